@@ -1,0 +1,1 @@
+"""Estimation of the tyre-road peak adhesion coefficient from dynamics and camera."""

@@ -1,0 +1,1 @@
+"""The camera side: what the pictures say of the road ahead."""
