@@ -1,0 +1,176 @@
+"""The two networks behind the camera side: road and shadow masks, surface of patches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+import numpy as np
+import onnxruntime as ort
+from numpy.typing import NDArray
+from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
+
+from .classes import Surface
+from .regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
+
+MASK_WIDTH_PX = 256
+MASK_HEIGHT_PX = 160
+
+_LOAD_ERRORS = (
+    ort_errors.Fail,
+    ort_errors.InvalidArgument,
+    ort_errors.InvalidGraph,
+    ort_errors.InvalidProtobuf,
+    ort_errors.NoSuchFile,
+    ort_errors.NotImplemented,
+    ort_errors.RuntimeException,
+)
+_CLASS_LIST = ",".join(surface.label for surface in Surface)
+
+
+class ModelError(ValueError):
+    """A network file that cannot be used; the text names the file and what was expected."""
+
+
+@dataclass(frozen=True)
+class RoadMasks:
+    """Probabilities over the whole picture at the network's resolution, both of shape (160, 256) [-]."""
+
+    drivable: NDArray[np.float32]
+    shadow: NDArray[np.float32]
+
+
+class RoadSegmenter(Protocol):
+    """Finds drivable road and shadow in a picture."""
+
+    def segment(self, image: NDArray[np.uint8]) -> RoadMasks:
+        """Masks of a BGR picture of any size."""
+        ...
+
+
+class PatchClassifier(Protocol):
+    """Tells the surface of road patches."""
+
+    @property
+    def temperature(self) -> float:
+        """T of the temperature scaling [-]."""
+        ...
+
+    def logits(self, patches: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Logits of BGR patches (n, 64, 96, 3), shape (n, 3)."""
+        ...
+
+
+def calibrated_probabilities(logits: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
+    """Softmax of the logits over the temperature T, shape (n, 3) [-] (section 3.1)."""
+    scaled = logits / temperature
+    raised = np.exp(scaled - scaled.max(axis=1, keepdims=True))
+    return raised / raised.sum(axis=1, keepdims=True)
+
+
+class Segmenter:
+    """The multi-task network for drivable road and shadow (section 3.1)."""
+
+    def __init__(self, path: str | Path, threads: int = 2) -> None:
+        """Load and check the file; raises ModelError."""
+        self._session = _load(path, threads)
+        _check_input(self._session, path, "image", [1, MASK_HEIGHT_PX, MASK_WIDTH_PX, 3])
+        _check_outputs(self._session, path, ("drivable", "shadow"))
+
+    def segment(self, image: NDArray[np.uint8]) -> RoadMasks:
+        """Masks of a BGR picture of any size, reduced by area averaging."""
+        small = cv2.resize(image, (MASK_WIDTH_PX, MASK_HEIGHT_PX), interpolation=cv2.INTER_AREA)
+        drivable, shadow = self._session.run(["drivable", "shadow"], {"image": small[None]})
+        shape = (MASK_HEIGHT_PX, MASK_WIDTH_PX)
+        return RoadMasks(drivable.reshape(shape), shadow.reshape(shape))
+
+
+class SurfaceClassifier:
+    """The patch classifier for dry, wet, snow and ice, with its calibration (section 3.1)."""
+
+    def __init__(self, path: str | Path, threads: int = 2) -> None:
+        """Load and check the file; raises ModelError."""
+        self._session = _load(path, threads)
+        self._path = path
+        _check_input(self._session, path, "patches", [None, PATCH_HEIGHT_PX, PATCH_WIDTH_PX, 3])
+        _check_outputs(self._session, path, ("logits",))
+        self._temperature = _read_temperature(self._session, path)
+
+    @property
+    def temperature(self) -> float:
+        """T of the temperature scaling [-]."""
+        return self._temperature
+
+    def logits(self, patches: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Logits of BGR patches (n, 64, 96, 3) in one run, shape (n, 3); raises ModelError if they are not finite."""
+        (logits,) = self._session.run(["logits"], {"patches": patches})
+        if logits.shape != (len(patches), len(Surface)) or not np.isfinite(logits).all():
+            raise ModelError(
+                f"{self._path}: expected finite logits of shape {(len(patches), len(Surface))}, got shape "
+                f"{logits.shape}. Export or train the network again."
+            )
+        return logits.astype(np.float64)
+
+
+def _load(path: str | Path, threads: int) -> ort.InferenceSession:
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    # Idle threads must not spin: the host simulation needs the cores between two frames.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.log_severity_level = 3
+    if not Path(path).is_file():
+        raise ModelError(
+            f"{path}: no such network file. Expected an ONNX file; train it or correct the path."
+        )
+    try:
+        return ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except _LOAD_ERRORS as error:
+        raise ModelError(
+            f"{path}: not an ONNX network that this version of onnxruntime runs: {error}"
+        ) from error
+
+
+def _check_input(session: ort.InferenceSession, path: str | Path, name: str, shape: list[int | None]) -> None:
+    wanted = f"one input '{name}' of type tensor(uint8) and shape {['n' if n is None else n for n in shape]}"
+    inputs = session.get_inputs()
+    found = ", ".join(f"'{i.name}' {i.type} {i.shape}" for i in inputs)
+    fits = (
+        len(inputs) == 1
+        and inputs[0].name == name
+        and inputs[0].type == "tensor(uint8)"
+        and len(inputs[0].shape) == len(shape)
+        and all(
+            not isinstance(got, int) if want is None else got == want
+            for got, want in zip(inputs[0].shape, shape, strict=True)
+        )
+    )
+    if not fits:
+        raise ModelError(f"{path}: expected {wanted}; found {found}. Is it the other network's file?")
+
+
+def _check_outputs(session: ort.InferenceSession, path: str | Path, names: tuple[str, ...]) -> None:
+    found = {output.name: output.type for output in session.get_outputs()}
+    if any(found.get(name) != "tensor(float)" for name in names):
+        raise ModelError(f"{path}: expected outputs {list(names)} of type tensor(float); found {found}.")
+
+
+def _read_temperature(session: ort.InferenceSession, path: str | Path) -> float:
+    metadata = session.get_modelmeta().custom_metadata_map
+    text, classes = metadata.get("temperature"), metadata.get("classes")
+    try:
+        temperature = float(text) if text is not None else np.nan
+    except ValueError:
+        temperature = np.nan
+    problems = []
+    if not (np.isfinite(temperature) and temperature > 0.0):
+        problems.append(f"'temperature' must be a decimal number above 0, is {text!r}")
+    if classes != _CLASS_LIST:
+        problems.append(f"'classes' must be {_CLASS_LIST!r}, is {classes!r}")
+    if problems:
+        raise ModelError(
+            f"{path}: wrong metadata: {'; '.join(problems)}. Export the network with its calibration."
+        )
+    return temperature

@@ -1,0 +1,221 @@
+"""Which patches of road are looked at: grid corners in the ellipses, shadow removal, sampling, cutting (Figure 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import Camera
+from .trajectory import CHI_SQUARE_95_2DOF, Ellipses
+
+PATCH_WIDTH_PX = 96
+PATCH_HEIGHT_PX = 64
+LEAST_ROI_WIDTH_PX = 48
+"""Narrower regions hold too little texture; they are widened to this [px]."""
+
+ROI_ASPECT = PATCH_WIDTH_PX / PATCH_HEIGHT_PX
+_PROBE_M = 0.1
+
+
+@dataclass(frozen=True)
+class Corners:
+    """The grid corners of one group that lie in the picture.
+
+    Attributes
+    ----------
+    ground_m, pixel : array, shape (n, 2)
+        Place on the road [m] and in the picture [px].
+    usable : array of bool, shape (n,)
+        On drivable road, out of the shadow.
+    """
+
+    ground_m: NDArray[np.float64]
+    pixel: NDArray[np.float64]
+    usable: NDArray[np.bool_]
+
+    @property
+    def n_ell(self) -> int:
+        """Corners of the group that the picture shows."""
+        return len(self.usable)
+
+    @property
+    def n_rs(self) -> int:
+        """Corners of the group that are of no use: shadowed, or not drivable."""
+        return self.n_ell - int(np.count_nonzero(self.usable))
+
+    @property
+    def p_util(self) -> float:
+        """Share of the group that can be used, 1 - n_rs / n_ell [-]; 0 if the picture shows none of it."""
+        return 1.0 - self.n_rs / self.n_ell if self.n_ell else 0.0
+
+
+def corners_in_ellipses(groups: Sequence[Ellipses], grid_m: float) -> NDArray[np.float64]:
+    """Corners of a ground grid inside any of the ellipses, each once.
+
+    Parameters
+    ----------
+    groups : sequence of Ellipses
+        Ellipses of one range, of one wheel or of both.
+    grid_m : float
+        Grid size a [m]; the grid is anchored at the origin.
+
+    Returns
+    -------
+    array, shape (n, 2)
+        x and y, ordered along x [m].
+    """
+    centres = np.concatenate([group.centre_m for group in groups])
+    covariances = np.concatenate([group.covariance_m2 for group in groups])
+    if not len(centres):
+        return np.empty((0, 2))
+    reach = np.sqrt(CHI_SQUARE_95_2DOF * np.stack((covariances[:, 0, 0], covariances[:, 1, 1]), axis=1))
+    first = np.ceil((centres - reach) / grid_m).astype(np.int64)
+    last = np.floor((centres + reach) / grid_m).astype(np.int64)
+    origin = first.min(axis=0)
+    inside = np.zeros(last.max(axis=0) - origin + 1, dtype=np.bool_)
+    for centre, inverse, low, high in zip(centres, np.linalg.inv(covariances), first, last, strict=True):
+        dx = np.arange(low[0], high[0] + 1)[:, None] * grid_m - centre[0]
+        dy = np.arange(low[1], high[1] + 1)[None, :] * grid_m - centre[1]
+        squared = inverse[0, 0] * dx * dx + 2.0 * inverse[0, 1] * dx * dy + inverse[1, 1] * dy * dy
+        window = np.s_[
+            low[0] - origin[0] : high[0] - origin[0] + 1, low[1] - origin[1] : high[1] - origin[1] + 1
+        ]
+        inside[window] |= squared <= CHI_SQUARE_95_2DOF
+    return (np.argwhere(inside) + origin) * grid_m
+
+
+def corners_in_strip(from_m: float, to_m: float, half_width_m: float, grid_m: float) -> NDArray[np.float64]:
+    """Corners of a ground grid across the whole road ahead, shape (n, 2) [m]: no trajectory, for comparison."""
+    x = np.arange(np.ceil(from_m / grid_m), np.ceil(to_m / grid_m)) * grid_m
+    y = np.arange(-np.floor(half_width_m / grid_m), np.floor(half_width_m / grid_m) + 1) * grid_m
+    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def project(points_m: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+    """Pixels of ground points, shape (n, 2), by H_cv of Eq. (6) where the lens does not distort."""
+    if any(camera.distortion):
+        return camera.ground_to_image(points_m)
+    H = camera.ground_homography
+    columns, rows, depth = H[:, :2] @ points_m.T + H[:, 2:]
+    depth = np.where(depth > 0.0, depth, np.nan)
+    return np.column_stack((columns / depth, rows / depth))
+
+
+def look_up(
+    mask: NDArray[np.bool_], pixels: NDArray[np.float64], width_px: int, height_px: int
+) -> NDArray[np.bool_]:
+    """Values of a reduced mask of the whole picture at pixels that lie in the picture, shape (n,)."""
+    rows, columns = mask.shape
+    column = ((pixels[:, 0] + 0.5) * (columns / width_px)).astype(np.intp)
+    row = ((pixels[:, 1] + 0.5) * (rows / height_px)).astype(np.intp)
+    return mask[np.minimum(row, rows - 1), np.minimum(column, columns - 1)]
+
+
+def classify_corners(ground_m: NDArray[np.float64], camera: Camera, usable: NDArray[np.bool_]) -> Corners:
+    """Corners that the picture shows, with their use.
+
+    Parameters
+    ----------
+    ground_m : array, shape (n, 2)
+        Grid corners [m]; those outside the picture are not counted.
+    camera : Camera
+        Of the picture's own size.
+    usable : array of bool
+        Drivable and out of the shadow, over the whole picture at any resolution. Figure 8 counts shadowed
+        corners only, since its mask is already the drivable area; what is not drivable here is counted as of
+        no use too.
+    """
+    pixel = project(ground_m, camera)
+    with np.errstate(invalid="ignore"):
+        shown = (
+            (pixel[:, 0] >= -0.5)
+            & (pixel[:, 0] < camera.width_px - 0.5)
+            & (pixel[:, 1] >= -0.5)
+            & (pixel[:, 1] < camera.height_px - 0.5)
+        )
+    pixel = pixel[shown]
+    return Corners(ground_m[shown], pixel, look_up(usable, pixel, camera.width_px, camera.height_px))
+
+
+def sample(corners: Corners, b: int, key: Sequence[int]) -> NDArray[np.intp]:
+    """Indices of up to b usable corners, drawn without replacement, repeatable by key; none if n_ell - n_rs <= 1."""
+    candidates = np.flatnonzero(corners.usable)
+    if len(candidates) <= 1:
+        return np.empty(0, dtype=np.intp)
+    return np.random.default_rng(list(key)).choice(candidates, min(b, len(candidates)), replace=False)
+
+
+def roi_widths_px(camera: Camera, ground_m: NDArray[np.float64], roi_width_m: float) -> NDArray[np.float64]:
+    """Widths of the regions around ground points, shape (n,) [px]: see `roi_width_px`."""
+    step = np.array([0.0, _PROBE_M / 2.0])
+    left, right = camera.ground_to_image(ground_m + step), camera.ground_to_image(ground_m - step)
+    return np.maximum(np.hypot(*(right - left).T) * (roi_width_m / _PROBE_M), LEAST_ROI_WIDTH_PX)
+
+
+def roi_width_px(
+    camera: Camera, ground_point_m: NDArray[np.float64] | Sequence[float], roi_width_m: float
+) -> float:
+    """Width in the picture of a stretch across the road at a ground point.
+
+    Parameters
+    ----------
+    camera : Camera
+        Of the picture's own size.
+    ground_point_m : array, shape (2,)
+        x and y in vehicle axes [m].
+    roi_width_m : float
+        Width on the road [m].
+
+    Returns
+    -------
+    float
+        Width, at least `LEAST_ROI_WIDTH_PX`; NaN if the point is not ahead of the lens [px].
+    """
+    point = np.asarray(ground_point_m, dtype=np.float64).reshape(1, 2)
+    return float(roi_widths_px(camera, point, roi_width_m)[0])
+
+
+def roi_box(
+    picture_width_px: int,
+    picture_height_px: int,
+    centre_px: Sequence[float] | NDArray[np.float64],
+    width_px: float,
+) -> tuple[int, int, int, int]:
+    """Left, top, right, bottom of a region of aspect 3:2 around a pixel, shifted to lie inside the picture [px]."""
+    width = max(float(width_px), float(LEAST_ROI_WIDTH_PX))
+    width = min(width, picture_width_px, picture_height_px * ROI_ASPECT)
+    columns, rows = round(width), min(round(width / ROI_ASPECT), picture_height_px)
+    left = round(float(centre_px[0]) + 0.5 - columns / 2.0)
+    top = round(float(centre_px[1]) + 0.5 - rows / 2.0)
+    left = min(max(left, 0), picture_width_px - columns)
+    top = min(max(top, 0), picture_height_px - rows)
+    return left, top, left + columns, top + rows
+
+
+def cut_patch(
+    image: NDArray[np.uint8], centre_px: Sequence[float] | NDArray[np.float64], width_px: float
+) -> NDArray[np.uint8]:
+    """The patch that the surface network looks at.
+
+    Parameters
+    ----------
+    image : array of uint8, shape (height, width, 3)
+        The picture, BGR.
+    centre_px : array, shape (2,)
+        Column and row of the region's centre [px].
+    width_px : float
+        Width of the region [px]: see `roi_width_px`.
+
+    Returns
+    -------
+    array of uint8, shape (64, 96, 3)
+        The region of aspect 3:2, shifted to lie inside the picture, reduced by area averaging.
+    """
+    left, top, right, bottom = roi_box(image.shape[1], image.shape[0], centre_px, width_px)
+    return cv2.resize(
+        image[top:bottom, left:right], (PATCH_WIDTH_PX, PATCH_HEIGHT_PX), interpolation=cv2.INTER_AREA
+    )
