@@ -1,0 +1,1 @@
+"""Rendered road pictures with exact labels, camera files and picture disturbances."""

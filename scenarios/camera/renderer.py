@@ -1,0 +1,295 @@
+"""Draws the road ahead through the camera geometry, with exact labels for every pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trpac_core.vision.camera import Camera
+from trpac_core.vision.classes import Surface
+
+from .decals import decal_map
+from .scene import RenderedFrame, SceneLook, SurfaceSegment
+from .shading import TONE_RANGE, TONE_STEPS_PER_UNIT, Look, Maps, Pixels, shade
+from .sky import AZIMUTH_RAD, LOWEST_RAD, build_panorama
+from .textures import fine_texture, macro_texture
+
+PROFILE_STEP_M = 0.02
+WATER_INDEX = 1.33
+FINEST_SKY_PX_RAD = 0.0009
+METERED_M = (5.0, 40.0)
+"""The stretch of road ahead on which the automatic exposure looks [m]."""
+GREY = 0.20
+"""Light that automatic exposure brings to mid grey, relative to white open ground [-]."""
+
+_VERGES = {
+    "grass": ((0.035, 0.13, 0.085), 0.9),
+    "dry_grass": ((0.11, 0.21, 0.26), 0.8),
+    "soil": ((0.08, 0.12, 0.17), 0.6),
+    "gravel": ((0.19, 0.21, 0.23), 0.7),
+}
+
+
+class Renderer:
+    """Pictures of one fixed world: the same road place looks the same from wherever it is seen.
+
+    Parameters
+    ----------
+    camera : Camera
+        Geometry and size of the picture.
+    segments : sequence of SurfaceSegment
+        Ascending starts [m]; the first surface also holds before its start.
+    look : SceneLook
+        Everything else; two renderers of one look draw the same world.
+
+    Raises
+    ------
+    ValueError
+        When there are no segments or their starts do not ascend.
+    """
+
+    def __init__(self, camera: Camera, segments: Sequence[SurfaceSegment], look: SceneLook) -> None:
+        starts = [segment.start_m for segment in segments]
+        if not starts or any(b <= a for a, b in zip(starts, starts[1:], strict=False)):
+            raise ValueError(
+                f"segments: starts {starts} m; expected at least one, each beyond the one before"
+            )
+        self.camera, self.segments, self.look = camera, tuple(segments), look
+        self._build()
+
+    def __reduce__(self) -> tuple:
+        return Renderer, (self.camera, self.segments, self.look)
+
+    def _build(self) -> None:
+        look, camera = self.look, self.camera
+        self._pixels = _pixels(camera)
+        sky = build_panorama(look, max(FINEST_SKY_PX_RAD, 1.0 / camera.fx_px))
+        macro, fine, decal = macro_texture(), fine_texture(), decal_map(look)
+        self._maps = Maps(
+            macro=macro.texels,
+            macro_at=macro.offsets,
+            fine=fine.texels,
+            fine_at=fine.offsets,
+            decal=decal.texels,
+            decal_at=decal.offsets,
+            sharp=sky.sharp,
+            rough=sky.rough,
+            tone=_tone_table(look.contrast),
+            lines=_lines(look),
+            profile=_profile(look),
+            starts=np.array([segment.start_m for segment in self.segments]),
+            surfaces=np.array([int(segment.surface) for segment in self.segments], dtype=np.int8),
+        )
+        self._scales = (AZIMUTH_RAD, LOWEST_RAD, sky.sharp_px_rad, sky.rough_px_rad)
+        horizon = sky.sharp[int((0.05 - LOWEST_RAD) / sky.sharp_px_rad)].mean(axis=0)
+        self._look = _loop_look(look, horizon)
+        self._sky_mean = float(sky.mean.mean())
+
+    def frame(
+        self, front_axle_position_m: float, lateral_m: float = 0.0, heading_rad: float = 0.0
+    ) -> RenderedFrame:
+        """The picture and labels from one place on the road.
+
+        Parameters
+        ----------
+        front_axle_position_m : float
+            Road coordinate of the front axle's centre [m].
+        lateral_m : float
+            Its distance to the left of the own lane's middle [m].
+        heading_rad : float
+            Vehicle heading against the road, left positive [rad].
+        """
+        size = (self.camera.height_px, self.camera.width_px)
+        image = np.empty((*size, 3), dtype=np.uint8)
+        drivable, shadow = np.empty(size, dtype=np.bool_), np.empty(size, dtype=np.bool_)
+        surface = np.empty(size, dtype=np.int8)
+        shade(
+            self._pixels,
+            self._maps,
+            self._look,
+            self._scales,
+            float(front_axle_position_m),
+            float(lateral_m),
+            float(heading_rad),
+            self._gains(front_axle_position_m),
+            image,
+            drivable,
+            shadow,
+            surface,
+        )
+        return RenderedFrame(image, drivable, shadow, surface)
+
+    def surface_at(self, position_m: float) -> Surface:
+        """Surface at a road coordinate [m]."""
+        index = int(np.searchsorted(self._maps.starts, position_m, side="right")) - 1
+        return self.segments[max(index, 0)].surface
+
+    def _gains(self, position_m: float) -> NDArray[np.float32]:
+        """Exposure times white balance, in steps of the tone table per unit of light."""
+        look = self.look
+        brightness = {
+            Surface.DRY: look.asphalt_albedo,
+            Surface.WET: 0.5 * look.asphalt_albedo * look.wet_darkening + 0.08,
+            Surface.SNOW_ICE: look.snow_albedo * (1 - 0.5 * look.snow_dirt) * min(1.0, look.snow_cover),
+        }
+        ahead = np.linspace(*METERED_M, 36) + position_m
+        road = float(np.mean([brightness[self.surface_at(place)] for place in ahead]))
+        metered = 0.6 * road + 0.4 * max(0.12, 0.5 * self._sky_mean)
+        exposure = 2.0**look.exposure_ev * (GREY / 0.25) * (0.25 / metered) ** look.auto_exposure
+        return (exposure * TONE_STEPS_PER_UNIT * np.array(look.white_balance)).astype(np.float32)
+
+
+@lru_cache(maxsize=3)
+def _pixels(camera: Camera) -> Pixels:
+    """Where each pixel of a camera meets the ground, how large it is there, and where it looks."""
+    height, width = camera.height_px, camera.width_px
+    grid = (
+        np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2).astype(np.float64)
+    )
+    ground = camera.image_to_ground(grid).reshape(height, width, 2)
+    x, y = ground[..., 0], ground[..., 1]
+    behind = (x < camera.x_from_front_axle_m) | (x > 5000.0)
+    x[behind], y[behind] = np.nan, np.nan
+    azimuth, elevation = _directions(camera, grid, (height, width))
+    foot_x = np.maximum(np.abs(np.gradient(x, axis=0)), np.abs(np.gradient(x, axis=1)))
+    foot_y = np.maximum(np.abs(np.gradient(y, axis=0)), np.abs(np.gradient(y, axis=1)))
+    dither = np.random.default_rng(7).uniform(-0.5, 0.5, (2, height, width))
+    away = np.hypot(x - camera.position_m[0], y - camera.position_m[1])
+    cosine = camera.height_m / np.hypot(away, camera.height_m)
+    level_x = np.nan_to_num(np.log2(np.maximum(foot_x, 1e-4)), nan=8.0) + 0.7 * dither[0]
+    level_y = np.nan_to_num(np.log2(np.maximum(foot_y, 1e-4)), nan=4.0) + 0.7 * dither[1]
+    arrays = (
+        x,
+        y,
+        level_x,
+        level_y,
+        azimuth,
+        elevation,
+        fresnel_reflectance(cosine),
+        np.nan_to_num(away, nan=-1.0),
+    )
+    return Pixels(*(np.ascontiguousarray(np.nan_to_num(array), dtype=np.float32) for array in arrays))
+
+
+def _directions(
+    camera: Camera, grid: NDArray[np.float64], shape: tuple[int, int]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Azimuth (left positive) and elevation of every pixel's ray against the level road [rad]."""
+    import cv2
+
+    undistorted = cv2.undistortPoints(grid.reshape(-1, 1, 2), camera.matrix, np.array(camera.distortion))
+    rays = np.ones((len(grid), 3))
+    rays[:, :2] = undistorted.reshape(-1, 2)
+    rays = rays @ camera.rotation
+    azimuth = np.arctan2(rays[:, 1], rays[:, 0])
+    elevation = np.arctan2(rays[:, 2], np.hypot(rays[:, 0], rays[:, 1]))
+    return azimuth.reshape(shape), elevation.reshape(shape)
+
+
+def fresnel_reflectance(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of light that smooth water mirrors at an angle of incidence, Schlick's formula (1994) [-]."""
+    at_right_angle = ((WATER_INDEX - 1.0) / (WATER_INDEX + 1.0)) ** 2
+    return at_right_angle + (1.0 - at_right_angle) * (1.0 - cosine) ** 5
+
+
+def _tone_table(contrast: float) -> NDArray[np.uint8]:
+    """Linear light to display bytes: sRGB curve, soft shoulder, contrast about mid grey."""
+    light = np.arange(int(TONE_STEPS_PER_UNIT * TONE_RANGE)) / TONE_STEPS_PER_UNIT
+    shoulder = np.where(light < 0.6, light, 0.6 + 0.4 * np.tanh((light - 0.6) / 0.4 * 0.8))
+    display = np.where(shoulder < 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)
+    display = 0.45 + contrast * (display - 0.45)
+    return np.clip(255.0 * display + 0.5, 0, 255).astype(np.uint8)
+
+
+def _lines(look: SceneLook) -> NDArray[np.float64]:
+    """Markings: lateral middle, width, period (0 is unbroken), painted length, phase [m]."""
+    rng = np.random.default_rng([look.seed, 31])
+    right, left = look.road_edges_m
+    width = look.marking_width_m
+    dash = float(rng.choice([1.0, 3.0, 4.0, 6.0]))
+    period = dash * float(rng.choice([2.0, 3.0, 4.0]))
+    phase = rng.uniform(0, period)
+    rows: list[tuple[float, float, float, float, float]] = []
+    if look.edge_lines:
+        rows += [
+            (right + look.shoulder_m, width, 0.0, 0.0, 0.0),
+            (left - look.shoulder_m, width, 0.0, 0.0, 0.0),
+        ]
+    for boundary in range(1, look.lanes):
+        middle = right + look.shoulder_m + boundary * look.lane_width_m
+        if look.centre_line in ("dashed", "solid"):
+            rows.append((middle, width, period if look.centre_line == "dashed" else 0.0, dash, phase))
+        elif look.centre_line == "double":
+            rows += [(middle + side * width, width, 0.0, 0.0, 0.0) for side in (-1, 1)]
+    return np.array(rows, dtype=np.float64).reshape(-1, 5)
+
+
+def _profile(look: SceneLook) -> NDArray[np.float32]:
+    """Wheel tracks and the oil band between them, 0..1, over the lateral coordinate from the right edge."""
+    rng = np.random.default_rng([look.seed, 37])
+    right, left = look.road_edges_m
+    across = np.arange(right, left + 2 * PROFILE_STEP_M, PROFILE_STEP_M)
+    track, oil = np.zeros_like(across), np.zeros_like(across)
+    sharpness = rng.uniform(0.12, 0.32)
+    for lane in range(look.lanes):
+        middle = (lane - look.own_lane) * look.lane_width_m + rng.normal(0.0, 0.15)
+        for side in (-0.75, 0.75):
+            flat = np.maximum(np.abs(across - middle - side) - 0.12, 0.0)
+            track = np.maximum(track, np.exp(-0.5 * (flat / sharpness) ** 2))
+        oil = np.maximum(oil, np.exp(-0.5 * ((across - middle) / 0.35) ** 2))
+    return np.column_stack((track, oil)).astype(np.float32)
+
+
+def _loop_look(look: SceneLook, horizon: NDArray[np.float32]) -> Look:
+    rng = np.random.default_rng([look.seed, 41])
+    right, left = look.road_edges_m
+    warm = 0.12 * look.asphalt_warmth
+    asphalt = look.asphalt_albedo * np.array([1 - warm, 1.0, 1 + warm])
+    snow = look.snow_albedo * np.array([1 + 0.12 * look.snow_blue, 1.0, 1 - 0.12 * look.snow_blue])
+    paint = np.array([0.08, 0.4, 0.62]) if look.yellow_lines else np.array([0.66, 0.68, 0.68])
+    colour, verge_grain = _VERGES[look.verge]
+    verge = np.array(colour) * look.verge_tone
+    low = look.sky == "low_sun"
+    sun = look.sun_share * (np.array([0.62, 0.85, 1.12]) if low else np.array([0.9, 1.0, 1.06]))
+    fill_tint = np.array([1.22, 1.0, 0.86]) if look.sky in ("clear", "low_sun") else np.ones(3)
+    fill = (1.0 - look.sun_share) * fill_tint
+
+    def bgr(name: str, values: NDArray[np.float64]) -> dict[str, float]:
+        return {f"{name}_{channel}": float(value) for channel, value in zip("bgr", values, strict=True)}
+
+    return Look(
+        right=right,
+        left=left,
+        **bgr("asphalt", asphalt),
+        grain=look.grain,
+        stains=look.stains,
+        wheel_band=look.wheel_band,
+        oil_band=look.oil_band,
+        cracks=look.cracks,
+        wet_darkening=look.wet_darkening,
+        film=look.film,
+        puddles=look.puddles,
+        cover=look.snow_cover,
+        **bgr("snow", snow),
+        dirt=look.snow_dirt,
+        relief=look.snow_relief,
+        clearing=look.track_clearing,
+        ice_gloss=look.ice_gloss,
+        wear=look.marking_wear,
+        **bgr("paint", paint),
+        **bgr("verge", verge),
+        verge_grain=verge_grain,
+        verge_snow=look.verge_snow,
+        **bgr("sun", sun),
+        **bgr("fill", fill),
+        **bgr("haze", horizon),
+        visibility=look.visibility_m,
+        veil=look.veil,
+        macro_s=rng.uniform(0, 40),
+        macro_t=rng.uniform(0, 20),
+        fine_s=rng.uniform(0, 4),
+        fine_t=rng.uniform(0, 4),
+    )

@@ -1,0 +1,148 @@
+"""The surroundings at infinity: sky, sun glow, clouds, hills and a line of trees, as one panorama."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .scene import SceneLook
+
+Float = NDArray[np.float32]
+
+AZIMUTH_RAD = 1.0  # the panorama reaches this far to either side
+LOWEST_RAD, HIGHEST_RAD = -0.02, 0.62
+
+
+@dataclass(frozen=True)
+class Panorama:
+    """Linear BGR light by direction; rows go up from ``LOWEST_RAD``, columns left to right.
+
+    ``sharp`` is what the camera sees, ``rough`` what a wet road mirrors; both shape (rows, columns, 3),
+    relative to the light that white open ground sends back.
+    """
+
+    sharp: Float
+    rough: Float
+    sharp_px_rad: float
+    rough_px_rad: float
+    mean: Float
+
+
+def _clouds(rng: np.random.Generator, elevation: Float, columns: int) -> Float:
+    """Fractal noise, finer and flatter towards the horizon, values about 0..1."""
+    rows = len(elevation)
+    total = np.zeros((rows, columns), dtype=np.float32)
+    squeeze = 1.0 / (np.maximum(elevation, 0.0) + 0.12)
+    v = (squeeze * 9.0)[:, None].repeat(columns, axis=1).astype(np.float32)
+    u = (np.linspace(-1.0, 1.0, columns)[None, :] * squeeze[:, None] * 2.2).astype(np.float32)
+    size = 64
+    for octave in range(4):
+        noise = rng.random((size, size), dtype=np.float32)
+        scale = 2.0**octave
+        total += 0.55**octave * cv2.remap(
+            noise, (u * scale + 200) % (size - 1), (v * scale) % (size - 1), cv2.INTER_LINEAR
+        )
+    return total / 2.0
+
+
+def _ridge(rng: np.random.Generator, columns: int, roughness: float) -> Float:
+    """A periodic outline of heights, values about 0..1."""
+    frequency = np.arange(columns // 2 + 1, dtype=np.float64)
+    amplitude = np.where(frequency > 1.5, np.maximum(frequency, 1.0) ** -roughness, 0.0)
+    line = np.fft.irfft(amplitude * np.fft.rfft(rng.standard_normal(columns)), columns)
+    return (0.5 + 0.2 * line / line.std()).astype(np.float32)
+
+
+def build_panorama(look: SceneLook, px_rad: float) -> Panorama:
+    """The panorama of one look with pixels of ``px_rad`` [rad]."""
+    rng = np.random.default_rng([look.seed, 23])
+    columns = int(2 * AZIMUTH_RAD / px_rad)
+    rows = int((HIGHEST_RAD - LOWEST_RAD) / px_rad)
+    elevation = (LOWEST_RAD + (np.arange(rows) + 0.5) * px_rad).astype(np.float32)
+    azimuth = (AZIMUTH_RAD - (np.arange(columns) + 0.5) * px_rad).astype(np.float32)
+    light = _sky(look, rng, elevation, azimuth)
+    haze = light[int(0.06 / px_rad)].mean(axis=0)
+    _land(look, rng, light, elevation, haze)
+    rough_px_rad = max(px_rad, 0.006)
+    factor = px_rad / rough_px_rad
+    small = cv2.resize(light, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+    rough = cv2.GaussianBlur(small, (0, 0), sigmaX=2.5, sigmaY=14.0, borderType=cv2.BORDER_REPLICATE)
+    mean = light.mean(axis=(0, 1)).astype(np.float32)
+    return Panorama(light, rough, px_rad, HIGHEST_RAD / rough.shape[0] * 1.03, mean)
+
+
+def _sky(look: SceneLook, rng: np.random.Generator, elevation: Float, azimuth: Float) -> Float:
+    up = np.clip(elevation / HIGHEST_RAD, 0.0, 1.0)[:, None, None]
+    if look.sky == "overcast":
+        zenith, horizon = np.array([0.95, 0.93, 0.9]), np.array([0.72, 0.71, 0.7])
+    elif look.sky == "low_sun":
+        zenith, horizon = np.array([0.55, 0.42, 0.32]), np.array([0.55, 0.75, 1.0])
+    else:
+        zenith, horizon = np.array([0.62, 0.38, 0.2]), np.array([0.85, 0.75, 0.62])
+    tone = rng.uniform(0.7, 1.15)
+    light = (tone * (horizon + (zenith - horizon) * up**0.6)).astype(np.float32)
+    light = np.repeat(light, len(azimuth), axis=1)
+    if look.sky != "clear":
+        cover = {"broken": 0.5, "overcast": 0.0, "low_sun": 0.45}[look.sky]
+        field = _clouds(rng, elevation, len(azimuth))
+        share = np.clip((field - cover) * 4.0, 0.0, 1.0)[..., None]
+        if look.sky == "overcast":
+            share = share * 0.55
+        bright = look.cloud_tone * (0.55 + 0.5 * field[..., None]) * np.array([1.0, 0.99, 0.97])
+        light = light * (1 - share) + bright.astype(np.float32) * share
+    if look.sun_share > 0.0:
+        apart = np.arccos(
+            np.clip(
+                np.sin(elevation)[:, None] * np.sin(look.sun_elevation_rad)
+                + np.cos(elevation)[:, None]
+                * np.cos(look.sun_elevation_rad)
+                * np.cos(azimuth - look.sun_azimuth_rad)[None, :],
+                -1.0,
+                1.0,
+            )
+        )[..., None]
+        glow = 0.6 * np.exp(-apart / 0.25) + 3.0 * np.exp(-apart / 0.06)
+        light = light + look.sun_share * glow * np.array([0.75, 0.9, 1.0])
+    return light.astype(np.float32)
+
+
+def _land(look: SceneLook, rng: np.random.Generator, light: Float, elevation: Float, haze: Float) -> None:
+    columns = light.shape[1]
+    snow = min(look.verge_snow, 1.0)
+    rows = elevation[:, None]
+    if look.hills > 0.05:
+        outline = 0.08 * look.hills * _ridge(rng, columns, 1.4)[None, :]
+        base = np.array([0.14, 0.12, 0.09]) * look.verge_tone * (1 - 0.7 * snow) + 0.45 * snow
+        far = 0.35 * base + 0.65 * haze
+        light[rows < outline] = far.astype(np.float32)
+    if look.tree_line > 0.0:
+        tall = look.tree_line * 0.14
+        outline = (
+            tall
+            * (0.4 + 0.6 * _ridge(rng, columns, 0.75))
+            * np.clip(_ridge(rng, columns, 1.2) * 2.2, 0.15, 1)
+        )
+        middle = np.abs(np.linspace(-1, 1, columns))
+        outline = outline * np.clip(0.15 + 2.5 * middle, 0, 1)
+        inside = rows < outline[None, :]
+        leaf = cv2.resize(
+            rng.random((light.shape[0] // 3 + 1, columns // 3 + 1), dtype=np.float32),
+            (columns, light.shape[0]),
+        )
+        trunk = cv2.resize(rng.random((2, columns // 2), dtype=np.float32), (columns, light.shape[0]))
+        texture = 0.35 + 0.9 * leaf * (0.5 + 0.5 * trunk)
+        green = {
+            "grass": (0.035, 0.075, 0.05),
+            "dry_grass": (0.04, 0.075, 0.08),
+            "soil": (0.045, 0.06, 0.065),
+            "gravel": (0.05, 0.06, 0.06),
+        }[look.verge]
+        colour = texture[..., None] * np.array(green, dtype=np.float32) * look.verge_tone
+        white = np.clip(leaf * 2.2 - 1.35 + 0.5 * snow, 0, 1)[..., None] * snow * 0.55
+        colour = colour * (1 - white) + white * np.array([0.8, 0.76, 0.72], dtype=np.float32)
+        share = 1.0 - np.exp(-120.0 / look.visibility_m)
+        light[inside] = (colour * (1 - share) + haze * share)[inside]
+    light[elevation < 0] = light[np.searchsorted(elevation, 0.0)] * 0.8
