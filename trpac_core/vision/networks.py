@@ -104,7 +104,7 @@ class SurfaceClassifier:
         return self._temperature
 
     def logits(self, patches: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Logits of BGR patches (n, 64, 96, 3) in one run, shape (n, 3); raises ModelError if they are not finite."""
+        """Logits of BGR patches (n, 64, 96, 3) in one run, shape (n, 3); raises ModelError if not finite."""
         (logits,) = self._session.run(["logits"], {"patches": patches})
         if logits.shape != (len(patches), len(Surface)) or not np.isfinite(logits).all():
             raise ModelError(

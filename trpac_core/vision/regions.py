@@ -1,4 +1,4 @@
-"""Which patches of road are looked at: grid corners in the ellipses, shadow removal, sampling, cutting (Figure 8)."""
+"""Which patches of road are looked at: corners in the ellipses, shadow removal, sampling (Figure 8)."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def corners_in_ellipses(groups: Sequence[Ellipses], grid_m: float) -> NDArray[np
 
 
 def corners_in_strip(from_m: float, to_m: float, half_width_m: float, grid_m: float) -> NDArray[np.float64]:
-    """Corners of a ground grid across the whole road ahead, shape (n, 2) [m]: no trajectory, for comparison."""
+    """Corners of a ground grid across the whole road ahead, shape (n, 2) [m]: without a trajectory."""
     x = np.arange(np.ceil(from_m / grid_m), np.ceil(to_m / grid_m)) * grid_m
     y = np.arange(-np.floor(half_width_m / grid_m), np.floor(half_width_m / grid_m) + 1) * grid_m
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -142,7 +142,7 @@ def classify_corners(ground_m: NDArray[np.float64], camera: Camera, usable: NDAr
 
 
 def sample(corners: Corners, b: int, key: Sequence[int]) -> NDArray[np.intp]:
-    """Indices of up to b usable corners, drawn without replacement, repeatable by key; none if n_ell - n_rs <= 1."""
+    """Indices of up to b usable corners, no corner twice, repeatable by key; none if not two are left."""
     candidates = np.flatnonzero(corners.usable)
     if len(candidates) <= 1:
         return np.empty(0, dtype=np.intp)
@@ -185,7 +185,7 @@ def roi_box(
     centre_px: Sequence[float] | NDArray[np.float64],
     width_px: float,
 ) -> tuple[int, int, int, int]:
-    """Left, top, right, bottom of a region of aspect 3:2 around a pixel, shifted to lie inside the picture [px]."""
+    """Left, top, right, bottom of a 3:2 region around a pixel, shifted to lie inside the picture [px]."""
     width = max(float(width_px), float(LEAST_ROI_WIDTH_PX))
     width = min(width, picture_width_px, picture_height_px * ROI_ASPECT)
     columns, rows = round(width), min(round(width / ROI_ASPECT), picture_height_px)
@@ -216,6 +216,7 @@ def cut_patch(
         The region of aspect 3:2, shifted to lie inside the picture, reduced by area averaging.
     """
     left, top, right, bottom = roi_box(image.shape[1], image.shape[0], centre_px, width_px)
-    return cv2.resize(
-        image[top:bottom, left:right], (PATCH_WIDTH_PX, PATCH_HEIGHT_PX), interpolation=cv2.INTER_AREA
+    size = (PATCH_WIDTH_PX, PATCH_HEIGHT_PX)
+    return cv2.resize(image[top:bottom, left:right], size, interpolation=cv2.INTER_AREA).astype(
+        np.uint8, copy=False
     )

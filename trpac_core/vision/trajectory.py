@@ -24,7 +24,7 @@ towards standstill; and a yaw rate says nothing of the path of a car that stands
 """
 
 STEEPEST_CURVATURE_1_M = 0.4
-"""Curvature beyond which a measured yaw rate over speed is noise: a passenger car turns on 2.5 m at best [1/m]."""
+"""Curvature that no passenger car exceeds; a yaw rate over speed beyond it is noise [1/m]."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Motion:
             raise ValueError(f"Motion {values}: every value must be finite.")
         if abs(self.steering_angle_rad) >= np.pi / 2:
             raise ValueError(
-                f"Steering angle {self.steering_angle_rad:g} rad: expected the angle of the front wheels, within "
-                "+-pi/2 rad. Is it the hand wheel's, or in degrees?"
+                f"Steering angle {self.steering_angle_rad:g} rad: expected the angle of the front wheels, "
+                "within +-pi/2 rad. Is it the hand wheel's, or in degrees?"
             )
 
 

@@ -1,0 +1,348 @@
+"""The image-based fusion estimator (IFE): a picture and the car's motion in, surface and confidence out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import Camera
+from .classes import Surface
+from .evidence import EvidenceState, WeightLaw, basic_probability, combine, update_weights, visual_confidence
+from .images import ImageError
+from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
+from .regions import (
+    Corners,
+    classify_corners,
+    corners_in_ellipses,
+    corners_in_strip,
+    cut_patch,
+    roi_box,
+    roi_widths_px,
+    sample,
+)
+from .results import FrameResult, FrameView, GroupResult, GroupView
+from .trajectory import Ellipses, Motion, reckon
+
+GROUP_NAMES = ("near", "middle", "far")
+MASK_THRESHOLD = 0.5
+"""Probability above which a mask's cell counts as drivable, or as shadow [-]."""
+
+SIDES = {"left": (1.0,), "right": (-1.0,), "both": (1.0, -1.0)}
+"""Front wheels whose tracks are looked at, as the sign of their lateral position."""
+
+
+@dataclass(frozen=True)
+class IfeConfig:
+    """Settings of the estimator; the defaults are Table 3 and section 3 of the paper where it states them.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera file. Pictures of another size with the same shape scale it.
+    track_m, wheelbase_m : float
+        Of the vehicle [m].
+    side : {'left', 'right', 'both'}
+        Front wheels whose tracks are looked at.
+    ranges_m : tuple of 3 pairs
+        Ways of the wheel that the near, middle and far group cover; the first starts at the preview distance
+        [m].
+    a_m : float
+        Grid size a [m].
+    b : tuple of 3 ints
+        Patches per group.
+    roi_width_m : float
+        Width of road that a patch shows [m].
+    step_m : float
+        Distance between ellipses, and step of the covariance recursion [m].
+    k1, k2 : float
+        Growth of the track's uncertainty along and across [m/s]; k1 < k2.
+    start_deviation_m : float
+        Standard deviation of the wheel's place at the start: tyre width and mounting [m].
+    weight_law : WeightLaw
+        Parameters of the evidence weights.
+    flag_threshold : float
+        Q_v above which the flag is set [-].
+    seed : int
+        Of the drawing of patches.
+    use_trajectory, remove_shadow, calibrate, weight_evidence : bool
+        Each False leaves that part of the method out, to measure what it is worth: the whole drivable strip
+        ahead in place of the ellipses; shadow kept; T = 1; equal evidence weights in Eq. (8).
+    """
+
+    camera: Camera = field(default_factory=Camera)
+    track_m: float = 1.356
+    wheelbase_m: float = 2.305
+    side: Literal["left", "right", "both"] = "both"
+    ranges_m: tuple[tuple[float, float], ...] = ((2.5, 4.5), (4.5, 7.5), (7.5, 12.0))
+    a_m: float = 0.02
+    b: tuple[int, int, int] = (4, 6, 8)
+    roi_width_m: float = 1.2
+    step_m: float = 0.25
+    k1: float = 5e-5
+    k2: float = 2e-4
+    start_deviation_m: float = 0.08
+    strip_half_width_m: float = 4.0
+    weight_law: WeightLaw = field(default_factory=WeightLaw)
+    flag_threshold: float = 0.5
+    seed: int = 0
+    use_trajectory: bool = True
+    remove_shadow: bool = True
+    calibrate: bool = True
+    weight_evidence: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse settings that contradict themselves, all at once; raises ValueError."""
+        checks = {
+            f"side must be one of {list(SIDES)}, is {self.side!r}": self.side in SIDES,
+            "ranges_m and b must have three entries, near, middle and far": len(self.ranges_m)
+            == len(self.b)
+            == 3,
+            "each range must end beyond its start and start at 0 or beyond": all(
+                0.0 <= low < high for low, high in self.ranges_m
+            ),
+            "b must be at least 2 in each group, since one patch alone cannot be fused": min(self.b) >= 2,
+            "0 < k1 < k2 must hold, as in section 3.2": 0.0 < self.k1 < self.k2,
+            "track, wheelbase, a, patch width, step, start deviation and strip width must be above 0": min(
+                self.track_m,
+                self.wheelbase_m,
+                self.a_m,
+                self.roi_width_m,
+                self.step_m,
+                self.start_deviation_m,
+                self.strip_half_width_m,
+            )
+            > 0.0,
+            "sigma must lie in [0, 1]": 0.0 <= self.weight_law.sigma <= 1.0,
+            "seed must not be negative": self.seed >= 0,
+        }
+        problems = [text for text, good in checks.items() if not good]
+        if problems:
+            raise ValueError(f"Settings of the image estimator: {'; '.join(problems)}.")
+
+
+@dataclass(frozen=True)
+class IfeState:
+    """What the estimator remembers: evidence weights per group, and the number of frames seen."""
+
+    evidence: tuple[EvidenceState, ...] = (EvidenceState(),) * len(GROUP_NAMES)
+    frame_count: int = 0
+
+    def to_json(self) -> dict[str, Any]:
+        """The state as JSON-able values, exact."""
+        return {"weights": [list(group.weights) for group in self.evidence], "frame_count": self.frame_count}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> IfeState:
+        """The state that `to_json` wrote."""
+        evidence = tuple(EvidenceState((dry, wet, snow_ice)) for dry, wet, snow_ice in data["weights"])
+        return cls(evidence, int(data["frame_count"]))
+
+
+@dataclass(frozen=True)
+class _Region:
+    """One group before the classifier: its corners, and the patches drawn from them."""
+
+    corners: Corners
+    centres_px: NDArray[np.float64]
+    widths_px: NDArray[np.float64]
+    ellipses: tuple[Ellipses, ...]
+
+
+class Ife:
+    """The estimator with its networks; the state goes in and comes out, nothing is remembered inside."""
+
+    def __init__(self, config: IfeConfig, segmenter: RoadSegmenter, classifier: PatchClassifier) -> None:
+        self.config = config
+        self._segmenter = segmenter
+        self._classifier = classifier
+
+    def process(
+        self,
+        state: IfeState,
+        image: NDArray[np.uint8],
+        motion: Motion,
+        *,
+        masks: RoadMasks | None = None,
+        with_view: bool = False,
+    ) -> tuple[IfeState, FrameResult]:
+        """One frame.
+
+        Parameters
+        ----------
+        state : IfeState
+            After the frame before; `IfeState()` at first.
+        image : array of uint8, shape (height, width, 3)
+            The picture, BGR, of the camera's shape.
+        motion : Motion
+            Of the car when the picture was taken.
+        masks : RoadMasks, optional
+            Of this picture, where several estimators share it (left and right wheels).
+        with_view : bool
+            Whether the result also says where in the picture it looked.
+
+        Returns
+        -------
+        IfeState, FrameResult
+            The state after the frame, and its verdict.
+
+        Raises
+        ------
+        ImageError
+            If the picture is not 8-bit BGR or has another shape than the camera's.
+        """
+        camera = fit_camera(self.config.camera, image)
+        masks = self._segmenter.segment(image) if masks is None else masks
+        usable = usable_road(masks, self.config.remove_shadow)
+        tracks = self._tracks(motion) if self.config.use_trajectory else []
+        regions = [
+            self._region(index, state.frame_count, tracks, camera, masks, usable)
+            for index in range(len(GROUP_NAMES))
+        ]
+        evidence = self._classify(image, regions)
+        verdicts = [
+            self._fuse(index, state.evidence[index], region.corners, probabilities)
+            for index, (region, probabilities) in enumerate(zip(regions, evidence, strict=True))
+        ]
+        view = _view(camera, masks, usable, regions, evidence) if with_view else None
+        result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count, view)
+        return IfeState(tuple(weights for weights, _ in verdicts), state.frame_count + 1), result
+
+    def _region(
+        self,
+        index: int,
+        frame: int,
+        tracks: list[Ellipses],
+        camera: Camera,
+        masks: RoadMasks,
+        usable: NDArray[np.bool_],
+    ) -> _Region:
+        config = self.config
+        low, high = config.ranges_m[index]
+        ellipses = tuple(track.within(low, high) for track in tracks)
+        if config.use_trajectory:
+            corners = classify_corners(corners_in_ellipses(ellipses, config.a_m), camera, usable)
+        else:
+            ground = _strip(low, high, config.strip_half_width_m, config.a_m)
+            # Without ellipses the group is the drivable road: what lies beside it is no loss of usable area.
+            road = classify_corners(ground, camera, masks.drivable > MASK_THRESHOLD)
+            corners = classify_corners(road.ground_m[road.usable], camera, usable)
+        key = (config.seed, frame, index, list(SIDES).index(config.side))
+        drawn = sample(corners, config.b[index], key)
+        widths = roi_widths_px(camera, corners.ground_m[drawn], config.roi_width_m)
+        return _Region(corners, corners.pixel[drawn], widths, ellipses)
+
+    def _tracks(self, motion: Motion) -> list[Ellipses]:
+        config = self.config
+        return [
+            reckon(
+                motion,
+                wheelbase_m=config.wheelbase_m,
+                lateral_m=sign * config.track_m / 2.0,
+                horizon_m=max(high for _, high in config.ranges_m),
+                step_m=config.step_m,
+                k1=config.k1,
+                k2=config.k2,
+                start_deviation_m=config.start_deviation_m,
+            )
+            for sign in SIDES[config.side]
+        ]
+
+    def _classify(self, image: NDArray[np.uint8], regions: list[_Region]) -> list[NDArray[np.float64]]:
+        """Calibrated probabilities of the patches of each group, all in one run of the network."""
+        patches = [
+            cut_patch(image, centre, width)
+            for region in regions
+            for centre, width in zip(region.centres_px, region.widths_px, strict=True)
+        ]
+        if not patches:
+            return [np.empty((0, len(Surface)))] * len(regions)
+        temperature = self._classifier.temperature if self.config.calibrate else 1.0
+        probabilities = calibrated_probabilities(self._classifier.logits(np.stack(patches)), temperature)
+        ends = np.cumsum([len(region.widths_px) for region in regions])
+        return np.split(probabilities, ends[:-1])
+
+    def _fuse(
+        self, index: int, before: EvidenceState, corners: Corners, probabilities: NDArray[np.float64]
+    ) -> tuple[EvidenceState, GroupResult]:
+        """Evidence weights and verdict of one group, Eqs. (7) to (10)."""
+        config = self.config
+        n_roi = len(probabilities)
+        if n_roi > 1:
+            after = update_weights(before, probabilities.argmax(axis=1), config.weight_law)
+            weights = after.weights if config.weight_evidence else EvidenceState().weights
+            fused = combine(basic_probability(probabilities, weights), n_roi)
+        else:
+            after, fused = before, np.array(before.weights)
+        surface = Surface(int(fused.argmax()))
+        Q_v = visual_confidence(corners.p_util, float(fused[surface]))
+        dry, wet, snow_ice = fused.tolist()
+        return after, GroupResult(
+            name=GROUP_NAMES[index],
+            range_m=config.ranges_m[index],
+            surface=surface,
+            probabilities=(dry, wet, snow_ice),
+            P_fusion=float(fused[surface]),
+            p_util=corners.p_util,
+            Q_v=Q_v,
+            flag=n_roi > 1 and Q_v > config.flag_threshold,
+            n_roi=n_roi,
+            n_ell=corners.n_ell,
+            n_rs=corners.n_rs,
+        )
+
+
+def fit_camera(camera: Camera, image: NDArray[np.uint8]) -> Camera:
+    """The camera at the picture's size; raises ImageError if the picture is not of the camera's shape."""
+    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+        raise ImageError(
+            f"Picture of shape {image.shape} and type {image.dtype}: expected (height, width, 3) of uint8."
+        )
+    height, width = image.shape[:2]
+    factor = width / camera.width_px
+    if abs(camera.height_px * factor - height) > 1.0:
+        raise ImageError(
+            f"Picture of {width} x {height} pixels: the camera file says {camera.width_px} x "
+            f"{camera.height_px}. Expected that size, or the same shape at another scale: do not crop, or "
+            "correct the camera file."
+        )
+    return camera if factor == 1.0 else _scaled(camera, factor)
+
+
+def usable_road(masks: RoadMasks, remove_shadow: bool) -> NDArray[np.bool_]:
+    """Drivable road out of the shadow, at the masks' resolution."""
+    drivable = masks.drivable > MASK_THRESHOLD
+    return drivable & ~(masks.shadow > MASK_THRESHOLD) if remove_shadow else drivable
+
+
+_scaled = lru_cache(maxsize=8)(Camera.scaled)
+_strip = lru_cache(maxsize=8)(corners_in_strip)
+
+
+def _view(
+    camera: Camera,
+    masks: RoadMasks,
+    usable: NDArray[np.bool_],
+    regions: list[_Region],
+    evidence: list[NDArray[np.float64]],
+) -> FrameView:
+    groups = []
+    for region, probabilities in zip(regions, evidence, strict=True):
+        outlines = [ellipses.outlines_m() for ellipses in region.ellipses]
+        stacked = np.concatenate(outlines) if outlines else np.empty((0, 32, 2))
+        boxes = [
+            roi_box(camera.width_px, camera.height_px, centre, width)
+            for centre, width in zip(region.centres_px, region.widths_px, strict=True)
+        ]
+        groups.append(
+            GroupView(
+                camera.ground_to_image(stacked.reshape(-1, 2)).reshape(stacked.shape),
+                np.array(boxes, dtype=np.int64).reshape(-1, 4),
+                probabilities,
+            )
+        )
+    return FrameView(masks, usable, tuple(groups))

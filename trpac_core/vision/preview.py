@@ -1,0 +1,153 @@
+"""From the road seen ahead to the road under the wheel: displacement stamps, Eq. (11).
+
+Positions are the front wheel's odometric coordinate X, the integral of the vehicle's speed [m].
+
+A frame taken at X = P_1 speaks of the road from X_lb = P_1 + P_0 on. Eq. (11) writes X_lb from the position
+P_2 when the frame has been processed, less the way driven meanwhile, which is the same place. X_ub lies one
+frame interval's way further, so that successive frames tile the road. Real frames come late or not at all, so
+the tiling is read as:
+
+* A stamp's length is the way driven since the frame before; for the first frame, speed times frame interval.
+* A result holds from its X_lb until the X_lb of the next frame, at most `hold_m` beyond its X_ub. The default
+is the
+  depth of the near group, the stretch of road that the result was taken from. Then there is a gap: no result.
+* Where several stamps cover a position, the newest frame wins. * Frames less than `resolution_m` apart share
+one stamp, with the newest result: a standing car does not pile up
+  stamps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from .classes import Surface
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a frame, or a classifier elsewhere on the bus, says of the road ahead."""
+
+    surface: Surface
+    confidence: float
+    Q_v: float
+    flag: bool
+    captured_s: float
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """One outcome and the stretch [X_lb, X_ub) of road that it applies to [m]."""
+
+    X_lb_m: float
+    X_ub_m: float
+    outcome: Outcome
+
+
+@dataclass(frozen=True)
+class PreviewConfig:
+    """Settings of the stamps.
+
+    Parameters
+    ----------
+    P_0_m : float
+        Preview distance from the front wheel to the near edge of what is classified [m].
+    hold_m : float
+        How far beyond its X_ub a result holds when no newer one begins [m].
+    resolution_m : float
+        Way below which two frames share a stamp [m].
+    behind_m : float
+        How far behind the front wheel stamps are kept: the wheelbase where rear wheels ask too [m].
+    """
+
+    P_0_m: float = 2.5
+    hold_m: float = 2.0
+    resolution_m: float = 0.02
+    behind_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse negative distances; raises ValueError."""
+        if min(self.P_0_m, self.hold_m, self.resolution_m, self.behind_m) < 0.0:
+            raise ValueError(f"Settings of the displacement stamps: no distance may be negative, got {self}.")
+
+
+@dataclass(frozen=True)
+class PreviewState:
+    """Stamps from the oldest frame to the newest, and where the newest was captured [m]."""
+
+    stamps: tuple[Stamp, ...] = ()
+    captured_at_m: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The state as JSON-able values, exact."""
+        return {
+            "captured_at_m": self.captured_at_m,
+            "stamps": [
+                [s.X_lb_m, s.X_ub_m, int(o.surface), o.confidence, o.Q_v, o.flag, o.captured_s]
+                for s in self.stamps
+                for o in (s.outcome,)
+            ],
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> PreviewState:
+        """The state that `to_json` wrote."""
+        stamps = tuple(
+            Stamp(X_lb, X_ub, Outcome(Surface(surface), confidence, Q_v, flag, captured_s))
+            for X_lb, X_ub, surface, confidence, Q_v, flag, captured_s in data["stamps"]
+        )
+        return cls(stamps, data["captured_at_m"])
+
+
+def add_frame(
+    state: PreviewState,
+    config: PreviewConfig,
+    outcome: Outcome,
+    *,
+    position_m: float,
+    speed_m_s: float,
+    frame_interval_s: float,
+) -> PreviewState:
+    """Stamp a frame's outcome, Eq. (11).
+
+    Parameters
+    ----------
+    state : PreviewState
+        Before the frame.
+    config : PreviewConfig
+        Settings.
+    outcome : Outcome
+        The frame's verdict.
+    position_m : float
+        P_1, the front wheel's coordinate when the picture was taken [m].
+    speed_m_s, frame_interval_s : float
+        Speed then and the camera's cycle time, for the length of a first stamp [m/s], [s].
+    """
+    X_lb = position_m + config.P_0_m
+    if state.captured_at_m is None:
+        length = max(0.0, speed_m_s * frame_interval_s)
+    else:
+        length = max(0.0, position_m - state.captured_at_m)
+    newest = Stamp(X_lb, X_lb + length, outcome)
+    kept = state.stamps
+    captured_at_m = position_m
+    if kept and 0.0 <= X_lb - kept[-1].X_lb_m < config.resolution_m:
+        newest = replace(kept[-1], X_ub_m=max(kept[-1].X_ub_m, newest.X_ub_m), outcome=outcome)
+        kept = kept[:-1]
+    return PreviewState((*kept, newest), captured_at_m)
+
+
+def covering(state: PreviewState, config: PreviewConfig, position_m: float) -> Outcome | None:
+    """Outcome for the road at a coordinate now, of the newest frame that covers it; None in a gap."""
+    for stamp in reversed(state.stamps):
+        if stamp.X_lb_m <= position_m < stamp.X_ub_m + config.hold_m:
+            return stamp.outcome
+    return None
+
+
+def prune(state: PreviewState, config: PreviewConfig, position_m: float) -> PreviewState:
+    """The state without the stamps that lie behind the wheels when the front wheel is at a coordinate."""
+    rear_m = position_m - config.behind_m
+    stamps = tuple(stamp for stamp in state.stamps if stamp.X_ub_m + config.hold_m > rear_m)
+    return state if len(stamps) == len(state.stamps) else replace(state, stamps=stamps)
