@@ -1,0 +1,190 @@
+"""The adhesion estimator with or without the camera: Eqs. (16) to (19) of Tian et al. 2022.
+
+One step serves the dynamics estimator DE (epsilon = 0) and the fusion DIFE alike, so they differ by the camera alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+from .observer import advanced_state, observed_force, settled_state
+from .slip import Slip
+from .tyre import force, friction_by_theta, theta_from_friction
+
+GREATEST_THETA = 1.2
+"""Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
+LEAST_THETA = 0.02
+"""Lower end: at 0 the tyre model has no force and the estimate could never leave it [-]."""
+LEAST_SENSITIVITY = 0.1
+"""Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
+nothing to invert [-]."""
+
+
+class VisualTerm(Enum):
+    """Where the visual term stands."""
+
+    INSIDE = 17
+    """Eq. (17): inside the bracket that gamma multiplies."""
+    OUTSIDE = 18
+    """Eq. (18): outside of it, the form that the paper gives with its cases."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of force observer and estimator.
+
+    K [1/s] is the force observer's bandwidth, gamma [1/s] the estimator's.
+    """
+
+    K: float = 60.0
+    gamma: float = 6.0
+    visual_term: VisualTerm = VisualTerm.OUTSIDE
+
+
+class WheelInputs(NamedTuple):
+    """What one wheel's estimator is given at a step."""
+
+    wheel_speed_rad_s: float
+    wheel_torque_nm: float
+    slip: Slip
+    load_n: float
+
+
+class Wheel(NamedTuple):
+    """The constants of the wheel: I [kg m^2], R [m], C_x [N]."""
+
+    inertia_kg_m2: float
+    radius_m: float
+    longitudinal_stiffness_n: float
+
+
+class FusionState(NamedTuple):
+    """Inner state: estimated adhesion [-] and the observer's s [rad/s^2]."""
+
+    theta_hat: float
+    s: float
+
+
+class FusionStep(NamedTuple):
+    """Outcome of one step."""
+
+    state: FusionState
+    tyre_force_n: float
+    """Observed force F_hat [N]."""
+    theta_tyre: float | None
+    """theta(lambda, F_hat), None where the tyre does not show theta [-]."""
+    sensitivity: float
+    """d mu / d theta there [-]; 0 where the tyre does not show theta."""
+
+
+def settled(theta_hat: float, inputs: WheelInputs, wheel: Wheel, gains: Gains) -> FusionState:
+    """State whose observed force balances the wheel torque, to start from."""
+    model = force(
+        theta_hat,
+        inputs.slip.size,
+        inputs.load_n,
+        wheel.longitudinal_stiffness_n,
+        inputs.slip.direction,
+    )
+    balanced = inputs.wheel_torque_nm / wheel.radius_m
+    s = settled_state(model, balanced, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
+    return FusionState(theta_hat, s)
+
+
+def visible_theta(
+    force_n: float, slip: Slip, load_n: float, longitudinal_stiffness_n: float
+) -> tuple[float | None, float]:
+    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
+    if slip.size == 0.0:
+        return None, 0.0
+    friction = force_n * slip.direction / load_n
+    theta = theta_from_friction(friction, slip.size, load_n, longitudinal_stiffness_n)
+    if theta is None:
+        return None, 0.0
+    sensitivity = friction_by_theta(theta, slip.size, load_n, longitudinal_stiffness_n)
+    if sensitivity < LEAST_SENSITIVITY:
+        return None, 0.0
+    return min(theta, GREATEST_THETA), sensitivity
+
+
+def fusion_step(
+    state: FusionState,
+    inputs: WheelInputs,
+    wheel: Wheel,
+    gains: Gains,
+    excited: bool,
+    theta_img: float | None,
+    K_v: float,
+    step_s: float,
+) -> FusionStep:
+    """One step of observer and estimator.
+
+    Where the tyre is not excited theta_hat holds and the observer keeps running. theta_img is None where
+    epsilon = 0. The estimator's equation is linear in theta_hat over a step and is solved exactly, so that it
+    is stable for any step size.
+
+    Parameters
+    ----------
+    state, inputs, wheel, gains
+        State now, inputs at the start of the step and constants.
+    excited : bool
+        Whether slip is above the excitation threshold.
+    theta_img, K_v : float or None, float
+        Adhesion of the class that the camera gives the road under the wheel [-], and its gain [-] in the
+        form (17), [1/s] in the form (18).
+    step_s : float
+        Step [s].
+    """
+    slip, load_n, C_x = inputs.slip, inputs.load_n, wheel.longitudinal_stiffness_n
+    model_n = force(state.theta_hat, slip.size, load_n, C_x, slip.direction) if slip.size else 0.0
+    F_hat = observed_force(
+        model_n, state.s, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m
+    )
+    theta_tyre, sensitivity = visible_theta(F_hat, slip, load_n, C_x)
+    theta_next = state.theta_hat
+    if excited:
+        theta_next = _driven(state.theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
+    by_theta_n = 0.0
+    if theta_next != state.theta_hat and slip.size:
+        by_theta_n = slip.direction * load_n * friction_by_theta(state.theta_hat, slip.size, load_n, C_x)
+    rate = (theta_next - state.theta_hat) / step_s if step_s > 0.0 else 0.0
+    s = advanced_state(
+        state.s,
+        model_n,
+        by_theta_n,
+        rate,
+        inputs.wheel_torque_nm,
+        inputs.wheel_speed_rad_s,
+        gains.K,
+        wheel.inertia_kg_m2,
+        wheel.radius_m,
+        step_s,
+    )
+    return FusionStep(FusionState(theta_next, s), F_hat, theta_tyre, sensitivity)
+
+
+def _driven(
+    theta_hat: float,
+    theta_tyre: float | None,
+    theta_img: float | None,
+    K_v: float,
+    gains: Gains,
+    step_s: float,
+) -> float:
+    """theta_hat one step later under Eq. (17) or (18), for the two targets held over the step."""
+    dynamic_rate = gains.gamma if theta_tyre is not None else 0.0
+    visual_rate = 0.0
+    if theta_img is not None:
+        visual_rate = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)
+    rate = dynamic_rate + visual_rate
+    if rate == 0.0:
+        return theta_hat
+    pull = (dynamic_rate * theta_tyre if theta_tyre is not None else 0.0) + (
+        visual_rate * theta_img if theta_img is not None else 0.0
+    )
+    target = pull / rate
+    moved = target + (theta_hat - target) * math.exp(-rate * step_s)
+    return min(max(moved, LEAST_THETA), GREATEST_THETA)

@@ -1,0 +1,88 @@
+"""Fuzzy scheduling of the excitation threshold and of the visual gain K_v, Table 2 of Tian et al. 2022.
+
+A cell of Table 2 names the threshold first and K_v second; the threshold's letter follows the row (theta_img) alone
+and K_v's the column (the difference) alone. With memberships that add up to 1, product inference and one value
+per output set, the table therefore falls apart into two interpolations, which is what is computed here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .tyre import onset_slip
+
+THRESHOLD_LIMIT = 0.06
+"""Upper end of the threshold's domain [-] (section 4.2)."""
+K_V_LIMIT = 3.0
+"""Upper end of K_v's domain [-] (section 4.2)."""
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Three fuzzy sets S, M, B that add up to 1: trapezoids given by where each is full.
+
+    S is full up to `small`, M at `medium`, B from `big` on; between them membership goes over linearly.
+    """
+
+    small: float
+    medium: float
+    big: float
+
+    def memberships(self, value: float) -> tuple[float, float, float]:
+        """Degrees of S, M and B, which add up to 1 [-]."""
+        if value <= self.small:
+            return 1.0, 0.0, 0.0
+        if value >= self.big:
+            return 0.0, 0.0, 1.0
+        if value <= self.medium:
+            share = (value - self.small) / (self.medium - self.small)
+            return 1.0 - share, share, 0.0
+        share = (value - self.medium) / (self.big - self.medium)
+        return 0.0, 1.0 - share, share
+
+    def blend(self, value: float, outputs: tuple[float, float, float]) -> float:
+        """Centre of gravity of three output values under the memberships."""
+        degrees = self.memberships(value)
+        return degrees[0] * outputs[0] + degrees[1] * outputs[1] + degrees[2] * outputs[2]
+
+
+@dataclass(frozen=True)
+class FuzzyScheduler:
+    """Where the fuzzy sets lie. The paper gives their domains and the table, not their place.
+
+    theta_img's sets are full at the class values 0.2, 0.6 and 0.8. A threshold set lies at the slip from which the
+    tyre at hand shows a road that is `class_scatter` more slippery than its class says, so that such a
+    road too is seen; below `slip_noise` nothing can be told from sensor noise. K_v's S set reaches over the
+    class value's own scatter, or that would pull the settled estimate away from the tyre's.
+    """
+
+    theta_sets: Partition = Partition(0.2, 0.6, 0.8)
+    difference_sets: Partition = Partition(0.15, 0.35, 0.6)
+    K_v_values: tuple[float, float, float] = (0.0, 1.5, 3.0)
+    class_scatter: float = 0.1
+    onset_sensitivity: float = 0.1
+    slip_noise: float = 0.006
+
+    def threshold(self, theta_img: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+        """Slip above which the estimator runs [-].
+
+        Parameters
+        ----------
+        theta_img : float
+            Adhesion that the camera gives the road, or the estimate itself where the camera gives none [-].
+        load_n, longitudinal_stiffness_n : float
+            Vertical load and longitudinal stiffness of the tyre at hand [N].
+        """
+        sets = self.theta_sets
+        visible = (
+            sets.small - self.class_scatter,
+            sets.medium - self.class_scatter,
+            sets.big - self.class_scatter,
+        )
+        theta = sets.blend(theta_img, visible)
+        slip = onset_slip(theta, load_n, longitudinal_stiffness_n, self.onset_sensitivity)
+        return min(max(slip, self.slip_noise), THRESHOLD_LIMIT)
+
+    def K_v(self, difference: float) -> float:
+        """Visual gain for a difference abs(theta_img - theta_hat) [-]."""
+        return self.difference_sets.blend(difference, self.K_v_values)

@@ -1,0 +1,86 @@
+"""Longitudinal force observer, Eqs. (14) and (15) of Tian et al. 2022 in the sign convention of Eq. (12).
+
+As printed the pair holds only for the opposite sign of the force, and Eq. (15) lacks F_z in its last term. With
+F_x > 0 driving the car it reads
+
+    F_hat = F_z mu(theta_hat, lambda) sigma - (I / R) (s + K omega)
+    s'    = -(K / I) (T - R F_hat) + (R / I) F_z (d mu / d theta) sigma theta_hat'
+
+so that at constant theta the error e = F_x - F_hat obeys
+e' = -K e + F_z [mu_lambda(theta) - mu_lambda(theta_hat)] lambda'. The tyre model gives the fast part of the force,
+the wheel's balance of torque the slow part, and K is the corner between them.
+"""
+
+from __future__ import annotations
+
+import math
+
+
+def observed_force(
+    model_force_n: float,
+    s: float,
+    wheel_speed_rad_s: float,
+    gain: float,
+    inertia_kg_m2: float,
+    radius_m: float,
+) -> float:
+    """Observed tyre force F_hat, Eq. (14). [N].
+
+    Parameters
+    ----------
+    model_force_n : float
+        Force of the tyre model at the estimated theta, F_z mu(theta_hat, lambda) sigma [N].
+    s : float
+        The observer's inner state [rad/s^2].
+    wheel_speed_rad_s, gain, inertia_kg_m2, radius_m : float
+        omega [rad/s], K [1/s], I [kg m^2], R [m].
+    """
+    return model_force_n - inertia_kg_m2 / radius_m * (s + gain * wheel_speed_rad_s)
+
+
+def settled_state(
+    model_force_n: float,
+    force_n: float,
+    wheel_speed_rad_s: float,
+    gain: float,
+    inertia_kg_m2: float,
+    radius_m: float,
+) -> float:
+    """The inner state s at which the observer gives a wanted force. [rad/s^2]."""
+    return (model_force_n - force_n) * radius_m / inertia_kg_m2 - gain * wheel_speed_rad_s
+
+
+def advanced_state(
+    s: float,
+    model_force_n: float,
+    force_by_theta_n: float,
+    theta_rate_1_s: float,
+    wheel_torque_nm: float,
+    wheel_speed_rad_s: float,
+    gain: float,
+    inertia_kg_m2: float,
+    radius_m: float,
+    step_s: float,
+) -> float:
+    """The inner state one step later, Eq. (15), exact for inputs held over the step. [rad/s^2].
+
+    With Eq. (14) put in, (15) is linear in s with the pole -K; its exact solution is stable for any step size.
+
+    Parameters
+    ----------
+    s : float
+        Inner state now [rad/s^2].
+    model_force_n, force_by_theta_n : float
+        F_z mu sigma and F_z (d mu / d theta) sigma at the estimated theta [N].
+    theta_rate_1_s : float
+        theta_hat' over the step [1/s].
+    wheel_torque_nm, wheel_speed_rad_s : float
+        Inputs at the start of the step [N m], [rad/s].
+    gain, inertia_kg_m2, radius_m, step_s : float
+        K [1/s], I [kg m^2], R [m] and the step [s].
+    """
+    drive = (
+        -gain * wheel_torque_nm + radius_m * (gain * model_force_n + force_by_theta_n * theta_rate_1_s)
+    ) / inertia_kg_m2 - gain * gain * wheel_speed_rad_s
+    decay = math.exp(-gain * step_s)
+    return s * decay + drive / gain * (1.0 - decay)

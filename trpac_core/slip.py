@@ -1,0 +1,51 @@
+"""Longitudinal slip of one wheel, Eq. (13) of Tian et al. 2022."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+GREATEST_SLIP = 0.999
+"""A locked or spinning wheel is kept this far from slip 1, where the tyre's slip ratio has its pole [-]."""
+
+
+class Slip(NamedTuple):
+    """Size and direction of a wheel's slip."""
+
+    size: float
+    """Unsigned slip lambda, between 0 and 1 [-]."""
+    direction: float
+    """+1 where the wheel drives, -1 where it brakes, 0 where it rolls freely or stands."""
+
+
+def wheel_slip(
+    wheel_speed_rad_s: float, vehicle_speed_m_s: float, wheel_radius_m: float, floor_m_s: float
+) -> Slip:
+    """Slip of a wheel that rolls forwards; at standstill there is none.
+
+    Parameters
+    ----------
+    wheel_speed_rad_s, vehicle_speed_m_s : float
+        Wheel speed [rad/s] and longitudinal speed of the car [m/s].
+    wheel_radius_m : float
+        Rolling radius [m].
+    floor_m_s : float
+        Below this speed of both wheel and car the quotient says nothing [m/s].
+
+    Returns
+    -------
+    Slip
+        Eq. (13) of Tian et al. (2022), doi:10.3390/rs14215583, with the sign kept apart.
+
+    Examples
+    --------
+    >>> wheel_slip(50.0, 14.0, 0.29, 1.0)
+    Slip(size=0.034482758620689655, direction=1.0)
+    """
+    circumferential = wheel_speed_rad_s * wheel_radius_m
+    faster = max(circumferential, vehicle_speed_m_s)
+    if faster < floor_m_s:
+        return Slip(0.0, 0.0)
+    sliding = circumferential - vehicle_speed_m_s
+    if sliding == 0.0:
+        return Slip(0.0, 0.0)
+    return Slip(min(abs(sliding) / faster, GREATEST_SLIP), 1.0 if sliding > 0.0 else -1.0)

@@ -1,0 +1,178 @@
+r"""The modified Dugoff tyre at pure longitudinal slip, its inverse in theta and its derivatives.
+
+With the slip ratio X = C_x lambda / (1 - lambda) and L = theta F_z / (2 X), the force is
+
+.. math:: \mu F_z = X f(L) G, \quad f = L (2 - L) \text{ for } L < 1, \text{ else } 1,
+
+with the correction G = (1.15 - 0.75 theta) lambda^2 - (1.63 - 0.75 theta) lambda + 1.27 [1]_ [2]_. G is
+linear in theta, G = g_0 + g_1 theta, so that below L = 1 the used friction is the cubic
+mu = theta (g_0 + g_1 theta) (1 - kappa theta) with kappa = F_z / (4 X). It rises with theta all the way up to L = 1.
+
+All functions take and return floats. Slip is unsigned, between 0 and 1.
+
+References
+----------
+.. [1] Bian, Chen, Luo, Li (2014), SAE Technical Paper 2014-01-0123.
+.. [2] Korayem et al. (2024) for the coefficients; the constant 1.27 gives a locked-to-peak ratio of 0.79.
+"""
+
+from __future__ import annotations
+
+import math
+
+NEWTON_STEPS = 30
+"""Far above what the safeguarded Newton searches need (3 to 6): a bound, not a setting."""
+
+
+def slip_ratio_force(slip: float, longitudinal_stiffness_n: float) -> float:
+    """X = C_x lambda / (1 - lambda), the force of a tyre that never slides. [N]."""
+    return longitudinal_stiffness_n * slip / (1.0 - slip)
+
+
+def correction(theta: float, slip: float) -> float:
+    """Correction factor G of the modified Dugoff tyre [-]."""
+    return (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + 1.27
+
+
+def used_friction(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+    """Used friction mu(theta, lambda) = abs(F_x) / F_z [-].
+
+    Parameters
+    ----------
+    theta, slip : float
+        Peak adhesion coefficient and unsigned slip [-].
+    load_n, longitudinal_stiffness_n : float
+        Vertical load F_z and longitudinal stiffness C_x [N].
+
+    Examples
+    --------
+    >>> round(used_friction(0.5, 0.0186, 2895.0, 50_000.0), 3)
+    0.384
+    """
+    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
+    if theta >= 2.0 * elastic:
+        return elastic * correction(theta, slip)
+    return theta * (1.0 - theta / (4.0 * elastic)) * correction(theta, slip)
+
+
+def force(
+    theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float, direction: float
+) -> float:
+    """Longitudinal force F_x, positive where it drives the car. [N]."""
+    return direction * load_n * used_friction(theta, slip, load_n, longitudinal_stiffness_n)
+
+
+def friction_by_theta(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+    """Sensitivity d mu / d theta at constant slip [-]: how clearly the tyre shows the road's friction."""
+    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
+    correction_by_theta = 0.75 * slip * (1.0 - slip)
+    if theta >= 2.0 * elastic:
+        return elastic * correction_by_theta
+    share = theta / (4.0 * elastic)
+    return (1.0 - 2.0 * share) * correction(theta, slip) + theta * (1.0 - share) * correction_by_theta
+
+
+def friction_by_slip(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+    """Slope d mu / d lambda at constant theta [-]."""
+    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
+    elastic_by_slip = longitudinal_stiffness_n / (load_n * (1.0 - slip) ** 2)
+    correction_by_slip = 2.0 * (1.15 - 0.75 * theta) * slip - (1.63 - 0.75 * theta)
+    if theta >= 2.0 * elastic:
+        return elastic_by_slip * correction(theta, slip) + elastic * correction_by_slip
+    share_by_slip = -theta * elastic_by_slip / (4.0 * elastic * elastic)
+    return theta * (
+        -share_by_slip * correction(theta, slip) + (1.0 - theta / (4.0 * elastic)) * correction_by_slip
+    )
+
+
+def theta_from_friction(
+    friction: float, slip: float, load_n: float, longitudinal_stiffness_n: float
+) -> float | None:
+    """The inverse theta(lambda, F) of the tyre: the one theta below L = 1 that gives this used friction.
+
+    Parameters
+    ----------
+    friction : float
+        Used friction abs(F_x) / F_z [-].
+    slip, load_n, longitudinal_stiffness_n : float
+        As in `used_friction`.
+
+    Returns
+    -------
+    float or None
+        Theta [-]; None where no theta gives it: at L >= 1 the force no longer depends on theta.
+    """
+    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
+    if friction <= 0.0:
+        return 0.0 if friction == 0.0 else None
+    upper = 2.0 * elastic
+    if friction >= elastic * correction(upper, slip):
+        return None
+    # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
+    base = 1.27 + slip * (1.15 * slip - 1.63)
+    theta = upper * (1.0 - math.sqrt(max(0.0, 1.0 - friction / (elastic * base))))
+    lower = 0.0
+    for _ in range(NEWTON_STEPS):
+        excess = used_friction(theta, slip, load_n, longitudinal_stiffness_n) - friction
+        if excess > 0.0:
+            upper = theta
+        else:
+            lower = theta
+        slope = friction_by_theta(theta, slip, load_n, longitudinal_stiffness_n)
+        proposal = theta - excess / slope
+        if not lower <= proposal <= upper:
+            proposal = 0.5 * (lower + upper)
+        if abs(proposal - theta) < 1e-12:
+            return proposal
+        theta = proposal
+    return theta
+
+
+def onset_slip(theta: float, load_n: float, longitudinal_stiffness_n: float, sensitivity: float) -> float:
+    """Slip at which d mu / d theta reaches a sensitivity: from here on the tyre shows theta.
+
+    G's dependence on theta (0.75 theta lambda, about 1 %) is left out, and G is taken at small slip, 1.27.
+    """
+    elastic = theta / (2.0 * (1.0 - sensitivity / 1.27))
+    ratio = elastic * load_n / longitudinal_stiffness_n
+    return ratio / (1.0 + ratio)
+
+
+def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+    """Slip at which the used friction is greatest, found by Newton on d mu / d lambda = 0 [-].
+
+    Valid for stiff tyres (C_x above about 3 theta F_z), whose maximum lies below slip 0.5.
+    """
+    quarter = theta * load_n / (4.0 * longitudinal_stiffness_n)
+    square, linear = 1.15 - 0.75 * theta, 1.63 - 0.75 * theta
+    slip = min(0.5, math.sqrt(1.27 * quarter / linear))
+    for _ in range(NEWTON_STEPS):
+        # lambda^2 times the slope of (1 - quarter (1 - lambda) / lambda) G(lambda)
+        g = (square * slip - linear) * slip + 1.27
+        g_by_slip = 2.0 * square * slip - linear
+        rise = (1.0 + quarter) * slip - quarter
+        value = quarter * g + slip * rise * g_by_slip
+        value_by_slip = (
+            quarter * g_by_slip
+            + (2.0 * (1.0 + quarter) * slip - quarter) * g_by_slip
+            + 2.0 * square * slip * rise
+        )
+        change = value / value_by_slip
+        slip = min(0.9, max(1e-6, slip - change))
+        if abs(change) < 1e-10:
+            break
+    return slip
+
+
+def peak_friction(theta: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+    """The curve's maximum at this theta, what a brake test or friction tester measures [-].
+
+    Examples
+    --------
+    >>> round(peak_friction(0.9, 3411.0, 50_000.0) / 0.9, 2)
+    1.04
+    """
+    if theta <= 0.0:
+        return 0.0
+    slip = peak_slip(theta, load_n, longitudinal_stiffness_n)
+    return used_friction(theta, slip, load_n, longitudinal_stiffness_n)
