@@ -1,0 +1,30 @@
+"""Longitudinal load transfer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class LoadTransfer(Effect):
+    """Acceleration moves load from the front to the rear axle, in phase with it (stiff suspension)."""
+
+    id = "load_transfer"
+    equation = "F_z,front = m (g l_r - a_x h) / (2 L) per wheel, F_z,rear = m (g l_f + a_x h) / (2 L)"
+    source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 1, dynamic axle loads on level ground"
+    excited_by = "strong acceleration or braking on a tyre near its grip limit"
+    look_alikes = ("friction_offset", "tyre_stiffness_offset")
+
+    cog_height_m: float = parameter(
+        "m", "height of the centre of gravity that the transfer acts through", neutral=0.0, low=0.0, high=1.5
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Loads follow the acceleration through the centre of gravity's height."""
+        return parameters._replace(transfer_height_m=self.cog_height_m)

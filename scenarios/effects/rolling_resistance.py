@@ -1,0 +1,30 @@
+"""Rolling resistance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class RollingResistance(Effect):
+    """A moment against each loaded wheel's rotation; it holds a resting wheel and never turns it back."""
+
+    id = "rolling_resistance"
+    equation = "I omega' = T - F_x R - c F_z R"
+    source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 4; ISO 28580 defines the coefficient"
+    excited_by = "coasting at low speed"
+    look_alikes = ("brake_drag", "road_grade", "torque_gain")
+
+    coefficient: float = parameter(
+        "-", "resisting force at the contact per vertical load", neutral=0.0, low=0.0, high=0.3
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The moment is proportional to each wheel's own load."""
+        return parameters._replace(rolling_coefficient=self.coefficient)

@@ -1,0 +1,353 @@
+"""The YAML files that describe a scenario: vehicle, road, manoeuvre, and the scenario that names them.
+
+Every loader reads strictly and raises one ScenarioError that lists all problems of its file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from scenarios.effects import Effect, make_effect, problems_of, suggestion
+from scenarios.errors import ScenarioError
+from trpac_core.vehicle import Vehicle
+from trpac_core.vision.classes import Surface
+
+WHEELS = ("fl", "fr", "rl", "rr")
+"""Wheel order of all arrays and files."""
+
+WheelName = Literal["fl", "fr", "rl", "rr"]
+SurfaceName = Literal["dry", "wet", "snow_ice"]
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Friction = Annotated[float, Field(gt=0.0, le=1.5)]
+
+
+class _FileModel(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class TyreSection(_FileModel):
+    """The tyre in vehicle.yaml."""
+
+    model: Literal["modified_dugoff"]
+    longitudinal_stiffness_n: Positive
+
+
+class VehicleFile(_FileModel):
+    """vehicle.yaml: the vehicle, and which effects the simulation models of it."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    name: str
+    mass_kg: Positive
+    wheelbase_m: Positive
+    track_m: Positive
+    cog_height_m: NonNegative
+    cog_to_rear_axle_m: Positive
+    wheel_radius_m: Positive
+    wheel_inertia_kg_m2: Positive
+    motor_peak_torque_nm: Positive
+    tyre: TyreSection
+    effects: dict[str, dict[str, float]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _check(self) -> VehicleFile:
+        problems = [text for key, values in self.effects.items() for text in problems_of(key, values)]
+        if self.cog_to_rear_axle_m >= self.wheelbase_m:
+            problems.append(
+                f"cog_to_rear_axle_m is {self.cog_to_rear_axle_m:g}; expected less than wheelbase_m "
+                f"({self.wheelbase_m:g}), since the centre of gravity lies between the axles."
+            )
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+    def to_core(self) -> Vehicle:
+        """The vehicle as the estimator knows it."""
+        return Vehicle(
+            mass_kg=self.mass_kg,
+            wheelbase_m=self.wheelbase_m,
+            track_m=self.track_m,
+            cog_height_m=self.cog_height_m,
+            cog_to_rear_axle_m=self.cog_to_rear_axle_m,
+            wheel_radius_m=self.wheel_radius_m,
+            wheel_inertia_kg_m2=self.wheel_inertia_kg_m2,
+            motor_peak_torque_nm=self.motor_peak_torque_nm,
+            longitudinal_stiffness_n=self.tyre.longitudinal_stiffness_n,
+        )
+
+    def make_effects(self) -> tuple[Effect, ...]:
+        """The effects that the file switches on, in its order."""
+        return tuple(make_effect(key, values) for key, values in self.effects.items())
+
+
+class RoadSegment(_FileModel):
+    """One stretch of road; it holds to the next one's start."""
+
+    start_m: float
+    mu_left: Friction
+    mu_right: Friction
+    surface: SurfaceName
+
+    @property
+    def surface_class(self) -> Surface:
+        """The surface as class index."""
+        return Surface[self.surface.upper()]
+
+
+class RoadFile(_FileModel):
+    """road.yaml: friction (theta) and surface along the road; the first segment also holds before it."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    segments: Annotated[list[RoadSegment], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _check(self) -> RoadFile:
+        starts = [s.start_m for s in self.segments]
+        problems = [
+            f"segments[{i + 1}].start_m is {b:g} after {a:g}; expected ascending starts."
+            for i, (a, b) in enumerate(pairwise(starts))
+            if b <= a
+        ]
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+    def segment_at(self, position_m: float) -> RoadSegment:
+        """The segment under a place on the road [m]."""
+        return next((s for s in reversed(self.segments) if s.start_m <= position_m), self.segments[0])
+
+
+class Pulse(_FileModel):
+    """A trapezoidal torque pulse: rises from start_s and falls to 0 at end_s, over ramp_s each [N m, s]."""
+
+    start_s: NonNegative
+    end_s: Positive
+    torque_nm: float
+    ramp_s: Positive
+    wheels: Annotated[list[WheelName], Field(min_length=1)] = ["fl", "fr", "rl", "rr"]
+
+    @model_validator(mode="after")
+    def _check(self) -> Pulse:
+        if self.end_s - self.start_s < 2.0 * self.ramp_s:
+            raise ValueError(
+                f"the pulse from {self.start_s:g} to {self.end_s:g} s is shorter than its two ramps of "
+                f"{self.ramp_s:g} s; expected end_s >= start_s + 2 ramp_s."
+            )
+        return self
+
+    def torque(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Torque of the pulse at these times, same shape [N m]."""
+        rise = (time_s - self.start_s) / self.ramp_s
+        fall = (self.end_s - time_s) / self.ramp_s
+        return self.torque_nm * np.clip(np.minimum(rise, fall), 0.0, 1.0)
+
+
+class Manoeuvre(_FileModel):
+    """manoeuvre.yaml: torque pulses per wheel; where pulses of one wheel overlap they add up."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    name: str
+    description: str = ""
+    pulses: list[Pulse]
+
+    def torque(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Commanded torque of the four wheels, shape (n, 4) [N m]."""
+        total = np.zeros((len(time_s), len(WHEELS)))
+        for pulse in self.pulses:
+            columns = [WHEELS.index(w) for w in WHEELS if w in pulse.wheels]
+            total[:, columns] += pulse.torque(np.asarray(time_s, dtype=np.float64))[:, None]
+        return total
+
+    def peak_torque_nm(self) -> float:
+        """Largest driving torque of any wheel [N m]."""
+        corners = [(p.start_s, p.start_s + p.ramp_s, p.end_s - p.ramp_s, p.end_s) for p in self.pulses]
+        return float(self.torque(np.array(corners).ravel()).max(initial=0.0))
+
+
+class End(_FileModel):
+    """When a drive ends: at a place (of the front axle) or a time, whichever comes first."""
+
+    position_m: Positive
+    time_s: Positive
+
+
+class SensorNoise(_FileModel):
+    """Standard deviations of the sensors' white Gaussian noise; the defaults are ideal sensors."""
+
+    wheel_speed_noise_rad_s: NonNegative = 0.0
+    wheel_torque_noise_nm: NonNegative = 0.0
+    vehicle_speed_noise_m_s: NonNegative = 0.0
+    accel_x_noise_m_s2: NonNegative = 0.0
+
+
+class Pictures(_FileModel):
+    """How the camera's pictures are disturbed and stored."""
+
+    disturbance: Literal["paper", "none"] = "none"
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 90
+    fps: Positive = 20.0
+
+
+class ScenarioFile(_FileModel):
+    """scenario.yaml as written; paths are relative to it."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    name: str
+    description: str = ""
+    vehicle: str
+    road: str
+    camera: str | None = None
+    manoeuvre: str
+    step_s: Annotated[float, Field(ge=1e-4, le=0.02)]
+    end: End
+    sensors: SensorNoise = Field(default_factory=SensorNoise)
+    pictures: Pictures = Field(default_factory=Pictures)
+    wheel: WheelName = "fl"
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario with all its files read; camera_path is None without camera."""
+
+    path: Path
+    name: str
+    description: str
+    vehicle: VehicleFile
+    road: RoadFile
+    manoeuvre: Manoeuvre
+    camera_path: Path | None
+    step_s: float
+    end: End
+    sensors: SensorNoise
+    pictures: Pictures
+    wheel: WheelName
+    seed: int
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """YAML that refuses a key written twice."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key.value!r} stands twice", key.start_mark
+                )
+            seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+def load_vehicle(path: str | Path) -> VehicleFile:
+    """Read vehicle.yaml; raises ScenarioError."""
+    return _load(path, VehicleFile)
+
+
+def load_road(path: str | Path) -> RoadFile:
+    """Read road.yaml; raises ScenarioError."""
+    return _load(path, RoadFile)
+
+
+def load_manoeuvre(path: str | Path) -> Manoeuvre:
+    """Read manoeuvre.yaml; raises ScenarioError."""
+    return _load(path, Manoeuvre)
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Read scenario.yaml and the files that it names; raises ScenarioError."""
+    path = Path(path)
+    file = _load(path, ScenarioFile)
+    problems: list[str] = []
+
+    def resolve(key: str, relative: str, model: type[Model]) -> Model | None:
+        try:
+            return _load(path.parent / relative, model)
+        except ScenarioError as error:
+            problems.append(f"{path}: {key}: {error}")
+            return None
+
+    vehicle = resolve("vehicle", file.vehicle, VehicleFile)
+    road = resolve("road", file.road, RoadFile)
+    manoeuvre = resolve("manoeuvre", file.manoeuvre, Manoeuvre)
+    camera_path = None if file.camera is None else path.parent / file.camera
+    if camera_path is not None and not camera_path.is_file():
+        problems.append(f"{path}: camera: {camera_path}: no such file; expected the camera's YAML file.")
+    if vehicle and manoeuvre and manoeuvre.peak_torque_nm() > vehicle.motor_peak_torque_nm * (1.0 + 1e-9):
+        problems.append(
+            f"{path}: manoeuvre: drives a wheel with {manoeuvre.peak_torque_nm():g} N m; "
+            f"expected at most the motor's peak of {vehicle.motor_peak_torque_nm:g} N m."
+        )
+    if problems or vehicle is None or road is None or manoeuvre is None:
+        raise ScenarioError("\n".join(problems))
+    return Scenario(
+        path=path,
+        name=file.name,
+        description=file.description,
+        vehicle=vehicle,
+        road=road,
+        manoeuvre=manoeuvre,
+        camera_path=camera_path,
+        step_s=file.step_s,
+        end=file.end,
+        sensors=file.sensors,
+        pictures=file.pictures,
+        wheel=file.wheel,
+        seed=file.seed,
+    )
+
+
+def _load(path: str | Path, model: type[Model]) -> Model:
+    path = Path(path)
+    try:
+        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)  # a SafeLoader
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}; expected a YAML file.") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: not valid YAML: {error}") from error
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError("\n".join(f"{path}: {text}" for text in _problems(error, model))) from error
+
+
+def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
+    """One sentence per problem: key, what is wrong, what was expected."""
+    texts = []
+    for item in error.errors():
+        place = "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in item["loc"]).lstrip(".")
+        if item["type"] == "extra_forbidden":
+            known = _keys_at(model, item["loc"][:-1])
+            texts.append(f"{place}: unknown key; {suggestion(str(item['loc'][-1]), known)}")
+        elif item["type"] == "missing":
+            texts.append(f"{place}: missing; expected this key.")
+        elif item["type"] == "value_error":
+            prefix = f"{place}: " if place else ""
+            texts.extend(prefix + line for line in str(item["ctx"]["error"]).splitlines())
+        else:
+            texts.append(
+                f"{place or 'file'}: is {item['input']!r}; {item['msg'][0].lower()}{item['msg'][1:]}."
+            )
+    return texts
+
+
+def _keys_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Keys of the model that lies at a location inside a file."""
+    for key in location:
+        if isinstance(key, int):
+            continue
+        annotation: Any = next(f.annotation for n, f in model.model_fields.items() if (f.alias or n) == key)
+        candidates = [annotation, *getattr(annotation, "__args__", ())]
+        model = next(c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel))
+    return [f.alias or n for n, f in model.model_fields.items()]
