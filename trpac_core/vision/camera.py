@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 NEAREST_DEPTH_M = 0.05
 """Points closer to the image plane than this, or behind it, have no picture [m]."""
 
+_UNDISTORT_STOP = (cv2.TERM_CRITERIA_MAX_ITER + cv2.TERM_CRITERIA_EPS, 100, 1e-9)
+"""OpenCV's own five steps leave an error of up to a pixel in the corners of a wide lens."""
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -66,8 +69,20 @@ class Camera:
         columns = np.column_stack((self.rotation[:, :2], -self.rotation @ self.position_m))
         return self.matrix @ columns
 
+    @cached_property
+    def widest_radius(self) -> float:
+        """Distance from the optical axis, over depth, up to which the radial distortion rises [-].
+
+        Beyond it the distortion polynomial folds back, and road far outside the field of view would appear
+        inside the picture.
+        """
+        k1, k2, _, _, k3 = self.distortion
+        roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
+        turning = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
+        return float(np.sqrt(turning.min())) if len(turning) else np.inf
+
     def ground_to_image(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Pixels of ground points, NaN where a point is not ahead of the lens.
+        """Pixels of ground points, NaN where a point is not ahead of the lens or beyond `widest_radius`.
 
         Parameters
         ----------
@@ -82,6 +97,8 @@ class Camera:
         points = np.column_stack((points_m, np.zeros(len(points_m))))
         camera_points = (points - self.position_m) @ self.rotation.T
         ahead = camera_points[:, 2] > NEAREST_DEPTH_M
+        depth = np.where(ahead, camera_points[:, 2], 1.0)
+        ahead &= np.hypot(camera_points[:, 0], camera_points[:, 1]) / depth < self.widest_radius
         pixels = np.full((len(points), 2), np.nan)
         if ahead.any():
             projected, _ = cv2.projectPoints(
@@ -91,7 +108,7 @@ class Camera:
         return pixels
 
     def image_to_ground(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Ground points seen at pixels, NaN at and above the horizon.
+        """Ground points seen at pixels, NaN at and above the horizon and beyond `widest_radius`.
 
         Parameters
         ----------
@@ -106,12 +123,15 @@ class Camera:
         rays = np.ones((len(pixels), 3))
         if len(pixels):
             undistorted = cv2.undistortPoints(
-                np.asarray(pixels, dtype=np.float64).reshape(-1, 1, 2), self.matrix, np.array(self.distortion)
+                np.asarray(pixels, dtype=np.float64).reshape(-1, 1, 2),
+                self.matrix,
+                np.array(self.distortion),
+                criteria=_UNDISTORT_STOP,
             )
             rays[:, :2] = undistorted.reshape(-1, 2)
         directions = rays @ self.rotation
         ground = np.full((len(pixels), 2), np.nan)
-        down = directions[:, 2] < -1e-9
+        down = (directions[:, 2] < -1e-9) & (np.hypot(rays[:, 0], rays[:, 1]) < self.widest_radius)
         reach = -self.height_m / directions[down, 2]
         ground[down] = self.position_m[:2] + reach[:, None] * directions[down, :2]
         return ground

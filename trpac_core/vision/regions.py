@@ -153,7 +153,7 @@ def roi_widths_px(camera: Camera, ground_m: NDArray[np.float64], roi_width_m: fl
     """Widths of the regions around ground points, shape (n,) [px]: see `roi_width_px`."""
     step = np.array([0.0, _PROBE_M / 2.0])
     left, right = camera.ground_to_image(ground_m + step), camera.ground_to_image(ground_m - step)
-    return np.maximum(np.hypot(*(right - left).T) * (roi_width_m / _PROBE_M), LEAST_ROI_WIDTH_PX)
+    return np.fmax(np.hypot(*(right - left).T) * (roi_width_m / _PROBE_M), LEAST_ROI_WIDTH_PX)
 
 
 def roi_width_px(
@@ -173,7 +173,7 @@ def roi_width_px(
     Returns
     -------
     float
-        Width, at least `LEAST_ROI_WIDTH_PX`; NaN if the point is not ahead of the lens [px].
+        Width, at least `LEAST_ROI_WIDTH_PX`, also where the point has no picture [px].
     """
     point = np.asarray(ground_point_m, dtype=np.float64).reshape(1, 2)
     return float(roi_widths_px(camera, point, roi_width_m)[0])
