@@ -5,6 +5,8 @@ All of it is drawn once on a map that repeats along the road.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from .textures import RipMap, build_ripmap
 
 TEXEL_M = 0.06
 SHAPE = (4096, 512)  # along, across: 245.76 m x 30.72 m
+LEVELS = (6, 6)
 LENGTH_M = SHAPE[0] * TEXEL_M
 LABEL_BLUR_M = 0.35
 LABEL_SHADE = 0.4  # shade from which, averaged over LABEL_BLUR_M, the ground counts as shadowed
@@ -23,14 +26,14 @@ Points = NDArray[np.float64]
 
 
 def decal_map(look: SceneLook) -> RipMap:
-    """Channels: shade (0 lit, 255 dark), shade for the label (128 is the threshold), tone of repairs, gloss of them."""
+    """Channels: shade (255 is dark), shade for the label (128 is the threshold), tone and gloss of repairs."""
     rng = np.random.default_rng([look.seed, 11])
     shade = _shade(look, rng) if look.casts_shadows else np.zeros(SHAPE, dtype=np.uint8)
     spread = LABEL_BLUR_M / TEXEL_M
     mean = cv2.GaussianBlur(_wrapped(shade), (0, 0), spread)[_WRAP:-_WRAP].astype(np.float32)
     label = np.clip(128.0 + (mean / 255.0 - LABEL_SHADE) * 400.0, 0, 255).astype(np.uint8)
     tone, gloss = _repairs(look, rng)
-    return build_ripmap(np.dstack((shade, label, tone, gloss)), TEXEL_M, 6, 6)
+    return build_ripmap(np.dstack((shade, label, tone, gloss)), LEVELS)
 
 
 _WRAP = 64
@@ -143,8 +146,7 @@ def _repairs(look: SceneLook, rng: np.random.Generator) -> tuple[NDArray[np.uint
         value = int(np.clip(rng.normal(112, 22), 60, 175))
         _fill(tone, corners, value)
         if rng.random() < 0.4:
-            cv_line = np.vstack((corners, corners[:1]))
-            for start, end in zip(cv_line[:-1], cv_line[1:], strict=True):
+            for start, end in pairwise(np.vstack((corners, corners[:1]))):
                 _strip(tone, start, end, 0.08, 70)
                 _strip(gloss, start, end, 0.08, 160)
     for _ in range(_count(rng, 6.0 * look.cracks**2)):
@@ -161,5 +163,6 @@ def _repairs(look: SceneLook, rng: np.random.Generator) -> tuple[NDArray[np.uint
         foot = np.array([rng.uniform(0, LENGTH_M), rng.uniform(-1.2, -0.5) + SHAPE[1] * TEXEL_M / 2])
         run = np.array([rng.uniform(4, 25), rng.normal(0.0, 0.4)])
         for offset in (0.0, 1.5):
-            _strip(tone, foot + [0.0, offset], foot + run + [0.0, offset], 0.2, 105)
+            start = foot + np.array([0.0, offset])
+            _strip(tone, start, start + run, 0.2, 105)
     return tone, gloss

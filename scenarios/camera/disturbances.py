@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 os.environ.setdefault("NO_ALBUMENTATIONS_UPDATE", "1")  # read on import: no look-up of newer versions
-import albumentations as A  # noqa: E402
+import albumentations
 
 REFERENCE_WIDTH_PX = 1920
 """Picture width for which blur lengths are given; they scale with the picture."""
@@ -67,15 +67,15 @@ def disturb(image: NDArray[np.uint8], disturbance: Disturbance, rng_seed: int) -
     steps = _steps(disturbance, image.shape[1])
     if not steps:
         return image.copy()
-    return A.Compose(steps, seed=rng_seed)(image=image)["image"]
+    return albumentations.Compose(steps, seed=rng_seed)(image=image)["image"]
 
 
-def _steps(disturbance: Disturbance, width_px: int) -> list[A.BasicTransform]:
+def _steps(disturbance: Disturbance, width_px: int) -> list[albumentations.BasicTransform]:
     """The library's transforms in the order of the light's way: road, exposure, motion, development."""
-    steps: list[A.BasicTransform] = []
+    steps: list[albumentations.BasicTransform] = []
     if disturbance.shadow_probability > 0.0:
         steps.append(
-            A.RandomShadow(
+            albumentations.RandomShadow(
                 shadow_roi=(0.0, 0.5, 1.0, 1.0),
                 num_shadows_limit=(1, disturbance.shadow_count),
                 shadow_intensity_range=(0.35, 0.65),
@@ -84,15 +84,21 @@ def _steps(disturbance: Disturbance, width_px: int) -> list[A.BasicTransform]:
         )
     if disturbance.exposure_probability > 0.0:
         gain = 2.0 ** (disturbance.exposure_limit_ev / DISPLAY_GAMMA)
-        steps.append(A.MultiplicativeNoise(multiplier=(1.0 / gain, gain), p=disturbance.exposure_probability))
+        steps.append(
+            albumentations.MultiplicativeNoise(
+                multiplier=(1.0 / gain, gain), p=disturbance.exposure_probability
+            )
+        )
     if disturbance.motion_blur_probability > 0.0:
         longest = blur_length_px(disturbance.motion_blur_limit_px, width_px)
         steps.append(
-            A.MotionBlur(blur_limit=(SHORTEST_BLUR_PX, longest), p=disturbance.motion_blur_probability)
+            albumentations.MotionBlur(
+                blur_limit=(SHORTEST_BLUR_PX, longest), p=disturbance.motion_blur_probability
+            )
         )
     if disturbance.brightness_contrast_probability > 0.0:
         steps.append(
-            A.RandomBrightnessContrast(
+            albumentations.RandomBrightnessContrast(
                 brightness_limit=disturbance.brightness_limit,
                 contrast_limit=disturbance.contrast_limit,
                 p=disturbance.brightness_contrast_probability,

@@ -4,24 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 
-from .decals import decal_map
+from .decals import LENGTH_M, LEVELS, SHAPE, TEXEL_M, decal_map
 from .scene import RenderedFrame, SceneLook, SurfaceSegment
-from .shading import TONE_RANGE, TONE_STEPS_PER_UNIT, Look, Maps, Pixels, shade
-from .sky import AZIMUTH_RAD, LOWEST_RAD, build_panorama
-from .textures import fine_texture, macro_texture
+from .shading import TONE_RANGE, TONE_STEPS_PER_UNIT, Look, Maps, Pixels, Place, shade
+from .sky import AZIMUTH_RAD, LOWEST_RAD, Panorama, build_panorama
+from .textures import (
+    FINE_LEVELS,
+    FINE_SHAPE,
+    FINE_TEXEL_M,
+    MACRO_LEVELS,
+    MACRO_SHAPE,
+    MACRO_TEXEL_M,
+    fine_texture,
+    macro_texture,
+)
 
 PROFILE_STEP_M = 0.02
+LINES_REPEAT_M = 144.0
+"""A multiple of every period of dashed lines [m]."""
 WATER_INDEX = 1.33
 FINEST_SKY_PX_RAD = 0.0009
 METERED_M = (5.0, 40.0)
 """The stretch of road ahead on which the automatic exposure looks [m]."""
+VERGE_END_M = 130.0
+"""Where a line of trees hides the verge behind it [m]."""
 GREY = 0.20
 """Light that automatic exposure brings to mid grey, relative to white open ground [-]."""
 
@@ -53,7 +68,7 @@ class Renderer:
 
     def __init__(self, camera: Camera, segments: Sequence[SurfaceSegment], look: SceneLook) -> None:
         starts = [segment.start_m for segment in segments]
-        if not starts or any(b <= a for a, b in zip(starts, starts[1:], strict=False)):
+        if not starts or any(b <= a for a, b in pairwise(starts)):
             raise ValueError(
                 f"segments: starts {starts} m; expected at least one, each beyond the one before"
             )
@@ -68,6 +83,7 @@ class Renderer:
         self._pixels = _pixels(camera)
         sky = build_panorama(look, max(FINEST_SKY_PX_RAD, 1.0 / camera.fx_px))
         macro, fine, decal = macro_texture(), fine_texture(), decal_map(look)
+        distance = self._pixels.distance
         self._maps = Maps(
             macro=macro.texels,
             macro_at=macro.offsets,
@@ -80,13 +96,14 @@ class Renderer:
             tone=_tone_table(look.contrast),
             lines=_lines(look),
             profile=_profile(look),
-            starts=np.array([segment.start_m for segment in self.segments]),
-            surfaces=np.array([int(segment.surface) for segment in self.segments], dtype=np.int8),
+            clear=np.exp(-np.maximum(distance, 0.0) / np.float32(look.visibility_m)),
         )
-        self._scales = (AZIMUTH_RAD, LOWEST_RAD, sky.sharp_px_rad, sky.rough_px_rad)
         horizon = sky.sharp[int((0.05 - LOWEST_RAD) / sky.sharp_px_rad)].mean(axis=0)
-        self._look = _loop_look(look, horizon)
+        self._look = _loop_look(look, horizon, sky)
         self._sky_mean = float(sky.mean.mean())
+        self._starts = np.array([segment.start_m for segment in self.segments])
+        self._surfaces = np.array([int(segment.surface) for segment in self.segments], dtype=np.int8)
+        self._origin = np.random.default_rng([look.seed, 41]).uniform(0.0, 40.0, 4)
 
     def frame(
         self, front_axle_position_m: float, lateral_m: float = 0.0, heading_rad: float = 0.0
@@ -106,15 +123,15 @@ class Renderer:
         image = np.empty((*size, 3), dtype=np.uint8)
         drivable, shadow = np.empty(size, dtype=np.bool_), np.empty(size, dtype=np.bool_)
         surface = np.empty(size, dtype=np.int8)
+        starts = (self._starts - front_axle_position_m).astype(np.float32)
+        place = self._place(front_axle_position_m, lateral_m, heading_rad)
         shade(
             self._pixels,
             self._maps,
             self._look,
-            self._scales,
-            float(front_axle_position_m),
-            float(lateral_m),
-            float(heading_rad),
-            self._gains(front_axle_position_m),
+            place,
+            starts,
+            self._surfaces,
             image,
             drivable,
             shadow,
@@ -122,9 +139,30 @@ class Renderer:
         )
         return RenderedFrame(image, drivable, shadow, surface)
 
+    def _place(self, position_m: float, lateral_m: float, heading_rad: float) -> Place:
+        macro_s, macro_t, fine_s, fine_t = self._origin
+        gains = self._gains(position_m)
+        values = Place(
+            cos_heading=np.cos(heading_rad),
+            sin_heading=np.sin(heading_rad),
+            heading=heading_rad,
+            t=lateral_m,
+            macro_s=(position_m + macro_s) % (MACRO_SHAPE[0] * MACRO_TEXEL_M),
+            macro_t=(lateral_m + macro_t) % (MACRO_SHAPE[1] * MACRO_TEXEL_M),
+            fine_s=(position_m + fine_s) % (FINE_SHAPE[0] * FINE_TEXEL_M),
+            fine_t=(lateral_m + fine_t) % (FINE_SHAPE[1] * FINE_TEXEL_M),
+            decal_s=position_m % LENGTH_M,
+            decal_t=lateral_m + SHAPE[1] * TEXEL_M / 2,
+            lines_s=position_m % LINES_REPEAT_M,
+            gain_b=gains[0],
+            gain_g=gains[1],
+            gain_r=gains[2],
+        )
+        return Place(*(np.float32(value) for value in values))
+
     def surface_at(self, position_m: float) -> Surface:
         """Surface at a road coordinate [m]."""
-        index = int(np.searchsorted(self._maps.starts, position_m, side="right")) - 1
+        index = int(np.searchsorted(self._starts, position_m, side="right")) - 1
         return self.segments[max(index, 0)].surface
 
     def _gains(self, position_m: float) -> NDArray[np.float32]:
@@ -156,30 +194,40 @@ def _pixels(camera: Camera) -> Pixels:
     azimuth, elevation = _directions(camera, grid, (height, width))
     foot_x = np.maximum(np.abs(np.gradient(x, axis=0)), np.abs(np.gradient(x, axis=1)))
     foot_y = np.maximum(np.abs(np.gradient(y, axis=0)), np.abs(np.gradient(y, axis=1)))
-    dither = np.random.default_rng(7).uniform(-0.5, 0.5, (2, height, width))
     away = np.hypot(x - camera.position_m[0], y - camera.position_m[1])
     cosine = camera.height_m / np.hypot(away, camera.height_m)
-    level_x = np.nan_to_num(np.log2(np.maximum(foot_x, 1e-4)), nan=8.0) + 0.7 * dither[0]
-    level_y = np.nan_to_num(np.log2(np.maximum(foot_y, 1e-4)), nan=4.0) + 0.7 * dither[1]
+    foot_x, foot_y = (np.maximum(np.nan_to_num(foot, nan=100.0), 1e-4) for foot in (foot_x, foot_y))
     arrays = (
         x,
         y,
-        level_x,
-        level_y,
+        foot_x,
+        foot_y,
         azimuth,
         elevation,
         fresnel_reflectance(cosine),
         np.nan_to_num(away, nan=-1.0),
     )
-    return Pixels(*(np.ascontiguousarray(np.nan_to_num(array), dtype=np.float32) for array in arrays))
+    floats = [np.ascontiguousarray(np.nan_to_num(array), dtype=np.float32) for array in arrays]
+    return Pixels(*floats[:4], _levels(foot_x, foot_y), *floats[4:])
+
+
+def _levels(foot_x: NDArray[np.float64], foot_y: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """Ripmap levels of each pixel for the three textures, dithered so that no seam shows where they change."""
+    dither = np.random.default_rng(7).uniform(-0.35, 0.35, (2, *foot_x.shape))
+    packed = np.zeros(foot_x.shape, dtype=np.uint32)
+    along, across = np.log2(foot_x) + dither[0], np.log2(foot_y) + dither[1]
+    textures = ((MACRO_TEXEL_M, MACRO_LEVELS), (FINE_TEXEL_M, FINE_LEVELS), (TEXEL_M, LEVELS))
+    for k, (texel, counts) in enumerate(textures):
+        for m, (logarithm, count) in enumerate(zip((along, across), counts, strict=True)):
+            level = np.clip(np.round(logarithm - np.log2(texel)), 0, count - 1).astype(np.uint32)
+            packed |= level << np.uint32(8 * k + 4 * m)
+    return packed
 
 
 def _directions(
     camera: Camera, grid: NDArray[np.float64], shape: tuple[int, int]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Azimuth (left positive) and elevation of every pixel's ray against the level road [rad]."""
-    import cv2
-
     undistorted = cv2.undistortPoints(grid.reshape(-1, 1, 2), camera.matrix, np.array(camera.distortion))
     rays = np.ones((len(grid), 3))
     rays[:, :2] = undistorted.reshape(-1, 2)
@@ -224,7 +272,7 @@ def _lines(look: SceneLook) -> NDArray[np.float64]:
             rows.append((middle, width, period if look.centre_line == "dashed" else 0.0, dash, phase))
         elif look.centre_line == "double":
             rows += [(middle + side * width, width, 0.0, 0.0, 0.0) for side in (-1, 1)]
-    return np.array(rows, dtype=np.float64).reshape(-1, 5)
+    return np.array(rows, dtype=np.float32).reshape(-1, 5)
 
 
 def _profile(look: SceneLook) -> NDArray[np.float32]:
@@ -243,8 +291,7 @@ def _profile(look: SceneLook) -> NDArray[np.float32]:
     return np.column_stack((track, oil)).astype(np.float32)
 
 
-def _loop_look(look: SceneLook, horizon: NDArray[np.float32]) -> Look:
-    rng = np.random.default_rng([look.seed, 41])
+def _loop_look(look: SceneLook, horizon: NDArray[np.float32], sky: Panorama) -> Look:
     right, left = look.road_edges_m
     warm = 0.12 * look.asphalt_warmth
     asphalt = look.asphalt_albedo * np.array([1 - warm, 1.0, 1 + warm])
@@ -260,7 +307,7 @@ def _loop_look(look: SceneLook, horizon: NDArray[np.float32]) -> Look:
     def bgr(name: str, values: NDArray[np.float64]) -> dict[str, float]:
         return {f"{name}_{channel}": float(value) for channel, value in zip("bgr", values, strict=True)}
 
-    return Look(
+    values = Look(
         right=right,
         left=left,
         **bgr("asphalt", asphalt),
@@ -283,13 +330,14 @@ def _loop_look(look: SceneLook, horizon: NDArray[np.float32]) -> Look:
         **bgr("verge", verge),
         verge_grain=verge_grain,
         verge_snow=look.verge_snow,
+        verge_end=VERGE_END_M if look.tree_line > 0.1 else 1e9,
         **bgr("sun", sun),
         **bgr("fill", fill),
         **bgr("haze", horizon),
-        visibility=look.visibility_m,
         veil=look.veil,
-        macro_s=rng.uniform(0, 40),
-        macro_t=rng.uniform(0, 20),
-        fine_s=rng.uniform(0, 4),
-        fine_t=rng.uniform(0, 4),
+        reach=AZIMUTH_RAD,
+        lowest=LOWEST_RAD,
+        sharp_px=sky.sharp_px_rad,
+        rough_px=sky.rough_px_rad,
     )
+    return Look(*(np.float32(value) for value in values))

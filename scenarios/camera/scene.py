@@ -41,9 +41,9 @@ class RenderedFrame:
 class SceneLook:
     """Every choice that is not geometry of the camera or a surface class; the picture follows from it alone.
 
-    The road coordinate's lateral zero is the middle of the own lane, left positive. Shares and strengths lie in 0..1
-    where no unit is given; ``white_balance`` is (blue, green, red) gains. The defaults are a plain two-lane road
-    under a clear sky.
+    The road coordinate's lateral zero is the middle of the own lane, left positive. Shares and strengths lie in
+    0..1 where no unit is given; ``white_balance`` is (blue, green, red) gains. The defaults are a plain two-lane
+    road under a clear sky.
     """
 
     seed: int = 0
@@ -116,7 +116,7 @@ class SceneLook:
 
     @classmethod
     def random(cls, rng: np.random.Generator, surface: Surface | None = None) -> SceneLook:
-        """One look drawn at random; ``surface`` makes the weather likely for it (any weather stays possible)."""
+        """One look drawn at random; ``surface`` makes its weather likely (any stays possible)."""
         kind = Surface(int(rng.integers(3))) if surface is None else surface
         return cls(
             seed=int(rng.integers(2**31)),

@@ -5,342 +5,422 @@ Light is linear and relative to what white open ground sends back; the encoding 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-DRY, WET, SNOW = 0, 1, 2
+WET, SNOW = 1, 2
 TONE_STEPS_PER_UNIT = 4096
 TONE_RANGE = 4.0
+F = np.float32
+HALF = F(0.5)
+ONE = F(1.0)
 
 
 class Maps(NamedTuple):
-    """Ripmaps: texels, level offsets; and the sky panoramas."""
+    """What the loop looks up: ripmaps (texels as uint32 of four channels, level offsets), panoramas, tables."""
 
-    macro: np.ndarray
-    macro_at: np.ndarray
-    fine: np.ndarray
-    fine_at: np.ndarray
-    decal: np.ndarray
-    decal_at: np.ndarray
-    sharp: np.ndarray
-    rough: np.ndarray
-    tone: np.ndarray
-    lines: np.ndarray  # (n, 5): lateral middle, width, period, painted length, phase [m]
-    profile: np.ndarray  # (n, 2): wheel track and oil band 0..1 over the lateral coordinate
-    starts: np.ndarray
-    surfaces: np.ndarray
+    macro: NDArray[np.uint32]
+    macro_at: NDArray[np.int64]
+    fine: NDArray[np.uint32]
+    fine_at: NDArray[np.int64]
+    decal: NDArray[np.uint32]
+    decal_at: NDArray[np.int64]
+    sharp: NDArray[np.float32]
+    rough: NDArray[np.float32]
+    tone: NDArray[np.uint8]
+    lines: NDArray[np.float32]  # (n, 5): lateral middle, width, period, painted length, phase [m]
+    profile: NDArray[np.float32]  # (n, 2): wheel track and oil band 0..1 over the lateral coordinate
+    clear: NDArray[np.float32]  # (H, W) share of light that haze lets through; below 0 above the horizon
 
 
 class Pixels(NamedTuple):
     """What does not change while one camera drives: shape (H, W) each."""
 
-    x: np.ndarray
-    y: np.ndarray
-    level_x: np.ndarray  # log2 of the pixel's footprint in metres, dithered
-    level_y: np.ndarray
-    azimuth: np.ndarray
-    elevation: np.ndarray
-    shine: np.ndarray  # Fresnel share of a smooth water surface
-    distance: np.ndarray  # on the ground [m], -1 above the horizon
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    foot_x: NDArray[np.float32]  # the pixel's footprint on the ground [m]
+    foot_y: NDArray[np.float32]
+    levels: NDArray[np.uint32]  # ripmap levels, four bits each: macro along, across, fine ..., decal ...
+    azimuth: NDArray[np.float32]
+    elevation: NDArray[np.float32]
+    shine: NDArray[np.float32]  # Fresnel share of a smooth water surface
+    distance: NDArray[np.float32]  # on the ground [m], -1 above the horizon
 
 
 class Look(NamedTuple):
-    """The scalars of a look that the loop needs."""
+    """The scalars of a look that the loop needs, float32 all."""
 
-    right: float
-    left: float
-    asphalt_b: float
-    asphalt_g: float
-    asphalt_r: float
-    grain: float
-    stains: float
-    wheel_band: float
-    oil_band: float
-    cracks: float
-    wet_darkening: float
-    film: float
-    puddles: float
-    cover: float
-    snow_b: float
-    snow_g: float
-    snow_r: float
-    dirt: float
-    relief: float
-    clearing: float
-    ice_gloss: float
-    wear: float
-    paint_b: float
-    paint_g: float
-    paint_r: float
-    verge_b: float
-    verge_g: float
-    verge_r: float
-    verge_grain: float
-    verge_snow: float
-    sun_b: float
-    sun_g: float
-    sun_r: float
-    fill_b: float
-    fill_g: float
-    fill_r: float
-    haze_b: float
-    haze_g: float
-    haze_r: float
-    visibility: float
-    veil: float
-    macro_s: float
-    macro_t: float
-    fine_s: float
-    fine_t: float
+    right: Any
+    left: Any
+    asphalt_b: Any
+    asphalt_g: Any
+    asphalt_r: Any
+    grain: Any
+    stains: Any
+    wheel_band: Any
+    oil_band: Any
+    cracks: Any
+    wet_darkening: Any
+    film: Any
+    puddles: Any
+    cover: Any
+    snow_b: Any
+    snow_g: Any
+    snow_r: Any
+    dirt: Any
+    relief: Any
+    clearing: Any
+    ice_gloss: Any
+    wear: Any
+    paint_b: Any
+    paint_g: Any
+    paint_r: Any
+    verge_b: Any
+    verge_g: Any
+    verge_r: Any
+    verge_grain: Any
+    verge_snow: Any
+    verge_end: Any  # distance where what stands there hides the open verge [m]
+    sun_b: Any
+    sun_g: Any
+    sun_r: Any
+    fill_b: Any
+    fill_g: Any
+    fill_r: Any
+    haze_b: Any
+    haze_g: Any
+    haze_r: Any
+    veil: Any
+    # directions of the panoramas [rad]
+    reach: Any
+    lowest: Any
+    sharp_px: Any
+    rough_px: Any
 
 
-@njit(inline="always")
-def _level(footprint_log2: float, texel_log2: float, levels: int) -> int:
-    level = int(np.floor(footprint_log2 - texel_log2 + 0.5))
-    return min(max(level, 0), levels - 1)
+class Place(NamedTuple):
+    """Where the car is: everything float32, textures' origins reduced to their first period."""
+
+    cos_heading: Any
+    sin_heading: Any
+    heading: Any
+    t: Any
+    macro_s: Any
+    macro_t: Any
+    fine_s: Any
+    fine_t: Any
+    decal_s: Any
+    decal_t: Any
+    lines_s: Any
+    gain_b: Any
+    gain_g: Any
+    gain_r: Any
 
 
 @njit(inline="always", fastmath=True)
-def _sample(texels, offsets, along, across, texel, s, t, i, j):  # noqa: ANN
-    """Four channels at (s, t) [m] on level (i, j), bilinear, periodic, 0..1."""
-    rows = along >> i
-    columns = across >> j
-    v = s / (texel * (1 << i)) - 0.5
-    u = t / (texel * (1 << j)) - 0.5
-    v0 = np.floor(v)
-    u0 = np.floor(u)
-    fv = np.float32(v - v0)
-    fu = np.float32(u - u0)
-    r0 = int(v0) & (rows - 1)
-    r1 = (r0 + 1) & (rows - 1)
-    c0 = int(u0) & (columns - 1)
-    c1 = (c0 + 1) & (columns - 1)
-    base = offsets[i, j]
-    a = base + r0 * columns + c0
-    b = base + r0 * columns + c1
-    c = base + r1 * columns + c0
-    d = base + r1 * columns + c1
-    k = np.float32(1.0 / 255.0)
-    wb = (1 - fv) * fu * k
-    wa = (1 - fv) * (1 - fu) * k
-    wc = fv * (1 - fu) * k
-    wd = fv * fu * k
+def _sample(texels, offsets, rows_log2, columns_log2, per_m, s, t, i, j):
+    """Four channels 0..1 at (s, t) [m] on level (i, j): bilinear, periodic, all four channels in two words."""
+    row_mask = (1 << (rows_log2 - i)) - 1
+    shift = columns_log2 - j
+    column_mask = (1 << shift) - 1
+    v = s * (per_m / F(1 << i)) + F(8191.5)  # kept positive, so that truncation is floor
+    u = t * (per_m / F(1 << j)) + F(8191.5)
+    vi, ui = np.int32(v), np.int32(u)
+    fv, fu = np.uint32((v - F(vi)) * F(16.0)), np.uint32((u - F(ui)) * F(16.0))
+    r0 = offsets[i, j] + (((vi + 1) & row_mask) << shift)
+    r1 = offsets[i, j] + (((vi + 2) & row_mask) << shift)
+    c0 = (ui + 1) & column_mask
+    c1 = (ui + 2) & column_mask
+    wd = fv * fu
+    wc = (fv << np.uint32(4)) - wd
+    wb = (fu << np.uint32(4)) - wd
+    wa = np.uint32(256) - wb - wc - wd
+    a, b = texels[np.uint64(r0 + c0)], texels[np.uint64(r0 + c1)]
+    c, d = texels[np.uint64(r1 + c0)], texels[np.uint64(r1 + c1)]
+    mask, eight = np.uint32(0x00FF00FF), np.uint32(8)
+    even = (a & mask) * wa + (b & mask) * wb + (c & mask) * wc + (d & mask) * wd
+    odd = ((a >> eight) & mask) * wa + ((b >> eight) & mask) * wb + ((c >> eight) & mask) * wc
+    odd += ((d >> eight) & mask) * wd
+    k = F(1.0 / 65280.0)
+    low, high = np.uint32(0xFFFF), np.uint32(16)
     return (
-        texels[a, 0] * wa + texels[b, 0] * wb + texels[c, 0] * wc + texels[d, 0] * wd,
-        texels[a, 1] * wa + texels[b, 1] * wb + texels[c, 1] * wc + texels[d, 1] * wd,
-        texels[a, 2] * wa + texels[b, 2] * wb + texels[c, 2] * wc + texels[d, 2] * wd,
-        texels[a, 3] * wa + texels[b, 3] * wb + texels[c, 3] * wc + texels[d, 3] * wd,
+        F(np.int32(even & low)) * k,
+        F(np.int32(odd & low)) * k,
+        F(np.int32(even >> high)) * k,
+        F(np.int32(odd >> high)) * k,
     )
 
 
 @njit(inline="always", fastmath=True)
-def _panorama(image, azimuth, elevation, reach, lowest, px):  # noqa: ANN
+def _panorama(image, azimuth, elevation, reach, lowest, px):
     """Light from a direction, bilinear, clamped at the rims."""
     rows, columns = image.shape[0], image.shape[1]
-    u = min(max((reach - azimuth) / px - 0.5, 0.0), columns - 1.001)
-    v = min(max((elevation - lowest) / px - 0.5, 0.0), rows - 1.001)
-    c, r = int(u), int(v)
-    fu, fv = np.float32(u - c), np.float32(v - r)
-    wa, wb, wc, wd = (1 - fv) * (1 - fu), (1 - fv) * fu, fv * (1 - fu), fv * fu
+    u = min(max((reach - azimuth) / px - HALF, F(0.0)), F(columns - 2))
+    v = min(max((elevation - lowest) / px - HALF, F(0.0)), F(rows - 2))
+    ui, vi = np.int32(u), np.int32(v)
+    fu, fv = u - F(ui), v - F(vi)
+    c, r = np.uint64(ui), np.uint64(vi)
+    c1, r1 = c + np.uint64(1), r + np.uint64(1)
+    wa, wb, wc, wd = (ONE - fv) * (ONE - fu), (ONE - fv) * fu, fv * (ONE - fu), fv * fu
     return (
-        image[r, c, 0] * wa + image[r, c + 1, 0] * wb + image[r + 1, c, 0] * wc + image[r + 1, c + 1, 0] * wd,
-        image[r, c, 1] * wa + image[r, c + 1, 1] * wb + image[r + 1, c, 1] * wc + image[r + 1, c + 1, 1] * wd,
-        image[r, c, 2] * wa + image[r, c + 1, 2] * wb + image[r + 1, c, 2] * wc + image[r + 1, c + 1, 2] * wd,
+        image[r, c, 0] * wa + image[r, c1, 0] * wb + image[r1, c, 0] * wc + image[r1, c1, 0] * wd,
+        image[r, c, 1] * wa + image[r, c1, 1] * wb + image[r1, c, 1] * wc + image[r1, c1, 1] * wd,
+        image[r, c, 2] * wa + image[r, c1, 2] * wb + image[r1, c, 2] * wc + image[r1, c1, 2] * wd,
     )
 
 
 @njit(inline="always", fastmath=True)
-def _step(value, low, high):  # noqa: ANN
+def _step(value, low, high):
     """Smooth step from 0 to 1 between two values."""
-    x = min(max((value - low) / (high - low), 0.0), 1.0)
-    return x * x * (3.0 - 2.0 * x)
+    x = min(max((value - low) / (high - low), F(0.0)), ONE)
+    return x * x * (F(3.0) - F(2.0) * x)
 
 
 @njit(inline="always", fastmath=True)
-def _paint(lines, s, t, foot_s, foot_t):  # noqa: ANN
+def _mix(b, g, r, to_b, to_g, to_r, share):
+    return b + (to_b - b) * share, g + (to_g - g) * share, r + (to_r - r) * share
+
+
+@njit(inline="always", fastmath=True)
+def _paint(lines, s, t, foot_s, foot_t):
     """Share of the pixel's footprint that a marking covers."""
-    share = np.float32(0.0)
+    share = F(0.0)
     for k in range(lines.shape[0]):
-        off = abs(t - lines[k, 0])
         width = lines[k, 1]
-        if off < 0.5 * (width + foot_t):
-            wide = min(1.0, (0.5 * (width + foot_t) - off) / foot_t, width / foot_t)
-            if lines[k, 2] > 0.0:
-                period = lines[k, 2]
-                phase = (s - lines[k, 4]) % period
-                middle = abs(phase - 0.5 * lines[k, 3])
-                middle = min(middle, period - middle)
-                run = min(
-                    1.0, max(0.0, (0.5 * (lines[k, 3] + foot_s) - middle) / foot_s), lines[k, 3] / foot_s
-                )
-                if foot_s > period:
-                    run = lines[k, 3] / period
-                wide *= run
-            share = max(share, np.float32(wide))
+        inside = HALF * (width + foot_t) - abs(t - lines[k, 0])
+        if inside <= F(0.0):
+            continue
+        part = min(ONE, inside / foot_t, width / foot_t)
+        period, dash = lines[k, 2], lines[k, 3]
+        if period > foot_s:
+            phase = (s - lines[k, 4]) % period
+            middle = abs(phase - HALF * dash)
+            middle = min(middle, period - middle)
+            part *= min(ONE, max(F(0.0), (HALF * (dash + foot_s) - middle) / foot_s), dash / foot_s)
+        elif period > F(0.0):
+            part *= dash / period
+        share = max(share, part)
     return share
 
 
+@njit(inline="always", fastmath=True)
+def _asphalt(look, m0, m1, m2, m3, f0, track, oil, repair):
+    """Tone of dry asphalt relative to its albedo: stains, wheel paths, cracks, repairs (grain comes later)."""
+    value = ONE + F(0.9) * look.stains * m0 + F(0.6) * look.stains * m1 + F(0.3) * look.stains * m3
+    value += look.wheel_band * track - look.oil_band * oil
+    threshold = F(0.75) - F(1.1) * look.cracks
+    crack = min(ONE, m2 * F(1.6)) * _step(m1 + F(0.7) * m3, threshold, threshold + F(0.2))
+    return value * (ONE - F(0.75) * crack) * (F(0.35) + F(1.3) * repair)
+
+
+@njit(inline="always", fastmath=True)
+def _water(look, m0, m1, m3, f0, f2, track, oil):
+    """A water film: share of standing water, darkening, gloss of the film, and how much grain it drowns."""
+    threshold = F(0.62) - F(0.75) * look.puddles
+    pool = m3 + F(0.25) * track + F(0.12) * m1 + F(0.05) * f2
+    still = _step(pool, threshold, threshold + F(0.08)) * min(ONE, look.puddles * F(5.0))
+    film = look.film + F(0.4) * m0 + F(0.4) * m3 + F(0.35) * m1 - F(0.3) * track + F(0.1) * oil
+    film = min(max(film, F(0.08)), F(1.1))
+    dark = ONE - (ONE - look.wet_darkening) * min(ONE, F(0.5) + film)
+    dark *= ONE - F(0.35) * still
+    calm = ONE - F(0.5) * min(film, ONE)
+    gloss = (F(0.06) + F(0.5) * film) * (ONE + F(1.6) * calm * f0)
+    gloss = min(max(gloss, F(0.0)), F(0.85))
+    return still, dark, gloss, calm * (ONE - F(0.8) * still)
+
+
+@njit(inline="always", fastmath=True)
+def _snow(look, m0, m1, m3, f0, f1, track):
+    """Snow on the road: cover, its colour, and how far the wheels have packed it."""
+    cover = look.cover - look.clearing * track * (ONE + F(0.8) * m0)
+    cover += F(0.55) * m1 + F(0.3) * m0 + F(0.35) * m3 + F(0.5) * f1 + F(0.25) * f0
+    cover = _step(cover, F(0.28), F(0.62))
+    packed = track * (F(0.35) + HALF * look.clearing)
+    bump = ONE + look.relief * (F(0.75) * f1 + F(0.25) * f0) * (ONE - F(0.4) * packed)
+    bump *= ONE + look.relief * (F(0.45) * m0 + F(0.3) * m1) - F(0.22) * packed
+    grime = look.dirt * (F(0.7) + F(1.6) * m0 + F(1.2) * m1 + HALF * track)
+    grime = min(max(grime, F(0.0)), F(0.9))
+    b, g, r = _mix(look.snow_b, look.snow_g, look.snow_r, F(0.16), F(0.165), F(0.17), grime)
+    return cover, b * bump, g * bump, r * bump, packed
+
+
+@njit(inline="always", fastmath=True)
+def _verge(look, kind, m1, m3, f1, f3):
+    """Ground beside the road, with snow on it where there is any."""
+    value = max(ONE + look.verge_grain * (F(1.2) * f3 + F(0.9) * m1 + F(0.7) * m3), F(0.15))
+    if kind == WET:
+        value *= F(0.75)
+    b, g, r = look.verge_b * value, look.verge_g * value, look.verge_r * value
+    blanket = look.verge_snow
+    if kind == SNOW:
+        blanket = max(blanket, look.cover + F(0.1))
+    if blanket > F(0.0):
+        cover = _step(blanket + F(0.6) * m1 + HALF * m3 + F(0.7) * f3, F(0.3), F(0.7))
+        bump = ONE + look.relief * (HALF * f1 + F(0.6) * m3 + HALF * m1)
+        b, g, r = _mix(b, g, r, look.snow_b * bump, look.snow_g * bump, look.snow_r * bump, cover)
+    return b, g, r
+
+
+@njit(inline="always", fastmath=True)
+def _road(look, kind, macro, fine, track, oil, repair, bitumen, paint):
+    """Reflectance of the road, gloss of its film, and share of standing water."""
+    m0, m1, m2, m3 = macro
+    f0, f1, f2 = fine
+    value = _asphalt(look, m0, m1, m2, m3, f0, track, oil, repair)
+    b, g, r = look.asphalt_b * value, look.asphalt_g * value, look.asphalt_r * value
+    if paint > F(0.0):
+        paint *= ONE - _step(look.wear * F(1.5) - F(0.55) + F(0.9) * m1 + F(0.8) * f0, F(0.0), HALF)
+        b, g, r = _mix(b, g, r, look.paint_b, look.paint_g, look.paint_r, paint)
+    grain = F(2.6) * look.grain * f0
+    gloss, still = F(0.1) * bitumen, F(0.0)
+    if kind >= WET:
+        still, dark, gloss, calm = _water(look, m0, m1, m3, f0, f2, track, oil)
+        grain *= calm
+        b, g, r = b * dark, g * dark, r * dark
+    grain += ONE
+    b, g, r = b * grain, g * grain, r * grain
+    if kind == SNOW:
+        cover, white_b, white_g, white_r, packed = _snow(look, m0, m1, m3, f0, f1, track)
+        b, g, r = _mix(b, g, r, white_b, white_g, white_r, cover)
+        still *= (ONE - cover) * F(0.6)
+        gloss = gloss * (ONE - cover) + look.ice_gloss * packed * cover
+    return b, g, r, gloss, still
+
+
+@njit(inline="always", fastmath=True)
+def _mirrored(look, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, still, ripple):
+    """Adds what a wet surface mirrors: blurred by the film on rough stone, sharp in standing water."""
+    sway = ripple * F(0.05)
+    mb, mg, mr = _panorama(
+        rough,
+        azimuth + sway,
+        F(0.03) - elevation * F(1.15) + sway,
+        look.reach,
+        look.lowest,
+        look.rough_px,
+    )
+    b, g, r = _mix(b, g, r, mb, mg, mr, gloss * shine)
+    if still > F(0.02):
+        mb, mg, mr = _panorama(
+            sharp,
+            azimuth + F(0.1) * sway,
+            F(0.2) * sway - elevation,
+            look.reach,
+            look.lowest,
+            look.sharp_px,
+        )
+        b, g, r = _mix(b, g, r, mb, mg, mr, still * min(ONE, F(0.06) + shine))
+    return b, g, r
+
+
 @njit(nogil=True, cache=True, fastmath=True)
-def shade(  # noqa: PLR
-    pixels, maps, look, scales, s0, t0, heading, gains, image, drivable, shadow, surface
-):  # noqa: ANN
-    """Fills the picture and the label maps; ``scales`` is (reach, lowest, sharp px, rough px) of the panorama [rad]."""
-    height, width = pixels.x.shape
-    cos_h, sin_h = np.cos(heading), np.sin(heading)
-    tone, top = maps.tone, maps.tone.shape[0] - 1
-    reach, lowest, sharp_px, rough_px = scales
-    half = np.float32(0.5)
+def shade(pixels, maps, look, place, starts, surfaces, image, drivable, shadow, surface):
+    """Fills the picture and the label maps.
+
+    ``starts`` are the segments' starts ahead of the front axle [m], ``surfaces`` their classes; the outputs have
+    shapes (H, W, 3) and (H, W).
+    """
+    # Named here, since taking an array from its tuple costs reference counting at every pixel.
+    xs, ys, foot_x, foot_y, level_words, azimuths, elevations, shines, distances = pixels
+    macro, macro_at, fine, fine_at, decal, decal_at, sharp, rough, tone, lines, profile, clears = maps
+    height, width = xs.shape
+    top = np.uint64(tone.shape[0] - 1)
+    four = np.uint32(15)
     for row in range(height):
         for col in range(width):
-            azimuth = pixels.azimuth[row, col] + heading
-            elevation = pixels.elevation[row, col]
-            x = pixels.x[row, col]
-            distance = pixels.distance[row, col]
-            if distance < 0.0:  # above the horizon
-                b, g, r = _panorama(maps.sharp, azimuth, elevation, reach, lowest, sharp_px)
-                b, g, r = b + look.veil, g + look.veil, r + look.veil
-                image[row, col, 0] = tone[min(int(b * gains[0]), top)]
-                image[row, col, 1] = tone[min(int(g * gains[1]), top)]
-                image[row, col, 2] = tone[min(int(r * gains[2]), top)]
-                drivable[row, col] = False
-                shadow[row, col] = False
-                surface[row, col] = -1
-                continue
-            y = pixels.y[row, col]
-            s = s0 + x * cos_h - y * sin_h
-            t = t0 + x * sin_h + y * cos_h
-            kind = maps.surfaces[0]
-            for k in range(1, maps.starts.shape[0]):
-                if s >= maps.starts[k]:
-                    kind = maps.surfaces[k]
-            on_road = look.right <= t <= look.left
-            lx, ly = pixels.level_x[row, col], pixels.level_y[row, col]
-
-            m0, m1, m2, m3 = _sample(
-                maps.macro, maps.macro_at, 2048, 1024, 0.02, s + look.macro_s, t + look.macro_t,
-                _level(lx, -5.644, 9), _level(ly, -5.644, 8),
-            )  # fmt: skip
-            f0, f1, f2, f3 = _sample(
-                maps.fine, maps.fine_at, 1024, 1024, 0.004, s + look.fine_s, t + look.fine_t,
-                _level(lx, -7.966, 9), _level(ly, -7.966, 9),
-            )  # fmt: skip
-            shaded, label, repair, bitumen = np.float32(0.0), np.float32(0.0), half, np.float32(0.0)
-            if -15.3 < t < 15.3:
-                shaded, label, repair, bitumen = _sample(
-                    maps.decal, maps.decal_at, 4096, 512, 0.06, s, t + 15.36,
-                    _level(lx, -4.059, 6), _level(ly, -4.059, 6),
-                )  # fmt: skip
-            m0 -= half
-            m1 -= half
-            m3 -= half
-            f0 -= half
-            f1 -= half
-            f3 -= half
-            gloss = np.float32(0.0)
-            still = np.float32(0.0)
-            if on_road:
-                spot = min(int((t - look.right) * 50.0), maps.profile.shape[0] - 1)
-                track, oil = maps.profile[spot, 0], maps.profile[spot, 1]
-                value = 1.0 + 1.3 * look.stains * m0 + 0.5 * look.stains * m1
-                value += look.wheel_band * track - look.oil_band * oil
-                worn = _step(m1 + 0.7 * m3, 0.75 - 1.1 * look.cracks, 0.95 - 1.1 * look.cracks)
-                crack = min(1.0, m2 * 1.5) * worn
-                value *= (1.0 - 0.75 * crack) * (0.35 + 1.3 * repair)
-                rough = 1.0 + 2.6 * look.grain * f0
-                b, g, r = look.asphalt_b * value, look.asphalt_g * value, look.asphalt_r * value
-                foot_s, foot_t = 2.0**lx, 2.0**ly
-                paint = _paint(maps.lines, s, t, foot_s, foot_t)
-                if paint > 0.0:
-                    paint *= 1.0 - _step(look.wear * 1.5 - 0.55 + 0.9 * m1 + 0.8 * f0, 0.0, 0.5)
-                    b += (look.paint_b - b) * paint
-                    g += (look.paint_g - g) * paint
-                    r += (look.paint_r - r) * paint
-                if kind == WET or kind == SNOW:
-                    film = look.film + 0.5 * m0 + 0.5 * m3 + 0.35 * m1 - 0.2 * track + 0.15 * oil
-                    still = _step(
-                        m3 + 0.25 * track + 0.12 * m1 + 0.05 * f2,
-                        0.62 - 0.75 * look.puddles,
-                        0.70 - 0.75 * look.puddles,
-                    )
-                    still *= min(1.0, look.puddles * 5.0)
-                    film = min(max(film, 0.1), 1.1)
-                    dark = 1.0 - (1.0 - look.wet_darkening) * min(1.0, 0.45 + film)
-                    calm = 1.0 - 0.55 * min(film, 1.0)
-                    gloss = min(0.9, (0.1 + 0.55 * film) * (1.0 + 1.2 * calm * f0))
-                    gloss = max(gloss, 0.0)
-                    dark *= 1.0 - 0.35 * still
-                    rough = 1.0 + (rough - 1.0) * calm * (1.0 - 0.8 * still)
-                    b, g, r = b * dark, g * dark, r * dark
-                b, g, r = b * rough, g * rough, r * rough
-                if kind == DRY:
-                    gloss = np.float32(0.03) + 0.1 * bitumen
-                elif kind == SNOW:
-                    cover = (
-                        look.cover
-                        - look.clearing * track * (1.0 + 0.8 * m0)
-                        + 0.55 * m1
-                        + 0.3 * m0
-                        + 0.35 * m3
-                    )
-                    cover = _step(cover + 0.5 * f1 + 0.25 * f0, 0.28, 0.62)
-                    packed = track * (0.35 + 0.5 * look.clearing)
-                    bump = 1.0 + look.relief * (0.75 * f1 + 0.25 * f0) * (1.0 - 0.4 * packed)
-                    bump *= 1.0 + (0.45 * look.relief * m0 + 0.3 * look.relief * m1) - 0.22 * packed
-                    grime = min(max(look.dirt * (0.7 + 1.6 * m0 + 1.2 * m1 + 0.5 * track), 0.0), 0.9)
-                    white_b = (look.snow_b + (0.16 - look.snow_b) * grime) * bump
-                    white_g = (look.snow_g + (0.165 - look.snow_g) * grime) * bump
-                    white_r = (look.snow_r + (0.17 - look.snow_r) * grime) * bump
-                    b += (white_b - b) * cover
-                    g += (white_g - g) * cover
-                    r += (white_r - r) * cover
-                    still *= (1.0 - cover) * 0.6
-                    gloss = gloss * (1.0 - cover) + look.ice_gloss * packed * cover
+            azimuth = azimuths[row, col] + place.heading
+            elevation = elevations[row, col]
+            distance = distances[row, col]
+            on_road, shaded_label, kind = False, False, np.int8(-1)
+            if distance < F(0.0):
+                b, g, r = _panorama(sharp, azimuth, elevation, look.reach, look.lowest, look.sharp_px)
             else:
-                value = 1.0 + look.verge_grain * (1.2 * f3 + 0.9 * m1 + 0.7 * m3)
-                value = max(value, 0.15)
-                b, g, r = look.verge_b * value, look.verge_g * value, look.verge_r * value
-                if kind == WET:
-                    b, g, r = b * 0.75, g * 0.75, r * 0.75
-                blanket = look.verge_snow
-                if kind == SNOW:
-                    blanket = max(blanket, look.cover + 0.1)
-                if blanket > 0.0:
-                    cover = _step(blanket + 0.6 * m1 + 0.5 * m3 + 0.7 * f3, 0.3, 0.7)
-                    bump = 1.0 + look.relief * (0.5 * f1 + 0.6 * m3 + 0.5 * m1)
-                    b += (look.snow_b * bump - b) * cover
-                    g += (look.snow_g * bump - g) * cover
-                    r += (look.snow_r * bump - r) * cover
-            lit = 1.0 - shaded
-            b = max(b, 0.004) * (look.fill_b + look.sun_b * lit)
-            g = max(g, 0.004) * (look.fill_g + look.sun_g * lit)
-            r = max(r, 0.004) * (look.fill_r + look.sun_r * lit)
-            if gloss + still > 0.01:
-                shine = pixels.shine[row, col]
-                sway = (f2 - half) * 0.05
-                mb, mg, mr = _panorama(
-                    maps.rough, azimuth + sway, 0.03 - elevation * 1.15 + sway, reach, lowest, rough_px
-                )
-                share = gloss * shine
-                b += (mb - b) * share
-                g += (mg - g) * share
-                r += (mr - r) * share
-                if still > 0.02:
-                    mb, mg, mr = _panorama(
-                        maps.sharp, azimuth + 0.1 * sway, 0.2 * sway - elevation, reach, lowest, sharp_px
+                x, y = xs[row, col], ys[row, col]
+                ahead = x * place.cos_heading - y * place.sin_heading
+                aside = x * place.sin_heading + y * place.cos_heading
+                t = place.t + aside
+                on_road = look.right <= t <= look.left
+                if not on_road and distance > look.verge_end:
+                    b, g, r = _panorama(
+                        sharp, azimuth, max(elevation, F(0.002)), look.reach, look.lowest, look.sharp_px
                     )
-                    share = still * min(1.0, 0.06 + shine)
-                    b += (mb - b) * share
-                    g += (mg - g) * share
-                    r += (mr - r) * share
-            clear = np.exp(-distance / look.visibility)
-            b = look.haze_b + (b - look.haze_b) * clear + look.veil
-            g = look.haze_g + (g - look.haze_g) * clear + look.veil
-            r = look.haze_r + (r - look.haze_r) * clear + look.veil
-            image[row, col, 0] = tone[min(int(b * gains[0]), top)]
-            image[row, col, 1] = tone[min(int(g * gains[1]), top)]
-            image[row, col, 2] = tone[min(int(r * gains[2]), top)]
+                else:
+                    kind = surfaces[0]
+                    for k in range(1, starts.shape[0]):
+                        if ahead >= starts[k]:
+                            kind = surfaces[k]
+                    levels = level_words[row, col]
+                    m0, m1, m2, m3 = _sample(
+                        macro,
+                        macro_at,
+                        11,
+                        10,
+                        F(50.0),
+                        place.macro_s + ahead,
+                        place.macro_t + aside,
+                        levels & four,
+                        (levels >> np.uint32(4)) & four,
+                    )
+                    f0, f1, f2, f3 = _sample(
+                        fine,
+                        fine_at,
+                        10,
+                        10,
+                        F(250.0),
+                        place.fine_s + ahead,
+                        place.fine_t + aside,
+                        (levels >> np.uint32(8)) & four,
+                        (levels >> np.uint32(12)) & four,
+                    )
+                    shaded, label, repair, bitumen = F(0.0), F(0.0), HALF, F(0.0)
+                    if F(-15.2) < t < F(15.2):
+                        shaded, label, repair, bitumen = _sample(
+                            decal,
+                            decal_at,
+                            12,
+                            9,
+                            F(1.0 / 0.06),
+                            place.decal_s + ahead,
+                            place.decal_t + aside,
+                            (levels >> np.uint32(16)) & four,
+                            (levels >> np.uint32(20)) & four,
+                        )
+                    m0, m1, m3 = m0 - HALF, m1 - HALF, m3 - HALF
+                    f0, f1, f2, f3 = f0 - HALF, f1 - HALF, f2 - HALF, f3 - HALF
+                    gloss, still = F(0.0), F(0.0)
+                    if on_road:
+                        spot = min(int((t - look.right) * F(50.0)), profile.shape[0] - 1)
+                        track, oil = profile[spot, 0], profile[spot, 1]
+                        paint = _paint(
+                            lines,
+                            place.lines_s + ahead,
+                            t,
+                            foot_x[row, col],
+                            foot_y[row, col],
+                        )
+                        b, g, r, gloss, still = _road(
+                            look, kind, (m0, m1, m2, m3), (f0, f1, f2), track, oil, repair, bitumen, paint
+                        )
+                        shaded_label = label >= F(0.502)
+                    else:
+                        b, g, r = _verge(look, kind, m1, m3, f1, f3)
+                        kind = np.int8(-1)
+                    lit = ONE - shaded
+                    b = max(b, F(0.004)) * (look.fill_b + look.sun_b * lit)
+                    g = max(g, F(0.004)) * (look.fill_g + look.sun_g * lit)
+                    r = max(r, F(0.004)) * (look.fill_r + look.sun_r * lit)
+                    if gloss + still > F(0.02):
+                        shine = shines[row, col]
+                        b, g, r = _mirrored(
+                            look, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, still, f2
+                        )
+                    b, g, r = _mix(look.haze_b, look.haze_g, look.haze_r, b, g, r, clears[row, col])
+            image[row, col, 0] = tone[min(np.uint64((b + look.veil) * place.gain_b), top)]
+            image[row, col, 1] = tone[min(np.uint64((g + look.veil) * place.gain_g), top)]
+            image[row, col, 2] = tone[min(np.uint64((r + look.veil) * place.gain_r), top)]
             drivable[row, col] = on_road
-            shadow[row, col] = on_road and label >= 0.502
-            surface[row, col] = kind if on_road else -1
+            shadow[row, col] = shaded_label
+            surface[row, col] = kind

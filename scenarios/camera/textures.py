@@ -14,8 +14,10 @@ Texture = NDArray[np.uint8]
 
 MACRO_TEXEL_M = 0.02
 MACRO_SHAPE = (2048, 1024)  # along the road, across: 40.96 m x 20.48 m
+MACRO_LEVELS = (9, 8)
 FINE_TEXEL_M = 0.004
 FINE_SHAPE = (1024, 1024)  # 4.096 m x 4.096 m
+FINE_LEVELS = (9, 9)
 BANK_SEED = 20220901
 
 
@@ -23,19 +25,18 @@ BANK_SEED = 20220901
 class RipMap:
     """A texture halved independently along and across the road, so that far ground neither flickers nor smears.
 
-    ``texels`` holds every level one after another, shape (n, 4); ``offsets[i, j]`` is where the level with
-    ``i`` halvings along and ``j`` halvings across begins. The map is periodic along the road.
+    ``texels`` holds every level one after another, shape (n,), a word of four byte channels each;
+    ``offsets[i, j]`` is where the level with ``i`` halvings along and ``j`` halvings across begins.
     """
 
-    texels: Texture
+    texels: NDArray[np.uint32]
     offsets: NDArray[np.int64]
-    shape: tuple[int, int]
-    texel_m: float
 
 
-def build_ripmap(texture: Texture, texel_m: float, levels_along: int, levels_across: int) -> RipMap:
+def build_ripmap(texture: Texture, levels: tuple[int, int]) -> RipMap:
     """All levels of a texture of shape (along, across, 4); both sizes must be divisible by their halvings."""
     along, across = texture.shape[:2]
+    levels_along, levels_across = levels
     parts: list[Texture] = []
     offsets = np.zeros((levels_along, levels_across), dtype=np.int64)
     total = 0
@@ -50,7 +51,7 @@ def build_ripmap(texture: Texture, texel_m: float, levels_along: int, levels_acr
                 level = cv2.resize(level, (across >> (j + 1), along >> i), interpolation=cv2.INTER_AREA)
         if i + 1 < levels_along:
             row = cv2.resize(row, (across, along >> (i + 1)), interpolation=cv2.INTER_AREA)
-    return RipMap(np.concatenate(parts), offsets, (along, across), texel_m)
+    return RipMap(np.concatenate(parts).view(np.uint32)[:, 0], offsets)
 
 
 def _spectrum_noise(
@@ -123,7 +124,7 @@ def macro_texture() -> RipMap:
         _cracks(rng, MACRO_SHAPE),
         _to_bytes(hollows),
     ]
-    return build_ripmap(np.dstack(channels), MACRO_TEXEL_M, 9, 8)
+    return build_ripmap(np.dstack(channels), MACRO_LEVELS)
 
 
 @lru_cache(maxsize=1)
@@ -137,4 +138,4 @@ def fine_texture() -> RipMap:
     ripples = _spectrum_noise(rng, FINE_SHAPE, (200.0, 8.0), 1.0, 1.0)
     blades = _spectrum_noise(rng, FINE_SHAPE, (200.0, 1.0), 0.6, 1.0)
     channels = [_to_bytes(layer / layer.std()) for layer in (stones, crumbs, ripples, blades)]
-    return build_ripmap(np.dstack(channels), FINE_TEXEL_M, 9, 9)
+    return build_ripmap(np.dstack(channels), FINE_LEVELS)
