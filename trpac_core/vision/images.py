@@ -67,7 +67,11 @@ def decode_image(
             f"{name}: neither JPEG nor PNG (starts with {data[:8].hex(' ')}). Convert the picture."
         )
     _check_size(width, height, name)
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR_BGR | cv2.IMREAD_IGNORE_ORIENTATION)
+    how = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), how)
+    except cv2.error as error:
+        raise ImageError(f"{name}: damaged; the picture cannot be decoded ({error.err}).") from error
     if image is None:
         raise ImageError(f"{name}: damaged; the picture cannot be decoded. Copy or record it again.")
     return image.astype(np.uint8, copy=False)

@@ -1,0 +1,116 @@
+"""Every way in which a picture file can be good or bad."""
+
+import struct
+import zlib
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from trpac_core.vision.images import ImageError, decode_image, raw_bgr_image
+
+PICTURE = np.random.default_rng(0).integers(0, 256, (80, 128, 3), dtype=np.uint8)
+
+
+def encoded(kind: str, image=PICTURE) -> bytes:
+    good, data = cv2.imencode(kind, image)
+    assert good
+    return data.tobytes()
+
+
+PNG, JPEG = encoded(".png"), encoded(".jpg")
+
+
+def test_png_is_exact_and_jpeg_close(tmp_path):
+    assert (decode_image(PNG) == PICTURE).all()
+    smooth = cv2.GaussianBlur(PICTURE, (0, 0), 8)
+    assert np.abs(decode_image(encoded(".jpg", smooth)).astype(int) - smooth).max() < 25
+    file = tmp_path / "frame ü.png"
+    file.write_bytes(PNG)
+    assert (decode_image(file) == PICTURE).all()
+    assert (decode_image(str(file)) == PICTURE).all()
+    assert (decode_image(memoryview(PNG)) == PICTURE).all()
+
+
+def test_grey_alpha_and_16_bit_become_8_bit_bgr():
+    grey = PICTURE[..., 0]
+    assert (decode_image(encoded(".png", grey)) == grey[..., None]).all()
+    alpha = np.dstack((PICTURE, np.full((80, 128), 7, np.uint8)))
+    assert (decode_image(encoded(".png", alpha)) == PICTURE).all()
+    deep = decode_image(encoded(".png", PICTURE.astype(np.uint16) * 257))
+    assert deep.dtype == np.uint8
+    assert np.abs(deep.astype(int) - PICTURE).max() <= 1
+
+
+def test_exif_turn_is_not_applied():
+    exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
+    turned = JPEG[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + JPEG[2:]
+    assert decode_image(turned).shape == PICTURE.shape
+
+
+def test_progressive_jpeg_and_trailing_bytes():
+    good, data = cv2.imencode(".jpg", PICTURE, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])
+    assert good
+    assert decode_image(data.tobytes()).shape == PICTURE.shape
+    assert decode_image(JPEG + b"\0" * 64).shape == PICTURE.shape
+
+
+@pytest.mark.parametrize("data", [PNG, JPEG], ids=["png", "jpeg"])
+@given(share=st.floats(0.05, 0.999))
+def test_every_cut_is_noticed(data, share):
+    with pytest.raises(ImageError, match="cut short"):
+        decode_image(data[: int(len(data) * share)], "frame.bin")
+
+
+@given(st.binary(max_size=400))
+def test_no_bytes_lead_to_another_error(data):
+    for start in (b"", b"\xff\xd8\xff", PNG[:8], JPEG[:200], PNG[:60]):
+        with pytest.raises(ImageError):
+            decode_image(start + data)
+
+
+def test_damaged_png():
+    broken = bytearray(PNG)
+    broken[len(PNG) // 2] ^= 0xFF
+    with pytest.raises(ImageError, match="wrong checksum"):
+        decode_image(bytes(broken))
+
+
+def test_missing_empty_foreign_and_unreadable_files(tmp_path):
+    (tmp_path / "empty.jpg").write_bytes(b"")
+    (tmp_path / "text.jpg").write_text("hello")
+    with pytest.raises(ImageError, match=r"nothing\.jpg: no such file"):
+        decode_image(tmp_path / "nothing.jpg")
+    with pytest.raises(ImageError, match=r"empty\.jpg: empty"):
+        decode_image(tmp_path / "empty.jpg")
+    with pytest.raises(ImageError, match=r"text\.jpg: neither JPEG nor PNG"):
+        decode_image(tmp_path / "text.jpg")
+    with pytest.raises(ImageError, match="cannot be read"):
+        decode_image(tmp_path)
+    with pytest.raises(ImageError, match="cannot be read"):
+        decode_image("a\0b.jpg")
+    with pytest.raises(ImageError, match="image: empty"):
+        decode_image(b"")
+
+
+def test_too_small_and_too_large_are_refused_before_decoding():
+    with pytest.raises(ImageError, match="40 x 30 pixels; expected at least 64"):
+        decode_image(encoded(".png", np.zeros((30, 40, 3), np.uint8)))
+    header = struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0)
+    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(b"")), (b"IEND", b"")]
+    bomb = PNG[:8] + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks
+    )
+    with pytest.raises(ImageError, match="at most 64 megapixels"):
+        decode_image(bomb)
+
+
+def test_raw_buffer():
+    assert (raw_bgr_image(PICTURE.tobytes(), 128, 80) == PICTURE).all()
+    with pytest.raises(ImageError, match="expected 30720"):
+        raw_bgr_image(PICTURE.tobytes()[:-1], 128, 80)
+    with pytest.raises(ImageError, match="at least 64"):
+        raw_bgr_image(b"", 0, 0)

@@ -1,0 +1,72 @@
+"""The networks' contract: inputs, outputs, calibration, and files that do not fit."""
+
+import numpy as np
+import pytest
+from tiny_onnx import write_classifier, write_segmenter
+
+from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
+
+
+def test_classifier_takes_any_number_of_patches_in_one_run(tmp_path):
+    classifier = SurfaceClassifier(write_classifier(tmp_path / "surface.onnx"))
+    patches = np.random.default_rng(0).integers(0, 256, (7, 64, 96, 3), dtype=np.uint8)
+    assert classifier.logits(patches) == pytest.approx(patches.mean(axis=(1, 2)), rel=1e-5)
+    assert classifier.logits(patches[:1]).shape == (1, 3)
+    assert classifier.temperature == 2.5
+
+
+def test_segmenter_reduces_the_picture_and_keeps_its_layout(tmp_path):
+    segmenter = Segmenter(write_segmenter(tmp_path / "segmenter.onnx"), threads=1)
+    image = np.zeros((1200, 1920, 3), np.uint8)
+    image[600:, :960] = 200
+    masks = segmenter.segment(image)
+    assert masks.drivable.shape == masks.shadow.shape == (160, 256)
+    assert (masks.drivable[80:, :128] > 0.99).all()
+    assert masks.shadow[100, 10] == pytest.approx(200.0)
+    assert (masks.drivable[:80] == 0.5).all()
+    assert (masks.drivable[80:, 128:] == 0.5).all()
+
+
+def test_swapped_files_are_named_with_what_was_expected(tmp_path):
+    surface, segmenter = write_classifier(tmp_path / "a.onnx"), write_segmenter(tmp_path / "b.onnx")
+    with pytest.raises(
+        ModelError, match=r"a\.onnx: expected one input 'image'.*\[1, 160, 256, 3\].*'patches'"
+    ):
+        Segmenter(surface)
+    with pytest.raises(ModelError, match=r"b\.onnx: expected one input 'patches'.*64, 96, 3.*'image'"):
+        SurfaceClassifier(segmenter)
+
+
+def test_wrong_patch_size_and_wrong_outputs(tmp_path):
+    with pytest.raises(ModelError, match=r"\['n', 64, 96, 3\].*32, 96"):
+        SurfaceClassifier(write_classifier(tmp_path / "small.onnx", height=32))
+    with pytest.raises(ModelError, match=r"expected outputs \['drivable', 'shadow'\]"):
+        Segmenter(write_segmenter(tmp_path / "other.onnx", outputs=("road", "shade")))
+
+
+@pytest.mark.parametrize(
+    ("metadata", "said"),
+    [
+        ({}, "'temperature' must be .*None.*'classes' must be"),
+        ({"temperature": "warm", "classes": "dry,wet,snow_ice"}, "is 'warm'"),
+        ({"temperature": "-1.0", "classes": "dry,wet,snow_ice"}, "above 0"),
+        ({"temperature": "nan", "classes": "dry,wet,snow_ice"}, "above 0"),
+        ({"temperature": "1.5", "classes": "snow,wet,dry"}, "is 'snow,wet,dry'"),
+    ],
+)
+def test_calibration_must_come_with_the_file(tmp_path, metadata, said):
+    with pytest.raises(ModelError, match=said):
+        SurfaceClassifier(write_classifier(tmp_path / "surface.onnx", metadata=metadata))
+
+
+def test_missing_empty_and_foreign_files(tmp_path):
+    with pytest.raises(ModelError, match=r"nowhere\.onnx: no such network file"):
+        Segmenter(tmp_path / "nowhere.onnx")
+    for name, content in {"empty.onnx": b"", "text.onnx": b"not a network at all"}.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ModelError, match=name):
+            Segmenter(tmp_path / name)
+    whole = write_segmenter(tmp_path / "whole.onnx").read_bytes()
+    (tmp_path / "cut.onnx").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(ModelError, match=r"cut\.onnx"):
+        Segmenter(tmp_path / "cut.onnx")

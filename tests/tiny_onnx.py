@@ -1,0 +1,73 @@
+"""Writes networks of two nodes as ONNX files, by the protobuf wire format: stand-ins that need no training."""
+
+from pathlib import Path
+
+FLOAT, UINT8 = 1, 2
+
+
+def _varint(value: int) -> bytes:
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*out, value])
+
+
+def _field(number: int, value: int | str | bytes) -> bytes:
+    if isinstance(value, int):
+        return _varint(number << 3) + _varint(value)
+    data = value.encode() if isinstance(value, str) else value
+    return _varint(number << 3 | 2) + _varint(len(data)) + data
+
+
+def _tensor(name: str, kind: int, shape: list[int | str]) -> bytes:
+    dims = b"".join(_field(1, _field(1 if isinstance(size, int) else 2, size)) for size in shape)
+    return _field(1, name) + _field(2, _field(1, _field(1, kind) + _field(2, dims)))
+
+
+def _node(kind: str, source: str, target: str, attributes: bytes = b"") -> bytes:
+    return _field(1, source) + _field(2, target) + _field(4, kind) + attributes
+
+
+def _cast(source: str) -> bytes:
+    return _node("Cast", source, "as_float", _field(5, _field(1, "to") + _field(3, FLOAT) + _field(20, 2)))
+
+
+def _mean(target: str, axes: list[int]) -> bytes:
+    over = _field(1, "axes") + b"".join(_field(8, axis) for axis in axes) + _field(20, 7)
+    flat = _field(1, "keepdims") + _field(3, 0) + _field(20, 2)
+    return _node("ReduceMean", "as_float", target, _field(5, over) + _field(5, flat))
+
+
+def _write(path: Path, nodes: list[bytes], inputs: list[bytes], outputs: list[bytes], metadata: dict) -> Path:
+    graph = b"".join(_field(1, node) for node in nodes) + _field(2, "tiny")
+    graph += b"".join(_field(11, tensor) for tensor in inputs) + b"".join(_field(12, t) for t in outputs)
+    model = _field(1, 8) + _field(7, graph) + _field(8, _field(1, "") + _field(2, 13))
+    model += b"".join(_field(14, _field(1, key) + _field(2, value)) for key, value in metadata.items())
+    path.write_bytes(model)
+    return path
+
+
+def write_classifier(path: Path, *, height: int = 64, metadata: dict | None = None) -> Path:
+    """Logits are the mean blue, green and red of each patch."""
+    calibration = {"temperature": "2.5", "classes": "dry,wet,snow_ice"} if metadata is None else metadata
+    return _write(
+        path,
+        [_cast("patches"), _mean("logits", [1, 2])],
+        [_tensor("patches", UINT8, ["n", height, 96, 3])],
+        [_tensor("logits", FLOAT, ["n", 3])],
+        calibration,
+    )
+
+
+def write_segmenter(path: Path, *, outputs: tuple[str, str] = ("drivable", "shadow")) -> Path:
+    """Drivable is the sigmoid of the mean colour: above 0.99 where anything is lit; shadow its mean, unscaled."""
+    drivable, shadow = outputs
+    mask = [1, 160, 256]
+    return _write(
+        path,
+        [_cast("image"), _mean(shadow, [3]), _node("Sigmoid", shadow, drivable)],
+        [_tensor("image", UINT8, [1, 160, 256, 3])],
+        [_tensor(drivable, FLOAT, mask), _tensor(shadow, FLOAT, mask)],
+        {},
+    )
