@@ -1,0 +1,1 @@
+"""The FMI boundary: slaves, their variables and the packaging; no physics."""

@@ -1,0 +1,270 @@
+"""A co-simulation slave that never lets an exception reach the wrapper.
+
+The wrapper of pythonfmu frees the slave when an exception leaves a callback, while the host keeps its handle:
+the next call would use freed memory. It also passes log texts on as printf formats. Both are dealt with here,
+once, for every slave; see docs/fmu.md.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from _thread import interrupt_main
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ClassVar
+
+from pythonfmu.enums import Fmi2Status
+from pythonfmu.fmi2slave import Fmi2Slave
+
+from .variables import Kind, Variable
+
+Value = float | int | bool | str
+STATE_SCHEMA = 1
+INTERRUPT_DELAY_S = 0.01
+"""A Ctrl-C that arrives within a callback is raised again this much later, in the host's own code [s]."""
+NEUTRAL: dict[Kind, Value] = {Kind.REAL: 0.0, Kind.INTEGER: 0, Kind.BOOLEAN: False, Kind.STRING: ""}
+"""Start of outputs, and what a read of an unknown value reference gives."""
+
+
+def log_text(message: str) -> str:
+    """The message as the wrapper can log it: no printf directive, no lone surrogate."""
+    return message.encode("utf-8", "replace").decode("utf-8").replace("%", "%%")
+
+
+def guarded(fallback: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Keep every exception of a callback inside it: log it once and return `fallback(*arguments)`."""
+
+    def decorate(callback: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(callback)
+        def run(self: GuardedSlave, *arguments: Any) -> Any:
+            try:
+                return callback(self, *arguments)
+            except KeyboardInterrupt:
+                threading.Timer(INTERRUPT_DELAY_S, interrupt_main).start()
+            except BaseException as error:  # noqa: BLE001 - whatever it is, C++ must not see it
+                name = callback.__name__
+                self.report(
+                    f"{name}: {type(error).__name__}",
+                    Fmi2Status.error,
+                    f"{self.modelName}: {name} failed: {type(error).__name__}: {error}. "
+                    f"The outputs hold their last values. Please report this as a fault of the unit.",
+                )
+            return fallback(*arguments)
+
+        return run
+
+    return decorate
+
+
+def _nothing(*_: Any) -> None:
+    return None
+
+
+class InstantiationError(RuntimeError):
+    """The unit cannot be instantiated; the text says why, ready for a printf-like logger."""
+
+
+class GuardedSlave(Fmi2Slave):
+    """Variables by name, guarded callbacks, log lines once per kind, and the whole state as bytes.
+
+    A slave gives `variables` and overrides `prepare`, `initialise`, `step`, `inner_state` and
+    `restore_inner_state`; all of them may raise.
+    """
+
+    variables: ClassVar[tuple[Variable, ...]] = ()
+    _prepared: ClassVar[bool] = False
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        # The wrapper prepends the resources to sys.path at every instantiation, for good. All modules of the
+        # unit are imported by now, and packages find their parts without it.
+        sys.path[:] = [entry for entry in sys.path if entry != self.resources]
+        self.values: dict[str, Value] = {
+            v.name: NEUTRAL[v.kind] if v.start is None else v.start for v in self.variables
+        }
+        self._names: dict[Kind, dict[int, str]] = {
+            kind: {vr: v.name for vr, v in enumerate(self.variables) if v.kind is kind} for kind in Kind
+        }
+        self._inputs = frozenset(v.name for v in self.variables if v.causality == "input")
+        self._settable = self._inputs | {v.name for v in self.variables if v.causality == "parameter"}
+        self._reported: set[str] = set()
+        self._ready = False
+        try:
+            self.prepare()
+        except Exception as error:
+            text = f"{self.modelName} cannot be instantiated: {error}"
+            if not type(self)._prepared:
+                # Before there is an instance the wrapper survives an exception, and only so does the host
+                # learn of it. Many hosts show no log of a unit that they could not instantiate.
+                print(text, file=sys.stderr)
+                raise InstantiationError(log_text(text)) from error
+            self.report("prepare", Fmi2Status.error, text)
+        else:
+            type(self)._prepared = True
+
+    # What a slave adds
+
+    def prepare(self) -> None:
+        """Load what all instances need; may raise, and the unit is then not instantiated."""
+
+    def initialise(self) -> None:
+        """Apply the parameters; ValueError where they cannot be applied."""
+
+    def step(self, step_s: float) -> None:
+        """Advance by one communication step [s]."""
+        raise NotImplementedError
+
+    def inner_state(self) -> Any:
+        """What `step` keeps between calls, JSON-able and exact."""
+        return None
+
+    def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
+        """Take back what `inner_state` gave under these variable values, or raise and change nothing."""
+
+    def report(self, kind: str, status: Fmi2Status, message: str) -> None:
+        """Log a message, once per kind and instance."""
+        if kind not in self._reported:
+            self._reported.add(kind)
+            self.log(log_text(message), status)
+
+    # FMI callbacks
+
+    @guarded(_nothing)
+    def exit_initialization_mode(self) -> None:
+        """Apply the parameters; what is wrong with them is logged, and each step is then discarded."""
+        self._settable = self._inputs
+        try:
+            self.initialise()
+        except ValueError as error:
+            message = f"{self.modelName} cannot be initialised: {error} Every step will be discarded."
+            self.report("initialise", Fmi2Status.error, message)
+        else:
+            self._ready = True
+
+    @guarded(lambda *_: False)
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """One communication step; False (fmi2Discard) only where nothing could be computed."""
+        if not self._ready:
+            return False
+        self.step(step_size)
+        return True
+
+    @guarded(_nothing)
+    def terminate(self) -> None:
+        """Nothing to do: the unit holds no files and no threads."""
+
+    def _set(self, kind: Kind, references: list[int], values: list[Any]) -> None:
+        names, settable = self._names[kind], self._settable
+        for reference, value in zip(references, values, strict=True):
+            name = names.get(reference)
+            if name in settable:
+                self.values[name] = value
+            else:
+                self.report(
+                    f"set {kind.value} {reference}",
+                    Fmi2Status.error,
+                    f"{self.modelName}: value reference {reference} ({name or 'unknown'}) is no {kind.value} "
+                    "that can be set now, and was ignored. Inputs can be set at any time, parameters until "
+                    "the initialisation ends.",
+                )
+
+    def _get(self, kind: Kind, references: list[int]) -> list[Any]:
+        names, values = self._names[kind], self.values
+        try:
+            return [values[names[reference]] for reference in references]
+        except KeyError:
+            unknown = [reference for reference in references if reference not in names]
+            self.report(
+                f"get {kind.value}",
+                Fmi2Status.error,
+                f"{self.modelName}: value references {unknown} are no {kind.value} of this unit: read as "
+                f"{NEUTRAL[kind]!r}.",
+            )
+            return [values.get(names.get(reference, ""), NEUTRAL[kind]) for reference in references]
+
+    @guarded(_nothing)
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        """Set Real variables by value reference."""
+        self._set(Kind.REAL, vrs, values)
+
+    @guarded(_nothing)
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """Set Integer variables by value reference."""
+        self._set(Kind.INTEGER, vrs, values)
+
+    @guarded(_nothing)
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        """Set Boolean variables by value reference."""
+        self._set(Kind.BOOLEAN, vrs, values)
+
+    @guarded(_nothing)
+    def set_string(self, vrs: list[int], values: list[str | None]) -> None:
+        """Set String variables by value reference; a null pointer is the empty text."""
+        self._set(Kind.STRING, vrs, [value or "" for value in values])
+
+    @guarded(lambda vrs: [0.0] * len(vrs))
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """Read Real variables by value reference."""
+        return self._get(Kind.REAL, vrs)
+
+    @guarded(lambda vrs: [0] * len(vrs))
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        """Read Integer variables by value reference."""
+        return self._get(Kind.INTEGER, vrs)
+
+    @guarded(lambda vrs: [False] * len(vrs))
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        """Read Boolean variables by value reference."""
+        return self._get(Kind.BOOLEAN, vrs)
+
+    @guarded(lambda vrs: [""] * len(vrs))
+    def get_string(self, vrs: list[int]) -> list[str]:
+        """Read String variables by value reference."""
+        return self._get(Kind.STRING, vrs)
+
+    # The state is the bytes of a JSON text from the start: immutable, so that it can be restored many times,
+    # and its serialisation cannot fail.
+
+    @guarded(lambda: b"")
+    def _get_fmu_state(self) -> bytes:
+        state = {
+            "schema": STATE_SCHEMA,
+            "unit": __name__,
+            "ready": self._ready,
+            "values": self.values,
+            "inner": self.inner_state() if self._ready else None,
+        }
+        return json.dumps(state).encode()
+
+    @guarded(_nothing)
+    def _set_fmu_state(self, state: bytes) -> None:
+        try:
+            content = json.loads(state)
+            origin = (content["schema"], content["unit"])
+        except (ValueError, KeyError, TypeError) as error:
+            self._refuse_state(f"it is not a state of this unit ({type(error).__name__}: {error})")
+            return
+        if origin != (STATE_SCHEMA, __name__):
+            self._refuse_state(f"it was saved by another build of the unit ({content['unit']})")
+            return
+        if content["values"].keys() != self.values.keys():
+            self._refuse_state("its variables are not those of this unit")
+            return
+        if content["ready"]:
+            self.restore_inner_state(content["values"], content["inner"])
+            self._settable = self._inputs
+        self.values = content["values"]
+        self._ready = content["ready"]
+
+    def _refuse_state(self, reason: str) -> None:
+        self.report("state", Fmi2Status.error, f"{self.modelName}: the state was not restored: {reason}.")
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: bytes) -> bytes:
+        return state
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> bytes:
+        return state

@@ -1,0 +1,196 @@
+"""From sources to the unit's archive: unique module names, fixed bytes, and unpacking to a safe place."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import distribution, version
+from pathlib import Path
+
+import pythonfmu
+
+import trpac_core
+
+from .model_description import UnitInfo, model_description
+from .variables import Variable
+
+CARRIED_SLAVE_FILES = (
+    "__init__.py",
+    "fields.py",
+    "frames.py",
+    "guarded_slave.py",
+    "host.py",
+    "parameters.py",
+    "variables.py",
+)
+"""Files of this package that every unit carries; its slave's own file comes on top."""
+
+PYTHONFMU_FILES = (
+    "__init__.py",
+    "_version.py",
+    "default_experiment.py",
+    "enums.py",
+    "fmi2slave.py",
+    "logmsg.py",
+    "variables.py",
+)
+"""What a slave needs of pythonfmu; its builder and command line stay behind."""
+
+ZIP_TIME = (1980, 1, 1, 0, 0, 0)
+HASH_DIGITS = 12
+SAFE_PATH = re.compile(r"[A-Za-z0-9_./ -]*")
+"""Paths that the wrapper's URI decoding leaves as they are: it crashes on umlauts, # + % ( and )."""
+
+
+@dataclass(frozen=True)
+class Slave:
+    """One unit that can be built: its slave class and file, its variables, and what it carries besides."""
+
+    info: UnitInfo
+    module: str
+    variables: Sequence[Variable]
+    resources: Sequence[Path]
+
+
+class BuildError(ValueError):
+    """The unit cannot be built; the text lists everything that is wrong."""
+
+
+def build_unit(slave: Slave, target: Path) -> Path:
+    """Write the unit's archive; the same sources give the same bytes. Returns its path; raises BuildError."""
+    missing = [str(path) for path in slave.resources if not path.is_file()]
+    if missing:
+        raise BuildError(f"These files belong into the unit and are not there: {', '.join(missing)}.")
+    content = _resources(slave) | _binaries(slave.info.name) | _licences()
+    digest = _digest(slave, content)
+    content = {_renamed(path, digest): _renamed_imports(path, data, digest) for path, data in content.items()}
+    content[f"resources/{slave.info.name}_{digest}.py"] = _entry(slave, digest)
+    content["resources/slavemodule.txt"] = f"{slave.info.name}_{digest}".encode()
+    content["modelDescription.xml"] = model_description(slave.info, slave.variables, digest)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+        for path in sorted(content):
+            entry = zipfile.ZipInfo(path, ZIP_TIME)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content[path])
+    return target
+
+
+def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
+    """Unpack a unit to a folder whose path the wrapper can read; returns the folder.
+
+    Parameters
+    ----------
+    archive : Path
+        The unit.
+    folder : Path, optional
+        Where to; by default a fresh temporary folder, which the caller removes.
+
+    Raises
+    ------
+    ValueError
+        If the path holds a character that crashes the wrapper, or an entry of the archive leaves the folder.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="trpac-fmu-")) if folder is None else folder
+    path = str(folder.resolve())
+    if not SAFE_PATH.fullmatch(path):
+        bad = "".join(sorted(set(re.sub(SAFE_PATH, "", path))))
+        raise ValueError(
+            f"{path}: the unit's wrapper crashes on the characters {bad!r} in its path. Unpack to a path of "
+            "letters, digits, spaces and . _ - only, for example by setting TMPDIR."
+        )
+    with zipfile.ZipFile(archive) as content:
+        for name in content.namelist():
+            if not (folder / name).resolve().is_relative_to(folder.resolve()):
+                raise ValueError(f"{archive}: its entry '{name}' would be written outside of {folder}.")
+        content.extractall(folder)
+    return folder
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file, as hexadecimal text."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _package_files(package: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(package).as_posix(): path.read_bytes()
+        for path in package.rglob("*.py")
+        if "__pycache__" not in path.parts
+    }
+
+
+def _resources(slave: Slave) -> dict[str, bytes]:
+    here, core, wrapper = Path(__file__).parent, _folder(trpac_core), _folder(pythonfmu)
+    files = {f"resources/trpac_core/{name}": data for name, data in _package_files(core).items()}
+    for name in (*CARRIED_SLAVE_FILES, f"{slave.module}.py"):
+        files[f"resources/fmu_src/{name}"] = (here / name).read_bytes()
+    for name in PYTHONFMU_FILES:
+        files[f"resources/pythonfmu/{name}"] = (wrapper / name).read_bytes()
+    # The package's own __init__ imports its builder, which a host does not need.
+    files["resources/pythonfmu/__init__.py"] = b'"""The slave side of PythonFMU."""\n'
+    for path in slave.resources:
+        files[f"resources/{path.name}"] = path.read_bytes()
+    return files
+
+
+def _binaries(name: str) -> dict[str, bytes]:
+    binaries = _folder(pythonfmu) / "resources" / "binaries"
+    files = {
+        f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes()
+        for path in binaries.rglob("*")
+        if path.suffix in (".so", ".dll", ".dylib")
+    }
+    if not files:
+        raise BuildError(
+            f"{binaries}: pythonfmu {version('pythonfmu')} brings no wrapper library. Install it again."
+        )
+    return files
+
+
+def _licences() -> dict[str, bytes]:
+    files = {"documentation/licenses/license.txt": (Path(__file__).parent.parent / "LICENSE").read_bytes()}
+    for path in distribution("pythonfmu").files or []:
+        if path.name == "LICENSE":
+            files["documentation/licenses/pythonfmu.txt"] = Path(str(path.locate())).read_bytes()
+    return files
+
+
+def _digest(slave: Slave, content: dict[str, bytes]) -> str:
+    """Hash of all that the unit is made of, description included."""
+    total = hashlib.sha256(model_description(slave.info, slave.variables, ""))
+    for path in sorted(content):
+        total.update(f"{path}\0{len(content[path])}\0".encode() + content[path])
+    return total.hexdigest()[:HASH_DIGITS]
+
+
+_CARRIED = re.compile(rb"^(\s*(?:from|import) )(trpac_core|fmu_src|pythonfmu)\b", re.MULTILINE)
+
+
+def _renamed(path: str, digest: str) -> str:
+    return re.sub(r"^resources/(trpac_core|fmu_src|pythonfmu)/", rf"resources/\1_{digest}/", path)
+
+
+def _renamed_imports(path: str, data: bytes, digest: str) -> bytes:
+    return _CARRIED.sub(rb"\1\2_" + digest.encode(), data) if path.endswith(".py") else data
+
+
+def _entry(slave: Slave, digest: str) -> bytes:
+    """The script that the wrapper runs at each instantiation: so it holds little but imports."""
+    lines = (
+        f'"""Entry of the unit {slave.info.name}."""',
+        f"from fmu_src_{digest}.host import keep, require_packages",
+        "keep(globals())",
+        "require_packages()",
+        f"from fmu_src_{digest}.{slave.module} import {slave.info.name}",
+    )
+    return "\n".join(lines).encode() + b"\n"
+
+
+def _folder(package: object) -> Path:
+    return Path(str(package.__file__)).parent  # type: ignore[attr-defined]

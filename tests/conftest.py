@@ -1,0 +1,55 @@
+"""Fixtures that several test files share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from fmu_unit import Unit
+
+from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.units import UNITS
+
+
+@pytest.fixture(scope="session")
+def trpac_data() -> Path:
+    """Folder of real pictures and logs."""
+    folder = os.environ.get("TRPAC_DATA")
+    if not folder:
+        pytest.skip("needs real pictures or logs: set TRPAC_DATA to their folder")
+    path = Path(folder)
+    if not path.is_dir():
+        pytest.skip(f"TRPAC_DATA={folder} is not a folder")
+    return path
+
+
+@pytest.fixture(scope="session")
+def unit_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The unit TrpacEstimator, built once per test run."""
+    return build_unit(UNITS["TrpacEstimator"], tmp_path_factory.mktemp("unit") / "TrpacEstimator.fmu")
+
+
+@pytest.fixture(scope="session")
+def unit_folder(unit_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same unit, unpacked."""
+    return unpack_unit(unit_file, tmp_path_factory.mktemp("unpacked"))
+
+
+@pytest.fixture
+def open_unit(unit_folder: Path) -> Iterator[Callable[..., Unit]]:
+    """Opens initialised instances of the unit, with parameters by name, and frees them after the test."""
+    opened: list[Unit] = []
+
+    def open_one(initialise: bool = True, **parameters: object) -> Unit:
+        unit = Unit(unit_folder)
+        opened.append(unit)
+        unit.set({name.replace("__", "."): value for name, value in parameters.items()})
+        if initialise:
+            unit.initialise()
+        return unit
+
+    yield open_one
+    for unit in opened:
+        unit.free()

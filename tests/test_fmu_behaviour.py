@@ -1,0 +1,366 @@
+"""The unit under a real client: inputs good and bad, state, reset, several instances."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from fmu_unit import DRIVING, STEP_S, Unit
+
+from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors
+from trpac_core.estimator import TrpacEstimator as Estimator
+from trpac_core.vision.classes import CLASS_THETA, Surface
+
+pytestmark = pytest.mark.e2e
+
+Open = Callable[..., Unit]
+
+REAL_INPUTS = (
+    "wheel_speed",
+    "wheel_torque",
+    "vehicle_speed",
+    "road_class_confidence",
+    "vertical_load",
+    "steering_angle",
+    "longitudinal_acceleration",
+    "yaw_rate",
+)
+SLIPPERY = {**DRIVING, "road_class": int(Surface.SNOW_ICE), "road_class_confidence": 0.9}
+WARNING, ERROR = 1, 3
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    """A grey road below a bright sky, of the default camera's size."""
+    image = np.full((1200, 1920, 3), 190, np.uint8)
+    noise = np.random.default_rng(1).integers(80, 130, (700, 1920, 1), dtype=np.uint8)
+    image[500:] = noise
+    path = tmp_path / "frame.png"
+    cv2.imwrite(str(path), image)
+    return path
+
+
+def flag_up(unit: Unit) -> None:
+    """Drive over road that a class from the bus has announced, until the flag is up."""
+    unit.step(SLIPPERY, count=250)
+    assert unit.get("flag")
+
+
+def test_unit_and_estimator_agree_bit_by_bit(open_unit: Open) -> None:
+    unit, estimator = open_unit(), Estimator(EstimatorConfig())
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        wheel, torque, speed = 50.0 + rng.random(), 300.0 * rng.random(), 14.0 + 0.1 * rng.random()
+        unit.step({**SLIPPERY, "wheel_speed": wheel, "wheel_torque": torque, "vehicle_speed": speed})
+        estimate = estimator.step(STEP_S, Sensors(wheel, torque, speed), RoadClass(Surface.SNOW_ICE, 0.9))
+    assert unit.get("TRPAC") == estimate.TRPAC
+    assert unit.get("tyre_force") == estimate.tyre_force_n
+    assert unit.get("frame_age") == estimate.frame_age_s
+    assert unit.get("flag") == estimate.flag
+    assert unit.log == []
+
+
+def test_unconnected_it_runs_and_holds_its_start(open_unit: Open) -> None:
+    unit = open_unit()
+    start = unit.outputs()
+    unit.step(count=10)
+    assert unit.outputs()["TRPAC"] == start["TRPAC"] == 0.8
+    assert unit.log == []
+
+
+def test_parameters_change_the_run(open_unit: Open) -> None:
+    plain, icy = open_unit(), open_unit(estimator__theta_initial=0.3)
+    assert (plain.get("TRPAC"), icy.get("TRPAC")) == (0.8, 0.3)
+
+
+def test_optional_inputs_count_from_their_first_value_other_than_zero(open_unit: Open) -> None:
+    static, loaded = open_unit(), open_unit()
+    static.step(DRIVING)
+    loaded.step({**DRIVING, "vertical_load": 2000.0})
+    assert loaded.get("TRPAC_peak") != static.get("TRPAC_peak")
+    loaded.step({"vertical_load": 0.0})
+    assert loaded.log[0].status == WARNING
+    assert "without load" in loaded.log[0].text
+
+
+# Bad input: the unit goes on, flag down, one log line, fmi2OK
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", REAL_INPUTS)
+def test_value_that_is_no_number(open_unit: Open, name: str, value: float) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    held = unit.get("TRPAC")
+    unit.step({name: value}, count=20)
+    assert not unit.get("flag")
+    assert all(math.isfinite(v) for v in unit.outputs().values())
+    assert [line.status for line in unit.log] == [WARNING]
+    if name != "road_class_confidence":
+        assert unit.get("TRPAC") == held
+    unit.step({name: SLIPPERY.get(name, 1e-9 if name != "vertical_load" else 3000.0)}, count=300)
+    assert unit.get("flag")
+    assert len(unit.log) == 1
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300])
+@pytest.mark.parametrize("name", [name for name in REAL_INPUTS if name != "road_class_confidence"])
+def test_absurd_values_leave_finite_outputs_and_the_unit_alive(
+    open_unit: Open, name: str, value: float
+) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    unit.step({name: value}, count=5)
+    assert all(math.isfinite(v) for v in unit.outputs().values())
+    assert len(unit.log) <= 1
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"wheel_speed": 0.0, "vehicle_speed": 0.0},
+        {"wheel_speed": 0.0},
+        {"vehicle_speed": 0.0},
+        {"wheel_torque": -400.0, "wheel_speed": 48.0},
+        {"wheel_speed": -52.0, "vehicle_speed": -15.0},
+        {"wheel_speed": -52.0},
+        {"vehicle_speed": -15.0},
+        {"wheel_torque": -150.0},
+    ],
+    ids=str,
+)
+def test_standstill_locked_wheel_and_reversed_signs(open_unit: Open, values: dict[str, float]) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    unit.step({**DRIVING, **values}, count=50)
+    assert all(math.isfinite(v) for v in unit.outputs().values())
+    assert len(unit.log) <= 1
+    unit.step(DRIVING, count=50)
+    assert 0.0 < unit.get("TRPAC") < 1.2
+
+
+def test_zero_and_varying_step_sizes(open_unit: Open) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    before = unit.outputs()
+    unit.step(step_s=0.0, count=3)
+    after = unit.outputs()
+    assert after["TRPAC"] == before["TRPAC"]
+    assert after["flag"]
+    for step_s in (1e-6, 0.01, 0.0005, 0.1, 1.0, 0.0, 1e-9):
+        unit.step(step_s=step_s)
+        assert all(math.isfinite(v) for v in unit.outputs().values())
+    assert unit.log == []
+
+
+@pytest.mark.parametrize("step_s", [-0.001, math.nan, math.inf])
+def test_impossible_step_sizes_hold_the_estimate(open_unit: Open, step_s: float) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    held = unit.get("TRPAC")
+    unit.step(step_s=step_s, count=3)
+    assert unit.get("TRPAC") == held
+    assert not unit.get("flag")
+    assert [line.status for line in unit.log] == [WARNING]
+
+
+def _no_file(folder: Path, _: Path) -> Path:
+    return folder / "missing.png"
+
+
+def _cut_short(folder: Path, picture: Path) -> Path:
+    (folder / "cut.png").write_bytes(picture.read_bytes()[:5000])
+    return folder / "cut.png"
+
+
+def _no_picture(folder: Path, _: Path) -> Path:
+    (folder / "text.png").write_text("no picture")
+    return folder / "text.png"
+
+
+def _empty(folder: Path, _: Path) -> Path:
+    (folder / "empty.png").write_bytes(b"")
+    return folder / "empty.png"
+
+
+def _folder(folder: Path, _: Path) -> Path:
+    return folder
+
+
+def _other_shape(folder: Path, _: Path) -> Path:
+    cv2.imwrite(str(folder / "square.png"), np.zeros((400, 400, 3), np.uint8))
+    return folder / "square.png"
+
+
+@pytest.mark.parametrize("spoil", [_no_file, _cut_short, _no_picture, _empty, _folder, _other_shape])
+def test_picture_that_cannot_be_used(
+    open_unit: Open, tmp_path: Path, picture: Path, spoil: Callable[[Path, Path], Path]
+) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    unit.step({"road_class": -1, "image_path": str(spoil(tmp_path, picture))}, count=20)
+    assert not unit.get("flag")
+    unit.step({"frame_id": 1}, count=20)
+    assert not unit.get("flag")
+    assert [line.status for line in unit.log] == [WARNING]
+    unit.step(SLIPPERY, count=1)
+    assert unit.get("flag"), "a good frame lifts the flag again"
+
+
+@pytest.mark.parametrize("road_class", [-2, 3, 2**31 - 1])
+def test_class_out_of_range(open_unit: Open, road_class: int) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    unit.step({"road_class": road_class}, count=20)
+    assert not unit.get("flag")
+    assert [line.status for line in unit.log] == [WARNING]
+
+
+def test_bad_parameters_are_all_named_and_every_step_is_discarded(open_unit: Open) -> None:
+    unit = open_unit(vehicle__mass=-1.0, camera__pitch=math.nan)
+    assert unit.log[0].status == ERROR
+    assert "vehicle.mass" in unit.log[0].text
+    assert "camera.pitch" in unit.log[0].text
+    with pytest.raises(Exception, match=r"fmi2DoStep.*status 2"):
+        unit.step(DRIVING)
+    assert not unit.get("flag")
+
+
+def test_parameters_that_contradict_each_other_are_refused(open_unit: Open) -> None:
+    unit = open_unit(image__k1=1.0, image__k2=0.5)
+    assert "k1 < k2" in unit.log[0].text
+
+
+def test_parameter_set_too_late_and_output_set_are_refused_with_a_log_line(open_unit: Open) -> None:
+    unit = open_unit()
+    unit.set({"vehicle.mass": 1.0})
+    unit.set({"TRPAC": 0.1})
+    unit.step(DRIVING)
+    assert [line.status for line in unit.log] == [ERROR, ERROR]
+    assert unit.get("TRPAC") > 0.5
+
+
+def test_unknown_value_references_are_survived(open_unit: Open) -> None:
+    unit = open_unit()
+    for reference in (9999, 2**32 - 1):
+        assert unit.slave.getReal([reference]) == [0.0]
+        unit.slave.setReal([reference], [1.0])
+    assert unit.slave.getString([0]) == [b""]
+    unit.step(DRIVING)
+    assert {line.status for line in unit.log} == {ERROR}
+
+
+# Frames
+
+
+def test_a_picture_is_taken_once_and_again_with_a_new_number(open_unit: Open, picture: Path) -> None:
+    unit = open_unit()
+    unit.step({**DRIVING, "image_path": str(picture)}, count=3)
+    assert _frames_seen(unit) == 1
+    unit.step({"image_path": str(picture)}, count=3)
+    assert _frames_seen(unit) == 1
+    unit.step({"frame_id": 7}, count=3)
+    assert _frames_seen(unit) == 2
+    unit.step({"image_path": ""}, count=3)
+    unit.step({"image_path": str(picture)}, count=3)
+    assert _frames_seen(unit) == 3
+
+
+def _frames_seen(unit: Unit) -> int:
+    return _state(unit)["inner"]["estimator"]["state"]["ife"]["frame_count"]
+
+
+def _state(unit: Unit) -> dict:
+    state = unit.slave.getFMUstate()
+    text = unit.slave.serializeFMUstate(state)
+    unit.slave.freeFMUstate(state)
+    return json.loads(text)
+
+
+def test_numbered_classes_count_once_each(open_unit: Open) -> None:
+    unit = open_unit()
+    unit.step({**SLIPPERY, "frame_id": 1}, count=250)
+    first = len(_state(unit)["inner"]["estimator"]["state"]["preview"]["stamps"])
+    unit.step({"frame_id": 2})
+    assert (first, len(_state(unit)["inner"]["estimator"]["state"]["preview"]["stamps"])) == (1, 2)
+
+
+def test_the_class_by_bus_reaches_the_outputs(open_unit: Open) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    assert unit.get("TRPAC_image") == CLASS_THETA[Surface.SNOW_ICE]
+    assert unit.get("image_confidence") == 0.9
+
+
+# State, reset, instances
+
+
+def test_restored_state_repeats_the_run_bit_by_bit_with_a_frame_pending(
+    open_unit: Open, picture: Path
+) -> None:
+    unit, other = open_unit(), open_unit(estimator__gamma=1.0)
+    unit.step({**SLIPPERY, "vertical_load": 2900.0}, count=200)
+    unit.step({"road_class": -1, "image_path": str(picture)}, count=50)
+    unit.set({"frame_id": 5})
+    state = unit.slave.getFMUstate()
+    saved = unit.slave.serializeFMUstate(state)
+
+    def run(one: Unit) -> list[dict[str, float | bool]]:
+        trace = []
+        for index in range(60):
+            one.step({"wheel_torque": 100.0 + index, "wheel_speed": 52.0 + 0.01 * index})
+            trace.append(one.outputs())
+        return trace
+
+    first = run(unit)
+    unit.slave.setFMUstate(state)
+    assert run(unit) == first
+    unit.slave.setFMUstate(state)
+    assert run(unit) == first, "a state can be restored more than once"
+    unit.slave.freeFMUstate(state)
+    restored = other.slave.deSerializeFMUstate(saved)
+    other.slave.setFMUstate(restored)
+    assert run(other) == first, "another instance, with other parameters, takes the whole state over"
+    assert other.slave.serializeFMUstate(restored) == saved
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"\xff\x00", b'{"schema": 1, "unit": "another"}'])
+def test_state_of_something_else_is_refused(open_unit: Open, content: bytes) -> None:
+    unit = open_unit()
+    unit.step(DRIVING)
+    before = unit.outputs()
+    unit.slave.setFMUstate(unit.slave.deSerializeFMUstate(content))
+    unit.step(step_s=0.0)
+    assert unit.outputs() == before
+    assert [line.status for line in unit.log] == [ERROR]
+
+
+def test_reset_goes_back_to_the_start(open_unit: Open) -> None:
+    unit = open_unit()
+    start = unit.outputs()
+    flag_up(unit)
+    first = unit.outputs()
+    unit.reset()
+    unit.initialise()
+    assert unit.outputs() == start
+    flag_up(unit)
+    assert unit.outputs() == first
+
+
+def test_two_instances_do_not_touch_each_other(open_unit: Open) -> None:
+    alone = open_unit()
+    flag_up(alone)
+    first, second = open_unit(), open_unit()
+    for _ in range(250):
+        first.step(SLIPPERY)
+        second.step({**DRIVING, "wheel_speed": 60.0})
+    assert first.outputs() == alone.outputs()
+    assert second.outputs() != alone.outputs()
+    second.free()
+    first.step(SLIPPERY)
+    assert first.get("flag")

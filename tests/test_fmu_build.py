@@ -1,0 +1,301 @@
+"""Building the unit: bytes, description, command line, unpacking."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import zipfile
+from dataclasses import fields, is_dataclass, replace
+from enum import Enum
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+from fmu_unit import Unit
+
+import build_fmu
+from fmu_src import packaging, variable_table
+from fmu_src.fields import field_value
+from fmu_src.model_description import UNITS as SI_UNITS
+from fmu_src.packaging import BuildError, build_unit, sha256, unpack_unit
+from fmu_src.parameters import configuration
+from fmu_src.units import UNITS
+from fmu_src.variables import TRPAC_ESTIMATOR, Kind, Variable
+from trpac_core.estimator import Estimate, EstimatorConfig
+
+ROOT = Path(__file__).parent.parent
+SLAVE = UNITS["TrpacEstimator"]
+
+INTERFACE = {
+    "input": {
+        "wheel_speed",
+        "wheel_torque",
+        "vehicle_speed",
+        "image_path",
+        "frame_id",
+        "road_class",
+        "road_class_confidence",
+        "vertical_load",
+        "steering_angle",
+        "longitudinal_acceleration",
+        "yaw_rate",
+    },
+    "output": {
+        "TRPAC",
+        "flag",
+        "K_v",
+        "excitation_flag",
+        "excitation_threshold",
+        "slip",
+        "tyre_force",
+        "TRPAC_image",
+        "TRPAC_dynamics",
+        "TRPAC_peak",
+        "image_confidence",
+        "frame_age",
+        "TRPAC_std",
+    },
+}
+
+
+@pytest.mark.e2e
+def test_validation_finds_no_problem(unit_file: Path) -> None:
+    assert validate_fmu(str(unit_file)) == []
+
+
+@pytest.mark.e2e
+def test_the_same_sources_give_the_same_bytes_whatever_lies_in_the_caches(
+    unit_file: Path, tmp_path: Path
+) -> None:
+    second = build_unit(SLAVE, tmp_path / "again.fmu")
+    assert sha256(second) == sha256(unit_file)
+
+
+@pytest.mark.e2e
+def test_archive_holds_no_cache_and_no_time(unit_file: Path) -> None:
+    with zipfile.ZipFile(unit_file) as archive:
+        entries = archive.infolist()
+    names = [entry.filename for entry in entries]
+    assert names == sorted(names)
+    assert {entry.date_time for entry in entries} == {packaging.ZIP_TIME}
+    assert not [name for name in names if name.endswith(".pyc") or "__pycache__" in name]
+    assert "documentation/licenses/pythonfmu.txt" in names
+
+
+@pytest.mark.e2e
+def test_carried_modules_import_only_the_standard_library_their_own_and_three_packages(
+    unit_folder: Path,
+) -> None:
+    allowed = {"numpy", "cv2", "onnxruntime"} | sys.stdlib_module_names
+    carried = {path.name for path in (unit_folder / "resources").iterdir() if path.is_dir()}
+    for path in (unit_folder / "resources").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [node.module or ""]
+            for name in names:
+                assert name.split(".")[0] in allowed | carried, f"{path}:{node.lineno} imports {name}"
+
+
+@pytest.mark.parametrize("causality", ["input", "output"])
+def test_interface_has_the_documented_variables(causality: str) -> None:
+    assert {v.name for v in TRPAC_ESTIMATOR if v.causality == causality} == INTERFACE[causality]
+
+
+def test_every_variable_has_a_description_and_every_real_a_known_unit() -> None:
+    for v in TRPAC_ESTIMATOR:
+        assert v.description
+        assert (v.unit in SI_UNITS) == (v.kind is Kind.REAL), v.name
+
+
+@pytest.mark.parametrize("v", TRPAC_ESTIMATOR, ids=lambda v: v.name)
+def test_start_lies_within_the_range(v: Variable) -> None:
+    if isinstance(v.start, (int, float)):
+        assert v.minimum is None or v.minimum <= v.start
+        assert v.maximum is None or v.start <= v.maximum
+
+
+def test_outputs_are_the_fields_of_the_estimate() -> None:
+    fields = {name.removesuffix("_n").removesuffix("_s") for name in Estimate.__dataclass_fields__}
+    assert fields - {"problem"} == INTERFACE["output"]
+
+
+def plain(value: object) -> object:
+    return value.value if isinstance(value, Enum) else value
+
+
+def test_parameters_start_at_the_estimators_defaults() -> None:
+    for v in TRPAC_ESTIMATOR:
+        if v.source:
+            assert v.start == plain(field_value(EstimatorConfig(), v.source))
+
+
+def test_untouched_parameters_give_the_default_configuration() -> None:
+    starts = {v.name: v.start for v in TRPAC_ESTIMATOR}
+    assert configuration(TRPAC_ESTIMATOR, starts) == EstimatorConfig()
+
+
+DERIVED = {
+    "vision.track_m",
+    "vision.wheelbase_m",
+    "vision.side",
+    "frame_interval_s",
+    "flag_threshold",
+    "preview.behind_m",
+}
+"""Settings that follow from others."""
+
+NOT_OFFERED = {
+    "vehicle.motor_peak_torque_nm",
+    "vision.strip_half_width_m",
+    "vision.use_trajectory",
+    "vision.remove_shadow",
+    "vision.calibrate",
+    "vision.weight_evidence",
+}
+"""What the estimator of one wheel does not use, and switches for ablation studies."""
+
+
+def leaves(owner: object, path: str = "") -> list[str]:
+    if is_dataclass(owner):
+        return [leaf for f in fields(owner) for leaf in leaves(getattr(owner, f.name), f"{path}.{f.name}")]
+    if isinstance(owner, tuple):
+        return [leaf for place, item in enumerate(owner) for leaf in leaves(item, f"{path}.{place}")]
+    return [path.removeprefix(".")]
+
+
+def test_every_setting_of_the_estimator_is_a_parameter_or_left_out_on_purpose() -> None:
+    offered = [v.source for v in TRPAC_ESTIMATOR if v.source]
+    assert sorted(leaves(EstimatorConfig())) == sorted([*offered, *DERIVED, *NOT_OFFERED])
+
+
+@pytest.mark.parametrize("v", [v for v in TRPAC_ESTIMATOR if v.source], ids=lambda v: v.name)
+def test_each_parameter_reaches_its_field(v: Variable) -> None:
+    values = {v.name: v.start for v in TRPAC_ESTIMATOR}
+    changed = not v.start if v.kind is Kind.BOOLEAN else v.start + (1 if v.kind is Kind.INTEGER else 1e-6)
+    if v.maximum == v.start:
+        changed = v.minimum
+    configured = configuration(TRPAC_ESTIMATOR, values | {v.name: changed})
+    assert plain(field_value(configured, v.source)) == changed
+    others = {
+        w.source: plain(field_value(configured, w.source)) for w in TRPAC_ESTIMATOR if w.source and w is not v
+    }
+    assert others == {w.source: w.start for w in TRPAC_ESTIMATOR if w.source and w is not v}
+
+
+def test_all_bad_parameters_are_named_in_one_error() -> None:
+    values = {v.name: v.start for v in TRPAC_ESTIMATOR}
+    with pytest.raises(ValueError, match=r"vehicle\.mass.*camera\.pitch"):
+        configuration(TRPAC_ESTIMATOR, values | {"vehicle.mass": -1.0, "camera.pitch": float("nan")})
+
+
+@pytest.mark.e2e
+def test_description_says_units_ranges_and_abilities(unit_file: Path) -> None:
+    description = read_model_description(str(unit_file))
+    by_name = {v.name: v for v in description.modelVariables}
+    assert by_name["wheel_speed"].unit == "rad/s"
+    assert by_name["wheel_torque"].unit == "N.m"
+    assert by_name["road_class"].min == "-1"
+    assert by_name["image_path"].variability == "discrete"
+    assert description.variableNamingConvention == "structured"
+    ability = description.coSimulation
+    assert ability.canGetAndSetFMUstate
+    assert ability.canSerializeFMUstate
+    assert ability.canHandleVariableCommunicationStepSize
+    torque = next(unit for unit in description.unitDefinitions if unit.name == "N.m").baseUnit
+    assert (torque.kg, torque.m, torque.s) == (1, 2, -2)
+
+
+@pytest.mark.e2e
+def test_guid_follows_the_content(unit_file: Path, tmp_path: Path) -> None:
+    other = replace(SLAVE, info=replace(SLAVE.info, description="another text"))
+    changed = build_unit(other, tmp_path / "other.fmu")
+    assert _guid(changed) != _guid(unit_file)
+
+
+def _guid(path: Path) -> str:
+    with zipfile.ZipFile(path) as archive:
+        return ElementTree.fromstring(archive.read("modelDescription.xml")).attrib["guid"]
+
+
+def test_missing_network_files_are_all_named(tmp_path: Path) -> None:
+    slave = replace(SLAVE, resources=(tmp_path / "a.onnx", tmp_path / "b.onnx"))
+    with pytest.raises(BuildError, match=r"a\.onnx.*b\.onnx"):
+        build_unit(slave, tmp_path / "x.fmu")
+    assert not (tmp_path / "x.fmu").exists()
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize("name", ["Prüfstand", "a#b", "a+b", "a%b", "a(b)"])
+def test_unpacking_refuses_what_crashes_the_wrapper(unit_file: Path, tmp_path: Path, name: str) -> None:
+    with pytest.raises(ValueError, match="crashes on the characters"):
+        unpack_unit(unit_file, tmp_path / name)
+
+
+def test_unpacking_refuses_entries_that_leave_the_folder(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "bad.fmu", "w") as archive:
+        archive.writestr("../escaped.txt", "x")
+    with pytest.raises(ValueError, match="outside"):
+        unpack_unit(tmp_path / "bad.fmu", tmp_path / "inside")
+    assert not (tmp_path / "escaped.txt").exists()
+
+
+@pytest.mark.e2e
+def test_a_path_with_spaces_runs(unit_file: Path, tmp_path: Path) -> None:
+    unit = Unit(unpack_unit(unit_file, tmp_path / "with a space"))
+    unit.initialise()
+    unit.step()
+    unit.free()
+
+
+@pytest.mark.e2e
+def test_command_line_builds_validates_and_prints_the_hash(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert build_fmu.main(["--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert sha256(tmp_path / "TrpacEstimator.fmu") in printed
+    assert "no problems found" in printed
+
+
+def test_command_line_suggests_units(capsys: pytest.CaptureFixture[str]) -> None:
+    assert build_fmu.main(["--slave", "TrpacEstimater"]) == build_fmu.EXIT_USAGE
+    assert "TrpacEstimator" in capsys.readouterr().err
+
+
+@pytest.mark.e2e
+def test_command_line_says_which_folder_cannot_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert build_fmu.main(["--out", str(blocked)]) == build_fmu.EXIT_BUILD
+    assert str(blocked) in capsys.readouterr().err
+
+
+def test_variable_table_is_current() -> None:
+    written = variable_table.TARGET.read_text(encoding="utf-8")
+    assert written == variable_table.table(TRPAC_ESTIMATOR), "run: python -m fmu_src.variable_table"
+
+
+@pytest.mark.e2e
+def test_missing_packages_are_named_with_interpreter_and_command(unit_folder: Path) -> None:
+    code = (
+        f"import sys; sys.path.insert(0, {str(unit_folder / 'resources')!r})\n"
+        "sys.modules['cv2'] = None\nsys.modules['onnxruntime'] = None\n"
+        f"from fmu_src_{_folder_guid(unit_folder)}.host import require_packages\n"
+        "require_packages()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    first_line = done.stderr.splitlines()[0]
+    assert "opencv-python-headless" in first_line
+    assert f"{sys.executable} -m pip install opencv-python-headless onnxruntime" in first_line
+
+
+def _folder_guid(folder: Path) -> str:
+    return ElementTree.parse(folder / "modelDescription.xml").getroot().attrib["guid"]
