@@ -54,6 +54,14 @@ def test_signs_of_the_mounting_angles():
     assert sides[0, 1] > sides[1, 1], "right side down: the left of the road sinks in the picture"
 
 
+@pytest.mark.parametrize("roll", [0.0, 0.2])
+def test_optical_axis_points_where_yaw_and_pitch_say_whatever_the_roll(roll):
+    camera = Camera(yaw_rad=0.3, pitch_rad=0.2, roll_rad=roll, x_from_front_axle_m=0.0)
+    hit = camera.image_to_ground(np.array([[camera.cx_px, camera.cy_px]]))[0]
+    reach = camera.height_m / np.tan(0.2)
+    assert hit == pytest.approx([reach * np.cos(0.3), reach * np.sin(0.3)])
+
+
 @given(
     pitch=st.floats(0.0, 0.3),
     yaw=st.floats(-0.2, 0.2),

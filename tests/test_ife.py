@@ -168,6 +168,16 @@ def test_without_usable_road_history_answers_and_the_flag_is_down():
     assert after.frame_count == 8
 
 
+def test_one_usable_corner_is_no_evidence_however_sure_history_is():
+    snowy = IfeState((EvidenceState((0.01, 0.01, 0.98)),) * 3)
+    one_corner = IfeConfig(side="right", a_m=0.7, ranges_m=((3.4, 3.6), (4.5, 7.5), (7.5, 12.0)))
+    _, result = run(plain(DRY), config=one_corner, state=snowy)
+    assert (result.near.n_ell, result.near.n_rs, result.near.n_roi) == (1, 0, 0)
+    assert result.Q_v > 0.5
+    assert result.surface is SNOW
+    assert not result.flag
+
+
 def test_confidence_threshold():
     masks = Masks(shadow=half(left=True))
     low = IfeConfig(flag_threshold=0.4)
@@ -294,6 +304,9 @@ def test_vote_counts_the_whole_drivable_area_with_its_shadow():
     assert {voting.process(frame, picture).share for frame in range(20)} != {1.0}
     assert voting.process(3, picture) == voting.process(3, picture)
     assert Voting(VotingConfig(), Masks(NONE), Middle()).process(0, picture).surface is None
+    sides = paint(lambda x, y: np.where(y > 0.0, SNOW, DRY))
+    left = Voting(VotingConfig(), Masks(half(left=True)), Middle()).process(0, sides)
+    assert (left.surface, left.share) == (SNOW, 1.0)
 
 
 def rendered(segments, look, position_m=0.0):

@@ -114,7 +114,7 @@ def test_forward_drive_finds_the_newest_frame_that_began_before(steps, probe):
     elif found is not None:
         assert found == begun[-1]
     else:
-        assert probe - (positions[begun[-1]] + config.P_0_m) >= config.hold_m
+        assert probe - (positions[begun[-1]] + config.P_0_m) >= config.hold_m - 1e-9
 
 
 @given(st.lists(st.floats(-1.0, 2.0), min_size=1, max_size=30), st.floats(0.0, 6.0), st.floats(0.0, 3.0))
