@@ -23,27 +23,39 @@ LABEL_SHADE = 0.4  # shade from which, averaged over LABEL_BLUR_M, the ground co
 LONGEST_SHADOW = 7.0  # shadow length over height; a lower sun throws no sharper one
 
 Points = NDArray[np.float64]
+Image = NDArray[np.uint8]
 
 
 def decal_map(look: SceneLook) -> RipMap:
     """Channels: shade (255 is dark), shade for the label (128 is the threshold), tone and gloss of repairs."""
     rng = np.random.default_rng([look.seed, 11])
-    shade = _shade(look, rng) if look.casts_shadows else np.zeros(SHAPE, dtype=np.uint8)
-    spread = LABEL_BLUR_M / TEXEL_M
-    mean = cv2.GaussianBlur(_wrapped(shade), (0, 0), spread)[_WRAP:-_WRAP].astype(np.float32)
-    label = np.clip(128.0 + (mean / 255.0 - LABEL_SHADE) * 400.0, 0, 255).astype(np.uint8)
+    if look.casts_shadows:
+        shade = _shade(look, rng)
+        label = _label(shade)
+    else:
+        shade = label = np.zeros(SHAPE, dtype=np.uint8)
     tone, gloss = _repairs(look, rng)
     return build_ripmap(np.dstack((shade, label, tone, gloss)), LEVELS)
+
+
+def _label(shade: Image) -> Image:
+    """Shade averaged over LABEL_BLUR_M, scaled so that 128 is the threshold of the label."""
+    small = cv2.resize(shade, (SHAPE[1] // 4, SHAPE[0] // 4), interpolation=cv2.INTER_AREA)
+    mean = _blurred(np.asarray(small), LABEL_BLUR_M / TEXEL_M / 4.0).astype(np.float32)
+    label = np.clip(128.0 + (mean / 255.0 - LABEL_SHADE) * 400.0, 0, 255).astype(np.uint8)
+    return np.asarray(cv2.resize(label, (SHAPE[1], SHAPE[0]), interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
 
 
 _WRAP = 64
 
 
-def _wrapped(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    return np.vstack((image[-_WRAP:], image, image[:_WRAP]))
+def _blurred(image: Image, sigma: float) -> Image:
+    """Gaussian blur, periodic along the road."""
+    wrapped = np.vstack((image[-_WRAP:], image, image[:_WRAP]))
+    return np.asarray(cv2.GaussianBlur(wrapped, (0, 0), sigma)[_WRAP:-_WRAP], dtype=np.uint8)
 
 
-def _fill(canvas: NDArray[np.uint8], points_m: Points, value: int) -> None:
+def _fill(canvas: Image, points_m: Points, value: int) -> None:
     """Fills a polygon given as (along, across from the map's right rim) [m], with its repeats along the road."""
     pixels = points_m[:, ::-1] / TEXEL_M
     for turn in (-1, 0, 1):
@@ -64,7 +76,7 @@ def _beside(look: SceneLook, rng: np.random.Generator, nearest_m: float, farthes
     return np.array([rng.uniform(0, LENGTH_M), across + SHAPE[1] * TEXEL_M / 2])
 
 
-def _shade(look: SceneLook, rng: np.random.Generator) -> NDArray[np.uint8]:
+def _shade(look: SceneLook, rng: np.random.Generator) -> Image:
     reach = min(1.0 / np.tan(look.sun_elevation_rad), LONGEST_SHADOW)
     per_metre = -reach * np.array([np.cos(look.sun_azimuth_rad), np.sin(look.sun_azimuth_rad)])
     soft = np.zeros(SHAPE, dtype=np.uint8)
@@ -77,12 +89,10 @@ def _shade(look: SceneLook, rng: np.random.Generator) -> NDArray[np.uint8]:
         _block(hard, _beside(look, rng, 3.0, 14.0), per_metre, rng)
     for _ in range(_count(rng, look.bridges_per_100_m)):
         _bridge(hard, per_metre, rng)
-    soft = cv2.GaussianBlur(_wrapped(soft), (0, 0), 1.8)[_WRAP:-_WRAP]
-    hard = cv2.GaussianBlur(_wrapped(hard), (0, 0), 0.9)[_WRAP:-_WRAP]
-    return np.maximum(soft, hard)
+    return np.maximum(_blurred(soft, 1.8), _blurred(hard, 0.9))
 
 
-def _tree(canvas: NDArray[np.uint8], foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
+def _tree(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
     """A trunk and a crown of leaf clusters, which leave flecks of light between them."""
     height = rng.uniform(4.0, 14.0)
     radius = height * rng.uniform(0.18, 0.35)
@@ -99,20 +109,20 @@ def _tree(canvas: NDArray[np.uint8], foot: Points, per_metre: Points, rng: np.ra
         _fill(canvas, middle + ring + np.outer(np.cos(angles), stretch), int(rng.integers(190, 256)))
 
 
-def _strip(canvas: NDArray[np.uint8], start: Points, end: Points, width_m: float, value: int) -> None:
+def _strip(canvas: Image, start: Points, end: Points, width_m: float, value: int) -> None:
     along = end - start
     side = np.array([-along[1], along[0]]) / max(np.hypot(*along), 1e-6) * width_m / 2
     _fill(canvas, np.array([start + side, end + side, end - side, start - side]), value)
 
 
-def _pole(canvas: NDArray[np.uint8], foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
+def _pole(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
     tip = foot + per_metre * rng.uniform(4.0, 10.0)
     _strip(canvas, foot, tip, rng.uniform(0.12, 0.35), 255)
     if rng.random() < 0.5:
         _strip(canvas, tip, tip + np.array([0.0, rng.uniform(-2.5, 2.5)]), 0.3, 255)
 
 
-def _block(canvas: NDArray[np.uint8], foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
+def _block(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
     """A house, a wall or a lorry: the hull of a box's base and its roof thrown on the ground."""
     size = rng.uniform((2.0, 1.0), (18.0, 8.0))
     corners = foot + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size / 2
@@ -121,7 +131,7 @@ def _block(canvas: NDArray[np.uint8], foot: Points, per_metre: Points, rng: np.r
     _fill(canvas, hull, 255)
 
 
-def _bridge(canvas: NDArray[np.uint8], per_metre: Points, rng: np.random.Generator) -> None:
+def _bridge(canvas: Image, per_metre: Points, rng: np.random.Generator) -> None:
     width, slant = rng.uniform(3.0, 14.0), rng.normal(0.0, 3.0)
     start = rng.uniform(0, LENGTH_M) + per_metre[0] * 6.0
     rim = SHAPE[1] * TEXEL_M
@@ -132,7 +142,7 @@ def _bridge(canvas: NDArray[np.uint8], per_metre: Points, rng: np.random.Generat
     )
 
 
-def _repairs(look: SceneLook, rng: np.random.Generator) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def _repairs(look: SceneLook, rng: np.random.Generator) -> tuple[Image, Image]:
     """Tone (128 is the road's own) and gloss (bitumen) of patches, sealed seams, skid marks and covers."""
     tone = np.full(SHAPE, 128, dtype=np.uint8)
     gloss = np.zeros(SHAPE, dtype=np.uint8)

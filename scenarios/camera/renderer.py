@@ -197,18 +197,21 @@ def _pixels(camera: Camera) -> Pixels:
     away = np.hypot(x - camera.position_m[0], y - camera.position_m[1])
     cosine = camera.height_m / np.hypot(away, camera.height_m)
     foot_x, foot_y = (np.maximum(np.nan_to_num(foot, nan=100.0), 1e-4) for foot in (foot_x, foot_y))
-    arrays = (
-        x,
-        y,
-        foot_x,
-        foot_y,
-        azimuth,
-        elevation,
-        fresnel_reflectance(cosine),
-        np.nan_to_num(away, nan=-1.0),
+
+    def packed(array: NDArray[np.float64]) -> NDArray[np.float32]:
+        return np.ascontiguousarray(np.nan_to_num(array, nan=-1.0), dtype=np.float32)
+
+    return Pixels(
+        x=packed(x),
+        y=packed(y),
+        foot_x=packed(foot_x),
+        foot_y=packed(foot_y),
+        levels=_levels(foot_x, foot_y),
+        azimuth=packed(azimuth),
+        elevation=packed(elevation),
+        shine=packed(fresnel_reflectance(cosine)),
+        distance=packed(away),
     )
-    floats = [np.ascontiguousarray(np.nan_to_num(array), dtype=np.float32) for array in arrays]
-    return Pixels(*floats[:4], _levels(foot_x, foot_y), *floats[4:])
 
 
 def _levels(foot_x: NDArray[np.float64], foot_y: NDArray[np.float64]) -> NDArray[np.uint32]:
@@ -252,7 +255,7 @@ def _tone_table(contrast: float) -> NDArray[np.uint8]:
     return np.clip(255.0 * display + 0.5, 0, 255).astype(np.uint8)
 
 
-def _lines(look: SceneLook) -> NDArray[np.float64]:
+def _lines(look: SceneLook) -> NDArray[np.float32]:
     """Markings: lateral middle, width, period (0 is unbroken), painted length, phase [m]."""
     rng = np.random.default_rng([look.seed, 31])
     right, left = look.road_edges_m
@@ -304,7 +307,7 @@ def _loop_look(look: SceneLook, horizon: NDArray[np.float32], sky: Panorama) -> 
     fill_tint = np.array([1.22, 1.0, 0.86]) if look.sky in ("clear", "low_sun") else np.ones(3)
     fill = (1.0 - look.sun_share) * fill_tint
 
-    def bgr(name: str, values: NDArray[np.float64]) -> dict[str, float]:
+    def bgr(name: str, values: NDArray[np.floating]) -> dict[str, float]:
         return {f"{name}_{channel}": float(value) for channel, value in zip("bgr", values, strict=True)}
 
     values = Look(

@@ -155,12 +155,12 @@ def _random_surfaces(rng: np.random.Generator) -> dict:
         "wet_darkening": rng.uniform(0.38, 0.72),
         "film": rng.uniform(0.15, 1.0),
         "puddles": float(rng.choice([0.0, rng.uniform(0, 0.5), rng.uniform(0, 1)])),
-        "snow_cover": rng.uniform(0.5, 1.15),
+        "snow_cover": rng.uniform(0.6, 1.2),
         "snow_albedo": rng.uniform(0.42, 0.9),
         "snow_blue": rng.uniform(-0.1, 0.7),
         "snow_dirt": rng.beta(0.8, 2.5),
         "snow_relief": rng.uniform(0.1, 0.8),
-        "track_clearing": rng.choice([0.0, rng.uniform(0, 0.4), rng.uniform(0.3, 0.8)]),
+        "track_clearing": rng.choice([0.0, rng.uniform(0, 0.3), rng.uniform(0.2, 0.5)]),
         "ice_gloss": rng.choice([0.0, rng.uniform(0, 0.5)]),
     }
 

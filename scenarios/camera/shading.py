@@ -1,3 +1,5 @@
+# mypy: disallow-untyped-defs=False
+# numba infers the types below from the first call.
 """The compiled inner loop: light from every ground pixel to the lens.
 
 Light is linear and relative to what white open ground sends back; the encoding to bytes comes last.

@@ -69,7 +69,10 @@ def build_panorama(look: SceneLook, px_rad: float) -> Panorama:
     rough_px_rad = max(px_rad, 0.006)
     factor = px_rad / rough_px_rad
     small = cv2.resize(light, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    rough = cv2.GaussianBlur(small, (0, 0), sigmaX=2.5, sigmaY=14.0, borderType=cv2.BORDER_REPLICATE)
+    rough = np.asarray(
+        cv2.GaussianBlur(small, (0, 0), sigmaX=2.5, sigmaY=14.0, borderType=cv2.BORDER_REPLICATE),
+        dtype=np.float32,
+    )
     mean = light.mean(axis=(0, 1)).astype(np.float32)
     return Panorama(light, rough, px_rad, HIGHEST_RAD / rough.shape[0] * 1.03, mean)
 

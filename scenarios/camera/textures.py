@@ -35,23 +35,26 @@ class RipMap:
 
 def build_ripmap(texture: Texture, levels: tuple[int, int]) -> RipMap:
     """All levels of a texture of shape (along, across, 4); both sizes must be divisible by their halvings."""
-    along, across = texture.shape[:2]
-    levels_along, levels_across = levels
     parts: list[Texture] = []
-    offsets = np.zeros((levels_along, levels_across), dtype=np.int64)
+    offsets = np.zeros(levels, dtype=np.int64)
     total = 0
     row = texture
-    for i in range(levels_along):
+    for i in range(levels[0]):
         level = row
-        for j in range(levels_across):
+        for j in range(levels[1]):
             offsets[i, j] = total
             parts.append(level.reshape(-1, 4))
             total += level.shape[0] * level.shape[1]
-            if j + 1 < levels_across:
-                level = cv2.resize(level, (across >> (j + 1), along >> i), interpolation=cv2.INTER_AREA)
-        if i + 1 < levels_along:
-            row = cv2.resize(row, (across, along >> (i + 1)), interpolation=cv2.INTER_AREA)
+            level = _halved(level, 1) if j + 1 < levels[1] else level
+        row = _halved(row, 0) if i + 1 < levels[0] else row
     return RipMap(np.concatenate(parts).view(np.uint32)[:, 0], offsets)
+
+
+def _halved(level: Texture, axis: int) -> Texture:
+    """Mean of neighbours along one axis; at exactly half the size, linear interpolation is that mean."""
+    along, across = level.shape[:2]
+    size = (across, along // 2) if axis == 0 else (across // 2, along)
+    return np.asarray(cv2.resize(level, size, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
 
 
 def _spectrum_noise(
