@@ -74,6 +74,8 @@ class GuardedSlave(Fmi2Slave):
     """
 
     variables: ClassVar[tuple[Variable, ...]] = ()
+    volatile: ClassVar[frozenset[str]] = frozenset()
+    """Inputs that hold for one step only, such as addresses: `clear_volatile` forgets them, no state holds them."""
     _prepared: ClassVar[bool] = False
 
     def __init__(self, **kwargs: Any) -> None:
@@ -81,9 +83,10 @@ class GuardedSlave(Fmi2Slave):
         # The wrapper prepends the resources to sys.path at every instantiation, for good. All modules of the
         # unit are imported by now, and packages find their parts without it.
         sys.path[:] = [entry for entry in sys.path if entry != self.resources]
-        self.values: dict[str, Value] = {
+        self._starts: dict[str, Value] = {
             v.name: NEUTRAL[v.kind] if v.start is None else v.start for v in self.variables
         }
+        self.values = dict(self._starts)
         self._names: dict[Kind, dict[int, str]] = {
             kind: {vr: v.name for vr, v in enumerate(self.variables) if v.kind is kind} for kind in Kind
         }
@@ -122,6 +125,11 @@ class GuardedSlave(Fmi2Slave):
 
     def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
         """Take back what `inner_state` gave under these variable values, or raise and change nothing."""
+
+    def clear_volatile(self) -> None:
+        """Forget the inputs that hold for one step only."""
+        for name in self.volatile:
+            self.values[name] = self._starts[name]
 
     def report(self, kind: str, status: Fmi2Status, message: str) -> None:
         """Log a message, once per kind and instance."""
@@ -233,7 +241,7 @@ class GuardedSlave(Fmi2Slave):
             "schema": STATE_SCHEMA,
             "unit": __name__,
             "ready": self._ready,
-            "values": self.values,
+            "values": self.values | {name: self._starts[name] for name in self.volatile},
             "inner": self.inner_state() if self._ready else None,
         }
         return json.dumps(state).encode()

@@ -36,6 +36,10 @@ CAPABILITIES = {
     "canSerializeFMUstate": "true",
 }
 
+OSMP_NAMESPACE = "http://xsd.pmsf.net/OSISensorModelPackaging"
+OSMP_VERSION = "1.6.0"
+IMAGE_TYPE = "image/*"
+
 LOG_CATEGORIES = {
     "logStatusWarning": "An input that could not be used; the last good estimate is held.",
     "logStatusError": "A parameter, a call or a state that could not be used.",
@@ -80,6 +84,9 @@ def model_description(unit: UnitInfo, variables: Sequence[Variable], guid: str) 
         "DefaultExperiment",
         {"startTime": "0", "stopTime": f"{unit.stop_time_s:g}", "stepSize": f"{unit.step_size_s:g}"},
     )
+    if any(v.binary for v in variables):
+        # Without OSI messages in the buffers the annotation names no version of OSI.
+        _osmp(SubElement(root, "VendorAnnotations"), "osmp", {"version": OSMP_VERSION})
     listed = SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):
         _variable(listed, reference, variable)
@@ -123,7 +130,18 @@ def _variable(parent: Element, reference: int, variable: Variable) -> None:
     ):
         if value is not None:
             typed[name] = _text(value)
-    SubElement(SubElement(parent, "ScalarVariable", attributes), variable.kind.value, typed)
+    scalar = SubElement(parent, "ScalarVariable", attributes)
+    SubElement(scalar, variable.kind.value, typed)
+    if variable.binary:
+        role = variable.name.removeprefix(f"{variable.binary}.")
+        binary = {"name": variable.binary, "role": role, "mime-type": IMAGE_TYPE}
+        _osmp(SubElement(scalar, "Annotations"), "osmp-binary-variable", binary)
+
+
+def _osmp(parent: Element, element: str, attributes: dict[str, str]) -> None:
+    """Annotation of the OSI Sensor Model Packaging, which has the convention for binary data over FMI 2.0."""
+    tool = SubElement(parent, "Tool", {"name": "net.pmsf.osmp", "xmlns:osmp": OSMP_NAMESPACE})
+    SubElement(tool, f"osmp:{element}", attributes)
 
 
 def _text(value: float | bool | str) -> str:

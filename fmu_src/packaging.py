@@ -24,7 +24,10 @@ CARRIED_SLAVE_FILES = (
     "frames.py",
     "guarded_slave.py",
     "host.py",
+    "interface.py",
     "parameters.py",
+    "settings.py",
+    "signals.py",
     "variables.py",
 )
 """Files of this package that every unit carries; its slave's own file comes on top."""

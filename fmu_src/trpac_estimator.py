@@ -17,8 +17,9 @@ from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
 
 from .frames import FrameState, next_frame
 from .guarded_slave import GuardedSlave
+from .interface import TRPAC_ESTIMATOR
 from .parameters import configuration
-from .variables import TRPAC_ESTIMATOR, Variable
+from .variables import Variable
 
 SEGMENTER_FILE = "segmenter.onnx"
 CLASSIFIER_FILE = "surface.onnx"
@@ -30,6 +31,7 @@ class TrpacEstimator(GuardedSlave):
     """Sensors and camera frames of one wheel in, TRPAC, flag and K_v out."""
 
     variables: ClassVar[tuple[Variable, ...]] = TRPAC_ESTIMATOR
+    volatile: ClassVar[frozenset[str]] = frozenset(v.name for v in TRPAC_ESTIMATOR if v.binary)
 
     _networks: ClassVar[tuple[Segmenter, SurfaceClassifier] | None] = None
 
@@ -63,6 +65,7 @@ class TrpacEstimator(GuardedSlave):
         self._connected.update(name for name in OPTIONAL_INPUTS if values[name] != 0.0)
         sensors = self._sensors(values)
         self._frame, frame, problem = next_frame(self._frame, values)
+        self.clear_volatile()
         try:
             estimate = self._estimator.step(step_s, sensors, frame, frame_failed=self._frame.failed)
         except (ImageError, ModelError) as error:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib.metadata import version
 from pathlib import Path
 
+from .interface import TRPAC_ESTIMATOR
 from .model_description import UnitInfo
 from .packaging import Slave
-from .variables import TRPAC_ESTIMATOR
 
 MODELS = Path(__file__).parent.parent / "models"
 

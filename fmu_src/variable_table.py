@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from .variables import TRPAC_ESTIMATOR, Variable
+from .interface import TRPAC_ESTIMATOR
+from .variables import Variable
 
 TARGET = Path(__file__).parent.parent / "docs" / "fmu_variables.md"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 from collections.abc import Callable
@@ -295,6 +296,87 @@ def test_the_class_by_bus_reaches_the_outputs(open_unit: Open) -> None:
     flag_up(unit)
     assert unit.get("TRPAC_image") == CLASS_THETA[Surface.SNOW_ICE]
     assert unit.get("image_confidence") == 0.9
+
+
+# Pictures in memory
+
+
+class Memory:
+    """Bytes at an address, and the inputs that point there."""
+
+    def __init__(self, content: bytes) -> None:
+        self.buffer = ctypes.create_string_buffer(content, len(content))
+        address = ctypes.addressof(self.buffer)
+        self.inputs = {
+            "image.base.lo": ctypes.c_int32(address & 0xFFFFFFFF).value,
+            "image.base.hi": ctypes.c_int32(address >> 32).value,
+            "image.size": len(content),
+        }
+
+
+@pytest.mark.parametrize("form", ["png", "raw"])
+def test_picture_in_memory_counts_as_the_same_file_does(open_unit: Open, picture: Path, form: str) -> None:
+    by_path, by_address = open_unit(), open_unit()
+    raw = cv2.imread(str(picture))
+    memory = Memory(picture.read_bytes() if form == "png" else raw.tobytes())
+    size = {"image_width": 1920, "image_height": 1200} if form == "raw" else {}
+    by_path.step({**DRIVING, "image_path": str(picture)})
+    by_address.step({**DRIVING, **memory.inputs, **size})
+    ctypes.memset(memory.buffer, 0, len(memory.buffer))
+    for unit in (by_path, by_address):
+        unit.step(count=300)
+        assert unit.log == []
+    assert _frames_seen(by_address) == 1
+    assert by_address.outputs() == by_path.outputs()
+    assert by_address.get("image_confidence") > 0.0
+
+
+def test_an_address_is_forgotten_after_the_step_and_never_saved(open_unit: Open, picture: Path) -> None:
+    unit = open_unit()
+    memory = Memory(picture.read_bytes())
+    unit.set(memory.inputs)
+    saved = _state(unit)["values"]
+    assert {name: saved[name] for name in memory.inputs} == dict.fromkeys(memory.inputs, 0)
+    unit.step(DRIVING)
+    assert [unit.get(name) for name in memory.inputs] == [0, 0, 0]
+
+
+def test_numbered_pictures_in_memory_count_once_each_and_others_each_time(
+    open_unit: Open, picture: Path
+) -> None:
+    unit, memory = open_unit(), Memory(picture.read_bytes())
+    for frame_id, seen in ((1, 1), (1, 1), (2, 2), (0, 3), (0, 4)):
+        unit.step({**memory.inputs, "frame_id": frame_id})
+        unit.step()
+        assert _frames_seen(unit) == seen
+
+
+@pytest.mark.parametrize("missing", ["address", "size"])
+def test_address_or_size_of_zero_is_no_picture(open_unit: Open, picture: Path, missing: str) -> None:
+    unit, inputs = open_unit(), Memory(picture.read_bytes()).inputs
+    zero = ["image.size"] if missing == "size" else ["image.base.lo", "image.base.hi"]
+    unit.step({**inputs, **dict.fromkeys(zero, 0)})
+    assert _frames_seen(unit) == 0
+    assert unit.log == []
+
+
+@pytest.mark.parametrize(
+    ("content", "more"),
+    [
+        (b"no picture at all", {}),
+        (b"1234567890", {"image_width": 1920, "image_height": 1200}),
+        (b"1234567890", {"image_width": 1920}),
+        (b"1234567890", {"image.size": -5}),
+        (b"1234567890", {"image.size": 2**31 - 1}),
+    ],
+)
+def test_memory_that_holds_no_picture(open_unit: Open, content: bytes, more: dict[str, int]) -> None:
+    unit, memory = open_unit(), Memory(content)
+    flag_up(unit)
+    unit.step({"road_class": -1, **memory.inputs, **more})
+    unit.step(count=5)
+    assert not unit.get("flag")
+    assert [line.status for line in unit.log] == [WARNING]
 
 
 # State, reset, instances

@@ -19,11 +19,12 @@ from fmu_unit import Unit
 import build_fmu
 from fmu_src import packaging, variable_table
 from fmu_src.fields import field_value
+from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.model_description import UNITS as SI_UNITS
 from fmu_src.packaging import BuildError, build_unit, sha256, unpack_unit
 from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
-from fmu_src.variables import TRPAC_ESTIMATOR, Kind, Variable
+from fmu_src.variables import Kind, Variable
 from trpac_core.estimator import Estimate, EstimatorConfig
 
 ROOT = Path(__file__).parent.parent
@@ -36,6 +37,11 @@ INTERFACE = {
         "vehicle_speed",
         "image_path",
         "frame_id",
+        "image.base.lo",
+        "image.base.hi",
+        "image.size",
+        "image_width",
+        "image_height",
         "road_class",
         "road_class_confidence",
         "vertical_load",
@@ -209,6 +215,19 @@ def test_description_says_units_ranges_and_abilities(unit_file: Path) -> None:
     assert ability.canHandleVariableCommunicationStepSize
     torque = next(unit for unit in description.unitDefinitions if unit.name == "N.m").baseUnit
     assert (torque.kg, torque.m, torque.s) == (1, 2, -2)
+
+
+@pytest.mark.e2e
+def test_picture_in_memory_is_annotated_as_the_sensor_model_packaging_has_it(unit_folder: Path) -> None:
+    root = ElementTree.parse(unit_folder / "modelDescription.xml").getroot()
+    osmp = "{http://xsd.pmsf.net/OSISensorModelPackaging}"
+    assert root.find(f"VendorAnnotations/Tool[@name='net.pmsf.osmp']/{osmp}osmp") is not None
+    parts = {
+        (scalar.attrib["name"], binary.attrib["name"], binary.attrib["role"])
+        for scalar in root.iter("ScalarVariable")
+        for binary in scalar.iter(f"{osmp}osmp-binary-variable")
+    }
+    assert parts == {(f"image.{role}", "image", role) for role in ("base.lo", "base.hi", "size")}
 
 
 @pytest.mark.e2e

@@ -1,0 +1,158 @@
+"""Inputs and outputs of the estimator's unit."""
+
+from __future__ import annotations
+
+from trpac_core.dife import GREATEST_THETA
+from trpac_core.vision.classes import Surface
+
+from .variables import Kind, Variable
+
+NO_ROAD_CLASS = -1
+"""Value of `road_class` that means: no class by bus, use the picture."""
+
+
+def _input(
+    name: str,
+    unit: str,
+    description: str,
+    minimum: float | None = None,
+    maximum: float | None = None,
+    nominal: float | None = None,
+) -> Variable:
+    return Variable(name, Kind.REAL, "input", "continuous", description, unit, 0.0, minimum, maximum, nominal)
+
+
+def _output(
+    name: str,
+    unit: str,
+    description: str,
+    minimum: float | None = None,
+    maximum: float | None = None,
+    nominal: float | None = None,
+) -> Variable:
+    return Variable(
+        name, Kind.REAL, "output", "continuous", description, unit, None, minimum, maximum, nominal
+    )
+
+
+INPUTS = (
+    _input("wheel_speed", "rad/s", "Rotational speed of the wheel, positive forwards", nominal=100.0),
+    _input("wheel_torque", "N.m", "Torque on the wheel, brakes included; positive drives", nominal=300.0),
+    _input("vehicle_speed", "m/s", "Longitudinal speed of the car, positive forwards", nominal=30.0),
+    Variable(
+        "image_path",
+        Kind.STRING,
+        "input",
+        "discrete",
+        "Path of the newest camera picture; a changed path or frame_id is a new frame, an empty one is none",
+        start="",
+    ),
+    Variable(
+        "frame_id",
+        Kind.INTEGER,
+        "input",
+        "discrete",
+        "Number of the newest frame; 0 where frames have no numbers",
+        start=0,
+    ),
+    *(
+        Variable(
+            f"image.{part}",
+            Kind.INTEGER,
+            "input",
+            "discrete",
+            f"{meaning} of the newest picture in memory, set for one step; 0 is none",
+            start=0,
+            binary="image",
+        )
+        for part, meaning in (
+            ("base.lo", "Lower 32 bits of the address"),
+            ("base.hi", "Upper 32 bits of the address"),
+            ("size", "Size in bytes"),
+        )
+    ),
+    *(
+        Variable(
+            f"image_{side}",
+            Kind.INTEGER,
+            "input",
+            "discrete",
+            f"{side.capitalize()} in pixels of a picture in memory that is raw BGR, 8 bits each; 0: it is JPEG or PNG",
+            start=0,
+            minimum=0,
+        )
+        for side in ("width", "height")
+    ),
+    Variable(
+        "road_class",
+        Kind.INTEGER,
+        "input",
+        "discrete",
+        "Road surface class by bus instead of a picture: 0 dry, 1 wet, 2 snow or ice; -1 is none",
+        start=NO_ROAD_CLASS,
+        minimum=NO_ROAD_CLASS,
+        maximum=int(max(Surface)),
+    ),
+    _input("road_class_confidence", "1", "Confidence of road_class", 0.0, 1.0),
+    _input(
+        "vertical_load",
+        "N",
+        "Vertical load; as long as it has only been 0, the load follows from mass and acceleration",
+        nominal=3000.0,
+    ),
+    _input("steering_angle", "rad", "Steering angle of the front wheels, positive to the left"),
+    _input(
+        "longitudinal_acceleration",
+        "m/s2",
+        "Longitudinal acceleration; as long as it has only been 0, the speed is differentiated",
+        nominal=10.0,
+    ),
+    _input(
+        "yaw_rate",
+        "rad/s",
+        "Yaw rate, positive to the left; as long as it has only been 0, it follows from the steering angle",
+    ),
+)
+
+OUTPUTS = (
+    _output(
+        "TRPAC",
+        "1",
+        "Peak adhesion coefficient of tyre and road, fused estimate theta_hat",
+        0.0,
+        GREATEST_THETA,
+    ),
+    Variable(
+        "flag",
+        Kind.BOOLEAN,
+        "output",
+        "discrete",
+        "Visual information confidence flag epsilon at the wheel now",
+    ),
+    _output("K_v", "1", "Auxiliary gain of the visual term", 0.0),
+    Variable(
+        "excitation_flag", Kind.BOOLEAN, "output", "discrete", "The slip suffices to observe the adhesion now"
+    ),
+    _output("excitation_threshold", "1", "Slip above which the estimate is updated", 0.0, 1.0),
+    _output("slip", "1", "Longitudinal slip, unsigned", 0.0, 1.0),
+    _output("tyre_force", "N", "Observed longitudinal tyre force, positive drives", nominal=1000.0),
+    _output("TRPAC_image", "1", "Adhesion of the class that the camera gave the road under the wheel", 0.0),
+    _output("TRPAC_dynamics", "1", "Adhesion estimated from the dynamics alone", 0.0, GREATEST_THETA),
+    _output(
+        "TRPAC_peak", "1", "Maximum of the tyre's friction curve at TRPAC, as a friction tester measures", 0.0
+    ),
+    _output(
+        "image_confidence",
+        "1",
+        "Confidence Q_v of the road under the wheel, 0 where there is none",
+        0.0,
+        1.0,
+    ),
+    _output(
+        "frame_age",
+        "s",
+        "Time since the picture of the road under the wheel was taken; -1 where there is none",
+        -1.0,
+    ),
+    _output("TRPAC_std", "1", "Standard deviation of TRPAC", 0.0),
+)
