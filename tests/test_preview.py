@@ -95,6 +95,12 @@ def test_standing_car_keeps_one_stamp_with_the_newest_result():
     assert frame_at(state, 5.5) == 499.0
 
 
+def test_frame_that_shares_a_stamp_does_not_shorten_it():
+    (_, shared) = drive([0.0, 1.0, 1.01]).stamps
+    assert (shared.X_lb_m, shared.X_ub_m) == pytest.approx((3.5, 4.5))
+    assert shared.outcome.captured_s == 2.0
+
+
 def test_creeping_car_does_not_pile_up_stamps_nor_drag_the_first_along():
     state = drive([0.001 * k for k in range(3000)], speed_m_s=0.04)
     assert len(state.stamps) <= 3.0 / CONFIG.resolution_m + 1
