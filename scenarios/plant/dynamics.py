@@ -28,13 +28,21 @@ FLOOR_SPEED_M_S = 0.01
 """Below this speed slip is taken relative to the floor, so that standstill has slip 0 and not 0/0 [m/s]."""
 
 TOLERANCE_M_S = 2e-5
-"""Accepted error estimate of a sub-step, in wheel rim and vehicle speed [m/s]; see docs/plant.md."""
+"""Accepted error estimate of a sub-step at rest, in wheel rim and vehicle speed [m/s]; see docs/plant.md."""
+
+RELATIVE_TOLERANCE = 5e-5
+"""What the accepted error estimate grows by with speed, which keeps slip equally accurate at all speeds [-]."""
 
 SHORTEST_STEP_S = 1e-7
 """A sub-step of this length is taken whatever its error estimate says [s]."""
 
+ACCELERATION_TOLERANCE_M_S2 = 1e-7
+"""Accepted residual of the acceleration under load transfer, before its last Newton correction [m/s^2]."""
+
 BORDER_TOLERANCE_M = 1e-7
 """A contact point this close to the next road segment counts as being on it [m]."""
+
+compiled = njit(cache=True, error_model="numpy")  # divisions are guarded here, not by the compiler
 
 _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)  # makes the two-stage Rosenbrock method L-stable
 
@@ -64,7 +72,7 @@ class RoadTable(NamedTuple):
     """Friction under the left and the right wheels, shape (segments, 2) [-]."""
 
 
-@njit(cache=True)
+@compiled
 def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> tuple[float, float, float]:
     """Modified Dugoff force without side slip, and its slopes.
 
@@ -117,7 +125,7 @@ class Wheels(NamedTuple):
     """0 for a wheel that is held at rest, else 1."""
 
 
-@njit(cache=True)
+@compiled
 def new_wheels() -> tuple[Wheels, Wheels]:
     """Working arrays of the two stages; both read the same theta."""
     a = np.zeros((17, 4))
@@ -125,7 +133,7 @@ def new_wheels() -> tuple[Wheels, Wheels]:
     return first, Wheels(a[0], a[9], a[10], a[11], a[12], a[13], a[14], a[15], a[16])
 
 
-@njit(cache=True)
+@compiled
 def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Fill loads, slips, signed forces and force slopes; return the acceleration [m/s^2].
 
@@ -159,12 +167,12 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             wheels.force_by_speed[i] = -slope * (rim / speed if speed == scale else 1.0)
         error = (total_n - drag_n) / p.mass_kg - accel
         accel += error / (1.0 - total_by_accel / p.mass_kg)
-        if p.transfer_height_m == 0.0 or abs(error) < 1e-10:
+        if p.transfer_height_m == 0.0 or abs(error) < ACCELERATION_TOLERANCE_M_S2:
             break
     return accel
 
 
-@njit(cache=True)
+@compiled
 def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Omega' of one wheel [rad/s^2]; a resting wheel that nothing drives forward stays at rest."""
     resistance_n = wheels.force_n[i] + p.rolling_coefficient * wheels.load_n[i]
@@ -172,7 +180,7 @@ def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParamet
     return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
 
 
-@njit(cache=True)
+@compiled
 def _solve(
     speed_rhs: float, speed: float, h: float, p: DynamicsParameters, wheels: Wheels, k: NDArray
 ) -> float:
@@ -196,7 +204,7 @@ def _solve(
     return k_speed
 
 
-@njit(cache=True)
+@compiled
 def segment_at(start_m: NDArray, contact_m: float) -> int:
     """Index of the road segment under a contact point."""
     index = 0
@@ -205,7 +213,7 @@ def segment_at(start_m: NDArray, contact_m: float) -> int:
     return index
 
 
-@njit(cache=True)
+@compiled
 def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, theta: NDArray) -> float:
     """Fill theta under the wheels; return the least distance from a contact to the border ahead of it [m]."""
     front_m = position_m + p.cog_to_front_axle_m
@@ -222,13 +230,14 @@ def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, the
     return ahead
 
 
-@njit(cache=True)
+@compiled
 def _try_step(
     y: NDArray,
     trial: NDArray,
     torque_nm: NDArray,
-    torque_slope: NDArray,
-    at_s: float,
+    next_torque_nm: NDArray,
+    begin: float,
+    end: float,
     h: float,
     accel: float,
     p: DynamicsParameters,
@@ -236,9 +245,9 @@ def _try_step(
     second: Wheels,
 ) -> tuple[float, float]:
     """One two-stage Rosenbrock (ROS2) step from y to trial; return error estimate [m/s], acceleration."""
-    accel = forces(y, accel, p, first)
     for i in range(4):
-        rate = _wheel_rate(i, y[2 + i], torque_nm[i] + torque_slope[i] * at_s, p, first)
+        torque = torque_nm[i] + (next_torque_nm[i] - torque_nm[i]) * begin
+        rate = _wheel_rate(i, y[2 + i], torque, p, first)
         first.free[i] = 0.0 if y[2 + i] <= 0.0 and rate == 0.0 else 1.0
         first.rate_1[i] = rate
     speed_1 = _solve(accel, y[1], h, p, first, first.rate_1)
@@ -247,7 +256,8 @@ def _try_step(
         trial[2 + i] = y[2 + i] + h * first.rate_1[i]
     accel = forces(trial, accel, p, second)
     for i in range(4):
-        rate = _wheel_rate(i, trial[2 + i], torque_nm[i] + torque_slope[i] * (at_s + h), p, second)
+        torque = torque_nm[i] + (next_torque_nm[i] - torque_nm[i]) * end
+        rate = _wheel_rate(i, trial[2 + i], torque, p, second)
         first.rate_2[i] = rate - 2.0 * first.rate_1[i]
     speed_2 = _solve(accel - 2.0 * speed_1, y[1], h, p, first, first.rate_2)
     error = abs(speed_1 + speed_2)
@@ -259,7 +269,7 @@ def _try_step(
     return 0.5 * h * error, accel
 
 
-@njit(cache=True)
+@compiled
 def advance(
     y: NDArray,
     trial: NDArray,
@@ -272,31 +282,35 @@ def advance(
     first: Wheels,
     second: Wheels,
 ) -> float:
-    """Move y over one output step with torque linear between its ends; return the last acceleration [m/s^2].
+    """Move y over one output step with torque linear between its ends; return the acceleration there [m/s^2].
 
-    Sub-steps end at every road border that a wheel crosses and shrink until their error estimate is accepted.
+    `first` must hold the forces at y, and does so again at the end. Sub-steps end at every road border that a wheel
+    crosses and shrink until their error estimate is accepted.
     """
-    torque_slope = (next_torque_nm - torque_nm) / step_s
     at_s = 0.0
     h = step_s
+    ahead_m = look_up_theta(y[0], p, road, first.theta)
     while step_s - at_s > 1e-9 * step_s:
         h = min(h, step_s - at_s)
-        ahead_m = look_up_theta(y[0], p, road, first.theta)
         if y[1] * h > ahead_m:
             h = ahead_m / y[1]
-        error, new_accel = _try_step(y, trial, torque_nm, torque_slope, at_s, h, accel, p, first, second)
-        factor = 0.9 * np.sqrt(TOLERANCE_M_S / max(error, 1e-3 * TOLERANCE_M_S))
-        if error > TOLERANCE_M_S and h > SHORTEST_STEP_S:
-            h = max(h * max(factor, 0.1), SHORTEST_STEP_S)
+        begin, end = at_s / step_s, (at_s + h) / step_s
+        error, new_accel = _try_step(
+            y, trial, torque_nm, next_torque_nm, begin, end, h, accel, p, first, second
+        )
+        tolerance = TOLERANCE_M_S + RELATIVE_TOLERANCE * y[1]
+        if error > tolerance and h > SHORTEST_STEP_S:
+            h = max(h * max(0.9 * np.sqrt(tolerance / error), 0.1), SHORTEST_STEP_S)
             continue
         y[:] = trial
-        accel = new_accel
         at_s += h
-        h *= min(max(factor, 0.5), 10.0)
+        h *= min(0.9 * np.sqrt(tolerance / max(error, 1e-3 * tolerance)), 10.0)
+        ahead_m = look_up_theta(y[0], p, road, first.theta)
+        accel = forces(y, new_accel, p, first)
     return accel
 
 
-@njit(cache=True)
+@compiled
 def run(
     y: NDArray,
     torque_nm: NDArray,
@@ -316,10 +330,10 @@ def run(
     slip, force_n, load_n, theta = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4))
     first, second = new_wheels()
     trial = np.empty(6)
-    accel = 0.0
+    look_up_theta(y[0], p, road, first.theta)
+    accel = forces(y, 0.0, p, first)
     for k in range(n):
-        look_up_theta(y[0], p, road, first.theta)
-        accels[k] = forces(y, accel, p, first)
+        accels[k] = accel
         states[k] = y
         slip[k], force_n[k] = first.slip, first.force_n
         load_n[k], theta[k] = first.load_n, first.theta

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from scenarios.effects import Effect
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, Scenario, VehicleFile
 from scenarios.plant import dynamics
-from scenarios.plant.dynamics import DynamicsParameters, RoadTable
+from scenarios.plant.dynamics import DynamicsParameters, RoadTable, Wheels
 
 Array = NDArray[Any]
 
@@ -60,7 +60,7 @@ class PlantSetup:
 
 @dataclass(frozen=True)
 class PlantState:
-    """The plant at one time, for use step by step."""
+    """The plant at one time, for use step by step; wheels holds what the tyres do then, in arrays to read."""
 
     setup: PlantSetup
     time_s: float
@@ -69,6 +69,7 @@ class PlantState:
     accel_x_m_s2: float
     wheel_speed_rad_s: tuple[float, float, float, float]
     wheel_torque_nm: tuple[float, float, float, float]
+    wheels: Wheels
 
 
 def make_setup(vehicle: VehicleFile, road: RoadFile) -> PlantSetup:
@@ -165,19 +166,11 @@ def initial_state(
         raise ScenarioError("\n".join(problems))
     setup = make_setup(vehicle, road)
     wheel = float(initial_speed_m_s) / setup.parameters.wheel_radius_m
-    still = PlantState(
-        setup=setup,
-        time_s=0.0,
-        position_m=float(initial_position_m),
-        speed_m_s=float(initial_speed_m_s),
-        accel_x_m_s2=0.0,
-        wheel_speed_rad_s=(wheel, wheel, wheel, wheel),
-        wheel_torque_nm=(0.0, 0.0, 0.0, 0.0),
-    )
-    wheels, _ = dynamics.new_wheels()
-    y = _vector(still)
-    dynamics.look_up_theta(y[0], setup.parameters, setup.road, wheels.theta)
-    return replace(still, accel_x_m_s2=dynamics.forces(y, 0.0, setup.parameters, wheels))
+    first, _ = dynamics.new_wheels()
+    y = np.array([initial_position_m, initial_speed_m_s, wheel, wheel, wheel, wheel], dtype=np.float64)
+    dynamics.look_up_theta(y[0], setup.parameters, setup.road, first.theta)
+    accel = dynamics.forces(y, 0.0, setup.parameters, first)
+    return _state(setup, 0.0, y, accel, np.zeros(4), first)
 
 
 def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> PlantState:
@@ -189,9 +182,11 @@ def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> Pla
     if problems:
         raise ScenarioError("\n".join(problems))
     setup = state.setup
-    y = _vector(state)
+    y = np.array([state.position_m, state.speed_m_s, *state.wheel_speed_rad_s])
     first, second = dynamics.new_wheels()
-    dynamics.advance(
+    for own, given in zip(first, state.wheels, strict=True):
+        own[:] = given
+    accel = dynamics.advance(
         y,
         np.empty(6),
         np.array(state.wheel_torque_nm),
@@ -203,16 +198,22 @@ def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> Pla
         first,
         second,
     )
-    dynamics.look_up_theta(y[0], setup.parameters, setup.road, first.theta)
-    accel = dynamics.forces(y, state.accel_x_m_s2, setup.parameters, first)
+    return _state(setup, state.time_s + step_s, y, accel, torque, first)
+
+
+def _state(
+    setup: PlantSetup, time_s: float, y: Array, accel: float, torque: Array, wheels: Wheels
+) -> PlantState:
+    omega, command = tuple(map(float, y[2:])), tuple(map(float, torque))
     return PlantState(
         setup=setup,
-        time_s=state.time_s + step_s,
+        time_s=time_s,
         position_m=float(y[0]),
         speed_m_s=float(y[1]),
         accel_x_m_s2=accel,
-        wheel_speed_rad_s=tuple(map(float, y[2:])),  # type: ignore[arg-type]
-        wheel_torque_nm=tuple(map(float, torque)),  # type: ignore[arg-type]
+        wheel_speed_rad_s=(omega[0], omega[1], omega[2], omega[3]),
+        wheel_torque_nm=(command[0], command[1], command[2], command[3]),
+        wheels=wheels,
     )
 
 
@@ -229,10 +230,6 @@ def drive(scenario: Scenario) -> PlantTrajectory:
     )
     reached = np.flatnonzero(whole.position_m + to_front_m >= scenario.end.position_m)
     return whole.rows(int(reached[0]) + 1) if len(reached) else whole
-
-
-def _vector(state: PlantState) -> Array:
-    return np.array([state.position_m, state.speed_m_s, *state.wheel_speed_rad_s])
 
 
 def _problems(step_s: float, initial_speed_m_s: float) -> list[str]:

@@ -1,0 +1,369 @@
+from dataclasses import fields
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from plant_oracle import reference
+from scipy.optimize import brentq
+
+from scenarios.errors import ScenarioError
+from scenarios.files import RoadFile, SensorNoise, VehicleFile, load_scenario, load_vehicle
+from scenarios.plant import advance, drive, initial_state, make_log, simulate, write_log
+from scenarios.plant.dynamics import FLOOR_SPEED_M_S, tyre_force
+from trpac_core import tyre
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+CAR = load_vehicle(SCENARIOS / "vehicles" / "four_in_wheel_motor_ev.yaml")
+NOMINAL = CAR.model_copy(update={"effects": {}})
+TO_FRONT_M, TO_REAR_M = 2.305 - 1.193, 1.193
+
+
+def make_road(*segments):
+    rows = [
+        {"start_m": float(start), "mu_left": left, "mu_right": right, "surface": "dry"}
+        for start, left, right in segments
+    ]
+    return RoadFile.model_validate({"schema": 1, "segments": rows})
+
+
+DRY = make_road((0.0, 0.9, 0.9))
+ICE = make_road((0.0, 0.3, 0.3))
+
+
+def with_effects(**effects):
+    return VehicleFile.model_validate({**CAR.model_dump(by_alias=True), "effects": effects})
+
+
+def constant(torque_nm, duration_s, step_s=1e-3):
+    return np.full((round(duration_s / step_s) + 1, 4), float(torque_nm))
+
+
+def profile(knots, duration_s, step_s=1e-3):
+    """Torque of all wheels through (time, torque) knots."""
+    time_s = np.arange(round(duration_s / step_s) + 1) * step_s
+    times, torques = zip(*knots, strict=True)
+    return np.repeat(np.interp(time_s, times, torques)[:, None], 4, axis=1)
+
+
+@settings(deadline=None)
+@given(
+    theta=st.floats(0.05, 1.2),
+    slip=st.floats(0.0, 0.98),
+    load_n=st.floats(200.0, 8000.0),
+    stiffness_n=st.floats(2e4, 1e5),
+)
+def test_compiled_tyre_is_the_estimators_tyre(theta, slip, load_n, stiffness_n):
+    force, by_slip, by_load = tyre_force(theta, slip, load_n, stiffness_n)
+    assert force == pytest.approx(tyre.force(theta, slip, load_n, stiffness_n, 1.0), rel=1e-12, abs=1e-9)
+    if slip > 1e-3:
+        d = 1e-7
+        by_slip_numeric = (tyre_force(theta, slip + d, load_n, stiffness_n)[0] - force) / d
+        by_load_numeric = (tyre_force(theta, slip, load_n * (1.0 + d), stiffness_n)[0] - force) / (load_n * d)
+        assert by_slip == pytest.approx(by_slip_numeric, rel=1e-3, abs=5e-3 * load_n)
+        assert by_load == pytest.approx(by_load_numeric, abs=2e-4)
+
+
+def test_locked_wheel_keeps_the_sliding_share_of_the_grip():
+    assert tyre_force(0.5, 1.0, 3000.0, 5e4)[0] == pytest.approx(0.79 * 0.5 * 3000.0)
+    assert tyre_force(0.5, 0.0, 3000.0, 5e4)[0] == 0.0
+
+
+CASES = {
+    "standing start over two borders": (
+        {},
+        [(0.0, 0.0), (0.1, 300.0), (1.2, 300.0), (1.25, 0.0), (1.4, 220.0), (1.6, 220.0)],
+        [(0.0, 0.9, 0.9), (1.0, 0.35, 0.3), (3.0, 0.5, 0.5)],
+        0.0,
+        -TO_FRONT_M,
+    ),
+    "standing start with load transfer and drag": (
+        {"load_transfer": {"cog_height_m": 0.54}, "aero_drag": {"drag_area_m2": 2.0}},
+        [(0.0, 0.0), (0.1, 270.0), (0.8, 270.0), (0.85, 0.0), (1.6, 0.0)],
+        [(0.0, 0.3, 0.3)],
+        0.0,
+        -TO_FRONT_M,
+    ),
+    "rolling, all effects, braking to a lock": (
+        {
+            "load_transfer": {"cog_height_m": 0.54},
+            "aero_drag": {"drag_area_m2": 0.65},
+            "rolling_resistance": {"coefficient": 0.02},
+        },
+        [(0.0, 0.0), (0.2, 320.0), (0.6, 320.0), (0.8, -260.0), (1.6, -260.0)],
+        [(0.0, 0.5, 0.5), (4.0, 0.9, 0.8), (9.0, 0.4, 0.4)],
+        6.0,
+        0.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_agrees_with_an_independent_stiff_solver(case):
+    effects, knots, segments, speed, position = CASES[case]
+    torque = profile(knots, 1.6)
+    run = simulate(with_effects(**effects), make_road(*segments), torque, 1e-3, speed, position)
+    car = {
+        "m": CAR.mass_kg, "l_f": TO_FRONT_M, "l_r": TO_REAR_M,
+        "radius": CAR.wheel_radius_m, "inertia": CAR.wheel_inertia_kg_m2,
+        "stiffness": CAR.tyre.longitudinal_stiffness_n,
+        "h": effects.get("load_transfer", {}).get("cog_height_m", 0.0),
+        "k": 0.5 * 1.225 * effects.get("aero_drag", {}).get("drag_area_m2", 0.0),
+        "c": effects.get("rolling_resistance", {}).get("coefficient", 0.0),
+    }  # fmt: skip
+    times, torques = zip(*knots, strict=True)
+
+    def torque_at(t):
+        return np.interp(t, times, torques) * np.ones(4)
+
+    truth = reference(car, segments, torque_at, times, run.time_s, speed, position, FLOOR_SPEED_M_S)
+    assert np.abs(run.speed_m_s - truth[:, 1]).max() < 5e-5
+    assert np.abs(run.wheel_speed_rad_s - truth[:, 2:]).max() < 3e-3
+    # Sub-millisecond: where the plant is at a given time differs by less than it drives in 0.1 ms.
+    assert np.abs(run.position_m - truth[:, 0]).max() < 1e-4 * truth[:, 1].max()
+
+
+def test_standing_start_follows_the_closed_form():
+    """At constant torque from rest slip is constant: v = a t, omega R = b t solve the equations exactly."""
+    torque, mass, inertia, radius = 200.0, CAR.mass_kg, CAR.wheel_inertia_kg_m2, CAR.wheel_radius_m
+
+    def excess(slip):
+        force = tyre_force(0.9, slip, 3300.0, 5e4)[0]
+        return (torque - force * radius) / inertia * radius * (1.0 - slip) - 4.0 * force / mass
+
+    slip = brentq(excess, 1e-5, 0.05)
+    accel = 4.0 * tyre_force(0.9, slip, 3300.0, 5e4)[0] / mass
+    run = simulate(NOMINAL, DRY, constant(torque, 1.0), 1e-3)
+    assert run.speed_m_s[0] == 0.0
+    assert run.speed_m_s[-1] == pytest.approx(accel, rel=2e-3)
+    moving = run.time_s > 0.05
+    assert np.abs(run.slip[moving] / slip - 1.0).max() < 0.02
+    assert (np.diff(run.speed_m_s) > 0.0).all()
+    assert np.abs(np.diff(run.accel_x_m_s2[moving])).max() < 0.01  # no chatter
+
+
+@pytest.mark.parametrize("torque", [0.0, -5.0, -1500.0])
+def test_rest_without_drive_is_exact(torque):
+    run = simulate(CAR, ICE, constant(torque, 0.5), 1e-3)
+    for name in ("position_m", "speed_m_s", "accel_x_m_s2", "wheel_speed_rad_s", "slip", "tyre_force_n"):
+        assert not getattr(run, name).any(), name
+
+
+def test_rolling_resistance_holds_against_a_small_torque():
+    car = with_effects(rolling_resistance={"coefficient": 0.02})
+    holds_nm = 0.02 * 3179.0 * CAR.wheel_radius_m  # at the less loaded rear wheels
+    assert not simulate(car, DRY, constant(0.99 * holds_nm, 0.5), 1e-3).speed_m_s.any()
+    assert simulate(car, DRY, constant(1.2 * holds_nm, 0.5), 1e-3).speed_m_s[-1] > 0.0
+
+
+@pytest.mark.parametrize(("torque", "locks"), [(-60.0, False), (-900.0, True)])
+@pytest.mark.parametrize("car", [NOMINAL, CAR], ids=["nominal", "effects"])
+def test_braking_ends_at_rest_and_stays_there(car, torque, locks):
+    run = simulate(car, ICE, profile([(0.0, 0.0), (0.1, torque), (9.0, torque)], 9.0), 1e-3, 3.0)
+    assert (run.speed_m_s >= 0.0).all()
+    assert (run.wheel_speed_rad_s >= 0.0).all()
+    assert (np.diff(run.speed_m_s) <= 1e-12).all()
+    stopped = int(np.argmax(run.speed_m_s == 0.0))
+    assert stopped > 0
+    assert not run.speed_m_s[stopped:].any()
+    assert not run.tyre_force_n[stopped + 1 :].any()
+    assert np.ptp(run.position_m[stopped:]) == 0.0
+    assert (run.tyre_force_n[200:stopped] < 0.0).all()  # no sign chatter on the way
+    slides = (run.wheel_speed_rad_s[stopped // 2] == 0.0).all()
+    assert slides == locks
+    if locks:
+        decel = 0.79 * 0.3 * 9.81
+        drag = 0.0 if car is NOMINAL else 0.01
+        assert run.accel_x_m_s2[stopped // 2] == pytest.approx(-decel, abs=1e-9 + drag)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    torques=st.lists(st.lists(st.floats(-2000.0, 2000.0), min_size=4, max_size=4), min_size=2, max_size=8),
+    speed=st.floats(0.0, 20.0),
+    theta=st.floats(0.1, 1.0),
+    step_s=st.sampled_from([5e-4, 1e-3, 5e-3]),
+)
+def test_stays_bounded_whatever_the_torque(torques, speed, theta, step_s):
+    torque = np.repeat(np.array(torques), 40, axis=0)
+    run = simulate(CAR, make_road((0.0, theta, theta), (5.0, 0.2, 0.9)), torque, step_s, speed)
+    for field in fields(run):
+        assert np.isfinite(getattr(run, field.name)).all()
+    assert (run.speed_m_s >= 0.0).all()
+    assert (run.wheel_speed_rad_s >= 0.0).all()
+    assert (run.slip <= 1.0).all()
+    assert (np.abs(run.tyre_force_n) <= 1.28 * run.theta * run.vertical_load_n + 1e-9).all()
+    assert (np.diff(run.position_m) >= 0.0).all()
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    knots=st.lists(st.floats(-250.0, 320.0), min_size=3, max_size=8),
+    theta=st.floats(0.2, 1.0),
+    speed=st.floats(3.0, 12.0),
+)
+def test_energy_is_conserved(knots, theta, speed):
+    """Work of the motors = kinetic energy gained + slip losses + rolling losses + drag losses."""
+    duration_s = 1.0
+    times = np.linspace(0.0, duration_s, len(knots))
+    car = with_effects(
+        load_transfer={"cog_height_m": 0.5},
+        rolling_resistance={"coefficient": 0.03},
+        aero_drag={"drag_area_m2": 2.0},
+    )
+    run = simulate(
+        car, make_road((0.0, theta, theta)), profile(list(zip(times, knots, strict=True)), 1.0), 1e-3, speed
+    )
+    radius, inertia = CAR.wheel_radius_m, CAR.wheel_inertia_kg_m2
+    omega, v = run.wheel_speed_rad_s, run.speed_m_s
+    power = (run.wheel_torque_nm * omega).sum(1)
+    losses = (run.tyre_force_n * (omega * radius - v[:, None])).sum(1)
+    losses += (0.03 * run.vertical_load_n * radius * omega).sum(1) + 0.5 * 1.225 * 2.0 * v**3
+    kinetic = 0.5 * CAR.mass_kg * v**2 + 0.5 * inertia * (omega**2).sum(1)
+    scale = np.trapezoid(np.abs(power) + np.abs(losses), run.time_s) + 1.0
+    gained = kinetic[-1] - kinetic[0]
+    assert gained == pytest.approx(np.trapezoid(power - losses, run.time_s), abs=5e-3 * scale)
+
+
+def test_step_by_step_is_the_same_motion_bit_for_bit():
+    road = make_road((0.0, 0.9, 0.9), (0.5, 0.3, 0.5))
+    torque = profile([(0.0, 0.0), (0.1, 300.0), (0.6, 300.0), (0.7, -500.0), (1.0, -500.0)], 1.0)
+    torque[:, 1] *= 0.9
+    whole = simulate(CAR, road, torque, 1e-3, initial_position_m=-TO_FRONT_M)
+    state = initial_state(CAR, road, initial_position_m=-TO_FRONT_M)
+    for k in range(1, len(torque)):
+        state = advance(state, torque[k], 1e-3)
+        assert state.position_m == whole.position_m[k]
+        assert state.speed_m_s == whole.speed_m_s[k]
+        assert state.accel_x_m_s2 == whole.accel_x_m_s2[k]
+        assert state.wheel_speed_rad_s == tuple(whole.wheel_speed_rad_s[k])
+        assert (state.wheels.force_n == whole.tyre_force_n[k]).all()
+
+
+def test_theta_is_that_of_each_wheels_own_contact():
+    road = make_road((0.0, 0.9, 0.8), (2.0, 0.3, 0.4))
+    run = simulate(NOMINAL, road, constant(0.0, 1.0), 1e-3, 5.0, -1.0)
+    front, rear = run.position_m + TO_FRONT_M, run.position_m - TO_REAR_M
+    edge = np.minimum(np.abs(front - 2.0), np.abs(rear - 2.0)) < 1e-6
+    assert (run.theta[~edge, 0] == np.where(front < 2.0, 0.9, 0.3)[~edge]).all()
+    assert (run.theta[~edge, 1] == np.where(front < 2.0, 0.8, 0.4)[~edge]).all()
+    assert (run.theta[~edge, 2] == np.where(rear < 2.0, 0.9, 0.3)[~edge]).all()
+    assert (run.theta[~edge, 3] == np.where(rear < 2.0, 0.8, 0.4)[~edge]).all()
+    assert len(np.unique(run.theta[:, 0])) == len(np.unique(run.theta[:, 2])) == 2
+
+
+def test_accelerometer_reads_the_change_of_speed_on_a_flat_road():
+    run = simulate(CAR, DRY, profile([(0.0, 0.0), (0.3, 200.0), (1.0, -100.0)], 1.0), 1e-3, 5.0)
+    assert np.gradient(run.speed_m_s, run.time_s)[5:-5] == pytest.approx(run.accel_x_m_s2[5:-5], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"wheel_torque_nm": np.zeros((10, 3))}, r"shape \(10, 3\)"),
+        ({"wheel_torque_nm": np.full((10, 4), np.nan)}, "not finite at row 0"),
+        ({"step_s": 0.0}, "step_s is 0.0"),
+        ({"initial_speed_m_s": -1.0}, "initial_speed_m_s is -1.0"),
+    ],
+)
+def test_bad_input_is_named(changes, message):
+    arguments = {"wheel_torque_nm": np.zeros((10, 4)), "step_s": 1e-3, **changes}
+    with pytest.raises(ScenarioError, match=message):
+        simulate(CAR, DRY, **arguments)
+
+
+@pytest.fixture(scope="module")
+def paper():
+    scenario = load_scenario(SCENARIOS / "paper_simulation.yaml")
+    return scenario, drive(scenario)
+
+
+def test_paper_scenario_meets_the_papers_events(paper):
+    scenario, run = paper
+    front = run.position_m + TO_FRONT_M
+    assert run.speed_m_s[0] == 0.0
+    assert front[0] == pytest.approx(0.0)
+    assert front[-2] < scenario.end.position_m <= front[-1]
+    low_s, middle_s = run.time_s[np.argmax(front >= 20.0)], run.time_s[np.argmax(front >= 40.0)]
+    assert low_s == pytest.approx(5.14, abs=0.15)
+    assert middle_s == pytest.approx(7.85, abs=0.15)
+    coasting = run.wheel_torque_nm[(run.time_s >= middle_s) & (run.time_s < 8.14)]
+    assert not coasting.any()
+    assert run.wheel_torque_nm[(run.time_s > 8.16) & (run.time_s < 8.5)].all()
+
+
+def test_paper_scenario_excites_the_slippery_parts_only(paper):
+    _, run = paper
+    front = run.position_m + TO_FRONT_M
+    used = np.abs(run.tyre_force_n[:, 0]) / run.vertical_load_n[:, 0] / run.theta[:, 0]
+    high, low, middle = front < 20.0, (front >= 20.0) & (front < 40.0), front >= 40.0
+    assert used[high].max() < 0.45
+    assert (used[low] > 0.75).sum() * 1e-3 > 1.2
+    # The motors' peak leaves no more than this on 0.5; theta shows from 0.62 theta of used friction on.
+    assert (used[middle] > 0.68).sum() * 1e-3 > 1.2
+    assert run.slip[:, :2].max() < 0.15
+    excited = np.flatnonzero(np.diff((used > 0.68).astype(int)))
+    lengths = [b - a for a, b in pairwise(excited)][::2]
+    assert all(200 <= n <= 500 for n in lengths)
+
+
+def test_log_has_the_contracts_columns_and_the_curves_maximum(paper):
+    _, run = paper
+    log = make_log(run, CAR)
+    wheels = ("fl", "fr", "rl", "rr")
+    assert list(log.columns) == [
+        "time_s", *(f"wheel_torque_{w}_nm" for w in wheels), *(f"wheel_speed_{w}_rad_s" for w in wheels),
+        "vehicle_speed_m_s", "accel_x_m_s2", "position_m", "mu_reference",
+    ]  # fmt: skip
+    assert (log["vehicle_speed_m_s"] == run.speed_m_s).all()
+    slips = np.linspace(1e-4, 0.6, 20_000)
+    for theta in (0.9, 0.3, 0.5):
+        peak = max(tyre_force(theta, s, 3411.48, 5e4)[0] for s in slips) / 3411.48
+        found = log["mu_reference"][run.theta[:, 0] == theta]
+        assert found.to_numpy() == pytest.approx(peak, abs=1e-4)
+        assert peak > 1.02 * theta
+
+
+def test_noise_has_the_stated_size_and_repeats_with_its_seed(paper):
+    _, run = paper
+    noise = SensorNoise(
+        wheel_speed_noise_rad_s=0.03,
+        wheel_torque_noise_nm=3.2,
+        vehicle_speed_noise_m_s=0.014,
+        accel_x_noise_m_s2=0.05,
+    )
+    ideal, noisy = make_log(run, CAR), make_log(run, CAR, noise, seed=7)
+    residual = (noisy - ideal).std()
+    assert residual["wheel_speed_rl_rad_s"] == pytest.approx(0.03, rel=0.03)
+    assert residual["wheel_torque_fr_nm"] == pytest.approx(3.2, rel=0.03)
+    assert residual["vehicle_speed_m_s"] == pytest.approx(0.014, rel=0.03)
+    assert residual["accel_x_m_s2"] == pytest.approx(0.05, rel=0.03)
+    assert residual[["time_s", "position_m", "mu_reference"]].eq(0.0).all()
+    independent = (noisy - ideal)[["wheel_speed_fl_rad_s", "wheel_speed_fr_rad_s"]].corr().iloc[0, 1]
+    assert abs(independent) < 0.05
+    pd.testing.assert_frame_equal(noisy, make_log(run, CAR, noise, seed=7))
+    assert not noisy.equals(make_log(run, CAR, noise, seed=8))
+
+
+def test_written_log_reads_back_unchanged(paper, tmp_path):
+    _, run = paper
+    log = make_log(run.rows(50), CAR, SensorNoise(accel_x_noise_m_s2=0.05), seed=1)
+    write_log(log, tmp_path / "new" / "log.csv")
+    pd.testing.assert_frame_equal(
+        pd.read_csv(tmp_path / "new" / "log.csv"), log, check_exact=False, rtol=1e-15
+    )
+
+
+def test_peak_torque_uses_seven_tenths_of_the_grip_on_the_middle_friction():
+    """The balance by hand: rotating parts and load transfer included, at a constant 320 N m."""
+    car = with_effects(load_transfer={"cog_height_m": 0.54})
+    run = simulate(car, make_road((0.0, 0.5, 0.5)), constant(320.0, 0.5), 1e-3, 8.0)
+    accel = 4.0 * 320.0 / 0.29 / (1343.8 + 4.0 * 1.2 / 0.29**2)
+    force = 1343.8 * accel / 4.0
+    load = 1343.8 * (9.81 * 1.193 - accel * 0.54) / (2.0 * 2.305)
+    used = abs(run.tyre_force_n[-1, 0]) / run.vertical_load_n[-1, 0]
+    assert used == pytest.approx(force / load, rel=0.01)
+    assert used / 0.5 == pytest.approx(0.725, abs=0.01)  # in the scenario also drag and rolling: 0.71
