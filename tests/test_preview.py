@@ -89,6 +89,15 @@ def test_newest_frame_wins_where_stamps_overlap():
     assert frame_at(state, 4.6) == 2.0, "covered by frame 1's stamp too"
 
 
+def test_older_longer_stamp_does_not_come_back_when_a_newer_one_has_ended():
+    config = PreviewConfig(resolution_m=0.0)
+    state = drive([0.0, 3.0, 3.1], config)
+    # Frame 1 reaches to 8.5 + 2, frame 2 begins at 5.6 and reaches to 5.7 + 2.
+    assert frame_at(state, 7.6, config) == 2.0
+    assert frame_at(state, 7.8, config) is None
+    assert frame_at(prune(state, config, 7.8), 7.8, config) is None
+
+
 def test_standing_car_keeps_one_stamp_with_the_newest_result():
     state = drive([3.0] * 500, speed_m_s=0.0)
     assert len(state.stamps) == 1

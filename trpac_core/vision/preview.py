@@ -18,6 +18,7 @@ one stamp, with the newest result: a standing car does not pile up
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -140,14 +141,24 @@ def add_frame(
 
 def covering(state: PreviewState, config: PreviewConfig, position_m: float) -> Outcome | None:
     """Outcome for the road at a coordinate now, of the newest frame that covers it; None in a gap."""
+    begun_m = -math.inf
     for stamp in reversed(state.stamps):
-        if stamp.X_lb_m <= position_m < stamp.X_ub_m + config.hold_m:
-            return stamp.outcome
+        if begun_m < stamp.X_lb_m <= position_m:
+            if position_m < stamp.X_ub_m + config.hold_m:
+                return stamp.outcome
+            # A newer frame that began here has ended all older ones that began before it.
+            begun_m = stamp.X_lb_m
     return None
 
 
 def prune(state: PreviewState, config: PreviewConfig, position_m: float) -> PreviewState:
     """The state without the stamps that lie behind the wheels when the front wheel is at a coordinate."""
     rear_m = position_m - config.behind_m
-    stamps = tuple(stamp for stamp in state.stamps if stamp.X_ub_m + config.hold_m > rear_m)
-    return state if len(stamps) == len(state.stamps) else replace(state, stamps=stamps)
+    kept: list[Stamp] = []
+    first_m = math.inf
+    for stamp in state.stamps:
+        # An expired stamp still ends the older ones that began before it.
+        if stamp.X_ub_m + config.hold_m > rear_m or stamp.X_lb_m >= first_m:
+            kept.append(stamp)
+            first_m = min(first_m, stamp.X_lb_m)
+    return state if len(kept) == len(state.stamps) else replace(state, stamps=tuple(kept))
