@@ -411,9 +411,55 @@ def test_restored_state_repeats_the_run_bit_by_bit_with_a_frame_pending(
     assert other.slave.serializeFMUstate(restored) == saved
 
 
-@pytest.mark.parametrize("content", [b"", b"{}", b"\xff\x00", b'{"schema": 1, "unit": "another"}'])
-def test_state_of_something_else_is_refused(open_unit: Open, content: bytes) -> None:
+def test_restored_instance_knows_the_frame_that_was_taken(open_unit: Open, picture: Path) -> None:
+    unit, other = open_unit(), open_unit()
+    unit.step({**DRIVING, "image_path": str(picture), "frame_id": 3})
+    _hand_over(unit, other)
+    other.step(count=5)
+    assert _frames_seen(other) == 1
+
+
+def test_restored_instance_knows_which_inputs_are_connected(open_unit: Open) -> None:
+    unit, other = open_unit(), open_unit()
+    unit.step({**DRIVING, "longitudinal_acceleration": 1.0})
+    unit.set({"longitudinal_acceleration": 0.0})
+    _hand_over(unit, other)
+    for one in (unit, other):
+        for index in range(50):
+            one.step({"vehicle_speed": 15.0 + 0.01 * index})
+    assert other.outputs() == unit.outputs()
+
+
+def test_a_frame_that_failed_before_the_state_was_saved_keeps_the_flag_down(open_unit: Open) -> None:
+    unit, other = open_unit(), open_unit()
+    flag_up(unit)
+    unit.step({"road_class": -1, "image_path": "missing.png"})
+    _hand_over(unit, other)
+    other.step(count=5)
+    assert not other.get("flag")
+
+
+def _hand_over(unit: Unit, other: Unit) -> None:
+    state = unit.slave.getFMUstate()
+    other.slave.setFMUstate(other.slave.deSerializeFMUstate(unit.slave.serializeFMUstate(state)))
+    unit.slave.freeFMUstate(state)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda _: b"",
+        lambda _: b"{}",
+        lambda _: b"\xff\x00",
+        lambda saved: saved[:-20],
+        lambda saved: saved.replace(b"fmu_src_", b"fmu_src_another_"),
+        lambda saved: saved.replace(b'"wheel_speed"', b'"another_name"'),
+        lambda saved: saved.replace(b'"schema": 1', b'"schema": 0'),
+    ],
+)
+def test_state_of_something_else_is_refused(open_unit: Open, spoil: Callable[[bytes], bytes]) -> None:
     unit = open_unit()
+    content = spoil(unit.slave.serializeFMUstate(unit.slave.getFMUstate()))
     unit.step(DRIVING)
     before = unit.outputs()
     unit.slave.setFMUstate(unit.slave.deSerializeFMUstate(content))
