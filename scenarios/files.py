@@ -81,6 +81,7 @@ class VehicleFile(_FileModel):
             wheel_inertia_kg_m2=self.wheel_inertia_kg_m2,
             motor_peak_torque_nm=self.motor_peak_torque_nm,
             longitudinal_stiffness_n=self.tyre.longitudinal_stiffness_n,
+            rolling_resistance=self.effects.get("rolling_resistance", {}).get("coefficient", 0.0),
         )
 
     def make_effects(self) -> tuple[Effect, ...]:

@@ -3,8 +3,8 @@
 The force observer and the estimator are a cascade. K is bounded from above by what the wheel's equation leaves out
 (motor torque lag and driveline torsion, from about 10 Hz on), so K is put at that corner. gamma is bounded by the
 cascade (its loop must stay slower than the observer that feeds it, by `SEPARATION`) and by noise: at the tyre's least
-useful excitation the estimate's standard deviation must stay below half of the finest convergence band. The larger
-gamma that keeps both is taken.
+useful excitation two standard deviations of the estimate must stay within the paper's steady-state error of 0.02.
+The largest gamma that keeps both is taken.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from scipy.optimize import brentq
 from trpac_core.tyre import friction_by_slip, friction_by_theta, onset_slip
 from trpac_core.vehicle import Vehicle
 
-SEPARATION = 8.0
-"""Ratio of the observer's to the estimator's bandwidth that keeps the cascade well damped [-]."""
+SEPARATION = 5.0
+"""Ratio of the observer's to the estimator's bandwidth that keeps the two loops of the cascade apart [-]."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,15 @@ class DesignPoint:
     """
 
     force_bandwidth_hz: float = 10.0
-    wheel_speed_noise_rad_s: float = 0.05
+    wheel_speed_noise_rad_s: float = 0.01
     wheel_torque_noise_nm: float = 3.2
-    vehicle_speed_noise_m_s: float = 0.014
+    vehicle_speed_noise_m_s: float = 0.003
     sample_time_s: float = 0.001
     theta: float = 0.5
     sensitivity: float = 0.25
     longitudinal_acceleration_m_s2: float = 3.2
-    speed_m_s: float = 5.0
-    theta_deviation: float = 0.005
+    speed_m_s: float = 8.0
+    theta_deviation: float = 0.01
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,6 @@ class ConfidenceModel:
 
     Parameters
     ----------
-    slip_speed_noise_m_s : float
-        Standard deviation of the sliding speed omega R - v per sample [m/s].
     torque_noise_nm : float
         Of the wheel torque per sample [N m].
     tyre_share : float
@@ -27,7 +25,6 @@ class ConfidenceModel:
         Standard deviation where nothing is known: of a road between 0.1 and 1.1 [-].
     """
 
-    slip_speed_noise_m_s: float = 0.02
     torque_noise_nm: float = 3.2
     tyre_share: float = 0.01
     road_change: float = 0.05
@@ -56,7 +53,7 @@ def advanced_variance(
     grown = variance + model.road_change**2 * max(speed_m_s, 0.0) * step_s
     if sensitivity > 0.0:
         slope = friction_by_slip(theta_hat, inputs.slip.size, inputs.load_n, wheel.longitudinal_stiffness_n)
-        from_slip = slope * model.slip_speed_noise_m_s / max(speed_m_s, model.slip_speed_noise_m_s)
+        from_slip = slope * inputs.slip_deviation
         from_torque = model.torque_noise_nm / (wheel.radius_m * inputs.load_n)
         sample = (from_slip**2 + from_torque**2) / sensitivity**2
         settled = sample * gamma * step_s / 2.0 + (model.tyre_share / sensitivity) ** 2

@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 from .observer import advanced_state, observed_force, settled_state
 from .slip import Slip
-from .tyre import force, friction_by_theta, theta_from_friction
+from .tyre import correction, force, friction_by_theta, slip_ratio_force, theta_from_friction
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
 LEAST_THETA = 0.02
 """Lower end: at 0 the tyre model has no force and the estimate could never leave it [-]."""
+SIGNIFICANCE = 1.5
+"""How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
 LEAST_SENSITIVITY = 0.1
 """Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
 nothing to invert [-]."""
@@ -39,8 +41,8 @@ class Gains:
     K [1/s] is the force observer's bandwidth, gamma [1/s] the estimator's.
     """
 
-    K: float = 60.0
-    gamma: float = 6.0
+    K: float = 63.0
+    gamma: float = 12.5
     visual_term: VisualTerm = VisualTerm.OUTSIDE
 
 
@@ -51,6 +53,8 @@ class WheelInputs(NamedTuple):
     wheel_torque_nm: float
     slip: Slip
     load_n: float
+    slip_deviation: float
+    """Standard deviation of the slip through sensor noise [-]."""
 
 
 class Wheel(NamedTuple):
@@ -95,12 +99,22 @@ def settled(theta_hat: float, inputs: WheelInputs, wheel: Wheel, gains: Gains) -
 
 
 def visible_theta(
-    force_n: float, slip: Slip, load_n: float, longitudinal_stiffness_n: float
+    force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float
 ) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
-    if slip.size == 0.0:
+    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it.
+
+    On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
+    end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
+    So the force must also be below the elastic one of a slip that is `SIGNIFICANCE` deviations smaller.
+    """
+    slip, load_n = inputs.slip, inputs.load_n
+    surely = slip.size - SIGNIFICANCE * inputs.slip_deviation
+    if surely <= 0.0:
         return None, 0.0
     friction = force_n * slip.direction / load_n
+    elastic = slip_ratio_force(surely, longitudinal_stiffness_n) / load_n
+    if friction > elastic * correction(2.0 * elastic, surely):
+        return None, 0.0
     theta = theta_from_friction(friction, slip.size, load_n, longitudinal_stiffness_n)
     if theta is None:
         return None, 0.0
@@ -143,7 +157,7 @@ def fusion_step(
     F_hat = observed_force(
         model_n, state.s, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m
     )
-    theta_tyre, sensitivity = visible_theta(F_hat, slip, load_n, C_x)
+    theta_tyre, sensitivity = visible_theta(F_hat, inputs, C_x)
     theta_next = state.theta_hat
     if excited:
         theta_next = _driven(state.theta_hat, theta_tyre, theta_img, K_v, gains, step_s)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from .slip import wheel_slip
 from .tyre import peak_friction
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface
-from .vision.ife import Ife, IfeState
+from .vision.ife import Ife, IfeConfig, IfeState
 from .vision.preview import Outcome, PreviewConfig, PreviewState, add_frame, covering, prune
 from .vision.trajectory import Motion
 
@@ -56,7 +56,11 @@ class EstimatorConfig:
     vehicle : Vehicle
         What is known of the car.
     front_axle : bool
-        Whether the wheel is a front wheel: its load and where it runs over the road seen ahead.
+        Whether the wheel is a front wheel: its load and when it reaches the road seen ahead.
+    left_side : bool
+        Whether it is on the left: which wheel's track the camera follows.
+    vision : IfeConfig
+        Settings of the image estimator but for what the vehicle and the wheel already say, see `image_settings`.
     gains, scheduler, preview, confidence
         Settings of the parts.
     class_theta : tuple of 3 floats
@@ -66,8 +70,14 @@ class EstimatorConfig:
     floor_m_s : float
         Speed below which slip says nothing. At 1 m/s a speed error of 0.014 m/s is a slip of 0.014, as
         large as the excitation threshold [m/s].
+    sensor_filter_s : float
+        Time constant of the filter on wheel speed, torque, vehicle speed and measured acceleration. The tyre's curve
+        is bent: noise that reached it unfiltered would lower its mean force, and theta_hat would rise to make up for
+        it. One filter for all keeps Eq. (12) true between the filtered signals [s].
+    sliding_speed_noise_m_s : float
+        Standard deviation of the sliding speed omega R - v per sample: that of the car's sensors [m/s].
     acceleration_filter_s : float
-        Time constant for the acceleration that the load follows, measured or differentiated [s].
+        Time constant for the acceleration that the load follows where it is differentiated from speed [s].
     frame_interval_s : float
         Cycle time of the camera, for the first frame's stamp [s].
     flag_threshold : float
@@ -76,6 +86,8 @@ class EstimatorConfig:
 
     vehicle: Vehicle = field(default_factory=Vehicle)
     front_axle: bool = True
+    left_side: bool = True
+    vision: IfeConfig = field(default_factory=IfeConfig)
     gains: Gains = field(default_factory=Gains)
     scheduler: FuzzyScheduler = field(default_factory=FuzzyScheduler)
     preview: PreviewConfig = field(default_factory=PreviewConfig)
@@ -87,9 +99,21 @@ class EstimatorConfig:
     )
     theta_initial: float = 0.8
     floor_m_s: float = 1.0
+    sensor_filter_s: float = 0.010
+    sliding_speed_noise_m_s: float = 0.0042
     acceleration_filter_s: float = 0.05
     frame_interval_s: float = 0.025
     flag_threshold: float = 0.5
+
+    @property
+    def image_settings(self) -> IfeConfig:
+        """Settings of the image estimator for this vehicle and wheel."""
+        return replace(
+            self.vision,
+            track_m=self.vehicle.track_m,
+            wheelbase_m=self.vehicle.wheelbase_m,
+            side="left" if self.left_side else "right",
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,17 +148,31 @@ class Estimate:
     """One sentence where the input was unusable and the last good estimate is held."""
 
 
+GREATEST_ACCELERATION_M_S2 = 15.0
+"""No road car's tyres give more: a steeper change of speed is a jump of the signal [m/s^2]."""
+
+
+class Readings(NamedTuple):
+    """Filtered wheel speed [rad/s], wheel torque [N m] and vehicle speed [m/s]."""
+
+    wheel_speed_rad_s: float
+    wheel_torque_nm: float
+    vehicle_speed_m_s: float
+
+
 @dataclass(frozen=True, slots=True)
 class EstimatorState:
     """All that the estimator remembers."""
 
     fusion: FusionState
     dynamics: FusionState
+    readings: Readings
     variance: float
     time_s: float = 0.0
     position_m: float = 0.0
     speed_m_s: float = 0.0
     acceleration_m_s2: float = 0.0
+    slip_before: float = 0.0
     settled: bool = False
     """Whether the force observers follow the wheel; not so at the start and after a gap in the input."""
     frame_failed: bool = False
@@ -171,7 +209,12 @@ class TrpacEstimator:
         """Forget everything."""
         theta = self.config.theta_initial
         start = FusionState(theta, 0.0)
-        self._state = EstimatorState(fusion=start, dynamics=start, variance=self.config.confidence.unknown**2)
+        self._state = EstimatorState(
+            fusion=start,
+            dynamics=start,
+            readings=Readings(0.0, 0.0, 0.0),
+            variance=self.config.confidence.unknown**2,
+        )
         load_n = self.config.vehicle.wheel_load(self.config.front_axle)
         self._last = Estimate(
             TRPAC=theta,
@@ -179,7 +222,7 @@ class TrpacEstimator:
             K_v=0.0,
             excitation_flag=False,
             excitation_threshold=self.config.scheduler.threshold(
-                theta, load_n, self._wheel.longitudinal_stiffness_n
+                None, load_n, self._wheel.longitudinal_stiffness_n, self._slip_deviation(0.0, 0.001)
             ),
             slip=0.0,
             tyre_force_n=0.0,
@@ -244,11 +287,44 @@ class TrpacEstimator:
         """Longitudinal acceleration, measured or differentiated, through a first-order filter. [m/s^2]."""
         if step_s == 0.0 or not state.settled:
             return state.acceleration_m_s2
-        raw = sensors.longitudinal_acceleration_m_s2
+        raw, time_constant_s = sensors.longitudinal_acceleration_m_s2, self.config.sensor_filter_s
         if raw is None:
             raw = (sensors.vehicle_speed_m_s - state.speed_m_s) / step_s
-        share = 1.0 - math.exp(-step_s / self.config.acceleration_filter_s)
+            raw = min(max(raw, -GREATEST_ACCELERATION_M_S2), GREATEST_ACCELERATION_M_S2)
+            time_constant_s = self.config.acceleration_filter_s
+        share = 1.0 - math.exp(-step_s / time_constant_s)
         return state.acceleration_m_s2 + share * (raw - state.acceleration_m_s2)
+
+    def _filtered(self, state: EstimatorState, sensors: Sensors, step_s: float) -> Readings:
+        """Readings through the common filter, which starts at the first ones."""
+        now = Readings(sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s)
+        if not state.settled:
+            return now
+        share, before = 1.0 - math.exp(-step_s / self.config.sensor_filter_s), state.readings
+        return Readings(
+            before.wheel_speed_rad_s + share * (now.wheel_speed_rad_s - before.wheel_speed_rad_s),
+            before.wheel_torque_nm + share * (now.wheel_torque_nm - before.wheel_torque_nm),
+            before.vehicle_speed_m_s + share * (now.vehicle_speed_m_s - before.vehicle_speed_m_s),
+        )
+
+    def _lagged_slip(self, state: EstimatorState, signed_slip: float, step_s: float) -> float:
+        """Slip one filter time constant ago [-]."""
+        if not state.settled:
+            return signed_slip
+        share = 1.0 - math.exp(-step_s / self.config.sensor_filter_s)
+        return state.slip_before + share * (signed_slip - state.slip_before)
+
+    def _slip_deviation(self, speed_m_s: float, step_s: float) -> float:
+        """Standard deviation of the filtered slip: white noise through a discrete first-order filter [-]."""
+        share = 1.0 - math.exp(-step_s / self.config.sensor_filter_s)
+        filtered_m_s = self.config.sliding_speed_noise_m_s * math.sqrt(share / (2.0 - share))
+        return filtered_m_s / max(speed_m_s, self.config.floor_m_s)
+
+    def _rolling_moment(self, readings: Readings, load_n: float) -> float:
+        """Moment of rolling resistance on a wheel that turns forwards [N m]."""
+        if readings.wheel_speed_rad_s * self._wheel.radius_m < self.config.floor_m_s:
+            return 0.0
+        return self.config.vehicle.rolling_resistance * load_n * self._wheel.radius_m
 
     def _take_in(
         self,
@@ -293,13 +369,23 @@ class TrpacEstimator:
     ) -> Estimate:
         """Run both estimators over the step with the road that lies under the wheel at its start."""
         config, wheel = self.config, self._wheel
+        readings = self._filtered(state, sensors, step_s)
         slip = wheel_slip(
-            sensors.wheel_speed_rad_s, sensors.vehicle_speed_m_s, wheel.radius_m, config.floor_m_s
+            readings.wheel_speed_rad_s, readings.vehicle_speed_m_s, wheel.radius_m, config.floor_m_s
         )
+        signed_slip = slip.size * slip.direction
+        slip_before = self._lagged_slip(state, signed_slip, step_s)
         load_n = sensors.vertical_load_n
         if load_n is None:
             load_n = config.vehicle.wheel_load(config.front_axle, acceleration_m_s2)
-        inputs = WheelInputs(sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, slip, load_n)
+        load_n = max(load_n, LEAST_LOAD * config.vehicle.wheel_load(config.front_axle))
+        inputs = WheelInputs(
+            readings.wheel_speed_rad_s,
+            readings.wheel_torque_nm - self._rolling_moment(readings, load_n),
+            slip,
+            load_n,
+            self._slip_deviation(sensors.vehicle_speed_m_s, step_s) + abs(signed_slip - slip_before),
+        )
         if not state.settled:
             state = replace(
                 state,
@@ -331,6 +417,8 @@ class TrpacEstimator:
             position_m=position_m,
             speed_m_s=sensors.vehicle_speed_m_s,
             acceleration_m_s2=acceleration_m_s2,
+            readings=readings,
+            slip_before=slip_before,
             fusion=fused.state,
             dynamics=alone.state,
             settled=True,
@@ -358,12 +446,16 @@ class TrpacEstimator:
         return self._last
 
     def _estimate(
-        self, state: FusionState, inputs: WheelInputs, theta_img: float | None, step_s: float
+        self,
+        state: FusionState,
+        inputs: WheelInputs,
+        theta_img: float | None,
+        step_s: float,
     ) -> tuple[FusionStep, float, float]:
-        """One estimator's step, with its threshold and K_v. Without a picture the estimate sets the threshold."""
+        """One estimator's step, with its threshold and K_v."""
         scheduler = self.config.scheduler
-        theta_road = state.theta_hat if theta_img is None else theta_img
-        threshold = scheduler.threshold(theta_road, inputs.load_n, self._wheel.longitudinal_stiffness_n)
+        stiffness_n = self._wheel.longitudinal_stiffness_n
+        threshold = scheduler.threshold(theta_img, inputs.load_n, stiffness_n, inputs.slip_deviation)
         excited = inputs.slip.size > threshold
         K_v = 0.0
         if theta_img is not None and excited:
@@ -388,7 +480,8 @@ class TrpacEstimator:
         """All that is remembered as JSON-able values; floats survive the round trip bit by bit."""
         state, last = self._state, self._last
         values = {name: getattr(state, name) for name in EstimatorState.__slots__}
-        values["fusion"], values["dynamics"] = list(state.fusion), list(state.dynamics)
+        for name in ("fusion", "dynamics", "readings"):
+            values[name] = list(values[name])
         values["ife"], values["preview"] = state.ife.to_json(), state.preview.to_json()
         return {"state": values, "last": {name: getattr(last, name) for name in Estimate.__slots__}}
 
@@ -399,37 +492,40 @@ class TrpacEstimator:
             FusionState(*values["fusion"]),
             FusionState(*values["dynamics"]),
         )
+        values["readings"] = Readings(*values["readings"])
         values["ife"] = IfeState.from_json(values["ife"])
         values["preview"] = PreviewState.from_json(values["preview"])
         self._state = EstimatorState(**values)
         self._last = Estimate(**data["last"])
 
 
+PLAUSIBLE = {
+    "wheel_speed_rad_s": 1000.0,
+    "wheel_torque_nm": 20_000.0,
+    "vehicle_speed_m_s": 150.0,
+    "vertical_load_n": 50_000.0,
+    "steering_angle_rad": 1.5,
+    "longitudinal_acceleration_m_s2": 50.0,
+    "yaw_rate_rad_s": 20.0,
+}
+"""Sizes beyond which a reading of a road car is a fault or in another unit, in the unit of its name."""
+LEAST_LOAD = 0.05
+"""Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
+
+
 def unusable(step_s: float, sensors: Sensors, floor_m_s: float) -> str | None:
     """One sentence on what makes a step's input unusable, None where it is good."""
     if not math.isfinite(step_s) or step_s < 0.0:
         return f"Step size is {step_s} s; expected a finite number of seconds, 0 or above."
-    required = sensors.wheel_speed_rad_s + sensors.wheel_torque_nm + sensors.vehicle_speed_m_s
-    optional = (
-        sensors.vertical_load_n,
-        sensors.steering_angle_rad,
-        sensors.longitudinal_acceleration_m_s2,
-        sensors.yaw_rate_rad_s,
-    )
-    if not math.isfinite(required) or not all(value is None or math.isfinite(value) for value in optional):
-        bad = [
-            name
-            for name in Sensors.__slots__
-            if (value := getattr(sensors, name)) is not None and not math.isfinite(value)
-        ]
-        return f"{', '.join(bad)}: not a finite number. Check the signal's source."
+    bad = [
+        f"{name} is {value:g}, expected a number within +-{limit:g}"
+        for name, limit in PLAUSIBLE.items()
+        if (value := getattr(sensors, name)) is not None and not abs(value) <= limit
+    ]
+    if bad:
+        return f"{'; '.join(bad)}. Check the signal's source and unit."
     if sensors.vertical_load_n is not None and sensors.vertical_load_n <= 0.0:
         return f"vertical_load_n is {sensors.vertical_load_n:g}: a wheel without load has no friction to estimate."
-    if abs(sensors.steering_angle_rad) >= 0.5 * math.pi:
-        return (
-            f"steering_angle_rad is {sensors.steering_angle_rad:g}; expected the front wheels' angle in radians, "
-            "within +-pi/2."
-        )
     if sensors.vehicle_speed_m_s < -floor_m_s:
         return "The car rolls backwards: the camera looks the other way, and the estimate is held."
     if sensors.wheel_speed_rad_s < 0.0 and sensors.vehicle_speed_m_s > floor_m_s:

@@ -28,6 +28,13 @@ class Partition:
     medium: float
     big: float
 
+    def __post_init__(self) -> None:
+        """Refuse sets that do not ascend; raises ValueError."""
+        if not self.small < self.medium < self.big:
+            raise ValueError(
+                f"Fuzzy sets lie at {self.small:g}, {self.medium:g}, {self.big:g}; expected S below M below B."
+            )
+
     def memberships(self, value: float) -> tuple[float, float, float]:
         """Degrees of S, M and B, which add up to 1 [-]."""
         if value <= self.small:
@@ -52,7 +59,8 @@ class FuzzyScheduler:
 
     theta_img's sets are full at the class values 0.2, 0.6 and 0.8. A threshold set lies at the slip from which the
     tyre at hand shows a road that is `class_scatter` more slippery than its class says, so that such a
-    road too is seen; below `slip_noise` nothing can be told from sensor noise. K_v's S set reaches over the
+    road too is seen. Without a picture the road may be of any class and the S set's threshold stands. No
+    threshold lies below `noise_factor` standard deviations of the slip. K_v's S set reaches over the
     class value's own scatter, or that would pull the settled estimate away from the tyre's.
     """
 
@@ -61,17 +69,21 @@ class FuzzyScheduler:
     K_v_values: tuple[float, float, float] = (0.0, 1.5, 3.0)
     class_scatter: float = 0.1
     onset_sensitivity: float = 0.1
-    slip_noise: float = 0.006
+    noise_factor: float = 3.0
 
-    def threshold(self, theta_img: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+    def threshold(
+        self, theta_img: float | None, load_n: float, longitudinal_stiffness_n: float, slip_deviation: float
+    ) -> float:
         """Slip above which the estimator runs [-].
 
         Parameters
         ----------
-        theta_img : float
-            Adhesion that the camera gives the road, or the estimate itself where the camera gives none [-].
+        theta_img : float or None
+            Adhesion of the class that the camera gives the road; None where it gives none [-].
         load_n, longitudinal_stiffness_n : float
             Vertical load and longitudinal stiffness of the tyre at hand [N].
+        slip_deviation : float
+            Standard deviation of the slip through sensor noise [-].
         """
         sets = self.theta_sets
         visible = (
@@ -79,9 +91,9 @@ class FuzzyScheduler:
             sets.medium - self.class_scatter,
             sets.big - self.class_scatter,
         )
-        theta = sets.blend(theta_img, visible)
+        theta = visible[0] if theta_img is None else sets.blend(theta_img, visible)
         slip = onset_slip(theta, load_n, longitudinal_stiffness_n, self.onset_sensitivity)
-        return min(max(slip, self.slip_noise), THRESHOLD_LIMIT)
+        return min(max(slip, self.noise_factor * slip_deviation), THRESHOLD_LIMIT)
 
     def K_v(self, difference: float) -> float:
         """Visual gain for a difference abs(theta_img - theta_hat) [-]."""

@@ -29,6 +29,8 @@ class Vehicle:
     wheel_inertia_kg_m2: float = 1.2
     motor_peak_torque_nm: float = 320.0
     longitudinal_stiffness_n: float = 50_000.0
+    rolling_resistance: float = 0.0
+    """Coefficient of the moment against the wheel's rotation, c F_z R; 0 is Eq. (12) as printed [-]."""
 
     @property
     def cog_to_front_axle_m(self) -> float:
