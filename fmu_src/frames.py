@@ -23,6 +23,7 @@ BUS = "<road_class>"
 """Source of a frame whose class came by bus."""
 BUFFER = "<buffer>"
 """Source of a frame that came as a picture in memory."""
+SURFACES = {surface.value: surface for surface in Surface}
 MOST_BYTES = 3 * MOST_PIXELS
 """Larger buffers are refused unread [bytes]."""
 
@@ -96,11 +97,12 @@ def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
 
 def _road_class(values: Mapping[str, Any]) -> RoadClass:
     number, confidence = values["road_class"], values["road_class_confidence"]
+    surface = SURFACES.get(number)
+    if surface is not None and 0.0 <= confidence <= 1.0:
+        return RoadClass(surface, confidence)
     problems = []
-    if number not in list(Surface):
+    if surface is None:
         problems.append(f"road_class is {number}, expected -1 (none), 0 (dry), 1 (wet) or 2 (snow or ice)")
     if not 0.0 <= confidence <= 1.0:
         problems.append(f"road_class_confidence is {confidence}, expected 0 to 1")
-    if problems:
-        raise ValueError("; ".join(problems) + ".")
-    return RoadClass(Surface(number), confidence)
+    raise ValueError("; ".join(problems) + ".")

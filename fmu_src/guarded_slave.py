@@ -86,7 +86,8 @@ class GuardedSlave(Fmi2Slave):
         self._starts: dict[str, Value] = {
             v.name: NEUTRAL[v.kind] if v.start is None else v.start for v in self.variables
         }
-        self.values = dict(self._starts)
+        self._forgotten = {name: self._starts[name] for name in sorted(self.volatile)}
+        self.values: dict[str, Any] = dict(self._starts)
         self._names: dict[Kind, dict[int, str]] = {
             kind: {vr: v.name for vr, v in enumerate(self.variables) if v.kind is kind} for kind in Kind
         }
@@ -128,8 +129,7 @@ class GuardedSlave(Fmi2Slave):
 
     def clear_volatile(self) -> None:
         """Forget the inputs that hold for one step only."""
-        for name in self.volatile:
-            self.values[name] = self._starts[name]
+        self.values.update(self._forgotten)
 
     def report(self, kind: str, status: Fmi2Status, message: str) -> None:
         """Log a message, once per kind and instance."""
@@ -241,7 +241,7 @@ class GuardedSlave(Fmi2Slave):
             "schema": STATE_SCHEMA,
             "unit": __name__,
             "ready": self._ready,
-            "values": self.values | {name: self._starts[name] for name in self.volatile},
+            "values": self.values | self._forgotten,
             "inner": self.inner_state() if self._ready else None,
         }
         return json.dumps(state).encode()

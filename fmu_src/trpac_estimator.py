@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,8 +24,6 @@ from .variables import Variable
 
 SEGMENTER_FILE = "segmenter.onnx"
 CLASSIFIER_FILE = "surface.onnx"
-OPTIONAL_INPUTS = ("vertical_load", "longitudinal_acceleration", "yaw_rate")
-"""Inputs that count as connected from the first value other than 0."""
 
 
 class TrpacEstimator(GuardedSlave):
@@ -61,10 +60,8 @@ class TrpacEstimator(GuardedSlave):
 
     def step(self, step_s: float) -> None:
         """Hand sensors and a new frame to the estimator, and publish its estimate."""
-        values = self.values
-        self._connected.update(name for name in OPTIONAL_INPUTS if values[name] != 0.0)
-        sensors = self._sensors(values)
-        self._frame, frame, problem = next_frame(self._frame, values)
+        sensors = self._sensors()
+        self._frame, frame, problem = next_frame(self._frame, self.values)
         self.clear_volatile()
         try:
             estimate = self._estimator.step(step_s, sensors, frame, frame_failed=self._frame.failed)
@@ -77,21 +74,29 @@ class TrpacEstimator(GuardedSlave):
             if text:
                 self.report(kind, Fmi2Status.warning, f"{self.modelName}: {text}")
 
-    def _sensors(self, values: Mapping[str, Any]) -> Sensors:
-        optional = {name: values[name] if name in self._connected else None for name in OPTIONAL_INPUTS}
+    def _sensors(self) -> Sensors:
+        values = self.values
         return Sensors(
-            wheel_speed_rad_s=values["wheel_speed"],
-            wheel_torque_nm=values["wheel_torque"],
-            vehicle_speed_m_s=values["vehicle_speed"],
-            vertical_load_n=optional["vertical_load"],
-            steering_angle_rad=values["steering_angle"],
-            longitudinal_acceleration_m_s2=optional["longitudinal_acceleration"],
-            yaw_rate_rad_s=optional["yaw_rate"],
+            values["wheel_speed"],
+            values["wheel_torque"],
+            values["vehicle_speed"],
+            self._optional("vertical_load"),
+            values["steering_angle"],
+            self._optional("longitudinal_acceleration"),
+            self._optional("yaw_rate"),
         )
 
+    def _optional(self, name: str) -> float | None:
+        """An input that counts as connected from its first value other than 0; None before."""
+        value: float = self.values[name]
+        if value != 0.0:
+            self._connected.add(name)
+        elif name not in self._connected:
+            return None
+        return value
+
     def _publish(self, estimate: Estimate) -> None:
-        for output, field in OUTPUT_FIELDS:
-            self.values[output] = getattr(estimate, field)
+        self.values.update(zip(OUTPUTS, OF_ESTIMATE(estimate), strict=True))
 
     def inner_state(self) -> dict[str, Any]:
         """Estimator, frames and connected inputs, JSON-able and exact."""
@@ -112,8 +117,6 @@ class TrpacEstimator(GuardedSlave):
 OUTPUT_NAMES = {"tyre_force_n": "tyre_force", "frame_age_s": "frame_age"}
 """Fields of the estimate whose unit is in the name; the FMI variable states it as an attribute."""
 
-OUTPUT_FIELDS = tuple(
-    (OUTPUT_NAMES.get(field.name, field.name), field.name)
-    for field in fields(Estimate)
-    if field.name != "problem"
-)
+_FIELDS = [field.name for field in fields(Estimate) if field.name != "problem"]
+OUTPUTS = tuple(OUTPUT_NAMES.get(name, name) for name in _FIELDS)
+OF_ESTIMATE = attrgetter(*_FIELDS)
