@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
+import sysconfig
 import textwrap
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
+from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from fmu_unit import DRIVING, Unit
 from pythonfmu import FmuBuilder
@@ -305,6 +309,65 @@ def test_6_finding_some_characters_in_the_path_crash_the_host(
         tmp_path / name,
     )
     assert done.returncode < 0
+
+
+# 7. A host that is not Python
+
+
+@pytest.fixture(scope="module")
+def c_host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The host in tests/c_host.c, compiled."""
+    compiler = shutil.which("cc")
+    if compiler is None or not sys.platform.startswith("linux"):
+        pytest.skip("needs a C compiler on Linux")
+    program = tmp_path_factory.mktemp("c_host") / "c_host"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    source = Path(__file__).parent / "c_host.c"
+    subprocess.run([compiler, "-O1", "-I", headers, "-o", program, source, "-ldl"], check=True)
+    return program
+
+
+def run_in_c(
+    program: Path, folder: Path, picture: str, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Run the C host on the unpacked unit."""
+    description = read_model_description(str(folder))
+    references = {v.name: str(v.valueReference) for v in description.modelVariables}
+    names = (*DRIVING, "image_path", "road_class", "TRPAC")
+    library = folder / "binaries" / "linux64" / "TrpacEstimator.so"
+    resources = (folder / "resources").as_uri()
+    arguments = [library, description.guid, resources, picture, *(references[name] for name in names)]
+    variables = {"PATH": os.environ["PATH"], **environment}
+    return subprocess.run(
+        [program, *arguments], capture_output=True, text=True, check=False, timeout=60, env=variables
+    )
+
+
+def shared_libpython() -> str:
+    """The interpreter as a shared library."""
+    path = Path(str(sysconfig.get_config_var("LIBDIR"))) / str(sysconfig.get_config_var("INSTSONAME"))
+    if not path.is_file() or ".so" not in path.name:
+        pytest.skip(f"this Python has no shared library ({path})")
+    return str(path)
+
+
+def test_7_finding_a_host_without_python_misses_its_symbols(c_host: Path, unit_folder: Path) -> None:
+    done = run_in_c(c_host, unit_folder, "")
+    assert done.returncode == 3
+    assert "undefined symbol" in done.stderr
+
+
+def test_7_cure_with_libpython_preloaded_a_c_host_gets_the_same_result(
+    c_host: Path, unit_folder: Path, open_unit: Callable[..., Unit]
+) -> None:
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    done = run_in_c(c_host, unit_folder, "100 %s %n.png", LD_PRELOAD=shared_libpython(), PATH=path)
+    unit = open_unit()
+    unit.step({**DRIVING, "image_path": "100 %s %n.png"}, count=500)
+    assert done.returncode == 0, done.stderr
+    log, result = done.stdout.splitlines()
+    assert log == f"log c_host 1: {unit.log[0].text}"
+    assert result == f"TRPAC {unit.get('TRPAC'):.17g} status 0"
 
 
 # 8. State
