@@ -1,0 +1,61 @@
+"""Train both networks again: `python -m models.training --data DIR [--out models] [--seed N]`."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import sys
+from pathlib import Path
+
+from .data import DataFolderError
+
+NEEDED = ("torch", "onnx", "onnxscript", "albumentations", "rich", "matplotlib")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Exit code 0, or 2 with one clear line when the surroundings or the data folder lack something."""
+    parser = argparse.ArgumentParser(
+        prog="python -m models.training",
+        description="Trains the segmenter and the surface classifier, exports them as ONNX and writes their cards.",
+    )
+    parser.add_argument(
+        "--data", type=Path, required=True, help="folder of road pictures with its manifest.csv"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("models"), help="where the networks go (default: models)"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="seed of every random choice (default: 1)")
+    parser.add_argument(
+        "--only", choices=("segmenter", "surface"), help="train one of the two networks; the other file stays"
+    )
+    parser.add_argument(
+        "--effort", type=float, default=1.0, help="share of the usual steps and rendered worlds (default: 1)"
+    )
+    parser.add_argument("--threads", type=int, default=2, help="processor threads (default: 2)")
+    parser.add_argument(
+        "--teacher",
+        type=Path,
+        help="MobileNetV2 as 8-bit .tflite that guides the surface classifier's features",
+    )
+    given = parser.parse_args(arguments)
+    needed = NEEDED + (("ai_edge_litert",) if given.teacher else ())
+    missing = [name for name in needed if importlib.util.find_spec(name) is None]
+    if missing:
+        print(
+            f"models.training: not installed: {', '.join(missing)}; run: pip install -r requirements/train.txt",
+            file=sys.stderr,
+        )
+        return 2
+    from .run import train_all
+    from .teacher import TeacherError
+
+    try:
+        train_all(given, sys.argv[1:] if arguments is None else arguments)
+    except (DataFolderError, TeacherError) as error:
+        print(f"models.training: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

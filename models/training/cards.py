@@ -1,0 +1,280 @@
+"""The model cards, written by the training run from what it measured."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from trpac_core.vision.classes import Surface
+
+from .calibrate import Reliability
+from .data import Picture
+from .patches import CAMERA_SPREAD
+from .scores import ClassScore, wilson_interval
+from .train_segmenter import SegmentationScore
+
+CLASSES = [surface.label for surface in Surface]
+PACKAGES = ("torch", "onnx", "onnxruntime", "numpy", "opencv-python-headless", "albumentations")
+
+LICENCE_TEXT = """\
+## Licences of the pictures
+
+Most of the real pictures are non-commercial or carry no licence at all. None of them is part of this project, whole
+or in part; only weights learned from them are. A product should retrain on pictures that its maker owns. That is one
+command: `python -m models.training --data DIR`, where `DIR` holds the pictures and a `manifest.csv` with the columns
+file, split, task, label, mask, sequence_id, licence, width and height."""
+
+
+@dataclass
+class RunFacts:
+    """What is the same for both cards of a run."""
+
+    command: str
+    seed: int
+    pictures: Sequence[Picture]
+    worlds: dict[str, int]
+    seeds: dict[str, str]
+    render_s: float
+    teacher: str | None = None
+    versions: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.versions = {name: importlib.metadata.version(name) for name in PACKAGES}
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def data_table(pictures: Sequence[Picture]) -> str:
+    """Pictures per source, class and split, with the licence as found."""
+    counts = Counter((p.source, p.surface.label, p.split) for p in pictures)
+    licences = {p.source: p.licence for p in pictures}
+    rows = []
+    for source, label in sorted({(source, label) for source, label, _ in counts}):
+        split_counts = [str(counts[source, label, split]) for split in ("train", "val", "test")]
+        rows.append([source, label, *split_counts, licences[source]])
+    return table(["source", "class", "train", "val", "test", "licence as found"], rows)
+
+
+def splits_text(facts: RunFacts) -> str:
+    """How the data were split."""
+    worlds = ", ".join(
+        f"{split} {count} worlds (seeds {facts.seeds[split]})" for split, count in facts.worlds.items()
+    )
+    return f"""\
+Real pictures are split by the manifest: no series of neighbouring pictures stands in two splits, except the three
+clips of one car (`*_extreme`) that are cut in time, first part train, a gap, last part val. `other_cameras` and all
+test rows were judged once, at the end, and nothing was chosen by them.
+Rendered pictures, three places in each world: {worlds}; rendering took {facts.render_s:.0f} s."""
+
+
+def versions_text(facts: RunFacts) -> str:
+    """Command, seed and versions."""
+    versions = ", ".join(f"{name} {version}" for name, version in facts.versions.items())
+    return f"Command: `{facts.command}`; seed {facts.seed}. Python {platform.python_version()}, {versions}."
+
+
+def class_rows(name: str, score: ClassScore) -> list[str]:
+    """One row of a score table: items, accuracy with its interval, recalls, confusion."""
+    low, high = wilson_interval(score.right, score.count)
+    recalls = [
+        f"{score.recall(label):.2f} ({int(score.confusion[label].sum())})"
+        if score.confusion[label].sum()
+        else "-"
+        for label in range(3)
+    ]
+    confusion = " / ".join(" ".join(map(str, row)) for row in score.confusion.tolist())
+    return [name, str(score.count), f"{score.accuracy:.3f} [{low:.3f}, {high:.3f}]", *recalls, confusion]
+
+
+def class_table(scores: dict[str, ClassScore]) -> str:
+    """Scores of several test sets."""
+    header = ["set", "n", "accuracy [95 %]"] + [f"recall {name} (n)" for name in CLASSES]
+    return table(
+        [*header, "confusion, rows true"], [class_rows(name, score) for name, score in scores.items()]
+    )
+
+
+def surface_card(
+    facts: RunFacts,
+    *,
+    sha256: str,
+    parameters: int,
+    train_s: float,
+    train_patches: int,
+    temperature: float,
+    reliabilities: dict[str, tuple[Reliability, Reliability]],
+    entropies: tuple[float, float],
+    picture_scores: dict[str, ClassScore],
+    patch_scores: dict[str, ClassScore],
+) -> str:
+    """Card of surface.onnx."""
+    calibration = table(
+        [
+            "patches",
+            "n",
+            "ECE, T = 1",
+            f"ECE, T = {temperature:.3f}",
+            "MCE, T = 1",
+            f"MCE, T = {temperature:.3f}",
+        ],
+        [
+            [
+                name,
+                str(int(before.count.sum())),
+                *(f"{x:.3f}" for x in (before.ece, after.ece, before.mce, after.mce)),
+            ]
+            for name, (before, after) in reliabilities.items()
+        ],
+    )
+    teacher = (
+        "No teacher was used."
+        if facts.teacher is None
+        else "During training a linear map of the embedding also had to match block 12 of MobileNetV2 1.0 / 224 "
+        "(ImageNet weights, Apache-2.0), mean and deviation of each channel; neither that network nor the map is in "
+        "the file."
+    )
+    return f"""\
+# surface.onnx
+
+sha256: `{sha256}`
+
+ShuffleNet (grouped 1x1 convolutions with three groups, channel shuffle, depthwise 3x3; ref. [22] of Tian et al. 2022)
+in our own code, {parameters} parameters, trained from nothing. Mean and deviation of the middle and the last maps
+feed one linear layer.
+
+- Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
+- Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).
+- Metadata: `temperature` = {temperature:.6f}, `classes` = dry,wet,snow_ice.
+
+## Training
+
+{train_patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
+Patches are mirrored, shifted, zoomed by up to 12 % and seen with the gain, gamma and white balance of other cameras
+(within {CAMERA_SPREAD:.0%}). Classes are drawn equally often and sources within a class by fixed shares, so that wet
+and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the weights.
+{teacher}
+Training took {train_s:.0f} s on two processor cores.
+{versions_text(facts)}
+
+## Scores on pictures
+
+A real picture is judged by fixed patches of its road box (or mask): largest mean log probability. Recall columns give
+the number of pictures of the class. Every rendered view is one picture.
+
+{class_table(picture_scores)}
+
+## Scores on single patches
+
+{class_table(patch_scores)}
+
+## Calibration
+
+T = {temperature:.3f} minimises the cross-entropy of the validation patches, undisturbed and disturbed (motion blur on
+all, brightness and contrast on 70 %, abnormal exposure and shadow on 30 % each), from {entropies[0]:.3f} to
+{entropies[1]:.3f} nat. The class never changes. {len(reliabilities)} sets, 15 bins; MCE is the worst bin however few
+patches it holds. The diagram `reliability.png` is the validation set's, undisturbed and disturbed together.
+
+{calibration}
+
+## Limits
+
+- The validation and test stills come from the same kind of web search as the training stills; other cameras are the
+  honest guess for a new car. Wet carries over worst: see its recall on other cameras and how few pictures that is.
+- Real wet and snowy dash frames in training come from one car, one clip each. More than half of what the network
+  knows about them is rendered, and rendered scores say how well it knows the renderer, no more.
+- Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
+- Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
+- T is fitted on these validation pictures; on another camera confidence is likelier too high than too low.
+
+## Data
+
+{splits_text(facts)}
+Web stills are squashed by their source and used stretched back; only their lower centre counts. The `*_extreme` clips
+are used only where no text, path dots or bonnet cover the road.
+
+{data_table(facts.pictures)}
+
+{LICENCE_TEXT}
+"""
+
+
+def segmentation_table(scores: dict[str, dict[str, SegmentationScore]]) -> str:
+    """IoU and pixel accuracy per set and task."""
+    rows = []
+    for name, tasks in scores.items():
+        for task, score in tasks.items():
+            rows.append([name, task, str(score.pictures), f"{score.iou:.3f}", f"{score.accuracy:.3f}"])
+    return table(["set", "task", "pictures", "IoU", "pixel accuracy"], rows)
+
+
+def segmenter_card(
+    facts: RunFacts,
+    *,
+    sha256: str,
+    parameters: int,
+    train_s: float,
+    pools: dict[str, int],
+    scores: dict[str, dict[str, SegmentationScore]],
+) -> str:
+    """Card of segmenter.onnx."""
+    kinds = ", ".join(f"{kind} {count}" for kind, count in pools.items())
+    return f"""\
+# segmenter.onnx
+
+sha256: `{sha256}`
+
+Multi-task network after section 3.1 of Tian et al. 2022: one encoder (depthwise separable), two decoders of the same
+form, {parameters} parameters, trained from nothing in our own code.
+
+- Input `image`: uint8 (1, 160, 256, 3), BGR, the whole frame reduced by area averaging; normalisation is in the graph.
+- Outputs `drivable` and `shadow`: float32 (1, 160, 256), probabilities. `shadow` means shadow on the road; off the
+  drivable area it says nothing.
+
+## Training
+
+Pictures by kind: {kinds}. *masked* and *campus* are real pictures with road masks, with shadows painted over most of
+them; *weak* are real pictures of all three surfaces without a mask, where only the middle of the road box counts as
+road and the sky of stills as not road; *rendered* have exact labels of both tasks. Random crops, mirror, gain, gamma,
+white balance, and on some pictures blur, noise, contrast. Cross-entropy and Dice, AdamW.
+Training took {train_s:.0f} s on two processor cores.
+{versions_text(facts)}
+
+## Scores
+
+At probability 0.5, whole pictures; unknown pixels are left out.
+
+{segmentation_table(scores)}
+
+CamVid 0001TP is the validation drive (dusk, another drive than the training ones; real drivable masks of a test drive
+are not in the data). "painted" means painted shadows, judged on the road in them and within 15 pixels around.
+
+## Limits
+
+- No real picture has a shadow label. On real pictures the shadow task learns only in painted shadows and their close
+  surroundings, so that unlabelled real shadows do not teach "no shadow"; how well it finds real shadows is seen by
+  eye only.
+- No wet or snowy real picture has a road mask. There the drivable task rests on rendered pictures and weak labels,
+  and the edge between a snowy road and a snowy verge is a guess.
+- Kerbs, parked cars and pavements are known from one town (CamVid) and one campus. The rendered roads are straight.
+
+## Data
+
+{splits_text(facts)}
+
+{data_table(facts.pictures)}
+
+{LICENCE_TEXT}
+"""
+
+
+def write_card(path: Path, text: str) -> None:
+    """Write a card."""
+    path.write_text(text, encoding="utf-8")

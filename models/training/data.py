@@ -1,0 +1,206 @@
+"""The folder of real road pictures: its manifest, its splits and where the road is in each picture."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from trpac_core.vision.classes import Surface
+
+Image = NDArray[np.uint8]
+Box = tuple[float, float, float, float]
+
+MANIFEST = "manifest.csv"
+COLUMNS = ("file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height")
+SPLITS = ("train", "val", "test", "gap")
+LABELS = {"dry": Surface.DRY, "wet": Surface.WET, "snow": Surface.SNOW_ICE}
+IGNORE = 255
+"""Mask value of pixels whose label is unknown."""
+
+ROAD_BOXES: dict[str, tuple[Box, ...]] = {
+    "condition_web": ((0.20, 0.60, 0.80, 0.95),),
+    "seq_extreme": (
+        (170 / 640, 250 / 360, 290 / 640, 315 / 360),
+        (380 / 640, 255 / 360, 470 / 640, 315 / 360),
+    ),
+    "seq_dry_yolop": ((0.35, 0.78, 0.70, 0.98),),
+    "dry_udacity": ((0.30, 0.72, 0.75, 0.93),),
+    "other_cameras": ((0.30, 0.66, 0.65, 0.88),),
+    "other_cameras/bdd": ((0.35, 0.52, 0.62, 0.68),),
+    "other_cameras/ntnu_iphone": ((0.25, 0.75, 0.65, 0.98),),
+    "other_cameras/rdd_norway": ((0.12, 0.70, 0.52, 0.95),),
+}
+"""Where the road is in pictures without a mask: left, top, right, bottom as fractions of the picture.
+
+Set by looking at the pictures (burnt-in text, bonnets, verges), never by a network's score.
+"""
+
+EXTREME_LIMITS: tuple[Box, ...] = (
+    (120 / 640, 200 / 360, 290 / 640, 315 / 360),
+    (380 / 640, 200 / 360, 560 / 640, 315 / 360),
+)
+"""Parts of the overlaid clips that are free of text, path dots and bonnet; their road boxes lie inside."""
+
+MIN_EACH_CLASS = 1
+"""Pictures of each class that the training and the validation split must hold at least."""
+
+
+class DataFolderError(ValueError):
+    """The data folder cannot be trained on; the message lists every problem found."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One row of the manifest.
+
+    `source` is the camera or clip (a folder), `sequence` the series of neighbouring pictures in it.
+    """
+
+    path: Path
+    split: str
+    surface: Surface
+    mask: Path | None
+    source: str
+    sequence: str
+    licence: str
+
+    def image(self) -> Image:
+        """The picture, BGR uint8 of shape (height, width, 3)."""
+        image = cv2.imread(str(self.path), cv2.IMREAD_COLOR)
+        if image is None:
+            raise DataFolderError(f"{self.path}: not a readable picture; fetch the data folder again")
+        return np.asarray(image, dtype=np.uint8)
+
+    def road_mask(self) -> Image:
+        """The road mask, uint8 of shape (height, width): 0 not road, 1 road, 255 unknown."""
+        if self.mask is None:
+            raise DataFolderError(f"{self.path}: the manifest names no road mask for this picture")
+        mask = cv2.imread(str(self.mask), cv2.IMREAD_GRAYSCALE)
+        if mask is None:
+            raise DataFolderError(f"{self.mask}: not a readable mask; fetch the data folder again")
+        return np.asarray(mask, dtype=np.uint8)
+
+    @property
+    def boxes(self) -> tuple[Box, ...]:
+        """Road boxes of a picture without a mask, as fractions of its width and height."""
+        folder = self.source.split("/")[0]
+        if folder.startswith("seq_") and folder.endswith("_extreme"):
+            folder = "seq_extreme"
+        boxes = ROAD_BOXES.get(self.source, ROAD_BOXES.get(folder))
+        if boxes is None:
+            known = ", ".join(sorted(ROAD_BOXES))
+            raise DataFolderError(
+                f"{self.path}: no road box is known for source '{self.source}' (known: {known}); "
+                "add one to ROAD_BOXES in models/training/data.py"
+            )
+        return boxes
+
+
+def source_of(file: str) -> str:
+    """Camera or clip of a file of the manifest: its folder; all web stills are one source."""
+    folder = file.rpartition("/")[0]
+    return "condition_web" if folder.startswith("condition_web/") else folder
+
+
+def read_manifest(folder: Path) -> list[Picture]:
+    """All pictures of a data folder, in the manifest's order.
+
+    Raises
+    ------
+    DataFolderError
+        If the manifest or files that it names are missing or a row is malformed; all problems in one message.
+    """
+    manifest = folder / MANIFEST
+    if not manifest.is_file():
+        raise DataFolderError(
+            f"{manifest}: not found; --data must name the folder of road pictures that holds it"
+        )
+    with manifest.open(newline="", encoding="utf-8") as stream:
+        reader = csv.DictReader(stream)
+        missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
+        if missing:
+            raise DataFolderError(f"{manifest}: columns missing: {', '.join(missing)}")
+        rows = list(reader)
+    problems: list[str] = []
+    pictures: list[Picture] = []
+    for line, row in enumerate(rows, start=2):
+        found = list(_row_problems(folder, row))
+        problems += [f"line {line}: {problem}" for problem in found]
+        if not found:
+            pictures.append(
+                Picture(
+                    path=folder / row["file"],
+                    split=row["split"],
+                    surface=LABELS[row["label"]],
+                    mask=folder / row["mask"] if row["task"] == "seg" else None,
+                    source=source_of(row["file"]),
+                    sequence=row["sequence_id"],
+                    licence=row["licence"],
+                )
+            )
+    problems += _shared_sequences(pictures)
+    if problems:
+        shown = "\n  ".join(problems[:20])
+        more = f"\n  and {len(problems) - 20} more" if len(problems) > 20 else ""
+        raise DataFolderError(f"{manifest}: {len(problems)} problem(s)\n  {shown}{more}")
+    return pictures
+
+
+def _row_problems(folder: Path, row: dict[str, str]) -> Iterator[str]:
+    if row["split"] not in SPLITS:
+        yield f"split is '{row['split']}', expected one of {', '.join(SPLITS)}"
+    if row["label"] not in LABELS:
+        yield f"label is '{row['label']}', expected one of {', '.join(LABELS)}"
+    if row["task"] not in ("cls", "seg"):
+        yield f"task is '{row['task']}', expected cls or seg"
+    if not (folder / row["file"]).is_file():
+        yield f"file {row['file']} is not in the folder"
+    if row["task"] == "seg" and not (row["mask"] and (folder / row["mask"]).is_file()):
+        yield f"mask '{row['mask']}' of {row['file']} is not in the folder"
+
+
+def _shared_sequences(pictures: Iterable[Picture]) -> list[str]:
+    """Sequences whose pictures stand in more than one split, clips cut in time with a gap excepted."""
+    splits: dict[str, set[str]] = {}
+    for picture in pictures:
+        splits.setdefault(picture.sequence, set()).add(picture.split)
+    return [
+        f"sequence '{name}' is in the splits {', '.join(sorted(found))}: neighbouring pictures would leak"
+        for name, found in sorted(splits.items())
+        if len(found) > 1 and "gap" not in found
+    ]
+
+
+def of_split(pictures: Iterable[Picture], split: str, *, masked: bool | None = None) -> list[Picture]:
+    """Pictures of one split; with `masked`, only those with (True) or without (False) a road mask."""
+    return [
+        picture
+        for picture in pictures
+        if picture.split == split and (masked is None or (picture.mask is not None) == masked)
+    ]
+
+
+def check_trainable(pictures: list[Picture]) -> None:
+    """Raise DataFolderError with all that is lacking for a training run."""
+    lacking = []
+    for split in ("train", "val"):
+        if not of_split(pictures, split, masked=True):
+            lacking.append(f"split {split} holds no picture with a road mask (task seg)")
+        for label, surface in LABELS.items():
+            count = sum(picture.surface == surface for picture in of_split(pictures, split))
+            if count < MIN_EACH_CLASS:
+                lacking.append(f"split {split} holds no picture labelled {label}")
+    if lacking:
+        raise DataFolderError("the data folder lacks what training needs:\n  " + "\n  ".join(lacking))
+
+
+def pixel_box(box: Box, image: Image) -> tuple[int, int, int, int]:
+    """A box given in fractions as whole pixels of an image: left, top, right, bottom (exclusive)."""
+    height, width = image.shape[:2]
+    return (round(box[0] * width), round(box[1] * height), round(box[2] * width), round(box[3] * height))

@@ -1,0 +1,75 @@
+"""Writing the networks as ONNX files with the contract of the estimator."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+from trpac_core.vision.classes import Surface
+
+from .nets import Segmenter, SurfaceNet
+
+OPSET = 18
+
+
+class _SegmenterGraph(nn.Module):
+    """Probabilities instead of logits."""
+
+    def __init__(self, net: Segmenter):
+        super().__init__()
+        self.net = net
+
+    def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        drivable, shadow = self.net(image)
+        return torch.sigmoid(drivable), torch.sigmoid(shadow)
+
+
+def export_segmenter(net: Segmenter, path: Path) -> None:
+    """Write segmenter.onnx: `image` uint8 (1, 160, 256, 3) BGR to `drivable`, `shadow` (1, 160, 256)."""
+    example = torch.zeros((1, 160, 256, 3), dtype=torch.uint8)
+    _export(_SegmenterGraph(net), example, path, "image", ["drivable", "shadow"], None)
+    _annotate(path, {"task": "drivable area and road shadow"})
+
+
+def export_surface(net: SurfaceNet, temperature: float, path: Path) -> None:
+    """Write surface.onnx: `patches` uint8 (N, 64, 96, 3) BGR to `logits` (N, 3); T is in the metadata."""
+    example = torch.zeros((2, 64, 96, 3), dtype=torch.uint8)
+    _export(net, example, path, "patches", ["logits"], {"patches": {0: "n"}})
+    classes = ",".join(surface.label for surface in Surface)
+    _annotate(path, {"temperature": f"{temperature:.6f}", "classes": classes})
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _export(
+    net: nn.Module, example: Tensor, path: Path, name: str, outputs: list[str], dynamic: dict | None
+) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    net = net.eval().to(memory_format=torch.contiguous_format)
+    shapes = None if dynamic is None else ({0: torch.export.Dim("n", min=1)},)
+    program = torch.onnx.export(
+        net, (example,), input_names=[name], output_names=outputs, opset_version=OPSET, dynamo=True,
+        dynamic_shapes=shapes, verbose=False,
+    )  # fmt: skip
+    program.save(str(path), external_data=False)
+
+
+def _annotate(path: Path, properties: dict[str, str]) -> None:
+    """Set the metadata of an ONNX file and drop the exporter's notes on nodes."""
+    import onnx
+
+    model = onnx.load(str(path))
+    onnx.helper.set_model_props(model, properties)
+    for part in (*model.graph.node, *model.graph.value_info, *model.graph.input, *model.graph.output):
+        part.ClearField("metadata_props")
+        part.ClearField("doc_string")
+    del model.graph.value_info[:]
+    model.graph.ClearField("metadata_props")
+    onnx.checker.check_model(model)
+    onnx.save(model, str(path))

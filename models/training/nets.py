@@ -1,0 +1,185 @@
+"""The two networks: a two-task segmenter and a ShuffleNet surface classifier.
+
+Both take BGR uint8 pictures with channels last; normalisation is part of the graph.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+PIXEL_MEAN, PIXEL_DEVIATION = 110.0, 60.0
+"""Round figures for road pictures; the same for the three channels, so that grey stays grey."""
+
+
+def normalise(images: Tensor) -> Tensor:
+    """Uint8 pictures (n, h, w, 3) to float planes (n, 3, h, w) around zero."""
+    return (images.permute(0, 3, 1, 2).float() - PIXEL_MEAN) / PIXEL_DEVIATION
+
+
+class ConvUnit(nn.Sequential):
+    """Convolution, batch norm, ReLU."""
+
+    def __init__(self, channels_in: int, channels_out: int, kernel: int = 3, stride: int = 1):
+        super().__init__(
+            nn.Conv2d(channels_in, channels_out, kernel, stride, kernel // 2, bias=False),
+            nn.BatchNorm2d(channels_out),
+            nn.ReLU(inplace=True),
+        )
+
+
+class SeparableUnit(nn.Module):
+    """Depthwise then pointwise convolution, with a residual path where the shapes allow it."""
+
+    def __init__(self, channels_in: int, channels_out: int, stride: int = 1, dilation: int = 1):
+        super().__init__()
+        self.depthwise = nn.Conv2d(
+            channels_in, channels_in, 3, stride, dilation, dilation, groups=channels_in, bias=False
+        )
+        self.norm = nn.BatchNorm2d(channels_in)
+        self.pointwise = ConvUnit(channels_in, channels_out, kernel=1)
+        self.residual = stride == 1 and channels_in == channels_out
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Feature maps in, feature maps out."""
+        y = self.pointwise(functional.relu(self.norm(self.depthwise(x))))
+        return x + y if self.residual else y
+
+
+class Decoder(nn.Module):
+    """One task's decoder: from stride 16 up to stride 2, with the encoder's maps added in."""
+
+    def __init__(self, widths: tuple[int, int, int, int], width: int = 32):
+        super().__init__()
+        self.lateral = nn.ModuleList([nn.Conv2d(channels, width, 1) for channels in widths])
+        self.smooth = nn.ModuleList([SeparableUnit(width, width) for _ in widths])
+        self.head = nn.Conv2d(width, 1, 1)
+
+    def forward(self, maps: list[Tensor]) -> Tensor:
+        """Logits of one task at twice the finest map's size, shape (n, h, w)."""
+        x = self.smooth[-1](self.lateral[-1](maps[-1]))
+        for level in range(len(maps) - 2, -1, -1):
+            x = functional.interpolate(x, scale_factor=2.0, mode="nearest")
+            x = self.smooth[level](x + self.lateral[level](maps[level]))
+        logits = functional.interpolate(self.head(x), scale_factor=2.0, mode="bilinear", align_corners=False)
+        return logits[:, 0]
+
+
+class Segmenter(nn.Module):
+    """One encoder, two decoders: drivable area and road shadow (section 3.1 of Tian et al. 2022)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        widths = (16, 32, 64, 128)
+        self.stem = ConvUnit(3, widths[0], stride=2)
+        self.stages = nn.ModuleList(
+            [
+                nn.Sequential(SeparableUnit(widths[0], widths[0])),
+                nn.Sequential(SeparableUnit(widths[0], widths[1], 2), SeparableUnit(widths[1], widths[1])),
+                nn.Sequential(
+                    SeparableUnit(widths[1], widths[2], 2),
+                    SeparableUnit(widths[2], widths[2]),
+                    SeparableUnit(widths[2], widths[2]),
+                ),
+                nn.Sequential(
+                    SeparableUnit(widths[2], widths[3], 2),
+                    SeparableUnit(widths[3], widths[3], dilation=2),
+                    SeparableUnit(widths[3], widths[3], dilation=4),
+                    SeparableUnit(widths[3], widths[3]),
+                ),
+            ]
+        )
+        self.context = nn.Linear(widths[3], widths[3])
+        self.drivable = Decoder(widths)
+        self.shadow = Decoder(widths)
+
+    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits of drivable and of shadow, each (n, h, w), for uint8 pictures (n, h, w, 3)."""
+        x = self.stem(normalise(images))
+        maps = []
+        for stage in self.stages:
+            x = stage(x)
+            maps.append(x)
+        gate = torch.sigmoid(self.context(x.mean(dim=(2, 3))))
+        maps[-1] = x * gate[:, :, None, None]
+        return self.drivable(maps), self.shadow(maps)
+
+
+class ShuffleUnit(nn.Module):
+    """Unit of ShuffleNet: grouped 1x1, shuffle, depthwise 3x3, grouped 1x1 (Zhang et al. 2018, figure 2).
+
+    With stride 2 the average-pooled input is concatenated, as there; else the unit is residual.
+    """
+
+    def __init__(self, channels_in: int, channels_out: int, groups: int, stride: int, *, first: bool = False):
+        super().__init__()
+        self.stride, self.groups = stride, groups
+        branch_out = channels_out - channels_in if stride == 2 else channels_out
+        middle = channels_out // 4 // groups * groups
+        self.squeeze = nn.Sequential(
+            nn.Conv2d(channels_in, middle, 1, groups=1 if first else groups, bias=False),
+            nn.BatchNorm2d(middle),
+            nn.ReLU(inplace=True),
+        )
+        self.depthwise = nn.Sequential(
+            nn.Conv2d(middle, middle, 3, stride, 1, groups=middle, bias=False), nn.BatchNorm2d(middle)
+        )
+        self.expand = nn.Sequential(
+            nn.Conv2d(middle, branch_out, 1, groups=groups, bias=False), nn.BatchNorm2d(branch_out)
+        )
+
+    def shuffle(self, x: Tensor) -> Tensor:
+        """Deal the channels of each group to all groups."""
+        channels, height, width = x.shape[1:]
+        grouped = x.reshape(-1, self.groups, channels // self.groups, height, width)
+        return grouped.transpose(1, 2).reshape(-1, channels, height, width)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Feature maps in, feature maps out."""
+        y = self.expand(self.depthwise(self.shuffle(self.squeeze(x))))
+        if self.stride == 2:
+            return functional.relu(torch.cat((functional.avg_pool2d(x, 3, 2, 1), y), dim=1))
+        return functional.relu(x + y)
+
+
+def pooled(maps: Tensor) -> Tensor:
+    """Mean and standard deviation of each channel over the picture, shape (n, 2 c)."""
+    mean = maps.mean(dim=(2, 3))
+    variance = (maps - mean[:, :, None, None]).square().mean(dim=(2, 3))
+    return torch.cat((mean, torch.sqrt(variance + 1e-5)), dim=1)
+
+
+class SurfaceNet(nn.Module):
+    """ShuffleNet with three groups for 64 x 96 patches; middle and last maps feed the classifier.
+
+    Texture and gloss live in the middle maps, hence their mean and deviation beside the last stage's.
+    """
+
+    GROUPS = 3
+    STAGES = ((96, 4), (192, 5), (288, 2))
+    EMBEDDING = 2 * (192 + 288)
+
+    def __init__(self, classes: int = 3, dropout: float = 0.3):
+        super().__init__()
+        self.stem = ConvUnit(3, 24, stride=2)
+        stages = []
+        channels_in = 24
+        for index, (channels, units) in enumerate(self.STAGES):
+            layers = [ShuffleUnit(channels_in, channels, self.GROUPS, 2, first=index == 0)]
+            layers += [ShuffleUnit(channels, channels, self.GROUPS, 1) for _ in range(units - 1)]
+            stages.append(nn.Sequential(*layers))
+            channels_in = channels
+        self.stages = nn.ModuleList(stages)
+        self.dropout = nn.Dropout(dropout)
+        self.classifier = nn.Linear(self.EMBEDDING, classes)
+
+    def embed(self, patches: Tensor) -> Tensor:
+        """Pooled features of uint8 patches (n, 64, 96, 3), shape (n, EMBEDDING)."""
+        x = self.stages[0](self.stem(normalise(patches)))
+        middle = self.stages[1](x)
+        return torch.cat((pooled(middle), pooled(self.stages[2](middle))), dim=1)
+
+    def forward(self, patches: Tensor) -> Tensor:
+        """Logits (n, classes) of uint8 patches (n, 64, 96, 3)."""
+        return self.classifier(self.dropout(self.embed(patches)))

@@ -1,0 +1,224 @@
+"""Road patches for the surface classifier, cut from real pictures, with where each came from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from trpac_core.vision.regions import cut_patch
+
+from .augment import camera_look
+from .data import Image, Picture, pixel_box
+
+ASPECT = 1.5
+"""Width over height of a patch [-]."""
+
+MIN_WIDTH_PX = 48.0
+
+PATCHES_PER_PICTURE = {
+    "condition_web": 8,
+    "drivable_camvid/0006R0": 2,
+    "drivable_camvid/0016E5": 2,
+    "drivable_lums": 1,
+    "dry_udacity": 12,
+    "seq_dry_yolop/input1": 3,
+    "seq_dry_extreme/Critical_Driving1": 10,
+    "seq_wet_extreme/rain": 10,
+    "seq_snow_extreme/snow1": 10,
+}
+"""Training patches cut from each picture of a source; others give OTHER_SOURCES."""
+OTHER_SOURCES = 2
+
+SOURCE_SHARES = {
+    "rendered": 3.0,
+    "condition_web": 3.0,
+    "seq_extreme": 1.5,
+    "drivable_camvid": 1.0,
+    "drivable_lums": 0.4,
+    "seq_dry_yolop": 0.3,
+    "dry_udacity": 0.4,
+}
+"""Relative share of each source among the drawn patches of a class.
+
+Each class is drawn equally often, and its shares are normalised over the sources that it has. So nearly all dash
+cameras being dry does not make "dash camera" mean "dry": wet and snowy dash frames, real and rendered, weigh as much.
+"""
+
+CAMERA_SPREAD = 0.25
+"""Gain, gamma and white balance of other undisturbed cameras, as a share [-]."""
+
+WEB_STRETCH = (1.2, 1.5)
+"""Width over height that the squared web stills had before, roughly [-]."""
+
+
+@dataclass(frozen=True)
+class PatchSet:
+    """Patches with their class and origin, aligned along the first axis.
+
+    Attributes
+    ----------
+    patches : uint8, shape (n, 64, 96, 3), BGR
+    labels : int64, shape (n,), class index
+    sources : str, shape (n,), camera or clip, or "rendered"
+    pictures : int64, shape (n,), number of the picture that the patch was cut from
+    """
+
+    patches: Image
+    labels: NDArray[np.int64]
+    sources: NDArray[np.str_]
+    pictures: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def where(self, chosen: NDArray[np.bool_]) -> PatchSet:
+        """The chosen patches alone."""
+        return PatchSet(
+            self.patches[chosen], self.labels[chosen], self.sources[chosen], self.pictures[chosen]
+        )
+
+
+def joined(sets: Sequence[PatchSet]) -> PatchSet:
+    """Several patch sets as one, picture numbers kept apart."""
+    offsets = np.cumsum([0] + [int(part.pictures.max(initial=-1)) + 1 for part in sets])
+    return PatchSet(
+        np.concatenate([part.patches for part in sets]),
+        np.concatenate([part.labels for part in sets]),
+        np.concatenate([part.sources for part in sets]),
+        np.concatenate([part.pictures + offset for part, offset in zip(sets, offsets[:-1], strict=True)]),
+    )
+
+
+def share_group(source: str) -> str:
+    """The entry of SOURCE_SHARES that a source falls under."""
+    folder = source.split("/")[0]
+    return "seq_extreme" if folder.endswith("_extreme") else folder
+
+
+def unsquashed(picture: Picture, image: Image, stretch: float) -> Image:
+    """A web still at its likely former aspect; other pictures as they are."""
+    if picture.source != "condition_web":
+        return image
+    height, width = image.shape[:2]
+    return np.asarray(cv2.resize(image, (round(stretch * width), height)), np.uint8)
+
+
+def random_patches(rng: np.random.Generator, picture: Picture, count: int) -> list[Image]:
+    """Patches at random places and scales on the road of one picture, each wholly inside its box or mask."""
+    image = unsquashed(picture, picture.image(), rng.uniform(*WEB_STRETCH))
+    if picture.mask is not None:
+        return _patches_in_mask(rng, image, picture.road_mask(), count)
+    patches = []
+    for _ in range(count):
+        x0, y0, x1, y1 = pixel_box(picture.boxes[rng.integers(len(picture.boxes))], image)
+        largest = min(x1 - x0, ASPECT * (y1 - y0))
+        width = np.exp(rng.uniform(np.log(min(MIN_WIDTH_PX, largest)), np.log(largest)))
+        half_w, half_h = width / 2, width / ASPECT / 2
+        centre = (rng.uniform(x0 + half_w, x1 - half_w), rng.uniform(y0 + half_h, y1 - half_h))
+        patches.append(cut_patch(image, centre, width))
+    return patches
+
+
+def _patches_in_mask(rng: np.random.Generator, image: Image, mask: Image, count: int) -> list[Image]:
+    road = mask == 1
+    counts = cv2.integral(road.astype(np.uint8))
+    rows, columns = np.nonzero(road)
+    patches: list[Image] = []
+    for _ in range(60 * count):
+        if len(patches) == count or not len(rows):
+            break
+        index = rng.integers(len(rows))
+        width = np.exp(rng.uniform(np.log(MIN_WIDTH_PX), np.log(0.4 * image.shape[1])))
+        x0, y0 = int(columns[index] - width / 2), int(rows[index] - width / ASPECT / 2)
+        x1, y1 = int(x0 + width), int(y0 + width / ASPECT)
+        if x0 < 0 or y0 < 0 or x1 > image.shape[1] or y1 > image.shape[0]:
+            continue
+        inside = counts[y1, x1] - counts[y0, x1] - counts[y1, x0] + counts[y0, x0]
+        if inside >= 0.97 * (x1 - x0) * (y1 - y0):
+            patches.append(cut_patch(image, ((x0 + x1) / 2, (y0 + y1) / 2), x1 - x0))
+    return patches
+
+
+def fixed_patches(picture: Picture) -> list[Image]:
+    """The patches on which a picture is judged: the largest in each road box and four smaller ones in it."""
+    image = unsquashed(picture, picture.image(), float(np.mean(WEB_STRETCH)))
+    if picture.mask is not None:
+        return _patches_in_mask(np.random.default_rng(0), image, picture.road_mask(), 4)
+    patches = []
+    for box in picture.boxes:
+        x0, y0, x1, y1 = pixel_box(box, image)
+        largest = min(x1 - x0, ASPECT * (y1 - y0))
+        patches.append(cut_patch(image, ((x0 + x1) / 2, (y0 + y1) / 2), largest))
+        width = 0.55 * largest
+        for column in (x0 + width / 2, x1 - width / 2):
+            for row in (y0 + width / ASPECT / 2, y1 - width / ASPECT / 2):
+                patches.append(cut_patch(image, (column, row), width))
+    return patches
+
+
+def patch_set(groups: Iterable[tuple[Sequence[Image], int, str]]) -> PatchSet:
+    """A patch set from (patches, class index, source) of each picture."""
+    patches: list[Image] = []
+    labels: list[int] = []
+    sources: list[str] = []
+    numbers: list[int] = []
+    for number, (cut, label, source) in enumerate(groups):
+        patches += cut
+        labels += [label] * len(cut)
+        sources += [source] * len(cut)
+        numbers += [number] * len(cut)
+    stacked = np.stack(patches) if patches else np.empty((0, 64, 96, 3), np.uint8)
+    return PatchSet(
+        stacked, np.array(labels, np.int64), np.array(sources, np.str_), np.array(numbers, np.int64)
+    )
+
+
+def training_patches(pictures: Iterable[Picture], seed: int) -> PatchSet:
+    """Random patches of training pictures, as many per picture as PATCHES_PER_PICTURE says."""
+    rng = np.random.default_rng(seed)
+    return patch_set(
+        (
+            random_patches(rng, picture, PATCHES_PER_PICTURE.get(picture.source, OTHER_SOURCES)),
+            int(picture.surface),
+            picture.source,
+        )
+        for picture in pictures
+    )
+
+
+def judged_patches(pictures: Iterable[Picture]) -> PatchSet:
+    """The fixed patches of validation or test pictures."""
+    return patch_set((fixed_patches(picture), int(picture.surface), picture.source) for picture in pictures)
+
+
+def draw_weights(patches: PatchSet) -> NDArray[np.float64]:
+    """Probability of each patch to be drawn: classes equal, sources within a class by SOURCE_SHARES."""
+    groups = np.array([share_group(str(source)) for source in patches.sources])
+    weights = np.zeros(len(patches))
+    for label in np.unique(patches.labels):
+        of_class = patches.labels == label
+        for group in np.unique(groups[of_class]):
+            chosen = of_class & (groups == group)
+            weights[chosen] = SOURCE_SHARES[group] / chosen.sum()
+        weights[of_class] /= weights[of_class].sum()
+    return weights / weights.sum()
+
+
+def augmented(rng: np.random.Generator, patch: Image) -> Image:
+    """A patch mirrored, shifted a little and seen by another undisturbed camera."""
+    height, width = patch.shape[:2]
+    shift_x, shift_y = rng.integers(-10, 11), rng.integers(-6, 7)
+    zoom = np.exp(rng.uniform(-0.12, 0.12))
+    flip = -1.0 if rng.random() < 0.5 else 1.0
+    move = np.array(
+        [
+            [flip * zoom, 0.0, width / 2 - flip * zoom * width / 2 + shift_x],
+            [0.0, zoom, height / 2 - zoom * height / 2 + shift_y],
+        ]
+    )
+    moved = cv2.warpAffine(patch, move, (width, height), borderMode=cv2.BORDER_REFLECT_101)
+    return camera_look(rng, np.asarray(moved, np.uint8), spread=CAMERA_SPREAD)

@@ -1,0 +1,143 @@
+"""Rendered pictures for training and tests: looks, cameras and places drawn from seeds, one range per split."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from scenarios.camera.renderer import Renderer
+from scenarios.camera.scene import RenderedFrame, SceneLook, SurfaceSegment
+from trpac_core.vision.camera import Camera
+from trpac_core.vision.classes import Surface
+from trpac_core.vision.regions import cut_patch, roi_box, roi_width_px
+
+from .data import IGNORE, Image
+from .patches import PatchSet, patch_set
+from .segmenter_data import SIZE, Sample
+
+SEED_RANGES = {
+    "train": range(1_000_000, 2_000_000),
+    "val": range(2_000_000, 3_000_000),
+    "test": range(3_000_000, 4_000_000),
+}
+"""Seeds of the looks of each split: disjoint, so no world is seen in two splits."""
+
+STORED_WIDTH_PX = 384
+"""Width at which whole pictures are kept for the segmenter [px]."""
+
+PLACES_M = (0.0, 17.0, 41.0)
+"""Road coordinates from which each world is seen [m]."""
+
+FULL_SCALE, REDUCED_SCALE = 1.0, 0.5
+"""Scales of the rendered pictures: every fourth world at the camera's own resolution, the others at half."""
+
+NEAREST_M, FARTHEST_M = 2.5, 15.0
+ROI_WIDTHS_M = (0.7, 3.0)
+PURE_SHARE = 0.97
+"""Least share of a patch that is lit road of one surface [-]; the classifier learns undisturbed looks only."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One rendered picture with the camera that took it."""
+
+    frame: RenderedFrame
+    camera: Camera
+    patch_seed: int
+
+
+def random_camera(rng: np.random.Generator, scale: float) -> Camera:
+    """A mounting and lens near those of the camera file, pictures scaled by a factor."""
+    base = Camera().scaled(scale)
+    focal = base.fx_px * rng.uniform(0.7, 1.15)
+    return Camera(
+        width_px=base.width_px,
+        height_px=base.height_px,
+        fx_px=focal,
+        fy_px=focal,
+        cx_px=base.cx_px,
+        cy_px=base.cy_px,
+        height_m=rng.uniform(1.15, 1.7),
+        pitch_rad=rng.uniform(0.04, 0.15),
+        yaw_rad=rng.uniform(-0.03, 0.03),
+        roll_rad=rng.uniform(-0.02, 0.02),
+    )
+
+
+def world_views(seed: int, scale: float) -> Iterator[View]:
+    """Pictures of one world from several places; its class is seed modulo 3, and one world in four changes it."""
+    rng = np.random.default_rng(seed)
+    surface = Surface(seed % 3)
+    camera = random_camera(rng, scale)
+    segments = [SurfaceSegment(-1000.0, surface)]
+    if rng.random() < 0.25:
+        other = Surface((int(surface) + int(rng.integers(1, 3))) % 3)
+        segments.append(SurfaceSegment(rng.uniform(8.0, 60.0), other))
+    renderer = Renderer(camera, segments, SceneLook.random(rng, surface))
+    for number, place_m in enumerate(PLACES_M):
+        frame = renderer.frame(place_m, rng.uniform(-0.5, 0.5), rng.uniform(-0.05, 0.05))
+        yield View(frame, camera, 10 * seed + number)
+
+
+def draw_worlds(
+    split: str, count: int, patches_per_view: int, report: Callable[[], None]
+) -> tuple[list[Sample], PatchSet]:
+    """Whole pictures and patches of the first `count` worlds of a split; `report` is called after each world."""
+    samples: list[Sample] = []
+    cut: list[list[tuple[Image, int]]] = []
+    for number, seed in enumerate(SEED_RANGES[split][:count]):
+        scale = FULL_SCALE if number % 4 == 0 else REDUCED_SCALE
+        for view in world_views(seed, scale):
+            samples.append(view_sample(view))
+            cut.append(view_patches(view, patches_per_view))
+        report()
+    return samples, rendered_patches(cut)
+
+
+def view_sample(view: View) -> Sample:
+    """A view as the segmenter's sample, reduced; its shadow is known on the road only."""
+    height = round(STORED_WIDTH_PX * SIZE[1] / SIZE[0])
+    size = (STORED_WIDTH_PX, height)
+    image = np.asarray(cv2.resize(view.frame.image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    drivable, shadow = (
+        np.asarray(cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST), np.uint8)
+        for mask in (view.frame.drivable, view.frame.shadow)
+    )
+    shadow[drivable == 0] = IGNORE
+    return Sample(image, drivable, shadow, "rendered")
+
+
+def view_patches(view: View, count: int) -> list[tuple[Image, int]]:
+    """Patches on the road of a view with their class index; mixed and shadowed places are left out."""
+    rng = np.random.default_rng(view.patch_seed)
+    frame, camera = view.frame, view.camera
+    cut: list[tuple[Image, int]] = []
+    for _ in range(8 * count):
+        if len(cut) == count:
+            break
+        point = np.array([rng.uniform(NEAREST_M, FARTHEST_M), rng.uniform(-2.5, 2.5)])
+        width_m = float(np.exp(rng.uniform(*np.log(ROI_WIDTHS_M))))
+        pixel = camera.ground_to_image(point[None])[0]
+        width = roi_width_px(camera, point, width_m)
+        in_picture = (pixel >= 0).all() and pixel[0] < camera.width_px and pixel[1] < camera.height_px
+        if not in_picture or width > 0.9 * camera.width_px:
+            continue
+        left, top, right, bottom = roi_box(camera.width_px, camera.height_px, pixel, width)
+        window = np.s_[top:bottom, left:right]
+        label = int(frame.surface[int(pixel[1]), int(pixel[0])])
+        pure = (frame.surface[window] == label) & ~frame.shadow[window]
+        if label >= 0 and pure.mean() >= PURE_SHARE:
+            cut.append((cut_patch(frame.image, pixel, width), label))
+    return cut
+
+
+def rendered_patches(found: list[list[tuple[Image, int]]]) -> PatchSet:
+    """The patches of several views as one set; each view is one picture."""
+    groups = []
+    for cut in found:
+        for label in sorted({label for _, label in cut}):
+            groups.append(([patch for patch, own in cut if own == label], label, "rendered"))
+    return patch_set(groups)
