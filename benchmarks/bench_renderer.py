@@ -29,6 +29,7 @@ def cpu_ms(work, repeats=FRAMES):
 def main():
     cv2.setNumThreads(1)
     print(f"{'what':34} {'median':>8} {'fastest':>8}  [ms CPU]")
+    segments = [SurfaceSegment(0.0, Surface.DRY)]
     for factor in (1.0, 0.25):
         camera = Camera().scaled(factor)
         size = f"{camera.width_px}x{camera.height_px}"
@@ -37,7 +38,6 @@ def main():
             times = cpu_ms(lambda i, renderer=renderer: renderer.frame(2.0 * i))
             print(f"{size + ' frame, ' + surface.label:34} {times[0]:8.1f} {times[1]:8.1f}")
         looks = [SceneLook.random(np.random.default_rng(seed)) for seed in range(FRAMES)]
-        segments = [SurfaceSegment(0.0, Surface.DRY)]
         times = cpu_ms(lambda i, camera=camera, looks=looks: Renderer(camera, segments, looks[i]))
         print(f"{size + ' new world':34} {times[0]:8.1f} {times[1]:8.1f}")
         image = Renderer(camera, segments, SceneLook()).frame(0.0).image

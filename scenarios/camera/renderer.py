@@ -35,6 +35,8 @@ WATER_INDEX = 1.33
 FINEST_SKY_PX_RAD = 0.0009
 METERED_M = (5.0, 40.0)
 """The stretch of road ahead on which the automatic exposure looks [m]."""
+SHARPNESS = 0.5
+"""Levels by which textures are sampled finer than the pixel, as a camera that sharpens its pictures [-]."""
 VERGE_END_M = 130.0
 """Where a line of trees hides the verge behind it [m]."""
 GREY = 0.20
@@ -222,7 +224,7 @@ def _levels(foot_x: NDArray[np.float64], foot_y: NDArray[np.float64]) -> NDArray
     textures = ((MACRO_TEXEL_M, MACRO_LEVELS), (FINE_TEXEL_M, FINE_LEVELS), (TEXEL_M, LEVELS))
     for k, (texel, counts) in enumerate(textures):
         for m, (logarithm, count) in enumerate(zip((along, across), counts, strict=True)):
-            level = np.clip(np.round(logarithm - np.log2(texel)), 0, count - 1).astype(np.uint32)
+            level = np.clip(np.round(logarithm - np.log2(texel) - SHARPNESS), 0, count - 1).astype(np.uint32)
             packed |= level << np.uint32(8 * k + 4 * m)
     return packed
 

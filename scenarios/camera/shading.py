@@ -18,6 +18,7 @@ TONE_STEPS_PER_UNIT = 4096
 TONE_RANGE = 4.0
 F = np.float32
 HALF = F(0.5)
+GLAZE = F(0.25)  # ice and slush that stay where wheels have cleared the snow: a bare track is not this class
 ONE = F(1.0)
 
 
@@ -211,7 +212,7 @@ def _paint(lines, s, t, foot_s, foot_t):
 @njit(inline="always", fastmath=True)
 def _asphalt(look, m0, m1, m2, m3, f0, track, oil, repair):
     """Tone of dry asphalt relative to its albedo: stains, wheel paths, cracks, repairs (grain comes later)."""
-    value = ONE + F(0.9) * look.stains * m0 + F(0.6) * look.stains * m1 + F(0.3) * look.stains * m3
+    value = ONE + look.stains * (F(1.2) * m0 + F(1.3) * m1 + F(0.5) * m3)
     value += look.wheel_band * track - look.oil_band * oil
     threshold = F(0.75) - F(1.1) * look.cracks
     crack = min(ONE, m2 * F(1.6)) * _step(m1 + F(0.7) * m3, threshold, threshold + F(0.2))
@@ -228,8 +229,8 @@ def _water(look, m0, m1, m3, f0, f2, track, oil):
     film = min(max(film, F(0.08)), F(1.1))
     dark = ONE - (ONE - look.wet_darkening) * min(ONE, F(0.5) + film)
     dark *= ONE - F(0.35) * still
-    calm = ONE - F(0.5) * min(film, ONE)
-    gloss = (F(0.06) + F(0.5) * film) * (ONE + F(1.6) * calm * f0)
+    calm = ONE - F(0.65) * min(film, ONE)
+    gloss = (F(0.05) + F(0.6) * film) * (ONE + F(2.4) * calm * f0 + F(0.8) * m1)
     gloss = min(max(gloss, F(0.0)), F(0.85))
     return still, dark, gloss, calm * (ONE - F(0.8) * still)
 
@@ -239,10 +240,10 @@ def _snow(look, m0, m1, m3, f0, f1, track):
     """Snow on the road: cover, its colour, and how far the wheels have packed it."""
     cover = look.cover - look.clearing * track * (ONE + F(0.8) * m0)
     cover += F(0.55) * m1 + F(0.3) * m0 + F(0.35) * m3 + F(0.5) * f1 + F(0.25) * f0
-    cover = _step(cover, F(0.28), F(0.62))
+    cover = GLAZE + (ONE - GLAZE) * _step(cover, F(0.28), F(0.62))
     packed = track * (F(0.35) + HALF * look.clearing)
-    bump = ONE + look.relief * (F(0.75) * f1 + F(0.25) * f0) * (ONE - F(0.4) * packed)
-    bump *= ONE + look.relief * (F(0.45) * m0 + F(0.3) * m1) - F(0.22) * packed
+    bump = ONE + look.relief * (F(1.3) * f1 + F(0.6) * f0) * (ONE - F(0.4) * packed)
+    bump *= ONE + look.relief * (F(0.6) * m0 + F(0.8) * m1) - F(0.22) * packed
     grime = look.dirt * (F(0.7) + F(1.6) * m0 + F(1.2) * m1 + HALF * track)
     grime = min(max(grime, F(0.0)), F(0.9))
     b, g, r = _mix(look.snow_b, look.snow_g, look.snow_r, F(0.16), F(0.165), F(0.17), grime)
@@ -276,13 +277,13 @@ def _road(look, kind, macro, fine, track, oil, repair, bitumen, paint):
     if paint > F(0.0):
         paint *= ONE - _step(look.wear * F(1.5) - F(0.55) + F(0.9) * m1 + F(0.8) * f0, F(0.0), HALF)
         b, g, r = _mix(b, g, r, look.paint_b, look.paint_g, look.paint_r, paint)
-    grain = F(2.6) * look.grain * f0
+    grain = F(4.5) * look.grain * f0
     gloss, still = F(0.1) * bitumen, F(0.0)
     if kind >= WET:
         still, dark, gloss, calm = _water(look, m0, m1, m3, f0, f2, track, oil)
         grain *= calm
         b, g, r = b * dark, g * dark, r * dark
-    grain += ONE
+    grain = max(grain + ONE, F(0.15))
     b, g, r = b * grain, g * grain, r * grain
     if kind == SNOW:
         cover, white_b, white_g, white_r, packed = _snow(look, m0, m1, m3, f0, f1, track)

@@ -118,8 +118,8 @@ def _cracks(rng: np.random.Generator, shape: tuple[int, int]) -> Texture:
 def macro_texture() -> RipMap:
     """Stains drawn out along the road, blotches, cracks, and hollows where water stands."""
     rng = np.random.default_rng(BANK_SEED)
-    stains = _spectrum_noise(rng, MACRO_SHAPE, (600.0, 2.0), 0.7, 7.0)
-    blotches = _spectrum_noise(rng, MACRO_SHAPE, (150.0, 1.0), 0.9, 1.2)
+    stains = _spectrum_noise(rng, MACRO_SHAPE, (600.0, 1.0), 0.7, 5.0)
+    blotches = _spectrum_noise(rng, MACRO_SHAPE, (250.0, 0.5), 0.8, 1.2)
     hollows = _spectrum_noise(rng, MACRO_SHAPE, (350.0, 12.0), 1.6, 1.8)
     channels = [
         _to_bytes(stains),
@@ -134,9 +134,9 @@ def macro_texture() -> RipMap:
 def fine_texture() -> RipMap:
     """Stone grain of asphalt, crumbs of snow, ripples of a water film, and blades of the verge."""
     rng = np.random.default_rng(BANK_SEED + 1)
-    stones = _spectrum_noise(rng, FINE_SHAPE, (40.0, 1.0), 0.2, 1.0)
+    stones = _spectrum_noise(rng, FINE_SHAPE, (160.0, 1.0), 0.5, 1.0)
     stones += 0.5 * np.maximum(_spectrum_noise(rng, FINE_SHAPE, (16.0, 1.5), 0.0, 1.0) - 1.2, 0.0)
-    crumbs = _spectrum_noise(rng, FINE_SHAPE, (120.0, 2.0), 0.9, 1.6)
+    crumbs = _spectrum_noise(rng, FINE_SHAPE, (250.0, 2.0), 0.9, 1.4)
     crumbs = 0.8 * crumbs + 0.6 * np.roll(crumbs, 6, axis=0) - 0.6 * np.roll(crumbs, -6, axis=0)
     ripples = _spectrum_noise(rng, FINE_SHAPE, (200.0, 8.0), 1.0, 1.0)
     blades = _spectrum_noise(rng, FINE_SHAPE, (200.0, 1.0), 0.6, 1.0)
