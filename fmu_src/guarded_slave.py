@@ -132,10 +132,13 @@ class GuardedSlave(Fmi2Slave):
         self.values.update(self._forgotten)
 
     def report(self, kind: str, status: Fmi2Status, message: str) -> None:
-        """Log a message, once per kind and instance."""
-        if kind not in self._reported:
-            self._reported.add(kind)
-            self.log(log_text(message), status)
+        """Log a message, once per kind and instance; errors go to standard error too, for hosts without a log."""
+        if kind in self._reported:
+            return
+        self._reported.add(kind)
+        self.log(log_text(message), status)
+        if status >= Fmi2Status.error:
+            print(message, file=sys.stderr)
 
     # FMI callbacks
 

@@ -222,8 +222,11 @@ def test_class_out_of_range(open_unit: Open, road_class: int) -> None:
     assert [line.status for line in unit.log] == [WARNING]
 
 
-def test_bad_parameters_are_all_named_and_every_step_is_discarded(open_unit: Open) -> None:
+def test_bad_parameters_are_all_named_and_every_step_is_discarded(
+    open_unit: Open, capfd: pytest.CaptureFixture[str]
+) -> None:
     unit = open_unit(vehicle__mass=-1.0, camera__pitch=math.nan)
+    assert "vehicle.mass" in capfd.readouterr().err, "a host without a log must see it as well"
     assert unit.log[0].status == ERROR
     assert "vehicle.mass" in unit.log[0].text
     assert "camera.pitch" in unit.log[0].text
