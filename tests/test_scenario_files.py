@@ -40,7 +40,14 @@ def test_delivered_roads_load(path):
 
 
 def test_vehicle_file_is_table_3():
-    assert load_vehicle(VEHICLE).to_core() == Vehicle()
+    core = load_vehicle(VEHICLE).to_core()
+    assert core == Vehicle(rolling_resistance=core.rolling_resistance)
+
+
+def test_the_estimator_knows_the_rolling_resistance_of_the_file(tmp_path):
+    assert load_vehicle(VEHICLE).to_core().rolling_resistance > 0.0
+    bare = changed(VEHICLE, tmp_path, lambda d: d.pop("effects"))
+    assert load_vehicle(bare).to_core().rolling_resistance == 0.0
 
 
 def test_road_holds_each_segment_to_the_next():
