@@ -57,7 +57,7 @@ def linearised(point: DesignPoint, vehicle: Vehicle, K: float, gamma: float) -> 
 
     States: s and theta_hat; inputs: errors of wheel torque, wheel speed and vehicle speed; output: theta_hat.
     """
-    I, R, C_x = vehicle.wheel_inertia_kg_m2, vehicle.wheel_radius_m, vehicle.longitudinal_stiffness_n  # noqa: E741
+    I, R, C_x = vehicle.wheel_inertia_kg_m2, vehicle.wheel_radius_m, vehicle.longitudinal_stiffness_n
     load_n = vehicle.wheel_load(True, point.longitudinal_acceleration_m_s2)
     slip = onset_slip(point.theta, load_n, C_x, point.sensitivity)
     by_theta = load_n * friction_by_theta(point.theta, slip, load_n, C_x)

@@ -127,7 +127,7 @@ class Estimate:
     K_v: float
     """Visual gain [-] or [1/s], after Eq. (17) or (18)."""
     excitation_flag: bool
-    """Whether slip is above the threshold, so that the estimator runs."""
+    """Whether slip is above the threshold or the tyre visibly slides, so that the estimator runs."""
     excitation_threshold: float
     slip: float
     tyre_force_n: float
@@ -384,7 +384,8 @@ class TrpacEstimator:
             readings.wheel_torque_nm - self._rolling_moment(readings, load_n),
             slip,
             load_n,
-            self._slip_deviation(sensors.vehicle_speed_m_s, step_s) + abs(signed_slip - slip_before),
+            self._slip_deviation(sensors.vehicle_speed_m_s, step_s),
+            abs(signed_slip - slip_before),
         )
         if not state.settled:
             state = replace(
@@ -397,14 +398,13 @@ class TrpacEstimator:
         theta_seen = None if outcome is None else config.class_theta[outcome.surface]
         flag = outcome is not None and outcome.flag and not state.frame_failed
         theta_img = theta_seen if flag else None
-        fused, threshold, K_v = self._estimate(state.fusion, inputs, theta_img, step_s)
-        alone, _, _ = self._estimate(state.dynamics, inputs, None, step_s)
-        excited = slip.size > threshold
+        fused = self._fusion_step(state.fusion, inputs, theta_img, step_s)
+        alone = self._fusion_step(state.dynamics, inputs, None, step_s)
         variance = advanced_variance(
             config.confidence,
             state.variance,
             fused.state.theta_hat,
-            fused.sensitivity if excited else 0.0,
+            fused.sensitivity,
             inputs,
             wheel,
             config.gains.gamma,
@@ -431,9 +431,9 @@ class TrpacEstimator:
         self._last = Estimate(
             TRPAC=theta,
             flag=flag,
-            K_v=K_v,
-            excitation_flag=excited,
-            excitation_threshold=threshold,
+            K_v=fused.K_v,
+            excitation_flag=fused.excited,
+            excitation_threshold=fused.threshold,
             slip=slip.size,
             tyre_force_n=fused.tyre_force_n,
             TRPAC_image=self._last.TRPAC_image if theta_seen is None else theta_seen,
@@ -445,23 +445,11 @@ class TrpacEstimator:
         )
         return self._last
 
-    def _estimate(
-        self,
-        state: FusionState,
-        inputs: WheelInputs,
-        theta_img: float | None,
-        step_s: float,
-    ) -> tuple[FusionStep, float, float]:
-        """One estimator's step, with its threshold and K_v."""
-        scheduler = self.config.scheduler
-        stiffness_n = self._wheel.longitudinal_stiffness_n
-        threshold = scheduler.threshold(theta_img, inputs.load_n, stiffness_n, inputs.slip_deviation)
-        excited = inputs.slip.size > threshold
-        K_v = 0.0
-        if theta_img is not None and excited:
-            K_v = scheduler.K_v(abs(theta_img - state.theta_hat))
-        outcome = fusion_step(state, inputs, self._wheel, self.config.gains, excited, theta_img, K_v, step_s)
-        return outcome, threshold, K_v
+    def _fusion_step(
+        self, state: FusionState, inputs: WheelInputs, theta_img: float | None, step_s: float
+    ) -> FusionStep:
+        gains, scheduler = self.config.gains, self.config.scheduler
+        return fusion_step(state, inputs, self._wheel, gains, scheduler, theta_img, step_s)
 
     def _hold(self, step_s: float, problem: str) -> Estimate:
         """Keep the last good estimate through unusable readings; the way goes on at the last good speed."""

@@ -1,0 +1,109 @@
+"""The camera's pictures of a scenario, rendered, disturbed and written as a camera's recorder would."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+
+from scenarios.camera.disturbances import NONE, PAPER, disturb
+from scenarios.camera.files import load_camera
+from scenarios.camera.renderer import Renderer
+from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.errors import ScenarioError
+from scenarios.files import Scenario
+from scenarios.plant.pipeline import PlantTrajectory
+
+WORKERS = 2
+"""Processes that render: each holds one world of some 100 MB."""
+DISTURBANCES = {"none": NONE, "paper": PAPER}
+LOOK_STREAM = 101
+"""Keeps the scenario's world apart from the streams of its sensors and disturbances."""
+
+
+@dataclass(frozen=True)
+class PictureJob:
+    """All that it takes to draw some frames in a process of its own."""
+
+    scenario: Scenario
+    frames: tuple[tuple[int, float], ...]
+    """Number and front axle's position of each frame [m]."""
+    folder: Path
+
+
+def scene(scenario: Scenario) -> Renderer:
+    """The scenario's world; the same seed gives the same one. Raises ScenarioError where there is no camera."""
+    if scenario.camera_path is None:
+        raise ScenarioError(
+            f"{scenario.path}: camera: missing; expected a camera file, to draw pictures through."
+        )
+    segments = [SurfaceSegment(s.start_m, s.surface_class) for s in scenario.road.segments]
+    look = SceneLook.random(np.random.default_rng([scenario.seed, LOOK_STREAM]))
+    return Renderer(load_camera(scenario.camera_path), segments, look)
+
+
+def draw(job: PictureJob) -> int:
+    """Draw one job's frames; returns how many."""
+    renderer, pictures = scene(job.scenario), job.scenario.pictures
+    quality = [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality]
+    for number, position_m in job.frames:
+        image = renderer.frame(position_m).image
+        seed = int(np.random.SeedSequence([job.scenario.seed, number]).generate_state(1)[0])
+        image = disturb(image, DISTURBANCES[pictures.disturbance], seed)
+        path = job.folder / frame_name(number)
+        if not cv2.imwrite(str(path), image, quality):
+            raise OSError(f"{path}: the picture could not be written; is the disk full?")
+    return len(job.frames)
+
+
+def frame_name(number: int) -> str:
+    """File name of a frame."""
+    return f"frame_{number:05d}.jpg"
+
+
+def record(
+    scenario: Scenario,
+    trajectory: PlantTrajectory,
+    folder: Path,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> pd.DataFrame:
+    """Draw all pictures of a drive.
+
+    Parameters
+    ----------
+    scenario, trajectory : Scenario, PlantTrajectory
+        World and camera, and the drive through it.
+    folder : Path
+        Where the pictures go.
+    progress : callable
+        Told how many of how many pictures are done.
+
+    Returns
+    -------
+    DataFrame
+        frame, row (of the trajectory), time_s, front_axle_m, path. Without a camera it is empty.
+    """
+    columns = ["frame", "row", "time_s", "front_axle_m", "path"]
+    if scenario.camera_path is None:
+        return pd.DataFrame(columns=columns)
+    every = round(1.0 / (scenario.pictures.fps * scenario.step_s))
+    rows = np.arange(0, len(trajectory), max(1, every))
+    front_axle_m = trajectory.position_m[rows] + scenario.vehicle.to_core().cog_to_front_axle_m
+    folder.mkdir(parents=True, exist_ok=True)
+    frames = [(number, float(place)) for number, place in enumerate(front_axle_m, start=1)]
+    batch = max(1, -(-len(frames) // (4 * WORKERS)))
+    jobs = [PictureJob(scenario, tuple(frames[i : i + batch]), folder) for i in range(0, len(frames), batch)]
+    done = 0
+    for count in Parallel(n_jobs=WORKERS, return_as="generator_unordered")(
+        delayed(draw)(job) for job in jobs
+    ):
+        done += count
+        progress(done, len(frames))
+    paths = [str((folder / frame_name(number)).resolve()) for number, _ in frames]
+    values = zip((n for n, _ in frames), rows, trajectory.time_s[rows], front_axle_m, paths, strict=True)
+    return pd.DataFrame(list(values), columns=columns)

@@ -1,0 +1,151 @@
+"""One scenario from the files to the scores: plant, pictures, unit, metrics."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from fmu_src.packaging import sha256
+from scenarios.files import Scenario
+from scenarios.metrics import score_run
+from scenarios.pictures import record
+from scenarios.plant.pipeline import PlantTrajectory, drive
+from scenarios.plant.sensors import make_scenario_log
+from scenarios.unit_client import parameters, run_unit
+
+WHEELS = ("fl", "fr", "rl", "rr")
+ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
+"""The estimators that are compared, and the unit's output that holds each."""
+PACKAGES = ("fmpy", "pythonfmu", "numpy", "onnxruntime", "opencv-python-headless", "albumentations")
+
+Progress = Callable[[str, int, int], None]
+"""Told the stage, and how much of how much is done."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished scenario.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What was run.
+    trajectory : PlantTrajectory
+        The truth.
+    frames : DataFrame
+        The pictures given, see `pictures.record`.
+    table : DataFrame
+        One row per step: the sensors' log, the unit's outputs, theta and segment under the wheel.
+    summary : dict
+        What summary.json holds.
+    """
+
+    scenario: Scenario
+    trajectory: PlantTrajectory
+    frames: pd.DataFrame
+    table: pd.DataFrame
+    summary: dict[str, Any]
+
+
+def run_scenario(
+    scenario: Scenario,
+    fmu: Path,
+    frames_folder: Path,
+    progress: Progress = lambda stage, done, total: None,
+) -> Run:
+    """Drive the plant, draw the pictures, step the unit over both, score.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to run.
+    fmu : Path
+        The estimator unit.
+    frames_folder : Path
+        Where the pictures go.
+    progress : callable
+        Told the stage and how much of it is done.
+
+    Raises
+    ------
+    ScenarioError
+        If a file of the scenario cannot be used.
+    """
+    trajectory = drive(scenario)
+    log = make_scenario_log(scenario, trajectory)
+    frames = record(scenario, trajectory, frames_folder, lambda d, n: progress("drawing pictures", d, n))
+    settings = parameters(scenario)
+    outputs = run_unit(
+        fmu,
+        settings,
+        unit_signals(log, scenario.wheel),
+        frames,
+        scenario.step_s,
+        lambda done, total: progress("stepping the unit", done, total),
+    )
+    table = pd.concat([log, outputs, under_the_wheel(scenario, trajectory)], axis=1)
+    return Run(scenario, trajectory, frames, table, summarise(scenario, table, fmu))
+
+
+def unit_signals(log: pd.DataFrame, wheel: str) -> pd.DataFrame:
+    """The columns of a log that the unit of one wheel takes, under the unit's names."""
+    return pd.DataFrame(
+        {
+            "wheel_speed": log[f"wheel_speed_{wheel}_rad_s"],
+            "wheel_torque": log[f"wheel_torque_{wheel}_nm"],
+            "vehicle_speed": log["vehicle_speed_m_s"],
+            "longitudinal_acceleration": log["accel_x_m_s2"],
+        }
+    )
+
+
+def under_the_wheel(scenario: Scenario, trajectory: PlantTrajectory) -> pd.DataFrame:
+    """True adhesion and index of the road's stretch at the wheel's contact, columns theta_true and segment."""
+    car, column = scenario.vehicle.to_core(), WHEELS.index(scenario.wheel)
+    offset_m = car.cog_to_front_axle_m if scenario.wheel.startswith("f") else -car.cog_to_rear_axle_m
+    starts = segment_starts(scenario)
+    contact_m = trajectory.position_m + offset_m
+    segment = np.clip(np.searchsorted(starts, contact_m, side="right") - 1, 0, None)
+    return pd.DataFrame({"theta_true": trajectory.theta[:, column], "segment": segment})
+
+
+def segment_starts(scenario: Scenario) -> NDArray[np.float64]:
+    """Where the road's stretches begin [m]."""
+    return np.array([s.start_m for s in scenario.road.segments])
+
+
+def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path) -> dict[str, Any]:
+    """The scores of a run and what is needed to repeat it."""
+    scores = score_run(
+        segment_starts(scenario),
+        table["segment"].to_numpy(),
+        table["theta_true"].to_numpy(),
+        float(table["TRPAC_dynamics"].iloc[0]),
+        {name: table[column].to_numpy() for name, column in ESTIMATORS.items()},
+        table["excitation_flag"].to_numpy(),
+        scenario.step_s,
+    )
+    return {
+        "scenario": scenario.name,
+        "seed": scenario.seed,
+        "wheel": scenario.wheel,
+        "longitudinal_stiffness_n": scenario.vehicle.tyre.longitudinal_stiffness_n,
+        "fmu_sha256": sha256(fmu),
+        "versions": {package: version(package) for package in PACKAGES},
+        "estimators": scores,
+    }
+
+
+def write_run(run: Run, out: Path) -> None:
+    """Write log.csv and summary.json of a run."""
+    out.mkdir(parents=True, exist_ok=True)
+    run.table.to_csv(out / "log.csv", index=False)
+    (out / "summary.json").write_text(json.dumps(run.summary, indent=2) + "\n", encoding="utf-8")

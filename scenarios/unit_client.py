@@ -1,0 +1,172 @@
+"""The estimator unit as a host sees it: imported, parameterised and stepped through fmpy."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from fmpy import read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+from fmu_src.packaging import unpack_unit
+from scenarios.camera.files import load_camera
+from scenarios.files import Scenario
+from trpac_core.vision.camera import Camera
+
+OUTPUTS = (
+    "TRPAC",
+    "K_v",
+    "excitation_threshold",
+    "slip",
+    "tyre_force",
+    "TRPAC_image",
+    "TRPAC_dynamics",
+    "TRPAC_peak",
+    "image_confidence",
+    "frame_age",
+    "TRPAC_std",
+)
+FLAGS = ("flag", "excitation_flag")
+INPUTS = ("wheel_speed", "wheel_torque", "vehicle_speed", "longitudinal_acceleration")
+
+
+def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
+    """What the unit is told of the scenario's car, camera and sensors, by the unit's variable names."""
+    car, noise = scenario.vehicle.to_core(), scenario.sensors
+    values: dict[str, float | int | bool] = {
+        "wheel.front": scenario.wheel.startswith("f"),
+        "wheel.left": scenario.wheel.endswith("l"),
+        "vehicle.mass": car.mass_kg,
+        "vehicle.wheelbase": car.wheelbase_m,
+        "vehicle.track": car.track_m,
+        "vehicle.cog_height": car.cog_height_m,
+        "vehicle.cog_to_rear_axle": car.cog_to_rear_axle_m,
+        "vehicle.wheel_radius": car.wheel_radius_m,
+        "vehicle.wheel_inertia": car.wheel_inertia_kg_m2,
+        "tyre.rolling_resistance": car.rolling_resistance,
+        "tyre.longitudinal_stiffness": car.longitudinal_stiffness_n,
+        "estimator.sliding_speed_noise": float(
+            np.hypot(noise.vehicle_speed_noise_m_s, car.wheel_radius_m * noise.wheel_speed_noise_rad_s)
+        ),
+    }
+    if scenario.camera_path is not None:
+        values |= _camera_parameters(load_camera(scenario.camera_path))
+        values["camera.fps"] = scenario.pictures.fps
+    return values
+
+
+def _camera_parameters(camera: Camera) -> dict[str, float | int | bool]:
+    lens = dict(zip(("k1", "k2", "p1", "p2", "k3"), camera.distortion, strict=True))
+    return {
+        "camera.width": camera.width_px,
+        "camera.height": camera.height_px,
+        "camera.fx": camera.fx_px,
+        "camera.fy": camera.fy_px,
+        "camera.cx": camera.cx_px,
+        "camera.cy": camera.cy_px,
+        **{f"camera.{name}": value for name, value in lens.items()},
+        "camera.height_above_road": camera.height_m,
+        "camera.x_from_front_axle": camera.x_from_front_axle_m,
+        "camera.y": camera.y_m,
+        "camera.pitch": camera.pitch_rad,
+        "camera.yaw": camera.yaw_rad,
+        "camera.roll": camera.roll_rad,
+    }
+
+
+def run_unit(
+    fmu: Path,
+    settings: Mapping[str, float | int | bool],
+    signals: pd.DataFrame,
+    frames: pd.DataFrame,
+    step_s: float,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> pd.DataFrame:
+    """Step the unit over recorded signals and pictures, as a host would.
+
+    Parameters
+    ----------
+    fmu : Path
+        The unit's archive.
+    settings : mapping
+        Parameters by variable name; a name that the unit does not have raises KeyError.
+    signals : DataFrame
+        One row per step with the columns `INPUTS`, in the unit's units.
+    frames : DataFrame
+        row and path of each picture; it is given with that row's signals.
+    step_s : float
+        Communication step [s].
+    progress : callable
+        Told how many of how many steps are done.
+
+    Returns
+    -------
+    DataFrame
+        One row per step: the unit's outputs at the step's end.
+    """
+    folder = unpack_unit(fmu)
+    try:
+        description = read_model_description(str(folder))
+        references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
+        unit = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="estimator",
+        )
+        unit.instantiate()
+        try:
+            unit.setupExperiment(startTime=0.0)
+            _set(unit, references, settings)
+            unit.enterInitializationMode()
+            unit.exitInitializationMode()
+            outputs = _step_all(unit, references, signals, frames, step_s, progress)
+            unit.terminate()
+        finally:
+            unit.freeInstance()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return outputs
+
+
+def _set(
+    unit: FMU2Slave,
+    references: Mapping[str, tuple[int, str]],
+    settings: Mapping[str, float | int | bool],
+) -> None:
+    for name, value in settings.items():
+        reference, kind = references[name]
+        getattr(unit, f"set{kind}")([reference], [value])
+
+
+def _step_all(
+    unit: FMU2Slave,
+    references: Mapping[str, tuple[int, str]],
+    signals: pd.DataFrame,
+    frames: pd.DataFrame,
+    step_s: float,
+    progress: Callable[[int, int], None],
+) -> pd.DataFrame:
+    inputs = [references[name][0] for name in INPUTS]
+    reals, flags = ([references[name][0] for name in names] for names in (OUTPUTS, FLAGS))
+    path, number = references["image_path"][0], references["frame_id"][0]
+    pictures = {
+        int(row): (str(file), int(frame)) for row, file, frame in frames[["row", "path", "frame"]].values
+    }
+    values = signals[list(INPUTS)].to_numpy(dtype=float)
+    results = np.empty((len(values), len(OUTPUTS) + len(FLAGS)))
+    for row, readings in enumerate(values):
+        if row in pictures:
+            unit.setString([path], [pictures[row][0]])
+            unit.setInteger([number], [pictures[row][1]])
+        unit.setReal(inputs, readings)
+        unit.doStep(currentCommunicationPoint=row * step_s, communicationStepSize=step_s)
+        results[row, : len(OUTPUTS)] = unit.getReal(reals)
+        results[row, len(OUTPUTS) :] = unit.getBoolean(flags)
+        if row % 500 == 0 or row == len(values) - 1:
+            progress(row + 1, len(values))
+    table = pd.DataFrame(results, columns=[*OUTPUTS, *FLAGS])
+    return table.astype(dict.fromkeys(FLAGS, bool))
