@@ -332,17 +332,22 @@ def test_where_the_renderer_puts_a_change_of_surface_the_estimator_finds_it(posi
 
 
 @pytest.mark.parametrize("surface", list(Surface))
-def test_trained_networks_on_rendered_road(surface):
+@pytest.mark.parametrize("sky", ["overcast", "clear"])
+def test_trained_networks_on_rendered_road(surface, sky):
+    """Plainly dry, plainly wet, plainly snowy: every frame, and all but one with the flag set."""
     files = MODELS / "segmenter.onnx", MODELS / "surface.onnx"
     if missing := [file.name for file in files if not file.is_file()]:
         pytest.skip(f"needs the trained networks: {missing} not in models/")
     ife = Ife(IfeConfig(), Segmenter(files[0]), SurfaceClassifier(files[1]))
-    look = SceneLook(seed=11, sky="overcast", sun_share=0.0, verge_snow=0.9 if surface is SNOW else 0.0)
+    light = {"sky": sky, "sun_share": 0.0 if sky == "overcast" else 0.8}
+    look = SceneLook(seed=11, film=0.95, puddles=0.8, **light)
     renderer = Renderer(CAMERA, [SurfaceSegment(0.0, surface)], look)
     state, results = IfeState(), []
-    for position_m in np.arange(0.0, 10.0, 1.0):
+    for position_m in (0.0, 12.0, 24.0):
         state, result = ife.process(state, renderer.frame(position_m).image, Motion(10.0))
         results.append(result)
-    right = sum(result.surface is surface for result in results)
-    assert right >= 9, [result.probabilities for result in results]
-    assert sum(result.flag for result in results) >= 8, [result.Q_v for result in results]
+    verdicts = [
+        (result.surface.label, round(result.p_util, 2), round(result.P_fusion, 2)) for result in results
+    ]
+    assert all(result.surface is surface for result in results), verdicts
+    assert sum(result.flag for result in results) >= 2, verdicts
