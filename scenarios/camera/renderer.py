@@ -33,7 +33,7 @@ LINES_REPEAT_M = 144.0
 """A multiple of every period of dashed lines [m]."""
 WATER_INDEX = 1.33
 FINEST_SKY_PX_RAD = 0.0009
-METERED_M = (5.0, 40.0)
+METERED_M = (3.0, 30.0)
 """The stretch of road ahead on which the automatic exposure looks [m]."""
 SHARPNESS = 0.5
 """Levels by which textures are sampled finer than the pixel, as a camera that sharpens its pictures [-]."""
@@ -176,7 +176,8 @@ class Renderer:
             Surface.SNOW_ICE: look.snow_albedo * (1 - 0.5 * look.snow_dirt) * min(1.0, look.snow_cover),
         }
         ahead = np.linspace(*METERED_M, 36) + position_m
-        road = float(np.mean([brightness[self.surface_at(place)] for place in ahead]))
+        # the quadratic mean protects bright surfaces from clipping
+        road = float(np.sqrt(np.mean([brightness[self.surface_at(place)] ** 2 for place in ahead])))
         metered = 0.6 * road + 0.4 * max(0.12, 0.5 * self._sky_mean)
         exposure = 2.0**look.exposure_ev * (GREY / 0.25) * (0.25 / metered) ** look.auto_exposure
         return (exposure * TONE_STEPS_PER_UNIT * np.array(look.white_balance)).astype(np.float32)
