@@ -75,10 +75,10 @@ def build_unit(slave: Slave, target: Path) -> Path:
     content["resources/slavemodule.txt"] = f"{slave.info.name}_{digest}".encode()
     content["modelDescription.xml"] = model_description(slave.info, slave.variables, digest)
     target.parent.mkdir(parents=True, exist_ok=True)
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+    # Stored, not compressed: compressed bytes differ between versions of zlib.
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as archive:
         for path in sorted(content):
             entry = zipfile.ZipInfo(path, ZIP_TIME)
-            entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, content[path])
     return target
