@@ -33,6 +33,11 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--threads", type=int, default=2, help="processor threads (default: 2)")
     parser.add_argument(
+        "--worlds",
+        type=Path,
+        help="folder that keeps the rendered pictures; delete it when the renderer changes",
+    )
+    parser.add_argument(
         "--teacher",
         type=Path,
         help="MobileNetV2 as 8-bit .tflite that guides the surface classifier's features",

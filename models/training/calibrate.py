@@ -111,9 +111,9 @@ def draw_reliability(before: Reliability, after: Reliability, temperature: float
             edgecolor="#d1495b", hatch="//", label="gap to confidence",
         )  # fmt: skip
         axis.plot([0, 1], [0, 1], "--", color="grey", label="perfect calibration")
-        axis.text(
-            0.97, 0.05, f"ECE {curve.ece:.3f}\nMCE {curve.mce:.3f}", ha="right", transform=axis.transAxes
-        )
+        errors = f"ECE {curve.ece:.3f}\nMCE {curve.mce:.3f}"
+        paper = {"facecolor": "white", "edgecolor": "grey"}
+        axis.text(0.96, 0.06, errors, ha="right", transform=axis.transAxes, bbox=paper)
         axis.set(title=title, xlabel="confidence", ylabel="accuracy", xlim=(0, 1), ylim=(0, 1))
         axis.legend(loc="upper left", fontsize=8)
     figure.savefig(path, dpi=110, metadata={"Software": None})

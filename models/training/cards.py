@@ -39,6 +39,7 @@ class RunFacts:
     worlds: dict[str, int]
     seeds: dict[str, str]
     render_s: float
+    threads: int
     teacher: str | None = None
     versions: dict[str, str] = field(default_factory=dict)
 
@@ -71,8 +72,15 @@ def splits_text(facts: RunFacts) -> str:
     return f"""\
 Real pictures are split by the manifest: no series of neighbouring pictures stands in two splits, except the three
 clips of one car (`*_extreme`) that are cut in time, first part train, a gap, last part val. `other_cameras` and all
-test rows were judged once, at the end, and nothing was chosen by them.
-Rendered pictures, three places in each world: {worlds}; rendering took {facts.render_s:.0f} s."""
+test rows are never trained on, and nothing was chosen by them.
+Rendered pictures, three places in each world: {worlds}; drawing
+or loading them took {facts.render_s:.0f} s."""
+
+
+def time_text(facts: RunFacts, train_s: float) -> str:
+    """How long training took, and with what."""
+    threads = "one processor thread" if facts.threads == 1 else f"{facts.threads} processor threads"
+    return f"Training took {train_s:.0f} s by the clock with {threads}, no accelerator, on a machine with other work."
 
 
 def versions_text(facts: RunFacts) -> str:
@@ -161,7 +169,7 @@ Patches are mirrored, shifted, zoomed by up to 12 % and seen with the gain, gamm
 (within {CAMERA_SPREAD:.0%}). Classes are drawn equally often and sources within a class by fixed shares, so that wet
 and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the weights.
 {teacher}
-Training took {train_s:.0f} s on two processor cores.
+{time_text(facts, train_s)}
 {versions_text(facts)}
 
 ## Scores on pictures
@@ -188,8 +196,8 @@ patches it holds. The diagram `reliability.png` is the validation set's, undistu
 
 - The validation and test stills come from the same kind of web search as the training stills; other cameras are the
   honest guess for a new car. Wet carries over worst: see its recall on other cameras and how few pictures that is.
-- Real wet and snowy dash frames in training come from one car, one clip each. More than half of what the network
-  knows about them is rendered, and rendered scores say how well it knows the renderer, no more.
+- Real wet and snowy dash frames in training come from one car, one clip each, and the val rows of these clips show the
+  same road minutes later. Rendered scores say how well the network knows the renderer, no more.
 - Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
 - Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
 - T is fitted on these validation pictures; on another camera confidence is likelier too high than too low.
@@ -240,11 +248,12 @@ form, {parameters} parameters, trained from nothing in our own code.
 
 ## Training
 
-Pictures by kind: {kinds}. *masked* and *campus* are real pictures with road masks, with shadows painted over most of
-them; *weak* are real pictures of all three surfaces without a mask, where only the middle of the road box counts as
-road and the sky of stills as not road; *rendered* have exact labels of both tasks. Random crops, mirror, gain, gamma,
-white balance, and on some pictures blur, noise, contrast. Cross-entropy and Dice, AdamW.
-Training took {train_s:.0f} s on two processor cores.
+Pictures by kind: {kinds}.
+*masked* and *campus* are real pictures with road masks, with shadows painted over most of them; *weak* are real
+pictures of all three surfaces without a mask, where only the middle of the road box counts as road and the sky of
+stills as not road; *rendered* have exact labels of both tasks. Random crops, mirror, gain, gamma, white balance, and on
+some pictures blur, noise, contrast. Cross-entropy and Dice, AdamW.
+{time_text(facts, train_s)}
 {versions_text(facts)}
 
 ## Scores

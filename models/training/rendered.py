@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -141,3 +142,23 @@ def rendered_patches(found: list[list[tuple[Image, int]]]) -> PatchSet:
         for label in sorted({label for _, label in cut}):
             groups.append(([patch for patch, own in cut if own == label], label, "rendered"))
     return patch_set(groups)
+
+
+def save_worlds(file: Path, samples: list[Sample], patches: PatchSet) -> None:
+    """Keep drawn worlds in a .npz file, so that a second training need not draw them again."""
+    planes = {
+        name: np.stack([getattr(sample, name) for sample in samples])
+        for name in ("image", "drivable", "shadow")
+    }
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(".part.npz")
+    np.savez(part, **planes, **vars(patches))
+    part.replace(file)
+
+
+def load_worlds(file: Path) -> tuple[list[Sample], PatchSet]:
+    """Worlds kept by `save_worlds`."""
+    with np.load(file) as kept:
+        planes = zip(kept["image"], kept["drivable"], kept["shadow"], strict=True)
+        samples = [Sample(image, drivable, shadow, "rendered") for image, drivable, shadow in planes]
+        return samples, PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))

@@ -25,15 +25,15 @@ from . import calibrate, cards, scores
 from .data import Picture, check_trainable, of_split, read_manifest
 from .export import export_segmenter, export_surface, sha256_of
 from .patches import PatchSet, joined, judged_patches, training_patches
-from .rendered import SEED_RANGES, draw_worlds
+from .rendered import SEED_RANGES, draw_worlds, load_worlds, save_worlds
 from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
 from .train_segmenter import score_segmenter, train_segmenter
 from .train_surface import logits_of, train_surface
 
-WORLDS = {"train": 240, "val": 40, "test": 60}
+WORLDS = {"train": 160, "val": 24, "test": 40}
 PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
-SEGMENTER_STEPS = 2200
-SURFACE_STEPS = 2000
+SEGMENTER_STEPS = 1500
+SURFACE_STEPS = 1500
 CALIBRATION_PER_SOURCE = 240
 """Most validation patches that one source gives to the calibration, lest one drive decide T."""
 
@@ -55,7 +55,7 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
     with _progress() as progress:
         worlds = {split: max(3, round(given.effort * count)) for split, count in WORLDS.items()}
         start = time.monotonic()
-        rendered = _render(progress, worlds)
+        rendered = _render(progress, worlds, given.worlds)
         shown = [Path(word).name if "/" in word else word for word in arguments]
         facts = cards.RunFacts(
             command=" ".join(["python -m models.training", *shown]),
@@ -64,6 +64,7 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
             worlds=worlds,
             seeds={split: f"from {SEED_RANGES[split][0]}" for split in worlds},
             render_s=time.monotonic() - start,
+            threads=given.threads,
             teacher=given.teacher and given.teacher.name,
         )
         given.out.mkdir(parents=True, exist_ok=True)
@@ -73,12 +74,21 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
             _surface(progress, given, facts, rendered)
 
 
-def _render(progress: Progress, worlds: dict[str, int]) -> dict[str, Rendered]:
+def _render(progress: Progress, worlds: dict[str, int], store: Path | None) -> dict[str, Rendered]:
     task = progress.add_task("rendering worlds", total=sum(worlds.values()), note="")
-    return {
-        split: Rendered(*draw_worlds(split, count, PATCHES_PER_VIEW[split], lambda: progress.advance(task)))
-        for split, count in worlds.items()
-    }
+    rendered = {}
+    for split, count in worlds.items():
+        file = store / f"{split}-{count}.npz" if store else None
+        if file and file.is_file():
+            rendered[split] = Rendered(*load_worlds(file))
+            progress.advance(task, count)
+            continue
+        rendered[split] = Rendered(
+            *draw_worlds(split, count, PATCHES_PER_VIEW[split], lambda: progress.advance(task))
+        )
+        if file:
+            save_worlds(file, rendered[split].samples, rendered[split].patches)
+    return rendered
 
 
 def _segmenter(

@@ -1,0 +1,281 @@
+"""The training data: splits by source, unknown pixels, road boxes, painted shadows, drawing weights."""
+
+import csv
+import importlib.util
+import os
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from models.training import augment, calibrate, data, patches, rendered, scores, segmenter_data  # noqa: E402
+from models.training.__main__ import main  # noqa: E402
+
+COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height"]
+GREY, WHITE = 90, 250
+
+
+def row(file, split, label, *, mask="", sequence="", size=(64, 64)):
+    return {
+        "file": file,
+        "split": split,
+        "task": "seg" if mask else "cls",
+        "label": label,
+        "mask": mask,
+        "sequence_id": sequence or f"{file}-{split}",
+        "licence": "made up",
+        "width": size[0],
+        "height": size[1],
+    }
+
+
+def write_folder(folder, rows, pictures):
+    for name, picture in pictures.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        assert cv2.imwrite(str(folder / name), picture)
+    with (folder / "manifest.csv").open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder
+
+
+@pytest.fixture
+def made_up(tmp_path):
+    """Stills whose road box is grey and the rest white, overlaid frames, and one masked drive per split."""
+    rows, pictures = [], {}
+    for split in ("train", "val", "test"):
+        for label in ("dry", "wet", "snow"):
+            still = np.full((200, 200, 3), WHITE, np.uint8)
+            still[120:190, 40:160] = GREY
+            name = f"condition_web/{label}/{label}_{split}.png"
+            pictures[name] = still
+            rows.append(row(name, split, label))
+    for split in ("train", "val"):
+        frame = np.full((360, 480, 3), WHITE, np.uint8)
+        mask = np.zeros((360, 480), np.uint8)
+        frame[200:, 100:400], mask[200:, 100:400] = GREY, 1
+        mask[:, :20] = data.IGNORE
+        name = f"drivable_camvid/{split}/0.png"
+        pictures |= {name: frame, f"drivable_camvid/{split}/0_mask.png": mask}
+        rows.append(row(name, split, "dry", mask=f"drivable_camvid/{split}/0_mask.png"))
+    clip = np.full((360, 640, 3), WHITE, np.uint8)
+    clip[200:315, 120:290] = GREY
+    clip[200:315, 380:560] = GREY
+    for split in ("train", "gap", "val"):
+        name = f"seq_wet_extreme/rain/{split}.png"
+        pictures[name] = clip
+        rows.append(row(name, split, "wet", sequence="rain"))
+    return write_folder(tmp_path, rows, pictures)
+
+
+def test_splits_are_the_manifests(made_up):
+    pictures = data.read_manifest(made_up)
+    data.check_trainable(pictures)
+    for split in data.SPLITS:
+        assert all(picture.split == split for picture in data.of_split(pictures, split))
+    assert {p.path.name for p in data.of_split(pictures, "train", masked=True)} == {"0.png"}
+    training = patches.training_patches(data.of_split(pictures, "train"), seed=1)
+    assert set(training.sources) == {"condition_web", "drivable_camvid/train", "seq_wet_extreme/rain"}
+    assert len(np.unique(training.pictures)) == len(data.of_split(pictures, "train")) == 5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_patches_stay_on_the_road(made_up, seed):
+    """The road is grey and all else white: a white edge wider than one pixel is a box that is off."""
+    for picture in data.read_manifest(made_up):
+        cut = patches.random_patches(np.random.default_rng(seed), picture, 12)
+        cut += patches.fixed_patches(picture)
+        assert len(cut) > 12
+        for patch in cut:
+            assert patch.shape == (64, 96, 3)
+            assert np.mean(patch > GREY + 40) <= 0.06
+
+
+def test_overlaid_clips_are_used_inside_their_limits_only():
+    for box in data.ROAD_BOXES["seq_extreme"]:
+        inside = [
+            limit[0] <= box[0] < box[2] <= limit[2] and limit[1] <= box[1] < box[3] <= limit[3]
+            for limit in data.EXTREME_LIMITS
+        ]
+        assert any(inside)
+
+
+def test_stills_are_used_in_their_lower_centre_only():
+    (box,) = data.ROAD_BOXES["condition_web"]
+    assert box == (0.20, 0.60, 0.80, 0.95)
+
+
+def test_unknown_pixels_stay_unknown(made_up):
+    (picture,) = data.of_split(data.read_manifest(made_up), "train", masked=True)
+    sample = segmenter_data.masked_sample(picture)
+    assert (sample.shadow == data.IGNORE).all()
+    plain = segmenter_data.plain_view(sample)
+    assert set(np.unique(plain.drivable)) == {0, 1, data.IGNORE}
+    assert np.mean(plain.drivable == data.IGNORE) == pytest.approx(20 / 480, abs=0.01)
+    for seed in range(20):
+        view = segmenter_data.training_view(np.random.default_rng(seed), sample)
+        assert set(np.unique(view.drivable)) <= {0, 1, data.IGNORE}
+        assert view.image.shape == (160, 256, 3)
+        known = view.shadow != data.IGNORE
+        assert (view.drivable[known] == 1).all()
+
+
+def test_weak_labels_say_road_in_the_box_and_not_road_in_the_sky(made_up):
+    for picture in data.of_split(data.read_manifest(made_up), "train", masked=False):
+        sample = segmenter_data.weak_sample(picture)
+        assert (sample.image[sample.drivable == 1] == GREY).all()
+        assert (sample.image[sample.drivable == 0] == WHITE).all()
+        assert (sample.drivable == 1).any()
+        assert (sample.shadow == data.IGNORE).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6))
+def test_painted_shadows_darken_where_labelled(seed):
+    rng = np.random.default_rng(seed)
+    lit = np.full((80, 128, 3), 150, np.uint8)
+    depth = augment.shadow_depth(rng, 80, 128)
+    dark = augment.paint_shadow(rng, lit, depth)
+    road = np.ones((80, 128), np.uint8)
+    road[:10] = 0
+    road[10:20] = data.IGNORE
+    label = augment.shadow_label(depth, road)
+    assert (label[:20] == data.IGNORE).all()
+    assert (dark[depth == 0] == lit[depth == 0]).all()
+    assert (dark <= lit).all()
+    assert (dark[label == 1].mean(axis=-1) < 141).all()
+    assert (dark[label == 0].mean(axis=-1) > 100).all()
+
+
+def test_each_class_is_drawn_equally_and_dash_does_not_mean_dry():
+    sources = (
+        ["condition_web"] * 6 + ["drivable_camvid/x"] * 60 + ["seq_wet_extreme/rain"] * 3 + ["rendered"] * 9
+    )
+    labels = np.array([0, 0, 1, 1, 2, 2] + [0] * 60 + [1] * 3 + [0, 1, 2] * 3)
+    count = len(labels)
+    weights = patches.draw_weights(
+        patches.PatchSet(np.zeros((count, 64, 96, 3), np.uint8), labels, np.array(sources), np.arange(count))
+    )
+    assert weights.sum() == pytest.approx(1.0)
+    for label in range(3):
+        assert weights[labels == label].sum() == pytest.approx(1 / 3)
+    dash = np.array(["camvid" in source or "extreme" in source or source == "rendered" for source in sources])
+    assert weights[dash & (labels == 1)].sum() > 0.9 * weights[dash & (labels == 0)].sum()
+
+
+def test_rendered_seeds_of_the_splits_are_disjoint():
+    ranges = list(rendered.SEED_RANGES.values())
+    assert all(a.stop <= b.start for a, b in pairwise(ranges))
+    assert set(rendered.SEED_RANGES) == {"train", "val", "test"}
+
+
+def test_shared_sequence_is_refused(tmp_path):
+    picture = np.zeros((20, 20, 3), np.uint8)
+    rows = [row("a/0.png", "train", "dry", sequence="one"), row("a/1.png", "test", "dry", sequence="one")]
+    folder = write_folder(tmp_path, rows, {"a/0.png": picture, "a/1.png": picture})
+    with pytest.raises(data.DataFolderError, match="sequence 'one' is in the splits test, train"):
+        data.read_manifest(folder)
+
+
+def test_all_problems_of_a_manifest_are_told_at_once(tmp_path):
+    rows = [row("gone.png", "train", "dry"), row("gone.png", "training", "icy")]
+    with pytest.raises(data.DataFolderError) as failure:
+        data.read_manifest(write_folder(tmp_path, rows, {}))
+    text = str(failure.value)
+    assert "line 2: file gone.png" in text
+    assert "line 3: split is 'training'" in text
+    assert "line 3: label is 'icy'" in text
+
+
+def test_lacking_classes_are_named(tmp_path):
+    folder = write_folder(tmp_path, [row("a.png", "train", "dry")], {"a.png": np.zeros((9, 9, 3), np.uint8)})
+    with pytest.raises(data.DataFolderError) as failure:
+        data.check_trainable(data.read_manifest(folder))
+    for part in ("train holds no picture labelled wet", "val holds no picture labelled dry", "road mask"):
+        assert part in str(failure.value)
+
+
+def test_unknown_source_is_refused_with_what_to_do(tmp_path):
+    folder = write_folder(
+        tmp_path, [row("mine/a.png", "train", "dry")], {"mine/a.png": np.zeros((9, 9, 3), np.uint8)}
+    )
+    (picture,) = data.read_manifest(folder)
+    with pytest.raises(data.DataFolderError, match="add one to ROAD_BOXES"):
+        patches.fixed_patches(picture)
+
+
+def test_command_needs_the_training_extra_or_a_manifest(tmp_path, capsys):
+    assert main(["--data", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    if importlib.util.find_spec("torch") is None:
+        assert "requirements/train.txt" in told
+    else:
+        assert "manifest.csv: not found" in told
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.3, 6.0), st.integers(0, 1000))
+def test_temperature_is_found_again(true_temperature, seed):
+    """Labels drawn from softmax(logits / T) lead back to T within the sampling error."""
+    rng = np.random.default_rng(seed)
+    logits = rng.normal(0, 3, (6000, 3)) * true_temperature / 2
+    chances = calibrate.probabilities(logits, true_temperature).cumsum(axis=1)
+    labels = (rng.random((6000, 1)) > chances).sum(axis=1).clip(0, 2)
+    found = calibrate.learn_temperature(logits, labels)
+    assert found == pytest.approx(true_temperature, rel=0.12)
+    assert calibrate.cross_entropy(logits, labels, found) <= calibrate.cross_entropy(logits, labels) + 1e-9
+
+
+def test_calibration_errors_by_hand():
+    """Ten samples at confidence 0.9, six right: the gap is 0.3 in the only filled bin."""
+    logits = np.tile(np.log([0.9, 0.05, 0.05]), (10, 1))
+    curve = calibrate.reliability(logits, np.array([0] * 6 + [1] * 4))
+    assert curve.ece == pytest.approx(0.3)
+    assert curve.mce == pytest.approx(0.3)
+    assert curve.count.tolist() == [0] * 13 + [10, 0]
+
+
+def test_wilson_interval_from_the_literature():
+    """Newcombe (1998), table I: 81 of 263 gives 0.2553 to 0.3662; 0 of 20 gives 0 to 0.1611."""
+    assert scores.wilson_interval(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
+    assert scores.wilson_interval(0, 20) == pytest.approx((0.0, 0.1611), abs=5e-5)
+
+
+def test_picture_score_counts_pictures_not_patches():
+    logits = np.array([[4.0, 0, 0], [0, 1.0, 0], [0, 0, 3.0]])
+    part = patches.PatchSet(
+        np.zeros((3, 64, 96, 3), np.uint8), np.array([0, 0, 1]), np.array(["a"] * 3), np.array([0, 0, 1])
+    )
+    assert scores.by_picture(logits, part, 1.0).confusion.tolist() == [[1, 0, 0], [0, 0, 1], [0, 0, 0]]
+    assert scores.by_patch(logits, part).confusion.tolist() == [[1, 1, 0], [0, 0, 1], [0, 0, 0]]
+
+
+def test_disturbed_patches_repeat_and_differ():
+    plain = np.random.default_rng(1).integers(0, 255, (6, 64, 96, 3)).astype(np.uint8)
+    first, again, other = (calibrate.noised(plain, seed) for seed in (1, 1, 2))
+    assert (first == again).all()
+    assert (first != other).any()
+    assert all((first[i] != plain[i]).any() for i in range(6))
+
+
+@pytest.mark.data
+def test_real_folder_is_split_by_source():
+    folder = os.environ.get("TRPAC_DATA")
+    if not folder:
+        pytest.skip("TRPAC_DATA is not set: no real pictures to check")
+    pictures = data.read_manifest(Path(folder) / "road_images")
+    data.check_trainable(pictures)
+    sources = {split: {p.sequence for p in data.of_split(pictures, split)} for split in data.SPLITS}
+    assert not sources["test"] & (sources["train"] | sources["val"])
+    shared = sources["train"] & sources["val"]
+    assert shared == sources["gap"]
+    assert all(p.split == "test" for p in pictures if p.source.startswith("other_cameras"))
