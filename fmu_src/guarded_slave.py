@@ -22,8 +22,9 @@ from .variables import Kind, Variable
 
 Value = float | int | bool | str
 STATE_SCHEMA = 1
-INTERRUPT_DELAY_S = 0.01
-"""A Ctrl-C that arrives within a callback is raised again this much later, in the host's own code [s]."""
+INTERRUPT_DELAY_S = 0.1
+"""A Ctrl-C that arrives within a callback is raised again this much later, in the host's own code: long enough for
+the callback to return on a busy machine [s]."""
 NEUTRAL: dict[Kind, Value] = {Kind.REAL: 0.0, Kind.INTEGER: 0, Kind.BOOLEAN: False, Kind.STRING: ""}
 """Start of outputs, and what a read of an unknown value reference gives."""
 

@@ -277,7 +277,7 @@ def test_ctrl_c_within_a_step_reaches_the_host_and_the_unit_survives(unit_folder
                 unit.step(DRIVING)
             except Exception as error:
                 print("step:", error)
-            for _ in range(100):
+            for _ in range(300):
                 time.sleep(0.01)
         except KeyboardInterrupt:
             module.TrpacEstimator.step = step
