@@ -135,7 +135,9 @@ def test_weak_labels_say_road_in_the_box_and_not_road_in_the_sky(made_up):
         assert (sample.image[sample.drivable == 1] == GREY).all()
         assert (sample.image[sample.drivable == 0] == WHITE).all()
         assert (sample.drivable == 1).any()
-        assert (sample.shadow == data.IGNORE).all()
+        wet = picture.surface == data.LABELS["wet"]
+        assert set(sample.shadow[sample.drivable == 1]) == ({0} if wet else {data.IGNORE})
+        assert (sample.shadow[sample.drivable != 1] == data.IGNORE).all()
 
 
 @settings(max_examples=40, deadline=None)
@@ -148,7 +150,7 @@ def test_painted_shadows_darken_where_labelled(seed):
     road = np.ones((80, 128), np.uint8)
     road[:10] = 0
     road[10:20] = data.IGNORE
-    label = augment.shadow_label(depth, road)
+    label = augment.shadow_label(depth, road, np.full_like(road, data.IGNORE))
     assert (label[:20] == data.IGNORE).all()
     assert (dark[depth == 0] == lit[depth == 0]).all()
     assert (dark <= lit).all()

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from .data import IGNORE, Image, pixel_box
 
-SHADOW_EDGE = 0.5
-"""Share of a painted shadow's full depth above which a pixel is labelled as shadow [-]."""
+LIT_DEPTH, SHADOW_DEPTH = 0.2, 0.6
+"""Share of a painted shadow's full depth up to which a pixel is labelled lit, and from which shadow [-]."""
 
 SURROUNDINGS_PX = 15
 """Pixels around a painted shadow, in the network's input, that count as known to be unshadowed.
@@ -58,13 +58,18 @@ def paint_shadow(rng: np.random.Generator, image: Image, depth: NDArray[np.float
     return np.clip(255.0 * linear ** (1.0 / gamma) + 0.5, 0, 255).astype(np.uint8)
 
 
-def shadow_label(depth: NDArray[np.float32], road: Image) -> Image:
-    """Label of a painted shadow: 1 shadow, 0 lit and close to it, 255 off the road or unknown."""
-    shadow = depth > SHADOW_EDGE
+def shadow_label(depth: NDArray[np.float32], road: Image, before: Image) -> Image:
+    """Label after a shadow was painted: 1 shadow, 0 lit and close to it, half shadow and off the road 255.
+
+    Farther away the label stays as it was before.
+    """
     kernel = np.ones((2 * SURROUNDINGS_PX + 1, 2 * SURROUNDINGS_PX + 1), np.uint8)
-    near = cv2.dilate(shadow.astype(np.uint8), kernel) > 0
-    known = (road == 1) & near & ((depth < 0.2) | (depth > 0.6))
-    return np.where(known, shadow, IGNORE).astype(np.uint8)
+    near = cv2.dilate((depth > 0.5).astype(np.uint8), kernel) > 0
+    label = np.where(near, 0, before)
+    label[depth > LIT_DEPTH] = IGNORE
+    label[depth > SHADOW_DEPTH] = 1
+    label[road != 1] = IGNORE
+    return label.astype(np.uint8)
 
 
 def random_view(

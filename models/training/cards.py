@@ -249,10 +249,10 @@ form, {parameters} parameters, trained from nothing in our own code.
 ## Training
 
 Pictures by kind: {kinds}.
-*masked* and *campus* are real pictures with road masks, with shadows painted over most of them; *weak* are real
-pictures of all three surfaces without a mask, where only the middle of the road box counts as road and the sky of
-stills as not road; *rendered* have exact labels of both tasks. Random crops, mirror, gain, gamma, white balance, and on
-some pictures blur, noise, contrast. Cross-entropy and Dice, AdamW.
+*masked* and *campus* are real pictures with road masks, *weak* real pictures of all three surfaces without one: only
+the middle of the road box counts as road and the sky of stills as not road, and a wet road's box as free of shadow.
+Shadows are painted over most of these; *rendered* have exact labels of both tasks. Random crops, mirror, gain, gamma,
+white balance, and on some pictures blur, noise, contrast. Cross-entropy and Dice, AdamW.
 {time_text(facts, train_s)}
 {versions_text(facts)}
 
@@ -268,8 +268,8 @@ are not in the data). "painted" means painted shadows, judged on the road in the
 ## Limits
 
 - No real picture has a shadow label. On real pictures the shadow task learns only in painted shadows and their close
-  surroundings, so that unlabelled real shadows do not teach "no shadow"; how well it finds real shadows is seen by
-  eye only.
+  surroundings, so that unlabelled real shadows do not teach "no shadow", and that wet roads have none; how well it
+  finds real shadows is seen by eye only: it takes dark tyre bands and dark asphalt in low light for shadow too often.
 - No wet or snowy real picture has a road mask. There the drivable task rests on rendered pictures and weak labels,
   and the edge between a snowy road and a snowy verge is a guess.
 - Kerbs, parked cars and pavements are known from one town (CamVid) and one campus. The rendered roads are straight.

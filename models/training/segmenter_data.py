@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from trpac_core.vision.classes import Surface
+
 from .augment import camera_look, disturbed_look, paint_shadow, random_view, shadow_depth, shadow_label
 from .data import IGNORE, Image, Picture, pixel_box
 
@@ -18,6 +20,9 @@ SHARES = {"masked": 0.40, "campus": 0.12, "weak": 0.16, "rendered": 0.32}
 """Share of each kind of picture in training; a kind that is not there leaves its share to the others."""
 
 CAMPUS = "drivable_lums"
+PAINTED_SHARE = 0.7
+"""Share of the real training views that get a painted shadow [-]."""
+
 SKY_SHARE = 0.18
 """Top share of a still that holds no road [-]; holds for the stills at hand."""
 
@@ -42,7 +47,8 @@ def masked_sample(picture: Picture) -> Sample:
 def weak_sample(picture: Picture) -> Sample:
     """A real picture with a surface label only: its road box narrowed is road, the sky is not, the rest unknown.
 
-    The only real pictures of wet and snowy roads that the segmenter learns from.
+    The only real pictures of wet and snowy roads that the segmenter learns from. A wet road's box counts as lit: rain
+    clouds leave no sun for shadows, and a dark gloss must not pass for one.
     """
     image = picture.image()
     road = np.full(image.shape[:2], IGNORE, np.uint8)
@@ -53,17 +59,18 @@ def weak_sample(picture: Picture) -> Sample:
         inset = 0.0 if overlaid else 0.3 * (right - left)
         x0, y0, x1, y1 = pixel_box((left + inset, top, right - inset, bottom), image)
         road[y0 + (0 if overlaid else (y1 - y0) // 3) : y1, x0:x1] = 1
-    return Sample(image, road, np.full_like(road, IGNORE), "weak")
+    lit = (road == 1) & (picture.surface == Surface.WET)
+    return Sample(image, road, np.where(lit, 0, IGNORE).astype(np.uint8), "weak")
 
 
 def training_view(rng: np.random.Generator, sample: Sample) -> Sample:
     """A random view of a sample at the network's input size, as training sees it."""
     zoom = 1.25 if sample.kind == "rendered" else 1.6
     image, drivable, shadow = random_view(rng, [sample.image, sample.drivable, sample.shadow], SIZE, zoom)
-    if sample.kind in ("masked", "campus") and rng.random() < 0.8:
+    if sample.kind != "rendered" and rng.random() < PAINTED_SHARE:
         depth = shadow_depth(rng, SIZE[1], SIZE[0])
         image = paint_shadow(rng, image, depth)
-        shadow = shadow_label(depth, drivable)
+        shadow = shadow_label(depth, drivable, shadow)
     image = disturbed_look(rng, camera_look(rng, image, spread=0.35))
     return Sample(image, drivable, shadow, sample.kind)
 
@@ -84,7 +91,9 @@ def painted_views(samples: Sequence[Sample], seed: int) -> list[Sample]:
     for sample in map(plain_view, samples):
         depth = shadow_depth(rng, SIZE[1], SIZE[0])
         painted = paint_shadow(rng, sample.image, depth)
-        views.append(Sample(painted, sample.drivable, shadow_label(depth, sample.drivable), sample.kind))
+        views.append(
+            Sample(painted, sample.drivable, shadow_label(depth, sample.drivable, sample.shadow), sample.kind)
+        )
     return views
 
 
