@@ -103,6 +103,12 @@ _ESTIMATOR_PARAMETERS = (
         max(form.value for form in VisualTerm),
     ),
     _parameter(
+        "estimator.tyre_first",
+        "",
+        "gains.tyre_first",
+        "The camera does not drag the estimate away from what the tyre shows",
+    ),
+    _parameter(
         "estimator.theta_initial",
         "1",
         "theta_initial",
