@@ -17,7 +17,8 @@ $(READY): requirements/dev.txt pyproject.toml
 	@touch $@
 
 demo: $(READY)   ## build the unit, drive it over the paper's road, write out/demo
-	$(BIN)/trpac demo --out out/demo
+	$(BIN)/python build_fmu.py --out dist
+	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo
 
 test: $(READY) check  ## lint, types and the whole test suite
 	$(BIN)/python -m pytest

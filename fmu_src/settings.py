@@ -106,6 +106,12 @@ _ESTIMATOR_PARAMETERS = (
         "estimator.tyre_first",
         "",
         "gains.tyre_first",
+        "The visual term never pulls against what the tyre shows; false: Eqs. (17) and (18) as printed",
+    ),
+    _parameter(
+        "estimator.tyre_first",
+        "",
+        "gains.tyre_first",
         "The camera does not drag the estimate away from what the tyre shows",
     ),
     _parameter(
@@ -124,7 +130,7 @@ _ESTIMATOR_PARAMETERS = (
         "estimator.sliding_speed_noise",
         "m/s",
         "sliding_speed_noise_m_s",
-        "Standard deviation of the filtered sliding speed",
+        "Standard deviation of the sliding speed omega R - v per sample",
         0.0,
     ),
     _parameter(

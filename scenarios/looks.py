@@ -1,0 +1,97 @@
+"""What the image estimator looks at, drawn onto the pictures of a run for a person to see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.camera.files import load_camera
+from scenarios.files import Scenario
+from scenarios.runner import Run
+from trpac_core.vision.classes import Surface
+from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.images import decode_image
+from trpac_core.vision.networks import Segmenter, SurfaceClassifier
+from trpac_core.vision.results import FrameResult
+from trpac_core.vision.trajectory import Motion
+
+MODELS = Path(__file__).resolve().parents[1] / "models"
+CLASS_BGR = {Surface.DRY: (60, 160, 240), Surface.WET: (230, 140, 40), Surface.SNOW_ICE: (220, 80, 200)}
+ROAD_BGR, SHADOW_BGR = (90, 200, 90), (200, 90, 90)
+TINT = 0.22
+TILE_PX = 640
+COLUMNS = 3
+
+
+def image_estimator(scenario: Scenario) -> Ife:
+    """The image estimator with the shipped networks, set as the unit's is."""
+    if scenario.camera_path is None:
+        raise ValueError(f"{scenario.path}: there is no camera, so there are no pictures to look at.")
+    car = scenario.vehicle.to_core()
+    config = IfeConfig(
+        camera=load_camera(scenario.camera_path),
+        track_m=car.track_m,
+        wheelbase_m=car.wheelbase_m,
+        side="left" if scenario.wheel.endswith("l") else "right",
+    )
+    return Ife(config, Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx"))
+
+
+def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArray[np.uint8]:
+    """The picture with usable road and shadow tinted, ellipses, patches by their class, and the verdict.
+
+    Raises ValueError where the result was made without its view.
+    """
+    if result.view is None:
+        raise ValueError("The result holds no view: process the frame with with_view=True.")
+    shown = image.copy()
+    size = (image.shape[1], image.shape[0])
+    for mask, colour in ((result.view.masks.drivable, ROAD_BGR), (result.view.masks.shadow, SHADOW_BGR)):
+        inside = cv2.resize(mask, size, interpolation=cv2.INTER_LINEAR) > 0.5
+        shown[inside] = ((1.0 - TINT) * shown[inside] + TINT * np.array(colour)).astype(np.uint8)
+    for group in result.view.groups:
+        for outline in group.outlines_px:
+            if np.isfinite(outline).all():
+                cv2.polylines(
+                    shown, [np.round(outline).astype(np.int32)], True, (255, 255, 255), 2, cv2.LINE_AA
+                )
+        for box, probabilities in zip(group.boxes_px, group.probabilities, strict=True):
+            colour = CLASS_BGR[Surface(int(np.argmax(probabilities)))]
+            cv2.rectangle(shown, (int(box[0]), int(box[1])), (int(box[2]), int(box[3])), colour, 3)
+    verdict = f"{result.surface.label}  Q_v {result.Q_v:.2f}  flag {int(result.flag)}"
+    for row, text in enumerate((caption, verdict)):
+        place = (24, 60 + 60 * row)
+        cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.6, (0, 0, 0), 9, cv2.LINE_AA)
+        cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.6, (255, 255, 255), 3, cv2.LINE_AA)
+    return shown
+
+
+def draw_looks(
+    run: Run, path: Path, progress: Callable[[int, int], None] = lambda done, total: None, count: int = 6
+) -> None:
+    """Write a sheet of the run's pictures, evenly spread, as the estimator saw them.
+
+    The sheet replays every picture up to the last one shown, so its verdicts rest on the same history as the unit's.
+    """
+    ife, state = image_estimator(run.scenario), IfeState()
+    chosen = {round(share * (len(run.frames) - 1)) for share in np.linspace(0.06, 0.94, count)}
+    tiles = []
+    for place in range(max(chosen) + 1):
+        frame = run.frames.iloc[place]
+        progress(place + 1, max(chosen) + 1)
+        image = decode_image(Path(frame["path"]))
+        row = run.table.iloc[int(frame["row"])]
+        motion = Motion(float(row["vehicle_speed_m_s"]), float(row["accel_x_m_s2"]))
+        state, result = ife.process(state, image, motion, with_view=place in chosen)
+        if place in chosen:
+            caption = f"t {frame['time_s']:.2f} s, front axle at {frame['front_axle_m']:.1f} m"
+            tile = annotate(image, result, caption)
+            height = round(TILE_PX * tile.shape[0] / tile.shape[1])
+            tiles.append(cv2.resize(tile, (TILE_PX, height), interpolation=cv2.INTER_AREA))
+    rows = [np.hstack(tiles[i : i + COLUMNS]) for i in range(0, len(tiles) - COLUMNS + 1, COLUMNS)]
+    if not cv2.imwrite(str(path), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 88]):
+        raise OSError(f"{path}: the sheet could not be written; is the disk full?")

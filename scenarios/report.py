@@ -1,0 +1,75 @@
+"""report.html of a run: one file that needs nothing beside it."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from scenarios.runner import Run
+
+TEMPLATE = Path(__file__).with_name("report.html.jinja")
+DASH = "–"
+
+
+def write_report(run: Run, figure: Path, looks: Path | None, path: Path) -> None:
+    """Write the report of a run around its figure and, where there was a camera, its sheet of pictures."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATE.parent), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters["number"] = number
+    text = environment.get_template(TEMPLATE.name).render(
+        run=run,
+        summary=run.summary,
+        rows=score_rows(run.summary),
+        verdict=verdict(run.summary),
+        figure=embedded(figure, "image/png"),
+        looks=embedded(looks, "image/jpeg") if looks is not None else None,
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+def score_rows(summary: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Estimator and score, stretch by stretch, as a table shows them."""
+    estimators = summary["estimators"]
+    stretches = len(next(iter(estimators.values())))
+    return [(name, estimators[name][i]) for i in range(stretches) for name in estimators]
+
+
+def verdict(summary: dict[str, Any]) -> str:
+    """What the run showed, in sentences that follow from its numbers."""
+    sentences = []
+    for before, (dife, alone) in _steps(summary):
+        where = f"From {before:g} to {dife['theta']:g}"
+        if dife["steady_state_error"] is None:
+            sentences.append(f"{where} the tyre was not excited: the estimates hold what they had.")
+            continue
+        sentences.append(
+            f"{where} DIFE {_convergence(dife)} and stays {dife['steady_state_error']:.3f} off; "
+            f"DE alone {_convergence(alone)} and stays {number(alone['steady_state_error'])} off."
+        )
+    return " ".join(sentences)
+
+
+def _steps(summary: dict[str, Any]) -> list[tuple[float, tuple[dict[str, Any], dict[str, Any]]]]:
+    """Adhesion before each change of road, with DIFE's and DE's scores after it."""
+    dife, alone = summary["estimators"]["DIFE"], summary["estimators"]["DE"]
+    return [(dife[i - 1]["theta"], (dife[i], alone[i])) for i in range(1, len(dife))]
+
+
+def _convergence(score: dict[str, Any]) -> str:
+    if score["convergence_time_s"] is None:
+        return "does not converge"
+    return f"converges within {score['convergence_time_s']:.2f} s of excited time"
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number as the tables show it; a dash where there is none."""
+    return DASH if value is None else f"{value:.{digits}f}"
+
+
+def embedded(path: Path, media_type: str) -> str:
+    """A file as a data address."""
+    return f"data:{media_type};base64,{b64encode(path.read_bytes()).decode('ascii')}"

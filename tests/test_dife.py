@@ -1,0 +1,145 @@
+"""DE and DIFE on one wheel whose road is known, against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from trpac_core import tyre
+from trpac_core.dife import (
+    GREATEST_THETA,
+    LEAST_THETA,
+    FusionState,
+    Gains,
+    VisualTerm,
+    Wheel,
+    WheelInputs,
+    fusion_step,
+    settled,
+    visible_theta,
+)
+from trpac_core.excitation import FuzzyScheduler
+from trpac_core.slip import Slip
+
+WHEEL = Wheel(1.2, 0.29, 50_000.0)
+SCHEDULER = FuzzyScheduler()
+GAINS = Gains(K=60.0, gamma=6.0)
+STEP_S = 1e-3
+LOAD_N = 3000.0
+
+
+def on_road(theta, slip=0.03, deviation=0.0, change=0.0):
+    """A wheel that turns evenly at a slip: its torque balances the tyre's force."""
+    force = tyre.force(theta, slip, LOAD_N, WHEEL.longitudinal_stiffness_n, 1.0)
+    omega = 10.0 / WHEEL.radius_m / (1.0 - slip)
+    return WheelInputs(omega, force * WHEEL.radius_m, Slip(slip, 1.0), LOAD_N, deviation, change)
+
+
+def run(inputs, theta_hat, seconds, gains=GAINS, theta_img=None):
+    state = settled(theta_hat, inputs, WHEEL, gains)
+    trace = []
+    for _ in range(round(seconds / STEP_S)):
+        step = fusion_step(state, inputs, WHEEL, gains, SCHEDULER, theta_img, STEP_S)
+        state = step.state
+        trace.append(state.theta_hat)
+    return np.array(trace), step
+
+
+def test_de_is_first_order_with_rate_gamma():
+    """Eq. (16) with the force known: theta_hat goes to theta like exp(-gamma t)."""
+    trace, _ = run(on_road(0.3), 0.5, 0.5)
+    time = STEP_S * np.arange(1, len(trace) + 1)
+    assert trace == pytest.approx(0.3 + 0.2 * np.exp(-GAINS.gamma * time), abs=2e-3)
+
+
+@given(st.floats(0.1, 0.8), st.floats(0.1, 1.0))
+def test_it_converges_on_the_roads_theta_from_anywhere_and_the_force_with_it(theta, start):
+    inputs = on_road(theta, slip=0.06)
+    trace, step = run(inputs, start, 2.0)
+    assert trace[-1] == pytest.approx(theta, abs=1e-3)
+    assert step.tyre_force_n * WHEEL.radius_m == pytest.approx(inputs.wheel_torque_nm, rel=1e-3)
+
+
+def test_a_braked_wheel_is_seen_as_a_driven_one_is():
+    driven = on_road(0.3)
+    braked = driven._replace(wheel_torque_nm=-driven.wheel_torque_nm, slip=Slip(driven.slip.size, -1.0))
+    assert run(braked, 0.6, 0.7)[0] == pytest.approx(run(driven, 0.6, 0.7)[0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("form", "rate"), [(VisualTerm.OUTSIDE, 1.0), (VisualTerm.INSIDE, 6.0)])
+def test_printed_forms_settle_where_their_two_terms_balance(form, rate):
+    """gamma (theta - x) + rate K_v(|theta_img - x|) (theta_img - x) = 0, with the camera wrong and no guard."""
+    gains = replace(GAINS, visual_term=form, tyre_first=False)
+    x = run(on_road(0.3), 0.3, 4.0, gains, theta_img=0.8)[0][-1]
+    K_v = SCHEDULER.K_v(0.8 - x)
+    assert K_v > 0.0
+    assert gains.gamma * (0.3 - x) + rate * K_v * (0.8 - x) == pytest.approx(0.0, abs=2e-2)
+
+
+def test_the_camera_hurries_the_estimate_but_does_not_drag_it_off():
+    inputs = on_road(0.3)
+    alone, with_camera = (run(inputs, 0.8, 0.3, theta_img=image)[0] for image in (None, 0.2))
+    assert np.all(with_camera[1:] < alone[1:])
+    wrong = run(inputs, 0.3, 2.0, theta_img=0.8)[0]
+    assert wrong == pytest.approx(0.3, abs=2e-3)
+
+
+def test_the_right_class_leaves_no_bias_of_its_own():
+    assert run(on_road(0.3), 0.8, 3.0, theta_img=0.2)[0][-1] == pytest.approx(0.3, abs=1e-3)
+    assert run(on_road(0.5), 0.3, 3.0, theta_img=0.6)[0][-1] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_an_elastic_tyre_shows_nothing_and_the_estimate_holds():
+    trace, step = run(on_road(0.9, slip=0.008), 0.7, 1.0)
+    assert np.all(trace == 0.7)
+    assert step.sensitivity == 0.0
+
+
+def test_noise_at_the_elastic_end_is_not_taken_for_a_slippery_road():
+    """On 0.9 at L > 1 force and slip lie on the elastic line; a slip read 5 % high looks like a sliding tyre."""
+    truth = on_road(0.9, slip=0.016)
+    misread = truth._replace(slip=Slip(0.016 * 1.05, 1.0))
+    force_n = truth.wheel_torque_nm / WHEEL.radius_m
+    fooled, _ = visible_theta(force_n, misread, WHEEL.longitudinal_stiffness_n)
+    assert fooled is not None
+    assert fooled < 0.7
+    aware = misread._replace(slip_deviation=0.0008)
+    assert visible_theta(force_n, aware, WHEEL.longitudinal_stiffness_n) == (None, 0.0)
+
+
+def test_a_wrong_class_dry_does_not_keep_the_estimator_off_a_sliding_tyre():
+    """Its threshold, at 0.022, lies above the slip of 0.0195; the tyre is seen to slide all the same."""
+    inputs = on_road(0.5, slip=0.0195)
+    trace, step = run(inputs, 0.3, 2.0, theta_img=0.8)
+    assert step.threshold > 0.0195
+    assert trace[-1] == pytest.approx(0.5, abs=2e-3)
+
+
+@given(
+    st.floats(0.0, 0.999),
+    st.sampled_from([-1.0, 1.0]),
+    st.floats(-3000.0, 3000.0),
+    st.floats(1e-6, 100.0),
+    st.one_of(st.none(), st.floats(0.0, 1.2)),
+)
+def test_whatever_comes_the_estimate_stays_in_its_domain(slip, direction, torque, step_s, theta_img):
+    inputs = WheelInputs(40.0, torque, Slip(slip, direction if slip else 0.0), LOAD_N, 1e-4, 0.0)
+    state = FusionState(0.5, 0.0)
+    for _ in range(5):
+        state = fusion_step(state, inputs, WHEEL, GAINS, SCHEDULER, theta_img, step_s).state
+        assert LEAST_THETA <= state.theta_hat <= GREATEST_THETA
+        assert np.isfinite(state.s)
+
+
+def test_ten_short_steps_are_one_long_one():
+    """Both equations are solved exactly over a step: with the target at rest the step size does not matter."""
+    inputs = on_road(0.3)
+    start = settled(0.32, inputs, WHEEL, GAINS)
+    long = fusion_step(start, inputs, WHEEL, GAINS, SCHEDULER, None, 0.01).state.theta_hat
+    short = start
+    for _ in range(10):
+        short = fusion_step(short, inputs, WHEEL, GAINS, SCHEDULER, None, 0.001).state
+    # The target moves a little with F_hat meanwhile: a first-order remainder of (gamma + K) dt of the way made.
+    assert short.theta_hat == pytest.approx(long, abs=2e-4)

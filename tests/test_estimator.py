@@ -1,0 +1,193 @@
+"""The estimator as a whole: odometry and road ahead, bad readings, state."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from trpac_core import tyre
+from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors, TrpacEstimator
+from trpac_core.vehicle import Vehicle
+from trpac_core.vision.classes import Surface
+
+CAR = Vehicle()
+CRUISE = Sensors(10.0 / 0.29, 0.0, 10.0)
+NAN, INF = math.nan, math.inf
+
+
+def sliding(theta=0.3, slip=0.04, speed_m_s=10.0):
+    """Steady readings of a front wheel on a road, with the load told."""
+    load_n = CAR.wheel_load(True)
+    force = tyre.force(theta, slip, load_n, CAR.longitudinal_stiffness_n, 1.0)
+    omega = speed_m_s / CAR.wheel_radius_m / (1.0 - slip)
+    return Sensors(omega, force * CAR.wheel_radius_m, speed_m_s, vertical_load_n=load_n)
+
+
+def driven(estimator, sensors, seconds, frame=None):
+    for _ in range(round(seconds / 0.001)):
+        estimate = estimator.step(0.001, sensors, frame)
+        frame = None
+    return estimate
+
+
+def test_a_class_seen_ahead_counts_when_the_wheel_gets_there_and_not_before():
+    estimator = TrpacEstimator(EstimatorConfig())
+    before = driven(estimator, CRUISE, 0.249, RoadClass(Surface.SNOW_ICE, 0.9))
+    assert not before.flag
+    assert before.image_confidence == 0.0
+    there = driven(estimator, CRUISE, 0.003)
+    assert there.flag
+    assert there.TRPAC_image == 0.2
+    assert there.frame_age_s == pytest.approx(0.252, abs=2e-3)
+
+
+def test_a_rear_wheel_gets_there_a_wheelbase_later():
+    rear = TrpacEstimator(EstimatorConfig(front_axle=False))
+    assert not driven(rear, CRUISE, 0.25 + CAR.wheelbase_m / 10.0 - 0.005, RoadClass(Surface.WET, 0.9)).flag
+    assert driven(rear, CRUISE, 0.01).flag
+
+
+def test_low_confidence_keeps_the_flag_down_but_is_shown():
+    estimator = TrpacEstimator(EstimatorConfig())
+    estimate = driven(estimator, CRUISE, 0.26, RoadClass(Surface.WET, 0.4))
+    assert not estimate.flag
+    assert estimate.image_confidence == 0.4
+    assert estimate.TRPAC_image == 0.6
+
+
+def test_with_the_flag_down_fusion_is_the_dynamics_estimator():
+    estimator = TrpacEstimator(EstimatorConfig())
+    estimate = driven(estimator, sliding(), 1.0, RoadClass(Surface.DRY, 0.1))
+    assert estimate.TRPAC == estimate.TRPAC_dynamics
+    assert estimate.TRPAC == pytest.approx(0.3, abs=0.003)
+
+
+def test_peak_is_the_curves_maximum_not_theta():
+    estimate = driven(TrpacEstimator(EstimatorConfig()), sliding(), 2.0)
+    expected = tyre.peak_friction(estimate.TRPAC, CAR.wheel_load(True), CAR.longitudinal_stiffness_n)
+    assert estimate.TRPAC_peak == pytest.approx(expected)
+    assert estimate.TRPAC_peak > 1.05 * estimate.TRPAC
+
+
+def test_knowing_grows_with_excitation_and_fades_with_the_way_driven():
+    estimator = TrpacEstimator(EstimatorConfig())
+    unknown = estimator.last.TRPAC_std
+    sure = driven(estimator, sliding(), 1.0).TRPAC_std
+    later = driven(estimator, CRUISE, 2.0).TRPAC_std
+    assert sure < 0.15 * unknown
+    assert sure < later <= unknown
+
+
+def test_rolling_resistance_is_taken_off_the_torque():
+    """Without it the force would be read 30 N too high, and theta with it."""
+    told = TrpacEstimator(EstimatorConfig(vehicle=replace(CAR, rolling_resistance=0.01)))
+    readings = sliding()
+    torque = readings.wheel_torque_nm + 0.01 * CAR.wheel_load(True) * CAR.wheel_radius_m
+    assert driven(told, replace(readings, wheel_torque_nm=torque), 2.0).TRPAC == pytest.approx(0.3, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"wheel_speed_rad_s": NAN}, "wheel_speed_rad_s"),
+        ({"wheel_torque_nm": INF}, "wheel_torque_nm"),
+        ({"vehicle_speed_m_s": -INF}, "vehicle_speed_m_s"),
+        ({"vertical_load_n": NAN}, "vertical_load_n"),
+        ({"vertical_load_n": -100.0}, "vertical_load_n"),
+        ({"longitudinal_acceleration_m_s2": 1e300}, "longitudinal_acceleration_m_s2"),
+        ({"yaw_rate_rad_s": NAN}, "yaw_rate_rad_s"),
+        ({"steering_angle_rad": 400.0}, "steering_angle_rad"),
+        ({"vehicle_speed_m_s": -5.0, "wheel_speed_rad_s": -17.0}, "backwards"),
+        ({"wheel_speed_rad_s": -30.0}, "wheel_speed_rad_s"),
+    ],
+)
+def test_unusable_readings_hold_the_last_estimate_and_say_why(change, named):
+    estimator = TrpacEstimator(EstimatorConfig())
+    good = driven(estimator, sliding(), 0.5, RoadClass(Surface.SNOW_ICE, 0.9))
+    held = estimator.step(0.001, replace(sliding(), **change))
+    assert named in held.problem
+    assert held.TRPAC == good.TRPAC
+    assert not held.flag
+    assert not held.excitation_flag
+    back = driven(estimator, sliding(), 0.5)
+    assert back.problem is None
+    assert back.TRPAC == pytest.approx(0.3, abs=0.003)
+
+
+@pytest.mark.parametrize("step_s", [NAN, INF, -0.001])
+def test_an_impossible_step_size_is_said_and_held(step_s):
+    estimator = TrpacEstimator(EstimatorConfig())
+    assert "Step size" in estimator.step(step_s, CRUISE).problem
+    assert estimator.step(0.001, CRUISE).problem is None
+
+
+def test_the_road_goes_on_under_a_gap_in_the_readings():
+    """A class 2.5 m ahead arrives on time although the readings fail on the way."""
+    estimator = TrpacEstimator(EstimatorConfig())
+    driven(estimator, CRUISE, 0.1, RoadClass(Surface.WET, 0.9))
+    for _ in range(100):
+        estimator.step(0.001, replace(CRUISE, wheel_torque_nm=NAN))
+    assert driven(estimator, CRUISE, 0.06).flag
+
+
+def test_zero_step_lets_no_time_pass():
+    estimator = TrpacEstimator(EstimatorConfig())
+    driven(estimator, sliding(), 0.2)
+    before = estimator.step(0.0, sliding())
+    for _ in range(50):
+        again = estimator.step(0.0, sliding())
+    assert again == before
+
+
+def test_a_failed_frame_lowers_the_flag_until_a_good_one_comes():
+    estimator = TrpacEstimator(EstimatorConfig())
+    driven(estimator, CRUISE, 0.26, RoadClass(Surface.WET, 0.9))
+    assert estimator.last.flag
+    estimator.step(0.001, CRUISE, frame_failed=True)
+    assert not driven(estimator, CRUISE, 0.05).flag
+    assert estimator.step(0.001, CRUISE, RoadClass(Surface.WET, 0.9)).flag
+
+
+def test_standstill_and_launch_raise_no_alarm():
+    estimator = TrpacEstimator(EstimatorConfig())
+    estimate = driven(estimator, Sensors(0.0, 200.0, 0.0), 1.0)
+    assert not estimate.excitation_flag
+    assert estimate.TRPAC == EstimatorConfig().theta_initial
+    assert estimate.problem is None
+
+
+def test_state_survives_json_bit_by_bit():
+    first, second = (TrpacEstimator(EstimatorConfig()) for _ in range(2))
+    driven(first, sliding(), 0.123, RoadClass(Surface.SNOW_ICE, 0.77))
+    second.restore(json.loads(json.dumps(first.state())))
+    noise = np.random.default_rng(3)
+    for _ in range(300):
+        readings = replace(sliding(), vehicle_speed_m_s=10.0 + 0.01 * noise.standard_normal())
+        assert first.step(0.001, readings) == second.step(0.001, readings)
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(allow_nan=True, allow_infinity=True),
+            st.floats(allow_nan=True, allow_infinity=True),
+            st.floats(allow_nan=True, allow_infinity=True),
+            st.floats(-1.0, 10.0),
+            st.one_of(st.none(), st.floats(-1e9, 1e9)),
+        ),
+        max_size=12,
+    )
+)
+def test_nothing_that_arrives_raises_or_spoils_the_estimate(readings):
+    estimator = TrpacEstimator(EstimatorConfig())
+    for omega, torque, speed, step_s, load in readings:
+        estimate = estimator.step(step_s, Sensors(omega, torque, speed, vertical_load_n=load))
+        assert 0.0 < estimate.TRPAC <= 1.2
+        assert math.isfinite(estimate.TRPAC_std)
+        assert math.isfinite(estimate.tyre_force_n)
+    assert driven(estimator, sliding(), 3.0).TRPAC == pytest.approx(0.3, abs=0.01)

@@ -1,0 +1,167 @@
+"""The command `trpac`."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from scenarios.errors import ScenarioError
+from scenarios.files import Scenario
+
+EXIT_INPUT = 2
+"""Unusable input: one message on standard error, and nothing written."""
+
+app = typer.Typer(
+    help="Tyre-road adhesion from dynamics and camera: run scenarios, see how the gains come about.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.callback()
+def _root() -> None:
+    """Makes the commands subcommands, even while there is one alone."""
+
+
+@app.command()
+def run(
+    scenario: Annotated[Path, typer.Argument(help="Scenario file, such as scenarios/paper_simulation.yaml.")],
+    out: Annotated[
+        Path, typer.Option(help="Folder for report.html, figure17.png, log.csv and summary.json.")
+    ],
+    fmu: Annotated[
+        Path | None, typer.Option(help="Unit to run; without it one is built from the sources.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="In place of the scenario's seed.")] = None,
+    stiffness_n: Annotated[
+        float | None, typer.Option(min=1000.0, help="C_x in place of the vehicle's, in plant and unit [N].")
+    ] = None,
+) -> None:
+    """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy; write report and scores.
+
+    Example: trpac run scenarios/paper_simulation.yaml --out out/paper
+
+    Exit codes: 0 done, 2 unusable input.
+    """
+    from scenarios.files import load_scenario
+
+    try:
+        _require_unit(fmu)
+        chosen = _varied(load_scenario(scenario), seed, stiffness_n)
+        with tempfile.TemporaryDirectory(prefix="trpac_") as scratch:
+            _run(chosen, fmu, out, Path(scratch))
+    except ScenarioError as error:
+        print(f"trpac run: {error}", file=sys.stderr)
+        raise typer.Exit(EXIT_INPUT) from error
+
+
+def _require_unit(fmu: Path | None) -> None:
+    if fmu is not None and not fmu.is_file():
+        raise ScenarioError(f"{fmu}: no such file; expected a unit. Build one: python build_fmu.py")
+
+
+def _varied(scenario: Scenario, seed: int | None, stiffness_n: float | None) -> Scenario:
+    """The scenario with another seed or another tyre."""
+    if seed is not None:
+        scenario = replace(scenario, seed=seed)
+    if stiffness_n is not None:
+        tyre = scenario.vehicle.tyre.model_copy(update={"longitudinal_stiffness_n": stiffness_n})
+        scenario = replace(scenario, vehicle=scenario.vehicle.model_copy(update={"tyre": tyre}))
+    return scenario
+
+
+def _run(scenario: Scenario, fmu: Path | None, out: Path, scratch: Path) -> None:
+    """Run, then write everything; what fails before leaves the folder untouched."""
+    from fmu_src.packaging import build_unit
+    from fmu_src.units import UNITS
+    from scenarios.figure17 import draw_figure17
+    from scenarios.looks import draw_looks
+    from scenarios.report import write_report
+    from scenarios.runner import run_scenario, write_run
+
+    console = Console()
+    unit = fmu or build_unit(UNITS["TrpacEstimator"], scratch / "TrpacEstimator.fmu")
+    columns = (TextColumn("{task.description:>18}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done)
+
+        finished = run_scenario(scenario, unit, scratch / "frames", show)
+        figure, looks = scratch / "figure17.png", scratch / "looks.jpg"
+        draw_figure17(finished, figure)
+        if len(finished.frames):
+            draw_looks(finished, looks, lambda done, total: show("drawing the report", done, total))
+    report = scratch / "report.html"
+    write_report(finished, figure, looks if looks.is_file() else None, report)
+    write_run(finished, out)
+    for path in (figure, report):
+        (out / path.name).write_bytes(path.read_bytes())
+    console.print(_score_table(finished.summary))
+    console.print(f"Report: {out / 'report.html'}   figure: {out / 'figure17.png'}")
+
+
+def _score_table(summary: dict) -> Table:
+    """Scores as a table for the terminal."""
+    from scenarios.report import number, score_rows
+
+    table = Table(title=f"{summary['scenario']}, seed {summary['seed']}")
+    headings = (
+        "estimator",
+        "theta",
+        "steady-state error",
+        "convergence, excited [s]",
+        "clock [s]",
+        "excited [s]",
+    )
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "estimator" else "right")
+    for name, score in score_rows(summary):
+        table.add_row(
+            name,
+            f"{score['theta']:g}",
+            number(score["steady_state_error"]),
+            number(score["convergence_time_s"], 2),
+            number(score["wall_convergence_time_s"], 2),
+            number(score["excited_time_s"], 2),
+            style="bold" if name == "DIFE" else None,
+        )
+    return table
+
+
+@app.command()
+def gains() -> None:
+    """Show how the gains K and gamma follow from bandwidth, noise and accuracy.
+
+    The delivered gains are these, rounded; a test holds them to each other.
+    """
+    from scenarios.gain_design import SEPARATION, DesignPoint, design_gains
+    from trpac_core.dife import Gains
+    from trpac_core.vehicle import Vehicle
+
+    point, delivered = DesignPoint(), Gains()
+    table = Table(title=f"Designed gains (delivered: K {delivered.K:g} 1/s, gamma {delivered.gamma:g} 1/s)")
+    for heading in ("C_x [kN]", "K [1/s]", "gamma [1/s]", "deviation of theta_hat [-]"):
+        table.add_column(heading, justify="right")
+    for stiffness_n in (20_000.0, 40_000.0, 50_000.0, 60_000.0):
+        design = design_gains(point, Vehicle(longitudinal_stiffness_n=stiffness_n))
+        row = (stiffness_n / 1e3, design.K, design.gamma, design.theta_deviation)
+        table.add_row(f"{row[0]:g}", f"{row[1]:.1f}", f"{row[2]:.1f}", f"{row[3]:.4f}")
+    console = Console()
+    console.print(table)
+    console.print(
+        f"Force bandwidth {point.force_bandwidth_hz:g} Hz, loops a factor {SEPARATION:g} apart, deviation of theta_hat "
+        f"at most {point.theta_deviation:g} on theta {point.theta:g} at {point.speed_m_s:g} m/s."
+    )
