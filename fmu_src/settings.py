@@ -109,12 +109,6 @@ _ESTIMATOR_PARAMETERS = (
         "The visual term never pulls against what the tyre shows; false: Eqs. (17) and (18) as printed",
     ),
     _parameter(
-        "estimator.tyre_first",
-        "",
-        "gains.tyre_first",
-        "The camera does not drag the estimate away from what the tyre shows",
-    ),
-    _parameter(
         "estimator.theta_initial",
         "1",
         "theta_initial",
