@@ -288,7 +288,7 @@ def test_ctrl_c_within_a_step_reaches_the_host_and_the_unit_survives(unit_folder
         unit_folder,
     )
     assert done.stdout.splitlines()[-1] == "interrupted and alive"
-    assert done.returncode == 0
+    assert done.returncode == 0, done.stderr
 
 
 # 6. Characters in the unpack path
@@ -426,7 +426,7 @@ def test_packages_missing_in_the_host_leave_one_clear_message(unit_folder: Path)
         """,
         unit_folder,
     )
-    assert done.returncode == 0
+    assert done.returncode == 0, done.stderr
     assert done.stdout.strip().endswith("Failed to instantiate model")
     assert f"{sys.executable} -m pip install onnxruntime" in done.stderr
 
@@ -445,6 +445,6 @@ def test_damaged_network_file_leaves_one_clear_message(unit_file: Path, tmp_path
         """,
         folder,
     )
-    assert done.returncode == 0
+    assert done.returncode == 0, done.stderr
     assert "surface.onnx" in done.stderr
     assert done.stdout.strip().endswith("Failed to instantiate model")
