@@ -37,14 +37,14 @@ def shadow_depth(rng: np.random.Generator, height: int, width: int) -> NDArray[n
         noise = rng.standard_normal((height, width)).astype(np.float32)
         stretch = rng.uniform(1.0, 3.5)
         sigma = rng.uniform(2.0, 7.0)
-        noise = cv2.GaussianBlur(noise, (0, 0), sigmaX=sigma * stretch, sigmaY=sigma)
+        noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), sigmaX=sigma * stretch, sigmaY=sigma), np.float32)
         noise /= noise.std() + 1e-6
         depth = (noise > rng.uniform(-0.3, 0.8)).astype(np.float32)
         band = np.zeros((height, 1), np.float32)
         top, bottom = sorted(rows)
         band[int(top) : int(max(bottom, top + 0.15 * height))] = 1.0
         depth *= cv2.GaussianBlur(band, (0, 0), 3.0).reshape(height, 1)
-    return cv2.GaussianBlur(depth, (0, 0), rng.uniform(0.4, 2.0))
+    return np.asarray(cv2.GaussianBlur(depth, (0, 0), rng.uniform(0.4, 2.0)), np.float32)
 
 
 def paint_shadow(rng: np.random.Generator, image: Image, depth: NDArray[np.float32]) -> Image:
@@ -94,7 +94,7 @@ def random_view(
         view = cv2.resize(
             plane[y0:y1, x0:x1], size, interpolation=cv2.INTER_AREA if index == 0 else cv2.INTER_NEAREST
         )
-        views.append(np.ascontiguousarray(view[:, ::-1] if mirror else view))
+        views.append(np.ascontiguousarray(view[:, ::-1] if mirror else view, dtype=np.uint8))
     return views
 
 
@@ -117,7 +117,7 @@ def disturbed_look(rng: np.random.Generator, image: Image) -> Image:
         kernel = np.zeros((length, length), np.float32)
         kernel[length // 2] = 1.0 / length
         turn = cv2.getRotationMatrix2D((length / 2 - 0.5, length / 2 - 0.5), rng.uniform(0, 180), 1.0)
-        kernel = cv2.warpAffine(kernel, turn, (length, length))
+        kernel = np.asarray(cv2.warpAffine(kernel, turn, (length, length)), np.float32)
         image = cv2.filter2D(image, -1, kernel / max(float(kernel.sum()), 1e-6)).astype(np.uint8)
     if rng.random() < 0.25:
         noisy = image + rng.normal(0.0, rng.uniform(2.0, 10.0), image.shape)

@@ -51,12 +51,16 @@ def _export(
     net: nn.Module, example: Tensor, path: Path, name: str, outputs: list[str], dynamic: dict | None
 ) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    net = net.eval().to(memory_format=torch.contiguous_format)
+    net = net.eval().to(memory_format=torch.contiguous_format)  # type: ignore[call-overload]
     shapes = None if dynamic is None else ({0: torch.export.Dim("n", min=1)},)
     program = torch.onnx.export(
         net, (example,), input_names=[name], output_names=outputs, opset_version=OPSET, dynamo=True,
         dynamic_shapes=shapes, verbose=False,
     )  # fmt: skip
+    if program is None:
+        raise RuntimeError(
+            f"{path}: torch exported no ONNX program; check the versions in requirements/train.txt"
+        )
     program.save(str(path), external_data=False)
 
 

@@ -152,7 +152,7 @@ def save_worlds(file: Path, samples: list[Sample], patches: PatchSet) -> None:
     }
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_suffix(".part.npz")
-    np.savez(part, **planes, **vars(patches))
+    np.savez(part, **planes, **vars(patches))  # type: ignore[arg-type]
     part.replace(file)
 
 

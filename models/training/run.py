@@ -24,6 +24,7 @@ from rich.progress import (
 from . import calibrate, cards, scores
 from .data import Picture, check_trainable, of_split, read_manifest
 from .export import export_segmenter, export_surface, sha256_of
+from .nets import SurfaceNet
 from .patches import PatchSet, joined, judged_patches, training_patches
 from .rendered import SEED_RANGES, draw_worlds, load_worlds, save_worlds
 from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
@@ -190,7 +191,7 @@ def _sources(pictures: Sequence[Picture]) -> list[str]:
 
 
 def _calibrated(
-    net: torch.nn.Module, judged: dict[str, PatchSet], given: argparse.Namespace
+    net: SurfaceNet, judged: dict[str, PatchSet], given: argparse.Namespace
 ) -> tuple[float, dict[str, tuple[calibrate.Reliability, calibrate.Reliability]], tuple[float, float]]:
     """T from the validation sets; reliability before and after on them and, not used for T, on the test sets."""
     rng = np.random.default_rng(given.seed)
@@ -203,7 +204,9 @@ def _calibrated(
     labels = np.tile(validation.labels, 2)
     temperature = calibrate.learn_temperature(both, labels)
 
-    def pair(values: NDArray[np.float64], true: NDArray[np.int64]) -> tuple:
+    def pair(
+        values: NDArray[np.float64], true: NDArray[np.int64]
+    ) -> tuple[calibrate.Reliability, calibrate.Reliability]:
         return calibrate.reliability(values, true), calibrate.reliability(values, true, temperature)
 
     reliabilities = {"validation, both": pair(both, labels)}

@@ -77,11 +77,12 @@ def training_view(rng: np.random.Generator, sample: Sample) -> Sample:
 
 def plain_view(sample: Sample) -> Sample:
     """The whole picture at the network's input size, as at run time."""
-    labels = [
-        cv2.resize(plane, SIZE, interpolation=cv2.INTER_NEAREST) for plane in (sample.drivable, sample.shadow)
-    ]
+    drivable, shadow = (
+        np.asarray(cv2.resize(plane, SIZE, interpolation=cv2.INTER_NEAREST), np.uint8)
+        for plane in (sample.drivable, sample.shadow)
+    )
     image = cv2.resize(sample.image, SIZE, interpolation=cv2.INTER_AREA)
-    return Sample(np.asarray(image, np.uint8), labels[0], labels[1], sample.kind)
+    return Sample(np.asarray(image, np.uint8), drivable, shadow, sample.kind)
 
 
 def painted_views(samples: Sequence[Sample], seed: int) -> list[Sample]:

@@ -29,7 +29,7 @@ def teacher_features(model: Path, patches: NDArray[np.uint8]) -> NDArray[np.floa
     patches : uint8, shape (n, height, width, 3)
         BGR patches.
     """
-    from ai_edge_litert.interpreter import Interpreter
+    from ai_edge_litert.interpreter import Interpreter  # type: ignore[import-untyped]
 
     if not model.is_file():
         raise TeacherError(f"{model}: not found; leave --teacher out to train without one")

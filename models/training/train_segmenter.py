@@ -65,7 +65,7 @@ def train_segmenter(
     """Train for a number of steps under one learning-rate cycle; `report` gets the step and the loss."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    net = Segmenter().to(memory_format=torch.channels_last)
+    net = Segmenter().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     optimiser = torch.optim.AdamW(net.parameters(), lr=LEARNING_RATE, weight_decay=1e-3)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, LEARNING_RATE, total_steps=steps, pct_start=0.15

@@ -64,7 +64,9 @@ def train_surface(
         schedule.step()
         average.update_parameters(net)
         report(step + 1, float(loss.detach()))
-    return average.module.eval()
+    trained = average.module.eval()
+    assert isinstance(trained, SurfaceNet)
+    return trained
 
 
 def _running_average(average: Tensor, current: Tensor, steps: Tensor | int) -> Tensor:
