@@ -253,28 +253,28 @@ class _StrictLoader(yaml.SafeLoader):
 
 def load_vehicle(path: str | Path) -> VehicleFile:
     """Read vehicle.yaml; raises ScenarioError."""
-    return _load(path, VehicleFile)
+    return load_strict(path, VehicleFile)
 
 
 def load_road(path: str | Path) -> RoadFile:
     """Read road.yaml; raises ScenarioError."""
-    return _load(path, RoadFile)
+    return load_strict(path, RoadFile)
 
 
 def load_manoeuvre(path: str | Path) -> Manoeuvre:
     """Read manoeuvre.yaml; raises ScenarioError."""
-    return _load(path, Manoeuvre)
+    return load_strict(path, Manoeuvre)
 
 
 def load_scenario(path: str | Path) -> Scenario:
     """Read scenario.yaml and the files that it names; raises ScenarioError."""
     path = Path(path)
-    file = _load(path, ScenarioFile)
+    file = load_strict(path, ScenarioFile)
     problems: list[str] = []
 
     def resolve(key: str, relative: str, model: type[Model]) -> Model | None:
         try:
-            return _load(path.parent / relative, model)
+            return load_strict(path.parent / relative, model)
         except ScenarioError as error:
             problems.append(f"{path}: {key}: {error}")
             return None
@@ -309,7 +309,8 @@ def load_scenario(path: str | Path) -> Scenario:
     )
 
 
-def _load(path: str | Path, model: type[Model]) -> Model:
+def load_strict(path: str | Path, model: type[Model]) -> Model:
+    """Read a YAML file into its model; all of its problems in one ScenarioError."""
     path = Path(path)
     try:
         data = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)  # a SafeLoader

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -60,6 +60,7 @@ def run_scenario(
     fmu: Path,
     frames_folder: Path,
     progress: Progress = lambda stage, done, total: None,
+    overrides: Mapping[str, float] | None = None,
 ) -> Run:
     """Drive the plant, draw the pictures, step the unit over both, score.
 
@@ -73,6 +74,8 @@ def run_scenario(
         Where the pictures go.
     progress : callable
         Told the stage and how much of it is done.
+    overrides : mapping, optional
+        Parameters of the unit, by variable name, in place of the scenario's or the delivered ones.
 
     Raises
     ------
@@ -82,7 +85,7 @@ def run_scenario(
     trajectory = drive(scenario)
     log = make_scenario_log(scenario, trajectory)
     frames = record(scenario, trajectory, frames_folder, lambda d, n: progress("drawing pictures", d, n))
-    settings = parameters(scenario)
+    settings = parameters(scenario) | dict(overrides or {})
     outputs = run_unit(
         fmu,
         settings,

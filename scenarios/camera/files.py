@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from scenarios.files import _load
+from scenarios.files import load_strict
 from trpac_core.vision.camera import Camera
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
@@ -40,6 +40,6 @@ class CameraFile(BaseModel):
 
 def load_camera(path: str | Path) -> Camera:
     """Read camera.yaml; raises one ScenarioError that lists all problems of the file."""
-    values = _load(path, CameraFile).model_dump(exclude={"schema_"})
+    values = load_strict(path, CameraFile).model_dump(exclude={"schema_"})
     k1, k2, p1, p2, k3 = values.pop("distortion")
     return Camera(distortion=(k1, k2, p1, p2, k3), **values)
