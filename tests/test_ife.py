@@ -68,11 +68,17 @@ def paint(surface_at, camera=CAMERA) -> np.ndarray:
     """A picture of road whose class is a function of the ground point."""
     labels = surface_at(*ground(camera).T).astype(int)
     grey = PAINT.astype(np.uint8)[labels].reshape(camera.height_px // 2, camera.width_px // 2)
-    return np.repeat(grey.repeat(2, axis=0).repeat(2, axis=1)[..., None], 3, axis=2)
+    return grained(np.repeat(grey.repeat(2, axis=0).repeat(2, axis=1)[..., None], 3, axis=2))
+
+
+def grained(image) -> np.ndarray:
+    """With stripes of 40 pixels: a picture without any contrast shows no road."""
+    stripes = 6.0 * np.sin(2.0 * np.pi * np.arange(image.shape[1]) / 40.0)
+    return np.clip(image + stripes[:, None], 0, 255).astype(np.uint8)
 
 
 def plain(surface) -> np.ndarray:
-    return np.full((1200, 1920, 3), PAINT[surface], np.uint8)
+    return grained(np.full((1200, 1920, 3), PAINT[surface]))
 
 
 def run(image, *, config=None, masks=None, classifier=None, motion=None, state=None, **options):
@@ -317,7 +323,7 @@ def rendered(segments, look, position_m=0.0):
 def test_where_the_renderer_puts_a_change_of_surface_the_estimator_finds_it(position_m):
     """Two independent geometries: the renderer's labels, painted, through the estimator's projection."""
     frame = rendered([SurfaceSegment(0.0, DRY), SurfaceSegment(10.6, SNOW)], SceneLook(seed=4), position_m)
-    picture = np.repeat(PAINT[np.maximum(frame.surface, 0)].astype(np.uint8)[..., None], 3, axis=2)
+    picture = grained(np.repeat(PAINT[np.maximum(frame.surface, 0)][..., None], 3, axis=2))
     drivable = cv2.resize(frame.drivable.astype(np.float32), (256, 160), interpolation=cv2.INTER_AREA)
     _, result = run(picture, masks=Masks(drivable), with_view=True)
     change_m = 10.6 - position_m
@@ -351,3 +357,12 @@ def test_trained_networks_on_rendered_road(surface, sky):
     ]
     assert all(result.surface is surface for result in results), verdicts
     assert sum(result.flag for result in results) >= 2, verdicts
+
+
+@pytest.mark.parametrize("grey", [0, 90, 255])
+def test_a_camera_that_sees_nothing_keeps_the_flag_down(grey):
+    state, _ = run(plain(WET))
+    _, result = run(np.full((1200, 1920, 3), grey, np.uint8), state=state)
+    assert result.near.n_roi == 0
+    assert not result.flag
+    assert result.surface is WET  # what history says
