@@ -117,7 +117,8 @@ def test_stills_are_used_in_their_lower_centre_only():
 def test_unknown_pixels_stay_unknown(made_up):
     (picture,) = data.of_split(data.read_manifest(made_up), "train", masked=True)
     sample = segmenter_data.masked_sample(picture)
-    assert (sample.shadow == data.IGNORE).all()
+    assert set(np.unique(sample.shadow)) == {0, data.IGNORE}
+    assert (sample.drivable[sample.shadow == 0] == 1).all()
     plain = segmenter_data.plain_view(sample)
     assert set(np.unique(plain.drivable)) == {0, 1, data.IGNORE}
     assert np.mean(plain.drivable == data.IGNORE) == pytest.approx(20 / 480, abs=0.01)
@@ -135,9 +136,19 @@ def test_weak_labels_say_road_in_the_box_and_not_road_in_the_sky(made_up):
         assert (sample.image[sample.drivable == 1] == GREY).all()
         assert (sample.image[sample.drivable == 0] == WHITE).all()
         assert (sample.drivable == 1).any()
-        wet = picture.surface == data.LABELS["wet"]
-        assert set(sample.shadow[sample.drivable == 1]) == ({0} if wet else {data.IGNORE})
+        assert set(sample.shadow[sample.drivable == 1]) == {0}
         assert (sample.shadow[sample.drivable != 1] == data.IGNORE).all()
+
+
+def test_the_darker_half_of_a_real_road_may_be_shadow():
+    image = np.full((40, 60, 3), 100, np.uint8)
+    image[:, 45:] = 40
+    road = np.ones((40, 60), np.uint8)
+    road[:5] = 0
+    label = segmenter_data.brighter_half_lit(image, road)
+    assert (label[5:, :40] == 0).all()
+    assert (label[:, 50:] == data.IGNORE).all()
+    assert (label[:5] == data.IGNORE).all()
 
 
 @settings(max_examples=40, deadline=None)

@@ -145,9 +145,8 @@ def surface_card(
     teacher = (
         "No teacher was used."
         if facts.teacher is None
-        else "During training a linear map of the embedding also had to match block 12 of MobileNetV2 1.0 / 224 "
-        "(ImageNet weights, Apache-2.0), mean and deviation of each channel; neither that network nor the map is in "
-        "the file."
+        else "During training a linear map of the embedding also had to match block 12 of MobileNetV2 1.0 / 224\n"
+        "(ImageNet weights, Apache-2.0), mean and deviation of each channel; neither that network nor the map is in the file."
     )
     return f"""\
 # surface.onnx
@@ -166,8 +165,8 @@ feed one linear layer.
 
 {train_patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
 Patches are mirrored, shifted, zoomed by up to 12 % and seen with the gain, gamma and white balance of other cameras
-(within {CAMERA_SPREAD:.0%}). Classes are drawn equally often and sources within a class by fixed shares, so that wet
-and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the weights.
+(within {100 * CAMERA_SPREAD:.0f} %). Classes are drawn equally often and sources within a class by fixed shares, so
+that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the weights.
 {teacher}
 {time_text(facts, train_s)}
 {versions_text(facts)}
@@ -197,7 +196,7 @@ patches it holds. The diagram `reliability.png` is the validation set's, undistu
 - The validation and test stills come from the same kind of web search as the training stills; other cameras are the
   honest guess for a new car. Wet carries over worst: see its recall on other cameras and how few pictures that is.
 - Real wet and snowy dash frames in training come from one car, one clip each, and the val rows of these clips show the
-  same road minutes later. Rendered scores say how well the network knows the renderer, no more.
+  same road seconds later. Rendered scores say how well the network knows the renderer, no more.
 - Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
 - Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
 - T is fitted on these validation pictures; on another camera confidence is likelier too high than too low.
@@ -250,7 +249,8 @@ form, {parameters} parameters, trained from nothing in our own code.
 
 Pictures by kind: {kinds}.
 *masked* and *campus* are real pictures with road masks, *weak* real pictures of all three surfaces without one: only
-the middle of the road box counts as road and the sky of stills as not road, and a wet road's box as free of shadow.
+the middle of the road box counts as road and the sky of stills as not road. The brighter half of a real road, and all
+of a wet one, counts as free of shadow, the darker half as unknown.
 Shadows are painted over most of these; *rendered* have exact labels of both tasks. Random crops, mirror, gain, gamma,
 white balance, and on some pictures blur, noise, contrast. Cross-entropy and Dice, AdamW.
 {time_text(facts, train_s)}
@@ -267,9 +267,9 @@ are not in the data). "painted" means painted shadows, judged on the road in the
 
 ## Limits
 
-- No real picture has a shadow label. On real pictures the shadow task learns only in painted shadows and their close
-  surroundings, so that unlabelled real shadows do not teach "no shadow", and that wet roads have none; how well it
-  finds real shadows is seen by eye only: it takes dark tyre bands and dark asphalt in low light for shadow too often.
+- No real picture has a shadow label. On real pictures the shadow task learns from painted shadows and that the
+  brighter half of a road and wet roads have none; the darker half stays unknown, lest unlabelled real shadows teach "no
+  shadow". How well it finds real shadows is seen by eye only; dark asphalt and dusk still pass for shadow at times.
 - No wet or snowy real picture has a road mask. There the drivable task rests on rendered pictures and weak labels,
   and the edge between a snowy road and a snowy verge is a guess.
 - Kerbs, parked cars and pavements are known from one town (CamVid) and one campus. The rendered roads are straight.

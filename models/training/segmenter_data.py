@@ -37,11 +37,22 @@ class Sample:
     kind: str
 
 
+def brighter_half_lit(image: Image, road: Image) -> Image:
+    """Shadow label of a real picture: the brighter half of its road counts as lit, the rest is unknown.
+
+    A shadow is the darker part of a road; without this a plain dark road is learned as one great shadow.
+    """
+    grey = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), (0, 0), 2.0)
+    known = road == 1
+    middle = np.median(grey[known]) if known.any() else 0.0
+    return np.where(known & (grey >= middle), 0, IGNORE).astype(np.uint8)
+
+
 def masked_sample(picture: Picture) -> Sample:
-    """A real picture with its road mask; where its real shadows lie is unknown."""
+    """A real picture with its road mask; where its real shadows lie is unknown, see `brighter_half_lit`."""
     image, road = picture.image(), picture.road_mask()
     kind = "campus" if picture.source == CAMPUS else "masked"
-    return Sample(image, road, np.full_like(road, IGNORE), kind)
+    return Sample(image, road, brighter_half_lit(image, road), kind)
 
 
 def weak_sample(picture: Picture) -> Sample:
@@ -59,8 +70,10 @@ def weak_sample(picture: Picture) -> Sample:
         inset = 0.0 if overlaid else 0.3 * (right - left)
         x0, y0, x1, y1 = pixel_box((left + inset, top, right - inset, bottom), image)
         road[y0 + (0 if overlaid else (y1 - y0) // 3) : y1, x0:x1] = 1
-    lit = (road == 1) & (picture.surface == Surface.WET)
-    return Sample(image, road, np.where(lit, 0, IGNORE).astype(np.uint8), "weak")
+    lit = brighter_half_lit(image, road)
+    if picture.surface == Surface.WET:
+        lit[road == 1] = 0
+    return Sample(image, road, lit, "weak")
 
 
 def training_view(rng: np.random.Generator, sample: Sample) -> Sample:
