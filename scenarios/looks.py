@@ -54,7 +54,7 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
         inside = cv2.resize(mask, size, interpolation=cv2.INTER_LINEAR) > 0.5
         shown[inside] = ((1.0 - TINT) * shown[inside] + TINT * np.array(colour)).astype(np.uint8)
     for group in result.view.groups:
-        for outline in group.outlines_px:
+        for outline in group.outlines_px[::2]:
             if np.isfinite(outline).all():
                 cv2.polylines(
                     shown, [np.round(outline).astype(np.int32)], True, (255, 255, 255), 2, cv2.LINE_AA
@@ -63,10 +63,10 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
             colour = CLASS_BGR[Surface(int(np.argmax(probabilities)))]
             cv2.rectangle(shown, (int(box[0]), int(box[1])), (int(box[2]), int(box[3])), colour, 3)
     verdict = f"{result.surface.label}  Q_v {result.Q_v:.2f}  flag {int(result.flag)}"
+    cv2.rectangle(shown, (0, 0), (shown.shape[1], 150), (40, 40, 40), cv2.FILLED)
     for row, text in enumerate((caption, verdict)):
-        place = (24, 60 + 60 * row)
-        cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.6, (0, 0, 0), 9, cv2.LINE_AA)
-        cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.6, (255, 255, 255), 3, cv2.LINE_AA)
+        place = (24, 60 + 64 * row)
+        cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 4, cv2.LINE_AA)
     return shown
 
 
