@@ -191,6 +191,28 @@ def test_rendered_seeds_of_the_splits_are_disjoint():
     assert set(rendered.SEED_RANGES) == {"train", "val", "test"}
 
 
+def test_kept_worlds_come_back_as_they_were(tmp_path):
+    rng = np.random.default_rng(2)
+    planes = rng.integers(0, 2, (2, 2, 24, 40)).astype(np.uint8)
+    samples = [
+        segmenter_data.Sample(np.full((24, 40, 3), 7 + i, np.uint8), planes[i, 0], planes[i, 1], "rendered")
+        for i in range(2)
+    ]
+    cut = rendered.rendered_patches(
+        [[(np.full((64, 96, 3), 9, np.uint8), 2)], [(np.zeros((64, 96, 3), np.uint8), 0)]]
+    )
+    rendered.save_worlds(tmp_path / "kept" / "test-2.npz", samples, cut)
+    kept, kept_cut = rendered.load_worlds(tmp_path / "kept" / "test-2.npz")
+    for sample, again in zip(samples, kept, strict=True):
+        assert all(
+            (getattr(sample, name) == getattr(again, name)).all() for name in ("image", "drivable", "shadow")
+        )
+    assert kept_cut.labels.tolist() == [2, 0]
+    assert (kept_cut.patches == cut.patches).all()
+    assert kept_cut.sources.tolist() == ["rendered", "rendered"]
+    assert [path.name for path in (tmp_path / "kept").iterdir()] == ["test-2.npz"]
+
+
 def test_shared_sequence_is_refused(tmp_path):
     picture = np.zeros((20, 20, 3), np.uint8)
     rows = [row("a/0.png", "train", "dry", sequence="one"), row("a/1.png", "test", "dry", sequence="one")]

@@ -146,7 +146,8 @@ def surface_card(
         "No teacher was used."
         if facts.teacher is None
         else "During training a linear map of the embedding also had to match block 12 of MobileNetV2 1.0 / 224\n"
-        "(ImageNet weights, Apache-2.0), mean and deviation of each channel; neither that network nor the map is in the file."
+        "(ImageNet weights, Apache-2.0), mean and deviation of each channel; neither that network nor the map is in "
+        "the file."
     )
     return f"""\
 # surface.onnx
@@ -199,7 +200,8 @@ patches it holds. The diagram `reliability.png` is the validation set's, undistu
   same road seconds later. Rendered scores say how well the network knows the renderer, no more.
 - Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
 - Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
-- T is fitted on these validation pictures; on another camera confidence is likelier too high than too low.
+- T is one number for all pictures, between what undisturbed and what disturbed ones would want: where it corrects the
+  confidence on disturbed patches, undisturbed ones come out less sure than they could be.
 
 ## Data
 

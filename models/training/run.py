@@ -215,6 +215,8 @@ def _calibrated(
     for name, part in judged.items():
         if " test" in name:
             reliabilities[name] = pair(logits_of(net, part.patches), part.labels)
+            disturbed = calibrate.noised(part.patches, given.seed)
+            reliabilities[f"{name}, disturbed"] = pair(logits_of(net, disturbed), part.labels)
     calibrate.draw_reliability(*reliabilities["validation, both"], temperature, given.out / "reliability.png")
     entropies = (
         calibrate.cross_entropy(both, labels),
