@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from trpac_core import tyre
@@ -17,6 +17,7 @@ from trpac_core.dife import (
     Wheel,
     WheelInputs,
     fusion_step,
+    least_theta,
     settled,
     visible_theta,
 )
@@ -143,3 +144,22 @@ def test_ten_short_steps_are_one_long_one():
         short = fusion_step(short, inputs, WHEEL, GAINS, SCHEDULER, None, 0.001).state
     # The target moves a little with F_hat meanwhile: a first-order remainder of (gamma + K) dt of the way made.
     assert short.theta_hat == pytest.approx(long, abs=2e-4)
+
+
+def test_a_wrong_class_snow_does_not_pull_below_what_the_tyre_carries():
+    """Elastic on 0.9 at a used friction of 0.33: no road of 0.2 could do that."""
+    inputs = on_road(0.9, slip=0.016, deviation=2e-4)
+    trace, step = run(inputs, 0.8, 2.0, theta_img=0.2)
+    assert step.excited
+    assert step.sensitivity == 0.0
+    least = least_theta(inputs.wheel_torque_nm / WHEEL.radius_m, inputs, WHEEL.longitudinal_stiffness_n)
+    assert 0.33 < least < 0.6
+    assert trace.min() > least
+
+
+@given(st.floats(0.1, 1.0), st.floats(0.003, 0.1), st.floats(0.0, 0.002))
+def test_least_theta_never_exceeds_the_truth(theta, slip, deviation):
+    assume(slip + 2.0 * deviation < tyre.peak_slip(theta, LOAD_N, WHEEL.longitudinal_stiffness_n))
+    inputs = on_road(theta, slip, deviation)
+    force_n = inputs.wheel_torque_nm / WHEEL.radius_m
+    assert least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n) <= theta + 1e-6

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from .excitation import FuzzyScheduler
 from .observer import advanced_state, observed_force, settled_state
-from .slip import Slip
+from .slip import GREATEST_SLIP, Slip
 from .tyre import correction, force, friction_by_theta, slip_ratio_force, theta_from_friction
 
 GREATEST_THETA = 1.2
@@ -39,9 +39,11 @@ class VisualTerm(Enum):
 class Gains:
     """Gains of force observer and estimator.
 
-    K [1/s] is the force observer's bandwidth, gamma [1/s] the estimator's. With `tyre_first` the camera hurries the
-    estimate along but does not drag it away from what the tyre shows: where theta(lambda, F_hat) is seen, the visual
-    term acts only in its direction. Eqs. (17) and (18) as printed have no such guard: there a wrong class with its flag
+    K [1/s] is the force observer's bandwidth, gamma [1/s] the estimator's.
+
+    With `tyre_first` the camera hurries the estimate along but does not drag it away from what the tyre shows: where
+    theta(lambda, F_hat) is seen, the visual term acts only in its direction; where it is not, theta_img counts as no
+    less than force and slip allow. Eqs. (17) and (18) as printed have no such guard: there a wrong class with its flag
     up pulls a settled estimate off by K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for "dry" on a road of 0.5.
     """
 
@@ -174,9 +176,9 @@ def fusion_step(
         excited = slip.size > scheduler.threshold(None, load_n, C_x, inputs.slip_deviation)
     theta_next, K_v = state.theta_hat, 0.0
     if excited:
-        if theta_img is not None and not (
-            gains.tyre_first and _opposed(state.theta_hat, theta_tyre, theta_img)
-        ):
+        if theta_img is not None and gains.tyre_first:
+            theta_img = _compatible(theta_img, state.theta_hat, theta_tyre, F_hat, inputs, C_x)
+        if theta_img is not None:
             K_v = scheduler.K_v(abs(theta_img - state.theta_hat))
         theta_next = _driven(state.theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
     by_theta_n = 0.0
@@ -198,9 +200,35 @@ def fusion_step(
     return FusionStep(FusionState(theta_next, s), F_hat, sensitivity, threshold, excited, K_v)
 
 
-def _opposed(theta_hat: float, theta_tyre: float | None, theta_img: float) -> bool:
-    """Whether the tyre is seen to pull the other way than the camera."""
-    return theta_tyre is not None and (theta_tyre - theta_hat) * (theta_img - theta_hat) < 0.0
+def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
+    """The smallest theta that force and slip allow: the inverse at a slip `SIGNIFICANCE` deviations larger.
+
+    Below the curve's maximum, that is: beyond it a larger slip asks for more theta, but there the tyre is seen.
+    """
+    surely = inputs.slip.size + SIGNIFICANCE * (inputs.slip_deviation + inputs.slip_change)
+    friction = force_n * inputs.slip.direction / inputs.load_n
+    elastic = slip_ratio_force(min(surely, GREATEST_SLIP), longitudinal_stiffness_n) / inputs.load_n
+    theta = theta_from_friction(friction, min(surely, GREATEST_SLIP), inputs.load_n, longitudinal_stiffness_n)
+    if theta is None:
+        theta = 2.0 * elastic if friction > 0.0 else 0.0
+    return min(theta, GREATEST_THETA)
+
+
+def _compatible(
+    theta_img: float,
+    theta_hat: float,
+    theta_tyre: float | None,
+    force_n: float,
+    inputs: WheelInputs,
+    longitudinal_stiffness_n: float,
+) -> float | None:
+    """What the camera may still say beside the tyre.
+
+    None where the tyre is seen to pull the estimate the other way; not less than the tyre already carries.
+    """
+    if theta_tyre is None:
+        return max(theta_img, least_theta(force_n, inputs, longitudinal_stiffness_n))
+    return theta_img if (theta_tyre - theta_hat) * (theta_img - theta_hat) >= 0.0 else None
 
 
 def _driven(
