@@ -15,6 +15,7 @@ from rich.table import Table
 
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
+from trpac_cli import vision
 
 EXIT_INPUT = 2
 """Unusable input: one message on standard error, and nothing written."""
@@ -25,6 +26,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(vision.app, name="vision")
 
 
 @app.callback()

@@ -1,0 +1,151 @@
+"""The commands `trpac vision`: the camera side alone, on pictures of one's own."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from scenarios.vision_runs import Drive
+    from scenarios.vision_runs import Progress as Told
+
+EXIT_SOME_UNREADABLE = 1
+"""Done, but some of the pictures could not be used; they are named on standard error."""
+EXIT_INPUT = 2
+"""Unusable input: one message on standard error, and nothing written."""
+MOST_NAMED = 20
+"""Unusable pictures that a message names; the rest are counted."""
+
+app = typer.Typer(help="The camera side alone: road surface from pictures.", no_args_is_help=True)
+
+
+@app.command()
+def classify(
+    paths: Annotated[list[Path], typer.Argument(help="Pictures (JPEG, PNG), or folders of them.")],
+    out: Annotated[Path, typer.Option(help="CSV file to write.")],
+) -> None:
+    """Tell the surface of road pictures of any camera: dry, wet, or snow and ice.
+
+    Looks at road out of the shadow in the lower centre of each picture. No camera file is needed.
+
+    Example: trpac vision classify my_pictures --out classes.csv
+
+    Exit codes: 0 done, 1 done but some pictures could not be used, 2 unusable input.
+    """
+    from scenarios.vision_runs import classify_pictures, find_pictures, write_classes
+    from trpac_core.vision.networks import ModelError
+
+    command = "trpac vision classify"
+    if out.is_dir():
+        _refuse(command, f"{out}: a folder. Expected the name of a CSV file to write.")
+    try:
+        files, problems = find_pictures(paths)
+        with _bar("pictures") as told:
+            table, unusable = classify_pictures(files, told)
+        problems += unusable
+        if table.empty:
+            _refuse(command, _listed("nothing to classify", problems))
+        write_classes(table, out)
+    except (ModelError, OSError) as error:
+        _refuse(command, str(error))
+    Console().print(f"{len(table)} pictures: {_counted(list(table['class']))}. Table: {out}", soft_wrap=True)
+    _finish(command, f"{len(problems)} of the inputs could not be used", problems)
+
+
+@app.command()
+def run(
+    frames: Annotated[
+        Path, typer.Argument(help="Folder of frames (in the order of their names), or a video.")
+    ],
+    camera: Annotated[Path, typer.Option(help="Camera file, such as scenarios/cameras/paper.yaml.")],
+    speed_m_s: Annotated[float, typer.Option(help="Constant speed of the car [m/s].")],
+    fps: Annotated[float, typer.Option(help="Frames per second.")],
+    out: Annotated[
+        Path, typer.Option(help="Folder for frames.csv, annotated.mp4, strip.jpg and summary.json.")
+    ],
+) -> None:
+    """Run the image estimator and the voting baseline over the frames of one drive.
+
+    Example: trpac vision run frames --camera scenarios/cameras/paper.yaml --speed-m-s 10 --fps 40 --out out/drive
+
+    Exit codes: 0 done, 1 done but some frames could not be used, 2 unusable input.
+    """
+    from scenarios.errors import ScenarioError
+    from scenarios.vision_runs import Frames, run_frames
+    from trpac_core.vision.networks import ModelError
+
+    command = "trpac vision run"
+    if out.exists() and not out.is_dir():
+        _refuse(command, f"{out}: a file. Expected a folder to write to.")
+    try:
+        found = Frames.find(frames)
+        with _bar("frames") as told:
+            drive = run_frames(found, camera, speed_m_s, fps, out, told)
+    except (ScenarioError, ModelError, OSError) as error:
+        _refuse(command, str(error))
+    _show(drive)
+    summary = drive.summary
+    problems = [f"{entry['frame']}: {entry['reason']}" for entry in summary["unreadable"]]
+    missing = summary["frames_announced"] - summary["frames"]
+    if missing > 0:
+        problems.append(
+            f"{frames}: ends {missing} frames before the {summary['frames_announced']} it announces."
+        )
+    _finish(command, f"of {summary['frames']} frames", problems)
+
+
+def _show(drive: Drive) -> None:
+    """The run's outcome on the terminal."""
+    summary, console = drive.summary, Console()
+    table = Table(title=f"{summary['frames']} frames, {len(summary['unreadable'])} not usable")
+    for heading in ("share of frames", "IFE", "voting"):
+        table.add_column(heading, justify="left" if heading == "share of frames" else "right")
+    for label, share in summary["class_share"].items():
+        table.add_row(label, f"{share:.1%}", f"{summary['voting_class_share'][label]:.1%}")
+    table.add_row("flag set", f"{summary['flag_share']:.1%}", "-")
+    console.print(table)
+    console.print(f"IFE time per frame: median {summary['ms_median']:.1f} ms, p99 {summary['ms_p99']:.1f} ms")
+    if summary["annotated"] is None:
+        console.print("No video encoder on this machine: strip.jpg in place of annotated.mp4.")
+    console.print(f"Table: {drive.out / 'frames.csv'}", soft_wrap=True)
+
+
+@contextmanager
+def _bar(what: str) -> Iterator[Told]:
+    """A progress bar, and what to tell it."""
+    columns = (TextColumn("{task.description:>18}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns) as bars:
+        task = bars.add_task(what, total=None)
+        yield lambda done, total: bars.update(task, completed=done, total=total)
+
+
+def _counted(classes: Sequence[str]) -> str:
+    """How many of each class."""
+    from trpac_core.vision.classes import Surface
+
+    return ", ".join(f"{classes.count(surface.label)} {surface.label}" for surface in Surface)
+
+
+def _listed(heading: str, problems: Sequence[str]) -> str:
+    more = [f"and {len(problems) - MOST_NAMED} more"] if len(problems) > MOST_NAMED else []
+    return "\n  ".join([f"{heading}:", *problems[:MOST_NAMED], *more])
+
+
+def _finish(command: str, heading: str, problems: Sequence[str]) -> None:
+    """Name what could not be used, if anything."""
+    if problems:
+        print(f"{command}: {_listed(heading, problems)}", file=sys.stderr)
+        raise typer.Exit(EXIT_SOME_UNREADABLE)
+
+
+def _refuse(command: str, message: str) -> NoReturn:
+    print(f"{command}: {message}", file=sys.stderr)
+    raise typer.Exit(EXIT_INPUT)
