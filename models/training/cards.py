@@ -73,8 +73,8 @@ def splits_text(facts: RunFacts) -> str:
 Real pictures are split by the manifest: no series of neighbouring pictures stands in two splits, except the three
 clips of one car (`*_extreme`) that are cut in time, first part train, a gap, last part val. `other_cameras` and all
 test rows are never trained on, and nothing was chosen by them.
-Rendered pictures, three places in each world: {worlds}; drawing
-or loading them took {facts.render_s:.0f} s."""
+Rendered pictures, three places in each world, half of the worlds with the weather that is likely for their surface:
+{worlds}; drawing or loading them took {facts.render_s:.0f} s."""
 
 
 def time_text(facts: RunFacts, train_s: float) -> str:
@@ -264,14 +264,16 @@ At probability 0.5, whole pictures; unknown pixels are left out.
 
 {segmentation_table(scores)}
 
-CamVid 0001TP is the validation drive (dusk, another drive than the training ones; real drivable masks of a test drive
-are not in the data). "painted" means painted shadows, judged on the road in them and within 15 pixels around.
+CamVid 0001TP is the validation drive (dusk, another drive than the training ones); the spread of gain and gamma in
+training was widened for it, so its score is no test score. Real drivable masks of a test drive are not in the data.
+"painted" means painted shadows, judged on the road in them and within 15 pixels around.
 
 ## Limits
 
 - No real picture has a shadow label. On real pictures the shadow task learns from painted shadows and that the
   brighter half of a road and wet roads have none; the darker half stays unknown, lest unlabelled real shadows teach "no
   shadow". How well it finds real shadows is seen by eye only; dark asphalt and dusk still pass for shadow at times.
+- On rendered pictures much of the shadow is missed, see its IoU; what is called shadow is mostly right.
 - No wet or snowy real picture has a road mask. There the drivable task rests on rendered pictures and weak labels,
   and the edge between a snowy road and a snowy verge is a guess.
 - Kerbs, parked cars and pavements are known from one town (CamVid) and one campus. The rendered roads are straight.

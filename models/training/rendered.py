@@ -69,15 +69,20 @@ def random_camera(rng: np.random.Generator, scale: float) -> Camera:
 
 
 def world_views(seed: int, scale: float) -> Iterator[View]:
-    """Pictures of one world from several places; its class is seed modulo 3, and one world in four changes it."""
+    """Pictures of one world from several places; its class is seed modulo 3, and one world in four changes it.
+
+    Half of the worlds have the weather that is likely for their class, half any weather: snow under a summer sky
+    must still be told by its surface.
+    """
     rng = np.random.default_rng(seed)
     surface = Surface(seed % 3)
+    likely = surface if seed // 3 % 2 == 0 else None
     camera = random_camera(rng, scale)
     segments = [SurfaceSegment(-1000.0, surface)]
     if rng.random() < 0.25:
         other = Surface((int(surface) + int(rng.integers(1, 3))) % 3)
         segments.append(SurfaceSegment(rng.uniform(8.0, 60.0), other))
-    renderer = Renderer(camera, segments, SceneLook.random(rng, surface))
+    renderer = Renderer(camera, segments, SceneLook.random(rng, likely))
     for number, place_m in enumerate(PLACES_M):
         frame = renderer.frame(place_m, rng.uniform(-0.5, 0.5), rng.uniform(-0.05, 0.05))
         yield View(frame, camera, 10 * seed + number)

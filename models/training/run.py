@@ -33,7 +33,7 @@ from .train_surface import logits_of, train_surface
 
 WORLDS = {"train": 160, "val": 24, "test": 40}
 PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
-SEGMENTER_STEPS = 1500
+SEGMENTER_STEPS = 1300
 SURFACE_STEPS = 1500
 CALIBRATION_PER_SOURCE = 240
 """Most validation patches that one source gives to the calibration, lest one drive decide T."""

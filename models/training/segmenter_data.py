@@ -84,7 +84,7 @@ def training_view(rng: np.random.Generator, sample: Sample) -> Sample:
         depth = shadow_depth(rng, SIZE[1], SIZE[0])
         image = paint_shadow(rng, image, depth)
         shadow = shadow_label(depth, drivable, shadow)
-    image = disturbed_look(rng, camera_look(rng, image, spread=0.35))
+    image = disturbed_look(rng, camera_look(rng, image, spread=0.5))
     return Sample(image, drivable, shadow, sample.kind)
 
 
