@@ -3,7 +3,6 @@
 import hashlib
 import os
 import re
-import sys
 from pathlib import Path
 
 import cv2
@@ -12,12 +11,10 @@ import onnxruntime as ort
 import pytest
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from models.training import data, patches, scores  # noqa: E402
-from models.training.calibrate import probabilities  # noqa: E402
-from models.training.rendered import SEED_RANGES, draw_worlds  # noqa: E402
-from models.training.segmenter_data import masked_sample, painted_views, plain_view  # noqa: E402
+from models.training import data, patches, scores
+from models.training.calibrate import probabilities
+from models.training.rendered import SEED_RANGES, draw_worlds
+from models.training.segmenter_data import masked_sample, painted_views, plain_view
 
 MODELS = ROOT / "models"
 WORLDS = 12

@@ -3,7 +3,6 @@
 import csv
 import importlib.util
 import os
-import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,10 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from models.training import augment, calibrate, data, patches, rendered, scores, segmenter_data  # noqa: E402
-from models.training.__main__ import main  # noqa: E402
+from models.training import augment, calibrate, data, patches, rendered, scores, segmenter_data
+from models.training.__main__ import main
 
 COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height"]
 GREY, WHITE = 90, 250
