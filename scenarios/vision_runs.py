@@ -8,6 +8,7 @@ import re
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -22,6 +23,7 @@ from fmu_src.packaging import sha256
 from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.looks import MODELS, annotate
+from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import LEAST_CONTRAST, Ife, IfeConfig, IfeState, usable_road
 from trpac_core.vision.images import ImageError, decode_image
@@ -201,11 +203,19 @@ def _usable_share(
 
 def write_classes(table: pd.DataFrame, out: Path) -> None:
     """Write the table of `classify_pictures`, whole or not at all; raises OSError."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=out.parent, prefix=".trpac_") as scratch:
-        whole = Path(scratch) / out.name
-        table.to_csv(whole, index=False, float_format="%.6f")
-        whole.replace(out)
+    with _scratch_for(out.parent) as scratch:
+        table.to_csv(scratch / out.name, index=False, float_format="%.6f")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        (scratch / out.name).replace(out)
+
+
+@contextmanager
+def _scratch_for(folder: Path) -> Iterator[Path]:
+    """A passing folder on the file system that a folder lies on, or will lie on, so that moving is at once."""
+    whole = folder.absolute()
+    nearest = next(place for place in (whole, *whole.parents) if place.exists())
+    with tempfile.TemporaryDirectory(dir=nearest, prefix=".trpac_") as scratch:
+        yield Path(scratch)
 
 
 # --- frames ------------------------------------------------------------------------------------------------
@@ -273,9 +283,11 @@ class Frames:
 
 
 def _open_video(path: Path) -> cv2.VideoCapture:
-    # The decoder would print its own complaints; one clear error is raised here instead.
+    # The decoder and OpenCV would print their own complaints; one clear error is raised here instead.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    cv2.utils.logging.setLogLevel(level)
     if not capture.isOpened():
         raise ScenarioError(
             f"{path}: not a video that can be decoded. Convert it to MP4, or to a folder of pictures."
@@ -332,9 +344,8 @@ def run_frames(
         Voting(VotingConfig(camera=camera), segmenter, classifier),
         Motion(speed_m_s),
     )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=out.parent, prefix=".trpac_") as scratch:
-        film, strip = _Film(Path(scratch) / FILM, fps), _Strip()
+    with _scratch_for(out) as scratch:
+        film, strip = _Film(scratch / FILM, camera, fps), _Strip()
         rows, unreadable = [], []
         for number, (name, image) in enumerate(frames):
             caption = f"{name}  {number / fps:.2f} s"
@@ -351,10 +362,10 @@ def run_frames(
         if len(unreadable) == len(rows):
             raise ScenarioError(_nothing_usable(frames, unreadable))
         summary = _summary(table, unreadable, frames, camera_file, speed_m_s, fps, film.finish())
-        strip.write(Path(scratch) / STRIP)
-        table.to_csv(Path(scratch) / FRAMES_CSV, index=False, float_format="%.6g")
-        (Path(scratch) / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        _publish(Path(scratch), out)
+        strip.write(scratch / STRIP)
+        table.to_csv(scratch / FRAMES_CSV, index=False, float_format="%.6g")
+        (scratch / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        _publish(scratch, out)
     return Drive(table, summary, out)
 
 
@@ -438,7 +449,7 @@ def _summary(
 
 def _publish(scratch: Path, out: Path) -> None:
     """Move the finished files into the folder; a film of an earlier run goes where this one has none."""
-    out.mkdir(exist_ok=True)
+    out.mkdir(parents=True, exist_ok=True)
     if not (scratch / FILM).exists():
         (out / FILM).unlink(missing_ok=True)
     for file in sorted(scratch.iterdir()):
@@ -466,13 +477,17 @@ def _shown(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArr
 
 
 def _at_width(image: NDArray[np.uint8], width_px: int) -> NDArray[np.uint8]:
-    """The picture at a width; the height is even, as encoders want it."""
-    height_px = max(2, 2 * round(width_px * image.shape[0] / image.shape[1] / 2.0))
+    """The picture at a width."""
+    height_px = _even_height(width_px, image.shape[1], image.shape[0])
     if image.shape[:2] == (height_px, width_px):
         return image
-    smaller = width_px < image.shape[1]
-    how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
+    how = cv2.INTER_AREA if width_px < image.shape[1] else cv2.INTER_LINEAR
     return cv2.resize(image, (width_px, height_px), interpolation=how).astype(np.uint8, copy=False)
+
+
+def _even_height(width_px: int, from_width_px: int, from_height_px: int) -> int:
+    """Height at another width, even as encoders want it [px]."""
+    return max(2, 2 * round(width_px * from_height_px / from_width_px / 2.0))
 
 
 def _dark(size: tuple[int, int], caption: str) -> NDArray[np.uint8]:
@@ -485,26 +500,23 @@ def _dark(size: tuple[int, int], caption: str) -> NDArray[np.uint8]:
 
 
 class _Film:
-    """annotated.mp4, begun with the first frame; frames of another shape are fitted to it."""
+    """annotated.mp4, begun with the first frame; every frame is fitted to the camera's shape."""
 
-    def __init__(self, path: Path, fps: float) -> None:
+    def __init__(self, path: Path, camera: Camera, fps: float) -> None:
         self._path, self._fps = path, fps
+        self.size = (FILM_PX, _even_height(FILM_PX, camera.width_px, camera.height_px))
         self._writer: cv2.VideoWriter | None = None
         self._count = 0
-        self.size = (FILM_PX, FILM_PX * 10 // 16)
 
     def add(self, image: NDArray[np.uint8]) -> None:
         """One more frame."""
         if self._writer is None:
-            self.size = (image.shape[1], image.shape[0])
             self._writer = cv2.VideoWriter(
                 str(self._path), cv2.VideoWriter.fourcc(*"mp4v"), self._fps, self.size
             )
         if self._writer.isOpened():
-            fitting = (image.shape[1], image.shape[0]) == self.size
-            self._writer.write(
-                image if fitting else cv2.resize(image, self.size, interpolation=cv2.INTER_AREA)
-            )
+            fits = (image.shape[1], image.shape[0]) == self.size
+            self._writer.write(image if fits else cv2.resize(image, self.size, interpolation=cv2.INTER_AREA))
             self._count += 1
 
     def finish(self) -> bool:

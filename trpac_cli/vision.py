@@ -92,14 +92,8 @@ def run(
     except (ScenarioError, ModelError, OSError) as error:
         _refuse(command, str(error))
     _show(drive)
-    summary = drive.summary
-    problems = [f"{entry['frame']}: {entry['reason']}" for entry in summary["unreadable"]]
-    missing = summary["frames_announced"] - summary["frames"]
-    if missing > 0:
-        problems.append(
-            f"{frames}: ends {missing} frames before the {summary['frames_announced']} it announces."
-        )
-    _finish(command, f"of {summary['frames']} frames", problems)
+    problems = [f"{entry['frame']}: {entry['reason']}" for entry in drive.summary["unreadable"]]
+    _finish(command, f"{len(problems)} of {drive.summary['frames']} frames could not be used", problems)
 
 
 def _show(drive: Drive) -> None:
@@ -115,6 +109,11 @@ def _show(drive: Drive) -> None:
     console.print(f"IFE time per frame: median {summary['ms_median']:.1f} ms, p99 {summary['ms_p99']:.1f} ms")
     if summary["annotated"] is None:
         console.print("No video encoder on this machine: strip.jpg in place of annotated.mp4.")
+    missing = summary["frames_announced"] - summary["frames"]
+    if missing > 0:
+        console.print(
+            f"The video ends {missing} frames before the {summary['frames_announced']} it announces."
+        )
     console.print(f"Table: {drive.out / 'frames.csv'}", soft_wrap=True)
 
 

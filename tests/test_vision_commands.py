@@ -1,0 +1,402 @@
+"""`trpac vision`: single pictures and drives through the command line, on the shipped networks."""
+
+import json
+import struct
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from scenarios import vision_runs
+from scenarios.camera.renderer import Renderer
+from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.looks import MODELS
+from scenarios.vision_runs import CLASSIFY_COLUMNS, FRAME_COLUMNS, Frames, picture_probabilities, run_frames
+from trpac_cli.main import app
+from trpac_core.vision.camera import Camera
+from trpac_core.vision.classes import Surface
+from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.images import ImageError, decode_image
+from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier, calibrated_probabilities
+from trpac_core.vision.regions import roi_box
+from trpac_core.vision.trajectory import Motion
+
+SMALL = Camera().scaled(0.25)
+POSITIONS_M = (0.0, 3.0, 6.0, 20.0, 22.0, 24.0)
+"""Three places with dry road under the whole near group, and three with snow."""
+
+BROKEN = b"\xff\xd8\xff\xe0 not a picture"
+
+
+def road(*segments):
+    return Renderer(SMALL, [SurfaceSegment(at, surface) for at, surface in segments], SceneLook(seed=4))
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    drive = road((-5.0, Surface.DRY), (14.0, Surface.SNOW_ICE))
+    return [drive.frame(position).image for position in POSITIONS_M]
+
+
+@pytest.fixture
+def folder(tmp_path, pictures):
+    """Frames whose names sort wrongly by letters: f_8, f_9, f_10 ..."""
+    path = tmp_path / "frames"
+    path.mkdir()
+    for number, image in enumerate(pictures, start=8):
+        assert cv2.imwrite(str(path / f"f_{number}.png"), image)
+    return path
+
+
+@pytest.fixture
+def camera_file(tmp_path):
+    values = {"schema": 1, "distortion": [0.0] * 5}
+    for key in ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "height_m", "fps"):
+        values[key] = getattr(SMALL, key)
+    for key in ("x_from_front_axle_m", "y_m", "pitch_rad", "yaw_rad", "roll_rad"):
+        values[key] = getattr(SMALL, key)
+    path = tmp_path / "camera.yaml"
+    path.write_text(yaml.safe_dump(values))
+    return path
+
+
+def trpac(*arguments):
+    return CliRunner().invoke(app, ["vision", *map(str, arguments)])
+
+
+def drive(frames, camera_file, out, speed_m_s=10.0, fps=20.0):
+    return trpac("run", frames, "--camera", camera_file, "--speed-m-s", speed_m_s, "--fps", fps, "--out", out)
+
+
+class ByColour:
+    """Logits are the mean blue, green and red of a patch, over 100."""
+
+    temperature = 2.0
+
+    def logits(self, patches):
+        return patches.astype(np.float64).mean(axis=(1, 2)) / 100.0
+
+
+class Certain:
+    """Every patch has the same logits."""
+
+    temperature = 1.5
+
+    def logits(self, patches):
+        return np.tile([2.0, 0.5, -1.0], (len(patches), 1))
+
+
+def noisy(colour, height, width):
+    """A colour with just enough grain to count as a picture."""
+    grain = np.random.default_rng(0).integers(-4, 5, (height, width, 1))
+    return np.clip(np.array(colour) + grain, 0, 255).astype(np.uint8)
+
+
+def masks(drivable, shadow=None):
+    none = np.zeros((160, 256), np.float32)
+    return RoadMasks(drivable.astype(np.float32), none if shadow is None else shadow.astype(np.float32))
+
+
+# --- classify ---
+
+
+def test_classify_tells_dry_from_snow_and_writes_the_agreed_columns(folder, tmp_path):
+    out = tmp_path / "deep" / "classes.csv"
+    result = trpac("classify", folder, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    table = pd.read_csv(out)
+    assert tuple(table.columns) == CLASSIFY_COLUMNS
+    assert list(table["file"]) == [str(folder / f"f_{number}.png") for number in range(8, 14)]
+    assert list(table["class"]) == ["dry"] * 3 + ["snow_ice"] * 3
+    shares = table[["p_dry", "p_wet", "p_snow_ice"]].to_numpy()
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=2e-6)
+    np.testing.assert_allclose(table["confidence"], shares.max(axis=1))
+    assert "3 dry, 0 wet, 3 snow_ice" in result.stdout
+    assert [path.name for path in out.parent.iterdir()] == ["classes.csv"]
+
+
+def test_what_cannot_be_used_is_named_and_the_rest_is_classified(folder, tmp_path, pictures):
+    cv2.imwrite(str(folder / "one.png"), np.zeros((1, 1, 3), np.uint8))
+    cv2.imwrite(str(folder / "lens_cap.png"), np.zeros((300, 480, 3), np.uint8))
+    cv2.imwrite(str(folder / "scan.tif"), pictures[0])
+    (folder / "broken.jpg").write_bytes(BROKEN)
+    (folder / "notes.txt").write_text("no picture, and none expected")
+    (folder / "._f_8.png").write_bytes(b"what file browsers leave")
+    missing = tmp_path / "not_there.jpg"
+    out = tmp_path / "classes.csv"
+    result = trpac("classify", missing, folder, folder / "f_8.png", "--out", out)
+    assert result.exit_code == 1
+    assert len(pd.read_csv(out)) == 6, "each good picture once"
+    lines = result.stderr.strip().splitlines()
+    assert lines[0] == "trpac vision classify: 5 of the inputs could not be used:"
+    assert [line.split(":")[0].rsplit("/")[-1] for line in lines[1:]] == [
+        "not_there.jpg",
+        "broken.jpg",
+        "lens_cap.png",
+        "one.png",
+        "scan.tif",
+    ]
+
+
+def test_nothing_is_written_where_nothing_can_be_classified(tmp_path):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    (tmp_path / "broken.jpg").write_bytes(BROKEN)
+    out = tmp_path / "out" / "classes.csv"
+    result = trpac("classify", empty, tmp_path / "broken.jpg", "--out", out)
+    assert result.exit_code == 2
+    assert "no pictures in this folder" in result.stderr
+    assert "broken.jpg" in result.stderr
+    assert not out.parent.exists()
+    assert trpac("classify", empty, "--out", tmp_path).exit_code == 2
+
+
+def turned_jpeg(image):
+    """A JPEG stored on its side, with the note that a telephone makes of it (EXIF orientation 6)."""
+    on_its_side = cv2.rotate(image, cv2.ROTATE_90_COUNTERCLOCKWISE)
+    jpeg = cv2.imencode(".jpg", on_its_side, [cv2.IMWRITE_JPEG_QUALITY, 98])[1].tobytes()
+    tag = struct.pack("<HHHIII", 1, 0x112, 3, 1, 6, 0)
+    exif = b"Exif\0\0II*\0" + struct.pack("<I", 8) + tag
+    return jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + jpeg[2:]
+
+
+def test_pictures_of_every_depth_and_turn_give_the_class_of_the_plain_one(tmp_path, pictures):
+    plain = pictures[4]
+    grey = cv2.cvtColor(plain, cv2.COLOR_BGR2GRAY)
+    variants = {
+        "a_plain": plain,
+        "b_deep": plain.astype(np.uint16) * 257,
+        "c_alpha": np.dstack([plain, np.full(plain.shape[:2], 7, np.uint8)]),
+        "d_large": cv2.resize(plain, (4000, 2500)),
+        "e_grey": grey,
+        "f_deep_grey": grey.astype(np.uint16) * 257,
+    }
+    for name, image in variants.items():
+        cv2.imwrite(str(tmp_path / f"{name}.png"), image)
+    (tmp_path / "g_turned.jpg").write_bytes(turned_jpeg(plain))
+    out = tmp_path / "classes.csv"
+    assert trpac("classify", tmp_path, "--out", out).exit_code == 0
+    table = pd.read_csv(out)
+    assert list(table["class"]) == ["snow_ice"] * 7
+    probabilities = table[["p_dry", "p_wet", "p_snow_ice"]].to_numpy()
+    np.testing.assert_array_equal(probabilities[1], probabilities[0])
+    np.testing.assert_array_equal(probabilities[2], probabilities[0])
+    np.testing.assert_allclose(probabilities[6], probabilities[0], atol=0.05)
+
+
+def test_only_usable_road_of_the_lower_centre_counts():
+    image = noisy((20, 20, 220), 320, 512)
+    image[:, :256] = noisy((220, 20, 20), 320, 256)
+    image[:180] = noisy((20, 220, 20), 180, 512)
+    left = np.zeros((160, 256), bool)
+    left[:, :128] = True
+    everywhere = np.ones((160, 256), bool)
+
+    def verdict(shown):
+        return Surface(int(picture_probabilities(image, shown, ByColour()).argmax()))
+
+    assert verdict(masks(left)) is Surface.DRY
+    assert verdict(masks(everywhere, shadow=left)) is Surface.SNOW_ICE
+    both = [
+        picture_probabilities(image, shown, ByColour())
+        for shown in (masks(everywhere), masks(~everywhere), masks(everywhere, shadow=everywhere))
+    ]
+    np.testing.assert_array_equal(both[0], both[1])
+    np.testing.assert_array_equal(both[0], both[2])
+    assert both[0][0] == pytest.approx(both[0][2], rel=0.05), "without usable road both halves count"
+    assert both[0][1] < 0.3, "what lies above the lower centre does not"
+
+
+def test_agreeing_patches_do_not_grow_more_certain_than_one():
+    image = noisy((100, 100, 100), 400, 640)
+    fused = picture_probabilities(image, masks(np.ones((160, 256), bool)), Certain())
+    np.testing.assert_allclose(fused, calibrated_probabilities(np.array([[2.0, 0.5, -1.0]]), 1.5)[0])
+
+
+def test_one_even_colour_is_refused():
+    with pytest.raises(ImageError, match=r"dark\.png: one even colour"):
+        picture_probabilities(
+            np.full((300, 400, 3), 90, np.uint8), masks(np.ones((160, 256), bool)), Certain(), "dark.png"
+        )
+
+
+@given(st.integers(64, 8000), st.integers(64, 8000))
+def test_patches_lie_in_pictures_of_any_shape(width, height):
+    places = vision_runs._patch_places(width, height)
+    assert 1 <= len(places) <= 3 * vision_runs.MOST_PER_AXIS**2
+    for column, row, patch_px in places:
+        left, top, right, bottom = roi_box(width, height, (column, row), patch_px)
+        assert 0 <= left < right <= width
+        assert 0 <= top < bottom <= height
+        assert 0.2 * width <= column <= 0.8 * width
+        assert 0.6 * height <= row <= 0.95 * height
+
+
+# --- run ---
+
+
+def test_a_folder_of_frames_gives_what_the_estimator_gives_frame_by_frame(folder, camera_file, tmp_path):
+    out = tmp_path / "out"
+    result = drive(folder, camera_file, out)
+    assert result.exit_code == 0, result.stderr
+    table = pd.read_csv(out / "frames.csv", keep_default_na=False)
+    assert tuple(table.columns) == FRAME_COLUMNS
+    assert list(table["frame"]) == [f"f_{number}.png" for number in range(8, 14)]
+    assert list(table["class"]) == list(table["voting_class"]) == ["dry"] * 3 + ["snow_ice"] * 3
+    networks = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
+    ife, state = Ife(IfeConfig(camera=SMALL), *networks), IfeState()
+    for _, row in table.iterrows():
+        state, expected = ife.process(state, decode_image(folder / row["frame"]), Motion(10.0))
+        found = (row["P_fusion"], row["p_util"], row["Q_v"], row["flag"])
+        assert found == pytest.approx(
+            (expected.P_fusion, expected.p_util, expected.Q_v, int(expected.flag)), 1e-5
+        )
+        assert 0.0 < row["ms"] < 5000.0
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["frames"] == 6
+    assert summary["unreadable"] == []
+    assert summary["class_share"] == {"dry": 0.5, "wet": 0.0, "snow_ice": 0.5}
+    assert summary["flag_share"] == pytest.approx(table["flag"].mean())
+    assert table["ms"].min() <= summary["ms_median"] <= summary["ms_p99"] <= table["ms"].max() * 1.00001
+    assert set(summary["model_sha256"]) == {"segmenter.onnx", "surface.onnx"}
+    assert sorted(path.name for path in out.iterdir()) == [
+        "annotated.mp4",
+        "frames.csv",
+        "strip.jpg",
+        "summary.json",
+    ]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["camera.yaml", "frames", "out"]
+    film = cv2.VideoCapture(str(out / "annotated.mp4"))
+    assert (film.get(cv2.CAP_PROP_FRAME_COUNT), film.get(cv2.CAP_PROP_FPS)) == (6, 20.0)
+    assert film.read()[1].shape == (600, 960, 3)
+    assert decode_image(out / "strip.jpg").shape == (600, 1440, 3)
+
+
+def test_an_unusable_frame_is_listed_and_leaves_the_memory_alone(folder, camera_file, tmp_path, pictures):
+    assert drive(folder, camera_file, tmp_path / "whole").exit_code == 0
+    (folder / "f_1.jpg").write_bytes(BROKEN)
+    cv2.imwrite(str(folder / "f_11_cropped.png"), pictures[0][:200])
+    result = drive(folder, camera_file, tmp_path / "holed")
+    assert result.exit_code == 1
+    assert "2 of 8 frames could not be used" in result.stderr
+    assert "480 x 200" in result.stderr
+    whole, holed = (
+        pd.read_csv(tmp_path / name / "frames.csv", keep_default_na=False) for name in ("whole", "holed")
+    )
+    bad = holed["frame"].isin(["f_1.jpg", "f_11_cropped.png"])
+    assert list(holed[bad].index) == [0, 5]
+    for column, empty in zip(FRAME_COLUMNS[1:], ("", "", "", "", 0, "", ""), strict=True):
+        assert list(holed[bad][column]) == [empty] * 2, column
+    left = holed[~bad].drop(columns="ms").astype(str).reset_index(drop=True)
+    numbers = ["P_fusion", "p_util", "Q_v"]
+    right = whole.drop(columns="ms").astype(str)
+    pd.testing.assert_frame_equal(left.drop(columns=numbers), right.drop(columns=numbers))
+    np.testing.assert_allclose(left[numbers].astype(float), right[numbers].astype(float))
+    summary = json.loads((tmp_path / "holed" / "summary.json").read_text())
+    assert [entry["frame"] for entry in summary["unreadable"]] == ["f_1.jpg", "f_11_cropped.png"]
+    assert summary["class_share"]["dry"] == 0.5
+    film = cv2.VideoCapture(str(tmp_path / "holed" / "annotated.mp4"))
+    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 8
+
+
+def test_a_video_is_read_frame_by_frame(camera_file, tmp_path, pictures):
+    video = tmp_path / "drive.mp4"
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"mp4v"), 20.0, (480, 300))
+    for image in pictures:
+        writer.write(image)
+    writer.release()
+    result = drive(video, camera_file, tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    table = pd.read_csv(tmp_path / "out" / "frames.csv", dtype={"frame": str})
+    assert list(table["frame"]) == [f"{number:06d}" for number in range(6)]
+    assert list(table["class"]) == ["dry"] * 3 + ["snow_ice"] * 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"frames": "nowhere"}, "no such folder or video"),
+        ({"frames": "empty"}, "no pictures in this folder"),
+        ({"frames": "frames/f_8.png"}, "a single picture"),
+        ({"frames": "camera.yaml"}, "not a video that can be decoded"),
+        ({"camera_file": "missing.yaml"}, "missing.yaml"),
+        ({"camera_file": "wrong.yaml"}, "height_m"),
+        ({"camera_file": "square.yaml"}, "none of 6 frames could be used"),
+        ({"speed_m_s": "nan", "fps": 0}, "expected a number of at least 0; 0 frames per second"),
+        ({"out": "camera.yaml"}, "a file. Expected a folder"),
+        ({"out": "frames"}, "holds the frames"),
+        ({"out": "camera.yaml/below/it"}, "camera.yaml"),
+        ({"camera_file": "square.yaml", "out": "new/folders/out"}, "none of 6 frames"),
+    ],
+)
+def test_unusable_input_is_one_message_and_leaves_no_trace(folder, camera_file, tmp_path, changes, expected):
+    (tmp_path / "empty").mkdir()
+    values = yaml.safe_load(camera_file.read_text())
+    (tmp_path / "square.yaml").write_text(yaml.safe_dump(values | {"height_px": 480}))
+    (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(values | {"height_m": -1.0}))
+    arguments = {"frames": folder, "camera_file": camera_file, "out": tmp_path / "out"}
+    arguments |= {
+        key: tmp_path / value if isinstance(value, str) else value for key, value in changes.items()
+    }
+    if "speed_m_s" in changes:
+        arguments["speed_m_s"] = changes["speed_m_s"]
+    before = sorted(tmp_path.rglob("*"))
+    result = drive(**arguments)
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith("trpac vision run: ")
+    assert expected in result.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_run_broken_off_leaves_the_results_of_the_last_one(folder, camera_file, tmp_path):
+    out = tmp_path / "out"
+    assert drive(folder, camera_file, out).exit_code == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def broken_off(done, total):
+        if done == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_frames(Frames.find(folder), camera_file, 20.0, 40.0, out, broken_off)
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["camera.yaml", "frames", "out"]
+
+
+def test_without_an_encoder_there_is_the_strip_and_the_run_says_so(
+    folder, camera_file, tmp_path, monkeypatch
+):
+    out = tmp_path / "out"
+    assert drive(folder, camera_file, out).exit_code == 0
+
+    class NoEncoder:
+        fourcc = staticmethod(cv2.VideoWriter.fourcc)
+
+        def __init__(self, *arguments):
+            pass
+
+        def isOpened(self):
+            return False
+
+    monkeypatch.setattr(vision_runs.cv2, "VideoWriter", NoEncoder)
+    result = drive(folder, camera_file, out)
+    assert result.exit_code == 0, result.stderr
+    assert "strip.jpg in place of annotated.mp4" in result.stdout
+    assert sorted(path.name for path in out.iterdir()) == ["frames.csv", "strip.jpg", "summary.json"]
+    assert json.loads((out / "summary.json").read_text())["annotated"] is None
+
+
+@given(st.integers(1, 400))
+def test_the_strip_spreads_evenly_over_a_run_of_any_length(count):
+    strip = vision_runs._Strip()
+    for number in range(count):
+        strip.add(np.full((2, 480, 3), number % 256, np.uint8))
+    kept = len(strip._tiles)
+    assert min(count, 12) <= kept <= 24
+    shown = [int(tile[0, 0, 0]) for tile in strip._tiles]
+    assert shown == [number % 256 for number in range(0, count, strip._stride)]
