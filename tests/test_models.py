@@ -10,11 +10,12 @@ import numpy as np
 import onnxruntime as ort
 import pytest
 
-ROOT = Path(__file__).parents[1]
 from models.training import data, patches, scores
 from models.training.calibrate import probabilities
 from models.training.rendered import SEED_RANGES, draw_worlds
 from models.training.segmenter_data import masked_sample, painted_views, plain_view
+
+ROOT = Path(__file__).parents[1]
 
 MODELS = ROOT / "models"
 WORLDS = 12

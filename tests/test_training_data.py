@@ -12,9 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-ROOT = Path(__file__).parents[1]
 from models.training import augment, calibrate, data, patches, rendered, scores, segmenter_data
 from models.training.__main__ import main
+
+ROOT = Path(__file__).parents[1]
 
 COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height"]
 GREY, WHITE = 90, 250
