@@ -202,6 +202,7 @@ def test_only_usable_road_of_the_lower_centre_counts():
 
     assert verdict(masks(left)) is Surface.DRY
     assert verdict(masks(everywhere, shadow=left)) is Surface.SNOW_ICE
+    assert verdict(masks(everywhere, shadow=~left)) is Surface.DRY
     both = [
         picture_probabilities(image, shown, ByColour())
         for shown in (masks(everywhere), masks(~everywhere), masks(everywhere, shadow=everywhere))

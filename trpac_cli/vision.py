@@ -66,7 +66,7 @@ def run(
         Path, typer.Argument(help="Folder of frames (in the order of their names), or a video.")
     ],
     camera: Annotated[Path, typer.Option(help="Camera file, such as scenarios/cameras/paper.yaml.")],
-    speed_m_s: Annotated[float, typer.Option(help="Constant speed of the car [m/s].")],
+    speed_m_s: Annotated[float, typer.Option(help="Constant speed of the car in m/s.")],
     fps: Annotated[float, typer.Option(help="Frames per second.")],
     out: Annotated[
         Path, typer.Option(help="Folder for frames.csv, annotated.mp4, strip.jpg and summary.json.")
