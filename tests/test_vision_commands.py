@@ -12,11 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from scenarios import vision_runs
+from scenarios import film, stills
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.looks import MODELS
-from scenarios.vision_runs import CLASSIFY_COLUMNS, FRAME_COLUMNS, Frames, picture_probabilities, run_frames
+from scenarios.stills import CLASSIFY_COLUMNS, picture_probabilities
+from scenarios.vision_runs import FRAME_COLUMNS, Frames, run_frames
 from trpac_cli.main import app
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
@@ -228,8 +229,8 @@ def test_one_even_colour_is_refused():
 
 @given(st.integers(64, 8000), st.integers(64, 8000))
 def test_patches_lie_in_pictures_of_any_shape(width, height):
-    places = vision_runs._patch_places(width, height)
-    assert 1 <= len(places) <= 3 * vision_runs.MOST_PER_AXIS**2
+    places = stills._patch_places(width, height)
+    assert 1 <= len(places) <= 3 * stills.MOST_PER_AXIS**2
     for column, row, patch_px in places:
         left, top, right, bottom = roi_box(width, height, (column, row), patch_px)
         assert 0 <= left < right <= width
@@ -384,7 +385,7 @@ def test_without_an_encoder_there_is_the_strip_and_the_run_says_so(
         def isOpened(self):
             return False
 
-    monkeypatch.setattr(vision_runs.cv2, "VideoWriter", NoEncoder)
+    monkeypatch.setattr(film.cv2, "VideoWriter", NoEncoder)
     result = drive(folder, camera_file, out)
     assert result.exit_code == 0, result.stderr
     assert "strip.jpg in place of annotated.mp4" in result.stdout
@@ -394,7 +395,7 @@ def test_without_an_encoder_there_is_the_strip_and_the_run_says_so(
 
 @given(st.integers(1, 400))
 def test_the_strip_spreads_evenly_over_a_run_of_any_length(count):
-    strip = vision_runs._Strip()
+    strip = film.Strip()
     for number in range(count):
         strip.add(np.full((2, 480, 3), number % 256, np.uint8))
     kept = len(strip._tiles)

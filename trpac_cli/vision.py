@@ -14,8 +14,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from scenarios.stills import Progress as Told
     from scenarios.vision_runs import Drive
-    from scenarios.vision_runs import Progress as Told
 
 EXIT_SOME_UNREADABLE = 1
 """Done, but some of the pictures could not be used; they are named on standard error."""
@@ -40,7 +40,7 @@ def classify(
 
     Exit codes: 0 done, 1 done but some pictures could not be used, 2 unusable input.
     """
-    from scenarios.vision_runs import classify_pictures, find_pictures, write_classes
+    from scenarios.stills import classify_pictures, find_pictures, write_classes
     from trpac_core.vision.networks import ModelError
 
     command = "trpac vision classify"

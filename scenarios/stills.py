@@ -1,0 +1,196 @@
+"""The surface of single road pictures, of any camera."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from scenarios.looks import MODELS
+from trpac_core.vision.classes import Surface
+from trpac_core.vision.ife import LEAST_CONTRAST, usable_road
+from trpac_core.vision.images import ImageError, decode_image
+from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier, calibrated_probabilities
+from trpac_core.vision.regions import LEAST_ROI_WIDTH_PX, ROI_ASPECT, cut_patch, roi_box
+
+CLASSIFY_COLUMNS = ("file", "class", "confidence", "p_dry", "p_wet", "p_snow_ice")
+PICTURE_ENDINGS = frozenset((".jpg", ".jpeg", ".png", ".bmp", ".gif", ".heic", ".tif", ".tiff", ".webp"))
+"""Files of a folder that count as pictures: those of unsupported formats are reported, not passed over."""
+
+LOWER_CENTRE = (0.20, 0.60, 0.80, 0.95)
+"""Where road is in the picture of a camera of which nothing is known: left, top, right, bottom [of its size]."""
+PATCH_SCALES = (1.0, 0.55, 0.3)
+"""Patch widths, of the largest that the lower centre holds [-]."""
+MOST_PER_AXIS = 6
+"""Patches of one width side by side, or one above the other."""
+LEAST_USABLE = 0.8
+"""Share of a patch that must be road out of the shadow [-]."""
+LEAST_PATCHES = 4
+"""With fewer patches on usable road, all of the lower centre's are taken."""
+_LEAST_PROBABILITY = 1e-12
+
+Progress = Callable[[int, int], None]
+"""Told how much of how much is done."""
+
+
+def silent(done: int, total: int) -> None:
+    """Progress that nobody follows."""
+
+
+def find_pictures(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:
+    """Picture files named or lying in named folders, numbers in names in their order, each once; and problems."""
+    found: dict[Path, None] = {}
+    problems = []
+    for path in paths:
+        inside = pictures_in(path) if path.is_dir() else [path]
+        if not inside:
+            problems.append(
+                f"{path}: no pictures in this folder. Expected JPEG or PNG files; name subfolders too."
+            )
+        found.update(dict.fromkeys(inside))
+    return list(found), problems
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """Pictures of a folder in counting order; raises OSError."""
+    files = (
+        p for p in folder.iterdir() if p.suffix.lower() in PICTURE_ENDINGS and not p.name.startswith(".")
+    )
+    return sorted((p for p in files if p.is_file()), key=counting_order)
+
+
+def counting_order(path: Path) -> tuple[list[tuple[int, int, str]], str]:
+    """Sorting key in which frame_2 comes before frame_10."""
+    parts = re.findall(r"(\d+)|(\D+)", path.name)
+    return [(0, int(digits), "") if digits else (1, 0, text) for digits, text in parts], path.name
+
+
+def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tuple[pd.DataFrame, list[str]]:
+    """Surface of each picture, of any camera.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        JPEG or PNG.
+    progress : callable
+        Told how many pictures are done.
+
+    Returns
+    -------
+    DataFrame, list of str
+        Columns `CLASSIFY_COLUMNS`, one row per picture that could be judged; one sentence per other picture.
+
+    Raises
+    ------
+    ModelError
+        If a network file cannot be used.
+    """
+    segmenter, classifier = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
+    rows, problems = [], []
+    for done, file in enumerate(files, start=1):
+        try:
+            image = _upright(file)
+            probabilities = picture_probabilities(image, segmenter.segment(image), classifier, str(file))
+            surface = Surface(int(probabilities.argmax()))
+            rows.append((str(file), surface.label, float(probabilities.max()), *probabilities.tolist()))
+        except ImageError as error:
+            problems.append(str(error))
+        progress(done, len(files))
+    return pd.DataFrame(rows, columns=list(CLASSIFY_COLUMNS)), problems
+
+
+def picture_probabilities(
+    image: NDArray[np.uint8], masks: RoadMasks, classifier: SurfaceClassifier, name: str = "image"
+) -> NDArray[np.float64]:
+    """Probabilities of dry, wet, snow and ice of one picture, shape (3,) [-].
+
+    The mean log probability of its patches, normalised: patches of one picture share light, camera and road, so they
+    are not the independent bodies of evidence that Dempster's rule would multiply to near-certainty.
+
+    Raises ImageError where the lower centre shows nothing at all: a covered, blinded or dark camera.
+    """
+    height, width = image.shape[:2]
+    boxes = _patch_places(width, height)
+    usable = usable_road(masks, remove_shadow=True)
+    share = np.array(
+        [_usable_share(usable, roi_box(width, height, at[:2], at[2]), width, height) for at in boxes]
+    )
+    on_road = boxes[share >= LEAST_USABLE]
+    for places in (on_road, boxes):
+        cut = [cut_patch(image, place[:2], place[2]) for place in places]
+        patches = [patch for patch in cut if patch.std(axis=(0, 1)).max() >= LEAST_CONTRAST]
+        if len(patches) >= LEAST_PATCHES:
+            break
+    if not patches:
+        raise ImageError(
+            f"{name}: one even colour where the road should be. Is the lens covered, or the picture dark?"
+        )
+    probabilities = calibrated_probabilities(classifier.logits(np.stack(patches)), classifier.temperature)
+    logs = np.log(np.maximum(probabilities, _LEAST_PROBABILITY)).mean(axis=0)
+    raised = np.exp(logs - logs.max())
+    return raised / raised.sum()
+
+
+def _upright(file: Path) -> NDArray[np.uint8]:
+    """The picture as a viewer shows it; raises ImageError. A turn noted by a telephone would move the road."""
+    image = decode_image(file)
+    data = file.read_bytes()
+    if b"Exif\0" not in data[:65536] and b"eXIf" not in data:
+        return image
+    turned = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR_BGR)
+    return image if turned is None else turned.astype(np.uint8, copy=False)
+
+
+def _patch_places(width_px: int, height_px: int) -> NDArray[np.float64]:
+    """Patches that cover the lower centre in three sizes: column, row and width of each, shape (n, 3) [px]."""
+    left, top, right, bottom = np.array(LOWER_CENTRE) * [width_px, height_px, width_px, height_px]
+    largest = min(right - left, ROI_ASPECT * (bottom - top))
+    places = []
+    for scale in PATCH_SCALES:
+        width = scale * largest
+        if scale == PATCH_SCALES[0] or width >= LEAST_ROI_WIDTH_PX:
+            columns = _spread(left, right, width)
+            places += [(x, y, width) for x in columns for y in _spread(top, bottom, width / ROI_ASPECT)]
+    return np.array(places)
+
+
+def _spread(low: float, high: float, length: float) -> NDArray[np.float64]:
+    """Centres of pieces of a length that overlap by two fifths and fill the stretch from low to high."""
+    count = min(MOST_PER_AXIS, 1 + round((high - low - length) / (0.6 * length)))
+    if count == 1:
+        return np.array([(low + high) / 2.0])
+    return np.linspace(low + length / 2.0, high - length / 2.0, count)
+
+
+def _usable_share(
+    usable: NDArray[np.bool_], box: tuple[int, int, int, int], width_px: int, height_px: int
+) -> float:
+    """Share of a patch that is usable road [-], from the mask of the whole picture."""
+    rows, columns = usable.shape
+    left, right = box[0] * columns // width_px, -(-box[2] * columns // width_px)
+    top, bottom = box[1] * rows // height_px, -(-box[3] * rows // height_px)
+    return float(usable[top:bottom, left:right].mean())
+
+
+def write_classes(table: pd.DataFrame, out: Path) -> None:
+    """Write the table of `classify_pictures`, whole or not at all; raises OSError."""
+    with scratch_for(out.parent) as scratch:
+        table.to_csv(scratch / out.name, index=False, float_format="%.6f")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        (scratch / out.name).replace(out)
+
+
+@contextmanager
+def scratch_for(folder: Path) -> Iterator[Path]:
+    """A passing folder on the file system that a folder lies on, or will lie on, so that moving is at once."""
+    whole = folder.absolute()
+    nearest = next(place for place in (whole, *whole.parents) if place.exists())
+    with tempfile.TemporaryDirectory(dir=nearest, prefix=".trpac_") as scratch:
+        yield Path(scratch)
