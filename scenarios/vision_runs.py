@@ -21,7 +21,7 @@ from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.film import Film, Strip, dark, shown
 from scenarios.looks import MODELS
-from scenarios.stills import Progress, pictures_in, scratch_for, silent
+from scenarios.stills import PICTURE_ENDINGS, Progress, pictures_in, scratch_for, silent
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeConfig, IfeState
 from trpac_core.vision.images import ImageError, decode_image
