@@ -5,7 +5,8 @@ import time
 
 import numpy as np
 
-from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors, TrpacEstimator
+from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.readings import Sensors
 from trpac_core.vision.classes import Surface
 
 STEPS, REPEATS = 5000, 9

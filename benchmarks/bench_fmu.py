@@ -24,7 +24,8 @@ from pythonfmu import FmuBuilder
 
 from fmu_src.packaging import build_unit, sha256, unpack_unit
 from fmu_src.units import UNITS
-from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors, TrpacEstimator
+from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.readings import Sensors
 from trpac_core.vision.classes import Surface
 
 STEP_S = 0.001

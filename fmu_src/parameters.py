@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from trpac_core.estimator import EstimatorConfig
@@ -27,11 +26,7 @@ def configuration(variables: Sequence[Variable], values: Mapping[str, Any]) -> E
         raise ValueError(f"{len(problems)} parameter(s) cannot be used: {'; '.join(problems)}.")
     settings = {v.source: values[v.name] for v in parameters}
     configured: EstimatorConfig = with_fields(EstimatorConfig(), settings)
-    return replace(
-        configured,
-        frame_interval_s=1.0 / configured.vision.camera.fps,
-        flag_threshold=configured.vision.flag_threshold,
-    )
+    return configured
 
 
 def _problem(variable: Variable, value: Any) -> str | None:

@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
 
-from trpac_core.estimator import Estimate, Sensors
+from trpac_core.estimator import Estimate
 from trpac_core.estimator import TrpacEstimator as Estimator
+from trpac_core.readings import Sensors
 from trpac_core.vision.ife import Ife
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier

@@ -8,9 +8,13 @@ from pathlib import Path
 
 import pytest
 from fmu_unit import Unit
+from hypothesis import settings
 
 from fmu_src.packaging import build_unit, unpack_unit
 from fmu_src.units import UNITS
+
+settings.register_profile("project", deadline=None)  # a busy machine is no fault of the code
+settings.load_profile("project")
 
 
 @pytest.fixture(scope="session")

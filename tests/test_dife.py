@@ -35,7 +35,7 @@ def on_road(theta, slip=0.03, deviation=0.0, change=0.0):
     """A wheel that turns evenly at a slip: its torque balances the tyre's force."""
     force = tyre.force(theta, slip, LOAD_N, WHEEL.longitudinal_stiffness_n, 1.0)
     omega = 10.0 / WHEEL.radius_m / (1.0 - slip)
-    return WheelInputs(omega, force * WHEEL.radius_m, Slip(slip, 1.0), LOAD_N, deviation, change)
+    return WheelInputs(omega, omega, force * WHEEL.radius_m, Slip(slip, 1.0), LOAD_N, deviation, change)
 
 
 def run(inputs, theta_hat, seconds, gains=GAINS, theta_img=None):
@@ -126,7 +126,7 @@ def test_a_wrong_class_dry_does_not_keep_the_estimator_off_a_sliding_tyre():
     st.one_of(st.none(), st.floats(0.0, 1.2)),
 )
 def test_whatever_comes_the_estimate_stays_in_its_domain(slip, direction, torque, step_s, theta_img):
-    inputs = WheelInputs(40.0, torque, Slip(slip, direction if slip else 0.0), LOAD_N, 1e-4, 0.0)
+    inputs = WheelInputs(40.0, 40.0, torque, Slip(slip, direction if slip else 0.0), LOAD_N, 1e-4, 0.0)
     state = FusionState(0.5, 0.0)
     for _ in range(5):
         state = fusion_step(state, inputs, WHEEL, GAINS, SCHEDULER, theta_img, step_s).state

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trpac_core import tyre
-from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors, TrpacEstimator
+from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.readings import Sensors
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from fmu_unit import DRIVING, STEP_S, Unit
 
-from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors
+from trpac_core.estimator import EstimatorConfig, RoadClass
 from trpac_core.estimator import TrpacEstimator as Estimator
+from trpac_core.readings import Sensors
 from trpac_core.vision.classes import CLASS_THETA, Surface
 
 pytestmark = pytest.mark.e2e

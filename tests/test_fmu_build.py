@@ -153,8 +153,6 @@ DERIVED = {
     "vision.track_m",
     "vision.wheelbase_m",
     "vision.side",
-    "frame_interval_s",
-    "flag_threshold",
     "preview.behind_m",
 }
 """Settings that follow from others."""

@@ -21,7 +21,7 @@ CONFIG = PreviewConfig()
 
 
 def outcome(frame: int, surface: Surface = Surface.DRY) -> Outcome:
-    return Outcome(surface, 0.9, 0.8, True, captured_s=float(frame))
+    return Outcome(surface, 0.8, True, captured_s=float(frame))
 
 
 def drive(positions_m, config=CONFIG, speed_m_s=10.0) -> PreviewState:
@@ -161,7 +161,7 @@ def test_pruning_bounds_a_long_drive():
     st.booleans(),
 )
 def test_state_survives_json_bit_for_bit(bounds, confidence, surface, flag):
-    said = Outcome(surface, confidence, confidence / 3.0, flag, 0.1 + 0.2)
+    said = Outcome(surface, confidence / 3.0, flag, 0.1 + 0.2)
     state = PreviewState(tuple(Stamp(b, b + 0.1, said) for b in bounds), bounds[-1] if bounds else None)
     back = PreviewState.from_json(json.loads(json.dumps(state.to_json())))
     assert back == state

@@ -31,6 +31,11 @@ class ConfidenceModel:
     unknown: float = 0.29
 
 
+def wandered(model: ConfidenceModel, variance: float, way_m: float) -> float:
+    """Variance after a way driven unseen [-]."""
+    return min(variance + model.road_change**2 * abs(way_m), model.unknown**2)
+
+
 def advanced_variance(
     model: ConfidenceModel,
     variance: float,
@@ -39,7 +44,7 @@ def advanced_variance(
     inputs: WheelInputs,
     wheel: Wheel,
     gamma: float,
-    speed_m_s: float,
+    way_m: float,
     step_s: float,
 ) -> float:
     """Variance of the estimate one step later [-].
@@ -50,7 +55,7 @@ def advanced_variance(
     """
     if step_s == 0.0:
         return variance
-    grown = variance + model.road_change**2 * max(speed_m_s, 0.0) * step_s
+    grown = wandered(model, variance, way_m)
     if sensitivity > 0.0:
         slope = friction_by_slip(theta_hat, inputs.slip.size, inputs.load_n, wheel.longitudinal_stiffness_n)
         from_slip = slope * inputs.slip_deviation

@@ -57,13 +57,16 @@ class WheelInputs(NamedTuple):
     """What one wheel's estimator is given at a step."""
 
     wheel_speed_rad_s: float
+    wheel_speed_ahead_rad_s: float
+    """Mean over the step to come: a wheel that gains speed would else seem to bear too much force."""
     wheel_torque_nm: float
+    """Mean over the step to come."""
     slip: Slip
     load_n: float
     slip_deviation: float
     """Standard deviation of the slip through sensor noise [-]."""
     slip_change: float
-    """How much the slip changed within the sensor filter's time constant [-]: force and slip of a tyre that is being
+    """Distance of the slip from its own, once more filtered, course [-]: force and slip of a tyre that is being
     loaded or unloaded pass the filter along the chord of its bent curve, and lie that far beside it."""
 
 
@@ -89,7 +92,7 @@ class FusionStep(NamedTuple):
     tyre_force_n: float
     """Observed force F_hat [N]."""
     sensitivity: float
-    """d mu / d theta at theta(lambda, F_hat) [-]; 0 where the tyre does not show theta."""
+    """d mu / d theta at theta(lambda, F_hat) [-]; 0 where the tyre does not show theta or the estimate holds."""
     threshold: float
     """Excitation threshold [-]."""
     excited: bool
@@ -165,7 +168,7 @@ def fusion_step(
         Step [s].
     """
     slip, load_n, C_x = inputs.slip, inputs.load_n, wheel.longitudinal_stiffness_n
-    model_n = force(state.theta_hat, slip.size, load_n, C_x, slip.direction) if slip.size else 0.0
+    model_n = force(state.theta_hat, slip.size, load_n, C_x, slip.direction)
     F_hat = observed_force(
         model_n, state.s, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m
     )
@@ -191,13 +194,14 @@ def fusion_step(
         by_theta_n,
         rate,
         inputs.wheel_torque_nm,
-        inputs.wheel_speed_rad_s,
+        inputs.wheel_speed_ahead_rad_s,
         gains.K,
         wheel.inertia_kg_m2,
         wheel.radius_m,
         step_s,
     )
-    return FusionStep(FusionState(theta_next, s), F_hat, sensitivity, threshold, excited, K_v)
+    shown = sensitivity if excited else 0.0
+    return FusionStep(FusionState(theta_next, s), F_hat, shown, threshold, excited, K_v)
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:

@@ -62,7 +62,7 @@ def advanced_state(
     radius_m: float,
     step_s: float,
 ) -> float:
-    """The inner state one step later, Eq. (15), exact for inputs held over the step. [rad/s^2].
+    """The inner state one step later, Eq. (15), exact for constant inputs over the step. [rad/s^2].
 
     With Eq. (14) put in, (15) is linear in s with the pole -K; its exact solution is stable for any step size.
 
@@ -75,7 +75,8 @@ def advanced_state(
     theta_rate_1_s : float
         theta_hat' over the step [1/s].
     wheel_torque_nm, wheel_speed_rad_s : float
-        Inputs at the start of the step [N m], [rad/s].
+        Their means over the step [N m], [rad/s]: with those of its start the inertia's share of a wheel that gains
+        speed would be counted K dt / (1 - exp(-K dt)) times.
     gain, inertia_kg_m2, radius_m, step_s : float
         K [1/s], I [kg m^2], R [m] and the step [s].
     """

@@ -8,11 +8,10 @@ frame interval's way further, so that successive frames tile the road. Real fram
 the tiling is read as:
 
 * A stamp's length is the way driven since the frame before; for the first frame, speed times frame interval.
-* A result holds from its X_lb until the X_lb of the next frame, at most `hold_m` beyond its X_ub. The default
-is the
-  depth of the near group, the stretch of road that the result was taken from. Then there is a gap: no result.
-* Where several stamps cover a position, the newest frame wins. * Frames less than `resolution_m` apart share
-one stamp, with the newest result: a standing car does not pile up
+* A result holds from its X_lb until the X_lb of the next frame, at most `hold_m` beyond its X_ub; then there is a
+  gap: no result. The default is the depth of the near group, the stretch of road that the result was taken from.
+* Where several stamps cover a position, the newest frame wins.
+* Frames less than `resolution_m` apart share one stamp, with the newest result: a standing car does not pile up
   stamps.
 """
 
@@ -31,7 +30,6 @@ class Outcome:
     """What a frame, or a classifier elsewhere on the bus, says of the road ahead."""
 
     surface: Surface
-    confidence: float
     Q_v: float
     flag: bool
     captured_s: float
@@ -85,7 +83,7 @@ class PreviewState:
         return {
             "captured_at_m": self.captured_at_m,
             "stamps": [
-                [s.X_lb_m, s.X_ub_m, int(o.surface), o.confidence, o.Q_v, o.flag, o.captured_s]
+                [s.X_lb_m, s.X_ub_m, int(o.surface), o.Q_v, o.flag, o.captured_s]
                 for s in self.stamps
                 for o in (s.outcome,)
             ],
@@ -95,8 +93,8 @@ class PreviewState:
     def from_json(cls, data: Mapping[str, Any]) -> PreviewState:
         """The state that `to_json` wrote."""
         stamps = tuple(
-            Stamp(X_lb, X_ub, Outcome(Surface(surface), confidence, Q_v, flag, captured_s))
-            for X_lb, X_ub, surface, confidence, Q_v, flag, captured_s in data["stamps"]
+            Stamp(X_lb, X_ub, Outcome(Surface(surface), Q_v, flag, captured_s))
+            for X_lb, X_ub, surface, Q_v, flag, captured_s in data["stamps"]
         )
         return cls(stamps, data["captured_at_m"])
 

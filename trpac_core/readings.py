@@ -1,0 +1,97 @@
+"""What the car measures, what makes a reading unusable, and the one filter that all readings pass."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+PLAUSIBLE = {
+    "wheel_speed_rad_s": 1000.0,
+    "wheel_torque_nm": 20_000.0,
+    "vehicle_speed_m_s": 150.0,
+    "vertical_load_n": 50_000.0,
+    "steering_angle_rad": 1.5,
+    "longitudinal_acceleration_m_s2": 50.0,
+    "yaw_rate_rad_s": 20.0,
+}
+"""Sizes beyond which a reading of a road car is a fault or in another unit, in the unit of its name."""
+
+MOTION = ("vehicle_speed_m_s", "steering_angle_rad", "yaw_rate_rad_s")
+"""The readings that place a picture on the road."""
+
+GREATEST_ACCELERATION_M_S2 = 15.0
+"""No road car's tyres give more: a steeper change of speed is a jump of the signal [m/s^2]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """What the car measures now. What is None is not connected and is replaced as the estimator documents.
+
+    Torque is positive where it drives, brakes included; steering angle of the front wheels and yaw rate are
+    positive to the left.
+    """
+
+    wheel_speed_rad_s: float
+    wheel_torque_nm: float
+    vehicle_speed_m_s: float
+    vertical_load_n: float | None = None
+    steering_angle_rad: float = 0.0
+    longitudinal_acceleration_m_s2: float | None = None
+    yaw_rate_rad_s: float | None = None
+
+
+class Readings(NamedTuple):
+    """Filtered wheel speed [rad/s], wheel torque [N m] and vehicle speed [m/s]."""
+
+    wheel_speed_rad_s: float
+    wheel_torque_nm: float
+    vehicle_speed_m_s: float
+
+
+def filter_share(step_s: float, time_constant_s: float) -> float:
+    """How much of the way to a held value a first-order filter goes in a step [-]."""
+    return 1.0 - math.exp(-step_s / time_constant_s)
+
+
+def smoothed(before: Readings, sensors: Sensors, share: float) -> Readings:
+    """Readings through the first-order filter."""
+    omega, torque, speed = before
+    return Readings(
+        omega + share * (sensors.wheel_speed_rad_s - omega),
+        torque + share * (sensors.wheel_torque_nm - torque),
+        speed + share * (sensors.vehicle_speed_m_s - speed),
+    )
+
+
+def ahead(now: float, before: float, ratio: float) -> float:
+    """Mean over the step to come of a signal that goes on as it came; `ratio` of this step to the one before."""
+    return now + 0.5 * ratio * (now - before)
+
+
+def implausible(sensors: Sensors, names: tuple[str, ...]) -> list[str]:
+    """Which of these readings are not finite or beyond what a road car gives, each with what was expected."""
+    return [
+        f"{name} is {value:g}, expected a number within +-{PLAUSIBLE[name]:g}"
+        for name in names
+        if (value := getattr(sensors, name)) is not None and not abs(value) <= PLAUSIBLE[name]
+    ]
+
+
+def unusable(step_s: float, sensors: Sensors, wheel_radius_m: float, floor_m_s: float) -> str | None:
+    """One sentence on what makes a step's input unusable, None where it is good.
+
+    A wheel that reads a little below 0 is locked, not reversed: what counts is its speed against the floor.
+    """
+    if not math.isfinite(step_s) or step_s < 0.0:
+        return f"Step size is {step_s} s; expected a finite number of seconds, 0 or above."
+    bad = implausible(sensors, tuple(PLAUSIBLE))
+    if bad:
+        return f"{'; '.join(bad)}. Check the signal's source and unit."
+    if sensors.vertical_load_n is not None and sensors.vertical_load_n <= 0.0:
+        return f"vertical_load_n is {sensors.vertical_load_n:g}: a wheel without load has no friction to estimate."
+    if sensors.vehicle_speed_m_s < -floor_m_s:
+        return "The car rolls backwards: the camera looks the other way, and the estimate is held."
+    if sensors.wheel_speed_rad_s * wheel_radius_m < -floor_m_s and sensors.vehicle_speed_m_s > floor_m_s:
+        return "The wheel turns backwards while the car drives forwards; check the sign of wheel_speed_rad_s."
+    return None
