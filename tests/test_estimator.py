@@ -192,3 +192,78 @@ def test_nothing_that_arrives_raises_or_spoils_the_estimate(readings):
         assert math.isfinite(estimate.TRPAC_std)
         assert math.isfinite(estimate.tyre_force_n)
     assert driven(estimator, sliding(), 3.0).TRPAC == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_locked_wheel_is_not_a_fault():
+    """Its speed reads 0 give or take the sensor's noise."""
+    estimator = TrpacEstimator(EstimatorConfig())
+    noise = np.random.default_rng(2).normal(0.0, 0.01, 500)
+    for omega in noise:
+        load_n = CAR.wheel_load(True)
+        torque = -0.79 * 0.3 * load_n * CAR.wheel_radius_m
+        assert estimator.step(0.001, Sensors(float(omega), torque, 20.0, load_n)).problem is None
+
+
+@pytest.mark.parametrize("hold", [1, 10, 50])
+def test_load_follows_a_speed_that_is_updated_more_rarely_than_the_unit_steps(hold):
+    """A bus of 100 or 20 Hz under a host of 1 kHz: differentiated, it must still give the mean acceleration."""
+    estimator = TrpacEstimator(EstimatorConfig())
+    found = []
+    for row in range(2000):
+        speed = 5.0 + 3.0 * (row // hold * hold) * 1e-3
+        estimator.step(0.001, Sensors(speed / 0.29, 100.0, speed))
+        found.append(estimator.state()["state"]["acceleration_m_s2"])
+    assert np.mean(found[1000:]) == pytest.approx(3.0, abs=0.2)
+
+
+def test_a_frame_that_comes_with_unusable_readings_is_not_lost():
+    estimator = TrpacEstimator(EstimatorConfig())
+    driven(estimator, CRUISE, 0.05)
+    estimator.step(0.001, replace(CRUISE, wheel_torque_nm=NAN), RoadClass(Surface.WET, 0.9))
+    assert driven(estimator, CRUISE, 0.26).flag
+
+
+def test_under_a_gap_the_speed_that_can_be_read_counts():
+    """Braking from 20 to 5 m/s while the torque is missing: the way driven is that of the speed."""
+    estimator = TrpacEstimator(EstimatorConfig())
+    driven(estimator, Sensors(20.0 / 0.29, 0.0, 20.0), 0.01)
+    before = estimator.state()["state"]["position_m"]
+    unknown = estimator.last.TRPAC_std
+    speeds = np.linspace(20.0, 5.0, 2000)
+    for speed in speeds:
+        held = estimator.step(0.001, Sensors(speed / 0.29, NAN, speed))
+    assert estimator.state()["state"]["position_m"] - before == pytest.approx(speeds.sum() * 0.001)
+    assert held.TRPAC_std >= unknown
+
+
+def test_nothing_is_learned_while_the_estimate_holds():
+    """The standard deviation falls only with the estimator running."""
+    estimator = TrpacEstimator(EstimatorConfig())
+    noise = np.random.default_rng(7)
+    before = estimator.last.TRPAC_std
+    for _ in range(3000):
+        slip = 0.0036 * noise.random()
+        readings = replace(sliding(theta=0.1, slip=max(slip, 1e-5)), wheel_torque_nm=60.0 * noise.random())
+        now = estimator.step(0.001, readings)
+        assert now.excitation_flag or now.TRPAC_std >= before - 1e-12
+        before = now.TRPAC_std
+
+
+def test_a_failed_frames_own_road_has_no_flag_either():
+    """The next good frame speaks of the road beyond its own stamp, not of what the failed one would have shown."""
+    estimator = TrpacEstimator(EstimatorConfig())
+    driven(estimator, CRUISE, 0.2, RoadClass(Surface.WET, 0.9))
+    estimator.step(0.001, CRUISE, frame_failed=True)
+    driven(estimator, CRUISE, 0.099)
+    assert driven(estimator, CRUISE, 0.1, RoadClass(Surface.WET, 0.9)).flag
+    flags = [estimator.step(0.001, CRUISE).flag for _ in range(300)]
+    # 2.5 m at 10 m/s after the failed frame, 0.1 m before the next one's stamp
+    assert flags.index(False) == pytest.approx(50, abs=5)
+    assert flags[60:140] == [False] * 80
+    assert flags[170]
+
+
+def test_zero_step_keeps_the_guards_against_noise():
+    estimator = TrpacEstimator(EstimatorConfig())
+    ordinary = driven(estimator, CRUISE, 0.1)
+    assert estimator.step(0.0, CRUISE).excitation_threshold == pytest.approx(ordinary.excitation_threshold)
