@@ -87,7 +87,7 @@ _VEHICLE_PARAMETERS = (
         "N",
         "vehicle.longitudinal_stiffness_n",
         "Longitudinal stiffness C_x per unit slip",
-        1000.0,
+        10_000.0,
     ),
 )
 

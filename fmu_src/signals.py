@@ -131,9 +131,13 @@ OUTPUTS = (
     ),
     _output("K_v", "1", "Auxiliary gain of the visual term", 0.0),
     Variable(
-        "excitation_flag", Kind.BOOLEAN, "output", "discrete", "The slip suffices to observe the adhesion now"
+        "excitation_flag",
+        Kind.BOOLEAN,
+        "output",
+        "discrete",
+        "The fused estimate runs: slip above the threshold or visible",
     ),
-    _output("excitation_threshold", "1", "Slip above which the estimate is updated", 0.0, 1.0),
+    _output("excitation_threshold", "1", "Slip above which the fused estimate runs in any case", 0.0, 1.0),
     _output("slip", "1", "Longitudinal slip, unsigned", 0.0, 1.0),
     _output("tyre_force", "N", "Observed longitudinal tyre force, positive drives", nominal=1000.0),
     _output("TRPAC_image", "1", "Adhesion of the class that the camera gave the road under the wheel", 0.0),

@@ -12,12 +12,12 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
+from scenarios.files import WHEELS
 from scenarios.runner import ESTIMATORS, Run
 
 COLOURS = {"IFE": "#d08a00", "DE": "#2b6fb3", "DIFE": "#c0272d"}
 TRUTH = "#222222"
 ROAD = {"dry": "#eeeeea", "wet": "#d3e0ec", "snow_ice": "#f2f6fb"}
-NAMES = {"dry": "dry", "wet": "wet", "snow_ice": "snow, ice"}
 
 
 def draw_figure17(run: Run, path: Path) -> None:
@@ -63,10 +63,10 @@ def _motion(speed: Axes, slip: Axes, run: Run, table: pd.DataFrame, time: np.nda
     speed.plot(time, run.trajectory.speed_m_s, color=TRUTH, lw=1.4)
     speed.set_ylabel("(a) speed\n[m/s]")
     torque = speed.twinx()
-    torque.plot(time, run.trajectory.wheel_torque_nm[:, 0], color="#999999", lw=0.8)
+    wheel = WHEELS.index(run.scenario.wheel)
+    torque.plot(time, run.trajectory.wheel_torque_nm[:, wheel], color="#999999", lw=0.8)
     torque.set_ylabel("torque [N m]", color="#777777")
     torque.grid(visible=False)
-    wheel = ("fl", "fr", "rl", "rr").index(run.scenario.wheel)
     slip.plot(time, run.trajectory.slip[:, wheel], color="#999999", lw=1.2, label="true")
     slip.plot(time, table["slip"], color=TRUTH, lw=0.8, label="in the unit")
     slip.plot(time, table["excitation_threshold"], color="#2c9c5a", lw=1.0, ls="--", label="threshold")
@@ -86,7 +86,7 @@ def _flags(start_stop: Axes, visual: Axes, gain: Axes, table: pd.DataFrame, time
         axis.set_yticks([0, 1])
     gain.plot(time, table["K_v"], color=COLOURS["DIFE"], lw=1.2)
     gain.set_ylim(bottom=-0.05)
-    gain.set_ylabel("(e) gain\n$K_v$ [1/s]")
+    gain.set_ylabel("(e) gain\n$K_v$")
 
 
 def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray) -> None:

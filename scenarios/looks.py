@@ -75,7 +75,8 @@ def draw_looks(
 ) -> None:
     """Write a sheet of the run's pictures, evenly spread, as the estimator saw them.
 
-    The sheet replays every picture up to the last one shown, so its verdicts rest on the same history as the unit's.
+    The sheet replays every picture up to the last one shown with the checkout's networks, so that its verdicts rest on
+    the same history as the unit's; they are the unit's own where it was built from this checkout.
     """
     ife, state = image_estimator(run.scenario), IfeState()
     chosen = {round(share * (len(run.frames) - 1)) for share in np.linspace(0.06, 0.94, count)}
@@ -92,6 +93,8 @@ def draw_looks(
             tile = annotate(image, result, caption)
             height = round(TILE_PX * tile.shape[0] / tile.shape[1])
             tiles.append(cv2.resize(tile, (TILE_PX, height), interpolation=cv2.INTER_AREA))
-    rows = [np.hstack(tiles[i : i + COLUMNS]) for i in range(0, len(tiles) - COLUMNS + 1, COLUMNS)]
+    blank = np.full_like(tiles[0], 255)
+    tiles += [blank] * (-len(tiles) % COLUMNS)
+    rows = [np.hstack(tiles[i : i + COLUMNS]) for i in range(0, len(tiles), COLUMNS)]
     if not cv2.imwrite(str(path), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 88]):
         raise OSError(f"{path}: the sheet could not be written; is the disk full?")

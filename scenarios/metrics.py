@@ -29,7 +29,7 @@ class SegmentScore:
     convergence_time_s, wall_convergence_time_s : float or None
         Excited, and elapsed, time on the stretch until the error stays within 5 % of the step; None: it never does [s].
     excited_time_s : float
-        Time on the stretch with slip above the threshold [s].
+        Time on the stretch with the start/stop flag set [s].
     """
 
     start_m: float
@@ -100,7 +100,7 @@ def score_run(
     estimates : dict of arrays, shape (n,)
         By estimator [-].
     excited : array, shape (n,)
-        Excitation flag.
+        DIFE's start/stop flag: one clock for all estimators, so that their times can be compared.
     step_s : float
         Step [s].
 

@@ -61,6 +61,11 @@ def draw(job: PictureJob) -> int:
     return len(job.frames)
 
 
+def frame_steps(scenario: Scenario) -> int:
+    """Steps from picture to picture: the scenario's frame rate, to the nearest whole number of steps."""
+    return max(1, round(1.0 / (scenario.pictures.fps * scenario.step_s)))
+
+
 def frame_name(number: int) -> str:
     """File name of a frame."""
     return f"frame_{number:05d}.jpg"
@@ -91,8 +96,7 @@ def record(
     columns = ["frame", "row", "time_s", "front_axle_m", "path"]
     if scenario.camera_path is None:
         return pd.DataFrame(columns=columns)
-    every = round(1.0 / (scenario.pictures.fps * scenario.step_s))
-    rows = np.arange(0, len(trajectory), max(1, every))
+    rows = np.arange(0, len(trajectory), frame_steps(scenario))
     front_axle_m = trajectory.position_m[rows] + scenario.vehicle.to_core().cog_to_front_axle_m
     folder.mkdir(parents=True, exist_ok=True)
     frames = [(number, float(place)) for number, place in enumerate(front_axle_m, start=1)]

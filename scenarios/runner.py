@@ -14,17 +14,26 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from fmu_src.packaging import sha256
-from scenarios.files import Scenario
+from scenarios.files import WHEELS, Scenario
 from scenarios.metrics import score_run
 from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.unit_client import parameters, run_unit
 
-WHEELS = ("fl", "fr", "rl", "rr")
 ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
 """The estimators that are compared, and the unit's output that holds each."""
-PACKAGES = ("fmpy", "pythonfmu", "numpy", "onnxruntime", "opencv-python-headless", "albumentations")
+PACKAGES = (
+    "trpac-fmu",
+    "fmpy",
+    "pythonfmu",
+    "numpy",
+    "numba",
+    "scipy",
+    "onnxruntime",
+    "opencv-python-headless",
+    "albumentations",
+)
 
 Progress = Callable[[str, int, int], None]
 """Told the stage, and how much of how much is done."""
@@ -141,6 +150,7 @@ def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path) -> dict[str, A
         "seed": scenario.seed,
         "wheel": scenario.wheel,
         "longitudinal_stiffness_n": scenario.vehicle.tyre.longitudinal_stiffness_n,
+        "excited_time_of": "DIFE's start/stop flag, one clock for all estimators",
         "fmu_sha256": sha256(fmu),
         "versions": {package: version(package) for package in PACKAGES},
         "estimators": scores,

@@ -14,6 +14,7 @@ from fmpy.fmi2 import FMU2Slave
 from fmu_src.packaging import unpack_unit
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario
+from scenarios.pictures import frame_steps
 from trpac_core.vision.camera import Camera
 
 OUTPUTS = (
@@ -48,13 +49,14 @@ def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
         "vehicle.wheel_inertia": car.wheel_inertia_kg_m2,
         "tyre.rolling_resistance": car.rolling_resistance,
         "tyre.longitudinal_stiffness": car.longitudinal_stiffness_n,
+        "confidence.torque_noise": noise.wheel_torque_noise_nm,
         "estimator.sliding_speed_noise": float(
             np.hypot(noise.vehicle_speed_noise_m_s, car.wheel_radius_m * noise.wheel_speed_noise_rad_s)
         ),
     }
     if scenario.camera_path is not None:
         values |= _camera_parameters(load_camera(scenario.camera_path))
-        values["camera.fps"] = scenario.pictures.fps
+        values["camera.fps"] = 1.0 / (frame_steps(scenario) * scenario.step_s)
     return values
 
 

@@ -1,6 +1,7 @@
 """A scenario through the command line, from files to report, on the real unit."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,12 +15,23 @@ from scenarios.plant.pipeline import drive
 from scenarios.runner import run_scenario
 from trpac_cli.main import app
 
+ROOT = Path(__file__).parents[1]
+
 SHORT_ROAD = {
     "schema": 1,
     "segments": [
         {"start_m": 0.0, "mu_left": 0.9, "mu_right": 0.9, "surface": "dry"},
         {"start_m": 4.0, "mu_left": 0.3, "mu_right": 0.3, "surface": "snow_ice"},
     ],
+}
+SCORE_KEYS = {
+    "start_m",
+    "theta",
+    "steady_state_error",
+    "max_error_after_convergence",
+    "convergence_time_s",
+    "wall_convergence_time_s",
+    "excited_time_s",
 }
 PULSES = {
     "schema": 1,
@@ -34,7 +46,7 @@ PULSES = {
 @pytest.fixture
 def scenario_file(tmp_path):
     """Seven metres of road, a quarter of the paper's picture size."""
-    root = load_scenario("scenarios/paper_simulation.yaml").path.parent
+    root = ROOT / "scenarios"
     camera = yaml.safe_load((root / "cameras" / "paper.yaml").read_text())
     for key in ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px"):
         camera[key] = camera[key] / 4
@@ -71,6 +83,9 @@ def test_run_writes_report_figure_log_and_scores(scenario_file, unit_file, tmp_p
     assert sorted(p.name for p in out.iterdir()) == ["figure17.png", "log.csv", "report.html", "summary.json"]
     summary = json.loads((out / "summary.json").read_text())
     assert set(summary["estimators"]) == {"IFE", "DE", "DIFE"}
+    assert {"fmu_sha256", "seed", "versions"} <= set(summary)
+    for scores in summary["estimators"].values():
+        assert [set(score) for score in scores] == [SCORE_KEYS, SCORE_KEYS]
     slippery = summary["estimators"]["DIFE"][1]
     assert slippery["theta"] == 0.3
     assert slippery["steady_state_error"] < 0.02
@@ -135,3 +150,11 @@ def test_a_missing_unit_is_said(scenario_file, tmp_path):
     assert result.exit_code == 2
     assert "none.fmu" in result.stderr
     assert "build_fmu.py" in result.stderr
+
+
+def test_an_output_that_is_a_file_is_said_before_the_work(scenario_file, tmp_path):
+    out = tmp_path / "out"
+    out.write_text("mine")
+    result = CliRunner().invoke(app, ["run", str(scenario_file), "--out", str(out)])
+    assert result.exit_code == 2
+    assert out.read_text() == "mine"

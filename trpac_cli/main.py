@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -45,7 +46,8 @@ def run(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="In place of the scenario's seed.")] = None,
     stiffness_n: Annotated[
-        float | None, typer.Option(min=1000.0, help="C_x in place of the vehicle's, in plant and unit [N].")
+        float | None,
+        typer.Option(min=10_000.0, max=1e6, help="C_x in place of the vehicle's, in plant and unit [N]."),
     ] = None,
 ) -> None:
     """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy; write report and scores.
@@ -57,7 +59,7 @@ def run(
     from scenarios.files import load_scenario
 
     try:
-        _require_unit(fmu)
+        _require(fmu, out)
         chosen = _varied(load_scenario(scenario), seed, stiffness_n)
         with tempfile.TemporaryDirectory(prefix="trpac_") as scratch:
             _run(chosen, fmu, out, Path(scratch))
@@ -66,9 +68,12 @@ def run(
         raise typer.Exit(EXIT_INPUT) from error
 
 
-def _require_unit(fmu: Path | None) -> None:
-    if fmu is not None and not fmu.is_file():
-        raise ScenarioError(f"{fmu}: no such file; expected a unit. Build one: python build_fmu.py")
+def _require(fmu: Path | None, out: Path) -> None:
+    """Refuse before the work what would fail after it."""
+    if fmu is not None and not zipfile.is_zipfile(fmu):
+        raise ScenarioError(f"{fmu}: no unit there. Build one: .venv/bin/python build_fmu.py")
+    if out.exists() and not out.is_dir():
+        raise ScenarioError(f"{out}: a file. Expected a folder to write into.")
 
 
 def _varied(scenario: Scenario, seed: int | None, stiffness_n: float | None) -> Scenario:

@@ -20,8 +20,10 @@ from __future__ import annotations
 
 import math
 
-NEWTON_STEPS = 30
+NEWTON_STEPS = 50
 """Far above what the safeguarded Newton searches need (3 to 6): a bound, not a setting."""
+GREATEST_PEAK_SLIP = 0.95
+"""Where the search for the curve's maximum ends [-]."""
 
 
 def slip_ratio_force(slip: float, longitudinal_stiffness_n: float) -> float:
@@ -141,10 +143,11 @@ def onset_slip(theta: float, load_n: float, longitudinal_stiffness_n: float, sen
 def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> float:
     """Slip at which the used friction is greatest, found by Newton on d mu / d lambda = 0 [-].
 
-    Valid for stiff tyres (C_x above about 3 theta F_z), whose maximum lies below slip 0.5.
+    The slope falls through zero once between slip 0 and the curve's end; a very soft tyre rises all the way.
     """
     quarter = theta * load_n / (4.0 * longitudinal_stiffness_n)
     square, linear = 1.15 - 0.75 * theta, 1.63 - 0.75 * theta
+    lower, upper = 1e-6, GREATEST_PEAK_SLIP
     slip = min(0.5, math.sqrt(1.27 * quarter / linear))
     for _ in range(NEWTON_STEPS):
         # lambda^2 times the slope of (1 - quarter (1 - lambda) / lambda) G(lambda)
@@ -152,15 +155,21 @@ def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> f
         g_by_slip = 2.0 * square * slip - linear
         rise = (1.0 + quarter) * slip - quarter
         value = quarter * g + slip * rise * g_by_slip
+        if value > 0.0:
+            lower = slip
+        else:
+            upper = slip
         value_by_slip = (
             quarter * g_by_slip
             + (2.0 * (1.0 + quarter) * slip - quarter) * g_by_slip
             + 2.0 * square * slip * rise
         )
-        change = value / value_by_slip
-        slip = min(0.9, max(1e-6, slip - change))
-        if abs(change) < 1e-10:
-            break
+        proposal = slip - value / value_by_slip if value_by_slip != 0.0 else upper
+        if not lower < proposal < upper:
+            proposal = 0.5 * (lower + upper)
+        if abs(proposal - slip) < 1e-10:
+            return proposal
+        slip = proposal
     return slip
 
 
