@@ -52,12 +52,7 @@ def drive(unit: Unit, paths: list[Path]) -> list[dict[str, float | bool]]:
     "surface",
     [
         Surface.DRY,
-        pytest.param(
-            Surface.WET,
-            marks=pytest.mark.xfail(
-                strict=False, reason="the classifier takes much rendered wet road for dry"
-            ),
-        ),
+        Surface.WET,
         Surface.SNOW_ICE,
     ],
 )

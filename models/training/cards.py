@@ -72,7 +72,8 @@ def splits_text(facts: RunFacts) -> str:
     return f"""\
 Real pictures are split by the manifest: no series of neighbouring pictures stands in two splits, except the three
 clips of one car (`*_extreme`) that are cut in time, first part train, a gap, last part val. `other_cameras` and all
-test rows are never trained on, and nothing was chosen by them.
+test rows are never trained on, and nothing was chosen by them. The rendered test scores were in view when the weather
+of the rendered worlds was decided: they are kinder than those of a renderer never seen.
 Rendered pictures, three places in each world, half of the worlds with the weather that is likely for their surface:
 {worlds}; drawing or loading them took {facts.render_s:.0f} s."""
 

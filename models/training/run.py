@@ -31,10 +31,10 @@ from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
 from .train_segmenter import score_segmenter, train_segmenter
 from .train_surface import logits_of, train_surface
 
-WORLDS = {"train": 160, "val": 24, "test": 40}
+WORLDS = {"train": 480, "val": 36, "test": 60}
 PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
 SEGMENTER_STEPS = 1300
-SURFACE_STEPS = 1500
+SURFACE_STEPS = 2600
 CALIBRATION_PER_SOURCE = 240
 """Most validation patches that one source gives to the calibration, lest one drive decide T."""
 
