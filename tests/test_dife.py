@@ -11,6 +11,8 @@ from trpac_core import tyre
 from trpac_core.dife import (
     GREATEST_THETA,
     LEAST_THETA,
+    NEVER_SEEN_M,
+    SEEN_HOLD_M,
     FusionState,
     Gains,
     VisualTerm,
@@ -39,7 +41,7 @@ def on_road(theta, slip=0.03, deviation=0.0, change=0.0):
 
 
 def run(inputs, theta_hat, seconds, gains=GAINS, theta_img=None):
-    state = settled(theta_hat, inputs, WHEEL, gains)
+    state = settled(theta_hat, NEVER_SEEN_M, inputs, WHEEL, gains)
     trace = []
     for _ in range(round(seconds / STEP_S)):
         step = fusion_step(state, inputs, WHEEL, gains, SCHEDULER, theta_img, STEP_S)
@@ -137,7 +139,7 @@ def test_whatever_comes_the_estimate_stays_in_its_domain(slip, direction, torque
 def test_ten_short_steps_are_one_long_one():
     """Both equations are solved exactly over a step: with the target at rest the step size does not matter."""
     inputs = on_road(0.3)
-    start = settled(0.32, inputs, WHEEL, GAINS)
+    start = settled(0.32, NEVER_SEEN_M, inputs, WHEEL, GAINS)
     long = fusion_step(start, inputs, WHEEL, GAINS, SCHEDULER, None, 0.01).state.theta_hat
     short = start
     for _ in range(10):
@@ -163,3 +165,18 @@ def test_least_theta_never_exceeds_the_truth(theta, slip, deviation):
     inputs = on_road(theta, slip, deviation)
     force_n = inputs.wheel_torque_nm / WHEEL.radius_m
     assert least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n) <= theta + 1e-6
+
+
+def test_the_camera_rests_for_a_way_after_the_tyre_was_seen():
+    """Elastic again after it slid: a wrong class must not undo what the tyre just showed, but may speak later on."""
+    elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
+    state = settled(0.5, 0.0, elastic, WHEEL, GAINS)
+    trace = []
+    for _ in range(round(1.5 * SEEN_HOLD_M / elastic.way_m)):
+        step = fusion_step(state, elastic, WHEEL, GAINS, SCHEDULER, 0.8, STEP_S)
+        state = step.state
+        trace.append(state.theta_hat)
+    assert step.sensitivity == 0.0
+    resting = round(SEEN_HOLD_M / elastic.way_m)
+    assert trace[: resting - 1] == [0.5] * (resting - 1)
+    assert trace[-1] > 0.5

@@ -21,6 +21,10 @@ LEAST_THETA = 0.02
 """Lower end: at 0 the tyre model has no force and the estimate could never leave it [-]."""
 SIGNIFICANCE = 1.5
 """How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
+SEEN_HOLD_M = 2.0
+"""Way after which what the tyre showed no longer speaks for the road under it: the depth of the near group [m]."""
+NEVER_SEEN_M = 1e6
+"""Way since the tyre showed theta where it never did [m]."""
 LEAST_SENSITIVITY = 0.1
 """Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
 nothing to invert [-]."""
@@ -42,9 +46,10 @@ class Gains:
     K [1/s] is the force observer's bandwidth, gamma [1/s] the estimator's.
 
     With `tyre_first` the camera hurries the estimate along but does not drag it away from what the tyre shows: where
-    theta(lambda, F_hat) is seen, the visual term acts only in its direction; where it is not, theta_img counts as no
-    less than force and slip allow. Eqs. (17) and (18) as printed have no such guard: there a wrong class with its flag
-    up pulls a settled estimate off by K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for "dry" on a road of 0.5.
+    theta(lambda, F_hat) is seen, the visual term acts only in its direction and no farther than it; for 2 m after it
+    was seen the term rests; where it is not seen, theta_img counts as no less than force and slip allow. Eqs. (17)
+    and (18) as printed have no such guard: there a wrong class with its flag up pulls a settled estimate off by
+    K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for "dry" on a road of 0.5.
     """
 
     K: float = 63.0
@@ -68,6 +73,8 @@ class WheelInputs(NamedTuple):
     slip_change: float
     """Distance of the slip from its own, once more filtered, course [-]: force and slip of a tyre that is being
     loaded or unloaded pass the filter along the chord of its bent curve, and lie that far beside it."""
+    way_m: float = 0.0
+    """Way driven over the step to come [m]."""
 
 
 class Wheel(NamedTuple):
@@ -79,10 +86,11 @@ class Wheel(NamedTuple):
 
 
 class FusionState(NamedTuple):
-    """Inner state: estimated adhesion [-] and the observer's s [rad/s^2]."""
+    """Inner state: estimated adhesion [-], the observer's s [rad/s^2], way since the tyre last showed theta [m]."""
 
     theta_hat: float
     s: float
+    unseen_m: float = NEVER_SEEN_M
 
 
 class FusionStep(NamedTuple):
@@ -100,7 +108,9 @@ class FusionStep(NamedTuple):
     """Visual gain, [-] in the form (17) and [1/s] in the form (18)."""
 
 
-def settled(theta_hat: float, inputs: WheelInputs, wheel: Wheel, gains: Gains) -> FusionState:
+def settled(
+    theta_hat: float, unseen_m: float, inputs: WheelInputs, wheel: Wheel, gains: Gains
+) -> FusionState:
     """State whose observed force balances the wheel torque, to start from."""
     model = force(
         theta_hat,
@@ -111,7 +121,7 @@ def settled(theta_hat: float, inputs: WheelInputs, wheel: Wheel, gains: Gains) -
     )
     balanced = inputs.wheel_torque_nm / wheel.radius_m
     s = settled_state(model, balanced, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
-    return FusionState(theta_hat, s)
+    return FusionState(theta_hat, s, unseen_m)
 
 
 def visible_theta(
@@ -180,7 +190,7 @@ def fusion_step(
     theta_next, K_v = state.theta_hat, 0.0
     if excited:
         if theta_img is not None and gains.tyre_first:
-            theta_img = _compatible(theta_img, state.theta_hat, theta_tyre, F_hat, inputs, C_x)
+            theta_img = _compatible(theta_img, state, theta_tyre, F_hat, inputs, C_x)
         if theta_img is not None:
             K_v = scheduler.K_v(abs(theta_img - state.theta_hat))
         theta_next = _driven(state.theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
@@ -201,7 +211,8 @@ def fusion_step(
         step_s,
     )
     shown = sensitivity if excited else 0.0
-    return FusionStep(FusionState(theta_next, s), F_hat, shown, threshold, excited, K_v)
+    unseen_m = 0.0 if shown else min(state.unseen_m + inputs.way_m, NEVER_SEEN_M)
+    return FusionStep(FusionState(theta_next, s, unseen_m), F_hat, shown, threshold, excited, K_v)
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
@@ -220,7 +231,7 @@ def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: f
 
 def _compatible(
     theta_img: float,
-    theta_hat: float,
+    state: FusionState,
     theta_tyre: float | None,
     force_n: float,
     inputs: WheelInputs,
@@ -228,11 +239,18 @@ def _compatible(
 ) -> float | None:
     """What the camera may still say beside the tyre.
 
-    None where the tyre is seen to pull the estimate the other way; not less than the tyre already carries.
+    None where the tyre is seen to pull the estimate the other way, or was seen just before; no farther off than what
+    the tyre shows, and not less than it already carries.
     """
-    if theta_tyre is None:
-        return max(theta_img, least_theta(force_n, inputs, longitudinal_stiffness_n))
-    return theta_img if (theta_tyre - theta_hat) * (theta_img - theta_hat) >= 0.0 else None
+    if theta_tyre is not None:
+        by_tyre, by_camera = theta_tyre - state.theta_hat, theta_img - state.theta_hat
+        if by_tyre * by_camera < 0.0:
+            return None
+        # Of noisy samples half lie on the camera's side: without this bound their noise would be rectified.
+        return theta_img if abs(by_camera) < abs(by_tyre) else theta_tyre
+    if state.unseen_m < SEEN_HOLD_M:
+        return None
+    return max(theta_img, least_theta(force_n, inputs, longitudinal_stiffness_n))
 
 
 def _driven(

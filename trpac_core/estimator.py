@@ -341,8 +341,10 @@ class TrpacEstimator:
         if not state.settled:
             state = replace(
                 state,
-                fusion=settled(state.fusion.theta_hat, inputs, wheel, config.gains),
-                dynamics=settled(state.dynamics.theta_hat, inputs, wheel, config.gains),
+                fusion=settled(state.fusion.theta_hat, state.fusion.unseen_m, inputs, wheel, config.gains),
+                dynamics=settled(
+                    state.dynamics.theta_hat, state.dynamics.unseen_m, inputs, wheel, config.gains
+                ),
             )
         outcome = self._under_wheel(state)
         flag = outcome is not None and outcome.flag and not state.frame_failed
@@ -357,10 +359,10 @@ class TrpacEstimator:
             inputs,
             wheel,
             config.gains.gamma,
-            sensors.vehicle_speed_m_s * step_s,
+            inputs.way_m,
             step_s,
         )
-        position_m = state.position_m + sensors.vehicle_speed_m_s * step_s
+        position_m = state.position_m + inputs.way_m
         self._state = replace(
             state,
             fusion=fused.state,
@@ -425,6 +427,7 @@ class TrpacEstimator:
             state.load_n,
             noise_m_s / max(sensors.vehicle_speed_m_s, config.floor_m_s),
             abs(signed - smoothed_slip),
+            sensors.vehicle_speed_m_s * step_s,
         )
         return now, inputs, smoothed_slip
 
