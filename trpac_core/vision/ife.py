@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -163,7 +164,7 @@ class _Region:
             cut_patch(image, centre, width)
             for centre, width in zip(self.centres_px, self.widths_px, strict=True)
         ]
-        kept = [i for i, patch in enumerate(cut) if patch.std(axis=(0, 1)).max() >= LEAST_CONTRAST]
+        kept = [i for i, patch in enumerate(cut) if cv2.meanStdDev(patch)[1].max() >= LEAST_CONTRAST]
         patches = tuple(cut[i] for i in kept)
         return replace(
             self, centres_px=self.centres_px[kept], widths_px=self.widths_px[kept], patches=patches
