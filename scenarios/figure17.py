@@ -15,7 +15,9 @@ from matplotlib.axes import Axes
 from scenarios.files import WHEELS
 from scenarios.runner import ESTIMATORS, Run
 
-COLOURS = {"IFE": "#d08a00", "DE": "#2b6fb3", "DIFE": "#c0272d"}
+COLOURS = {"IFE": "#d08a00", "DE": "#7fb2e5", "DIFE": "#c0272d"}
+WIDTHS = {"IFE": 1.1, "DE": 3.0, "DIFE": 1.3}
+"""DE lies as a band under DIFE, so that both are seen where they agree."""
 TRUTH = "#222222"
 ROAD = {"dry": "#eeeeea", "wet": "#d3e0ec", "snow_ice": "#f2f6fb"}
 
@@ -92,7 +94,7 @@ def _flags(start_stop: Axes, visual: Axes, gain: Axes, table: pd.DataFrame, time
 def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray) -> None:
     axis.plot(time, table["theta_true"], color=TRUTH, lw=2.2, label="true TRPAC")
     for name, column in ESTIMATORS.items():
-        axis.plot(time, table[column], color=COLOURS[name], lw=1.5 if name == "DIFE" else 1.1, label=name)
+        axis.plot(time, table[column], color=COLOURS[name], lw=WIDTHS[name], label=name)
     spread = 2.0 * table["TRPAC_std"]
     axis.fill_between(
         time,
@@ -122,7 +124,7 @@ def _stretches(table: pd.DataFrame, time: np.ndarray) -> list[tuple[float, float
 def _errors(axis: Axes, table: pd.DataFrame, time: np.ndarray) -> None:
     for name, column in ESTIMATORS.items():
         error = table[column] - table["theta_true"]
-        axis.plot(time, error, color=COLOURS[name], lw=1.5 if name == "DIFE" else 1.1, label=name)
+        axis.plot(time, error, color=COLOURS[name], lw=WIDTHS[name], label=name)
     axis.axhspan(-0.02, 0.02, color=TRUTH, alpha=0.12, lw=0, label="± 0.02")
     axis.set_ylim(-0.45, 0.6)
     axis.set_ylabel("(g) error [-]")
