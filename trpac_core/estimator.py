@@ -403,21 +403,21 @@ class TrpacEstimator:
         config, radius_m = self.config, self._wheel.radius_m
         now = Readings(sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s)
         before, ratio = now, 0.0
-        share = filter_share(step_s or state.step_s, config.sensor_filter_s)
+        passed = filter_share(step_s, config.sensor_filter_s)
         if state.settled:
             before = state.readings
-            now = smoothed(before, sensors, filter_share(step_s, config.sensor_filter_s))
+            now = smoothed(before, sensors, passed)
             ratio = min(step_s / state.step_s, MOST_AHEAD) if state.step_s else 0.0
         slip = wheel_slip(now.wheel_speed_rad_s, now.vehicle_speed_m_s, radius_m, config.floor_m_s)
         signed = slip.size * slip.direction
         smoothed_slip = signed
         if state.settled:
-            passed = filter_share(step_s, config.sensor_filter_s)
             smoothed_slip = state.smoothed_slip + passed * (signed - state.smoothed_slip)
         rolling_nm = 0.0
         if now.wheel_speed_rad_s * radius_m >= config.floor_m_s:
             rolling_nm = config.vehicle.rolling_resistance * state.load_n * radius_m
-        # White noise per sample through a discrete first-order filter
+        # White noise per sample through a discrete first-order filter; a step of 0 keeps the last one's
+        share = passed or filter_share(state.step_s, config.sensor_filter_s)
         noise_m_s = config.sliding_speed_noise_m_s * math.sqrt(share / (2.0 - share))
         inputs = WheelInputs(
             now.wheel_speed_rad_s,
