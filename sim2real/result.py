@@ -1,0 +1,307 @@
+"""What a diagnosis says, and its JSON form (schema 1)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Verdict(StrEnum):
+    """The outcome in a word; `MEANING` has the sentence."""
+
+    IDENTIFIED = "identified"
+    AMBIGUOUS = "ambiguous"
+    COMPOUND = "compound"
+    UNKNOWN = "unknown"
+    NO_GAP = "no_gap"
+
+
+MEANING = {
+    Verdict.IDENTIFIED: "One effect explains the gap down to the noise, and no other does as well.",
+    Verdict.AMBIGUOUS: "The data cannot tell some effects apart; the next manoeuvre would.",
+    Verdict.COMPOUND: "Two or more effects are needed together.",
+    Verdict.UNKNOWN: "There is a gap, and no effect of the library explains it.",
+    Verdict.NO_GAP: "What is left between simulation and log is sensor noise; nothing may be blamed.",
+}
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value and its 95 % interval, in `unit`."""
+
+    value: float
+    low: float
+    high: float
+    unit: str = "-"
+
+    def to_json(self) -> dict[str, float]:
+        """Value and bounds."""
+        return {"value": self.value, "low": self.low, "high": self.high}
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Size of the gap in units of the sensor noise: 1 is what noise alone leaves.
+
+    Attributes
+    ----------
+    total : float
+        Root mean square over the signals [-].
+    signals : dict
+        Per signal: wheel_speed (all four), vehicle_speed, accel_x, position, and the camera's [-].
+    si : dict
+        The same signals' root mean square residual in their own SI units.
+    """
+
+    total: float
+    signals: dict[str, float] = field(default_factory=dict)
+    si: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Gap:
+    """The gap on the hold-out before and after what the verdict adds; the noise floor in the same units."""
+
+    before: Measure
+    after: Measure
+    noise_floor: float
+    measured_on: str = "holdout"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a part of the gap lies: signal, subsystem, regime of driving, time window [s] of a log, share of the gap."""
+
+    signal: str
+    subsystem: str
+    regime: str
+    from_s: float
+    to_s: float
+    share: float
+    log: str = ""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One candidate (an effect, or the pair of a compound) and what speaks for it.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    probability : float
+        That it is the cause, given the data and the library [-].
+    parameters : dict
+        Parameter name to its estimate.
+    gap_after : float
+        Gap that is left on the hold-out with this effect alone [noise floors].
+    shrink_percent : Interval
+        By how much the hold-out's gap shrinks with it alone [%].
+    fit_bic : float
+        Plain in-sample BIC on the fit logs, for comparison.
+    evidence_for, evidence_against : tuple of str
+        Sentences.
+    excited : bool
+        Whether the manoeuvres could have shown it; if not, it cannot be ruled out.
+    """
+
+    effect: str
+    probability: float
+    parameters: dict[str, Interval]
+    gap_after: float
+    shrink_percent: Interval
+    fit_bic: float
+    evidence_for: tuple[str, ...] = ()
+    evidence_against: tuple[str, ...] = ()
+    excited: bool = True
+
+
+@dataclass(frozen=True)
+class NextManoeuvre:
+    """What to drive next, and which pair of effects it would tell apart.
+
+    Attributes
+    ----------
+    sentence : str
+        For the driver.
+    initial_speed_m_s : float
+        Speed at the start [m/s].
+    time_s, wheel_torque_nm : array, shape (n,) and (n, 4)
+        The torque profile per wheel, fl, fr, rl, rr [s, N m].
+    separates : tuple of str
+        The effects told apart.
+    power_sigma : float
+        Predicted distance between them after the best refit of the other [standard deviations of the noise].
+    power_now_sigma : float
+        The same distance on the logs at hand.
+    """
+
+    sentence: str
+    initial_speed_m_s: float
+    time_s: Array
+    wheel_torque_nm: Array
+    separates: tuple[str, ...]
+    power_sigma: float
+    power_now_sigma: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What no effect of the library explains: which equation wants a further term, on what it depends, its shape.
+
+    Attributes
+    ----------
+    subsystem, signal : str
+        Where the term belongs, and the signal that shows it most.
+    depends_on, unit : str
+        The quantity that the term varies with, and the term's own unit.
+    sign, shape : str
+        In words: "opposes motion", "grows with its square".
+    share : float
+        How much of the unexplained part this term takes on the hold-out [-].
+    x, y : array, shape (n,)
+        The term over the quantity, to be drawn.
+    sentence : str
+        All this in a sentence.
+    """
+
+    subsystem: str
+    signal: str
+    depends_on: str
+    unit: str
+    sign: str
+    shape: str
+    share: float
+    x: Array
+    y: Array
+    sentence: str
+
+
+@dataclass(frozen=True)
+class TrpacError:
+    """Root mean square error of the estimator's TRPAC on the hold-out, excited time only [-].
+
+    `before` with the simulation's model in the estimator, `after` with the found effect's parameters where they have a
+    place in it; `against` says which truth it is held to.
+    """
+
+    before: float
+    after: float
+    against: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One signal of the hold-out: measured, simulated before and after [its SI unit], over time [s]."""
+
+    signal: str
+    unit: str
+    time_s: Array
+    measured: Array
+    before: Array
+    after: Array
+    noise: float
+    """Standard deviation of its noise."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything that a diagnosis says; `to_json` is the contract's form, the rest is for the report."""
+
+    verdict: Verdict
+    sentence: str
+    gap: Gap
+    where: tuple[Place, ...]
+    heat_map: dict[str, dict[str, float]]
+    """Subsystem to regime to the share of the gap [-]."""
+    causes: tuple[Cause, ...]
+    ambiguous_with: tuple[tuple[str, ...], ...] = ()
+    cannot_rule_out: tuple[str, ...] = ()
+    next_manoeuvre: NextManoeuvre | None = None
+    unexplained: Unexplained | None = None
+    trpac: TrpacError | None = None
+    rating: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    """ISO/TS 18571 rating per signal, before and after; None where it is not defined."""
+    traces: tuple[Trace, ...] = ()
+    warnings: tuple[str, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+    """Files and their SHA-256, versions, seed, rates."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The contract's JSON, and further keys."""
+        return {
+            "schema": 1,
+            "verdict": str(self.verdict),
+            "sentence": self.sentence,
+            "gap": {
+                "before": asdict(self.gap.before),
+                "after": asdict(self.gap.after),
+                "noise_floor": self.gap.noise_floor,
+                "measured_on": self.gap.measured_on,
+            },
+            "where": [asdict(place) for place in self.where],
+            "heat_map": self.heat_map,
+            "causes": [_cause(cause) for cause in self.causes],
+            "ambiguous_with": [list(group) for group in self.ambiguous_with],
+            "cannot_rule_out": list(self.cannot_rule_out),
+            "next_manoeuvre": _profile(self.next_manoeuvre),
+            "unexplained": _term(self.unexplained),
+            "trpac": None if self.trpac is None else asdict(self.trpac),
+            "rating": {k: {"before": b, "after": a} for k, (b, a) in self.rating.items()},
+            "warnings": list(self.warnings),
+            "provenance": self.provenance,
+        }
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    return {
+        "effect": cause.effect,
+        "probability": cause.probability,
+        "parameters": {
+            name: {**interval.to_json(), "unit": interval.unit} for name, interval in cause.parameters.items()
+        },
+        "gap_after": cause.gap_after,
+        "shrink_percent": cause.shrink_percent.to_json(),
+        "fit_bic": cause.fit_bic,
+        "evidence_for": list(cause.evidence_for),
+        "evidence_against": list(cause.evidence_against),
+        "excited": cause.excited,
+    }
+
+
+def _profile(manoeuvre: NextManoeuvre | None) -> dict[str, Any] | None:
+    if manoeuvre is None:
+        return None
+    return {
+        "sentence": manoeuvre.sentence,
+        "initial_speed_m_s": manoeuvre.initial_speed_m_s,
+        "time_s": manoeuvre.time_s.tolist(),
+        "wheel_torque_nm": manoeuvre.wheel_torque_nm.tolist(),
+        "separates": list(manoeuvre.separates),
+        "power_sigma": manoeuvre.power_sigma,
+        "power_now_sigma": manoeuvre.power_now_sigma,
+    }
+
+
+def _term(term: Unexplained | None) -> dict[str, Any] | None:
+    if term is None:
+        return None
+    return {
+        "subsystem": term.subsystem,
+        "signal": term.signal,
+        "depends_on": term.depends_on,
+        "unit": term.unit,
+        "sign": term.sign,
+        "shape": term.shape,
+        "share": term.share,
+        "x": term.x.tolist(),
+        "y": term.y.tolist(),
+        "sentence": term.sentence,
+    }
