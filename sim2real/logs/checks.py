@@ -1,0 +1,234 @@
+"""What must hold for a log before anything may be concluded from it; each check gives findings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.logs.contract import REQUIRED, TIME, WHEEL_SPEEDS
+from sim2real.logs.resampling import BROKEN, median_step
+from sim2real.logs.table import SHOWN, Array, Finding, and_more
+from sim2real.logs.units import factor
+
+RATE_HZ = (20.0, 2000.0)
+"""Rates that can be used: slower than this no wheel dynamics are left."""
+CONTRACT_RATE_HZ = (50.0, 2000.0)
+"""Rates that the log format asks for; outside there is a warning."""
+RATE_TOLERANCE = 0.02
+"""Clocks are not exact."""
+MIN_DURATION_S = 2.0
+"""Vehicle speed forgets its past within about 1 s; a log must be longer than that."""
+GAP_S = 0.25
+"""Longer pieces without rows are gaps; shorter ones are lost samples."""
+IRREGULAR_SHARE = 0.05
+"""Share of steps off by more than half a step from which on a log has no rate any more."""
+LOST_SHARE = 0.5
+"""Share of lost samples from which on a required column is refused."""
+LOST_WARNING = 0.05
+"""Share of lost samples worth a warning."""
+
+MOVING_M_S = 3.0
+"""From this speed on a wheel speed is compared with it [m/s]."""
+WHEEL_PER_METRE = (1.5, 6.5)
+"""Wheel speed over ground speed, radius 0.15 to 0.67 m [rad/m]; with km/h, with rpm and with both it lies outside."""
+DISTANCE_M = 10.0
+"""From this distance on the position is compared with the integral of speed [m]."""
+DISTANCE_RATIO = (0.5, 2.0)
+"""Change of position over the integral of speed; kilometres, feet and km/h lie outside."""
+SMOOTH_S = 0.5
+"""The accelerometer is compared with the change of speed over pieces of this length [s]."""
+VARIED_M_S2 = 0.5
+"""Least standard deviation of the change of speed for that comparison [m/s2]."""
+
+Row = Callable[[int], str]
+
+
+@dataclass(frozen=True)
+class Clock:
+    """What is wrong with the times of a log, and its gaps as (from, to) [s]."""
+
+    findings: tuple[Finding, ...] = ()
+    gaps: tuple[tuple[float, float], ...] = ()
+
+
+def check_time(time_s: Array, row: Row) -> Clock:
+    """Whether time ascends at a usable rate; where a finding is fatal nothing else of the log can be judged."""
+    bad = np.flatnonzero(~np.isfinite(time_s))
+    if len(bad):
+        return _unusable(f"column {TIME}: {rows_text(bad, row)} has no time; expected one in every row.")
+    step = np.diff(time_s)
+    back = np.flatnonzero(step <= 0.0) + 1
+    if len(back):
+        i = int(back[0])
+        what = "repeats" if step[i - 1] == 0.0 else "lies before"
+        return _unusable(
+            f"column {TIME}: {rows_text(back, row)} {what} the time above ({time_s[i]:.9g} after {time_s[i - 1]:.9g}); "
+            "expected ascending times, written with enough digits."
+        )
+    duration = float(time_s[-1] - time_s[0]) if len(time_s) else 0.0
+    rate = 1.0 / median_step(time_s) if len(step) else RATE_HZ[0]
+    if not RATE_HZ[0] / (1.0 + RATE_TOLERANCE) <= rate <= RATE_HZ[1] * (1.0 + RATE_TOLERANCE):
+        return _unusable(
+            f"comes at {rate:.4g} Hz; expected {_span(CONTRACT_RATE_HZ)} Hz.{_time_unit_hint(rate)}"
+        )
+    if duration < MIN_DURATION_S:
+        return _unusable(f"is {duration:.3g} s long; expected at least {MIN_DURATION_S:g} s.")
+    at = np.flatnonzero(step > GAP_S)
+    gaps = tuple((float(time_s[i]), float(time_s[i + 1])) for i in at)
+    return Clock((*_rate_findings(rate), *_step_findings(step, row)), gaps)
+
+
+def _unusable(text: str) -> Clock:
+    return Clock((Finding(text),))
+
+
+def _rate_findings(rate_hz: float) -> Iterator[Finding]:
+    if rate_hz < CONTRACT_RATE_HZ[0] / (1.0 + RATE_TOLERANCE):
+        text = f"comes at {rate_hz:.4g} Hz, less than the {CONTRACT_RATE_HZ[0]:g} Hz expected."
+        yield Finding(text, fatal=False)
+
+
+def _step_findings(step: Array, row: Row) -> Iterator[Finding]:
+    median = float(np.median(step))
+    irregular = np.flatnonzero(np.abs(step - median) > (BROKEN - 1.0) * median * (1.0 + 1e-6)) + 1
+    if len(irregular) == 0:
+        return
+    fatal = len(irregular) > IRREGULAR_SHARE * len(step)
+    yield Finding(
+        f"column {TIME}: {rows_text(irregular, row)} is more than half a step ({median * 500:.3g} ms) off its time "
+        f"after the row above{'; expected a constant or slightly jittered rate.' if fatal else '.'}",
+        fatal,
+    )
+
+
+def check_values(signals: Mapping[str, Array], row: Row) -> Iterator[Finding]:
+    """Infinite and lost values, and values that a column cannot have."""
+    for name, values in signals.items():
+        infinite = np.flatnonzero(np.isinf(values))
+        if len(infinite):
+            yield Finding(
+                f"column {name}: {rows_text(infinite, row)} is infinite; expected a number or an empty cell."
+            )
+        share = float(np.mean(np.isnan(values)))
+        if share == 1.0:
+            tail = "expected measured values." if name in REQUIRED else "it is taken as not measured."
+            yield Finding(f"column {name} has no value at all; {tail}", fatal=name in REQUIRED)
+        elif name in REQUIRED and share > LOST_WARNING:
+            fatal = share > LOST_SHARE
+            tail = f"; expected at most {LOST_SHARE:.0%}." if fatal else "."
+            yield Finding(f"column {name}: {share:.0%} of its samples are lost{tail}", fatal)
+    yield from _check_range(signals, "image_class", lambda x: np.isin(x, (-1, 0, 1, 2)), "0, 1, 2 or -1", row)
+    yield from _check_range(
+        signals, "image_confidence", lambda x: (x >= 0) & (x <= 1), "0 to 1 (unit: '%'?)", row
+    )
+    yield from _check_range(
+        signals, "mu_reference", lambda x: (x >= 0) & (x <= 2), "0 to 2 (unit: '%'?)", row
+    )
+
+
+def check_scales(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
+    """Whether columns that measure the same motion agree to a factor: units, signs."""
+    if "vehicle_speed_m_s" not in signals:
+        return
+    speed = signals["vehicle_speed_m_s"]
+    yield from _check_wheels(speed, signals)
+    if "position_m" in signals:
+        yield from _check_position(time_s, speed, signals["position_m"])
+    if "accel_x_m_s2" in signals:
+        yield from _check_acceleration(time_s, speed, signals["accel_x_m_s2"])
+
+
+def _check_wheels(speed: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
+    for name in (n for n in WHEEL_SPEEDS if n in signals):
+        moving = (np.abs(speed) > MOVING_M_S) & np.isfinite(signals[name])
+        if np.count_nonzero(moving) < 2:
+            continue
+        ratio = float(np.median(signals[name][moving] / speed[moving]))
+        if not WHEEL_PER_METRE[0] <= ratio <= WHEEL_PER_METRE[1]:
+            yield Finding(
+                f"column {name} over vehicle_speed_m_s is {ratio:.3g} rad/m in the median; expected "
+                f"{_span(WHEEL_PER_METRE)} rad/m (one over the wheel's radius). {_ratio_hint(ratio)}"
+            )
+
+
+def _check_position(time_s: Array, speed: Array, position: Array) -> Iterator[Finding]:
+    known = np.isfinite(speed) & np.isfinite(position)
+    if np.count_nonzero(known) < 2:
+        return
+    driven = float(np.trapezoid(speed[known], time_s[known]))
+    moved = float(position[known][-1] - position[known][0])
+    if driven > DISTANCE_M and not DISTANCE_RATIO[0] <= moved / driven <= DISTANCE_RATIO[1]:
+        yield Finding(
+            f"column position_m changes by {moved:.4g} m while the speed integrates to {driven:.4g} m; expected the "
+            "distance driven along the road in metres, without a reset. Where it was not measured, a mapping file "
+            "can say `position_m: {integrate: {copy: vehicle_speed_m_s}}`."
+        )
+
+
+def _check_acceleration(time_s: Array, speed: Array, accel: Array) -> Iterator[Finding]:
+    """Slope of the accelerometer over the change of speed; only a warning, since grade and bias blur it."""
+    known = np.isfinite(speed) & np.isfinite(accel)
+    t, v, a = time_s[known], speed[known], accel[known]
+    if np.count_nonzero(known) < 2:
+        return
+    piece = np.floor((t - t[0]) / SMOOTH_S).astype(int)
+    _, first = np.unique(piece, return_index=True)
+    change = np.diff(v[first]) / np.diff(t[first])
+    mean = (np.add.reduceat(a, first) / np.diff([*first, len(a)]))[:-1]
+    if len(change) < 3 or np.std(change) < VARIED_M_S2:
+        return
+    slope = float(np.cov(change, mean)[0, 1] / np.var(change, ddof=1))
+    if slope < -0.5:
+        yield Finding(
+            "accel_x_m_s2 goes against the change of vehicle_speed_m_s; is its sign reversed?", fatal=False
+        )
+    elif abs(slope) < 0.25:
+        hint = "is it in g?" if slope > 0.05 else "is it the longitudinal acceleration, and in m/s2?"
+        yield Finding(
+            f"accel_x_m_s2 is {slope:.2g} times the change of vehicle_speed_m_s; {hint}", fatal=False
+        )
+
+
+def _check_range(
+    signals: Mapping[str, Array],
+    name: str,
+    allowed: Callable[[Array], NDArray[np.bool_]],
+    expected: str,
+    row: Row,
+) -> Iterator[Finding]:
+    if name not in signals:
+        return
+    values = signals[name]
+    bad = np.flatnonzero(~allowed(values) & np.isfinite(values))
+    if len(bad):
+        yield Finding(f"column {name}: {rows_text(bad, row)} is {values[bad[0]]:g}; expected {expected}.")
+
+
+def rows_text(indices: NDArray[np.intp], row: Row) -> str:
+    """The first few rows of a list, and how many more."""
+    return ", ".join(row(int(i)) for i in indices[:SHOWN]) + and_more(len(indices))
+
+
+def _time_unit_hint(rate: float) -> str:
+    """Which unit of time would make this a log's rate."""
+    for unit in ("ms", "us", "ns", "min", "h"):
+        if RATE_HZ[0] <= rate / factor(unit, "s") <= RATE_HZ[1]:
+            return (
+                f" Is the time in {unit}? A mapping file says so: `time_s: {{column: NAME, unit: {unit}}}`."
+            )
+    return ""
+
+
+def _ratio_hint(ratio: float) -> str:
+    if ratio < 0.0:
+        return "Is a sign reversed?"
+    if ratio < WHEEL_PER_METRE[0]:
+        return "Is the vehicle's speed in km/h, or the wheel's in m/s or rev/s?"
+    return "Is the wheel's speed in rpm, deg/s or km/h?"
+
+
+def _span(bounds: tuple[float, float]) -> str:
+    return f"{bounds[0]:g} to {bounds[1]:g}"

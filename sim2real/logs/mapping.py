@@ -1,0 +1,217 @@
+"""Mapping files: how a tool's columns become the columns of the log format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+
+from scenarios.files import load_strict
+from sim2real.logs.contract import COLUMNS, IMAGE_PATH, TIME
+from sim2real.logs.errors import LogError
+from sim2real.logs.units import factor
+
+SOURCES = ("column", "constant", "sum", "integrate", "copy")
+INTEGRAND_UNIT = {"m": "m/s", "m/s": "m/s2", "rad": "rad/s"}
+"""Unit of a column of the log format, and of what it is the integral of."""
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Spec(_Strict):
+    """Where one column comes from: value = sign * scale * source in the column's unit + offset.
+
+    The source is exactly one of `column` (of the file; with `unit`, and with `radius_m` where it is a wheel's
+    circumferential speed), `constant`, `sum` (of such sources), `integrate` (over time, from 0 at the first row) and
+    `copy` (of another column of the log format). A bare name in a file is a `column`.
+    """
+
+    column: str | None = None
+    constant: float | None = None
+    sum: list[Spec] = Field(default_factory=list)
+    integrate: Spec = Field(default=None)  # type: ignore[assignment]  # absent, but a null in the file is refused
+    copy_of: str | None = Field(default=None, alias="copy")
+    unit: str | None = None
+    radius_m: float | None = Field(default=None, gt=0.0)
+    sign: Literal[1, -1] = 1
+    scale: float = 1.0
+    offset: float = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare_name(cls, data: object) -> object:
+        if isinstance(data, str):
+            return {"column": data}
+        if not isinstance(data, dict):
+            raise ValueError(  # noqa: TRY004  # pydantic collects ValueErrors
+                f"is {data!r}; expected a column's name, or one of {{column: NAME, unit: UNIT}}, {{constant: VALUE}}, "
+                "{sum: [...]}, {integrate: ...}, {copy: NAME}."
+            )
+        return data
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Spec:
+        given = [name for name in SOURCES if (name if name != "copy" else "copy_of") in self.model_fields_set]
+        if len(given) != 1:
+            raise ValueError(
+                f"has {' and '.join(given) or 'no source'}; expected exactly one of {', '.join(SOURCES)}."
+            )
+        if self.sum == [] and given == ["sum"]:
+            raise ValueError("sum is empty; expected at least one source in it.")
+        if given != ["column"] and (self.unit is not None or self.radius_m is not None):
+            raise ValueError(f"unit and radius_m belong to a column; expected none beside {given[0]}.")
+        return self
+
+    @property
+    def terms(self) -> list[Spec]:
+        """The sources directly inside this one."""
+        return [*self.sum, *([self.integrate] if self.integrate is not None else [])]
+
+    @property
+    def derived(self) -> bool:
+        """Whether anything in it was computed rather than measured."""
+        own = self.constant is not None or self.integrate is not None or self.copy_of is not None
+        return own or any(term.derived for term in self.terms)
+
+    def factor(self, unit: str) -> float:
+        """What the column's raw values are multiplied with to be in `unit`; raises ValueError for a wrong unit."""
+        if self.radius_m is not None:
+            return factor(self.unit or "m/s", "m/s") / self.radius_m
+        return 1.0 if self.unit is None else factor(self.unit, unit)
+
+    def leaves(self) -> Iterator[Spec]:
+        """The source itself, or all of those inside it."""
+        if not self.terms:
+            yield self
+        for term in self.terms:
+            yield from term.leaves()
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """How a tool's columns become those of the log format; what is not in it is read under its own name.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    columns : dict
+        Column of the log format to its source.
+    """
+
+    path: Path
+    columns: dict[str, Spec]
+
+    def spec(self, column: str) -> Spec:
+        """The source of a column of the log format."""
+        return self.columns.get(column) or Spec(column=column)
+
+    def sources(self, column: str) -> list[str]:
+        """Columns of the file that a column of the log format is made of."""
+        return [leaf.column for leaf in self.spec(column).leaves() if leaf.column is not None]
+
+
+NO_MAPPING = Mapping(Path(), {})
+"""Every column has its own name and unit."""
+
+
+class _MappingBase(_Strict):
+    @model_validator(mode="before")
+    @classmethod
+    def _columns_to_top(cls, data: Any) -> Any:
+        """The form `columns: {...}` as the bare form."""
+        if isinstance(data, dict) and "columns" in data:
+            columns = data["columns"]
+            rest = {key: value for key, value in data.items() if key != "columns"}
+            both = sorted(str(key) for key in set(rest) - {"schema"})
+            if not isinstance(columns, dict) or both:
+                raise ValueError(
+                    f"columns: stands beside {', '.join(both)}; expected all columns in one place."
+                    if both
+                    else "columns: expected one line `name: source` per column."
+                )
+            return {**rest, **columns}
+        return data
+
+    @model_validator(mode="after")
+    def _check(self) -> _MappingBase:
+        specs = _specs(self)
+        problems = [text for name, spec in specs.items() for text in _problems(name, spec, specs)]
+        if not specs:
+            problems.append(
+                "maps nothing; expected lines such as vehicle_speed_m_s: {column: VehSpd, unit: km/h}."
+            )
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+
+_MappingFile = create_model(
+    "_MappingFile",
+    __base__=_MappingBase,
+    schema_=(Literal[1], Field(default=1, alias="schema")),
+    **{name: (Spec, Field(default=None)) for name in COLUMNS},  # type: ignore[call-overload]
+)
+
+
+def load_mapping(path: str | Path) -> Mapping:
+    """Read a mapping file; all of its problems in one LogError."""
+    try:
+        file = load_strict(path, _MappingFile)
+    except LogError:
+        raise
+    except ValueError as error:
+        raise LogError(str(error)) from error
+    return Mapping(Path(path), _specs(file))
+
+
+def _specs(file: BaseModel) -> dict[str, Spec]:
+    return {name: getattr(file, name) for name in COLUMNS if name in file.model_fields_set}
+
+
+def _problems(name: str, spec: Spec, specs: dict[str, Spec]) -> list[str]:
+    if name == IMAGE_PATH and (spec.column is None or spec.model_fields_set != {"column"}):
+        return [f"{name}: holds text; expected the bare name of a column."]
+    if name == TIME and spec.derived:
+        return [f"{name}: expected a measured column, since all else is read against it."]
+    if _copies_itself(name, specs):
+        return [f"{name}: is copied from itself in a circle; expected a column of the file at its end."]
+    return [f"{name}: {text}" for text in _unit_problems(spec, COLUMNS[name].unit)]
+
+
+def _unit_problems(spec: Spec, unit: str) -> list[str]:
+    """What is wrong with the units of a source that must end up in `unit` of the log format."""
+    if spec.integrate is not None:
+        if unit not in INTEGRAND_UNIT:
+            return [f"integrate gives no [{unit}]; expected it for positions, speeds and angles only."]
+        return _unit_problems(spec.integrate, INTEGRAND_UNIT[unit])
+    if spec.copy_of is not None:
+        found = COLUMNS[spec.copy_of].unit if spec.copy_of in COLUMNS else None
+        if found != unit:
+            what = "no column of the log format" if found is None else f"in [{found}]"
+            return [f"copy: {spec.copy_of!r} is {what}; expected the name of one in [{unit}]."]
+    if spec.radius_m is not None and unit != "rad/s":
+        return ["radius_m turns a circumferential speed into a wheel speed; expected it there only."]
+    try:
+        spec.factor(unit)
+    except ValueError as error:
+        return [str(error)]
+    return [text for term in spec.sum for text in _unit_problems(term, unit)]
+
+
+def _copies_itself(name: str, specs: dict[str, Spec]) -> bool:
+    seen, open_names = set(), [name]
+    while open_names:
+        for leaf in specs[open_names.pop()].leaves():
+            target = leaf.copy_of
+            if target == name:
+                return True
+            if target in specs and target not in seen:
+                seen.add(target)
+                open_names.append(target)
+    return False

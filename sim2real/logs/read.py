@@ -1,0 +1,103 @@
+"""Reading a log of any format."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+from sim2real.logs.checks import check_scales, check_time, check_values
+from sim2real.logs.csv_file import read_csv
+from sim2real.logs.errors import LogError
+from sim2real.logs.log import Log
+from sim2real.logs.mapping import NO_MAPPING, Mapping
+from sim2real.logs.parquet_file import read_parquet
+from sim2real.logs.resampling import median_step
+from sim2real.logs.table import Finding, Table, Wanted
+from sim2real.logs.translate import (
+    ignored_columns,
+    missing_columns,
+    picture_source,
+    read_time,
+    translate,
+    wanted_columns,
+)
+
+MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF"}
+"""First four bytes of the files that are not text; UnFi is an MDF that its recorder did not close."""
+SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"}
+
+
+def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
+    """Read a log strictly: CSV, Parquet or MDF, told apart by their content.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    mapping : Mapping, optional
+        How its columns become those of the log format; columns that it does not name are read under their own names.
+
+    Raises
+    ------
+    LogError
+        With all problems of the file, one a line.
+    """
+    path, mapping = Path(path), mapping or NO_MAPPING
+    row_word, table = _read_table(path, wanted_columns(mapping))
+
+    def row(i: int) -> str:
+        return f"{row_word} {table.rows[i]}"
+
+    findings = [*table.findings, *missing_columns(table, mapping)]
+    time_s = read_time(table, mapping)
+    if time_s is None:
+        raise _error(path, findings)
+    clock = check_time(time_s, row)
+    findings += clock.findings
+    if any(finding.fatal for finding in clock.findings):
+        raise _error(path, findings)
+    made = translate(table, mapping, time_s)
+    findings += [*made.findings, *check_values(made.signals, row), *check_scales(time_s, made.signals)]
+    if any(finding.fatal for finding in findings):
+        raise _error(path, findings)
+    return Log(
+        path=path,
+        name=path.name,
+        time_s=time_s,
+        signals={name: values for name, values in made.signals.items() if not np.isnan(values).all()},
+        image_path=table.text.get(picture_source(mapping)),
+        rate_hz=1.0 / median_step(time_s),
+        gaps=clock.gaps,
+        derived=made.derived,
+        ignored=ignored_columns(table, mapping),
+        warnings=tuple(finding.text for finding in findings),
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+    )
+
+
+def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
+    """The file's columns, and what one of its rows is called; the content tells the format, the name must agree."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(4)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}; expected a log.") from error
+    kind = MAGIC.get(start, "CSV")
+    named = SUFFIXES.get(path.suffix.lower(), kind)
+    if kind != named:
+        raise LogError(
+            f"{path}: is named like {named} and does not start like it; expected a whole {named} file."
+        )
+    if kind == "Parquet":
+        return "row", read_parquet(path, wanted)
+    if kind == "MDF":
+        from sim2real.logs.mdf_file import read_mdf  # takes a second to import, and most logs are not MDF
+
+        return "sample", read_mdf(path, wanted)
+    return "row", read_csv(path, wanted)
+
+
+def _error(path: Path, findings: list[Finding]) -> LogError:
+    return LogError("\n".join(f"{path}: {finding.text}" for finding in findings if finding.fatal))

@@ -1,0 +1,208 @@
+"""From a file's columns to the columns of the log format, by a mapping or by their own names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+
+from sim2real.logs.contract import COLUMNS, IMAGE_PATH, REQUIRED, TIME, WHEEL_SPEEDS
+from sim2real.logs.mapping import INTEGRAND_UNIT, Mapping, Spec
+from sim2real.logs.table import Array, Finding, Table, Wanted
+
+BRIDGED_S = 0.25
+"""An integral across a longer stretch of lost samples is worth a warning [s]."""
+
+LISTED_NAMES = 12
+"""Column names of the file that an error lists."""
+
+
+def wanted_columns(mapping: Mapping) -> Wanted:
+    """Which columns of a file the log format needs under a mapping."""
+    sources = {name: mapping.sources(name) for name in COLUMNS}
+    text = frozenset(sources.pop(IMAGE_PATH))
+    return Wanted(
+        numbers=frozenset(s for names in sources.values() for s in names) - text,
+        text=text,
+        identifiers=frozenset(sources["frame_id"]),
+        held=frozenset(s for name, names in sources.items() if COLUMNS[name].held for s in names),
+        base=tuple(s for name in WHEEL_SPEEDS for s in sources[name]),
+    )
+
+
+def missing_columns(table: Table, mapping: Mapping) -> list[Finding]:
+    """What the log format or the mapping needs and the file does not have; and ignored columns that are a slip."""
+    names = list(table.names)
+    findings = []
+    mapped = mapping.columns
+    for name, spec in mapped.items():
+        for source in (leaf.column for leaf in spec.leaves()):
+            if source is not None and source not in names:
+                hint = _did_you_mean(source, names)
+                findings.append(
+                    Finding(f"column {source!r} is missing, which {mapping.path} wants for {name}.{hint}")
+                )
+        for copied in (leaf.copy_of for leaf in spec.leaves()):
+            if copied is not None and copied not in mapped and copied not in names:
+                findings.append(
+                    Finding(f"column {copied!r} is missing, which {mapping.path} copies to {name}.")
+                )
+    absent = [name for name in REQUIRED if name not in mapped and name not in names]
+    if absent:
+        findings.append(Finding(_absent_text(absent, names)))
+    spare = [n for n in COLUMNS if n not in REQUIRED and n not in mapped and n not in names]
+    for name in ignored_columns(table, mapping):
+        close = get_close_matches(name.lower(), spare, n=1, cutoff=0.85)
+        if close:
+            findings.append(Finding(f"column {name!r} is ignored; did you mean {close[0]!r}?", fatal=False))
+    return findings
+
+
+def ignored_columns(table: Table, mapping: Mapping) -> tuple[str, ...]:
+    """Columns of the file that nothing is made of."""
+    used = {source for name in COLUMNS for source in mapping.sources(name)}
+    return tuple(name for name in table.names if name not in used)
+
+
+@dataclass(frozen=True)
+class Translated:
+    """The columns of the log format that could be made of a file's.
+
+    Attributes
+    ----------
+    time_s : array, shape (n,)
+        Time [s].
+    signals : dict
+        The other columns that hold numbers, shape (n,), in the log format's units.
+    derived : frozenset of str
+        Which of them were computed rather than measured.
+    findings : list of Finding
+        Where an integral is doubtful.
+    """
+
+    time_s: Array
+    signals: dict[str, Array]
+    derived: frozenset[str]
+    findings: list[Finding]
+
+
+def read_time(table: Table, mapping: Mapping) -> Array | None:
+    """Time [s], shape (n,); None where its columns are not there or hold no numbers."""
+    return _Evaluation(table, _specs(mapping), np.empty(0), {}, []).column(TIME)
+
+
+def translate(table: Table, mapping: Mapping, time_s: Array) -> Translated:
+    """Make the columns of the log format out of the file's."""
+    specs = _specs(mapping)
+    evaluation = _Evaluation(table, specs, time_s, {TIME: time_s}, [])
+    made = {name: evaluation.column(name) for name in specs}
+    signals = {name: values for name, values in made.items() if values is not None and name != TIME}
+    derived = frozenset(name for name in signals if specs[name].derived)
+    return Translated(time_s, signals, derived, evaluation.findings)
+
+
+@dataclass(frozen=True)
+class _Evaluation:
+    """Columns of the log format in the making; `done` holds those that are, since some are copied to others."""
+
+    table: Table
+    specs: dict[str, Spec]
+    time_s: Array
+    done: dict[str, Array]
+    findings: list[Finding]
+
+    def column(self, name: str) -> Array | None:
+        """A column of the log format; None where a source of it is missing."""
+        if name not in self.done:
+            values = self.value(self.specs[name], COLUMNS[name].unit, name)
+            if values is None:
+                return None
+            self.done[name] = values
+        return self.done[name]
+
+    def value(self, spec: Spec, unit: str, name: str) -> Array | None:
+        """A source in `unit`; `name` is the column that it is for."""
+        raw = self._raw(spec, unit, name)
+        return None if raw is None else spec.sign * spec.scale * raw + spec.offset
+
+    def _raw(self, spec: Spec, unit: str, name: str) -> Array | None:
+        if spec.constant is not None:
+            return np.full(len(self.time_s), spec.constant)
+        if spec.copy_of is not None:
+            return self.column(spec.copy_of)
+        if spec.integrate is not None:
+            rate = self.value(spec.integrate, INTEGRAND_UNIT[unit], name)
+            return None if rate is None else self._integral(rate, name)
+        if spec.sum:
+            terms = [self.value(term, unit, name) for term in spec.sum]
+            known = [term for term in terms if term is not None]
+            return np.sum(known, axis=0) if len(known) == len(terms) else None
+        return _measured(self.table, spec, unit)
+
+    def _integral(self, rate: Array, name: str) -> Array:
+        total, bridged_s = integrate(self.time_s, rate)
+        if bridged_s > BRIDGED_S:
+            text = (
+                f"{name} is integrated across {bridged_s:.2g} s without samples; it may be off from there on."
+            )
+            self.findings.append(Finding(text, fatal=False))
+        return total
+
+
+def integrate(time_s: Array, values: Array) -> tuple[Array, float]:
+    """Trapezoidal integral over time from 0, and the longest time that it bridges [s].
+
+    Across lost samples the signal is taken as a straight line; without any sample the integral is NaN.
+    """
+    known = np.isfinite(values)
+    if not known.any():
+        return np.full(len(values), np.nan), 0.0
+    filled = np.interp(time_s, time_s[known], values[known])
+    total = np.concatenate(([0.0], np.cumsum(0.5 * (filled[1:] + filled[:-1]) * np.diff(time_s))))
+    ends = np.concatenate(([time_s[0]], time_s[known], [time_s[-1]]))
+    return total, float(np.max(np.diff(ends)))
+
+
+def _measured(table: Table, spec: Spec, unit: str) -> Array | None:
+    raw = table.numbers.get(spec.column or "")
+    if raw is None:
+        return None
+    return raw * spec.factor(unit)
+
+
+def _specs(mapping: Mapping) -> dict[str, Spec]:
+    return {name: mapping.spec(name) for name in COLUMNS if name != IMAGE_PATH}
+
+
+def picture_source(mapping: Mapping) -> str:
+    """The file's column of picture names."""
+    return mapping.sources(IMAGE_PATH)[0]
+
+
+def _did_you_mean(name: str, known: list[str]) -> str:
+    lower = {k.lower(): k for k in known}
+    close = get_close_matches(name.lower(), lower, n=1, cutoff=0.5)
+    return f" Did you mean {lower[close[0]]!r}?" if close else f" The file has: {_listed(known)}."
+
+
+def _absent_text(absent: list[str], names: list[str]) -> str:
+    lower = {n.lower(): n for n in names}
+    hints = [
+        f"{name} (is it {lower[close[0]]!r}?)" if close else name
+        for name in absent
+        for close in [get_close_matches(name.lower(), lower, n=1, cutoff=0.6)]
+    ]
+    what = "column" if len(absent) == 1 else "columns"
+    line = f"{absent[0]}: {{column: NAME, unit: UNIT}}"
+    if absent == ["position_m"]:
+        line = "position_m: {integrate: {copy: vehicle_speed_m_s}}"
+    return (
+        f"required {what} missing: {', '.join(hints)}. The file has: {_listed(names)}. If they are there under other "
+        f"names or in other units, write a mapping file with lines such as `{line}` and give it with --map."
+    )
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - LISTED_NAMES} more" if len(names) > LISTED_NAMES else ""
+    return ", ".join(names[:LISTED_NAMES]) + more
