@@ -15,7 +15,7 @@ import yaml
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from scenarios.effects import Effect, make_effect, problems_of, suggestion
+from scenarios.effects import EFFECTS, Effect, make_effect, problems_of, suggestion
 from scenarios.errors import ScenarioError
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
@@ -59,7 +59,8 @@ class VehicleFile(_FileModel):
 
     @model_validator(mode="after")
     def _check(self) -> VehicleFile:
-        problems = [text for key, values in self.effects.items() for text in problems_of(key, values)]
+        core = self.to_core()
+        problems = [text for key, values in self.effects.items() for text in problems_of(key, values, core)]
         if self.cog_to_rear_axle_m >= self.wheelbase_m:
             problems.append(
                 f"cog_to_rear_axle_m is {self.cog_to_rear_axle_m:g}; expected less than wheelbase_m "
@@ -85,8 +86,10 @@ class VehicleFile(_FileModel):
         )
 
     def make_effects(self) -> tuple[Effect, ...]:
-        """The effects that the file switches on, in its order."""
-        return tuple(make_effect(key, values) for key, values in self.effects.items())
+        """The effects that the file switches on, in the order in which they act."""
+        core, order = self.to_core(), list(EFFECTS)
+        made = [make_effect(key, values, core) for key, values in self.effects.items()]
+        return tuple(sorted(made, key=lambda effect: order.index(effect.id)))
 
 
 class RoadSegment(_FileModel):

@@ -61,12 +61,13 @@ def test_neutral_values_reproduce_the_base_plant_bit_for_bit(effect_id):
     run = drive_through_everything(car_with(**{effect_id: neutral}))
     assert_same(run, base)
     assert make_log(run, car_with(**{effect_id: neutral})).equals(make_log(base, car_with()))
-    assert EFFECTS[effect_id].neutral(CAR.to_core()) == make_effect(effect_id, neutral)
+    assert EFFECTS[effect_id].neutral(CAR.to_core()) == make_effect(effect_id, neutral, CAR.to_core())
 
 
 @pytest.mark.parametrize("effect_id", EFFECTS)
 def test_other_values_change_the_log(effect_id):
-    middle = {p.name: 0.3 * p.low + 0.7 * p.high for p in EFFECTS[effect_id].parameters()}
+    bounds = {p.name: p.bounds(CAR.to_core()) for p in EFFECTS[effect_id].parameters()}
+    middle = {name: 0.3 * low + 0.7 * high for name, (low, high) in bounds.items()}
     car = car_with(**{effect_id: middle})
     base = drive_through_everything(car_with())
     assert not make_log(drive_through_everything(car), car).equals(make_log(base, car_with()))
@@ -84,7 +85,8 @@ def test_each_effect_describes_itself(effect_id):
     for p in effect.parameters():
         assert p.unit
         assert p.meaning
-        assert p.low <= p.neutral_value(CAR.to_core()) <= p.high
+        low, high = p.bounds(CAR.to_core())
+        assert low <= p.neutral_value(CAR.to_core()) <= high
 
 
 def test_order_of_effects_does_not_matter():
@@ -137,17 +139,17 @@ def test_load_transfer_follows_the_closed_form():
 
 def test_unknown_effect_suggests_the_known_one():
     with pytest.raises(ValueError, match=r"'aero_darg' is not an effect.*did you mean 'aero_drag'"):
-        make_effect("aero_darg", {})
+        make_effect("aero_darg", {}, CAR.to_core())
 
 
 def test_all_problems_of_an_effect_come_at_once():
     with pytest.raises(
         ValueError, match=r"'drag_aera_m2'.*did you mean 'drag_area_m2'.*needs drag_area_m2"
     ) as caught:
-        make_effect("aero_drag", {"drag_aera_m2": 0.6})
+        make_effect("aero_drag", {"drag_aera_m2": 0.6}, CAR.to_core())
     assert "m^2" in str(caught.value)
     with pytest.raises(ValueError, match=r"rolling_resistance.coefficient is 12; expected 0 to 0.3"):
-        make_effect("rolling_resistance", {"coefficient": 12.0})
+        make_effect("rolling_resistance", {"coefficient": 12.0}, CAR.to_core())
 
 
 def test_actuators_and_sensors_take_one_file_each(monkeypatch):

@@ -5,12 +5,63 @@ from __future__ import annotations
 from collections.abc import Mapping
 from difflib import get_close_matches
 
+from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.aero_drag import AeroDrag
 from scenarios.effects.base import Effect, Parameter
+from scenarios.effects.brake_drag import BrakeDrag
+from scenarios.effects.driveline_compliance import DrivelineCompliance
+from scenarios.effects.friction_falloff import FrictionFalloff
+from scenarios.effects.friction_offset import FrictionOffset
 from scenarios.effects.load_transfer import LoadTransfer
+from scenarios.effects.mass_offset import MassOffset
+from scenarios.effects.mu_split import MuSplit
+from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.rolling_resistance import RollingResistance
+from scenarios.effects.torque_delay import TorqueDelay
+from scenarios.effects.torque_gain import TorqueGain
+from scenarios.effects.torque_lag import TorqueLag
+from scenarios.effects.tyre_relaxation import TyreRelaxation
+from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset
+from scenarios.effects.vehicle_speed_delay import VehicleSpeedDelay
+from scenarios.effects.vehicle_speed_scale import VehicleSpeedScale
+from scenarios.effects.wheel_inertia_offset import WheelInertiaOffset
+from scenarios.effects.wheel_radius_offset import WheelRadiusOffset
+from scenarios.effects.wheel_speed_delay import WheelSpeedDelay
+from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
+from trpac_core.vehicle import Vehicle
 
-EFFECTS: dict[str, type[Effect]] = {e.id: e for e in (LoadTransfer, AeroDrag, RollingResistance)}
+EFFECTS: dict[str, type[Effect]] = {
+    effect.id: effect
+    for effect in (
+        # actuators
+        TorqueGain,
+        TorqueLag,
+        TorqueDelay,
+        # dynamics
+        AeroDrag,
+        RollingResistance,
+        BrakeDrag,
+        RoadGrade,
+        MassOffset,
+        WheelRadiusOffset,
+        WheelInertiaOffset,
+        DrivelineCompliance,
+        LoadTransfer,
+        TyreStiffnessOffset,
+        TyreRelaxation,
+        FrictionFalloff,
+        # road
+        FrictionOffset,
+        MuSplit,
+        # sensors
+        VehicleSpeedScale,
+        VehicleSpeedDelay,
+        WheelSpeedDelay,
+        WheelSpeedQuantisation,
+        AccelerometerBias,
+    )
+}
+"""All effects by id, in the order in which they act: along the plant, and within a stage as the signal passes them."""
 
 __all__ = ["EFFECTS", "Effect", "Parameter", "make_effect", "problems_of"]
 
@@ -22,8 +73,8 @@ def suggestion(word: str, known: list[str]) -> str:
     return f"{hint}Known: {', '.join(known)}."
 
 
-def problems_of(effect_id: str, values: Mapping[str, float]) -> list[str]:
-    """Everything that keeps an effect from being made; empty when nothing does."""
+def problems_of(effect_id: str, values: Mapping[str, float], vehicle: Vehicle) -> list[str]:
+    """Everything that keeps an effect from being made on this vehicle; empty when nothing does."""
     if effect_id not in EFFECTS:
         return [
             f"{effect_id!r} is not an effect that the plant models; {suggestion(effect_id, list(EFFECTS))}"
@@ -35,25 +86,25 @@ def problems_of(effect_id: str, values: Mapping[str, float]) -> list[str]:
         if name not in known
     ]
     for name, p in known.items():
+        low, high = p.bounds(vehicle)
         if name not in values:
             problems.append(f"{effect_id} needs {name} [{p.unit}], {p.meaning}.")
-        elif not p.low <= values[name] <= p.high:
+        elif not low <= values[name] <= high:
             problems.append(
-                f"{effect_id}.{name} is {values[name]:g}; "
-                f"expected {p.low:g} to {p.high:g} [{p.unit}], {p.meaning}."
+                f"{effect_id}.{name} is {values[name]:g}; expected {low:g} to {high:g} [{p.unit}], {p.meaning}."
             )
     return problems
 
 
-def make_effect(effect_id: str, values: Mapping[str, float]) -> Effect:
-    """The effect with these parameter values.
+def make_effect(effect_id: str, values: Mapping[str, float], vehicle: Vehicle) -> Effect:
+    """The effect with these parameter values on this vehicle.
 
     Raises
     ------
     ValueError
         Unknown id or parameter, a missing parameter, or a value out of bounds; names them all.
     """
-    problems = problems_of(effect_id, values)
+    problems = problems_of(effect_id, values, vehicle)
     if problems:
         raise ValueError(" ".join(problems))
     return EFFECTS[effect_id](**values)

@@ -19,13 +19,20 @@ class AeroDrag(Effect):
     """Air drag in still air; lift and the drag's pitching moment are left out."""
 
     id = "aero_drag"
+    stage = "dynamics"
+    subsystem = "vehicle"
     equation = "F_drag = 0.5 rho C_d A v^2"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 4; rho 1.225 kg/m^3 of ISO 2533"
     excited_by = "coasting or holding a high speed"
     look_alikes = ("rolling_resistance", "road_grade", "mass_offset")
 
     drag_area_m2: float = parameter(
-        "m^2", "drag coefficient times frontal area", neutral=0.0, low=0.0, high=5.0
+        "m^2",
+        "drag coefficient times frontal area",
+        neutral=0.0,
+        low=0.0,
+        high=5.0,
+        starts=(0.4, 0.8, 2.0),
     )
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:

@@ -9,17 +9,37 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.perception import Frames
+    from scenarios.plant.dynamics import DynamicsParameters, RoadTable
     from trpac_core.vehicle import Vehicle
 
-Neutral = float | Callable[["Vehicle"], float]
-"""A neutral value: a number, or what it is for a given vehicle."""
+Array = NDArray[np.float64]
+Signals = dict[str, Array]
+
+Stage = Literal["actuators", "dynamics", "road", "sensors", "perception"]
+Subsystem = Literal[
+    "powertrain",
+    "wheel",
+    "tyre",
+    "vehicle",
+    "road",
+    "wheel_speed_sensor",
+    "vehicle_speed_sensor",
+    "accelerometer",
+    "camera",
+]
+
+Value = float | Callable[["Vehicle"], float]
+"""A number, or what it is for a given vehicle."""
+
+Values = tuple[float, ...] | Callable[["Vehicle"], tuple[float, ...]]
+"""Numbers, or what they are for a given vehicle."""
 
 
 @dataclass(frozen=True)
@@ -29,18 +49,34 @@ class Parameter:
     name: str
     unit: str
     meaning: str
-    neutral: Neutral
-    low: float
-    high: float
+    neutral: Value
+    low: Value
+    high: Value
+    starts: Values
 
     def neutral_value(self, vehicle: Vehicle) -> float:
         """The value at which the effect vanishes on this vehicle, in `unit`."""
-        return self.neutral(vehicle) if callable(self.neutral) else self.neutral
+        return _on(vehicle, self.neutral)
+
+    def bounds(self, vehicle: Vehicle) -> tuple[float, float]:
+        """The least and the greatest value that is accepted on this vehicle, in `unit`."""
+        return _on(vehicle, self.low), _on(vehicle, self.high)
+
+    def start_values(self, vehicle: Vehicle) -> tuple[float, ...]:
+        """Values worth trying first in a fit, in `unit`: they bracket what a real car may plausibly have."""
+        return self.starts(vehicle) if callable(self.starts) else self.starts
 
 
-def parameter(unit: str, meaning: str, *, neutral: Neutral, low: float, high: float) -> Any:
-    """Declare one effect parameter; values outside [low, high] are refused."""
-    return field(metadata={"unit": unit, "meaning": meaning, "neutral": neutral, "low": low, "high": high})
+def _on(vehicle: Vehicle, value: Value) -> float:
+    return value(vehicle) if callable(value) else value
+
+
+def parameter(
+    unit: str, meaning: str, *, neutral: Value, low: Value, high: Value, starts: Values = ()
+) -> Any:
+    """Declare one effect parameter; values outside [low, high] are refused, fits begin at `starts`."""
+    about = {"unit": unit, "meaning": meaning, "neutral": neutral, "low": low, "high": high, "starts": starts}
+    return field(metadata=about)
 
 
 @dataclass(frozen=True)
@@ -48,6 +84,8 @@ class Effect:
     """Base of all effects: describes itself and leaves every stage as it is."""
 
     id: ClassVar[str]
+    stage: ClassVar[Stage]
+    subsystem: ClassVar[Subsystem]
     equation: ClassVar[str]
     source: ClassVar[str]
     excited_by: ClassVar[str]
@@ -63,16 +101,26 @@ class Effect:
         """The effect with all parameters at their neutral values for this vehicle."""
         return cls(**{p.name: p.neutral_value(vehicle) for p in cls.parameters()})
 
-    def actuate(self, time_s: NDArray[np.float64], torque_nm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Actuators: the torque at the wheels for a commanded one, both shape (n, 4) [N m]."""
+    def actuate(self, time_s: Array, torque_nm: Array) -> Array:
+        """Actuators: the torque at the wheels for a commanded one, both shape (n, 4), at uniform times [N m]."""
         return torque_nm
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Dynamics: the compiled step's parameters with this effect in them."""
         return parameters
 
-    def sense(
-        self, time_s: NDArray[np.float64], signals: dict[str, NDArray[np.float64]]
-    ) -> dict[str, NDArray[np.float64]]:
+    def road(self, table: RoadTable) -> RoadTable:
+        """Road: the friction under the left and right wheels with this effect in it."""
+        return table
+
+    def sense(self, time_s: Array, signals: Signals) -> Signals:
         """Sensors: the log's columns, shape (n,) each, as the sensor reports them."""
         return signals
+
+    def correct(self, time_s: Array, signals: Signals) -> Signals:
+        """Undo `sense` as well as can be: what an ideal sensor would have reported; NaN where that is not known."""
+        return signals
+
+    def perceive(self, frames: Frames) -> Frames:
+        """Perception: what the camera chain makes of its pictures."""
+        return frames

@@ -16,13 +16,20 @@ class RollingResistance(Effect):
     """A moment against each loaded wheel's rotation; it holds a resting wheel and never turns it back."""
 
     id = "rolling_resistance"
+    stage = "dynamics"
+    subsystem = "wheel"
     equation = "I omega' = T - F_x R - c F_z R"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 4; ISO 28580 defines the coefficient"
     excited_by = "coasting at low speed"
     look_alikes = ("brake_drag", "road_grade", "torque_gain")
 
     coefficient: float = parameter(
-        "-", "resisting force at the contact per vertical load", neutral=0.0, low=0.0, high=0.3
+        "-",
+        "resisting force at the contact per vertical load",
+        neutral=0.0,
+        low=0.0,
+        high=0.3,
+        starts=(0.008, 0.02, 0.05),
     )
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:

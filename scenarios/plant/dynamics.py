@@ -2,12 +2,15 @@
 
 Equations (docs/plant.md has them with their sources):
 
-    I omega' = T - F_x R - c F_z R          Eq. (12) of [1]_, with the rolling resistance's moment
-    m v'     = sum F_x - k v^2
+    I omega' = T - F_x R - c F_z R - T_drag          Eq. (12) of [1]_, with resistances
+    m v'     = sum F_x - k v^2 - m g sin
     lambda   = abs(omega R - v) / max(omega R, v, floor)        Eq. (13) of [1]_
 
+With relaxation each tyre force is a state that follows its steady value; with a driveline T is a shaft's torque, and
+twist and motor speed are states. Both vanish from the step's linear equations by elimination per wheel.
+
 The vehicle drives forward or stands: omega >= 0 and v >= 0. A torque that resists (a brake, rolling resistance)
-can bring a wheel to rest and then holds it, it never turns it back.
+can bring a wheel to rest and then holds it, it never turns it back; the ground holds a standing car likewise.
 
 References
 ----------
@@ -16,13 +19,36 @@ References
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from trpac_core.vehicle import GRAVITY_M_S2
+from scenarios.plant.parameters import (
+    FORCE,
+    MOTOR,
+    POSITION,
+    SPEED,
+    STATES,
+    TWIST,
+    WHEEL,
+    DynamicsParameters,
+    RoadTable,
+    Wheels,
+)
+
+__all__ = [
+    "DynamicsParameters",
+    "RoadTable",
+    "Wheels",
+    "advance",
+    "forces",
+    "initial_y",
+    "look_up_theta",
+    "new_wheels",
+    "refresh",
+    "run",
+    "tyre_force",
+]
 
 FLOOR_SPEED_M_S = 0.01
 """Below this speed slip is taken relative to the floor, so that standstill has slip 0 and not 0/0 [m/s]."""
@@ -39,37 +65,15 @@ SHORTEST_STEP_S = 1e-7
 ACCELERATION_TOLERANCE_M_S2 = 1e-7
 """Accepted residual of the acceleration under load transfer, before its last Newton correction [m/s^2]."""
 
+RELEASE_SPEED_M_S = 1.0
+"""At rest a lagging force that still brakes is released as at this speed: the car would rock back on it [m/s]."""
+
 BORDER_TOLERANCE_M = 1e-7
 """A contact point this close to the next road segment counts as being on it [m]."""
 
 compiled = njit(cache=True, error_model="numpy")  # divisions are guarded here, not by the compiler
 
 _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)  # makes the two-stage Rosenbrock method L-stable
-
-
-class DynamicsParameters(NamedTuple):
-    """Everything that the dynamics stage depends on; effects replace fields."""
-
-    mass_kg: float
-    cog_to_front_axle_m: float
-    cog_to_rear_axle_m: float
-    wheel_radius_m: float
-    wheel_inertia_kg_m2: float
-    longitudinal_stiffness_n: float
-    transfer_height_m: float = 0.0
-    """Height through which acceleration moves load between the axles; 0: static loads [m]."""
-    drag_kg_m: float = 0.0
-    """Air drag per squared speed, 0.5 rho C_d A [kg/m]."""
-    rolling_coefficient: float = 0.0
-    """Rolling resistance moment per load and radius [-]."""
-
-
-class RoadTable(NamedTuple):
-    """The road as the compiled step reads it; the first segment also holds before its start."""
-
-    start_m: NDArray[np.float64]
-    theta: NDArray[np.float64]
-    """Friction under the left and the right wheels, shape (segments, 2) [-]."""
 
 
 @compiled
@@ -108,102 +112,6 @@ def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> 
     return force, by_slip, theta * (1.0 - adhering) * shape
 
 
-class Wheels(NamedTuple):
-    """Working arrays of one evaluation, shape (4,) each; theta is input, the others are filled."""
-
-    theta: NDArray[np.float64]
-    force_n: NDArray[np.float64]
-    load_n: NDArray[np.float64]
-    slip: NDArray[np.float64]
-    force_by_wheel: NDArray[np.float64]
-    """Slope of the force by wheel speed [N s/rad]."""
-    force_by_speed: NDArray[np.float64]
-    """Slope of the force by vehicle speed [N s/m]."""
-    rate_1: NDArray[np.float64]
-    rate_2: NDArray[np.float64]
-    free: NDArray[np.float64]
-    """0 for a wheel that is held at rest, else 1."""
-
-
-@compiled
-def new_wheels() -> tuple[Wheels, Wheels]:
-    """Working arrays of the two stages; both read the same theta."""
-    a = np.zeros((17, 4))
-    first = Wheels(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8])
-    return first, Wheels(a[0], a[9], a[10], a[11], a[12], a[13], a[14], a[15], a[16])
-
-
-@compiled
-def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> float:
-    """Fill loads, slips, signed forces and force slopes; return the acceleration [m/s^2].
-
-    With load transfer the acceleration stands on both sides; Newton's method on it starts from `accel`.
-    """
-    speed = max(y[1], 0.0)
-    half_base = 0.5 / (p.cog_to_front_axle_m + p.cog_to_rear_axle_m)
-    front_n = p.mass_kg * GRAVITY_M_S2 * p.cog_to_rear_axle_m * half_base
-    rear_n = p.mass_kg * GRAVITY_M_S2 * p.cog_to_front_axle_m * half_base
-    transfer_kg = p.mass_kg * p.transfer_height_m * half_base
-    drag_n = p.drag_kg_m * speed * speed
-    for _ in range(8):
-        shift_n = transfer_kg * accel
-        total_n = 0.0
-        total_by_accel = 0.0
-        for i in range(4):
-            rim = max(y[2 + i], 0.0) * p.wheel_radius_m
-            scale = max(rim, speed, FLOOR_SPEED_M_S)
-            slip = abs(rim - speed) / scale
-            load_n = max(front_n - shift_n, 0.0) if i < 2 else max(rear_n + shift_n, 0.0)
-            force, by_slip, by_load = tyre_force(wheels.theta[i], slip, load_n, p.longitudinal_stiffness_n)
-            sign = 1.0 if rim >= speed else -1.0
-            total_n += sign * force
-            total_by_accel += sign * by_load * (-transfer_kg if i < 2 else transfer_kg)
-            wheels.force_n[i] = sign * force
-            wheels.load_n[i] = load_n
-            wheels.slip[i] = slip
-            # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
-            slope = max(by_slip, 0.0) / scale
-            wheels.force_by_wheel[i] = slope * p.wheel_radius_m * (speed / rim if rim == scale else 1.0)
-            wheels.force_by_speed[i] = -slope * (rim / speed if speed == scale else 1.0)
-        error = (total_n - drag_n) / p.mass_kg - accel
-        accel += error / (1.0 - total_by_accel / p.mass_kg)
-        if p.transfer_height_m == 0.0 or abs(error) < ACCELERATION_TOLERANCE_M_S2:
-            break
-    return accel
-
-
-@compiled
-def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
-    """Omega' of one wheel [rad/s^2]; a resting wheel that nothing drives forward stays at rest."""
-    resistance_n = wheels.force_n[i] + p.rolling_coefficient * wheels.load_n[i]
-    rate = (torque_nm - resistance_n * p.wheel_radius_m) / p.wheel_inertia_kg_m2
-    return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
-
-
-@compiled
-def _solve(
-    speed_rhs: float, speed: float, h: float, p: DynamicsParameters, wheels: Wheels, k: NDArray
-) -> float:
-    """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; return the vehicle speed's part.
-
-    A couples each wheel with the vehicle's speed alone, so eliminating the wheels leaves one scalar equation.
-    """
-    gh = _GAMMA * h
-    pivot = 1.0 + gh * 2.0 * p.drag_kg_m * speed / p.mass_kg
-    rhs = speed_rhs
-    per_newton = p.wheel_radius_m / p.wheel_inertia_kg_m2
-    for i in range(4):
-        gain = gh * per_newton * wheels.free[i]
-        share = gh * wheels.force_by_wheel[i] / (p.mass_kg * (1.0 + gain * wheels.force_by_wheel[i]))
-        pivot -= (gh / p.mass_kg - share * gain) * wheels.force_by_speed[i]
-        rhs += share * k[i]
-    k_speed = rhs / pivot
-    for i in range(4):
-        gain = gh * per_newton * wheels.free[i]
-        k[i] = (k[i] - gain * wheels.force_by_speed[i] * k_speed) / (1.0 + gain * wheels.force_by_wheel[i])
-    return k_speed
-
-
 @compiled
 def segment_at(start_m: NDArray, contact_m: float) -> int:
     """Index of the road segment under a contact point."""
@@ -231,6 +139,197 @@ def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, the
 
 
 @compiled
+def new_wheels() -> tuple[Wheels, Wheels]:
+    """Working arrays of the two stages; both read the same theta."""
+    theta = np.zeros(4)
+    a, free, rates, pivots = np.zeros((14, 4)), np.ones((2, 9)), np.zeros((2, 16)), np.zeros((2, 6, 4))
+    first = Wheels(theta, a[0], a[1], a[2], a[3], a[4], a[5], a[6], rates[0], free[0], pivots[0])
+    second = Wheels(theta, a[7], a[8], a[9], a[10], a[11], a[12], a[13], rates[1], free[1], pivots[1])
+    return first, second
+
+
+@compiled
+def initial_y(speed_m_s: float, position_m: float, p: DynamicsParameters) -> NDArray:
+    """The state of a freely rolling car, shape (18,)."""
+    y = np.zeros(STATES)
+    y[POSITION], y[SPEED] = position_m, speed_m_s
+    y[WHEEL : WHEEL + 4] = speed_m_s / p.wheel_radius_m
+    if p.motor_inertia_kg_m2 > 0.0:
+        y[MOTOR : MOTOR + 4] = y[WHEEL : WHEEL + 4]
+    return y
+
+
+@compiled
+def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> float:
+    """Fill loads, slips, signed forces and force slopes; return what the accelerometer reads [m/s^2].
+
+    With load transfer the acceleration stands on both sides; Newton's method on it starts from `accel`.
+    """
+    speed = max(y[SPEED], 0.0)
+    half_base = 0.5 / (p.cog_to_front_axle_m + p.cog_to_rear_axle_m)
+    front_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_rear_axle_m * half_base
+    rear_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_front_axle_m * half_base
+    transfer_kg = p.mass_kg * p.transfer_height_m * half_base
+    drag_n = p.drag_kg_m * speed * speed
+    for _ in range(8):
+        shift_n = transfer_kg * accel
+        total_n = 0.0
+        total_by_accel = 0.0
+        for i in range(4):
+            rim = max(y[WHEEL + i], 0.0) * p.wheel_radius_m
+            scale = max(rim, speed, FLOOR_SPEED_M_S)
+            slip = abs(rim - speed) / scale
+            load_n = max(front_n - shift_n, 0.0) if i < 2 else max(rear_n + shift_n, 0.0)
+            theta = wheels.theta[i]
+            if p.falloff_s_m > 0.0:
+                left = np.exp(-p.falloff_s_m * abs(rim - speed))
+                theta *= p.falloff_floor + (1.0 - p.falloff_floor) * left
+            force, by_slip, by_load = tyre_force(theta, slip, load_n, p.longitudinal_stiffness_n)
+            sign = 1.0 if rim >= speed else -1.0
+            wheels.steady_n[i] = sign * force
+            if p.relaxation_m > 0.0:
+                wheels.force_n[i] = y[FORCE + i]
+                rest = speed <= 0.0 and y[FORCE + i] < 0.0
+                wheels.lag_rate[i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / p.relaxation_m
+            else:
+                wheels.force_n[i] = sign * force
+                total_by_accel += sign * by_load * (-transfer_kg if i < 2 else transfer_kg)
+            total_n += wheels.force_n[i]
+            wheels.load_n[i] = load_n
+            wheels.slip[i] = slip
+            # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
+            slope = max(by_slip, 0.0) / scale
+            wheels.force_by_wheel[i] = slope * p.wheel_radius_m * (speed / rim if rim == scale else 1.0)
+            wheels.force_by_speed[i] = -slope * (rim / speed if speed == scale else 1.0)
+        error = (total_n - drag_n) / p.mass_kg - accel
+        accel += error / (1.0 - total_by_accel / p.mass_kg)
+        if p.transfer_height_m == 0.0 or abs(error) < ACCELERATION_TOLERANCE_M_S2:
+            break
+    # The ground holds a standing car that would roll back.
+    return max(accel, p.slope_m_s2) if speed <= 0.0 else accel
+
+
+@compiled
+def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, first: Wheels) -> float:
+    """Make `first` hold what `advance` needs after y was changed from outside; return the accelerometer [m/s^2]."""
+    look_up_theta(y[POSITION], p, road, first.theta)
+    return forces(y, accel, p, first)
+
+
+@compiled
+def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
+    """Omega' of one wheel [rad/s^2]; a resting wheel that nothing drives forward stays at rest."""
+    resistance_n = wheels.force_n[i] + p.rolling_coefficient * wheels.load_n[i]
+    inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2
+    rate = (torque_nm - resistance_n * p.wheel_radius_m - p.drag_torque_nm) / inertia
+    return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
+
+
+@compiled
+def _motor_torque(speed_rad_s: float, torque_nm: float, shaft_nm: float) -> float:
+    """What accelerates a motor [N m]; a negative torque is a brake, which opposes its motion and holds it at rest."""
+    if torque_nm >= 0.0 or speed_rad_s > 0.0:
+        return torque_nm - shaft_nm
+    if speed_rad_s < 0.0:
+        return -torque_nm - shaft_nm
+    return max(-shaft_nm + torque_nm, 0.0) + min(-shaft_nm - torque_nm, 0.0)
+
+
+@compiled
+def _fill_rates(
+    y: NDArray, torque_nm: NDArray, next_nm: NDArray, part: float, p: DynamicsParameters, wheels: Wheels
+) -> None:
+    """Fill the rates of y from the wheel speeds on, and what is free to move, at a part of the output step."""
+    total_n = 0.0
+    for i in range(4):
+        torque = torque_nm[i] + (next_nm[i] - torque_nm[i]) * part
+        if p.motor_inertia_kg_m2 > 0.0:
+            spread = y[MOTOR + i] - y[WHEEL + i]
+            shaft_nm = p.shaft_stiffness_nm_rad * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
+            motor_nm = _motor_torque(y[MOTOR + i], torque, shaft_nm)
+            wheels.rates[TWIST - WHEEL + i] = spread
+            wheels.rates[MOTOR - WHEEL + i] = motor_nm / p.motor_inertia_kg_m2
+            wheels.free[4 + i] = 0.0 if torque < 0.0 and y[MOTOR + i] == 0.0 and motor_nm == 0.0 else 1.0
+            torque = shaft_nm
+        rate = _wheel_rate(i, y[WHEEL + i], torque, p, wheels)
+        wheels.free[i] = 0.0 if y[WHEEL + i] <= 0.0 and rate == 0.0 else 1.0
+        wheels.rates[i] = rate
+        if p.relaxation_m > 0.0:
+            lag_n = wheels.steady_n[i] - y[FORCE + i]
+            wheels.rates[FORCE - WHEEL + i] = wheels.lag_rate[i] * lag_n
+        total_n += wheels.force_n[i]
+    wheels.free[8] = 0.0 if y[SPEED] <= 0.0 and total_n < p.mass_kg * p.slope_m_s2 else 1.0
+
+
+@compiled
+def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> float:
+    """Eliminate all wheels from 1 - gamma h A; fill the pivots, return the vehicle speed's.
+
+    A couples each wheel with the vehicle's speed alone. Within a wheel, shaft and motor act as inertia, and a lagging
+    force as a smaller slope.
+    """
+    gh = _GAMMA * h
+    pivot = 1.0 + gh * 2.0 * p.drag_kg_m * speed / p.mass_kg
+    gains, by_wheel, by_speed, own, shares, ratios = wheels.pivots
+    per_newton = p.wheel_radius_m / p.wheel_inertia_kg_m2
+    for i in range(4):
+        if p.motor_inertia_kg_m2 > 0.0:
+            shaft = gh * (gh * p.shaft_stiffness_nm_rad + p.shaft_damping_nm_s_rad)
+            free = wheels.free[4 + i] > 0.0
+            ratios[i] = p.motor_inertia_kg_m2 / (p.motor_inertia_kg_m2 + shaft) if free else 1.0
+            inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2 + ratios[i] * shaft
+            per_newton = p.wheel_radius_m / inertia
+        lagged = gh * wheels.lag_rate[i]
+        share = lagged / (1.0 + lagged) if p.relaxation_m > 0.0 else 1.0
+        by_wheel[i] = wheels.force_by_wheel[i] * share
+        by_speed[i] = wheels.force_by_speed[i] * share
+        gains[i] = gh * per_newton * wheels.free[i]
+        own[i] = 1.0 + gains[i] * by_wheel[i]
+        shares[i] = gh * by_wheel[i] / (p.mass_kg * own[i])
+        pivot -= (gh / p.mass_kg - shares[i] * gains[i]) * by_speed[i]
+    return pivot
+
+
+@compiled
+def _solve(
+    speed_rhs: float, pivot: float, h: float, p: DynamicsParameters, wheels: Wheels, k: NDArray
+) -> float:
+    """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; return the vehicle speed's part."""
+    gh = _GAMMA * h
+    gains, by_wheel, by_speed, own, shares, ratios = wheels.pivots
+    stiffness, motor = gh * p.shaft_stiffness_nm_rad, p.motor_inertia_kg_m2
+    shaft = gh * (stiffness + p.shaft_damping_nm_s_rad)
+    inertia = p.wheel_inertia_kg_m2 - motor
+    rhs = speed_rhs
+    for i in range(4):
+        if motor > 0.0 and wheels.free[i] > 0.0:
+            passed = stiffness * k[TWIST - WHEEL + i] + shaft * k[MOTOR - WHEEL + i]
+            k[i] = (inertia * k[i] + ratios[i] * passed) / (inertia + ratios[i] * shaft)
+        if p.relaxation_m > 0.0:
+            k[FORCE - WHEEL + i] /= 1.0 + gh * wheels.lag_rate[i]
+            k[i] -= gains[i] * k[FORCE - WHEEL + i]
+            rhs += gh / p.mass_kg * k[FORCE - WHEEL + i]
+        rhs += shares[i] * k[i]
+    k_speed = rhs / pivot if wheels.free[8] > 0.0 else speed_rhs
+    for i in range(4):
+        k[i] = (k[i] - gains[i] * by_speed[i] * k_speed) / own[i]
+        if p.relaxation_m > 0.0:
+            k[FORCE - WHEEL + i] += by_wheel[i] * k[i] + by_speed[i] * k_speed
+        if motor > 0.0:
+            if wheels.free[4 + i] > 0.0:
+                pull = shaft * k[i] - stiffness * k[TWIST - WHEEL + i]
+                k[MOTOR - WHEEL + i] = (motor * k[MOTOR - WHEEL + i] + pull) / (motor + shaft)
+            k[TWIST - WHEEL + i] += gh * (k[MOTOR - WHEEL + i] - k[i])
+    return k_speed
+
+
+@compiled
+def _states(p: DynamicsParameters) -> int:
+    """How many entries of y are in use."""
+    return STATES if p.relaxation_m > 0.0 or p.motor_inertia_kg_m2 > 0.0 else FORCE
+
+
+@compiled
 def _try_step(
     y: NDArray,
     trial: NDArray,
@@ -244,28 +343,33 @@ def _try_step(
     first: Wheels,
     second: Wheels,
 ) -> tuple[float, float]:
-    """One two-stage Rosenbrock (ROS2) step from y to trial; return error estimate [m/s], acceleration."""
-    for i in range(4):
-        torque = torque_nm[i] + (next_torque_nm[i] - torque_nm[i]) * begin
-        rate = _wheel_rate(i, y[2 + i], torque, p, first)
-        first.free[i] = 0.0 if y[2 + i] <= 0.0 and rate == 0.0 else 1.0
-        first.rate_1[i] = rate
-    speed_1 = _solve(accel, y[1], h, p, first, first.rate_1)
-    trial[1] = y[1] + h * speed_1
-    for i in range(4):
-        trial[2 + i] = y[2 + i] + h * first.rate_1[i]
+    """One two-stage Rosenbrock (ROS2) step from y to trial; return error estimate [m/s], accelerometer."""
+    count = _states(p) - WHEEL
+    k_1, k_2 = first.rates, second.rates
+    _fill_rates(y, torque_nm, next_torque_nm, begin, p, first)
+    pivot = _factor(y[SPEED], h, p, first)
+    speed_1 = _solve(accel - p.slope_m_s2 if first.free[8] > 0.0 else 0.0, pivot, h, p, first, k_1)
+    trial[SPEED] = y[SPEED] + h * speed_1
+    for j in range(count):
+        trial[WHEEL + j] = y[WHEEL + j] + h * k_1[j]
     accel = forces(trial, accel, p, second)
-    for i in range(4):
-        torque = torque_nm[i] + (next_torque_nm[i] - torque_nm[i]) * end
-        rate = _wheel_rate(i, trial[2 + i], torque, p, second)
-        first.rate_2[i] = rate - 2.0 * first.rate_1[i]
-    speed_2 = _solve(accel - 2.0 * speed_1, y[1], h, p, first, first.rate_2)
+    _fill_rates(trial, torque_nm, next_torque_nm, end, p, second)
+    for j in range(count):
+        k_2[j] -= 2.0 * k_1[j]
+    speed_2 = _solve(accel - p.slope_m_s2 - 2.0 * speed_1, pivot, h, p, first, k_2)
     error = abs(speed_1 + speed_2)
-    trial[1] = max(y[1] + h * (1.5 * speed_1 + 0.5 * speed_2), 0.0)
+    for j in range(count):
+        trial[WHEEL + j] = y[WHEEL + j] + h * (1.5 * k_1[j] + 0.5 * k_2[j])
+    trial[SPEED] = max(y[SPEED] + h * (1.5 * speed_1 + 0.5 * speed_2), 0.0)
     for i in range(4):
-        error = max(error, p.wheel_radius_m * abs(first.rate_1[i] + first.rate_2[i]))
-        trial[2 + i] = max(y[2 + i] + h * (1.5 * first.rate_1[i] + 0.5 * first.rate_2[i]), 0.0)
-    trial[0] = y[0] + 0.5 * h * (y[1] + trial[1])
+        error = max(error, p.wheel_radius_m * abs(k_1[i] + k_2[i]))
+        trial[WHEEL + i] = max(trial[WHEEL + i], 0.0)
+        if p.motor_inertia_kg_m2 > 0.0:
+            motor = MOTOR - WHEEL + i
+            error = max(error, p.wheel_radius_m * abs(k_1[motor] + k_2[motor]))
+            if torque_nm[i] < 0.0 and y[MOTOR + i] * trial[MOTOR + i] < 0.0:
+                trial[MOTOR + i] = 0.0  # a brake stops the motor before it could turn back
+    trial[POSITION] = y[POSITION] + 0.5 * h * (y[SPEED] + trial[SPEED])
     return 0.5 * h * error, accel
 
 
@@ -282,30 +386,32 @@ def advance(
     first: Wheels,
     second: Wheels,
 ) -> float:
-    """Move y over one output step with torque linear between its ends; return the acceleration there [m/s^2].
+    """Move y over one output step with torque linear between its ends; return the accelerometer there [m/s^2].
 
     `first` must hold the forces at y, and does so again at the end. Sub-steps end at every road border that a wheel
     crosses and shrink until their error estimate is accepted.
     """
+    count = _states(p)
     at_s = 0.0
     h = step_s
-    ahead_m = look_up_theta(y[0], p, road, first.theta)
+    ahead_m = look_up_theta(y[POSITION], p, road, first.theta)
     while step_s - at_s > 1e-9 * step_s:
         h = min(h, step_s - at_s)
-        if y[1] * h > ahead_m:
-            h = ahead_m / y[1]
+        if y[SPEED] * h > ahead_m:
+            h = ahead_m / y[SPEED]
         begin, end = at_s / step_s, (at_s + h) / step_s
         error, new_accel = _try_step(
             y, trial, torque_nm, next_torque_nm, begin, end, h, accel, p, first, second
         )
-        tolerance = TOLERANCE_M_S + RELATIVE_TOLERANCE * y[1]
+        tolerance = TOLERANCE_M_S + RELATIVE_TOLERANCE * y[SPEED]
         if error > tolerance and h > SHORTEST_STEP_S:
             h = max(h * max(0.9 * np.sqrt(tolerance / error), 0.1), SHORTEST_STEP_S)
             continue
-        y[:] = trial
+        for j in range(count):
+            y[j] = trial[j]
         at_s += h
         h *= min(0.9 * np.sqrt(tolerance / max(error, 1e-3 * tolerance)), 10.0)
-        ahead_m = look_up_theta(y[0], p, road, first.theta)
+        ahead_m = look_up_theta(y[POSITION], p, road, first.theta)
         accel = forces(y, new_accel, p, first)
     return accel
 
@@ -318,23 +424,24 @@ def run(
     p: DynamicsParameters,
     road: RoadTable,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Simulate all rows from y (position, speed, four wheel speeds), which ends as the last row's state.
+    """Simulate all rows from y, which ends as the last row's state.
 
     Returns
     -------
     tuple
-        States (n, 6), accelerometer (n,) [m/s^2], and slip [-], tyre force [N], load [N], theta [-] (n, 4).
+        States (n, 6), or (n, 18) where forces or motors are states, accelerometer (n,) [m/s^2], and slip [-], tyre
+        force [N], load [N], theta [-] (n, 4).
     """
     n = torque_nm.shape[0]
-    states, accels = np.empty((n, 6)), np.empty(n)
+    count = _states(p)
+    states, accels = np.empty((n, count)), np.empty(n)
     slip, force_n, load_n, theta = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4))
     first, second = new_wheels()
-    trial = np.empty(6)
-    look_up_theta(y[0], p, road, first.theta)
-    accel = forces(y, 0.0, p, first)
+    trial = np.empty(STATES)
+    accel = refresh(y, 0.0, p, road, first)
     for k in range(n):
         accels[k] = accel
-        states[k] = y
+        states[k] = y[:count]
         slip[k], force_n[k] = first.slip, first.force_n
         load_n[k], theta[k] = first.load_n, first.theta
         if k + 1 < n:

@@ -12,7 +12,7 @@ from scenarios.effects import Effect
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, Scenario, VehicleFile
 from scenarios.plant import dynamics
-from scenarios.plant.dynamics import DynamicsParameters, RoadTable, Wheels
+from scenarios.plant.parameters import FORCE, POSITION, SPEED, WHEEL, DynamicsParameters, RoadTable, Wheels
 
 Array = NDArray[Any]
 
@@ -25,7 +25,8 @@ class PlantTrajectory:
     ----------
     time_s, position_m, speed_m_s, accel_x_m_s2 : array, shape (n,)
         Time [s], position [m] and speed [m/s] of the centre of gravity, and what an ideal accelerometer there
-        reads, (sum of tyre forces - drag) / m [m/s^2].
+        reads, (sum of tyre forces - drag) / m, and gravity's part along the road where the ground holds the car
+        on a grade [m/s^2].
     wheel_speed_rad_s, wheel_torque_nm, slip, tyre_force_n, vertical_load_n, theta : array, shape (n, 4)
         Wheel speed [rad/s], commanded torque [N m], unsigned slip [-], F_x [N], F_z [N], adhesion theta at the
         contact [-].
@@ -60,20 +61,48 @@ class PlantSetup:
 
 @dataclass(frozen=True)
 class PlantState:
-    """The plant at one time, for use step by step; wheels holds what the tyres do then, in arrays to read."""
+    """The plant at one time, for use step by step.
+
+    Attributes
+    ----------
+    setup : PlantSetup
+        Its constants.
+    time_s, accel_x_m_s2 : float
+        Time [s], and what the accelerometer reads [m/s^2].
+    y : array, shape (18,)
+        The state as the compiled step has it, see `scenarios.plant.parameters`.
+    wheel_torque_nm : tuple
+        Torque at the wheels [N m].
+    wheels : Wheels
+        What the tyres do, in arrays to read.
+    """
 
     setup: PlantSetup
     time_s: float
-    position_m: float
-    speed_m_s: float
     accel_x_m_s2: float
-    wheel_speed_rad_s: tuple[float, float, float, float]
+    y: Array
     wheel_torque_nm: tuple[float, float, float, float]
     wheels: Wheels
 
+    @property
+    def position_m(self) -> float:
+        """Position of the centre of gravity [m]."""
+        return float(self.y[POSITION])
+
+    @property
+    def speed_m_s(self) -> float:
+        """Speed of the centre of gravity [m/s]."""
+        return float(self.y[SPEED])
+
+    @property
+    def wheel_speed_rad_s(self) -> tuple[float, float, float, float]:
+        """Speeds of the four wheels [rad/s]."""
+        fl, fr, rl, rr = map(float, self.y[WHEEL:FORCE])
+        return fl, fr, rl, rr
+
 
 def make_setup(vehicle: VehicleFile, road: RoadFile) -> PlantSetup:
-    """The dynamics stage of a vehicle, its effects included, on a road."""
+    """The dynamics stage of a vehicle and a road, the vehicle's effects on both included."""
     parameters = DynamicsParameters(
         mass_kg=float(vehicle.mass_kg),
         cog_to_front_axle_m=float(vehicle.wheelbase_m - vehicle.cog_to_rear_axle_m),
@@ -82,13 +111,20 @@ def make_setup(vehicle: VehicleFile, road: RoadFile) -> PlantSetup:
         wheel_inertia_kg_m2=float(vehicle.wheel_inertia_kg_m2),
         longitudinal_stiffness_n=float(vehicle.tyre.longitudinal_stiffness_n),
     )
-    for effect in vehicle.make_effects():
-        parameters = effect.dynamics(parameters)
     table = RoadTable(
         start_m=np.array([s.start_m for s in road.segments], dtype=np.float64),
         theta=np.array([[s.mu_left, s.mu_right] for s in road.segments], dtype=np.float64),
     )
+    for effect in vehicle.make_effects():
+        parameters, table = effect.dynamics(parameters), effect.road(table)
     return PlantSetup(DynamicsParameters(*map(float, parameters)), table)
+
+
+def actual_torque(vehicle: VehicleFile, time_s: Array, wheel_torque_nm: Array) -> Array:
+    """The torque that a vehicle's actuators make of a commanded one, both shape (n, 4), at uniform times [N m]."""
+    for effect in vehicle.make_effects():
+        wheel_torque_nm = effect.actuate(time_s, wheel_torque_nm)
+    return wheel_torque_nm
 
 
 def simulate(
@@ -129,21 +165,17 @@ def simulate(
         raise ScenarioError("\n".join(problems))
     setup = make_setup(vehicle, road)
     time_s: Array = np.arange(len(torque)) * step_s
-    actual = torque
-    for effect in vehicle.make_effects():
-        actual = effect.actuate(time_s, actual)
-    start = np.empty(6)
-    start[0], start[1] = initial_position_m, initial_speed_m_s
-    start[2:] = initial_speed_m_s / setup.parameters.wheel_radius_m
+    actual = actual_torque(vehicle, time_s, torque)
+    start = dynamics.initial_y(float(initial_speed_m_s), float(initial_position_m), setup.parameters)
     states, accel, slip, force_n, load_n, theta = dynamics.run(
         start, np.ascontiguousarray(actual), float(step_s), setup.parameters, setup.road
     )
     return PlantTrajectory(
         time_s=time_s,
-        position_m=states[:, 0],
-        speed_m_s=states[:, 1],
+        position_m=states[:, POSITION],
+        speed_m_s=states[:, SPEED],
         accel_x_m_s2=accel,
-        wheel_speed_rad_s=states[:, 2:],
+        wheel_speed_rad_s=states[:, WHEEL:FORCE],
         wheel_torque_nm=torque,
         slip=slip,
         tyre_force_n=force_n,
@@ -165,12 +197,10 @@ def initial_state(
     if problems:
         raise ScenarioError("\n".join(problems))
     setup = make_setup(vehicle, road)
-    wheel = float(initial_speed_m_s) / setup.parameters.wheel_radius_m
+    y = dynamics.initial_y(float(initial_speed_m_s), float(initial_position_m), setup.parameters)
     first, _ = dynamics.new_wheels()
-    y = np.array([initial_position_m, initial_speed_m_s, wheel, wheel, wheel, wheel], dtype=np.float64)
-    dynamics.look_up_theta(y[0], setup.parameters, setup.road, first.theta)
-    accel = dynamics.forces(y, 0.0, setup.parameters, first)
-    return _state(setup, 0.0, y, accel, np.zeros(4), first)
+    accel = dynamics.refresh(y, 0.0, setup.parameters, setup.road, first)
+    return PlantState(setup, 0.0, accel, y, (0.0, 0.0, 0.0, 0.0), first)
 
 
 def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> PlantState:
@@ -181,14 +211,13 @@ def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> Pla
         problems.append(f"wheel_torque_nm is {wheel_torque_nm!r}; expected four finite numbers in N m.")
     if problems:
         raise ScenarioError("\n".join(problems))
-    setup = state.setup
-    y = np.array([state.position_m, state.speed_m_s, *state.wheel_speed_rad_s])
+    setup, y = state.setup, state.y.copy()
     first, second = dynamics.new_wheels()
     for own, given in zip(first, state.wheels, strict=True):
         own[:] = given
     accel = dynamics.advance(
         y,
-        np.empty(6),
+        np.empty_like(y),
         np.array(state.wheel_torque_nm),
         torque,
         float(step_s),
@@ -198,23 +227,8 @@ def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> Pla
         first,
         second,
     )
-    return _state(setup, state.time_s + step_s, y, accel, torque, first)
-
-
-def _state(
-    setup: PlantSetup, time_s: float, y: Array, accel: float, torque: Array, wheels: Wheels
-) -> PlantState:
-    omega, command = tuple(map(float, y[2:])), tuple(map(float, torque))
-    return PlantState(
-        setup=setup,
-        time_s=time_s,
-        position_m=float(y[0]),
-        speed_m_s=float(y[1]),
-        accel_x_m_s2=accel,
-        wheel_speed_rad_s=(omega[0], omega[1], omega[2], omega[3]),
-        wheel_torque_nm=(command[0], command[1], command[2], command[3]),
-        wheels=wheels,
-    )
+    fl, fr, rl, rr = map(float, torque)
+    return PlantState(setup, state.time_s + step_s, accel, y, (fl, fr, rl, rr), first)
 
 
 def drive(scenario: Scenario) -> PlantTrajectory:

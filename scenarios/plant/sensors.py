@@ -13,6 +13,8 @@ from scenarios.files import WHEELS, Scenario, SensorNoise, VehicleFile
 from scenarios.plant.pipeline import PlantTrajectory
 from trpac_core.tyre import peak_friction
 
+Array = NDArray[np.float64]
+
 IDEAL = SensorNoise()
 """Sensors that read the truth."""
 
@@ -49,14 +51,27 @@ def make_log(
         "position_m": trajectory.position_m,
         "mu_reference": mu_reference(trajectory, vehicle),
     }
-    for effect in vehicle.make_effects():
-        signals = effect.sense(trajectory.time_s, signals)
+    signals = sense(vehicle, trajectory.time_s, signals)
     streams = np.random.SeedSequence(seed).spawn(len(signals))
     for (name, signal), stream in zip(signals.items(), streams, strict=True):
         deviation = _deviation(name, noise)
         if deviation > 0.0:
             signals[name] = signal + deviation * np.random.default_rng(stream).standard_normal(len(signal))
     return pd.DataFrame({"time_s": trajectory.time_s, **signals})
+
+
+def sense(vehicle: VehicleFile, time_s: Array, signals: dict[str, Array]) -> dict[str, Array]:
+    """A vehicle's true signals as its sensors report them, without noise; by log column, shape (n,) each."""
+    for effect in vehicle.make_effects():
+        signals = effect.sense(time_s, signals)
+    return signals
+
+
+def correct(vehicle: VehicleFile, time_s: Array, signals: dict[str, Array]) -> dict[str, Array]:
+    """Undo `sense` as well as can be; a lost sample stays NaN, and so does what delayed sensors never told."""
+    for effect in reversed(vehicle.make_effects()):
+        signals = effect.correct(time_s, signals)
+    return signals
 
 
 def make_scenario_log(scenario: Scenario, trajectory: PlantTrajectory) -> pd.DataFrame:

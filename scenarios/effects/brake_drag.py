@@ -1,0 +1,37 @@
+"""Dragging brakes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class BrakeDrag(Effect):
+    """A constant moment against every turning wheel; it holds a resting wheel and never turns it back."""
+
+    id = "brake_drag"
+    stage = "dynamics"
+    subsystem = "wheel"
+    equation = "I omega' = T - F_x R - T_drag"
+    source = "Eq. (12) of Tian et al. 2022, doi:10.3390/rs14215583, with a further torque"
+    excited_by = "coasting at any speed"
+    look_alikes = ("rolling_resistance", "road_grade", "aero_drag", "torque_gain")
+
+    torque_nm: float = parameter(
+        "N m",
+        "resisting torque at each wheel",
+        neutral=0.0,
+        low=0.0,
+        high=500.0,
+        starts=(5.0, 20.0, 60.0),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The same torque at each wheel, whatever its load."""
+        return parameters._replace(drag_torque_nm=self.torque_nm)

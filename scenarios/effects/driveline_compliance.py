@@ -1,0 +1,62 @@
+"""Torsion between motor and wheel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+LARGEST_MOTOR_SHARE = 0.95
+"""Of the wheel's inertia that may be the motor's: the wheel itself keeps the rest [-]."""
+
+
+@dataclass(frozen=True)
+class DrivelineCompliance(Effect):
+    """Motor and wheel turn on the two ends of a shaft; driving and braking torque both act at the motor.
+
+    The motor's inertia J is a part of the wheel's I, so that a stiff shaft is the plant without it.
+    """
+
+    id = "driveline_compliance"
+    stage = "dynamics"
+    subsystem = "powertrain"
+    equation = (
+        "T_s = k twist + d (omega_m - omega), twist' = omega_m - omega, J omega_m' = T - T_s, "
+        "(I - J) omega' = T_s - F_x R; J at most 0.95 I"
+    )
+    source = "Kiencke and Nielsen (2005), Automotive Control Systems, drive-shaft model"
+    excited_by = "tip-in and tip-out: wheel-speed oscillation after a step of torque"
+    look_alikes = ("torque_lag", "torque_delay", "tyre_relaxation", "wheel_inertia_offset")
+
+    stiffness_nm_rad: float = parameter(
+        "N m/rad",
+        "torsional stiffness of one shaft",
+        neutral=1e4,
+        low=100.0,
+        high=1e6,
+        starts=(2e3, 8e3, 3e4),
+    )
+    damping_nm_s_rad: float = parameter(
+        "N m s/rad", "torsional damping of one shaft", neutral=0.0, low=0.0, high=1e3, starts=(3.0, 20.0)
+    )
+    motor_inertia_kg_m2: float = parameter(
+        "kg m^2",
+        "part of the wheel's inertia that turns with the motor; 0 is a rigid driveline",
+        neutral=0.0,
+        low=0.0,
+        high=lambda car: LARGEST_MOTOR_SHARE * car.wheel_inertia_kg_m2,
+        starts=lambda car: (0.2 * car.wheel_inertia_kg_m2, 0.5 * car.wheel_inertia_kg_m2),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Motor speed and twist become states of each wheel."""
+        most = LARGEST_MOTOR_SHARE * parameters.wheel_inertia_kg_m2
+        return parameters._replace(
+            shaft_stiffness_nm_rad=self.stiffness_nm_rad,
+            shaft_damping_nm_s_rad=self.damping_nm_s_rad,
+            motor_inertia_kg_m2=min(self.motor_inertia_kg_m2, most),
+        )

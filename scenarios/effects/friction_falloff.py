@@ -1,0 +1,47 @@
+"""Friction that falls with sliding speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class FrictionFalloff(Effect):
+    """Adhesion falls exponentially with the tyre's sliding speed, towards a floor."""
+
+    id = "friction_falloff"
+    stage = "dynamics"
+    subsystem = "tyre"
+    equation = "theta_eff = theta (floor + (1 - floor) exp(-falloff abs(omega R - v)))"
+    source = (
+        "Canudas de Wit et al. (2003), Vehicle System Dynamics 39, doi:10.1076/vesd.39.3.189.14152 (Stribeck)"
+    )
+    excited_by = "spinning or locked wheels at speed"
+    look_alikes = ("friction_offset", "tyre_stiffness_offset", "mu_split")
+
+    falloff_s_m: float = parameter(
+        "s/m",
+        "rate of the fall per sliding speed",
+        neutral=0.0,
+        low=0.0,
+        high=5.0,
+        starts=(0.05, 0.2, 0.8),
+    )
+    floor: float = parameter(
+        "-",
+        "share of the adhesion that is left at high sliding speed",
+        neutral=1.0,
+        low=0.05,
+        high=1.0,
+        starts=(0.45, 0.75),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each wheel's adhesion falls with its own sliding speed."""
+        return parameters._replace(falloff_s_m=self.falloff_s_m, falloff_floor=self.floor)

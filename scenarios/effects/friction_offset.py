@@ -1,0 +1,37 @@
+"""Friction of the whole road."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import RoadTable
+
+
+@dataclass(frozen=True)
+class FrictionOffset(Effect):
+    """The road is grippier or more slippery than its file says, everywhere by the same factor."""
+
+    id = "friction_offset"
+    stage = "road"
+    subsystem = "road"
+    equation = "theta_true = factor theta"
+    source = "definition"
+    excited_by = "driving or braking near the grip limit"
+    look_alikes = ("mu_split", "tyre_stiffness_offset", "friction_falloff", "load_transfer")
+
+    factor: float = parameter(
+        "-",
+        "true friction per the road file's",
+        neutral=1.0,
+        low=0.1,
+        high=3.0,
+        starts=(0.6, 0.85, 1.15, 1.4),
+    )
+
+    def road(self, table: RoadTable) -> RoadTable:
+        """All of the road's friction is scaled."""
+        return table._replace(theta=table.theta * self.factor)

@@ -1,0 +1,50 @@
+"""Different friction left and right."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import RoadTable
+
+
+@dataclass(frozen=True)
+class MuSplit(Effect):
+    """The friction under the left and the right wheels differs from the road file's by a factor each.
+
+    The car still drives straight on.
+    """
+
+    id = "mu_split"
+    stage = "road"
+    subsystem = "road"
+    equation = "theta_left = left_factor theta, theta_right = right_factor theta"
+    source = "definition; manoeuvre as in ISO 14512"
+    excited_by = "driving or braking near the grip limit: one side's wheels slip more"
+    look_alikes = ("friction_offset", "friction_falloff")
+
+    left_factor: float = parameter(
+        "-",
+        "true friction left per the road file's",
+        neutral=1.0,
+        low=0.05,
+        high=3.0,
+        starts=(0.6, 1.0, 1.4),
+    )
+    right_factor: float = parameter(
+        "-",
+        "true friction right per the road file's",
+        neutral=1.0,
+        low=0.05,
+        high=3.0,
+        starts=(0.6, 1.0, 1.4),
+    )
+
+    def road(self, table: RoadTable) -> RoadTable:
+        """Each side's friction is scaled."""
+        return table._replace(theta=table.theta * np.array([self.left_factor, self.right_factor]))

@@ -1,0 +1,45 @@
+"""Grade of the road."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+from trpac_core.vehicle import GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class RoadGrade(Effect):
+    """A road that rises or falls evenly; the car never rolls backwards on it.
+
+    The accelerometer reads what the tyres and the air do, so v' + g sin of the road's angle.
+    """
+
+    id = "road_grade"
+    stage = "dynamics"
+    subsystem = "road"
+    equation = "F = -m g s / sqrt(1 + s^2); loads times 1 / sqrt(1 + s^2)"
+    source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 1, loads on grades"
+    excited_by = "any driving, best with little torque; speed against accelerometer shows it"
+    look_alikes = ("accelerometer_bias", "rolling_resistance", "mass_offset", "aero_drag")
+
+    grade: float = parameter(
+        "-",
+        "rise per run, positive uphill",
+        neutral=0.0,
+        low=-0.3,
+        high=0.3,
+        starts=(-0.05, -0.015, 0.015, 0.05),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Gravity has a part along the road, and less of it loads the wheels."""
+        length = hypot(1.0, self.grade)
+        return parameters._replace(
+            slope_m_s2=GRAVITY_M_S2 * self.grade / length, gravity_m_s2=GRAVITY_M_S2 / length
+        )

@@ -1,0 +1,37 @@
+"""Relaxation of the tyre force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class TyreRelaxation(Effect):
+    """The tyre's force follows the slip only as the tyre rolls on."""
+
+    id = "tyre_relaxation"
+    stage = "dynamics"
+    subsystem = "tyre"
+    equation = "F_x' = (V / length) (F_steady - F_x), V = max(omega R, v, 0.01 m/s)"
+    source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 7, single-point contact patch model"
+    excited_by = "steps of torque at low speed: the lag is length / v"
+    look_alikes = ("torque_lag", "torque_delay", "wheel_speed_delay", "driveline_compliance")
+
+    length_m: float = parameter(
+        "m",
+        "way rolled until a step of slip has built 63 % of its force",
+        neutral=0.0,
+        low=0.0,
+        high=3.0,
+        starts=(0.1, 0.3, 0.8),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The force becomes a state."""
+        return parameters._replace(relaxation_m=self.length_m)

@@ -1,0 +1,37 @@
+"""Longitudinal stiffness of the tyres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class TyreStiffnessOffset(Effect):
+    """All tyres are stiffer or softer along the road than the vehicle file says."""
+
+    id = "tyre_stiffness_offset"
+    stage = "dynamics"
+    subsystem = "tyre"
+    equation = "F_x(lambda) with the true C_x"
+    source = "Bian et al. (2014), SAE 2014-01-0123"
+    excited_by = "strong torque below the grip limit: slip per force"
+    look_alikes = ("friction_offset", "wheel_radius_offset", "vehicle_speed_scale", "load_transfer")
+
+    stiffness_n: float = parameter(
+        "N",
+        "true longitudinal stiffness C_x of one tyre",
+        neutral=lambda car: car.longitudinal_stiffness_n,
+        low=lambda car: 0.1 * car.longitudinal_stiffness_n,
+        high=lambda car: 6.0 * car.longitudinal_stiffness_n,
+        starts=lambda car: tuple(s * car.longitudinal_stiffness_n for s in (0.5, 0.8, 1.3, 2.0)),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The true stiffness takes the nominal one's place."""
+        return parameters._replace(longitudinal_stiffness_n=self.stiffness_n)

@@ -1,0 +1,37 @@
+"""Inertia of the wheels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class WheelInertiaOffset(Effect):
+    """Wheel and motor are harder or easier to spin up than the vehicle file says."""
+
+    id = "wheel_inertia_offset"
+    stage = "dynamics"
+    subsystem = "wheel"
+    equation = "I omega' = T - F_x R with the true I"
+    source = "Eq. (12) of Tian et al. 2022, doi:10.3390/rs14215583"
+    excited_by = "quick changes of wheel speed: spinning up and locking wheels on a slippery road"
+    look_alikes = ("mass_offset", "torque_gain", "torque_lag", "driveline_compliance")
+
+    inertia_kg_m2: float = parameter(
+        "kg m^2",
+        "true inertia of one wheel with its motor",
+        neutral=lambda car: car.wheel_inertia_kg_m2,
+        low=lambda car: 0.2 * car.wheel_inertia_kg_m2,
+        high=lambda car: 5.0 * car.wheel_inertia_kg_m2,
+        starts=lambda car: tuple(s * car.wheel_inertia_kg_m2 for s in (0.6, 0.85, 1.2, 2.0)),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The true inertia takes the nominal one's place."""
+        return parameters._replace(wheel_inertia_kg_m2=self.inertia_kg_m2)

@@ -1,0 +1,37 @@
+"""Rolling radius."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.plant.dynamics import DynamicsParameters
+
+
+@dataclass(frozen=True)
+class WheelRadiusOffset(Effect):
+    """The true rolling radius of all wheels differs from the vehicle file's: wear, pressure, other tyres."""
+
+    id = "wheel_radius_offset"
+    stage = "dynamics"
+    subsystem = "wheel"
+    equation = "rim speed omega R and moment F_x R with the true R"
+    source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 1, effective rolling radius"
+    excited_by = "free rolling: v per omega at torque zero"
+    look_alikes = ("vehicle_speed_scale", "tyre_stiffness_offset", "mass_offset", "torque_gain")
+
+    radius_m: float = parameter(
+        "m",
+        "true rolling radius",
+        neutral=lambda car: car.wheel_radius_m,
+        low=lambda car: 0.7 * car.wheel_radius_m,
+        high=lambda car: 1.3 * car.wheel_radius_m,
+        starts=lambda car: tuple(s * car.wheel_radius_m for s in (0.95, 0.985, 1.015, 1.05)),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The true radius takes the nominal one's place."""
+        return parameters._replace(wheel_radius_m=self.radius_m)

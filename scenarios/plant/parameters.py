@@ -1,0 +1,80 @@
+"""What goes into the plant's compiled step, and what it works on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trpac_core.vehicle import GRAVITY_M_S2
+
+POSITION, SPEED, WHEEL, FORCE, TWIST, MOTOR, STATES = 0, 1, 2, 6, 10, 14, 18
+"""Where the state vector y holds what: position [m], vehicle speed [m/s], and four each of wheel speed [rad/s], tyre
+force [N] (with relaxation), shaft twist [rad] and motor speed [rad/s] (with a driveline); unused ones stay as they
+are."""
+
+
+class DynamicsParameters(NamedTuple):
+    """Everything that the dynamics stage depends on; effects replace fields."""
+
+    mass_kg: float
+    cog_to_front_axle_m: float
+    cog_to_rear_axle_m: float
+    wheel_radius_m: float
+    wheel_inertia_kg_m2: float
+    longitudinal_stiffness_n: float
+    transfer_height_m: float = 0.0
+    """Height through which acceleration moves load between the axles; 0: static loads [m]."""
+    drag_kg_m: float = 0.0
+    """Air drag per squared speed, 0.5 rho C_d A [kg/m]."""
+    rolling_coefficient: float = 0.0
+    """Rolling resistance moment per load and radius [-]."""
+    drag_torque_nm: float = 0.0
+    """Torque against each wheel's rotation [N m]."""
+    slope_m_s2: float = 0.0
+    """Gravity's part along the road, positive uphill [m/s^2]."""
+    gravity_m_s2: float = GRAVITY_M_S2
+    """Gravity's part across the road, which loads the wheels [m/s^2]."""
+    falloff_s_m: float = 0.0
+    """Rate at which adhesion falls with sliding speed; 0: it does not [s/m]."""
+    falloff_floor: float = 1.0
+    """Share of the adhesion that is left at high sliding speed [-]."""
+    relaxation_m: float = 0.0
+    """Way over which the tyre force follows its steady value; 0: at once [m]."""
+    shaft_stiffness_nm_rad: float = 1e4
+    shaft_damping_nm_s_rad: float = 0.0
+    motor_inertia_kg_m2: float = 0.0
+    """The part of wheel_inertia_kg_m2 that turns with the motor, behind the shaft; 0: no shaft [kg m^2]."""
+
+
+class RoadTable(NamedTuple):
+    """The road as the compiled step reads it; the first segment also holds before its start."""
+
+    start_m: NDArray[np.float64]
+    theta: NDArray[np.float64]
+    """Friction under the left and the right wheels, shape (segments, 2) [-]."""
+
+
+class Wheels(NamedTuple):
+    """Working arrays of one evaluation, shape (4,) each unless said; theta is input, the others are filled."""
+
+    theta: NDArray[np.float64]
+    force_n: NDArray[np.float64]
+    """What the tyre does; with relaxation that lags behind steady_n."""
+    load_n: NDArray[np.float64]
+    slip: NDArray[np.float64]
+    steady_n: NDArray[np.float64]
+    """What the tyre would do if the slip stayed."""
+    lag_rate: NDArray[np.float64]
+    """Transport speed per relaxation length [1/s]."""
+    force_by_wheel: NDArray[np.float64]
+    """Slope of the steady force by wheel speed [N s/rad]."""
+    force_by_speed: NDArray[np.float64]
+    """Slope of the steady force by vehicle speed [N s/m]."""
+    rates: NDArray[np.float64]
+    """Of y from the wheel speeds on, shape (16,)."""
+    free: NDArray[np.float64]
+    """0 for what is held at rest, else 1: four wheels, four motors, the vehicle; shape (9,)."""
+    pivots: NDArray[np.float64]
+    """The step's linear equations after elimination, shape (6, 4); see dynamics.py."""
