@@ -9,11 +9,16 @@ from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.aero_drag import AeroDrag
 from scenarios.effects.base import Effect, Parameter
 from scenarios.effects.brake_drag import BrakeDrag
+from scenarios.effects.camera_latency import CameraLatency
+from scenarios.effects.camera_pitch import CameraPitch
+from scenarios.effects.class_friction_offset import ClassFrictionOffset
 from scenarios.effects.driveline_compliance import DrivelineCompliance
+from scenarios.effects.exposure_shift import ExposureShift
 from scenarios.effects.friction_falloff import FrictionFalloff
 from scenarios.effects.friction_offset import FrictionOffset
 from scenarios.effects.load_transfer import LoadTransfer
 from scenarios.effects.mass_offset import MassOffset
+from scenarios.effects.motion_blur import MotionBlur
 from scenarios.effects.mu_split import MuSplit
 from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.rolling_resistance import RollingResistance
@@ -59,6 +64,12 @@ EFFECTS: dict[str, type[Effect]] = {
         WheelSpeedDelay,
         WheelSpeedQuantisation,
         AccelerometerBias,
+        # perception
+        CameraPitch,
+        CameraLatency,
+        MotionBlur,
+        ExposureShift,
+        ClassFrictionOffset,
     )
 }
 """All effects by id, in the order in which they act: along the plant, and within a stage as the signal passes them."""

@@ -1,0 +1,76 @@
+"""Wrong mounting angle of the camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.perception import Frames
+
+LEAST_ANGLE_RAD = 0.005
+"""Rays are not followed closer to the horizon than this: they would meet the road beyond 280 m [rad]."""
+
+
+def seen_distance_m(
+    stamped_m: NDArray[np.float64], height_m: float, pitch_rad: float | NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance at which a pitched camera truly looks where its file says that it looks at a stamped one.
+
+    The file takes a point at distance d to lie atan(h / d) below the horizon. The picture shows there what lies
+    pitch more below it, at h / tan(atan(h / d) + pitch).
+
+    Parameters
+    ----------
+    stamped_m : array
+        Distance ahead of the lens by the camera file, above 0 [m].
+    height_m : float
+        Of the lens above the road [m].
+    pitch_rad : float or array
+        Additional pitch of the real camera, nose down positive [rad].
+
+    Examples
+    --------
+    >>> round(float(seen_distance_m(2.9, 1.4, 0.05)), 3)   # 0.34 m nearer than stamped
+    2.561
+    """
+    angle = np.arctan2(height_m, stamped_m) + pitch_rad
+    return height_m / np.tan(np.clip(angle, LEAST_ANGLE_RAD, 0.5 * np.pi))
+
+
+@dataclass(frozen=True)
+class CameraPitch(Effect):
+    """A camera that looks down more (or less) than its file says.
+
+    Nose down it sees road nearer than stamped, so every change of class appears later along the road, by a distance
+    that does not depend on speed.
+    """
+
+    id = "camera_pitch"
+    stage = "perception"
+    subsystem = "camera"
+    equation = "distance seen = h / tan(atan(h / distance stamped) + pitch)"
+    source = "Geometry of a pinhole camera over a flat road, Eqs. (5) and (6) of Tian et al. (2022)"
+    excited_by = "passing borders of surfaces at two or more speeds"
+    look_alikes = ("camera_latency",)
+
+    pitch_rad: float = parameter(
+        "rad",
+        "real camera's pitch minus the camera file's, nose down",
+        neutral=0.0,
+        low=-0.3,
+        high=0.3,
+        starts=(-0.08, -0.02, 0.02, 0.08),
+    )
+
+    def perceive(self, frames: Frames) -> Frames:
+        """The stretch seen is not the one stamped."""
+        if self.pitch_rad == 0.0:
+            return frames
+        seen = seen_distance_m(frames.stamped_m, frames.camera_height_m, self.pitch_rad)
+        return replace(frames, seen_m=seen)

@@ -1,0 +1,55 @@
+"""Over- or underexposed pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenarios.effects.base import Effect, parameter
+
+if TYPE_CHECKING:
+    from scenarios.perception import Frames
+
+TOLERATED_STOPS = 4.3
+"""Exposure error that leaves 1/e of the right classes [stops].
+
+By ``benchmarks/measure_camera_laws.py``: the shipped networks are right on 0.96, 0.80, 0.49 of what they are right on
+undisturbed, at 1, 2, 3 stops to either side (60 rendered roads; 0.95, 0.81, 0.61 by this law).
+"""
+
+
+def share_left(stops: float) -> float:
+    """Share of right classes, and of confidence, that an exposure error leaves [-]."""
+    return float(np.exp(-((stops / TOLERATED_STOPS) ** 2)))
+
+
+@dataclass(frozen=True)
+class ExposureShift(Effect):
+    """Pictures exposed too long (stops above 0) or too short.
+
+    Confidence is taken as that of a calibrated chain, which falls with the share of right classes. The shipped
+    networks' own Q_v does not do so below 3 stops: Dempster's rule keeps it near 1 whatever the patches say.
+    """
+
+    id = "exposure_shift"
+    stage = "perception"
+    subsystem = "camera"
+    equation = "Q_v and share of right classes times exp(-(stops / 4.3)^2); linear light times 2^stops"
+    source = "measured on the shipped networks, benchmarks/measure_camera_laws.py"
+    excited_by = "any drive with a known normal confidence, best with the pictures themselves"
+    look_alikes = ("motion_blur",)
+
+    stops: float = parameter(
+        "stops",
+        "exposure error, overexposed positive",
+        neutral=0.0,
+        low=-6.0,
+        high=6.0,
+        starts=(-3.0, -1.5, 1.5, 3.0),
+    )
+
+    def perceive(self, frames: Frames) -> Frames:
+        """The picture tells less, whatever the speed."""
+        return frames.dimmed(np.full(len(frames.time_s), share_left(self.stops)))
