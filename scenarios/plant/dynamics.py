@@ -72,7 +72,10 @@ BORDER_TOLERANCE_M = 1e-7
 """A contact point this close to the next road segment counts as being on it [m]."""
 
 compiled = njit(cache=True, error_model="numpy")  # divisions are guarded here, not by the compiler
+# As calls these would count references of every working array, which takes twice as long as their arithmetic.
+inlined = njit(cache=True, error_model="numpy", inline="always")
 
+_GAIN, _BY_WHEEL, _BY_SPEED, _OWN, _SHARE, _RATIO = range(6)  # rows of the pivots
 _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)  # makes the two-stage Rosenbrock method L-stable
 
 
@@ -235,7 +238,7 @@ def _motor_torque(speed_rad_s: float, torque_nm: float, shaft_nm: float) -> floa
     return max(-shaft_nm + torque_nm, 0.0) + min(-shaft_nm - torque_nm, 0.0)
 
 
-@compiled
+@inlined
 def _fill_rates(
     y: NDArray, torque_nm: NDArray, next_nm: NDArray, part: float, p: DynamicsParameters, wheels: Wheels
 ) -> None:
@@ -261,42 +264,42 @@ def _fill_rates(
     wheels.free[8] = 0.0 if y[SPEED] <= 0.0 and total_n < p.mass_kg * p.slope_m_s2 else 1.0
 
 
-@compiled
+@inlined
 def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Eliminate all wheels from 1 - gamma h A; fill the pivots, return the vehicle speed's.
 
     A couples each wheel with the vehicle's speed alone. Within a wheel, shaft and motor act as inertia, and a lagging
-    force as a smaller slope.
+    force as a smaller slope of the force.
     """
     gh = _GAMMA * h
     pivot = 1.0 + gh * 2.0 * p.drag_kg_m * speed / p.mass_kg
-    gains, by_wheel, by_speed, own, shares, ratios = wheels.pivots
+    at = wheels.pivots
     per_newton = p.wheel_radius_m / p.wheel_inertia_kg_m2
     for i in range(4):
         if p.motor_inertia_kg_m2 > 0.0:
             shaft = gh * (gh * p.shaft_stiffness_nm_rad + p.shaft_damping_nm_s_rad)
             free = wheels.free[4 + i] > 0.0
-            ratios[i] = p.motor_inertia_kg_m2 / (p.motor_inertia_kg_m2 + shaft) if free else 1.0
-            inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2 + ratios[i] * shaft
+            at[_RATIO, i] = p.motor_inertia_kg_m2 / (p.motor_inertia_kg_m2 + shaft) if free else 1.0
+            inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2 + at[_RATIO, i] * shaft
             per_newton = p.wheel_radius_m / inertia
         lagged = gh * wheels.lag_rate[i]
         share = lagged / (1.0 + lagged) if p.relaxation_m > 0.0 else 1.0
-        by_wheel[i] = wheels.force_by_wheel[i] * share
-        by_speed[i] = wheels.force_by_speed[i] * share
-        gains[i] = gh * per_newton * wheels.free[i]
-        own[i] = 1.0 + gains[i] * by_wheel[i]
-        shares[i] = gh * by_wheel[i] / (p.mass_kg * own[i])
-        pivot -= (gh / p.mass_kg - shares[i] * gains[i]) * by_speed[i]
+        at[_BY_WHEEL, i] = wheels.force_by_wheel[i] * share
+        at[_BY_SPEED, i] = wheels.force_by_speed[i] * share
+        at[_GAIN, i] = gh * per_newton * wheels.free[i]
+        at[_OWN, i] = 1.0 + at[_GAIN, i] * at[_BY_WHEEL, i]
+        at[_SHARE, i] = gh * at[_BY_WHEEL, i] / (p.mass_kg * at[_OWN, i])
+        pivot -= (gh / p.mass_kg - at[_SHARE, i] * at[_GAIN, i]) * at[_BY_SPEED, i]
     return pivot
 
 
-@compiled
+@inlined
 def _solve(
     speed_rhs: float, pivot: float, h: float, p: DynamicsParameters, wheels: Wheels, k: NDArray
 ) -> float:
     """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; return the vehicle speed's part."""
     gh = _GAMMA * h
-    gains, by_wheel, by_speed, own, shares, ratios = wheels.pivots
+    at = wheels.pivots
     stiffness, motor = gh * p.shaft_stiffness_nm_rad, p.motor_inertia_kg_m2
     shaft = gh * (stiffness + p.shaft_damping_nm_s_rad)
     inertia = p.wheel_inertia_kg_m2 - motor
@@ -304,17 +307,17 @@ def _solve(
     for i in range(4):
         if motor > 0.0 and wheels.free[i] > 0.0:
             passed = stiffness * k[TWIST - WHEEL + i] + shaft * k[MOTOR - WHEEL + i]
-            k[i] = (inertia * k[i] + ratios[i] * passed) / (inertia + ratios[i] * shaft)
+            k[i] = (inertia * k[i] + at[_RATIO, i] * passed) / (inertia + at[_RATIO, i] * shaft)
         if p.relaxation_m > 0.0:
             k[FORCE - WHEEL + i] /= 1.0 + gh * wheels.lag_rate[i]
-            k[i] -= gains[i] * k[FORCE - WHEEL + i]
+            k[i] -= at[_GAIN, i] * k[FORCE - WHEEL + i]
             rhs += gh / p.mass_kg * k[FORCE - WHEEL + i]
-        rhs += shares[i] * k[i]
+        rhs += at[_SHARE, i] * k[i]
     k_speed = rhs / pivot if wheels.free[8] > 0.0 else speed_rhs
     for i in range(4):
-        k[i] = (k[i] - gains[i] * by_speed[i] * k_speed) / own[i]
+        k[i] = (k[i] - at[_GAIN, i] * at[_BY_SPEED, i] * k_speed) / at[_OWN, i]
         if p.relaxation_m > 0.0:
-            k[FORCE - WHEEL + i] += by_wheel[i] * k[i] + by_speed[i] * k_speed
+            k[FORCE - WHEEL + i] += at[_BY_WHEEL, i] * k[i] + at[_BY_SPEED, i] * k_speed
         if motor > 0.0:
             if wheels.free[4 + i] > 0.0:
                 pull = shaft * k[i] - stiffness * k[TWIST - WHEEL + i]
@@ -329,7 +332,7 @@ def _states(p: DynamicsParameters) -> int:
     return STATES if p.relaxation_m > 0.0 or p.motor_inertia_kg_m2 > 0.0 else FORCE
 
 
-@compiled
+@inlined
 def _try_step(
     y: NDArray,
     trial: NDArray,
