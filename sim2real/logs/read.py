@@ -12,6 +12,7 @@ from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import NO_MAPPING, Mapping
+from sim2real.logs.mdf_file import read_mdf
 from sim2real.logs.parquet_file import read_parquet
 from sim2real.logs.resampling import median_step
 from sim2real.logs.table import Finding, Table, Wanted
@@ -93,8 +94,6 @@ def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
     if kind == "Parquet":
         return "row", read_parquet(path, wanted)
     if kind == "MDF":
-        from sim2real.logs.mdf_file import read_mdf  # takes a second to import, and most logs are not MDF
-
         return "sample", read_mdf(path, wanted)
     return "row", read_csv(path, wanted)
 
