@@ -8,7 +8,7 @@ import math
 import os
 import tempfile
 from base64 import b64encode
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 from scenarios.effects import EFFECTS
 from scenarios.files import WHEELS
 from sim2real import figures
+from sim2real.rating import rate
 from sim2real.result import MEANING, Cause, Diagnosis, Interval, NextManoeuvre, Trace, Verdict
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
@@ -56,6 +57,11 @@ def write_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> tuple[Path, Pat
         for name in contents:
             os.replace(Path(scratch) / name, folder / name)
     return folder / JSON_NAME, folder / REPORT_NAME
+
+
+def rated(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with the ISO/TS 18571 ratings of its traces, which cost seconds and decide nothing."""
+    return replace(diagnosis, rating=rate(shown_traces(diagnosis)))
 
 
 def jsonable(value: Any) -> Any:

@@ -76,7 +76,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a part of the gap lies: signal, subsystem, regime of driving, time window [s] of a log, share of the gap."""
+    """A part of the gap: signal, subsystem, regime of driving, time window [s] of a log, share of the whole [-]."""
 
     signal: str
     subsystem: str

@@ -59,6 +59,9 @@ TOLERANCE_M_S = 2e-5
 RELATIVE_TOLERANCE = 5e-5
 """What the accepted error estimate grows by with speed, which keeps slip equally accurate at all speeds [-]."""
 
+BRAKE_FADE_RAD_S = 1.0
+"""Motor speed below which its brake fades out [rad/s]."""
+
 SHORTEST_STEP_S = 1e-7
 """A sub-step of this length is taken whatever its error estimate says [s]."""
 
@@ -230,12 +233,13 @@ def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParamet
 
 @compiled
 def _motor_torque(speed_rad_s: float, torque_nm: float, shaft_nm: float) -> float:
-    """What accelerates a motor [N m]; a negative torque is a brake, which opposes its motion and holds it at rest."""
-    if torque_nm >= 0.0 or speed_rad_s > 0.0:
+    """What accelerates a motor [N m]; a negative torque is a brake, which opposes its motion.
+
+    Within BRAKE_FADE_RAD_S of rest the brake acts like a damper: a brake that reverses at rest would chatter.
+    """
+    if torque_nm >= 0.0:
         return torque_nm - shaft_nm
-    if speed_rad_s < 0.0:
-        return -torque_nm - shaft_nm
-    return max(-shaft_nm + torque_nm, 0.0) + min(-shaft_nm - torque_nm, 0.0)
+    return torque_nm * min(max(speed_rad_s / BRAKE_FADE_RAD_S, -1.0), 1.0) - shaft_nm
 
 
 @inlined
@@ -252,7 +256,7 @@ def _fill_rates(
             motor_nm = _motor_torque(y[MOTOR + i], torque, shaft_nm)
             wheels.rates[TWIST - WHEEL + i] = spread
             wheels.rates[MOTOR - WHEEL + i] = motor_nm / p.motor_inertia_kg_m2
-            wheels.free[4 + i] = 0.0 if torque < 0.0 and y[MOTOR + i] == 0.0 and motor_nm == 0.0 else 1.0
+            wheels.free[4 + i] = 1.0
             torque = shaft_nm
         rate = _wheel_rate(i, y[WHEEL + i], torque, p, wheels)
         wheels.free[i] = 0.0 if y[WHEEL + i] <= 0.0 and rate == 0.0 else 1.0
@@ -370,8 +374,6 @@ def _try_step(
         if p.motor_inertia_kg_m2 > 0.0:
             motor = MOTOR - WHEEL + i
             error = max(error, p.wheel_radius_m * abs(k_1[motor] + k_2[motor]))
-            if torque_nm[i] < 0.0 and y[MOTOR + i] * trial[MOTOR + i] < 0.0:
-                trial[MOTOR + i] = 0.0  # a brake stops the motor before it could turn back
     trial[POSITION] = y[POSITION] + 0.5 * h * (y[SPEED] + trial[SPEED])
     return 0.5 * h * error, accel
 
@@ -449,4 +451,55 @@ def run(
         load_n[k], theta[k] = first.load_n, first.theta
         if k + 1 < n:
             accel = advance(y, trial, torque_nm[k], torque_nm[k + 1], step_s, accel, p, road, first, second)
+    return states, accels, slip, force_n, load_n, theta
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def follow(
+    y: NDArray,
+    torque_nm: NDArray,
+    push_m_s2: NDArray,
+    measured: NDArray,
+    memory_s: NDArray,
+    step_s: float,
+    p: DynamicsParameters,
+    road: RoadTable,
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Simulate all rows from y while position, speed and wheel speeds are drawn to measurements; see `run`.
+
+    Parameters
+    ----------
+    push_m_s2 : array, shape (n,)
+        Further acceleration of the vehicle [m/s^2].
+    measured : array, shape (n, 6)
+        Position, speed and wheel speeds; NaN where there is none.
+    memory_s : array, shape (6,)
+        Time in which a state comes to its measurement [s]; the first rows are averaged instead.
+
+    Returns
+    -------
+    tuple
+        As `run`, each row before its own measurement is taken in; states (n, 6).
+    """
+    n = torque_nm.shape[0]
+    states, accels = np.empty((n, 6)), np.empty(n)
+    slip, force_n, load_n, theta = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4))
+    first, second = new_wheels()
+    trial = np.empty_like(y)
+    accel = refresh(y, 0.0, p, road, first)
+    for k in range(n):
+        states[k] = y[:6]
+        accels[k] = accel
+        slip[k], force_n[k], load_n[k], theta[k] = first.slip, first.force_n, first.load_n, first.theta
+        if k + 1 == n:
+            break
+        for j in range(6):
+            if np.isfinite(measured[k, j]):
+                share = max(1.0 - np.exp(-step_s / memory_s[j]), 1.0 / (k + 5.0))
+                y[j] += share * (measured[k, j] - y[j])
+        y[SPEED] += push_m_s2[k] * step_s
+        for j in range(SPEED, FORCE):
+            y[j] = max(y[j], 0.0)
+        accel = refresh(y, accel, p, road, first)
+        accel = advance(y, trial, torque_nm[k], torque_nm[k + 1], step_s, accel, p, road, first, second)
     return states, accels, slip, force_n, load_n, theta

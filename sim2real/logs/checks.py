@@ -48,14 +48,19 @@ Row = Callable[[int], str]
 
 @dataclass(frozen=True)
 class Clock:
-    """What is wrong with the times of a log, and its gaps as (from, to) [s]."""
+    """What is odd about the times of a log, and its gaps as (from, to) [s]."""
 
     findings: tuple[Finding, ...] = ()
     gaps: tuple[tuple[float, float], ...] = ()
 
+    @property
+    def usable(self) -> bool:
+        """Whether anything can be reckoned over these times."""
+        return not any(finding.fatal for finding in self.findings)
+
 
 def check_time(time_s: Array, row: Row) -> Clock:
-    """Whether time ascends at a usable rate; where a finding is fatal nothing else of the log can be judged."""
+    """Whether time ascends at a usable rate; the gaps in it."""
     bad = np.flatnonzero(~np.isfinite(time_s))
     if len(bad):
         return _unusable(f"column {TIME}: {rows_text(bad, row)} has no time; expected one in every row.")
@@ -78,7 +83,7 @@ def check_time(time_s: Array, row: Row) -> Clock:
         return _unusable(f"is {duration:.3g} s long; expected at least {MIN_DURATION_S:g} s.")
     at = np.flatnonzero(step > GAP_S)
     gaps = tuple((float(time_s[i]), float(time_s[i + 1])) for i in at)
-    return Clock((*_rate_findings(rate), *_step_findings(step, row)), gaps)
+    return Clock((*_rate_findings(rate), *_step_findings(step, row), *_gap_findings(gaps)), gaps)
 
 
 def _unusable(text: str) -> Clock:
@@ -102,6 +107,12 @@ def _step_findings(step: Array, row: Row) -> Iterator[Finding]:
         f"after the row above{'; expected a constant or slightly jittered rate.' if fatal else '.'}",
         fatal,
     )
+
+
+def _gap_findings(gaps: tuple[tuple[float, float], ...]) -> Iterator[Finding]:
+    if gaps:
+        listed = ", ".join(f"from {start:.6g} to {end:.6g} s" for start, end in gaps[:SHOWN])
+        yield Finding(f"has no rows {listed}{and_more(len(gaps))}.", fatal=False)
 
 
 def check_values(signals: Mapping[str, Array], row: Row) -> Iterator[Finding]:
@@ -129,21 +140,22 @@ def check_values(signals: Mapping[str, Array], row: Row) -> Iterator[Finding]:
     )
 
 
-def check_scales(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
-    """Whether columns that measure the same motion agree to a factor: units, signs."""
+def check_motion(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
+    """Whether position, speed and acceleration agree to a factor: units, signs."""
     if "vehicle_speed_m_s" not in signals:
         return
     speed = signals["vehicle_speed_m_s"]
-    yield from _check_wheels(speed, signals)
     if "position_m" in signals:
         yield from _check_position(time_s, speed, signals["position_m"])
     if "accel_x_m_s2" in signals:
         yield from _check_acceleration(time_s, speed, signals["accel_x_m_s2"])
 
 
-def _check_wheels(speed: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
-    for name in (n for n in WHEEL_SPEEDS if n in signals):
-        moving = (np.abs(speed) > MOVING_M_S) & np.isfinite(signals[name])
+def check_wheels(signals: Mapping[str, Array]) -> Iterator[Finding]:
+    """Whether the wheels turn about as fast as the car moves: units, signs."""
+    for name in (n for n in WHEEL_SPEEDS if n in signals and "vehicle_speed_m_s" in signals):
+        speed = signals["vehicle_speed_m_s"]
+        moving = (np.abs(speed) > MOVING_M_S) & np.isfinite(speed + signals[name])
         if np.count_nonzero(moving) < 2:
             continue
         ratio = float(np.median(signals[name][moving] / speed[moving]))

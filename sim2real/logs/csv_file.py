@@ -41,7 +41,7 @@ def read_csv(path: Path, wanted: Wanted) -> Table:
             findings += _bad_cells(name, cells, rows, bad)
             if not bad:
                 numbers[name] = values
-    if text and text[-1] not in "\r\n":
+    if rows and text[-1] not in "\r\n":
         findings.append(
             Finding(
                 f"row {rows[-1]} ends the file without a line break; if the recording was cut off, look at it.",

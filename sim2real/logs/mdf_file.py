@@ -65,7 +65,7 @@ def read_mdf(path: Path, wanted: Wanted) -> Table:
     """
     content = _extract(path, wanted.numbers | wanted.text)
     channels = {name: _Channel(**c) for name, c in content["channels"].items()}
-    names = tuple(dict.fromkeys((*content["names"], *content["masters"], TIME)))
+    names = tuple(dict.fromkeys((*content["names"], *content["masters"], *({TIME} & wanted.numbers))))
     base = next((name for name in (*wanted.base, *channels) if name in channels), None)
     if base is None:
         return Table(names, {}, {}, np.arange(0), ())

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sim2real.logs.checks import check_scales, check_time, check_values
+from sim2real.logs.checks import check_motion, check_time, check_values, check_wheels
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.log import Log
@@ -56,11 +56,15 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
     if time_s is None:
         raise _error(path, findings)
     clock = check_time(time_s, row)
-    findings += clock.findings
-    if any(finding.fatal for finding in clock.findings):
-        raise _error(path, findings)
-    made = translate(table, mapping, time_s)
-    findings += [*made.findings, *check_values(made.signals, row), *check_scales(time_s, made.signals)]
+    made = translate(table, mapping, time_s if clock.usable else None)
+    findings += [
+        *clock.findings,
+        *made.findings,
+        *check_values(made.signals, row),
+        *check_wheels(made.signals),
+    ]
+    if clock.usable:
+        findings += check_motion(time_s, made.signals)
     if any(finding.fatal for finding in findings):
         raise _error(path, findings)
     return Log(

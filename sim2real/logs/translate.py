@@ -71,17 +71,14 @@ class Translated:
 
     Attributes
     ----------
-    time_s : array, shape (n,)
-        Time [s].
     signals : dict
-        The other columns that hold numbers, shape (n,), in the log format's units.
+        Without time and picture names; shape (n,), in the log format's units.
     derived : frozenset of str
         Which of them were computed rather than measured.
     findings : list of Finding
         Where an integral is doubtful.
     """
 
-    time_s: Array
     signals: dict[str, Array]
     derived: frozenset[str]
     findings: list[Finding]
@@ -89,17 +86,18 @@ class Translated:
 
 def read_time(table: Table, mapping: Mapping) -> Array | None:
     """Time [s], shape (n,); None where its columns are not there or hold no numbers."""
-    return _Evaluation(table, _specs(mapping), np.empty(0), {}, []).column(TIME)
+    return _Evaluation(table, _specs(mapping), None, {}, []).column(TIME)
 
 
-def translate(table: Table, mapping: Mapping, time_s: Array) -> Translated:
-    """Make the columns of the log format out of the file's."""
+def translate(table: Table, mapping: Mapping, time_s: Array | None) -> Translated:
+    """Make the columns of the log format out of the file's; without usable times those that need none."""
     specs = _specs(mapping)
-    evaluation = _Evaluation(table, specs, time_s, {TIME: time_s}, [])
+    del specs[TIME]
+    evaluation = _Evaluation(table, specs, time_s, {}, [])
     made = {name: evaluation.column(name) for name in specs}
-    signals = {name: values for name, values in made.items() if values is not None and name != TIME}
+    signals = {name: values for name, values in made.items() if values is not None}
     derived = frozenset(name for name in signals if specs[name].derived)
-    return Translated(time_s, signals, derived, evaluation.findings)
+    return Translated(signals, derived, evaluation.findings)
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ class _Evaluation:
 
     table: Table
     specs: dict[str, Spec]
-    time_s: Array
+    time_s: Array | None
     done: dict[str, Array]
     findings: list[Finding]
 
@@ -128,20 +126,20 @@ class _Evaluation:
 
     def _raw(self, spec: Spec, unit: str, name: str) -> Array | None:
         if spec.constant is not None:
-            return np.full(len(self.time_s), spec.constant)
+            return np.full(len(self.table.rows), spec.constant)
         if spec.copy_of is not None:
             return self.column(spec.copy_of)
         if spec.integrate is not None:
             rate = self.value(spec.integrate, INTEGRAND_UNIT[unit], name)
-            return None if rate is None else self._integral(rate, name)
+            return None if rate is None or self.time_s is None else self._integral(self.time_s, rate, name)
         if spec.sum:
             terms = [self.value(term, unit, name) for term in spec.sum]
             known = [term for term in terms if term is not None]
             return np.sum(known, axis=0) if len(known) == len(terms) else None
         return _measured(self.table, spec, unit)
 
-    def _integral(self, rate: Array, name: str) -> Array:
-        total, bridged_s = integrate(self.time_s, rate)
+    def _integral(self, time_s: Array, rate: Array, name: str) -> Array:
+        total, bridged_s = integrate(time_s, rate)
         if bridged_s > BRIDGED_S:
             text = (
                 f"{name} is integrated across {bridged_s:.2g} s without samples; it may be off from there on."

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
+from numpy.typing import NDArray
 
 from scenarios.plant.sensors import write_log as write_csv
-from sim2real.logs.contract import IMAGE_PATH, TIME
+from sim2real.logs.contract import TIME
 from sim2real.logs.errors import LogError
 from sim2real.logs.log import Log
 
@@ -46,14 +48,15 @@ def _write_mdf(table: pd.DataFrame, path: Path) -> None:
 
     time_s = table[TIME].to_numpy()
     with MDF(version="4.10") as mdf:
-        signals = []
-        for name in table.columns.drop(TIME):
-            if name == IMAGE_PATH:
-                samples = table[name].fillna("").str.encode("utf-8").to_numpy().astype("S")
-                signals.append(
-                    Signal(samples, time_s, name=IMAGE_PATH, encoding="utf-8", master_metadata=MASTER)
-                )
-            else:
-                signals.append(Signal(table[name].to_numpy(), time_s, name=str(name), master_metadata=MASTER))
+        signals = [
+            Signal(_samples(table[name]), time_s, name=str(name), encoding="utf-8", master_metadata=MASTER)
+            for name in table.columns.drop(TIME)
+        ]
         mdf.append(signals, common_timebase=True)
         mdf.save(path, overwrite=True)
+
+
+def _samples(column: pd.Series) -> NDArray[Any]:
+    if pd.api.types.is_numeric_dtype(column):
+        return column.to_numpy()
+    return column.fillna("").str.encode("utf-8").to_numpy().astype("S")

@@ -1,0 +1,194 @@
+"""The contest of the candidates: every effect alone, then pairs, fitted to the fit logs and held to the hold-out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from scenarios.effects import EFFECTS
+from sim2real.fitting import Candidate, Evidence, Fit, fit, loss, robust
+from sim2real.observer import Simulation
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+BEAM = 3
+"""Best single effects that pairs are built on."""
+PAIRS_PER_MEMBER = 4
+"""Pairs that are fitted per single effect of the beam, the most promising by a linear screening."""
+LINEAR_PAIRS = 4
+"""Further pairs, the most promising by the slopes at the effects' own fits."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A candidate with its fit and what it leaves on the hold-out.
+
+    Attributes
+    ----------
+    ids : tuple of str
+        Its effects; empty for the model as it is.
+    fit : Fit or None
+        None for the model as it is.
+    z_fit, z_hold : array
+        Whitened residuals on the fit logs and on the hold-out.
+    loss_fit, loss_hold : float
+        Their losses.
+    """
+
+    ids: tuple[str, ...]
+    fit: Fit | None
+    z_fit: Array
+    z_hold: Array
+
+    @property
+    def loss_fit(self) -> float:
+        """Loss on the fit logs."""
+        return loss(self.z_fit)
+
+    @property
+    def loss_hold(self) -> float:
+        """Loss on the hold-out."""
+        return loss(self.z_hold)
+
+    @property
+    def loss(self) -> float:
+        """Loss on all logs."""
+        return self.loss_fit + self.loss_hold
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return 0 if self.fit is None else len(self.fit.x)
+
+
+@dataclass(frozen=True)
+class Contest:
+    """All entries, best first within each kind."""
+
+    null: Entry
+    singles: tuple[Entry, ...]
+    pairs: tuple[Entry, ...]
+
+
+def hold_contest(
+    model: Simulation,
+    fit_to: Evidence,
+    holdout: Evidence,
+    exclude: Collection[str] = (),
+    jobs: int = 1,
+    progress: Progress = lambda stage, done, total: None,
+) -> Contest:
+    """Fit every effect that acts on the car's motion or its sensors, then pairs of them where one is not enough."""
+    null = Entry(
+        (), None, fit_to.whitened(fit_to.residuals(model)), holdout.whitened(holdout.residuals(model))
+    )
+    ids = [key for key, effect in EFFECTS.items() if key not in exclude and effect.stage != "perception"]
+    singles = _fit_all([Candidate(model, (key,)) for key in ids], fit_to, holdout, jobs, progress, "effects")
+    return Contest(null, tuple(sorted(singles, key=lambda e: e.loss)), ())
+
+
+def add_pairs(
+    contest: Contest,
+    model: Simulation,
+    fit_to: Evidence,
+    holdout: Evidence,
+    jobs: int = 1,
+    progress: Progress = lambda stage, done, total: None,
+) -> Contest:
+    """The contest with the most promising pairs fitted too."""
+    wanted = promising_pairs(contest)
+    entries = {e.ids[0]: e for e in contest.singles}
+
+    def start(pair: tuple[str, ...]) -> Array:
+        return np.concatenate([entries[key].fit.x for key in pair])  # type: ignore[union-attr]
+
+    pairs = _fit_all(
+        [Candidate(model, pair) for pair in wanted],
+        fit_to,
+        holdout,
+        jobs,
+        progress,
+        "pairs",
+        map(start, wanted),
+    )
+    return Contest(contest.null, contest.singles, tuple(sorted(pairs, key=lambda e: e.loss)))
+
+
+def promising_pairs(contest: Contest) -> list[tuple[str, ...]]:
+    """Pairs by the loss that a linear model of both foretells, from the slopes at each single's fit.
+
+    A pair is screened from either member's fit with the other's slopes, as weighted least squares on the residuals.
+    """
+    beam = contest.singles[:BEAM]
+    chosen: list[tuple[str, ...]] = []
+    for entry in beam:
+        foretold = sorted(
+            (_foretold(entry.z_fit, _slopes(entry), _slopes(other)), other.ids[0])
+            for other in contest.singles
+            if other is not entry
+        )
+        chosen += [_ordered(entry.ids[0], key) for _, key in foretold[:PAIRS_PER_MEMBER]]
+    foretold_pairs = sorted(
+        (_foretold(contest.null.z_fit, _slopes(a), _slopes(b)), _ordered(a.ids[0], b.ids[0]))
+        for a, b in combinations(contest.singles, 2)
+    )
+    chosen += [pair for _, pair in foretold_pairs[:LINEAR_PAIRS]]
+    return list(dict.fromkeys(chosen))
+
+
+def _ordered(a: str, b: str) -> tuple[str, ...]:
+    order = list(EFFECTS)
+    return tuple(sorted((a, b), key=order.index))
+
+
+def _slopes(entry: Entry) -> Array:
+    assert entry.fit is not None
+    return entry.fit.jacobian
+
+
+def _foretold(z: Array, *slopes: Array) -> float:
+    """Loss that is left after a weighted linear fit of z on the slopes."""
+    jacobian = np.concatenate(slopes, axis=1)
+    weight = np.sqrt(robust_weight(z))
+    step, *_ = np.linalg.lstsq(jacobian * weight[:, None], -z * weight, rcond=1e-8)
+    return float(np.sum(robust(z + jacobian @ step)))
+
+
+def robust_weight(z: Array) -> Array:
+    """Weight of each residual in the robust fit [-]."""
+    from sim2real.fitting import ROBUST_FROM
+
+    return 1.0 / np.sqrt(1.0 + (z / ROBUST_FROM) ** 2)
+
+
+def _fit_all(
+    candidates: Sequence[Candidate],
+    fit_to: Evidence,
+    holdout: Evidence,
+    jobs: int,
+    progress: Progress,
+    stage: str,
+    starts: Iterable[Array] = (),
+) -> list[Entry]:
+    begins: list[Array | None] = [*starts] or [None for _ in candidates]
+
+    def one(candidate: Candidate, begin: Array | None) -> Entry:
+        found = fit(candidate, fit_to, begin)
+        z_hold = holdout.whitened(holdout.residuals(candidate.model(found.x)))
+        return Entry(candidate.ids, found, found.z, z_hold)
+
+    # the compiled step releases the interpreter's lock, so threads do
+    results = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
+        delayed(one)(c, b) for c, b in zip(candidates, begins, strict=True)
+    )
+    entries = []
+    for entry in results:
+        entries.append(entry)
+        progress(stage, len(entries), len(candidates))
+    return entries

@@ -1,0 +1,113 @@
+"""A log made ready for the diagnosis: one clock, one rate, the channels that the model predicts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.files import WHEELS, RoadFile
+
+Array = NDArray[np.float64]
+
+CHANNELS = (
+    "position_m",
+    "vehicle_speed_m_s",
+    *(f"wheel_speed_{w}_rad_s" for w in WHEELS),
+    "accel_x_m_s2",
+)
+"""The columns that the model predicts, in the order of all channel arrays."""
+POSITION, SPEED, WHEEL, ACCEL = 0, 1, slice(2, 6), 6
+GROUPS = {
+    "position": slice(0, 1),
+    "vehicle_speed": slice(1, 2),
+    "wheel_speed": slice(2, 6),
+    "accel_x": slice(6, 7),
+}
+"""Signals as the verdict names them, and their channels."""
+UNITS = {"position": "m", "vehicle_speed": "m/s", "wheel_speed": "rad/s", "accel_x": "m/s^2"}
+
+ANALYSIS_RATE_HZ = 150.0
+"""Least rate that a faster log is averaged down to: fast enough for driveline oscillation [Hz]."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One log on the diagnosis' grid.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    road : RoadFile
+        Where it was driven.
+    time_s : array, shape (n,)
+        Uniform time [s].
+    torque_nm : array, shape (n, 4)
+        Commanded torque [N m].
+    measured : array, shape (n, 7)
+        The channels as measured; NaN where a sample is lost or a channel is not measured.
+    moving : array of bool, shape (n,)
+        Rows in which the car moves: at rest nothing of the model shows.
+    counted : array of bool, shape (7,)
+        Channels that are evidence: measured, and not computed from others.
+    """
+
+    name: str
+    road: RoadFile
+    time_s: Array
+    torque_nm: Array
+    measured: Array
+    moving: NDArray[np.bool_]
+    counted: NDArray[np.bool_]
+
+    @property
+    def step_s(self) -> float:
+        """Grid step [s]."""
+        return float(self.time_s[1] - self.time_s[0])
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+LEAST_SPEED_M_S = 0.5
+"""Below this speed the car counts as standing [m/s]."""
+
+
+def make_drive(
+    name: str,
+    road: RoadFile,
+    time_s: Array,
+    columns: dict[str, Array],
+    without: frozenset[str] = frozenset(),
+) -> Drive:
+    """Channels of a log that is on a uniform grid.
+
+    Parameters
+    ----------
+    name, road : str, RoadFile
+        What to call it, and where it was driven.
+    time_s : array, shape (n,)
+        Uniform time [s].
+    columns : dict
+        The contract's columns, shape (n,) each, NaN where lost.
+    without : frozenset of str
+        Columns that are not evidence of their own (computed from others); they still tell where on the road the car is.
+    """
+    measured = np.column_stack([columns[name] for name in CHANNELS]).astype(np.float64)
+    torque = np.column_stack([columns[f"wheel_torque_{w}_nm"] for w in WHEELS]).astype(np.float64)
+    for i in range(4):  # a lost sample of a command that is continuous
+        lost = ~np.isfinite(torque[:, i])
+        if lost.any():
+            torque[lost, i] = np.interp(time_s[lost], time_s[~lost], torque[~lost, i])
+    speed = measured[:, SPEED]
+    moving = np.nan_to_num(speed, nan=np.inf) > LEAST_SPEED_M_S
+    counted = np.isfinite(measured).any(axis=0) & np.array([name not in without for name in CHANNELS])
+    return Drive(name, road, time_s, torque, measured, moving, counted)
+
+
+def decimation(rate_hz: float) -> int:
+    """Odd factor by which a log of this rate is averaged down; odd, so that the average adds no delay."""
+    factor = max(int(rate_hz / ANALYSIS_RATE_HZ), 1)
+    return factor if factor % 2 else factor - 1

@@ -1,0 +1,265 @@
+"""From what was found to what is said: sizes, places, causes with intervals and evidence, sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.effects import EFFECTS
+from sim2real import where
+from sim2real.contest import Contest, Entry
+from sim2real.drive import CHANNELS, UNITS
+from sim2real.fitting import Evidence, residuals
+from sim2real.gap import intervals, measure, noise_floor, shrink
+from sim2real.next_manoeuvre import propose
+from sim2real.noise import read_noise
+from sim2real.observer import Simulation
+from sim2real.result import (
+    Cause,
+    Diagnosis,
+    Gap,
+    Interval,
+    Measure,
+    NextManoeuvre,
+    Place,
+    Trace,
+    Verdict,
+)
+from sim2real.selection import Decision, fitness
+from sim2real.unknown import Term, characterise, fit_terms
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+SHOWN = {
+    "vehicle_speed_m_s": "m/s",
+    "wheel_speed_fl_rad_s": "rad/s",
+    "wheel_speed_rl_rad_s": "rad/s",
+    "accel_x_m_s2": "m/s^2",
+}
+"""Channels that are drawn, and their units."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """A decided contest with the evidence that it was held on."""
+
+    model: Simulation
+    fit_to: Evidence
+    holdout: Evidence
+    contest: Contest
+    decision: Decision
+
+
+def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Diagnosis:
+    """Everything that a diagnosis says."""
+    decision = found.decision
+    held = _final_noise(found)
+    before = held.residuals(found.model)
+    added = _added(found)
+    after = held.residuals(added)
+    floor = noise_floor(added, held, seed)
+    old, new = measure(held, before), measure(held, after)
+    gap = Gap(old, old if decision.verdict in (Verdict.NO_GAP, Verdict.UNKNOWN) else new, floor)
+    causes = _causes(found, held, before, seed)
+    terms: list[Term] = []
+    unexplained = None
+    places: tuple[Place, ...] = ()
+    heat: dict[str, dict[str, float]] = {}
+    if decision.verdict is not Verdict.NO_GAP:
+        progress("equations", 0, 1)
+        drives = (*found.fit_to.drives, *held.drives) if decision.verdict is Verdict.UNKNOWN else held.drives
+        noises = (*found.fit_to.noises, *held.noises) if decision.verdict is Verdict.UNKNOWN else held.noises
+        terms = fit_terms(found.model, drives, noises, jobs)
+        progress("equations", 1, 1)
+        if decision.verdict is Verdict.UNKNOWN:
+            unexplained = characterise(terms)
+        subsystem = _subsystem(decision, terms)
+        places, heat = _where(found, held, before, terms, subsystem)
+    return Diagnosis(
+        verdict=decision.verdict,
+        sentence=_sentence(decision, gap, causes, unexplained.sentence if unexplained else ""),
+        gap=gap,
+        where=places,
+        heat_map=heat,
+        causes=causes,
+        ambiguous_with=_ambiguous(decision),
+        cannot_rule_out=tuple(c.effect for c in causes if not c.excited),
+        next_manoeuvre=_next(found, progress),
+        unexplained=unexplained,
+        traces=_traces(found, held, added),
+        provenance={"seed": seed},
+    )
+
+
+def _final_noise(found: Findings) -> Evidence:
+    """The hold-out with its noise read anew from what the winner leaves: a gap may have looked like noise."""
+    entry = found.decision.winner
+    if entry.fit is None:
+        return found.holdout
+    model = entry.fit.candidate.model(entry.fit.x)
+    noises = []
+    for drive, first in zip(found.holdout.drives, found.holdout.noises, strict=True):
+        again = read_noise(drive, residuals(model, drive))
+        noises.append(again if np.all(again.sigma <= first.sigma * 1.001) else first)
+    return Evidence(found.holdout.drives, tuple(noises))
+
+
+def _added(found: Findings) -> Simulation:
+    entry = found.decision.winner
+    return found.model if entry.fit is None else entry.fit.candidate.model(entry.fit.x)
+
+
+def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int) -> tuple[Cause, ...]:
+    """All single candidates, ranked; a compound's members first, with their joint parameters."""
+    decision = found.decision
+    together = decision.winner if decision.verdict is Verdict.COMPOUND else None
+    out = []
+    for entry in found.contest.singles:
+        out.append(_cause(found, entry, held, before, seed, together))
+    order = {key: -i for i, key in enumerate(together.ids)} if together else {}
+    return tuple(sorted(out, key=lambda c: (c.effect not in order, -c.probability, c.gap_after)))
+
+
+def _cause(
+    found: Findings, entry: Entry, held: Evidence, before: Sequence[Array], seed: int, together: Entry | None
+) -> Cause:
+    assert entry.fit is not None
+    key = entry.ids[0]
+    after = held.residuals(entry.fit.candidate.model(entry.fit.x))
+    size = measure(held, after).total
+    values = _parameters(found, entry)
+    if together is not None and key in together.ids:
+        values = {name: value for (effect, name), value in _joint(found, together).items() if effect == key}
+    excited = _excited(entry, found.fit_to)
+    fit_ok = fitness(entry, found.fit_to, found.holdout)
+    worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
+    shrunk = shrink(held, before, after, seed)
+    pro, contra = [], []
+    if shrunk.low > 0.0:
+        pro.append(f"Takes {shrunk.value:.0f} % off the gap of a log that it was not fitted to.")
+    if fit_ok.misfit <= 1.5:
+        pro.append("What it leaves averages out like noise.")
+    else:
+        contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
+    if not excited:
+        contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
+    if shrunk.high <= 1.0:
+        contra.append("Does not shrink the gap on the hold-out.")
+    return Cause(
+        effect=key,
+        probability=round(found.decision.probability.get(key, 0.0), 6),
+        parameters=values,
+        gap_after=size,
+        shrink_percent=shrunk,
+        fit_bic=float(entry.loss_fit + entry.size * np.log(max(np.count_nonzero(entry.z_fit), 2))),
+        evidence_for=tuple(pro),
+        evidence_against=tuple(contra),
+        excited=excited,
+    )
+
+
+def _parameters(found: Findings, entry: Entry) -> dict[str, Interval]:
+    return {name: value for (_, name), value in _joint(found, entry).items()}
+
+
+def _joint(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
+    """Effect id and parameter to its interval."""
+    assert entry.fit is not None
+    triples = intervals(entry.fit, found.fit_to)
+    return {
+        (key, p.name): Interval(*triple, unit=p.unit)
+        for (key, p), triple in zip(entry.fit.candidate.parameters, triples, strict=True)
+    }
+
+
+EXCITED_SHARE = 1.0
+"""A parameter is seen when its interval's half width is below this many noticeable changes of it [-]."""
+
+
+def _excited(entry: Entry, evidence: Evidence) -> bool:
+    assert entry.fit is not None
+    half = [(high - low) / 2.0 for _, low, high in intervals(entry.fit, evidence)]
+    return bool(half[0] < EXCITED_SHARE * entry.fit.candidate.scale[0])
+
+
+def _subsystem(decision: Decision, terms: Sequence[Term]) -> str:
+    if decision.verdict is Verdict.UNKNOWN or decision.winner.fit is None:
+        return terms[0].equation.subsystem if terms else ""
+    return EFFECTS[decision.winner.ids[0]].subsystem
+
+
+def _where(
+    found: Findings, held: Evidence, before: Sequence[Array], terms: Sequence[Term], subsystem: str
+) -> tuple[tuple[Place, ...], dict[str, dict[str, float]]]:
+    null = sum(term.null_loss for term in terms[:1])
+    shares = where.equation_shares([(t.equation.subsystem, null - t.loss) for t in terms])
+    parts = [
+        where.blocks(drive, noise, found.model.predict(drive), rest)
+        for drive, noise, rest in zip(held.drives, held.noises, before, strict=True)
+    ]
+    places = tuple(
+        place
+        for drive, part in zip(held.drives, parts, strict=True)
+        for place in where.places(drive, part, subsystem)
+    )
+    return places, where.heat_map(parts, shares)
+
+
+def _ambiguous(decision: Decision) -> tuple[tuple[str, ...], ...]:
+    if not decision.rivals:
+        return ()
+    members = [decision.winner, *decision.rivals]
+    if decision.verdict is Verdict.AMBIGUOUS:
+        return (tuple(e.ids[0] for e in members),)
+    return tuple("+".join(e.ids) for e in members) and (tuple("+".join(e.ids) for e in members),)
+
+
+def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:
+    decision = found.decision
+    if decision.verdict is not Verdict.AMBIGUOUS:
+        return None
+    a, b = decision.winner, decision.rivals[0]
+    now = float(np.sqrt(max(b.loss - a.loss, 0.0)))
+    drive, noise = found.holdout.drives[0], found.holdout.noises[0]
+    return propose(found.model, a, b, drive.road, noise, now, progress)
+
+
+def _traces(found: Findings, held: Evidence, added: Simulation) -> tuple[Trace, ...]:
+    drive, noise = held.drives[0], held.noises[0]
+    before, after = found.model.predict(drive).channels, added.predict(drive).channels
+    return tuple(
+        Trace(
+            name, unit, drive.time_s, drive.measured[:, i], before[:, i], after[:, i], float(noise.sigma[i])
+        )
+        for name, unit in SHOWN.items()
+        for i in [CHANNELS.index(name)]
+    )
+
+
+def _sentence(decision: Decision, gap: Gap, causes: Sequence[Cause], term: str) -> str:
+    size = f"{gap.before.total:.1f} times the noise floor"
+    if decision.verdict is Verdict.NO_GAP:
+        return "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
+    if decision.verdict is Verdict.UNKNOWN:
+        return f"There is a gap of {size}, and no effect of the library explains it. {term}".strip()
+    top = causes[0]
+    cut = f"it takes the gap from {gap.before.total:.1f} to {gap.after.total:.1f} times the noise floor"
+    if decision.verdict is Verdict.COMPOUND:
+        return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
+    if decision.verdict is Verdict.AMBIGUOUS:
+        others = ", ".join(e.ids[0] for e in decision.rivals)
+        return f"The gap of {size} is {top.effect} or as well {others}: these logs cannot tell them apart."
+    values = ", ".join(f"{name} {v.value:.4g} {v.unit}" for name, v in top.parameters.items())
+    return f"The gap of {size} is {top.effect} ({values}): {cut}."
+
+
+def unit_of(signal: str) -> str:
+    """Unit of a signal group."""
+    return UNITS[signal]
+
+
+__all__ = ["Findings", "Measure", "describe"]

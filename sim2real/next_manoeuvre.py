@@ -1,0 +1,196 @@
+"""What to drive next: the profile on which two effects that look alike differ most, with its predicted power."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.effects import Effect
+from scenarios.files import WHEELS, RoadFile, VehicleFile
+from scenarios.plant import simulate
+from sim2real.contest import Entry
+from sim2real.drive import CHANNELS, Drive, make_drive
+from sim2real.fitting import Evidence, fit
+from sim2real.noise import Noise
+from sim2real.observer import Simulation
+from sim2real.result import NextManoeuvre
+
+Array = NDArray[np.float64]
+
+STEP_S = 0.005
+DURATION_S = 12.0
+SEPARATE_SIGMA = 5.0
+"""Distance from which on two effects are told apart reliably [standard deviations]."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A manoeuvre to choose from.
+
+    Torque over time is a share of the motor's peak where it drives (above 0), of full braking below.
+    """
+
+    name: str
+    sentence: str
+    initial_speed_m_s: float
+    times_s: tuple[float, ...]
+    shares: tuple[float, ...]
+
+
+PROFILES = (
+    Profile("coast-down", "Coast down from 30 m/s without any torque.", 30.0, (0.0, 12.0), (0.0, 0.0)),
+    Profile(
+        "steady speeds",
+        "Hold 8 m/s, then 25 m/s, five seconds each.",
+        8.0,
+        (0, 4, 4.5, 7.5, 8, 12),
+        (0.05, 0.05, 1, 1, 0.08, 0.08),
+    ),
+    Profile(
+        "steady acceleration",
+        "Accelerate from 3 m/s with half torque for ten seconds.",
+        3.0,
+        (0, 0.5, 10, 10.5, 12),
+        (0, 0.5, 0.5, 0, 0),
+    ),
+    Profile(
+        "tip-in and tip-out",
+        "At 10 m/s step the pedal in and out, once a second.",
+        10.0,
+        tuple(float(t) for k in range(12) for t in (k, k + 0.03, k + 0.5, k + 0.53)),
+        (-0.1, 0.8, 0.8, -0.1) * 12,
+    ),
+    Profile(
+        "torque sweep",
+        "From 8 m/s raise the torque slowly to its peak, then lower it.",
+        8.0,
+        (0, 5, 10, 12),
+        (0, 1, 0, 0),
+    ),
+    Profile(
+        "brake to the limit",
+        "Accelerate to 20 m/s, then press the brake slowly until the wheels are about to lock, and let go; twice.",
+        18.0,
+        (0, 1, 2, 2.2, 5.5, 5.7, 7, 7.2, 10, 10.2, 12),
+        (0.5, 0.5, 0, -0.2, -1.0, 0, 0.8, -0.2, -1.0, 0, 0),
+    ),
+    Profile(
+        "pulses at two speeds",
+        "Short full-torque pulses at 5 m/s, and again at higher speed, with one tip-out between.",
+        5.0,
+        (0, 0.5, 0.6, 1.0, 1.1, 2, 2.1, 2.5, 2.6, 3, 9, 9.1, 9.5, 9.6, 10.5, 10.6, 11, 11.1, 12),
+        (0, 0, 1, 1, 0, 0, 1, 1, 0, 0.8, 0.8, 0, 0, 1, 1, -0.6, -0.6, 0, 0),
+    ),
+)
+BRAKE_SHARE = 0.95
+"""Full brake is this share of the friction on the front axle at static load on the road's best segment [-]."""
+
+
+def propose(
+    model: Simulation,
+    a: Entry,
+    b: Entry,
+    road: RoadFile,
+    noise: Noise,
+    now_sigma: float,
+    progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
+) -> NextManoeuvre:
+    """The profile that tells two fitted entries apart best.
+
+    Parameters
+    ----------
+    model : Simulation
+        The simulation without either.
+    a, b : Entry
+        Fitted candidates.
+    road : RoadFile
+        Where it would be driven.
+    noise : Noise
+        Of the sensors.
+    now_sigma : float
+        Their distance on the data at hand.
+    progress : callable
+        Told the stage, and how much of how much is done.
+    """
+    best: tuple[float, Profile, Array, Array] | None = None
+    for number, profile in enumerate(PROFILES):
+        time_s, torque = torque_of(profile, model.vehicle, road)
+        power = min(
+            separation(model, truth, rival, road, noise, profile, time_s, torque)
+            for truth, rival in ((a, b), (b, a))
+        )
+        if best is None or power > best[0]:
+            best = (power, profile, time_s, torque)
+        progress("next manoeuvre", number + 1, len(PROFILES))
+    assert best is not None
+    power, profile, time_s, torque = best
+    names = tuple("+".join(e.ids) for e in (a, b))
+    verdict = (
+        f"It would leave {power:.0f} standard deviations between {names[0]} and {names[1]}"
+        if power >= SEPARATE_SIGMA
+        else f"Even so only {power:.1f} standard deviations would lie between {names[0]} and {names[1]}"
+    )
+    return NextManoeuvre(
+        f"{profile.sentence} {verdict}; the logs at hand have {now_sigma:.1f}.",
+        profile.initial_speed_m_s,
+        time_s[::10],
+        torque[::10],
+        names,
+        power,
+        now_sigma,
+    )
+
+
+def torque_of(profile: Profile, vehicle: VehicleFile, road: RoadFile) -> tuple[Array, Array]:
+    """Time (n,) [s] and torque (n, 4) [N m] of a profile for a car."""
+    time_s = np.arange(round(DURATION_S / STEP_S) + 1) * STEP_S
+    share = np.interp(time_s, profile.times_s, profile.shares)
+    grip = max(max(s.mu_left, s.mu_right) for s in road.segments)
+    car = vehicle.to_core()
+    torque = np.empty((len(time_s), 4))
+    for i in range(4):
+        brake = BRAKE_SHARE * grip * car.wheel_load(front=i < 2) * vehicle.wheel_radius_m
+        torque[:, i] = np.where(share > 0.0, share * vehicle.motor_peak_torque_nm, share * brake)
+    return time_s, torque
+
+
+def separation(
+    model: Simulation,
+    truth: Entry,
+    rival: Entry,
+    road: RoadFile,
+    noise: Noise,
+    profile: Profile,
+    time_s: Array,
+    torque: Array,
+) -> float:
+    """Distance that is left when the rival is fitted to what the truth would do, in standard deviations."""
+    drive = imagined(model, truth, road, profile, time_s, torque)
+    evidence = Evidence((drive,), (noise,))
+    assert rival.fit is not None
+    refit = fit(rival.fit.candidate, evidence, rival.fit.x)
+    return float(np.sqrt(refit.loss))
+
+
+def imagined(
+    model: Simulation, entry: Entry, road: RoadFile, profile: Profile, time_s: Array, torque: Array
+) -> Drive:
+    """The drive as a car with the entry's effects would do it, without noise."""
+    assert entry.fit is not None
+    effects: list[Effect] = list(model.with_effects(*entry.fit.candidate.effects(entry.fit.x)).effects)
+    car = model.vehicle.model_copy(update={"effects": {e.id: asdict(e) for e in effects}})
+    run = simulate(car, road, torque, STEP_S, profile.initial_speed_m_s, 0.0)
+    columns = dict(
+        zip(
+            CHANNELS,
+            (run.position_m, run.speed_m_s, *run.wheel_speed_rad_s.T, run.accel_x_m_s2),
+            strict=True,
+        )
+    )
+    for effect in effects:
+        columns = effect.sense(run.time_s, columns)
+    columns |= {f"wheel_torque_{w}_nm": torque[:, i] for i, w in enumerate(WHEELS)}
+    return make_drive(profile.name, road, run.time_s, columns)

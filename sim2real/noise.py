@@ -1,0 +1,112 @@
+"""The sensors' noise, read off the log itself, and residuals in units of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from sim2real.drive import CHANNELS, Drive
+
+Array = NDArray[np.float64]
+
+RESOLUTION = np.array([0.02, 0.002, 0.01, 0.01, 0.01, 0.01, 0.01])
+"""Least standard deviation that a channel is credited with, each in its unit: digits in files, integrators."""
+LONG_LAG_S = 0.04
+"""Lag at which sensor noise has forgotten itself, and a gap has hardly changed yet [s]."""
+MOST_CORRELATION = 0.9
+"""Greatest correlation from row to row that is taken for noise [-]."""
+FEWEST = 50
+"""Differences that a channel's noise must be read from."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of one drive's channels: first-order autoregressive.
+
+    Attributes
+    ----------
+    sigma : array, shape (7,)
+        Standard deviation, in each channel's unit.
+    correlation : array, shape (7,)
+        From row to row [-].
+    """
+
+    sigma: Array
+    correlation: Array
+
+    def scaled(self, residuals: Array) -> Array:
+        """Residuals in standard deviations, shape (n, 7)."""
+        return residuals / self.sigma
+
+    def whitened(self, residuals: Array) -> Array:
+        """Residuals without what the row before foretells of them, in standard deviations, shape (n, 7)."""
+        z = residuals / self.sigma
+        rest = (z[1:] - self.correlation * z[:-1]) / np.sqrt(1.0 - self.correlation**2)
+        first = z[:1]
+        return np.concatenate([first, np.where(np.isfinite(rest), rest, z[1:])])
+
+    def draw(self, n: int, generator: np.random.Generator) -> Array:
+        """Noise of n rows, shape (n, 7), in each channel's unit."""
+        white = generator.standard_normal((n, len(CHANNELS)))
+        out = np.empty_like(white)
+        out[0] = white[0]
+        fresh = np.sqrt(1.0 - self.correlation**2)
+        for k in range(1, n):
+            out[k] = self.correlation * out[k - 1] + fresh * white[k]
+        return out * self.sigma
+
+
+def read_noise(drive: Drive, residuals: Array) -> Noise:
+    """Noise from the second differences of a model's residuals at a short and a long lag.
+
+    What the model lacks changes slowly or rarely, so that the median of the differences is the noise's. The two lags
+    tell its standard deviation and its correlation apart.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    residuals : array, shape (n, 7)
+        Measured minus predicted, NaN where lost.
+    """
+    long_lag = max(round(LONG_LAG_S / drive.step_s), 2)
+    sigma, correlation = RESOLUTION.copy(), np.zeros(len(CHANNELS))
+    rows = np.where(drive.moving[:, None], residuals, np.nan)
+    for i in range(len(CHANNELS)):
+        short, far = _spread(rows[:, i], 1), _spread(rows[:, i], long_lag)
+        if short is None or far is None or far <= 0.0:
+            continue
+        rho = _correlation(short / far, long_lag)
+        sigma[i] = max(np.sqrt(far / _second_difference(rho**long_lag)), RESOLUTION[i])
+        correlation[i] = rho if sigma[i] > RESOLUTION[i] else 0.0
+    return Noise(sigma, correlation)
+
+
+def _spread(values: Array, lag: int) -> float | None:
+    """Robust variance of the second difference; None with too few samples."""
+    second = values[: -2 * lag] - 2.0 * values[lag:-lag] + values[2 * lag :]
+    second = second[np.isfinite(second)]
+    if len(second) < FEWEST:
+        return None
+    return float((1.4826 * np.median(np.abs(second))) ** 2)
+
+
+def _second_difference(rho: float) -> float:
+    """Variance of the second difference of unit noise whose correlation over its lag is rho."""
+    return 6.0 - 8.0 * rho + 2.0 * rho * rho
+
+
+def _correlation(ratio: float, long_lag: int) -> float:
+    """Correlation from row to row for a ratio of the differences' variances, short over long lag."""
+
+    def excess(rho: float) -> float:
+        return _second_difference(rho) / _second_difference(rho**long_lag) - ratio
+
+    if excess(0.0) <= 0.0:
+        return 0.0
+    if excess(MOST_CORRELATION) >= 0.0:
+        return MOST_CORRELATION
+    return float(brentq(excess, 0.0, MOST_CORRELATION))

@@ -1,0 +1,157 @@
+"""The plant as an observer along a log: its states follow the measurements softly, its residuals show its errors.
+
+An open-loop simulation drifts from the log, and at a locking or spinning wheel it runs away from it; a simulation that
+is set to the measured state at each row hides what builds up slowly. In between, each state is drawn to its
+measurement with a memory of `MEMORY_S`: with the right model the residuals are sensor noise, and a wrong acceleration
+shows as a residual of itself times the memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.effects import EFFECTS, Effect
+from scenarios.files import RoadFile, VehicleFile
+from scenarios.plant import dynamics
+from scenarios.plant.dynamics import DynamicsParameters, RoadTable
+from scenarios.plant.pipeline import make_setup
+from sim2real.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL, Drive
+
+Array = NDArray[np.float64]
+
+MEMORY_S = np.array([1.0, 1.0, 0.1, 0.1, 0.1, 0.1])
+"""Memory of position, vehicle speed and wheel speeds [s]: the wheels' is short, since they diverge within
+tenths of a second where the tyre slides."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """An input from outside the model, over the rows of one drive: what an unknown term would do.
+
+    Attributes
+    ----------
+    torque_nm : array, shape (n, 4)
+        On top of the wheels' torque [N m].
+    accel_m_s2 : array, shape (n,)
+        On top of the car's acceleration; `felt` says whether the accelerometer reads it (a force does, gravity
+        does not) [m/s^2].
+    felt : bool
+        See there.
+    offset : array, shape (n, 7)
+        On top of what the sensors read, in each channel's unit.
+    """
+
+    torque_nm: Array
+    accel_m_s2: Array
+    felt: bool
+    offset: Array
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What the model predicts row by row from all rows before.
+
+    Attributes
+    ----------
+    channels : array, shape (n, 7)
+        The channels as their sensors would read them.
+    states : array, shape (n, 6)
+        Position [m], vehicle speed [m/s], wheel speeds [rad/s], before any sensor.
+    slip, force_n, load_n, theta : array, shape (n, 4)
+        Of the tyres: unsigned slip [-], F_x [N], F_z [N], theta [-].
+    """
+
+    channels: Array
+    states: Array
+    slip: Array
+    force_n: Array
+    load_n: Array
+    theta: Array
+
+
+class Simulation:
+    """The simulation model of a car: its file, and effects on top of those that the file switches on.
+
+    Parameters
+    ----------
+    vehicle : VehicleFile
+        The car; its own effects are kept unless `effects` holds one of the same id.
+    effects : iterable of Effect
+        What is added.
+    """
+
+    def __init__(self, vehicle: VehicleFile, effects: Iterable[Effect] = ()) -> None:
+        chosen = {effect.id: effect for effect in (*vehicle.make_effects(), *effects)}
+        self.vehicle = vehicle
+        self.effects = tuple(chosen[key] for key in EFFECTS if key in chosen)
+        self._bare = vehicle.model_copy(update={"effects": {}})
+
+    def with_effects(self, *effects: Effect) -> Simulation:
+        """The model with these effects added."""
+        return Simulation(self.vehicle, (*self.effects, *effects))
+
+    def setup(self, road: RoadFile) -> tuple[DynamicsParameters, RoadTable]:
+        """The compiled step's inputs on a road."""
+        bare = make_setup(self._bare, road)
+        parameters, table = bare.parameters, bare.road
+        for effect in self.effects:
+            parameters, table = effect.dynamics(parameters), effect.road(table)
+        return DynamicsParameters(*map(float, parameters)), table
+
+    def predict(self, drive: Drive, push: Push | None = None) -> Prediction:
+        """Follow a drive."""
+        parameters, table = self.setup(drive.road)
+        torque, seen = drive.torque_nm, drive.measured - push.offset if push else drive.measured
+        columns = {name: seen[:, i] for i, name in enumerate(CHANNELS)}
+        for effect in reversed(self.effects):
+            columns = effect.correct(drive.time_s, columns)
+        for effect in self.effects:
+            torque = effect.actuate(drive.time_s, torque)
+        states, accel, slip, force_n, load_n, theta = dynamics.follow(
+            start(columns, drive.step_s, parameters),
+            np.ascontiguousarray(torque + push.torque_nm if push else torque),
+            push.accel_m_s2 if push else np.zeros(len(drive)),
+            np.column_stack([columns[name] for name in CHANNELS[:6]]),
+            MEMORY_S,
+            drive.step_s,
+            parameters,
+            table,
+        )
+        if push and push.felt:
+            accel = accel + push.accel_m_s2
+        channels = self._sense(drive.time_s, states, accel)
+        if push:
+            channels = channels + push.offset
+        return Prediction(channels, states, slip, force_n, load_n, theta)
+
+    def _sense(self, time_s: Array, states: Array, accel: Array) -> Array:
+        columns = {name: states[:, i] for i, name in enumerate(CHANNELS[:6])}
+        columns[CHANNELS[ACCEL]] = accel
+        for effect in self.effects:
+            columns = effect.sense(time_s, columns)
+        return np.column_stack([columns[name] for name in CHANNELS])
+
+
+def start(columns: dict[str, Array], step_s: float, p: DynamicsParameters) -> Array:
+    """The plant's state at the first row: straight lines through the first tenth of a second of each channel."""
+    count = max(round(0.1 / step_s), 5)
+    rows = np.arange(count)
+
+    def at_start(name: str) -> float:
+        values = columns[name][:count]
+        good = np.isfinite(values)
+        if good.sum() < 3:
+            return float("nan")
+        return float(np.polynomial.Polynomial.fit(rows[good], values[good], 1)(0.0))
+
+    speed = max(np.nan_to_num(at_start(CHANNELS[SPEED])), 0.0)
+    y = dynamics.initial_y(speed, float(np.nan_to_num(at_start(CHANNELS[POSITION]))), p)
+    for i, name in enumerate(CHANNELS[WHEEL]):
+        value = at_start(name)
+        if np.isfinite(value):
+            y[2 + i] = max(value, 0.0)
+    return y

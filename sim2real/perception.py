@@ -1,0 +1,316 @@
+"""The camera chain's part of the diagnosis: late, tilted, blurred, ill exposed, or wrong about the classes' friction.
+
+Three independent signals are judged, each by its own module: where the changes of class lie (`perception_shift`), how
+sure the camera is (`perception_confidence`), and what a friction reference says of the classes (`perception_friction`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from scenarios.files import RoadFile, VehicleFile
+from sim2real.logs import Log
+from sim2real.perception_chain import Account, Chain
+from sim2real.perception_confidence import confidence_chain
+from sim2real.perception_conflicts import class_conflicts
+from sim2real.perception_frames import Modelled, read_results
+from sim2real.perception_friction import friction_chain
+from sim2real.perception_pictures import read_light
+from sim2real.perception_shift import shift_chain
+from sim2real.result import Interval, Measure, Place, Verdict
+from trpac_core.vision.camera import Camera
+
+NOISE_FLOOR = 1.0
+"""Size of the gap that noise alone leaves, per signal and in total [-]."""
+UNEXPLAINED = 2.0
+"""Median rest of a signal, in standard deviations, from which on its best account does not explain it [-]."""
+BOOTSTRAP = 400
+QUANTILES = (0.025, 0.975)
+
+
+@dataclass(frozen=True)
+class CameraCandidate:
+    """One or two effects of the camera chain and what speaks for them.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Ids. friction_offset is the dynamics' own: its gain here is what the friction reference adds to it.
+    signal : str
+        What it was judged by.
+    gain_fit, gain_holdout : float
+        Quasi-log-likelihood over "as simulated", fitted, and on the hold-out at the same parameters [nats].
+    size : int
+        Number of parameters.
+    observations : int
+        Pictures or rows behind it.
+    effective : float
+        Observations that err independently: borders passed, seconds of confidence, stretches of road.
+    score : float
+        Both gains less half the logarithm of `effective` per parameter [nats].
+    parameters : dict
+        Estimates with 95 % intervals.
+    after : Measure
+        Gap that is left on the hold-out with it [noise floors].
+    shrink_percent : Interval
+        By how much it shrinks the camera's gap on the hold-out [%].
+    evidence_for, evidence_against : tuple of str
+        Sentences.
+    excited : bool
+        Whether the logs could have shown it.
+    """
+
+    effects: tuple[str, ...]
+    signal: str
+    gain_fit: float
+    gain_holdout: float
+    size: int
+    observations: int
+    effective: float
+    score: float
+    parameters: dict[str, Interval]
+    after: Measure
+    shrink_percent: Interval
+    evidence_for: tuple[str, ...]
+    evidence_against: tuple[str, ...]
+    excited: bool
+
+
+@dataclass(frozen=True)
+class PerceptionFinding:
+    """What the camera's columns say, to be merged with what the dynamics say.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        Of the camera chain alone.
+    causes : tuple of str
+        Effects that it stands by: one, several of a compound, or the best of an ambiguous set.
+    candidates : tuple of CameraCandidate
+        Every one tried, best score first.
+    before, after : Measure
+        Gap on the hold-out as simulated, and with the causes [noise floors]; the floor is 1 per signal.
+    ambiguous_with : tuple of tuple of str
+        Sets that these logs cannot tell apart.
+    cannot_rule_out : dict
+        Effect to the reason why these logs could not show it.
+    places : tuple of Place
+        Where the hold-out shows the gap most.
+    next_step : str
+        What to drive to tell apart what is ambiguous; empty where nothing is.
+    unexplained : tuple of str
+        What no effect of the library explains.
+    warnings : tuple of str
+        Damage of the columns, and conflicts of class with road.yaml.
+    """
+
+    verdict: Verdict
+    causes: tuple[str, ...]
+    candidates: tuple[CameraCandidate, ...]
+    before: Measure
+    after: Measure
+    ambiguous_with: tuple[tuple[str, ...], ...]
+    cannot_rule_out: dict[str, str]
+    places: tuple[Place, ...]
+    next_step: str
+    unexplained: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def diagnose_perception(
+    logs_fit: Sequence[Log],
+    log_holdout: Log,
+    roads: Sequence[RoadFile],
+    vehicle: VehicleFile,
+    camera: Camera | None = None,
+    exclude: Collection[str] = (),
+    seed: int = 0,
+) -> PerceptionFinding | None:
+    """Judge the perception columns and the friction reference of some logs.
+
+    Parameters
+    ----------
+    logs_fit, log_holdout : sequence of Log, Log
+        Logs that parameters are fitted to, and the one that the gap is measured on.
+    roads : sequence of RoadFile
+        The road of each fit log, and last that of the hold-out.
+    vehicle : VehicleFile
+        The car, with what the simulation models already.
+    camera : Camera, optional
+        Height and place of the lens; the default is that of scenarios/cameras/paper.yaml.
+    exclude : collection of str
+        Effects that are left out of the library.
+    seed : int
+        Of the resampling behind the shrink's interval.
+
+    Returns
+    -------
+    PerceptionFinding or None
+        None where nothing of the camera chain is measured.
+    """
+    camera = Camera() if camera is None else camera
+    read = [
+        read_results(log, road, vehicle, camera)
+        for log, road in zip((*logs_fit, log_holdout), roads, strict=True)
+    ]
+    warnings = [text for _, texts in read for text in texts]
+    fitted = [(one, log) for (one, _), log in zip(read[:-1], logs_fit, strict=True) if one is not None]
+    held_out, modelled = read[-1][0], Modelled.of(vehicle)
+    results = [one for one, _ in fitted]
+    light, more = read_light(results, [log.image_folder for _, log in fitted])
+    light_unseen, yet_more = read_light(
+        [] if held_out is None else [held_out], [log_holdout.image_folder][: held_out is not None]
+    )
+    warnings += [
+        *more,
+        *yet_more,
+        *class_conflicts([*results, *([held_out] if held_out is not None else [])]),
+    ]
+    found = (
+        shift_chain(results, held_out, modelled, camera.height_m, exclude),
+        confidence_chain(results, held_out, (light, light_unseen), modelled, exclude),
+        friction_chain((logs_fit, roads[:-1]), (log_holdout, roads[-1]), vehicle, modelled, exclude),
+    )
+    chains = [chain for chain in found if chain is not None]
+    return _conclude(chains, tuple(warnings), seed) if chains else None
+
+
+def _conclude(chains: Sequence[Chain], warnings: tuple[str, ...], seed: int) -> PerceptionFinding:
+    """Each signal's best account, and what they make together."""
+    best = [chain.best() for chain in chains]
+    rivals = [chain.rivals() for chain in chains]
+    nothing = [chain.nothing for chain in chains]
+    unexplained = tuple(
+        text for chain, account in zip(chains, best, strict=True) if (text := _unexplained(chain, account))
+    )
+    causes = tuple(dict.fromkeys(effect for account in best for effect in account.effects))
+    ambiguous = tuple(
+        dict.fromkeys(
+            tuple(dict.fromkeys((*account.effects, *(e for r in others for e in r.effects))))
+            for account, others in zip(best, rivals, strict=True)
+            if others
+        )
+    )
+    unexcited = {effect: why for chain in chains for effect, why in chain.unexcited.items()}
+    return PerceptionFinding(
+        verdict=_verdict(causes, bool(ambiguous), bool(unexplained)),
+        causes=causes,
+        candidates=_candidates(chains, best, unexcited, seed),
+        before=_measure(chains, nothing),
+        after=_measure(chains, best),
+        ambiguous_with=ambiguous,
+        cannot_rule_out={effect: why for effect, why in unexcited.items() if effect not in causes},
+        places=_places(chains, best),
+        next_step=" ".join(chain.next_step for chain, others in zip(chains, rivals, strict=True) if others),
+        unexplained=unexplained,
+        warnings=warnings,
+    )
+
+
+def _verdict(causes: tuple[str, ...], ambiguous: bool, unexplained: bool) -> Verdict:
+    if unexplained:
+        return Verdict.UNKNOWN
+    if ambiguous:
+        return Verdict.AMBIGUOUS
+    if len(causes) > 1:
+        return Verdict.COMPOUND
+    return Verdict.IDENTIFIED if causes else Verdict.NO_GAP
+
+
+def _unexplained(chain: Chain, account: Account) -> str:
+    """What a signal's best account leaves, in a sentence; empty where it leaves noise."""
+    if chain.unexplained:
+        return chain.unexplained
+    # the median: one odd border or stretch is no gap that depends on anything
+    typical = float(np.median(np.abs(account.z))) if len(account.z) else 0.0
+    if typical < UNEXPLAINED:
+        return ""
+    named = " and ".join(account.effects) or "the simulation as it is"
+    return f"{chain.signal}: {named} leaves {typical:.1f} times the noise on the hold-out."
+
+
+def _measure(chains: Sequence[Chain], accounts: Sequence[Account]) -> Measure:
+    """Gap on the hold-out under one account per signal."""
+    signals = {c.signal: a.left() for c, a in zip(chains, accounts, strict=True) if len(a.z)}
+    return Measure(_total(signals.values()), signals)
+
+
+def _total(sizes: Collection[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(list(sizes))))) if sizes else 0.0
+
+
+def _places(chains: Sequence[Chain], best: Sequence[Account]) -> tuple[Place, ...]:
+    """Places of the signals that have a gap; shares are of the camera's whole gap."""
+    size = {
+        c.signal: c.nothing.left() ** 2
+        for c, a in zip(chains, best, strict=True)
+        if a.effects or _unexplained(c, a)
+    }
+    whole = sum(size.values())
+    return tuple(
+        Place(p.signal, p.subsystem, p.regime, p.from_s, p.to_s, p.share * size[c.signal] / whole, p.log)
+        for c in chains
+        if c.signal in size
+        for p in c.places
+    )
+
+
+def _candidates(
+    chains: Sequence[Chain], best: Sequence[Account], unexcited: dict[str, str], seed: int
+) -> tuple[CameraCandidate, ...]:
+    """All accounts of all signals, and the compounds of the best ones of two signals."""
+    out = []
+    for at, chain in enumerate(chains):
+        out += [_candidate(chains, {at: account}, unexcited, seed) for account in chain.accounts]
+    standing = [at for at, account in enumerate(best) if account.effects]
+    for pair in combinations(standing, 2):
+        out.append(_candidate(chains, {at: best[at] for at in pair}, unexcited, seed))
+    return tuple(sorted(out, key=lambda c: -c.score))
+
+
+def _candidate(
+    chains: Sequence[Chain], changed: dict[int, Account], unexcited: dict[str, str], seed: int
+) -> CameraCandidate:
+    accounts = [changed.get(at, chain.nothing) for at, chain in enumerate(chains)]
+    own = [(chains[at], account) for at, account in changed.items()]
+    effects = tuple(effect for _, account in own for effect in account.effects)
+    return CameraCandidate(
+        effects=effects,
+        signal=" and ".join(chain.signal for chain, _ in own),
+        gain_fit=sum(account.gain_fit for _, account in own),
+        gain_holdout=sum(account.gain_holdout for _, account in own),
+        size=sum(account.size for _, account in own),
+        observations=sum(chain.observations for chain, _ in own),
+        effective=sum(chain.effective for chain, _ in own),
+        score=sum(chain.score(account) for chain, account in own),
+        parameters={name: value for _, account in own for name, value in account.parameters.items()},
+        after=_measure(chains, accounts),
+        shrink_percent=_shrink(chains, accounts, seed),
+        evidence_for=tuple(text for _, account in own for text in account.evidence_for),
+        evidence_against=tuple(text for _, account in own for text in account.evidence_against)
+        + tuple(unexcited[effect] for effect in effects if effect in unexcited),
+        excited=not any(effect in unexcited for effect in effects),
+    )
+
+
+def _shrink(chains: Sequence[Chain], accounts: Sequence[Account], seed: int) -> Interval:
+    """Shrink of the total with a 95 % interval, by resampling the hold-out's observations [%]."""
+    generator = np.random.default_rng(seed)
+    seen = [(c.nothing, a) for c, a in zip(chains, accounts, strict=True) if len(a.z)]
+    if not seen:
+        return Interval(0.0, 0.0, 0.0, "%")
+    old = np.zeros(BOOTSTRAP + 1)
+    new = np.zeros(BOOTSTRAP + 1)
+    for nothing, account in seen:
+        count = len(account.z)
+        rows = np.vstack((np.arange(count), generator.integers(0, count, (BOOTSTRAP, count))))
+        old += (nothing.z**2)[rows].mean(axis=1) + nothing.excess
+        new += (account.z**2)[rows].mean(axis=1) + account.excess
+    shrink = 100.0 * (1.0 - np.sqrt(new / np.maximum(old, 1e-12)))
+    low, high = np.quantile(shrink[1:], QUANTILES)
+    value = float(shrink[0])
+    return Interval(value, float(min(low, value)), float(max(high, value)), "%")

@@ -1,0 +1,128 @@
+"""What the camera's three kinds of evidence have in common: accounts of it, and how they are scored.
+
+Stamps, confidence and friction reference are independent signals; each makes a chain of accounts from "as simulated" to
+one or two effects. Gains are quasi-log-likelihoods in nats over "as simulated", counted in observations that err
+independently: a border passed, a second of confidence, a stretch of road.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.result import Interval, Place
+
+Array = NDArray[np.float64]
+
+DECISIVE = 3.0
+"""Score from which on an account beats another: odds of twenty to one [nats]."""
+FEWEST_EFFECTIVE = 2.0
+
+
+@dataclass(frozen=True)
+class Account:
+    """One way to account for a signal.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Its effects; empty for the simulation as it is.
+    size : int
+        Number of parameters.
+    gain_fit, gain_holdout : float
+        Over the simulation as it is, on the logs fitted to and on the hold-out at the same parameters [nats].
+    parameters : dict
+        Estimates.
+    z : array, shape (n,)
+        What it leaves of the hold-out's observations, in standard deviations.
+    excess : float
+        Square by which a level common to all observations lies beyond its spread [-].
+    evidence_for, evidence_against : tuple of str
+        Sentences.
+    """
+
+    effects: tuple[str, ...]
+    size: int
+    gain_fit: float
+    gain_holdout: float
+    parameters: dict[str, Interval]
+    z: Array
+    excess: float = 0.0
+    evidence_for: tuple[str, ...] = ()
+    evidence_against: tuple[str, ...] = ()
+
+    def left(self) -> float:
+        """Root mean square of what is left; noise alone gives about 1, no observations 0 [-]."""
+        return float(np.sqrt(np.mean(self.z**2) + self.excess)) if len(self.z) else 0.0
+
+
+@dataclass(frozen=True)
+class Chain:
+    """One signal of the camera chain with all its accounts.
+
+    Attributes
+    ----------
+    signal : str
+        Its name in the gap's measure.
+    observations : int
+        Pictures or rows behind it, on all logs.
+    effective : float
+        Observations that err independently, on all logs.
+    nothing : Account
+        The simulation as it is.
+    accounts : tuple of Account
+        Single effects, then pairs.
+    places : tuple of Place
+        Where the hold-out shows it most; shares of this signal's gap.
+    unexcited : dict
+        Effect to the reason why these logs could not show it.
+    next_step : str
+        What would tell its look-alikes apart.
+    unexplained : str
+        What no account explains, in a sentence; empty where nothing.
+    """
+
+    signal: str
+    observations: int
+    effective: float
+    nothing: Account
+    accounts: tuple[Account, ...]
+    places: tuple[Place, ...] = ()
+    unexcited: dict[str, str] = field(default_factory=dict)
+    next_step: str = ""
+    unexplained: str = ""
+
+    @classmethod
+    def silent(cls, signal: str, observations: int, effects: Collection[str], why: str) -> Chain:
+        """A chain that has too little to say anything."""
+        nothing = Account((), 0, 0.0, 0.0, {}, np.empty(0))
+        return cls(signal, observations, 0.0, nothing, (), unexcited=dict.fromkeys(effects, why))
+
+    def score(self, account: Account) -> float:
+        """Gain less half the logarithm of the effective observations per parameter, after Schwarz [nats]."""
+        price = 0.5 * account.size * np.log(max(self.effective, FEWEST_EFFECTIVE))
+        return account.gain_fit + account.gain_holdout - float(price)
+
+    def best(self) -> Account:
+        """The account that stands: with more effects only where that is decisive."""
+        best = self.nothing
+        for account in sorted(self.accounts, key=lambda a: (len(a.effects), -self.score(a))):
+            margin = DECISIVE if len(account.effects) > len(best.effects) else 0.0
+            if self.score(account) > self.score(best) + margin:
+                best = account
+        return best
+
+    def rivals(self) -> tuple[Account, ...]:
+        """Other accounts of as many effects that the best one does not beat decisively."""
+        best = self.best()
+        return tuple(
+            a
+            for a in self.accounts
+            if a is not best
+            and best.effects
+            and len(a.effects) == len(best.effects)
+            and self.score(best) - self.score(a) < DECISIVE
+        )

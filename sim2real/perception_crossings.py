@@ -1,0 +1,171 @@
+"""Where the camera saw the surface change: a bracket of stamps about each border of road.yaml."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.effects.camera_pitch import seen_distance_m
+from scenarios.perception import surfaces_at
+from sim2real.perception_frames import Results
+
+Array = NDArray[np.float64]
+
+AGES_S = np.linspace(0.0, 1.0, 201)
+"""Ages of a picture for which the way driven is tabulated; linear between them [s]."""
+COARSE_AGES_S = AGES_S[::10]
+COARSE_WAYS_M = np.arange(-6.0, 6.1, 0.25)
+"""Shifts among which the classes' sequence is first laid over the road's [s], [m]."""
+MISMATCH_NATS = 0.5
+"""What a picture of another class than the road's costs in that search: neighbouring pictures see the same [nats]."""
+COARSE_PRIOR = (0.2, 1.5)
+"""Shifts beyond these are not expected; a far one must earn its place by matches [s], [m]."""
+WINDOW_M = 15.0
+"""Farthest from where a border is expected that its pictures are looked at [m]."""
+FEWEST_SIDE = 2
+"""Pictures that must show each of the two classes."""
+MOST_WRONG = 0.3
+"""Share of pictures about a border that may contradict it."""
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Borders that the camera's classes show, one row each.
+
+    The border lies between the last picture of the old class and the first of the new one. What of a picture's stamp
+    its class is for is not known; at share s of the stamp the bracket is `low_m` + s `low_length_m` to the like.
+
+    Attributes
+    ----------
+    log : array of str, shape (k,)
+        Where it was seen.
+    time_s, speed_m_s, border_m : array, shape (k,)
+        When and how fast it was passed in the stamps, and where road.yaml has it [s], [m/s], [m].
+    low_m, high_m : array, shape (k,)
+        Begin of the stamps of the last old and the first new picture, minus the border [m].
+    low_length_m, high_length_m : array, shape (k,)
+        Lengths of these stamps [m].
+    way_m : array, shape (k, 201)
+        Way driven during each of `AGES_S` before [m].
+    ahead_m : array, shape (k,)
+        Stamped distance from the lens [m].
+    """
+
+    log: NDArray[np.str_]
+    time_s: Array
+    speed_m_s: Array
+    border_m: Array
+    low_m: Array
+    high_m: Array
+    low_length_m: Array
+    high_length_m: Array
+    way_m: Array
+    ahead_m: Array
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def shift_by_age(self, delay_s: Array) -> Array:
+        """Way driven during delays, shape (len(delay_s), k) [m]."""
+        place = np.clip(delay_s / AGES_S[1], 0.0, len(AGES_S) - 1.000001)
+        left = place.astype(np.intp)
+        rest = (place - left)[:, None]
+        return (1.0 - rest) * self.way_m.T[left] + rest * self.way_m.T[left + 1]
+
+    def shift_by_pitch(self, pitch_rad: Array, height_m: float) -> Array:
+        """How far stamps lie beyond what a pitched camera saw, shape (len(pitch_rad), k) [m]."""
+        return self.ahead_m - seen_distance_m(self.ahead_m, height_m, pitch_rad[:, None])
+
+    def bracket(self, share: float) -> tuple[Array, Array]:
+        """Where the border was seen to lie beyond its place, if a class is for this share of its stamp [m]."""
+        return self.low_m + share * self.low_length_m, self.high_m + share * self.high_length_m
+
+
+def find_crossings(results: Sequence[Results]) -> Crossings:
+    """All borders between surfaces that the results of some drives show."""
+    age_s, way_m = _rough_shift(results)
+    rows = [row for one in results for row in _of_one(one, age_s, way_m)]
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 9
+    names, numbers = columns[0], [np.array(c, dtype=np.float64) for c in columns[1:8]]
+    ways = np.array(columns[8], dtype=np.float64).reshape(len(rows), len(AGES_S))
+    time_s, speed, border, low, high, low_length, high_length = numbers
+    ahead = np.array([row[9] for row in rows], dtype=np.float64)
+    return Crossings(
+        np.array(names, dtype=np.str_), time_s, speed, border, low, high, low_length, high_length, ways, ahead
+    )
+
+
+def _rough_shift(results: Sequence[Results]) -> tuple[float, float]:
+    """The age and the distance at which the classes' sequence lies best over the road's [s], [m]."""
+    age, way = np.meshgrid(COARSE_AGES_S, COARSE_WAYS_M, indexing="ij")
+    cost = np.hypot(age / COARSE_PRIOR[0], way / COARSE_PRIOR[1])
+    for one in results:
+        middle = 0.5 * (one.from_m + one.to_m)
+        driven = one.driven_m(one.time_s, COARSE_AGES_S)
+        for i in range(len(COARSE_AGES_S)):
+            places = (middle - driven[:, i])[None, :] - COARSE_WAYS_M[:, None]
+            wrong = surfaces_at(one.road, places) != one.classes
+            cost[i] += MISMATCH_NATS * wrong.sum(axis=1)
+    best = np.unravel_index(int(np.argmin(cost)), cost.shape)
+    return float(age[best]), float(way[best])
+
+
+def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:
+    """Rows of the crossings of one drive, looked for about where a rough shift puts them."""
+    middle = 0.5 * (one.from_m + one.to_m)
+    shift = one.driven_m(one.time_s, np.array([age_s]))[:, 0] + way_m
+    rows = []
+    segments = one.road.segments
+    borders = [
+        (b.start_m, int(a.surface_class), int(b.surface_class))
+        for a, b in pairwise(segments)
+        if a.surface != b.surface
+    ]
+    edges = [-np.inf, *(b[0] for b in borders), np.inf]
+    for k, (border, old, new) in enumerate(borders):
+        reach = np.minimum(WINDOW_M, 0.5 * np.array([border - edges[k], edges[k + 2] - border]))
+        beyond = middle - shift - border
+        near = np.flatnonzero((beyond > -reach[0]) & (beyond < reach[1]))
+        near = near[np.argsort(middle[near], kind="stable")]
+        found = _bracket(one.classes[near], old, new)
+        if found is None:
+            continue
+        i, j = near[found[0]], near[found[1]]
+        at = i if abs(beyond[i]) < abs(beyond[j]) else j
+        rows.append(
+            (
+                one.log,
+                one.time_s[at],
+                one.speed_m_s[at],
+                border,
+                one.from_m[i] - border,
+                one.from_m[j] - border,
+                one.to_m[i] - one.from_m[i],
+                one.to_m[j] - one.from_m[j],
+                one.driven_m(one.time_s[[at]], AGES_S)[0],
+                one.ahead_m[at],
+            )
+        )
+    return rows
+
+
+def _bracket(classes: NDArray[np.intp], old: int, new: int) -> tuple[int, int] | None:
+    """Last picture before and first after a change of class, by the split that fewest pictures contradict.
+
+    Where several splits do equally well the bracket covers them all. None where too few pictures show either class, or
+    too many contradict.
+    """
+    is_old, is_new = classes == old, classes == new
+    # wrong[s]: pictures that contradict a change between picture s - 1 and picture s
+    wrong = np.concatenate(([0], np.cumsum(is_new))) + np.concatenate((np.cumsum(is_old[::-1])[::-1], [0]))
+    best = np.flatnonzero(wrong == wrong.min())
+    first, last = int(best[0]), int(best[-1])
+    if is_old[:first].sum() < FEWEST_SIDE or is_new[last:].sum() < FEWEST_SIDE:
+        return None
+    if wrong.min() > MOST_WRONG * (is_old.sum() + is_new.sum()):
+        return None
+    return first - 1, last

@@ -1,0 +1,220 @@
+"""The camera's results in a log: one row per result, damage left out and said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from scenarios.files import RoadFile, VehicleFile
+from sim2real.logs import Log
+from trpac_core.vision.camera import Camera
+from trpac_core.vision.classes import Surface
+
+Array = NDArray[np.float64]
+
+NEEDED = ("image_class", "image_from_m", "image_to_m")
+"""Without these a log says nothing of where the camera saw what."""
+LONGEST_STAMP_M = 50.0
+FARTHEST_STAMP_M = 200.0
+"""A stretch longer than the one, or farther from the car than the other, is no displacement stamp [m]."""
+LEAST_AHEAD_M = 0.5
+"""Stamps nearer to the lens than this do not tell at which angle the camera looked [m]."""
+USUAL_AHEAD_M = 2.9
+"""Distance then assumed: the preview distance of 2.5 m with the lens 0.4 m behind the front axle [m]."""
+RUN_UP_S = 2.0
+"""Time before the log's begin for which its first speed is assumed: late results look back there [s]."""
+STUCK_RESULTS = 3
+"""With fewer different frame_id while stamps go on, frame_id is taken for stuck."""
+
+
+@dataclass(frozen=True)
+class Modelled:
+    """What vehicle.yaml's effects make the simulation model already of the camera chain; 0 is nothing."""
+
+    delay_s: float = 0.0
+    pitch_rad: float = 0.0
+    exposure_s: float = 0.0
+    stops: float = 0.0
+    class_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def of(cls, vehicle: VehicleFile) -> Modelled:
+        """From a vehicle's effects."""
+        effects = vehicle.effects
+        offset = effects.get("class_friction_offset", {})
+        return cls(
+            delay_s=effects.get("camera_latency", {}).get("delay_s", 0.0),
+            pitch_rad=effects.get("camera_pitch", {}).get("pitch_rad", 0.0),
+            exposure_s=effects.get("motion_blur", {}).get("exposure_s", 0.0),
+            stops=effects.get("exposure_shift", {}).get("stops", 0.0),
+            class_offset=(offset.get("dry", 0.0), offset.get("wet", 0.0), offset.get("snow_ice", 0.0)),
+        )
+
+
+@dataclass(frozen=True)
+class Results:
+    """What the camera chain said during one log, one row per result, in order of arrival.
+
+    Attributes
+    ----------
+    log : str
+        The log's name.
+    road : RoadFile
+        Where it was driven.
+    time_s, speed_m_s : array, shape (n,)
+        When the result arrived, and the speed then [s], [m/s].
+    from_m, to_m : array, shape (n,)
+        Its stamp [m].
+    ahead_m : array, shape (n,)
+        Distance of the stamp's middle from the lens by the camera file [m].
+    classes : array, shape (n,)
+        Class index.
+    confidence : array, shape (n,)
+        Q_v; NaN where not measured [-].
+    picture : array of str, shape (n,)
+        Its file relative to the log, "" for none.
+    drive_time_s, drive_position_m : array, shape (m,)
+        The car's way [s], [m].
+    """
+
+    log: str
+    road: RoadFile
+    time_s: Array
+    speed_m_s: Array
+    from_m: Array
+    to_m: Array
+    ahead_m: Array
+    classes: NDArray[np.intp]
+    confidence: Array
+    picture: NDArray[np.str_]
+    drive_time_s: Array
+    drive_position_m: Array
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def driven_m(self, time_s: Array, age_s: Array) -> Array:
+        """Way driven during ages before times, shape (len(time_s), len(age_s)) [m]."""
+        then = np.interp(time_s[:, None] - age_s, self.drive_time_s, self.drive_position_m)
+        return np.interp(time_s, self.drive_time_s, self.drive_position_m)[:, None] - then
+
+
+def read_results(
+    log: Log, road: RoadFile, vehicle: VehicleFile, camera: Camera
+) -> tuple[Results | None, tuple[str, ...]]:
+    """The results in a log, and what is odd about them.
+
+    Returns
+    -------
+    Results or None, tuple of str
+        None where the log has no perception columns, or no usable row in them.
+    """
+    missing = [name for name in NEEDED if name not in log.signals]
+    if len(missing) == len(NEEDED):
+        return None, ()
+    if missing:
+        return None, (
+            f"{log.name}: the camera's results are left out: {', '.join(missing)} is missing; expected all of "
+            f"{', '.join(NEEDED)}.",
+        )
+    table, warnings = _one_row_per_result(log)
+    table, more = _plausible(table, log)
+    warnings += more
+    if table.empty:
+        return None, (*warnings, f"{log.name}: none of the camera's results is usable.")
+    time_s = table["time_s"].to_numpy()
+    drive_time_s, position_m = _finite(log.time_s, log.signals["position_m"])
+    clock, speed = _finite(log.time_s, log.signals["vehicle_speed_m_s"])
+    speed_m_s = np.interp(time_s, clock, speed)
+    lens_m = vehicle.to_core().cog_to_front_axle_m + camera.x_from_front_axle_m
+    ahead_m = 0.5 * (table["from"] + table["to"]).to_numpy()
+    ahead_m = ahead_m - np.interp(time_s, drive_time_s, position_m) - lens_m
+    if np.median(ahead_m) < LEAST_AHEAD_M:
+        warnings.append(
+            f"{log.name}: stamps lie {np.median(ahead_m):.1f} m ahead of the lens; the pitch is reckoned for "
+            f"{USUAL_AHEAD_M:g} m instead."
+        )
+        ahead_m = np.full(len(time_s), USUAL_AHEAD_M)
+    results = Results(
+        log=log.name,
+        road=road,
+        time_s=time_s,
+        speed_m_s=speed_m_s,
+        from_m=table["from"].to_numpy(),
+        to_m=table["to"].to_numpy(),
+        ahead_m=np.maximum(ahead_m, LEAST_AHEAD_M),
+        classes=table["class"].to_numpy().astype(np.intp),
+        confidence=table["confidence"].to_numpy(),
+        picture=table["picture"].to_numpy().astype(np.str_),
+        drive_time_s=np.concatenate(([drive_time_s[0] - RUN_UP_S], drive_time_s)),
+        drive_position_m=np.concatenate(([position_m[0] - RUN_UP_S * speed[0]], position_m)),
+    )
+    return results, tuple(warnings)
+
+
+def _one_row_per_result(log: Log) -> tuple[pd.DataFrame, list[str]]:
+    """Each result's first readable values: a sample of it may be lost."""
+    nothing = np.full(len(log), np.nan)
+    rows = pd.DataFrame(
+        {
+            "time_s": log.time_s,
+            "id": log.signals.get("frame_id", nothing),
+            "class": log.signals["image_class"],
+            "from": log.signals["image_from_m"],
+            "to": log.signals["image_to_m"],
+            "confidence": log.signals.get("image_confidence", nothing),
+            "picture": "" if log.image_path is None else log.image_path,
+        }
+    )
+    warnings: list[str] = []
+    key = ["id"]
+    if rows["id"].nunique() < STUCK_RESULTS:
+        key = ["from", "to"]
+        if rows[key].drop_duplicates().shape[0] > STUCK_RESULTS:
+            why = "is missing" if rows["id"].isna().all() else "does not change"
+            warnings.append(f"{log.name}: frame_id {why}; a new stamp is taken for a new result.")
+    rows = rows[rows[key].notna().all(axis=1)]
+    new = (rows[key] != rows[key].shift()).any(axis=1)
+    return rows.groupby(new.cumsum()).first(), warnings
+
+
+def _plausible(table: pd.DataFrame, log: Log) -> tuple[pd.DataFrame, list[str]]:
+    """The rows that say something; what was left out or put right, in sentences."""
+    warnings: list[str] = []
+
+    def tell(count: int, text: str) -> None:
+        if count:
+            warnings.append(f"{log.name}: {count} of {len(table)} camera results {text}")
+
+    known = table["class"].isin([int(s) for s in Surface])
+    tell(
+        int((~known & table["class"].notna() & (table["class"] != -1)).sum()),
+        "have no known class: left out.",
+    )
+    stamped = table[["from", "to"]].notna().all(axis=1)
+    tell(int((known & ~stamped).sum()), "have lost their stamp: left out.")
+    turned = table["from"] > table["to"]
+    tell(int(turned.sum()), "have image_from_m beyond image_to_m: both swapped.")
+    near, far = table[["from", "to"]].min(axis=1), table[["from", "to"]].max(axis=1)
+    place = np.interp(table["time_s"], *_finite(log.time_s, log.signals["position_m"]))
+    sane = (far - near < LONGEST_STAMP_M) & ((near - place).abs() < FARTHEST_STAMP_M)
+    tell(
+        int((known & stamped & ~sane).sum()),
+        f"are stamped more than {FARTHEST_STAMP_M:g} m from the car, or longer than {LONGEST_STAMP_M:g} m: "
+        "left out. Stamps are expected in position_m's coordinate.",
+    )
+    trusted = table["confidence"].between(0.0, 1.0)
+    tell(
+        int((~trusted & table["confidence"].notna()).sum()),
+        "have a confidence outside 0 to 1: not used. Is it in per cent?",
+    )
+    table = table.assign(**{"from": near, "to": far, "confidence": table["confidence"].where(trusted)})
+    return table[known & stamped & sane], warnings
+
+
+def _finite(time_s: Array, values: Array) -> tuple[Array, Array]:
+    there = np.isfinite(values)
+    return time_s[there], values[there]

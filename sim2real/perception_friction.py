@@ -1,0 +1,317 @@
+"""The class's friction value against a friction reference, stretch by stretch of road.
+
+The simulation predicts mu_reference as the class's value; a reference that follows road.yaml's own friction, or the
+tyre's peak there, is no gap of the simulation either, which has that friction. A stretch of one segment is one
+observation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from scenarios.effects.class_friction_offset import ClassFrictionOffset
+from scenarios.files import RoadFile, RoadSegment, VehicleFile
+from sim2real.logs import Log
+from sim2real.perception_chain import Account, Chain
+from sim2real.perception_frames import Modelled
+from sim2real.result import Interval, Place
+from trpac_core.tyre import peak_friction
+from trpac_core.vision.classes import CLASS_THETA, Surface
+
+Array = NDArray[np.float64]
+
+BORDER_M = 1.5
+"""Rows closer to a border are left out: either side may be under the wheels, and references average [m]."""
+FEWEST_ROWS = 5
+TOLERANCE = 0.02
+"""Standard deviation with which a reference gives a friction that is exactly known: testers repeat that well [-]."""
+TAIL = 4.0
+"""Degrees of freedom of a stretch's error."""
+CALIBRATION = 0.04
+"""Standard deviation, as a share, of what references mean by friction: peak or theta, and on which tyre [-]."""
+CLASSES = tuple(s.label for s in Surface)
+SIGNAL, OFFSET = "mu_reference", "class_friction_offset"
+NEXT_STEP = (
+    "Brake to the limit on each surface: the tyres show the road's friction, and whose value is wrong."
+)
+NOTABLE, MOST_PLACES = 3.0, 4
+BOUNDS = {p.name: (float(p.low), float(p.high)) for p in ClassFrictionOffset.parameters()}  # type: ignore[arg-type]
+"""Offsets that are possible at all."""
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Pieces of road within one segment, one row each.
+
+    Attributes
+    ----------
+    log : array of str, shape (n,)
+        Where.
+    from_s, to_s : array, shape (n,)
+        When the front axle was on it [s].
+    classes : array of int, shape (n,)
+        Surface.
+    reference, deviation : array, shape (n,)
+        Mean mu_reference and its standard deviation, tolerance included [-].
+    theta, peak : array, shape (n,)
+        road.yaml's friction, mean of left and right, and the tyre's peak at it [-].
+    """
+
+    log: NDArray[np.str_]
+    from_s: Array
+    to_s: Array
+    classes: NDArray[np.intp]
+    reference: Array
+    deviation: Array
+    theta: Array
+    peak: Array
+
+    def __len__(self) -> int:
+        return len(self.classes)
+
+    @property
+    def class_value(self) -> Array:
+        """The classes' friction values, shape (n,) [-]."""
+        return np.array([CLASS_THETA[Surface(int(c))] for c in self.classes], dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class FrictionFit:
+    """An account of the reference: what it predicts, its parameters, how well it does."""
+
+    effects: tuple[str, ...]
+    size: int
+    predict: Callable[[Stretches], Array]
+    parameters: dict[str, Interval]
+    what: str
+
+    def z(self, stretches: Stretches) -> Array:
+        """What it leaves, in standard deviations, shape (n,)."""
+        spread = np.hypot(stretches.deviation, calibration_error(stretches.class_value))
+        return (stretches.reference - self.predict(stretches)) / spread
+
+    def log_likelihood(self, stretches: Stretches) -> float:
+        """Of stretches, at what was fitted; each class may be off together by the calibration's error [nats]."""
+        rest = stretches.reference - self.predict(stretches)
+        total = 0.0
+        for c in np.unique(stretches.classes):
+            here = stretches.classes == c
+            spread = float(calibration_error(stretches.class_value[here])[0])
+            off = np.linspace(-4.0, 4.0, 161) * spread
+            z = (rest[here] - off[:, None]) / stretches.deviation[here]
+            fits = -0.5 * (TAIL + 1.0) * np.log1p(z**2 / TAIL).sum(axis=1) - 0.5 * (off / spread) ** 2
+            total += float(fits.max())
+        return total
+
+
+def calibration_error(value: Array) -> Array:
+    """Standard deviation of what all stretches of a class are off together, same shape [-]."""
+    return np.maximum(CALIBRATION * value, TOLERANCE)
+
+
+def find_stretches(logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile) -> Stretches:
+    """Stretches of some drives that have a friction reference."""
+    rows = [
+        row
+        for log, road in zip(logs, roads, strict=True)
+        if "mu_reference" in log.signals
+        for row in _of_one(log, road, vehicle)
+    ]
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 8
+    numbers = [np.array(c, dtype=np.float64) for c in columns[1:]]
+    return Stretches(
+        np.array(columns[0], dtype=np.str_),
+        numbers[0],
+        numbers[1],
+        numbers[2].astype(np.intp),
+        *numbers[3:],
+    )
+
+
+def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile) -> list[tuple]:
+    core = vehicle.to_core()
+    load_n = core.wheel_load(front=True)
+    front_m = log.signals["position_m"] + core.cog_to_front_axle_m
+    starts = [-np.inf, *(s.start_m for s in road.segments[1:]), np.inf]
+    rows = []
+    for segment, begin, end in zip(road.segments, starts[:-1], starts[1:], strict=True):
+        inside = (front_m > begin + BORDER_M) & (front_m < end - BORDER_M)
+        inside &= np.isfinite(log.signals["mu_reference"])
+        if np.count_nonzero(inside) < FEWEST_ROWS:
+            continue
+        values = log.signals["mu_reference"][inside]
+        wander = float(values.std() / np.sqrt(min(len(values), 10)))
+        peaks = [
+            peak_friction(mu, load_n, core.longitudinal_stiffness_n)
+            for mu in (segment.mu_left, segment.mu_right)
+        ]
+        rows.append(
+            (
+                log.name,
+                log.time_s[inside][0],
+                log.time_s[inside][-1],
+                int(segment.surface_class),
+                float(np.median(values)),
+                float(np.hypot(TOLERANCE, wander)),
+                _mean(segment),
+                0.5 * sum(peaks),
+            )
+        )
+    return rows
+
+
+def _mean(segment: RoadSegment) -> float:
+    return 0.5 * (segment.mu_left + segment.mu_right)
+
+
+def as_simulated(stretches: Stretches, offset: Array) -> FrictionFit:
+    """The best of the accounts that mean no gap: class values (with the offsets modelled already), road, tyre."""
+    accounts: dict[str, Callable[[Stretches], Array]] = {
+        "the class's value": lambda s: s.class_value + offset[s.classes],
+        "road.yaml's friction": lambda s: s.theta,
+        "the tyre's peak on road.yaml's friction": lambda s: s.peak,
+    }
+    fits = [FrictionFit((), 0, predict, {}, what) for what, predict in accounts.items()]
+    return max(fits, key=lambda f: f.log_likelihood(stretches))
+
+
+def with_class_offsets(stretches: Stretches) -> FrictionFit:
+    """The class's value plus an offset per class; classes that were not driven on are left open."""
+    values = np.zeros(len(CLASSES))
+    parameters = {}
+    for c, name in enumerate(CLASSES):
+        here = stretches.classes == c
+        if not here.any():
+            parameters[name] = Interval(0.0, *BOUNDS[name])
+            continue
+        off = (stretches.reference - stretches.class_value)[here]
+        values[c], half = _location(off, stretches.deviation[here])
+        parameters[name] = Interval(float(values[c]), float(values[c] - half), float(values[c] + half))
+
+    def predict(s: Stretches) -> Array:
+        return s.class_value + values[s.classes]
+
+    size = len(np.unique(stretches.classes))
+    return FrictionFit(("class_friction_offset",), size, predict, parameters, "class values of their own")
+
+
+def with_road_factor(stretches: Stretches) -> FrictionFit:
+    """One factor on the road's friction, as the dynamics' friction_offset has it."""
+    ratio = stretches.reference / stretches.theta
+    factor, half = _location(ratio, stretches.deviation / stretches.theta)
+
+    def predict(s: Stretches) -> Array:
+        return factor * s.theta
+
+    interval = {"factor": Interval(factor, factor - half, factor + half)}
+    return FrictionFit(("friction_offset",), 1, predict, interval, "one factor on road.yaml's friction")
+
+
+def _location(values: Array, deviation: Array) -> tuple[float, float]:
+    """Weighted mean without regard to outliers, and half the width of its 95 % interval."""
+    weight = 1.0 / deviation**2
+    centre = float(np.median(values))
+    for _ in range(20):
+        pull = weight * (TAIL + 1.0) / (TAIL + ((values - centre) / deviation) ** 2)
+        centre = float(np.average(values, weights=pull))
+    scatter = max(float(np.sqrt(np.average(((values - centre) / deviation) ** 2, weights=pull))), 1.0)
+    quantile = float(student.ppf(0.975, max(len(values) - 1, 3)))
+    return centre, quantile * scatter / float(np.sqrt(weight.sum()))
+
+
+def friction_chain(
+    fitted: tuple[Sequence[Log], Sequence[RoadFile]],
+    held_out: tuple[Log, RoadFile],
+    vehicle: VehicleFile,
+    modelled: Modelled,
+    exclude: Collection[str],
+) -> Chain | None:
+    """The friction reference's account; None where no log has one.
+
+    Beside class_friction_offset it holds an account of friction_offset, which the dynamics judge too.
+    """
+    known = find_stretches(*fitted, vehicle)
+    unseen = find_stretches([held_out[0]], [held_out[1]], vehicle)
+    measured = [log for log in (*fitted[0], held_out[0]) if "mu_reference" in log.signals]
+    if not measured:
+        return None
+    rows = sum(int(np.isfinite(log.signals["mu_reference"]).sum()) for log in measured)
+    if not len(known):
+        why = "mu_reference covers no stretch of one surface on the fit logs."
+        return Chain.silent(SIGNAL, rows, [OFFSET], why)
+    plain = as_simulated(known, np.array(modelled.class_offset))
+    fits = [
+        fit
+        for fit in (with_class_offsets(known), with_road_factor(known))
+        if not set(fit.effects) & set(exclude)
+    ]
+    accounts = [_account(fit, plain, known, unseen) for fit in (plain, *fits)]
+    return Chain(
+        SIGNAL,
+        rows,
+        float(len(known) + len(unseen)),
+        accounts[0],
+        tuple(accounts[1:]),
+        places=_places(accounts[0], unseen),
+        unexcited=_undriven(known),
+        next_step=NEXT_STEP,
+    )
+
+
+def _account(fit: FrictionFit, nothing: FrictionFit, known: Stretches, unseen: Stretches) -> Account:
+    return Account(
+        fit.effects,
+        fit.size,
+        fit.log_likelihood(known) - nothing.log_likelihood(known),
+        fit.log_likelihood(unseen) - nothing.log_likelihood(unseen),
+        fit.parameters,
+        fit.z(unseen),
+        evidence_for=_evidence(fit, nothing, known),
+    )
+
+
+def _evidence(fit: FrictionFit, nothing: FrictionFit, known: Stretches) -> tuple[str, ...]:
+    if not fit.effects:
+        return ()
+    means = []
+    for c, name in enumerate(CLASSES):
+        here = known.classes == c
+        if here.any():
+            means.append(
+                f"{name} {np.median(known.reference[here]):.2f} (class value {known.class_value[here][0]:g}, "
+                f"road.yaml {np.median(known.theta[here]):.2f})"
+            )
+    return (
+        f"mu_reference over {len(known)} stretches: {', '.join(means)}. Nearest without a gap is {nothing.what}; "
+        f"{fit.what} leave{'s' if fit.size == 1 else ''} {np.sqrt(np.mean(fit.z(known) ** 2)):.1f} of its deviation.",
+    )
+
+
+def _places(nothing: Account, unseen: Stretches) -> tuple[Place, ...]:
+    share = nothing.z**2 / max(float((nothing.z**2).sum()), 1e-12)
+    notable = np.flatnonzero(np.abs(nothing.z) > NOTABLE)
+    worst = notable[np.argsort(-share[notable])][:MOST_PLACES]
+    return tuple(
+        Place(
+            SIGNAL,
+            "camera",
+            CLASSES[unseen.classes[k]],
+            float(unseen.from_s[k]),
+            float(unseen.to_s[k]),
+            float(share[k]),
+            str(unseen.log[k]),
+        )
+        for k in worst
+    )
+
+
+def _undriven(known: Stretches) -> dict[str, str]:
+    missing = [name for c, name in enumerate(CLASSES) if not (known.classes == c).any()]
+    if not missing:
+        return {}
+    return {OFFSET: f"No friction reference on {' or '.join(missing)}: the value of that class is open."}

@@ -1,0 +1,282 @@
+"""Late results or a wrong mounting angle: by how much the classes' changes lie beyond the road's borders.
+
+A crossing is one observation, however many pictures show it: neighbouring pictures err together. A candidate's shift
+is to put the border into the crossing's bracket, but for an error under Student's t with four degrees of freedom, so
+that a border in another place than road.yaml has it does not decide. Where within its stamp a class belongs is
+uncertain, and so is the scale of the errors: each candidate takes what suits it best, at a price.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from sim2real.perception_chain import Account, Chain
+from sim2real.perception_crossings import Crossings, find_crossings
+from sim2real.perception_frames import Modelled, Results
+from sim2real.result import Interval, Place
+
+Array = NDArray[np.float64]
+
+ERROR_M = 0.1
+"""Least scale of a crossing's error: borders are no lines, positions wander [m]."""
+SCALES = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 20.0, 40.0])
+"""Scales of the crossings' errors that are tried [-]."""
+SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+"""Share of its stamp that a class is for [-]."""
+SHARE_SPREAD = 0.2
+"""Standard deviation of it: the middle is the plain reading, its ends are possible [-]."""
+LEAST_WIDTH_M = 0.02
+DELAYS_S, PITCHES_RAD = (0.0, 1.0), (-0.3, 0.3)
+GRID, ZOOMS = 41, 2
+"""Points per axis of the search, and how often it is drawn closer about what matters."""
+SIGNAL = "image_place"
+CHOICES = (("camera_latency",), ("camera_pitch",), ("camera_latency", "camera_pitch"))
+NEXT_STEP = "Pass the same borders once slowly and once fast, five times each at about 10 and 25 m/s."
+SAME_SPEED_M_S = 2.0
+"""Crossings within this range of speeds count as one speed [m/s]."""
+NOTABLE = 3.0
+MOST_PLACES = 4
+AROUND_S = 0.2
+"""Time about a crossing that is shown [s]."""
+SCATTERED_M, FEWEST_SCATTERED = 0.7, 4
+"""Scale of the crossings' errors, and number of crossings, from which on scatter is a gap of its own [m], [-]."""
+
+
+@dataclass(frozen=True)
+class ShiftFit:
+    """A candidate's shift fitted to crossings.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Its effects; empty for the simulation as it is.
+    log_likelihood : float
+        Of the crossings it was fitted to [nats].
+    delay_s, pitch_rad : Interval
+        Estimates; without width where the candidate does not move them.
+    share, scale : float
+        Share of the stamp that a class is for, and the scale of the errors, at the best [-].
+    """
+
+    effects: tuple[str, ...]
+    log_likelihood: float
+    delay_s: Interval
+    pitch_rad: Interval
+    share: float
+    scale: float
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return len(self.effects)
+
+    def shift(self, crossings: Crossings, height_m: float) -> Array:
+        """By how much it puts the classes' changes beyond the borders, shape (k,) [m]."""
+        age, pitch = np.array([self.delay_s.value]), np.array([self.pitch_rad.value])
+        return (crossings.shift_by_age(age) + crossings.shift_by_pitch(pitch, height_m))[0]
+
+    def log_likelihood_of(self, crossings: Crossings, height_m: float) -> float:
+        """Of other crossings, at what was fitted [nats]."""
+        low, high = crossings.bracket(self.share)
+        return float(_log_likelihood(self.shift(crossings, height_m), low, high, self.scale))
+
+    def z(self, crossings: Crossings, height_m: float, scale: float) -> Array:
+        """Brackets' middles beyond the candidate's, in standard deviations, shape (k,); noise alone gives about 1."""
+        low, high = crossings.bracket(0.5)
+        width, length = high - low, 0.5 * (crossings.low_length_m + crossings.high_length_m)
+        deviation = np.sqrt((scale * ERROR_M) ** 2 + (width**2 + length**2) / 12.0)
+        return (0.5 * (low + high) - self.shift(crossings, height_m)) / deviation
+
+
+def fit_shift(
+    crossings: Crossings, effects: tuple[str, ...], height_m: float, delay_s: float, pitch_rad: float
+) -> ShiftFit:
+    """The best delay, pitch, or both.
+
+    Parameters
+    ----------
+    crossings : Crossings
+        At least one.
+    effects : tuple of str
+        Out of camera_latency and camera_pitch: what may move.
+    height_m : float
+        Of the lens above the road [m].
+    delay_s, pitch_rad : float
+        What the simulation models already; effects that do not move stay there [s], [rad].
+    """
+    delays = np.linspace(*DELAYS_S, GRID) if "camera_latency" in effects else np.array([delay_s])
+    pitches = np.linspace(*PITCHES_RAD, GRID) if "camera_pitch" in effects else np.array([pitch_rad])
+    allowance = 0.5 * student.ppf(0.975, max(len(crossings) - 1, 1)) ** 2
+    for _ in range(ZOOMS):
+        profile = _profiles(crossings, delays, pitches, height_m).max(axis=(0, 1))
+        delays = _about(delays, profile.max(axis=1), allowance)
+        pitches = _about(pitches, profile.max(axis=0), allowance)
+    table = _profiles(crossings, delays, pitches, height_m)
+    share, scale, _, _ = np.unravel_index(int(np.argmax(table)), table.shape)
+    at_share, profile = table[share].max(axis=0), table.max(axis=(0, 1))
+    return ShiftFit(
+        effects,
+        float(profile.max()),
+        _interval(delays, at_share.max(axis=1), profile.max(axis=1), allowance, "s"),
+        _interval(pitches, at_share.max(axis=0), profile.max(axis=0), allowance, "rad"),
+        float(SHARES[share]),
+        float(SCALES[scale]),
+    )
+
+
+def _profiles(crossings: Crossings, delays: Array, pitches: Array, height_m: float) -> Array:
+    """Log-likelihood, shape (shares, scales, delays, pitches) [nats]."""
+    shift = crossings.shift_by_age(delays)[:, None] + crossings.shift_by_pitch(pitches, height_m)[None]
+    return np.array(
+        [
+            [_log_likelihood(shift, *crossings.bracket(share), scale) - cost for scale in SCALES]
+            for share, cost in zip(SHARES, 0.5 * ((SHARES - 0.5) / SHARE_SPREAD) ** 2, strict=True)
+        ]
+    )
+
+
+def _log_likelihood(shift: Array, low: Array, high: Array, scale: float) -> Array:
+    """Of crossings with these brackets under shifts, shape (..., k), summed over the crossings [nats].
+
+    The probability that an error under Student's t moves the border's shifted place into the bracket, per width: flat
+    within the bracket, so that crossings whose pictures happen to fall alike do not add up to a shift.
+    """
+    width = np.maximum(high - low, LEAST_WIDTH_M)
+    beyond = np.abs(shift - 0.5 * (low + high))
+    share = _student((0.5 * width - beyond) / (scale * ERROR_M)) - _student(
+        (-0.5 * width - beyond) / (scale * ERROR_M)
+    )
+    return np.log(np.maximum(share, 1e-30) / width).sum(axis=-1)
+
+
+def _student(t: Array) -> Array:
+    """Distribution function of Student's t with four degrees of freedom, in closed form."""
+    square = 1.0 + 0.25 * t * t
+    return 0.5 + 0.375 * t / np.sqrt(square) * (1.0 - t * t / (12.0 * square))
+
+
+def _about(grid: Array, profile: Array, allowance: float) -> Array:
+    """A finer grid over the part of a grid that the interval may take, one step wider."""
+    if len(grid) == 1:
+        return grid
+    matters = np.flatnonzero(profile >= profile.max() - allowance)
+    first, last = max(int(matters[0]) - 1, 0), min(int(matters[-1]) + 1, len(grid) - 1)
+    return np.linspace(grid[first], grid[last], GRID)
+
+
+def _interval(grid: Array, likely: Array, profile: Array, allowance: float, unit: str) -> Interval:
+    """Mean where the shares are at their best, and where the profile lies within the allowance of its best."""
+    if len(grid) == 1:
+        return Interval(float(grid[0]), float(grid[0]), float(grid[0]), unit)
+    value = float(np.average(grid, weights=np.exp(likely - likely.max())))
+    inside = grid[profile >= profile.max() - allowance]
+    return Interval(value, float(min(inside[0], value)), float(max(inside[-1], value)), unit)
+
+
+def shift_chain(
+    fitted: Sequence[Results],
+    held_out: Results | None,
+    modelled: Modelled,
+    height_m: float,
+    exclude: Collection[str],
+) -> Chain | None:
+    """The stamps' account; None where no log has camera results."""
+    if not fitted and held_out is None:
+        return None
+    known, unseen = find_crossings(fitted), find_crossings([] if held_out is None else [held_out])
+    pictures = sum(map(len, fitted)) + (0 if held_out is None else len(held_out))
+    choices = [c for c in CHOICES if not set(c) & set(exclude)]
+    if not len(known):
+        why = "No border between two surfaces shows in the camera's classes on the fit logs."
+        return Chain.silent(SIGNAL, pictures, {effect for choice in choices for effect in choice}, why)
+
+    def fit(effects: tuple[str, ...]) -> ShiftFit:
+        return fit_shift(known, effects, height_m, modelled.delay_s, modelled.pitch_rad)
+
+    plain, fits = fit(()), [fit(choice) for choice in choices]
+    scale = min(f.scale for f in (plain, *fits))
+    accounts = [_account(f, plain, unseen, height_m, scale, known) for f in (plain, *fits)]
+    return Chain(
+        SIGNAL,
+        pictures,
+        float(len(known) + len(unseen)),
+        accounts[0],
+        tuple(accounts[1:]),
+        places=_places(accounts[0], unseen),
+        next_step=NEXT_STEP,
+        unexplained=_scatter(scale, known),
+    )
+
+
+def _account(
+    f: ShiftFit, nothing: ShiftFit, unseen: Crossings, height_m: float, scale: float, known: Crossings
+) -> Account:
+    parameters = {"delay_s": f.delay_s} if "camera_latency" in f.effects else {}
+    if "camera_pitch" in f.effects:
+        parameters["pitch_rad"] = f.pitch_rad
+    gain = f.log_likelihood_of(unseen, height_m) - nothing.log_likelihood_of(unseen, height_m)
+    return Account(
+        f.effects,
+        f.size,
+        f.log_likelihood - nothing.log_likelihood,
+        gain if len(unseen) else 0.0,
+        parameters,
+        f.z(unseen, height_m, scale),
+        evidence_for=_seen(known) if f.effects else (),
+    )
+
+
+def _seen(known: Crossings) -> tuple[str, ...]:
+    """How far beyond the borders the changes of class appear, slow and fast."""
+    low, high = known.bracket(0.5)
+    beyond, speed = 0.5 * (low + high), known.speed_m_s
+    if np.ptp(speed) < SAME_SPEED_M_S:
+        return (
+            f"{len(known)} borders, all passed at about {speed.mean():.0f} m/s, appear {np.median(beyond):+.2f} m "
+            "along the road.",
+        )
+    slow, fast = speed <= np.median(speed), speed > np.median(speed)
+    fast = fast if fast.any() else ~slow
+    return (
+        f"{len(known)} borders appear {np.median(beyond[slow]):+.2f} m along the road at {speed[slow].mean():.0f} m/s "
+        f"and {np.median(beyond[fast]):+.2f} m at {speed[fast].mean():.0f} m/s.",
+    )
+
+
+def _places(nothing: Account, unseen: Crossings) -> tuple[Place, ...]:
+    """The crossings of the hold-out that lie beyond noise."""
+    share = nothing.z**2 / max(float((nothing.z**2).sum()), 1e-12)
+    low, high = unseen.bracket(0.5)
+    late_s = 0.5 * (low + high) / np.maximum(unseen.speed_m_s, 0.5)
+    begin = unseen.time_s - np.maximum(late_s, 0.0) - AROUND_S
+    end = unseen.time_s + np.maximum(-late_s, 0.0) + AROUND_S
+    notable = np.flatnonzero(np.abs(nothing.z) > NOTABLE)
+    worst = notable[np.argsort(-share[notable])][:MOST_PLACES]
+    return tuple(
+        Place(
+            "image_class",
+            "camera",
+            "surface change",
+            float(begin[k]),
+            float(end[k]),
+            float(share[k]),
+            str(unseen.log[k]),
+        )
+        for k in worst
+    )
+
+
+def _scatter(scale: float, known: Crossings) -> str:
+    low, high = known.bracket(0.5)
+    coarse_m = float(np.median(high - low + known.low_length_m))
+    if scale * ERROR_M < max(SCATTERED_M, 0.5 * coarse_m) or len(known) < FEWEST_SCATTERED:
+        return ""
+    return (
+        f"The changes of class lie about {scale * ERROR_M:.1f} m beside road.yaml's borders, with no common shift or "
+        "delay: are the borders where road.yaml has them, and does position_m drift?"
+    )

@@ -1,0 +1,192 @@
+"""From the contest to a verdict: probabilities, what cannot be told apart, the gates for no gap and unknown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.contest import Contest, Entry
+from sim2real.drive import GROUPS
+from sim2real.fitting import Evidence, robust
+from sim2real.result import Verdict
+
+Array = NDArray[np.float64]
+
+BLOCK_S = 0.2
+"""Residuals are averaged over blocks of this length to see what noise would average out [s]."""
+LONG_BLOCK_S = 1.0
+"""Blocks over which the residuals' sums are taken to see how correlated they are [s]."""
+
+
+@dataclass(frozen=True)
+class Fitness:
+    """How well an entry does, absolutely.
+
+    Attributes
+    ----------
+    misfit : float
+        Root mean square over the signals of the blocks' means in units of what noise gives: 1 for the true model.
+    signals : dict
+        The same per signal.
+    """
+
+    misfit: float
+    signals: dict[str, float]
+
+
+def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Fitness:
+    """Absolute goodness of fit of an entry on all logs."""
+    squares: dict[str, list[Array]] = {name: [] for name in GROUPS}
+    for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
+        for part, drive in zip(evidence.parts, evidence.drives, strict=True):
+            rows = z[part].reshape(-1, drive.measured.shape[1])
+            sums = _block_sums(rows, max(round(BLOCK_S / drive.step_s), 1))
+            for name, channels in GROUPS.items():
+                squares[name].append(sums[:, channels][np.abs(sums[:, channels]) > 0.0] ** 2)
+    signals = {
+        name: float(np.sqrt(np.mean(found)))
+        for name, parts in squares.items()
+        if len(found := np.concatenate(parts))
+    }
+    return Fitness(float(np.sqrt(np.mean(np.square(list(signals.values()))))), signals)
+
+
+def _block_sums(rows: Array, length: int) -> Array:
+    """Sums over blocks, divided by the root of the number of rows that count: of unit variance for white noise."""
+    count = len(rows) // length
+    cut = rows[: count * length].reshape(count, length, -1)
+    used = np.maximum((cut != 0.0).sum(axis=1), 1)
+    return cut.sum(axis=1) / np.sqrt(used)
+
+
+def inflation(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
+    """By how much the entry's residuals carry less information than white unit noise: their size times their memory."""
+    losses, counts, sums = 0.0, 0, []
+    for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
+        losses += float(np.sum(robust(z)))
+        counts += int(np.count_nonzero(z))
+        for part, drive in zip(evidence.parts, evidence.drives, strict=True):
+            rows = np.clip(z[part].reshape(-1, drive.measured.shape[1]), -5.0, 5.0)
+            sums.append(_block_sums(rows, max(round(LONG_BLOCK_S / drive.step_s), 1)).ravel())
+    size = max(losses / max(counts, 1), 1.0)
+    every = np.concatenate(sums)
+    memory = max(float(np.mean(every[every != 0.0] ** 2)) / size, 1.0) if np.any(every) else 1.0
+    return size * memory
+
+
+def probabilities(contest: Contest, entries: list[Entry], fit_to: Evidence, holdout: Evidence) -> Array:
+    """Probability of each entry, the null first: quasi-BIC on the fit logs and quasi-likelihood on the hold-out."""
+    everyone = [contest.null, *entries]
+    best = min(everyone, key=lambda e: e.loss)
+    factor = inflation(best, fit_to, holdout)
+    samples = max(np.count_nonzero(best.z_fit) / factor, 2.0)
+    score = np.array([-0.5 * e.loss / factor - 0.5 * e.size * np.log(samples) for e in everyone]) / SOFTNESS
+    weight = np.exp(score - score.max())
+    return weight / weight.sum()
+
+
+NO_GAP_MISFIT = 1.6
+"""Up to this misfit of the model as it is, what is left is noise [-]."""
+EXPLAINED_MISFIT = 2.0
+"""Up to this misfit an entry explains everything [-]."""
+EXPLAINED_SHARE = 0.08
+"""Where the gap is large, an entry explains it if it leaves this share of the misfit: no form is exact [-]."""
+PAIR_LEAVES = 0.5
+"""A pair is taken in place of one effect only where it at least halves the misfit [-]."""
+RIVAL = 0.1
+"""An entry with more than this share of the winner's probability is not told apart from it [-]."""
+SOFTNESS = 4.0
+"""Tempering of the quasi-likelihood: the library's forms are not nature's, so evidence counts for less than noise alone
+would say [-]."""
+
+
+def explains(after: Fitness, before: Fitness) -> bool:
+    """Whether what is left is noise, or small against the gap."""
+    return after.misfit <= max(EXPLAINED_MISFIT, EXPLAINED_SHARE * before.misfit)
+
+
+def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
+    """Whether one effect is not enough."""
+    before = fitness(contest.null, fit_to, holdout)
+    if before.misfit <= NO_GAP_MISFIT or not contest.singles:
+        return False
+    return fitness(contest.singles[0], fit_to, holdout).misfit > FLOOR_MISFIT
+
+
+FLOOR_MISFIT = 1.25
+"""Above this misfit an entry is worth a second effect's try [-]."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The verdict and what it rests on.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        The outcome.
+    winner : Entry
+        The entry that the verdict adds; the null where it adds none.
+    rivals : tuple of Entry
+        Entries that cannot be told apart from the winner.
+    probability : dict
+        Of each single effect; what is left to 1 is "none of these".
+    before, after : Fitness
+        Of the null and of the best entry.
+    """
+
+    verdict: Verdict
+    winner: Entry
+    rivals: tuple[Entry, ...]
+    probability: dict[str, float]
+    before: Fitness
+    after: Fitness
+
+
+def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
+    """Verdict of a contest."""
+    before = fitness(contest.null, fit_to, holdout)
+    singles = list(contest.singles)
+    weight = probabilities(contest, singles, fit_to, holdout)
+    share = dict(zip((e.ids[0] for e in singles), weight[1:], strict=True))
+    if before.misfit <= NO_GAP_MISFIT or not singles:
+        return Decision(Verdict.NO_GAP, contest.null, (), _scaled(share, 1.0 - weight[0]), before, before)
+    best = max(singles, key=lambda e: share[e.ids[0]])
+    after = fitness(best, fit_to, holdout)
+    if contest.pairs:
+        pair = contest.pairs[0]
+        paired = fitness(pair, fit_to, holdout)
+        if paired.misfit < PAIR_LEAVES * after.misfit and explains(paired, before):
+            return _compound(contest, pair, fit_to, holdout, before, paired)
+    if not explains(after, before):
+        return Decision(Verdict.UNKNOWN, best, (), _scaled(share, _belief(after, before)), before, after)
+    rivals = tuple(e for e in singles if e is not best and share[e.ids[0]] > RIVAL * share[best.ids[0]])
+    verdict = Verdict.AMBIGUOUS if rivals else Verdict.IDENTIFIED
+    return Decision(verdict, best, rivals, _scaled(share, _belief(after, before)), before, after)
+
+
+def _compound(
+    contest: Contest, pair: Entry, fit_to: Evidence, holdout: Evidence, before: Fitness, after: Fitness
+) -> Decision:
+    pairs = list(contest.pairs)
+    weight = probabilities(contest, pairs, fit_to, holdout)[1:]
+    rivals = tuple(
+        e for e, w in zip(pairs, weight, strict=True) if e is not pair and w > RIVAL * weight.max()
+    )
+    share: dict[str, float] = {e.ids[0]: 0.0 for e in contest.singles}
+    for entry, w in zip(pairs, weight, strict=True):
+        for key in entry.ids:
+            share[key] += w / len(entry.ids)
+    return Decision(Verdict.COMPOUND, pair, rivals, _scaled(share, _belief(after, before)), before, after)
+
+
+def _belief(after: Fitness, before: Fitness) -> float:
+    """Probability that the cause is in the library at all, from how well the best entry does [-]."""
+    allowed = max(EXPLAINED_MISFIT, EXPLAINED_SHARE * before.misfit)
+    return float(1.0 / (1.0 + (after.misfit / allowed) ** 6))
+
+
+def _scaled(share: dict[str, float], factor: float) -> dict[str, float]:
+    return {key: float(value * factor) for key, value in share.items()}

@@ -1,0 +1,111 @@
+"""The files of a diagnosis: vehicle, roads and logs, read and made ready."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenarios.errors import ScenarioError
+from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
+from sim2real.drive import Drive, decimation, make_drive
+from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
+
+
+@dataclass(frozen=True)
+class Source:
+    """One log with the road that it was driven on."""
+
+    log: Log
+    road: RoadFile
+    road_path: Path
+    drive: Drive
+
+
+@dataclass(frozen=True)
+class Sources:
+    """All that a diagnosis reads."""
+
+    vehicle: VehicleFile
+    vehicle_path: Path
+    fit: tuple[Source, ...]
+    holdout: Source
+
+    @property
+    def all(self) -> tuple[Source, ...]:
+        """Fit logs, then the hold-out."""
+        return (*self.fit, self.holdout)
+
+
+def read_sources(
+    vehicle: Path, road: Path | None, fit: Sequence[str], holdout: str, mapping: Path | None = None
+) -> Sources:
+    """Read everything, all problems of all files in one error.
+
+    Parameters
+    ----------
+    vehicle, road : Path
+        vehicle.yaml, and the road of the logs that name none.
+    fit, holdout : sequence of str, str
+        Logs, each `log.csv` or `log.csv@road.yaml`.
+    mapping : Path, optional
+        How the logs' columns become the contract's.
+
+    Raises
+    ------
+    ScenarioError
+        With everything that is wrong.
+    """
+    problems: list[str] = []
+    car, columns = None, None
+    try:
+        car = load_vehicle(vehicle)
+    except ScenarioError as error:
+        problems.append(str(error))
+    try:
+        columns = load_mapping(mapping) if mapping else None
+    except ScenarioError as error:
+        problems.append(str(error))
+    found: list[Source] = []
+    if not fit:
+        problems.append("No log to fit to; expected at least one --fit LOG.")
+    for text in (*fit, holdout):
+        try:
+            found.append(_read_source(text, road, columns))
+        except ScenarioError as error:
+            problems.append(str(error))
+    if problems or car is None:
+        raise ScenarioError("\n".join(dict.fromkeys(problems)))
+    return Sources(car, vehicle, tuple(found[:-1]), found[-1])
+
+
+def _read_source(text: str, road: Path | None, columns: Mapping | None) -> Source:
+    log_path, road_path = split(text, road)
+    problems: list[str] = []
+    course, log = None, None
+    try:
+        course = load_road(road_path)
+    except ScenarioError as error:
+        problems.append(str(error))
+    try:
+        log = read_log(log_path, columns)
+    except ScenarioError as error:
+        problems.append(str(error))
+    if course is None or log is None:
+        raise ScenarioError("\n".join(problems))
+    step_s = decimation(log.rate_hz) / log.rate_hz
+    time_s, signals = resample(log, step_s)
+    drive = make_drive(log_path.name, course, time_s, signals, log.derived)
+    if not drive.moving.any():
+        raise ScenarioError(f"{log_path}: the car never moves; expected a log of driving.")
+    return Source(log, course, road_path, drive)
+
+
+def split(text: str, road: Path | None) -> tuple[Path, Path]:
+    """Log and road of `log.csv@road.yaml`, or of a log alone with the common road."""
+    name, mark, own = text.rpartition("@")
+    if mark and own.endswith((".yaml", ".yml")):
+        return Path(name), Path(own)
+    if road is None:
+        raise ScenarioError(f"{text}: names no road; expected LOG@ROAD.yaml, or --road for all logs.")
+    return Path(text), road
