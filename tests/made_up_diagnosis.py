@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim2real.rating import rate
 from sim2real.result import (
     MEANING,
     Cause,
@@ -130,8 +129,11 @@ def identified() -> Diagnosis:
         trpac=TrpacError(
             0.081, 0.034, "road.yaml's friction", "The estimator's own tyre model has no place for a lag."
         ),
-        rating=rate(t for t in shown if t.signal in ("vehicle_speed_m_s", "wheel_speed_fl_rad_s"))
-        | {"accel_x_m_s2": (0.71, 0.86), "position_m": (None, None)},
+        rating={
+            "wheel_speed_fl_rad_s": (0.990, 0.998),
+            "accel_x_m_s2": (0.71, 0.86),
+            "position_m": (None, None),
+        },
         traces=shown,
         warnings=("fit_1.csv: 4 lost samples of vehicle_speed_m_s are bridged.",),
         provenance=PROVENANCE,

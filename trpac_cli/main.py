@@ -16,7 +16,7 @@ from rich.table import Table
 
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
-from trpac_cli import vision
+from trpac_cli import gap, vision
 
 EXIT_INPUT = 2
 """Unusable input: one message on standard error, and nothing written."""
@@ -28,6 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(vision.app, name="vision")
+app.add_typer(gap.app, name="gap")
 
 
 @app.callback()

@@ -1,0 +1,368 @@
+"""The report of a diagnosis, its JSON, its pictures and the ISO rating, on diagnoses made up by hand."""
+
+import csv
+import io
+import json
+import math
+from base64 import b64decode
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import cv2
+import made_up_diagnosis as made_up
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.effects import make_effect
+from scenarios.files import load_vehicle
+from sim2real import figures, report
+from sim2real.demo import VEHICLE
+from sim2real.rating import LEAST_SAMPLES, MOST_SAMPLES, rating
+from sim2real.report import estimate, jsonable, percent, render, vehicle_snippet, write_diagnosis
+from sim2real.result import Interval, Measure, Trace, Verdict
+
+DIAGNOSES = {name: make() for name, make in made_up.ALL.items()}
+BRIEF = {name: replace(diagnosis, traces=()) for name, diagnosis in DIAGNOSES.items()}
+"""Without the pictures that take longest."""
+
+
+class Page(HTMLParser):
+    """A page's visible words, addresses, and whether its tags are closed in order."""
+
+    VOID = ("meta", "img", "link", "br", "input")
+
+    def __init__(self, html):
+        super().__init__()
+        self.addresses, self.words, self.open, self.classes = [], [], [], []
+        self.feed(html)
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in self.VOID:
+            self.open.append(tag)
+        for key, value in attributes:
+            if key in ("src", "href"):
+                self.addresses.append(value)
+            if key == "class":
+                self.classes.append(value)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ("style", "script"):
+            self.words.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+@pytest.fixture(scope="module")
+def pages():
+    return {name: Page(render(diagnosis)) for name, diagnosis in DIAGNOSES.items()}
+
+
+@pytest.mark.parametrize("name", DIAGNOSES)
+class TestEveryVerdict:
+    def test_the_page_is_whole_and_needs_nothing_beside_it(self, pages, name):
+        page = pages[name]
+        assert page.open == []
+        assert page.addresses
+        assert all(a.startswith("data:") for a in page.addresses)
+        assert not {"undefined", "None", "nan"} & set(page.text.split())
+
+    def test_every_picture_is_a_picture(self, pages, name):
+        for address in pages[name].addresses:
+            kind, data = address.removeprefix("data:").split(";base64,")
+            if kind == "image/png":
+                pixels = cv2.imdecode(np.frombuffer(b64decode(data), np.uint8), cv2.IMREAD_COLOR)
+                assert pixels.shape[1] > 1000
+                assert pixels.std() > 5.0
+
+    def test_the_verdict_comes_first(self, pages, name):
+        diagnosis = DIAGNOSES[name]
+        before, found, _ = pages[name].text.partition(diagnosis.sentence)
+        assert found
+        assert "Where the gap lies" not in before
+
+    def test_every_candidate_and_what_cannot_be_ruled_out_is_listed(self, pages, name):
+        for effect in [c.effect for c in DIAGNOSES[name].causes] + list(DIAGNOSES[name].cannot_rule_out):
+            assert effect in pages[name].text
+
+    def test_the_json_is_the_contract_s(self, name):
+        said = json.loads(json.dumps(jsonable(DIAGNOSES[name].to_json()), allow_nan=False))
+        assert said["schema"] == 1
+        assert said["verdict"] == name
+        assert {"total", "signals"} <= set(said["gap"]["before"])
+        assert sum(c["probability"] for c in said["causes"]) <= 1.0
+        assert all({"value", "low", "high"} <= set(c["shrink_percent"]) for c in said["causes"])
+
+
+def test_a_cause_shows_its_estimate_shrink_and_reasons(pages):
+    text = pages["identified"].text
+    assert "length_m 0.30 m (0.25 to 0.36)" in text
+    assert "73.0 % (69.0 to 76.0)" in text
+    assert all(reason in text for reason in DIAGNOSES["identified"].causes[1].evidence_against)
+
+
+def test_where_and_warnings_and_provenance_are_told(pages):
+    text = pages["identified"].text
+    assert "wheel_speed_fl tyre drive, low speed fit_1.csv 1.20 1.90 31 %" in text
+    assert DIAGNOSES["identified"].warnings[0] in text
+    assert made_up.PROVENANCE["files"]["fit_1.csv"]["sha256"] in text
+
+
+def test_only_what_the_verdict_names_is_marked(pages):
+    marked = {name: sum(c == "cause needed" for c in page.classes) for name, page in pages.items()}
+    assert marked == {"identified": 1, "compound": 2, "ambiguous": 0, "unknown": 0, "no_gap": 0}
+
+
+def test_without_a_gap_nothing_is_blamed(pages):
+    assert "Nothing may be blamed" in pages["no_gap"].text
+    assert not any(c.startswith("cause") for c in pages["no_gap"].classes)
+
+
+def test_ambiguous_says_what_to_drive(pages):
+    proposal = DIAGNOSES["ambiguous"].next_manoeuvre
+    assert proposal.sentence in pages["ambiguous"].text
+    assert "cannot tell mass_offset and torque_gain apart" in pages["ambiguous"].text
+    address = next(a for a in pages["ambiguous"].addresses if a.startswith("data:text/csv"))
+    rows = list(csv.DictReader(io.StringIO(b64decode(address.split(",", 1)[1]).decode())))
+    np.testing.assert_allclose([float(r["time_s"]) for r in rows], proposal.time_s, rtol=1e-5)
+    read = [float(r["wheel_torque_rl_nm"]) for r in rows]
+    np.testing.assert_allclose(read, proposal.wheel_torque_nm[:, 2], rtol=1e-5, atol=1e-4)
+
+
+def test_unknown_describes_the_missing_term(pages):
+    text = pages["unknown"].text
+    assert DIAGNOSES["unknown"].unexplained.sentence in text
+    assert "vehicle speed [m/s]" in text
+    assert "opposes motion; grows in proportion" in text
+
+
+def test_text_from_files_cannot_become_markup():
+    page = Page(render(replace(DIAGNOSES["no_gap"], warnings=("<img src=http://x/y.png> & co",), traces=())))
+    assert "<img src=http://x/y.png> & co" in page.text
+    assert all(a.startswith("data:") for a in page.addresses)
+
+
+def test_a_signal_without_a_common_sample_is_left_out_of_the_traces():
+    first, second, *_ = DIAGNOSES["identified"].traces
+    lost = replace(first, measured=np.full_like(first.measured, np.nan))
+    assert report.shown_traces(replace(DIAGNOSES["identified"], traces=(lost, second))) == [second]
+
+
+def test_traces_come_worst_first():
+    shown = report.shown_traces(DIAGNOSES["identified"])
+    assert shown[0].signal.startswith("wheel_speed")
+    assert shown[-1].signal == "position_m"
+
+
+def test_the_snippet_is_what_vehicle_yaml_takes():
+    snippet = yaml.safe_load(vehicle_snippet(DIAGNOSES["compound"].causes[:2]))
+    assert list(snippet["effects"]) == ["tyre_relaxation", "aero_drag"]
+    for effect, values in snippet["effects"].items():
+        assert make_effect(effect, values, load_vehicle(VEHICLE)).id == effect
+
+
+class TestWriting:
+    def test_into_a_new_folder_and_again_into_the_same(self, tmp_path):
+        folder = tmp_path / "deep" / "out"
+        first = write_diagnosis(BRIEF["unknown"], folder)
+        (folder / "notes.txt").write_text("mine")
+        assert write_diagnosis(BRIEF["no_gap"], folder) == first
+        assert sorted(p.name for p in folder.iterdir()) == ["diagnosis.json", "notes.txt", "report.html"]
+        assert json.loads(first[0].read_text())["verdict"] == "no_gap"
+        assert [p.name for p in folder.parent.iterdir()] == ["out"]
+
+    def test_a_failure_leaves_nothing(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(figures, "gap_bars", lambda gap: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            write_diagnosis(BRIEF["identified"], tmp_path / "out")
+        assert list(tmp_path.iterdir()) == []
+
+    def test_a_full_disk_leaves_the_old_result(self, tmp_path, monkeypatch):
+        written = write_diagnosis(BRIEF["no_gap"], tmp_path / "out")
+        before = [p.read_bytes() for p in written]
+        original = type(tmp_path).write_text
+
+        def fail(self, text, **options):
+            if self.name == report.REPORT_NAME:
+                raise OSError(28, "No space left on device")
+            return original(self, text, **options)
+
+        monkeypatch.setattr(type(tmp_path), "write_text", fail)
+        with pytest.raises(OSError, match="No space"):
+            write_diagnosis(BRIEF["identified"], tmp_path / "out")
+        assert [p.read_bytes() for p in written] == before
+        assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+    def test_undefined_numbers_become_null(self):
+        value = {
+            "a": math.nan,
+            "b": (np.float64(1.5), np.int64(2)),
+            "c": np.array([1.0, math.inf]),
+            "d": Verdict.UNKNOWN,
+        }
+        assert json.loads(json.dumps(jsonable(value), allow_nan=False)) == {
+            "a": None,
+            "b": [1.5, 2],
+            "c": [1.0, None],
+            "d": "unknown",
+        }
+
+
+class TestNumbers:
+    @pytest.mark.parametrize(
+        ("interval", "text"),
+        [
+            (Interval(0.3, 0.25, 0.36, "m"), "0.30 m (0.25 to 0.36)"),
+            (Interval(48123.4, 46010.0, 50230.0, "N"), "48123 N (46010 to 50230)"),
+            (Interval(0.65, 0.6498, 0.6512, "m^2"), "0.6500 m² (0.6498 to 0.6512)"),
+            (Interval(1.0, 1.0, 1.0), "1.0 (1.0 to 1.0)"),
+            (Interval(0.0, 0.0, 0.0, "s"), "0 s (0 to 0)"),
+            (Interval(73.0, math.nan, math.nan, "%"), "73 %"),
+            (Interval(math.nan, 0.0, 1.0, "m"), "–"),
+            (Interval(-0.021, -0.03, -0.012, "rad"), "-0.021 rad (-0.030 to -0.012)"),
+        ],
+    )
+    def test_estimates_show_the_digits_that_their_interval_bears(self, interval, text):
+        assert estimate(interval) == text
+
+    @given(st.floats(-1e6, 1e6), st.floats(0.0, 1e6), st.floats(0.0, 1e6))
+    def test_a_shown_interval_is_within_a_tenth_of_its_width(self, value, below, above):
+        shown = estimate(Interval(value, value - below, value + above))
+        numbers = [float(n) for n in shown.replace("(", "").replace(")", "").replace("to ", "").split()]
+        width = below + above
+        for number, true in zip(numbers, (value, value - below, value + above), strict=True):
+            assert abs(number - true) <= 0.051 * width + 0.051 * abs(value) * (width == 0.0) + 1e-6 * abs(
+                value
+            )
+
+    def test_small_shares_keep_a_digit(self):
+        assert [percent(s) for s in (0.0, 0.004, 0.3149, 1.0, math.nan, None)] == [
+            "0 %",
+            "0.4 %",
+            "31 %",
+            "100 %",
+            "–",
+            "–",
+        ]
+
+    def test_shrink_follows_from_the_gap_where_no_single_cause_has_it(self):
+        gap = replace(DIAGNOSES["compound"].gap, before=Measure(5.0), after=Measure(1.5))
+        assert report.shrink(replace(DIAGNOSES["compound"], gap=gap)).value == pytest.approx(70.0)
+        assert report.shrink(DIAGNOSES["identified"]).low == pytest.approx(69.0)
+        assert report.possible_shrink(replace(DIAGNOSES["compound"], gap=gap)) == pytest.approx(80.0)
+
+
+class TestFigures:
+    def test_the_worst_window_is_where_the_simulation_is_furthest_off(self):
+        time = np.arange(0.0, 30.0, 0.01)
+        measured = np.where((time >= 12.0) & (time < 13.0), 5.0, 0.0)
+        measured[2000:2010] = np.nan
+        start, end = figures.worst_window(Trace("s", "-", time, measured, 0.0 * time, 0.0 * time, 0.1))
+        assert start <= 12.0
+        assert end >= 12.99
+        assert end - start == pytest.approx(figures.ZOOM_S, abs=0.02)
+
+    def test_a_short_log_is_its_own_window(self):
+        time = np.arange(0.0, 1.0, 0.01)
+        start, end = figures.worst_window(Trace("s", "-", time, time, time, time, 0.1))
+        assert (start, end) == (time[0], time[-1])
+
+    def test_after_is_drawn_only_where_something_was_added(self):
+        gap = DIAGNOSES["identified"].gap
+        alone = figures.gap_bars(replace(gap, after=gap.before))
+        assert _has_colour(figures.gap_bars(gap), figures.AFTER)
+        assert not _has_colour(alone, figures.AFTER)
+        assert _has_colour(alone, figures.BEFORE)
+
+    def test_a_cell_that_was_never_driven_is_not_shown_as_zero(self):
+        full = {"tyre": {"brake": 0.5, "coast": 0.0}, "vehicle": {"brake": 0.5, "coast": 0.0}}
+        part = {"tyre": {"brake": 0.5}, "vehicle": {"brake": 0.5, "coast": 0.0}}
+        assert figures.heat_map(full) != figures.heat_map(part)
+
+    @pytest.mark.parametrize(
+        ("name", "label"),
+        [
+            ("vehicle_speed_m_s", "vehicle speed [m/s]"),
+            ("accel_x_m_s2", "accel x [m/s²]"),
+            ("wheel_speed_fl_rad_s", "wheel speed fl [rad/s]"),
+            ("position_m", "position [m]"),
+            ("slip", "slip"),
+        ],
+    )
+    def test_names_become_labels(self, name, label):
+        assert figures.label_of(name) == label
+
+
+def _has_colour(png, colour):
+    pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+    bgr = [int(colour[i : i + 2], 16) for i in (5, 3, 1)]
+    return bool((np.abs(pixels.astype(int) - bgr).max(axis=2) <= 2).sum() > 1000)
+
+
+class TestRating:
+    time = np.arange(0.0, 20.0, 0.02)
+    curve = 10.0 + 5.0 * np.sin(time)
+
+    def test_the_same_curve_is_rated_one(self):
+        assert rating(self.time, self.curve, self.curve) == pytest.approx(1.0)
+
+    def test_it_falls_with_the_deviation(self):
+        values = [
+            rating(self.time, self.curve, self.curve + a * np.sin(7.0 * self.time)) for a in (0.1, 1.0, 4.0)
+        ]
+        assert 1.0 > values[0] > values[1] > values[2] > 0.0
+
+    def test_it_is_the_weighted_mean_that_the_standard_prescribes(self):
+        """Off by more than half the peak: no corridor (0.4), no magnitude (0.2), but phase and slope (0.2 each)."""
+        flat = 10.0 + 0.5 * np.sin(self.time)
+        assert rating(self.time, flat, flat + 6.3) == pytest.approx(0.4)
+
+    def test_a_delay_costs_the_phase(self):
+        """A tenth of the length is half of the largest shift: half of the phase's 0.2 is lost."""
+        pulse = np.exp(-((self.time - 9.0) ** 2))
+        late = np.exp(-((self.time - 11.0) ** 2))
+        assert rating(self.time, pulse, late) < 0.9
+
+    def test_the_step_counts(self):
+        """Slope is relative, so the same samples on a slower clock rate the same."""
+        other = self.curve + np.sin(7.0 * self.time)
+        assert rating(self.time, self.curve, other) == pytest.approx(
+            rating(3.0 * self.time, self.curve, other)
+        )
+
+    @pytest.mark.parametrize("reference", [np.zeros(1000), np.full(1000, 4.0), np.full(1000, np.nan)])
+    def test_undefined_is_none(self, reference):
+        assert rating(self.time, reference, self.curve) is None
+        assert rating(self.time, self.curve, reference) is None
+
+    def test_too_short_is_none(self):
+        few = LEAST_SAMPLES - 1
+        assert rating(self.time[:few], self.curve[:few], self.curve[:few]) is None
+
+    def test_unequal_lengths_are_refused(self):
+        with pytest.raises(ValueError, match="1000, 999 and 1000"):
+            rating(self.time, self.curve[:-1], self.curve)
+
+    def test_lost_samples_are_bridged_in_both(self):
+        lost = self.curve.copy()
+        lost[200:260] = np.nan
+        assert rating(self.time, lost, self.curve) == pytest.approx(1.0, abs=1e-9)
+
+    def test_long_logs_are_thinned(self):
+        time = np.arange(0.0, 60.0, 0.005)
+        curve = np.sin(time)
+        assert len(time) > 5 * MOST_SAMPLES
+        assert rating(time, curve, curve) == pytest.approx(1.0)
+
+    def test_a_diagnosis_gets_the_ratings_of_its_traces(self):
+        shown = DIAGNOSES["identified"].traces[1:3]
+        rated = report.rated(replace(DIAGNOSES["identified"], traces=shown))
+        assert set(rated.rating) == {t.signal for t in shown}
+        assert all(after > before for before, after in rated.rating.values())

@@ -1,0 +1,301 @@
+"""The commands `trpac gap`: why a simulation and recorded logs differ."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.panel import Panel
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from sim2real.demo import Case, Truth
+    from sim2real.result import Diagnosis
+
+EXIT_INPUT = 2
+"""Unusable input: one line on standard error, and nothing written."""
+MOST_NAMED = 10
+"""Problems that the line names; the rest are counted."""
+MOST_CAUSES = 5
+"""Causes that the summary shows."""
+COLOURS = {
+    "identified": "cyan",
+    "compound": "cyan",
+    "ambiguous": "yellow",
+    "unknown": "red",
+    "no_gap": "green",
+}
+
+Told = Callable[[str, int, int], None]
+
+app = typer.Typer(
+    help="The sim-to-real gap: where it lies, which effect causes it, how far it shrinks.",
+    no_args_is_help=True,
+)
+
+
+@app.command()
+def diagnose(
+    vehicle: Annotated[Path, typer.Option(help="What the simulation knows of the car: vehicle.yaml.")],
+    fit: Annotated[
+        list[str],
+        typer.Option(help="Log to fit to (CSV, Parquet, MDF4), LOG or LOG@ROAD.yaml; may be repeated."),
+    ],
+    holdout: Annotated[
+        str,
+        typer.Option(help="Log that the gap is measured on, and nothing is fitted to; LOG or LOG@ROAD.yaml."),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for diagnosis.json and report.html.")],
+    road: Annotated[
+        Path | None, typer.Option(help="Road of the logs that do not name one: road.yaml.")
+    ] = None,
+    mapping: Annotated[
+        Path | None,
+        typer.Option("--map", help="How the logs' columns and units become the contract's: mapping.yaml."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same diagnosis.")] = 0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Fits at a time; without it one per processor.")
+    ] = None,
+) -> None:
+    """Diagnose the gap between a simulation and recorded logs.
+
+    Runs the simulated car along the logs, fits every effect of the
+    library to the fit logs and compares them on the hold-out. Says where the
+    gap lies, which effect causes it, how far it shrinks with that, and what
+    to drive next where the logs cannot tell.
+
+    Example: trpac gap diagnose --vehicle car.yaml --road track.yaml
+    --fit monday.csv --fit tuesday.mf4 --holdout friday.csv@wet_track.yaml
+    --map mapping.yaml --out out/gap
+
+    No logs at hand? trpac gap demo --out out/demo makes some.
+
+    Exit codes: 0 with a diagnosis, 2 unusable input.
+    """
+    from scenarios.errors import ScenarioError
+    from sim2real.diagnose import diagnose_files
+    from sim2real.report import rated, write_diagnosis
+
+    command = "trpac gap diagnose"
+    _require_folder(command, out)
+    try:
+        with _bars() as told:
+            said = diagnose_files(
+                vehicle,
+                road,
+                fit,
+                holdout,
+                mapping=mapping,
+                seed=seed,
+                jobs=jobs or _processors(),
+                progress=told,
+            )
+            told("report", 0, 1)
+            written = write_diagnosis(rated(said), out)
+            told("report", 1, 1)
+    except (ScenarioError, OSError) as error:
+        _refuse(command, error)
+    console = Console()
+    _summarise(console, said)
+    console.print("  ".join(str(path) for path in written), soft_wrap=True, highlight=False)
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for the case, its sealed truth and the report.")],
+    seed: Annotated[int, typer.Option(min=0, help="Draws the hidden effect, road, drives and noise.")] = 1,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Fits at a time; without it one per processor.")
+    ] = None,
+) -> None:
+    """See a diagnosis at work: hide an effect, diagnose the logs, open the seal.
+
+    The effect is drawn from: accelerometer_bias, brake_drag,
+    friction_offset, mass_offset, road_grade, torque_delay, torque_gain,
+    torque_lag, tyre_relaxation, tyre_stiffness_offset, vehicle_speed_scale,
+    wheel_radius_offset, wheel_speed_delay.
+
+    Example: trpac gap demo --out out/demo --seed 4
+
+    Exit codes: 0 done, whether the diagnosis is right or not; 2 the folder cannot be used.
+    """
+    from scenarios.errors import ScenarioError
+    from sim2real.demo import make_case, open_seal
+    from sim2real.diagnose import diagnose_files
+    from sim2real.report import rated, write_diagnosis
+
+    command = "trpac gap demo"
+    _require_folder(command, out)
+    console = Console(highlight=False)
+    try:
+        case = make_case(out, seed)
+        _tell_case(console, case)
+        with _bars() as told:
+            said = diagnose_files(
+                case.vehicle,
+                case.road,
+                [str(path) for path in case.fit],
+                str(case.holdout),
+                seed=seed,
+                jobs=jobs or _processors(),
+                progress=told,
+            )
+            _, report = write_diagnosis(rated(said), out)
+        _tell(console, "\n4. What it says.", "A gap of 1 is what the sensors' noise alone leaves.")
+        _summarise(console, said)
+        _tell_truth(console, case, open_seal(case), said)
+    except (ScenarioError, OSError) as error:
+        _refuse(command, error)
+    console.print(f"The whole story, with pictures: {report}", soft_wrap=True)
+
+
+def _tell(console: Console, step: str, *sentences: str) -> None:
+    """One step of the demonstration, wrapped to the terminal."""
+    console.print(f"[bold]{step}[/bold] {' '.join(sentences)}\n", soft_wrap=False)
+
+
+def _tell_case(console: Console, case: Case) -> None:
+    """What is hidden from whom."""
+    _tell(
+        console,
+        "1. Hiding something.",
+        "One effect is drawn, with a strength, and built into a car. The simulation of that car knows nothing of it.",
+        "The car is driven three times over a road of dry, wet and icy stretches: accelerating, coasting, braking up",
+        "to the grip limit. Its sensors are noisy.",
+    )
+    _tell(
+        console,
+        "2. What the diagnosis gets:",
+        f"the simulation's {case.vehicle.name} and {case.road.name}, two logs to fit to",
+        f"({', '.join(path.name for path in case.fit)}), and {case.holdout.name}, to which no parameter is fitted.",
+        f"Not {case.truth.name}: it is sealed with SHA-256 {case.seal}. All lie in {escape(str(case.truth.parent))}.",
+    )
+    _tell(
+        console,
+        "3. The diagnosis",
+        "lets the simulation run beside each log. What it mispredicts beyond the sensors' noise is the gap. Every",
+        "effect of the library is tried: how much of the gap does it explain, on the hold-out too?",
+    )
+
+
+def _tell_truth(console: Console, case: Case, truth: Truth, said: Diagnosis) -> None:
+    """The end of the demonstration: what was hidden against what was found."""
+    from sim2real.report import estimate
+
+    hidden = ", ".join(f"{name} {value:g}" for name, value in truth.parameters.items())
+    _tell(
+        console,
+        "\n5. Opening the seal.",
+        f"{case.truth.name} is unchanged. Hidden was [bold]{truth.effect}[/bold] ({hidden}).",
+        judge(truth.effect, said),
+    )
+    found = next((c for c in said.causes if c.effect == truth.effect), None)
+    for name, interval in found.parameters.items() if found else ():
+        value = truth.parameters[name]
+        side = "inside" if interval.low <= value <= interval.high else "outside"
+        console.print(
+            f"   {name}: hidden {value:g}, found {estimate(interval)}; the truth is {side} the interval."
+        )
+
+
+def judge(hidden: str, said: Diagnosis) -> str:
+    """Whether the diagnosis found the hidden effect, in a sentence with colours."""
+    ranked = [c.effect for c in said.causes]
+    if hidden not in ranked:
+        return "The diagnosis did [red]not[/red] try it."
+    rank = ranked.index(hidden) + 1
+    probability = said.causes[rank - 1].probability
+    if rank == 1 and said.verdict == "identified":
+        return f"The diagnosis is [green]right[/green], with a probability of {probability:.0%}."
+    if any(hidden in name.split("+") for group in said.ambiguous_with for name in group):
+        return "The diagnosis has it among those that it [yellow]cannot tell apart[/yellow]."
+    return (
+        f"The diagnosis is [red]not right[/red]: it says '{said.verdict}' and ranks the hidden effect {rank} of "
+        f"{len(ranked)}, with a probability of {probability:.1%}."
+    )
+
+
+def _summarise(console: Console, said: Diagnosis) -> None:
+    """Verdict, sizes and the first causes on the terminal."""
+    from sim2real.report import added, estimate, leading
+
+    gap = said.gap
+    sizes = f"gap {gap.before.total:.2f}"
+    if added(said):
+        sizes += f", with {' and '.join(c.effect for c in added(said))} {gap.after.total:.2f}"
+    text = f"{escape(said.sentence)}\n[dim]{sizes}; noise alone {gap.noise_floor:.2f}[/dim]"
+    colour = COLOURS[said.verdict]
+    console.print(Panel(text, title=said.verdict.replace("_", " "), title_align="left", border_style=colour))
+    if leading(said):
+        console.print(_cause_table(said, estimate))
+    if said.next_manoeuvre is not None:
+        console.print(f"To tell them apart: {escape(said.next_manoeuvre.sentence)}")
+    for warning in said.warnings:
+        console.print(f"[yellow]{escape(warning)}[/yellow]")
+
+
+def _cause_table(said: Diagnosis, estimate: Callable) -> Table:
+    table = Table(title="Causes, likeliest first", title_justify="left")
+    for heading, justify in (
+        ("effect", "left"),
+        ("probability", "right"),
+        ("estimate, 95 % interval", "left"),
+        ("gap with it", "right"),
+        ("shrink", "left"),
+    ):
+        table.add_column(heading, justify=justify)  # type: ignore[arg-type]
+    for cause in said.causes[:MOST_CAUSES]:
+        values = "\n".join(f"{name} {estimate(value)}" for name, value in cause.parameters.items())
+        table.add_row(
+            cause.effect,
+            f"{cause.probability:.1%}",
+            values,
+            f"{cause.gap_after:.2f}",
+            estimate(cause.shrink_percent),
+        )
+    return table
+
+
+@contextmanager
+def _bars() -> Iterator[Told]:
+    """A progress bar per stage, and what to tell them."""
+    columns = (TextColumn("{task.description:>14}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def told(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done, total=total)
+
+        yield told
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _require_folder(command: str, out: Path) -> None:
+    """Refuse before the work what would fail after it."""
+    there = next(p for p in (out, *out.absolute().parents) if p.exists())
+    if not there.is_dir():
+        _refuse(command, f"{there}: a file. Expected a folder to write into.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        _refuse(command, f"{there}: no permission to write there. Expected a folder of your own.")
+
+
+def _refuse(command: str, problem: str | Exception) -> NoReturn:
+    """All problems in one line on standard error."""
+    lines = [line.strip() for line in str(problem).splitlines() if line.strip()]
+    more = [f"And {len(lines) - MOST_NAMED} more problems."] if len(lines) > MOST_NAMED else []
+    print(f"{command}: {' '.join([*lines[:MOST_NAMED], *more])}", file=sys.stderr)
+    raise typer.Exit(EXIT_INPUT)
