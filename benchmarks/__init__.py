@@ -1,0 +1,1 @@
+"""Measurements of the project; `benchmarks.blind` is the withheld-data check of the diagnosis."""

@@ -1,0 +1,112 @@
+"""Command line of the check on withheld data."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from .generator.cases import make_case
+from .generator.table import table
+from .outcome import ResultError
+from .runner import RunError, pending, run, seal_run, write_case
+from .scorer import score_run
+from .show import draw_confusion, print_scores
+
+app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
+console, complaints = Console(), Console(stderr=True, soft_wrap=True)
+
+
+class Size(StrEnum):
+    """The keys of `SIZES`, as choices."""
+
+    DEV = "dev"
+    SMALL = "small"
+    FULL = "full"
+
+
+Out = Annotated[Path, typer.Option(help="Folder of the run.")]
+Cases = Annotated[Size, typer.Option(help="How many: a handful, a few of each kind, or all.")]
+Seed = Annotated[
+    int, typer.Option(min=0, help="1 is for development; a seal wants one that nobody has looked at.")
+]
+
+
+@app.command("cases")
+def cases_command(out: Out, cases: Cases = Size.DEV, seed: Seed = 1) -> None:
+    """Only write the cases' files, with their seals beside, to look at."""
+    with _progress() as progress:
+        task = progress.add_task("cases", total=len(table(cases.value)))
+        for spec in table(cases.value):
+            case = make_case(spec, seed)
+            folder = write_case(case, seed, out)
+            folder.with_suffix(".seal.json").write_text(json.dumps(case.seal(), indent=1), encoding="utf-8")
+            progress.advance(task)
+
+
+@app.command("run")
+def run_command(
+    out: Out,
+    cases: Cases = Size.SMALL,
+    seed: Seed = 1,
+    jobs: Annotated[int, typer.Option(min=1, help="Cases side by side.")] = 2,
+    keep: Annotated[bool, typer.Option(help="Keep the cases' logs.")] = False,
+) -> None:
+    """Make the cases and have each diagnosed; a stopped run goes on where it stopped."""
+    seal_run(out, cases.value, seed)
+    waiting, total = pending(out, cases.value)
+    failed = 0
+    with _progress() as progress:
+        task = progress.add_task("diagnoses", total=total, completed=total - len(waiting))
+        for result in run(out, cases.value, seed, jobs, keep):
+            failed += result["error"] is not None
+            progress.update(
+                task, advance=1, description=f"diagnoses, {failed} failed" if failed else "diagnoses"
+            )
+
+
+@app.command("score")
+def score_command(out: Out) -> None:
+    """Open the seal: print the scores, write scores.json and confusion.png. Exit code 1 where a threshold is missed."""
+    scores = score_run(out)
+    print_scores(scores, console)
+    (out / "scores.json").write_text(json.dumps(scores.to_json(), indent=1), encoding="utf-8")
+    draw_confusion(scores, out / "confusion.png")
+    if any(line.n and not line.holds for line in scores.lines):
+        raise typer.Exit(1)
+
+
+def _progress() -> Progress:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    return Progress(*columns, console=complaints)
+
+
+def main() -> None:
+    """Errors of the run are one line and exit code 2."""
+    try:
+        app()
+    except (RunError, ResultError) as problem:
+        complaints.print(str(problem), style="red", highlight=False)
+        raise SystemExit(2) from problem
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,282 @@
+"""The plant's equations and their integration, compiled.
+
+A straight-line car in 31 states, integrated by the classical Runge-Kutta method at one fixed step per car, small enough
+for the stiffest mode: the wheel's eigenvalue is 1.27 C_x R^2 / (I v), so the slip's denominator has a floor of
+`FLOOR_M_S`, below which the drives do not go. A wheel that a brake has stopped stays at rest until the road or the
+motor turns it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .tyre import THETA_GRID, dugoff, magic
+
+Array = NDArray[np.floating[Any]]
+
+GRAVITY = 9.81
+FLOOR_M_S = 1.5
+COMMAND_STEP_S = 0.01
+RECORD_STEP_S = 0.001
+
+X, V, W, MOTOR, TWIST, SLIP, LAG, ANGLE, HEAT, PITCH, N = 0, 1, 2, 6, 10, 14, 18, 22, 26, 30, 31
+"""Where the states lie: position, speed; each wheel's speed, motor speed, twist, slip, torque, angle, heat; pitch."""
+
+
+class Physics(NamedTuple):
+    """Everything that moves the car; SI units. Wheel order fl, fr, rl, rr."""
+
+    mass: float
+    front_arm: float
+    rear_arm: float
+    cog_height: float
+    pitch_time: float
+    radius: float
+    inertia: float
+    stiffness_drive: float
+    stiffness_brake: float
+    factor_left: float
+    factor_right: float
+    falloff: float
+    falloff_floor: float
+    relaxation: float
+    magic_share: float
+    magic_shape: float
+    magic_curvature: float
+    peak: Array
+    heating: float
+    cooling: float
+    drag: float
+    gust_drag: float
+    wind: Array
+    roll_force: float
+    roll_moment: float
+    brake_drag: float
+    bearing: float
+    grade: float
+    wave_slope: float
+    wave_length: float
+    delay: float
+    lag: float
+    gain: Array
+    dead_band: float
+    torque_limit: float
+    ripple: float
+    ripple_order: float
+    shaft_stiffness: float
+    shaft_damping: float
+    motor_inertia: float
+    border: Array
+    mu_left: Array
+    mu_right: Array
+
+
+@njit(cache=True)
+def on_grid(table: Array, at: float) -> float:
+    """`table` at `at` steps from its start, linear between, held beyond."""
+    if at <= 0.0:
+        return table[0]
+    i = int(at)
+    if i >= table.size - 1:
+        return table[-1]
+    return table[i] + (at - i) * (table[i + 1] - table[i])
+
+
+@njit(cache=True)
+def commanded(command: Array, wheel: int, time: float) -> float:
+    return on_grid(command[:, wheel], time / COMMAND_STEP_S)
+
+
+@njit(cache=True)
+def friction(p: Physics, wheel: int, position: float) -> float:
+    """The road's friction under a wheel, as the real road has it [-]."""
+    at = position + (p.front_arm if wheel < 2 else -p.rear_arm)
+    k = p.border.size - 1
+    while k > 0 and p.border[k] > at:
+        k -= 1
+    if wheel % 2 == 0:
+        return p.mu_left[k] * p.factor_left
+    return p.mu_right[k] * p.factor_right
+
+
+@njit(cache=True)
+def slip_of(rim: float, speed: float) -> float:
+    """Signed slip, positive when driving [-]."""
+    return (rim - speed) / max(abs(rim), abs(speed), FLOOR_M_S)
+
+
+@njit(cache=True)
+def tyre_force(p: Physics, slip: float, sliding: float, theta: float, load: float, heat: float) -> float:
+    """Signed longitudinal force of one tyre [N]."""
+    size = min(abs(slip), 1.0)
+    stiffness = p.stiffness_drive if slip >= 0.0 else p.stiffness_brake
+    fade = 1.0 / (1.0 + heat)
+    grip = theta * fade
+    if p.falloff > 0.0:
+        grip *= p.falloff_floor + (1.0 - p.falloff_floor) * np.exp(-p.falloff * abs(sliding))
+    force = dugoff(size, stiffness * fade, grip, load)
+    if p.magic_share > 0.0:
+        top = load * on_grid(p.peak, (grip - THETA_GRID[0]) / (THETA_GRID[1] - THETA_GRID[0]))
+        other = magic(size, 1.27 * stiffness * fade, top, p.magic_shape, p.magic_curvature)
+        force += p.magic_share * (other - force)
+    return force if slip >= 0.0 else -force
+
+
+@njit(cache=True)
+def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: float) -> float:
+    """What the motor is told after dead time, dead band, limit, gain and ripple, before its lag [N m]."""
+    torque = commanded(command, wheel, time - p.delay)
+    if p.dead_band > 0.0:
+        torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
+    torque = min(max(torque, -p.torque_limit), p.torque_limit)
+    if p.ripple > 0.0:
+        torque *= 1.0 + p.ripple * np.cos(p.ripple_order * angle)
+    return torque * p.gain[wheel]
+
+
+@njit(cache=True)
+def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float:
+    """Derivative of the state into `dy`; returns what an ideal accelerometer reads [m/s^2]."""
+    speed, length = y[V], p.front_arm + p.rear_arm
+    grade = p.grade
+    if p.wave_slope != 0.0:
+        grade += p.wave_slope * np.sin(2.0 * np.pi * y[X] / p.wave_length)
+    press = p.mass * GRAVITY / np.sqrt(1.0 + grade * grade)
+    total = 0.0
+    for w in range(4):
+        arm = p.rear_arm if w < 2 else p.front_arm
+        pitch = -y[PITCH] if w < 2 else y[PITCH]
+        load = max((press * arm + pitch * p.mass * p.cog_height) / (2.0 * length), 0.0)
+        rim = y[W + w] * p.radius
+        slip = slip_of(rim, speed)
+        dy[SLIP + w] = 0.0
+        if p.relaxation > 0.0:
+            dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / p.relaxation
+            slip = y[SLIP + w]
+        force = tyre_force(p, slip, rim - speed, friction(p, w, y[X]), load, y[HEAT + w])
+        total += force
+        dy[HEAT + w] = p.heating * abs(force * (rim - speed)) - p.cooling * y[HEAT + w]
+        dy[ANGLE + w] = y[W + w]
+        resisting = p.brake_drag + p.roll_moment * load * p.radius
+        if resisting > 0.0:
+            resisting *= np.tanh(y[W + w] / 0.2)
+        resisting += p.bearing * y[W + w]
+        told = motor_torque(p, command, w, time, y[ANGLE + w])
+        dy[LAG + w] = (told - y[LAG + w]) / p.lag if p.lag > 0.0 else 0.0
+        torque = y[LAG + w] if p.lag > 0.0 else told
+        inertia = p.inertia - p.motor_inertia
+        dy[MOTOR + w] = dy[TWIST + w] = 0.0
+        if p.motor_inertia > 0.0:
+            dy[TWIST + w] = y[MOTOR + w] - y[W + w]
+            shaft = p.shaft_stiffness * y[TWIST + w] + p.shaft_damping * dy[TWIST + w]
+            dy[MOTOR + w] = (torque - shaft) / p.motor_inertia
+            torque = shaft
+        dy[W + w] = (torque - force * p.radius - resisting) / inertia
+    total -= p.drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
+    if p.gust_drag > 0.0:
+        against = speed + on_grid(p.wind, time / COMMAND_STEP_S)
+        total -= p.gust_drag * (against * abs(against) - speed * speed)
+    reading = total / p.mass
+    dy[X] = speed
+    dy[V] = reading - press * grade / p.mass
+    dy[PITCH] = (reading - y[PITCH]) / p.pitch_time
+    return reading
+
+
+@njit(cache=True)
+def step(p: Physics, y: Array, time: float, h: float, command: Array, k: Array, trial: Array) -> None:
+    """One step of the classical Runge-Kutta method, in place."""
+    slope(p, y, time, command, k[0])
+    trial[:] = y + 0.5 * h * k[0]
+    slope(p, trial, time + 0.5 * h, command, k[1])
+    trial[:] = y + 0.5 * h * k[1]
+    slope(p, trial, time + 0.5 * h, command, k[2])
+    trial[:] = y + h * k[2]
+    slope(p, trial, time + h, command, k[3])
+    y += h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
+    y[V] = max(y[V], 0.0)
+    for w in range(4):
+        if y[W + w] < 0.0:
+            y[W + w] = 0.0
+            y[MOTOR + w] = max(y[MOTOR + w], 0.0)
+
+
+@njit(cache=True)
+def integrate(p: Physics, y: Array, start: int, rows: int, split: int, command: Array, out: Array) -> None:
+    """Carry `y` over `rows` records of `RECORD_STEP_S` from record `start` on; `out[start + 1:]` gets each new state.
+
+    Parameters
+    ----------
+    p : Physics
+    y : array, shape (N,)
+        State at record `start`; changed.
+    start, rows : int
+        First record and how many follow.
+    split : int
+        Integration steps per record.
+    command : array, shape (n, 4)
+        Commanded torque every `COMMAND_STEP_S` [N m].
+    out : array, shape (>= start + rows + 1, N + 1)
+        State, and the accelerometer's reading in the last column.
+    """
+    k, trial = np.zeros((4, N)), np.zeros(N)
+    h = RECORD_STEP_S / split
+    for i in range(start, start + rows):
+        time = i * RECORD_STEP_S
+        for j in range(split):
+            step(p, y, time + j * h, h, command, k, trial)
+        out[i + 1, :N] = y
+        out[i + 1, N] = slope(p, y, time + RECORD_STEP_S, command, trial)
+
+
+@njit(cache=True)
+def begin(p: Physics, position: float, speed: float, wheels: Array, time: float, command: Array) -> Array:
+    """State of a car that has driven steadily like this until now."""
+    y = np.zeros(N)
+    y[X], y[V] = position, speed
+    for w in range(4):
+        y[W + w] = y[MOTOR + w] = wheels[w]
+        y[SLIP + w] = slip_of(wheels[w] * p.radius, speed)
+        y[LAG + w] = motor_torque(p, command, w, time, 0.0)
+        if p.motor_inertia > 0.0:
+            y[TWIST + w] = y[LAG + w] / p.shaft_stiffness
+    dy = np.empty(N)
+    for _ in range(6):
+        y[PITCH] = slope(p, y, time, command, dy)
+    return y
+
+
+@njit(cache=True)
+def replay(
+    p: Physics,
+    position: Array,
+    speed: Array,
+    wheels: Array,
+    split: int,
+    command: Array,
+    rows: int,
+    settle: int,
+) -> Array:
+    """What the car `p` does after every `rows` records when it is set to the state that was read there.
+
+    Returns
+    -------
+    array, shape (n, 6)
+        Four wheel speeds, vehicle speed, accelerometer; NaN for the first `settle` records of each window.
+    """
+    n = speed.size
+    out = np.full((n, 6), np.nan)
+    path = np.zeros((n + 1, N + 1))
+    for start in range(0, n - 1, rows):
+        count = min(rows, n - 1 - start)
+        y = begin(p, position[start], speed[start], wheels[start], start * RECORD_STEP_S, command)
+        integrate(p, y, start, count, split, command, path)
+        for i in range(start + settle, start + count + 1):
+            out[i, :4] = path[i, W : W + 4]
+            out[i, 4] = path[i, V]
+            out[i, 5] = path[i, N]
+    return out

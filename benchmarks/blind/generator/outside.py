@@ -1,0 +1,126 @@
+"""Deviations that the contract's library does not hold: the right answer to them is "unknown", and where they lie."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.random import Generator
+from scipy.signal import lfilter
+
+from .car import Car
+from .kernel import COMMAND_STEP_S
+from .library import Scale, growing
+from .world import AIR_KG_M3, Effect, Parameters, World, with_magic
+
+WIND_S = 120.0
+GUST_S = 0.75
+
+
+def _gusts(car: Car, rng: Generator) -> Scale:
+    seed = float(rng.integers(2**31))
+    area = float(rng.uniform(0.6, 0.9))
+    return lambda severity: {"wind_m_s": 1.5 * 8.0**severity, "drag_area_m2": area, "seed": seed}
+
+
+def _blow(world: World, given: Parameters) -> World:
+    """Smooth gusts of about a second, without the drag in still air: that is another effect's."""
+    n = int(WIND_S / COMMAND_STEP_S)
+    keep = np.exp(-COMMAND_STEP_S / GUST_S)
+    pushes = np.random.default_rng(int(given["seed"])).standard_normal(n)
+    wind = lfilter([1.0], [1.0, -2.0 * keep, keep**2], pushes)
+    wind *= given["wind_m_s"] / wind.std()
+    return world.moved(gust_drag=0.5 * AIR_KG_M3 * given["drag_area_m2"], wind=wind - wind.mean())
+
+
+def _one_wheel(name: str, least: float, most: float) -> Effect:
+    """A factor at one wheel alone: its speed sensor's scale, or its motor's gain."""
+
+    def at(car: Car, rng: Generator) -> Scale:
+        wheel, sign = float(rng.integers(4)), float(rng.choice([-1.0, 1.0]))
+        return lambda severity: {"wheel": wheel, "factor": 1.0 + sign * least * (most / least) ** severity}
+
+    def apply(world: World, given: Parameters) -> World:
+        factors = [given["factor"] if w == int(given["wheel"]) else 1.0 for w in range(4)]
+        return (
+            world.sensed(wheel_scale=tuple(factors))
+            if name == "sensor"
+            else world.moved(gain=np.array(factors))
+        )
+
+    places = ("wheel_speed_sensor", "wheel") if name == "sensor" else ("powertrain", "wheel")
+    return Effect(at, apply, places)
+
+
+def _ripple(car: Car, rng: Generator) -> Scale:
+    order = float(rng.integers(2, 7))
+    return lambda severity: {"share": 0.05 * 10.0**severity, "order": order}
+
+
+def _limit(car: Car, rng: Generator) -> Scale:
+    return lambda severity: {"torque_nm": car.motor_peak_torque_nm * (0.85 - 0.6 * severity)}
+
+
+def _waves(car: Car, rng: Generator) -> Scale:
+    length = float(rng.uniform(25.0, 70.0))
+    return lambda severity: {"grade": 0.006 * 12.0**severity, "length_m": length}
+
+
+def _asymmetry(car: Car, rng: Generator) -> Scale:
+    sign = float(rng.choice([-1.0, 1.0]))
+    return lambda severity: {"brake_factor": 1.0 + sign * 0.1 * 5.0**severity}
+
+
+def _magic(car: Car, rng: Generator) -> Scale:
+    shape, curvature = float(rng.uniform(1.4, 1.6)), float(rng.uniform(-1.0, 0.3))
+    return lambda severity: {"share": 0.1 * 10.0**severity, "shape": shape, "curvature": curvature}
+
+
+OUTSIDE: dict[str, Effect] = {
+    "wind_gusts": Effect(_gusts, _blow, ("vehicle",)),
+    "one_wheel_scale": _one_wheel("sensor", 0.003, 0.05),
+    "one_motor_gain": _one_wheel("motor", 0.05, 0.5),
+    "accelerometer_scale": Effect(
+        growing("excess", 0.02, 0.4), lambda w, g: w.sensed(accel_scale=1.0 + g["excess"]), ("accelerometer",)
+    ),
+    "accelerometer_lag": Effect(
+        growing("time_constant_s", 0.01, 0.5),
+        lambda w, g: w.sensed(accel_lag_s=g["time_constant_s"]),
+        ("accelerometer",),
+    ),
+    "torque_dead_band": Effect(
+        growing("torque_nm", 5.0, 60.0), lambda w, g: w.moved(dead_band=g["torque_nm"]), ("powertrain",)
+    ),
+    "torque_limit": Effect(_limit, lambda w, g: w.moved(torque_limit=g["torque_nm"]), ("powertrain",)),
+    "torque_ripple": Effect(
+        _ripple, lambda w, g: w.moved(ripple=g["share"], ripple_order=g["order"]), ("powertrain", "wheel")
+    ),
+    "grade_waves": Effect(
+        _waves, lambda w, g: w.moved(wave_slope=g["grade"], wave_length=g["length_m"]), ("road", "vehicle")
+    ),
+    "brake_side_stiffness": Effect(
+        _asymmetry,
+        lambda w, g: w.moved(stiffness_brake=w.physics.stiffness_drive * g["brake_factor"]),
+        ("tyre",),
+    ),
+    "tyre_heating": Effect(
+        growing("per_joule", 2e-6, 2e-4),
+        lambda w, g: w.moved(heating=g["per_joule"], cooling=0.08),
+        ("tyre",),
+    ),
+    "magic_formula_tyre": Effect(
+        _magic, lambda w, g: with_magic(w, g["share"], g["shape"], g["curvature"]), ("tyre",)
+    ),
+    "speed_low_pass": Effect(
+        growing("time_constant_s", 0.05, 1.5),
+        lambda w, g: w.sensed(speed_lag_s=g["time_constant_s"]),
+        ("vehicle_speed_sensor",),
+    ),
+    "speed_dropouts": Effect(
+        growing("hold_s", 0.05, 1.0),
+        lambda w, g: w.sensed(speed_hold_s=g["hold_s"]),
+        ("vehicle_speed_sensor",),
+    ),
+    "bearing_drag": Effect(
+        growing("nm_s_rad", 0.05, 1.5), lambda w, g: w.moved(bearing=g["nm_s_rad"]), ("wheel", "powertrain")
+    ),
+}
+"""With the subsystems that are a right answer."""

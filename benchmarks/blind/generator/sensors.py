@@ -1,0 +1,171 @@
+"""From the motion to the log: what each sensor does to its signal, and its noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.random import Generator
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from .kernel import ANGLE, COMMAND_STEP_S, RECORD_STEP_S, N, V, W, X
+
+Array = NDArray[np.floating[Any]]
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the sensors do; the defaults are ideal ones."""
+
+    wheel_delay_s: float = 0.0
+    wheel_teeth: float = 0.0
+    wheel_window_s: float = 0.0
+    wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    speed_delay_s: float = 0.0
+    speed_scale: float = 1.0
+    speed_lag_s: float = 0.0
+    speed_hold_s: float = 0.0
+    accel_bias_m_s2: float = 0.0
+    accel_scale: float = 1.0
+    accel_lag_s: float = 0.0
+    seed: int = 0
+    """For pulse phases and the moments of dropouts."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations, the coloured share of the variance and its correlation time; clock and losses."""
+
+    wheel_rad_s: float
+    speed_m_s: float
+    accel_m_s2: float
+    position_m: float
+    coloured_share: float
+    correlation_s: float
+    jitter: float
+    """Standard deviation of the rows' times [row steps]."""
+    lost: float
+    """Share of samples lost [-]."""
+
+    @property
+    def sigmas(self) -> Array:
+        """Of the six readings: four wheel speeds, vehicle speed, accelerometer."""
+        return np.array([self.wheel_rad_s] * 4 + [self.speed_m_s, self.accel_m_s2])
+
+
+def draw_noise(rng: Generator) -> Noise:
+    """Noise of a production car's sensors up to good test equipment."""
+    wheel, speed, accel = (np.exp(rng.uniform(*np.log(b))) for b in ((0.02, 0.1), (0.01, 0.05), (0.03, 0.15)))
+    return Noise(
+        wheel_rad_s=float(wheel),
+        speed_m_s=float(speed),
+        accel_m_s2=float(accel),
+        position_m=float(rng.choice([0.0, rng.uniform(0.005, 0.05)])),
+        coloured_share=float(rng.uniform(0.0, 0.4)),
+        correlation_s=float(rng.uniform(0.005, 0.015)),
+        jitter=float(rng.choice([0.0, rng.uniform(0.02, 0.1)], p=[0.7, 0.3])),
+        lost=float(rng.choice([0.0, rng.uniform(0.001, 0.01)], p=[0.7, 0.3])),
+    )
+
+
+def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
+    """Noise-free readings at `time_s`.
+
+    Parameters
+    ----------
+    path : array, shape (n, N + 1)
+        The kernel's record.
+    sensors : Sensors
+    time_s : array, shape (m,)
+        Within the record [s].
+
+    Returns
+    -------
+    array, shape (m, 6)
+        Four wheel speeds, vehicle speed, accelerometer.
+    """
+    record = np.arange(len(path)) * RECORD_STEP_S
+    rng = np.random.default_rng([sensors.seed, 11])
+    out = np.empty((time_s.size, 6))
+    for w in range(4):
+        if sensors.wheel_window_s > 0.0:
+            wheel = _count(record, path[:, ANGLE + w], sensors, time_s - sensors.wheel_delay_s, rng)
+        else:
+            wheel = np.interp(time_s - sensors.wheel_delay_s, record, path[:, W + w])
+        out[:, w] = wheel * sensors.wheel_scale[w]
+    speed = _hold(_lag(path[:, V], sensors.speed_lag_s), sensors.speed_hold_s, rng)
+    out[:, 4] = sensors.speed_scale * np.interp(time_s - sensors.speed_delay_s, record, speed)
+    accel = _lag(path[:, N], sensors.accel_lag_s)
+    out[:, 5] = sensors.accel_scale * np.interp(time_s, record, accel) + sensors.accel_bias_m_s2
+    return out
+
+
+def _count(record: Array, angle: Array, sensors: Sensors, time_s: Array, rng: Generator) -> Array:
+    """Speed from the pulses of each finished window [rad/s]; a wheel that was rolling before the record began."""
+    teeth, window = sensors.wheel_teeth, sensors.wheel_window_s
+    phase, first = rng.uniform(0.0, 1.0), rng.uniform(0.0, window)
+    ends = np.floor((time_s - first) / window) * window + first
+    before = np.gradient(angle[:3], RECORD_STEP_S)[0]
+
+    def pulses(at: Array) -> Array:
+        turned = np.interp(at, record, angle) + before * np.minimum(at, 0.0)
+        return np.floor(turned * teeth / (2.0 * np.pi) + phase)
+
+    return (pulses(ends) - pulses(ends - window)) * 2.0 * np.pi / (teeth * window)
+
+
+def _lag(signal: Array, time_constant_s: float) -> Array:
+    if time_constant_s == 0.0:
+        return signal
+    keep = np.exp(-RECORD_STEP_S / time_constant_s)
+    return lfilter([1.0 - keep], [1.0, -keep], signal, zi=[keep * signal[0]])[0]
+
+
+def _hold(signal: Array, duration_s: float, rng: Generator) -> Array:
+    """Dropouts: every second or two the last value stands for `duration_s`."""
+    if duration_s == 0.0:
+        return signal
+    source = np.arange(signal.size)
+    at = 0.0
+    while (at := at + duration_s + rng.uniform(0.7, 2.0)) < signal.size * RECORD_STEP_S:
+        start = int(at / RECORD_STEP_S)
+        source[start : start + int(duration_s / RECORD_STEP_S)] = start
+    return signal[source]
+
+
+def noise_of(noise: Noise, time_s: Array, rng: Generator) -> Array:
+    """White plus first-order coloured noise of the six readings, shape (m, 6)."""
+    shape = (time_s.size, 6)
+    keep = np.exp(-np.median(np.diff(time_s)) / noise.correlation_s)
+    pushes = rng.standard_normal(shape) * np.sqrt(1.0 - keep**2)
+    pushes[0] = rng.standard_normal(6)
+    coloured = lfilter([1.0], [1.0, -keep], pushes, axis=0)
+    white = rng.standard_normal(shape)
+    share = noise.coloured_share
+    return (np.sqrt(1.0 - share) * white + np.sqrt(share) * coloured) * noise.sigmas
+
+
+def make_log(
+    path: Array, command: Array, sensors: Sensors, noise: Noise, rate_hz: float, rng: Generator
+) -> pd.DataFrame:
+    """The log as the car's logger wrote it: noise, jittered clock, lost samples."""
+    rows = int((len(path) - 1) * RECORD_STEP_S * rate_hz)
+    time_s = (np.arange(rows) + 0.5 + np.clip(rng.normal(0.0, 1.0, rows) * noise.jitter, -0.3, 0.3)) / rate_hz
+    values = read(path, sensors, time_s) + noise_of(noise, time_s, rng)
+    record = np.arange(len(path)) * RECORD_STEP_S
+    position = np.interp(time_s, record, path[:, X]) + noise.position_m * rng.standard_normal(rows)
+    values[rng.random(values.shape) < noise.lost] = np.nan
+    clock = np.arange(len(command)) * COMMAND_STEP_S
+    columns = {"time_s": np.round(time_s, 7)}
+    for w, name in enumerate(WHEELS):
+        columns[f"wheel_torque_{name}_nm"] = np.round(np.interp(time_s, clock, command[:, w]), 4)
+    for w, name in enumerate(WHEELS):
+        columns[f"wheel_speed_{name}_rad_s"] = np.round(values[:, w], 5)
+    columns["vehicle_speed_m_s"] = np.round(values[:, 4], 5)
+    columns["accel_x_m_s2"] = np.round(values[:, 5], 5)
+    columns["position_m"] = np.round(position, 4)
+    return pd.DataFrame(columns)

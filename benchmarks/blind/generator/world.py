@@ -1,0 +1,133 @@
+"""A world: a car on a road with whatever deviates from its simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from .car import Car, Road
+from .kernel import FLOOR_M_S, GRAVITY, RECORD_STEP_S, Physics
+from .sensors import Sensors
+from .tyre import THETA_GRID, peaks
+
+Array = NDArray[np.floating[Any]]
+Parameters = dict[str, float]
+
+AIR_KG_M3 = 1.225
+"""Of the standard atmosphere (ISO 2533): the density that a drag area refers to."""
+
+
+@dataclass(frozen=True)
+class World:
+    """What moves the car and what its sensors make of it."""
+
+    physics: Physics
+    sensors: Sensors = field(default_factory=Sensors)
+
+    def moved(self, **changes: Any) -> World:
+        """With other physics."""
+        return replace(self, physics=self.physics._replace(**changes))
+
+    def sensed(self, **changes: Any) -> World:
+        """With other sensors."""
+        return replace(self, sensors=replace(self.sensors, **changes))
+
+    @property
+    def split(self) -> int:
+        """Integration steps per record that keep the classical Runge-Kutta method well inside its stability (2.78)."""
+        p = self.physics
+        wheel = p.radius**2 / (p.inertia - p.motor_inertia) + 4.0 / p.mass
+        rate = 1.27 * max(p.stiffness_drive, p.stiffness_brake) * wheel / FLOOR_M_S
+        return max(3, int(np.ceil(rate * RECORD_STEP_S / 2.0)))
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A deviation: how large it may plausibly be, and what it changes.
+
+    Attributes
+    ----------
+    at : callable
+        Of the car, and of a generator that fixes direction and secondary parameters, to a function of severity,
+        0 the least that one would care about and 1 the most that is plausible, to the parameters.
+    apply : callable
+        World and parameters to the world with it.
+    subsystems : tuple of str
+        Where it lies; any of them is a right answer.
+    """
+
+    at: Callable[[Car, Generator], Callable[[float], Parameters]]
+    apply: Callable[[World, Parameters], World]
+    subsystems: tuple[str, ...]
+
+
+def nominal(car: Car, road: Road) -> World:
+    """The world as the simulation has it, the effects that it models included."""
+    front = car.wheelbase_m - car.cog_to_rear_axle_m
+    modelled = car.modelled
+    height = modelled.get("load_transfer", {}).get("cog_height_m", 0.0)
+    area = modelled.get("aero_drag", {}).get("drag_area_m2", 0.0)
+    coefficient = modelled.get("rolling_resistance", {}).get("coefficient", 0.0)
+    return World(
+        Physics(
+            mass=car.mass_kg,
+            front_arm=front,
+            rear_arm=car.cog_to_rear_axle_m,
+            cog_height=height,
+            pitch_time=0.004,
+            radius=car.wheel_radius_m,
+            inertia=car.wheel_inertia_kg_m2,
+            stiffness_drive=car.stiffness_n,
+            stiffness_brake=car.stiffness_n,
+            factor_left=1.0,
+            factor_right=1.0,
+            falloff=0.0,
+            falloff_floor=1.0,
+            relaxation=0.0,
+            magic_share=0.0,
+            magic_shape=1.45,
+            magic_curvature=0.0,
+            peak=np.zeros(THETA_GRID.size),
+            heating=0.0,
+            cooling=0.0,
+            drag=0.5 * AIR_KG_M3 * area,
+            gust_drag=0.0,
+            wind=np.zeros(2),
+            roll_force=0.0,
+            roll_moment=coefficient,
+            brake_drag=0.0,
+            bearing=0.0,
+            grade=0.0,
+            wave_slope=0.0,
+            wave_length=1.0,
+            delay=0.0,
+            lag=0.0,
+            gain=np.ones(4),
+            dead_band=0.0,
+            torque_limit=1e9,
+            ripple=0.0,
+            ripple_order=1.0,
+            shaft_stiffness=1.0,
+            shaft_damping=0.0,
+            motor_inertia=0.0,
+            border=np.array(road.start_m),
+            mu_left=np.array(road.mu),
+            mu_right=np.array(road.mu),
+        )
+    )
+
+
+def with_magic(world: World, share: float, shape: float, curvature: float) -> World:
+    """With a tyre that is the magic formula to `share`: same initial slope, same peak."""
+    p = world.physics
+    return world.moved(
+        magic_share=share,
+        magic_shape=shape,
+        magic_curvature=curvature,
+        peak=peaks(p.stiffness_drive, p.mass * GRAVITY / 4.0),
+    )
