@@ -56,13 +56,11 @@ class Spec(_Strict):
 
     @model_validator(mode="after")
     def _one_source(self) -> Spec:
-        given = [name for name in SOURCES if (name if name != "copy" else "copy_of") in self.model_fields_set]
+        values = (self.column, self.constant, self.sum or None, self.integrate, self.copy_of)
+        given = [name for name, value in zip(SOURCES, values, strict=True) if value is not None]
         if len(given) != 1:
-            raise ValueError(
-                f"has {' and '.join(given) or 'no source'}; expected exactly one of {', '.join(SOURCES)}."
-            )
-        if self.sum == [] and given == ["sum"]:
-            raise ValueError("sum is empty; expected at least one source in it.")
+            what = " and ".join(given) or "no source"
+            raise ValueError(f"has {what}; expected exactly one of {', '.join(SOURCES)}, and not empty.")
         if given != ["column"] and (self.unit is not None or self.radius_m is not None):
             raise ValueError(f"unit and radius_m belong to a column; expected none beside {given[0]}.")
         return self

@@ -53,7 +53,7 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
 
     findings = [*table.findings, *missing_columns(table, mapping)]
     time_s = read_time(table, mapping)
-    if time_s is None:
+    if time_s is None or len(time_s) == 0:
         raise _error(path, findings)
     clock = check_time(time_s, row)
     made = translate(table, mapping, time_s if clock.usable else None)

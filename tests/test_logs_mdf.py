@@ -1,0 +1,171 @@
+"""Reading MDF: rasters, groups, invalid samples, and files that are damaged."""
+
+import numpy as np
+import pytest
+from asammdf import MDF, Signal
+from log_maker import make_frame
+
+from sim2real.logs import LogError, load_mapping, mdf_file, read_log, write_log
+
+
+@pytest.fixture
+def frame():
+    return make_frame()
+
+
+def save_groups(path, *groups):
+    """Signals of one group share a time base; each group is a list of Signals."""
+    with MDF(version="4.10") as mdf:
+        for group in groups:
+            mdf.append(group, common_timebase=True)
+        mdf.save(path, overwrite=True)
+    return path
+
+
+def signals(frame, drop=()):
+    time_s = frame["time_s"].to_numpy()
+    return [
+        Signal(frame[name].to_numpy(), time_s, name=name) for name in frame.columns.drop(["time_s", *drop])
+    ]
+
+
+def test_the_wheel_speeds_give_the_time_base(tmp_path, frame):
+    """A faster channel is averaged, a slower one interpolated, a class held; wherever the file has them."""
+    fast_s, slow_s = np.arange(3001) / 1000.0, np.arange(31) / 10.0
+    rng = np.random.default_rng(2)
+    noise = rng.normal(size=len(fast_s))
+    path = save_groups(
+        tmp_path / "log.mf4",
+        [Signal(4.0 * np.cos(2.0 * fast_s) + noise, fast_s, name="accel_x_m_s2")],
+        [
+            Signal(15.0 + 0.3 * slow_s, slow_s, name="vehicle_speed_m_s"),
+            Signal(np.arange(31) % 3, slow_s, name="image_class"),
+        ],
+        signals(frame, drop=["vehicle_speed_m_s", "accel_x_m_s2"]),
+    )
+    log = read_log(path)
+    assert np.array_equal(log.time_s, frame["time_s"])
+    assert log.signals["vehicle_speed_m_s"] == pytest.approx(15.0 + 0.3 * log.time_s, abs=1e-9)
+    assert log.warnings == ("channel vehicle_speed_m_s comes at 10 Hz and was interpolated onto 100 Hz.",)
+    assert log.signals["image_class"].tolist() == [(i // 10) % 3 for i in range(301)]
+    error = log.signals["accel_x_m_s2"][5:-5] - 4.0 * np.cos(2.0 * log.time_s[5:-5])
+    assert np.std(error) == pytest.approx(1.0 / np.sqrt(10.0), rel=0.15)
+    means = np.convolve(noise, np.r_[0.5, np.ones(9), 0.5] / 10.0, "same")[50:-50:10]
+    assert error == pytest.approx(means, abs=1e-3)
+
+
+def test_outside_its_own_time_a_channel_is_lost(tmp_path, frame):
+    late_s = frame["time_s"].to_numpy()[100:]
+    other = Signal(frame["accel_x_m_s2"].to_numpy()[100:], late_s, name="accel_x_m_s2")
+    log = read_log(save_groups(tmp_path / "log.mf4", signals(frame, drop=["accel_x_m_s2"]), [other]))
+    assert np.isnan(log.signals["accel_x_m_s2"][:100]).all()
+    assert np.array_equal(log.signals["accel_x_m_s2"][100:], frame["accel_x_m_s2"][100:])
+
+
+def test_invalid_samples_are_lost_ones(tmp_path, frame):
+    group = signals(frame)
+    marks = np.zeros(len(frame), dtype=bool)
+    marks[30:35] = True
+    k = [s.name for s in group].index("accel_x_m_s2")
+    group[k] = Signal(group[k].samples, group[k].timestamps, name="accel_x_m_s2", invalidation_bits=marks)
+    values = read_log(save_groups(tmp_path / "log.mf4", group)).signals["accel_x_m_s2"]
+    assert np.array_equal(np.isnan(values), marks)
+
+
+def test_raw_counts_and_value_tables(tmp_path, frame):
+    """A linear conversion is applied; a table of texts beside numbers leaves the numbers."""
+    group = signals(frame)
+    time_s = group[0].timestamps
+    counts = np.arange(len(frame), dtype=np.uint16)
+    names = {"val_0": 0, "text_0": b"dry", "val_1": 1, "text_1": b"wet", "default": b""}
+    group += [
+        Signal(counts, time_s, name="steering_angle_rad", conversion={"a": 0.001, "b": -0.1}),
+        Signal(counts % 2, time_s, name="image_class", conversion=names),
+    ]
+    log = read_log(save_groups(tmp_path / "log.mf4", group))
+    assert log.signals["steering_angle_rad"] == pytest.approx(0.001 * counts - 0.1)
+    assert log.signals["image_class"].tolist() == (counts % 2).tolist()
+
+
+def test_names_that_stand_in_several_groups(tmp_path, frame):
+    speed = frame["vehicle_speed_m_s"].to_numpy()
+    time_s = frame["time_s"].to_numpy()
+    path = save_groups(
+        tmp_path / "log.mf4", signals(frame), [Signal(speed * 3.6, time_s, name="vehicle_speed_m_s")]
+    )
+    with pytest.raises(LogError, match=r"missing: vehicle_speed_m_s \(is it 'vehicle_speed_m_s#[01]'\?\)"):
+        read_log(path)
+    (tmp_path / "map.yaml").write_text("vehicle_speed_m_s: {column: 'vehicle_speed_m_s#1', unit: km/h}")
+    log = read_log(path, load_mapping(tmp_path / "map.yaml"))
+    assert log.signals["vehicle_speed_m_s"] == pytest.approx(speed, rel=1e-12)
+    assert log.ignored == ("vehicle_speed_m_s#0", "time")
+
+
+def test_the_master_goes_by_its_name_too(tmp_path, frame):
+    path = save_groups(tmp_path / "log.mf4", signals(frame))
+    (tmp_path / "map.yaml").write_text("time_s: {column: time}")
+    log = read_log(path, load_mapping(tmp_path / "map.yaml"))
+    assert np.array_equal(log.time_s, frame["time_s"])
+    assert log.ignored == ()
+
+
+PAIR = np.dtype([("near", "f8"), ("far", "f8")])
+
+
+@pytest.mark.parametrize(
+    ("samples", "options", "expected"),
+    [
+        (np.array([b"x"] * 301), {"encoding": "utf-8"}, "channel position_m holds text"),
+        (np.zeros(301, dtype=PAIR), {}, "channel position_m holds several values"),
+        (
+            np.ones(301),
+            {"master_metadata": ("wheel", 3)},
+            "channel position_m is recorded over an angle, a dist",
+        ),
+    ],
+)
+def test_channels_that_are_no_signal(tmp_path, frame, samples, options, expected):
+    odd = Signal(samples, frame["time_s"].to_numpy(), name="position_m", **options)
+    path = save_groups(tmp_path / "log.mf4", signals(frame, drop=["position_m"]), [odd])
+    with pytest.raises(LogError, match=expected):
+        read_log(path)
+
+
+def test_samples_are_numbered(tmp_path, frame):
+    frame.loc[7, "accel_x_m_s2"] = np.inf
+    with pytest.raises(LogError, match="column accel_x_m_s2: sample 8 is infinite"):
+        read_log(save_groups(tmp_path / "log.mf4", signals(frame)))
+
+
+@pytest.mark.parametrize("damage", ["cut in the data", "cut in the header", "garbage"])
+def test_damage_is_one_clean_error(tmp_path, capfd, frame, damage):
+    path = tmp_path / "log.mf4"
+    write_log(frame, path)
+    raw = bytearray(path.read_bytes())
+    if damage == "garbage":
+        raw[64:] = np.random.default_rng(0).bytes(len(raw) - 64)
+    else:
+        raw = raw[: len(raw) // 2 if damage == "cut in the data" else 80]
+    path.write_bytes(raw)
+    with pytest.raises(LogError, match="cannot be read as MDF") as error:
+        read_log(path)
+    assert len(str(error.value).splitlines()) == 1
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("import os; os.abort()", "cannot be read as MDF; "),
+        ("while True: pass", "no MDF that can be read within 1 s"),
+    ],
+)
+def test_a_reader_that_crashes_or_hangs_is_one_too(tmp_path, monkeypatch, capfd, frame, code, expected):
+    """Damaged sizes make asammdf do both."""
+    write_log(frame, tmp_path / "log.mf4")
+    (tmp_path / "reader.py").write_text(code)
+    monkeypatch.setattr(mdf_file, "EXTRACTOR", tmp_path / "reader.py")
+    monkeypatch.setattr(mdf_file, "TIMEOUT_S", 1.0)
+    with pytest.raises(LogError, match=expected):
+        read_log(tmp_path / "log.mf4")
+    assert capfd.readouterr().err == ""

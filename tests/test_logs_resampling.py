@@ -1,0 +1,100 @@
+"""Logs onto a uniform grid: no delay, no aliasing, no bridging."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from log_maker import make_frame, save
+
+from sim2real.logs import read_log, resample
+from sim2real.logs.resampling import hold, onto
+
+STEPS = st.sampled_from([0.001, 0.002, 0.0025, 0.004, 0.01, 0.013, 0.05])
+
+
+def read(tmp_path, frame):
+    return read_log(save(frame, tmp_path / "log.csv"))
+
+
+@given(step=STEPS, jitter=st.floats(0.0, 0.45), seed=st.integers(0, 1000))
+def test_straight_lines_stay_exact_at_any_ratio(step, jitter, seed):
+    """So there is no delay: a delayed ramp would be off by slope times delay."""
+    time_s = 5.0 + np.arange(800) * 0.004
+    time_s = time_s + 0.004 * jitter * np.random.default_rng(seed).uniform(-0.5, 0.5, 800)
+    grid = np.arange(time_s[0], time_s[-1], step)
+    assert onto(time_s, 3.0 - 7.0 * time_s, grid, step) == pytest.approx(3.0 - 7.0 * grid, abs=1e-7)
+
+
+@pytest.mark.parametrize("ratio", [2, 3, 5, 10, 12.5])
+def test_white_noise_is_averaged(ratio):
+    noise = np.random.default_rng(0).normal(size=100_001)
+    time_s = np.arange(len(noise)) * 0.001
+    grid = np.arange(1.0, 99.0, ratio * 0.001)
+    mean = onto(time_s, noise, grid, ratio * 0.001)
+    assert np.std(mean) == pytest.approx(1.0 / np.sqrt(ratio), rel=0.15)
+
+
+def test_what_is_too_fast_for_the_grid_is_not_folded_back():
+    """A 99 Hz tone on a 100 Hz grid would be a 1 Hz tone of full size if samples were just left out."""
+    time_s = np.arange(10_001) * 0.001
+    tone = np.sin(2.0 * np.pi * 99.0 * time_s)
+    grid = np.arange(1.0, 9.0, 0.01)
+    assert np.max(np.abs(np.interp(grid, time_s, tone))) > 0.99
+    assert np.max(np.abs(onto(time_s, tone, grid, 0.01))) < 0.02
+
+
+def test_a_pulse_stays_centred():
+    time_s = np.arange(1001) * 0.001
+    pulse = np.exp(-(((time_s - 0.5) / 0.02) ** 2))
+    grid = np.arange(101) * 0.01
+    slow = onto(time_s, pulse, grid, 0.01)
+    assert np.sum(grid * slow) / np.sum(slow) == pytest.approx(0.5, abs=1e-6)
+
+
+def test_the_logs_own_grid_changes_nothing(tmp_path):
+    log = read(tmp_path, make_frame(rate_hz=200.0, camera=True))
+    time_s, signals = resample(log, 0.005)
+    assert time_s == pytest.approx(log.time_s, abs=1e-12)
+    for name, values in log.signals.items():
+        assert np.array_equal(signals[name], values), name
+
+
+@pytest.mark.parametrize(
+    ("ratio", "lost"),
+    [(1, {500}), (2, {250}), (3, {166, 167}), (4, {125}), (8, {62, 63}), (10, {50}), (200, {2, 3})],
+)
+def test_lost_samples_are_not_bridged(tmp_path, ratio, lost):
+    """Sample 500 is lost, and with it every value whose box reaches beyond sample 499 from below or 501 from above."""
+    log = read(tmp_path, make_frame(rate_hz=500.0))
+    log.signals["vehicle_speed_m_s"][500] = np.nan
+    _, signals = resample(log, 0.002 * ratio)
+    assert set(np.flatnonzero(np.isnan(signals["vehicle_speed_m_s"]))) == lost
+    assert np.isfinite(signals["position_m"]).all()
+
+
+def test_missing_rows_are_lost_samples(tmp_path):
+    log = read(tmp_path, make_frame().drop(index=[*range(100, 150), 200]))
+    time_s, signals = resample(log, 0.01)
+    lost = np.isnan(signals["vehicle_speed_m_s"])
+    assert time_s[lost] == pytest.approx([*np.arange(100, 150) * 0.01, 2.0])
+    _, coarse = resample(log, 0.05)
+    assert np.flatnonzero(np.isnan(coarse["vehicle_speed_m_s"])).tolist() == [*range(20, 31), 40]
+
+
+def test_classes_are_held_not_averaged(tmp_path):
+    log = read(tmp_path, make_frame(rate_hz=1000.0, camera=True))
+    time_s, signals = resample(log, 0.013)
+    expected = np.floor(time_s * 10.0 + 1e-6)
+    assert np.array_equal(signals["frame_id"], expected)
+    assert set(np.unique(signals["image_class"])) == {-1.0, 0.0, 1.0}
+
+
+def test_hold_knows_nothing_before_the_first():
+    held = hold(np.array([1.0, 2.0]), np.array([5.0, 6.0]), np.array([0.9, 1.0, 1.99, 2.0 - 1e-9, 7.0]))
+    assert np.array_equal(held, [np.nan, 5.0, 5.0, 6.0, 6.0], equal_nan=True)
+
+
+@pytest.mark.parametrize("step_s", [0.0, -1.0, np.nan, 4.0])
+def test_steps_that_make_no_grid(tmp_path, step_s):
+    with pytest.raises(ValueError, match="expected more than 0 and at most the log's 3 s"):
+        resample(read(tmp_path, make_frame()), step_s)
