@@ -10,8 +10,10 @@ from scenarios.effects.base import Effect, parameter
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
 
-LARGEST_MOTOR_SHARE = 0.95
+LARGEST_MOTOR_SHARE = 0.8
 """Of the wheel's inertia that may be the motor's: the wheel itself keeps the rest [-]."""
+LEAST_MOTOR_SHARE = 0.02
+"""A motor with less of the wheel's inertia counts as rigid: it would only make the equations stiff [-]."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class DrivelineCompliance(Effect):
     subsystem = "powertrain"
     equation = (
         "T_s = k twist + d (omega_m - omega), twist' = omega_m - omega, J omega_m' = T - T_s, "
-        "(I - J) omega' = T_s - F_x R; J at most 0.95 I"
+        "(I - J) omega' = T_s - F_x R; J at most 0.8 I"
     )
     source = "Kiencke and Nielsen (2005), Automotive Control Systems, drive-shaft model"
     excited_by = "tip-in and tip-out: wheel-speed oscillation after a step of torque"
@@ -55,8 +57,9 @@ class DrivelineCompliance(Effect):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Motor speed and twist become states of each wheel."""
         most = LARGEST_MOTOR_SHARE * parameters.wheel_inertia_kg_m2
+        motor = min(self.motor_inertia_kg_m2, most)
         return parameters._replace(
             shaft_stiffness_nm_rad=self.stiffness_nm_rad,
             shaft_damping_nm_s_rad=self.damping_nm_s_rad,
-            motor_inertia_kg_m2=min(self.motor_inertia_kg_m2, most),
+            motor_inertia_kg_m2=motor if motor >= LEAST_MOTOR_SHARE * parameters.wheel_inertia_kg_m2 else 0.0,
         )

@@ -62,7 +62,7 @@ RELATIVE_TOLERANCE = 5e-5
 BRAKE_FADE_RAD_S = 1.0
 """Motor speed below which its brake fades out [rad/s]."""
 
-SHORTEST_STEP_S = 1e-7
+SHORTEST_STEP_S = 1e-5
 """A sub-step of this length is taken whatever its error estimate says [s]."""
 
 ACCELERATION_TOLERANCE_M_S2 = 1e-7
