@@ -1,11 +1,14 @@
 """Mapping files: other names, units, signs, sums; and what is wrong with them."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from log_maker import RADIUS_M, WHEELS, make_frame, save
 
-from sim2real.logs import LogError, load_mapping, read_log
-from sim2real.logs.units import factor
+from sim2real.logs import COLUMNS, LogError, load_mapping, read_log
+from sim2real.logs.units import UNITS, factor
 
 
 @pytest.fixture
@@ -87,12 +90,14 @@ class TestReading:
             wheel_torque_fl_nm: {sum: [{column: engine, scale: 0.25}, {column: brake, scale: 0.3}], offset: 1.5}
             wheel_torque_rl_nm: {sum: [engine, {constant: 7}], sign: -1, scale: 2}
             steering_angle_rad: {constant: 0.0}
+            yaw_rate_rad_s: {sum: [{constant: 0.5}, {constant: -0.25, sign: -1}]}
         """
         log = read(frame, text)
         assert log.signals["wheel_torque_fl_nm"] == pytest.approx(np.full(len(frame), 200.0 - 30.0 + 1.5))
         assert log.signals["wheel_torque_rl_nm"] == pytest.approx(np.full(len(frame), -1614.0))
         assert not log.signals["steering_angle_rad"].any()
-        assert log.derived == {"wheel_torque_rl_nm", "steering_angle_rad"}
+        assert set(log.signals["yaw_rate_rad_s"]) == {0.75}
+        assert log.derived == {"yaw_rate_rad_s", "steering_angle_rad"}
 
     def test_circumferential_speeds(self, read):
         frame = make_frame()
@@ -184,7 +189,8 @@ class TestFileProblems:
             ("wheel_speed_fl_rad_s: {copy: wheel_speed_fl_rad_s}", "is copied from itself in a circle"),
             ("wheel_speed_fl_rad_s: {copy: wheel_speed_fr_rad_s}\n"
              "wheel_speed_fr_rad_s: {sum: [{copy: wheel_speed_fl_rad_s}]}", "is copied from itself in a circle"),
-            ("time_s: {constant: 1}", "time_s: expected a measured column"),
+            ("time_s: {constant: 1}", "time_s: expected measured columns only"),
+            ("time_s: {sum: [t, {integrate: u}]}", "time_s: expected measured columns only"),
             ("image_path: {constant: 1}", "image_path: holds text; expected the bare name of a column"),
             ("image_path: {column: a, scale: 2}", "image_path: holds text"),
             ("schema: 2\ntime_s: t", "schema: is 2;"),
@@ -230,6 +236,17 @@ class TestFileProblems:
             copy
             == f"{path}: column 'yaw_rate_rad_s' is missing, which {where} copies to wheel_speed_fl_rad_s."
         )
+
+
+def test_the_document_is_true(mapping):
+    page = (Path(__file__).parents[1] / "docs" / "logs.md").read_text(encoding="utf-8")
+    example = mapping(re.search(r"```yaml\n(.*?)```", page, re.DOTALL).group(1))
+    assert len(example.columns) == 9
+    for quantity, units in UNITS.items():
+        assert f"| {quantity} | {', '.join(units)} |" in page
+    for column in COLUMNS:
+        name = re.sub("_(fl|fr|rl|rr)_", "_{fl,fr,rl,rr}_", column)
+        assert f"`{name}`" in page
 
 
 @pytest.mark.parametrize(

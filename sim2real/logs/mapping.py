@@ -72,9 +72,13 @@ class Spec(_Strict):
 
     @property
     def derived(self) -> bool:
-        """Whether anything in it was computed rather than measured."""
-        own = self.constant is not None or self.integrate is not None or self.copy_of is not None
-        return own or any(term.derived for term in self.terms)
+        """Whether it carries no measurement of its own: a constant, an integral, a copy, a sum of nothing else."""
+        return self.column is None and (not self.sum or all(term.derived for term in self.sum))
+
+    @property
+    def measured(self) -> bool:
+        """Whether it is made of columns of the file alone, row by row."""
+        return self.column is not None or (bool(self.sum) and all(term.measured for term in self.sum))
 
     def factor(self, unit: str) -> float:
         """What the column's raw values are multiplied with to be in `unit`; raises ValueError for a wrong unit."""
@@ -175,8 +179,8 @@ def _specs(file: BaseModel) -> dict[str, Spec]:
 def _problems(name: str, spec: Spec, specs: dict[str, Spec]) -> list[str]:
     if name == IMAGE_PATH and (spec.column is None or spec.model_fields_set != {"column"}):
         return [f"{name}: holds text; expected the bare name of a column."]
-    if name == TIME and spec.derived:
-        return [f"{name}: expected a measured column, since all else is read against it."]
+    if name == TIME and not spec.measured:
+        return [f"{name}: expected measured columns only, since all else is read against it."]
     if _copies_itself(name, specs):
         return [f"{name}: is copied from itself in a circle; expected a column of the file at its end."]
     return [f"{name}: {text}" for text in _unit_problems(spec, COLUMNS[name].unit)]

@@ -10,7 +10,7 @@ from math import pi
 
 from scipy import constants
 
-_UNITS: dict[str, dict[str, float]] = {
+UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": constants.minute, "h": constants.hour},
     "m": {
         "m": 1.0,
@@ -52,6 +52,7 @@ _UNITS: dict[str, dict[str, float]] = {
     },
     "-": {"-": 1.0, "1": 1.0, "%": 1e-2},
 }
+"""Unit of the log format to the units that become it, each with its factor."""
 
 _PLAIN = str.maketrans({" ": "", "·": "", "*": "", ".": "", "^": "", "²": "2", "µ": "u", "μ": "u"})
 
@@ -71,10 +72,10 @@ def factor(unit: str, quantity: str) -> float:
     >>> round(factor("km/h", "m/s") * 36.0, 9)
     10.0
     """
-    table = {_plain(name): value for name, value in _UNITS[quantity].items()}
+    table = {_plain(name): value for name, value in UNITS[quantity].items()}
     if _plain(unit) not in table:
         raise ValueError(
-            f"unit {unit!r} cannot become [{quantity}]; known units: {', '.join(_UNITS[quantity])}."
+            f"unit {unit!r} cannot become [{quantity}]; known units: {', '.join(UNITS[quantity])}."
         )
     return table[_plain(unit)]
 
