@@ -46,6 +46,8 @@ ZOOM_S = 2.0
 """Length of the window that is looked at closely [s]."""
 MEAN_S = 0.1
 """Window of the running mean that shows a pattern under the noise [s]."""
+LEFT_OUT = 0.005
+"""Share of the largest residuals that may leave the picture of the whole drive, so that a spike hides nothing [-]."""
 BAND_SIGMA = 2.0
 """Half width of the shown noise band: 95 % of the samples of a right model lie in it."""
 
@@ -145,9 +147,8 @@ def trace(shown: Trace) -> bytes:
         axes[0, 1].set_title(f"worst window, {start:.1f} to {end:.1f} s", fontsize=9)
         axes[0, 0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=8)
         _fit_to_window(axes[0, 1], shown, start, end)
-        largest = np.nanmax(np.abs([shown.measured - shown.before, shown.measured - shown.after]))
-        for axis in axes[1]:
-            axis.set_ylim(-1.08 * largest, 1.08 * largest)
+        axes[1, 0].set_ylim(_limits(shown, shown.time_s[0], shown.time_s[-1], LEFT_OUT))
+        axes[1, 1].set_ylim(_limits(shown, start, end, 0.0))
     return buffer.getvalue()
 
 
@@ -180,6 +181,16 @@ def _running_mean(time_s: Array, values: Array) -> Array:
     there = np.convolve(np.isfinite(values), window, mode="same")
     total = np.convolve(np.nan_to_num(values), window, mode="same")
     return np.divide(total, there, out=np.full(len(values), np.nan), where=there > 0.5)
+
+
+def _limits(shown: Trace, start: float, end: float, left_out: float) -> tuple[float, float]:
+    """Symmetric limits for the residuals in a window but for this share of the largest."""
+    rows = (shown.time_s >= start) & (shown.time_s <= end)
+    rest = np.abs([shown.measured - shown.before, shown.measured - shown.after])[:, rows]
+    rest = rest[np.isfinite(rest)]
+    largest = float(np.quantile(rest, 1.0 - left_out)) if len(rest) else 0.0
+    limit = 1.1 * max(largest, 2.0 * BAND_SIGMA * shown.noise)
+    return -limit, limit
 
 
 def _fit_to_window(axis: Axes, shown: Trace, start: float, end: float) -> None:

@@ -117,6 +117,7 @@ def render(diagnosis: Diagnosis) -> str:
         shrink=shrink(diagnosis),
         possible=possible_shrink(diagnosis),
         snippet=vehicle_snippet(needed(diagnosis)),
+        provenance=provenance_rows(diagnosis.provenance),
         pictures=_pictures(diagnosis),
         traces=[(t, _picture(figures.trace(t), f"{t.signal} over time")) for t in shown_traces(diagnosis)],
         profile=None if diagnosis.next_manoeuvre is None else profile_csv(diagnosis.next_manoeuvre),
@@ -183,6 +184,23 @@ def profile_csv(manoeuvre: NextManoeuvre) -> str:
     return _address(text.getvalue().encode("ascii"), "text/csv")
 
 
+def provenance_rows(value: Any, label: str = "") -> list[tuple[str, str, str]]:
+    """What a diagnosis was made from, as label, value and, for a file, its SHA-256."""
+    if isinstance(value, dict):
+        rows = []
+        if {"path", "sha256"} <= set(value):
+            rows.append((label, str(value["path"]), str(value["sha256"])))
+            value = {k: v for k, v in value.items() if k not in ("path", "sha256")}
+        return rows + [
+            row
+            for k, v in value.items()
+            for row in provenance_rows(v, f"{label} {figures.words(str(k))}".strip())
+        ]
+    if isinstance(value, (list, tuple)):
+        return [row for i, v in enumerate(value, 1) for row in provenance_rows(v, f"{label} {i}")]
+    return [(label, f"{value:g}" if isinstance(value, float) else str(value), "")]
+
+
 def _pictures(diagnosis: Diagnosis) -> dict[str, Picture]:
     """The pictures that this diagnosis has."""
     made = {
@@ -215,10 +233,14 @@ def number(value: float | None, digits: int = 2) -> str:
 
 
 def percent(share: float | None) -> str:
-    """A share of 1 as per cent, with a digit more below one."""
+    """A share of 1 as per cent, with a digit more near none and all; what is not all is never shown as all."""
     if share is None or not math.isfinite(share):
         return DASH
-    return f"{100.0 * share:.1f} %" if 0.0 < share < 0.01 else f"{100.0 * share:.0f} %"
+    if 0.0 < share < 0.0005:
+        return "< 0.1 %"
+    if 0.9995 <= share < 1.0:
+        return "> 99.9 %"
+    return f"{100.0 * share:.1f} %" if 0.0 < share < 0.01 or 0.99 < share < 1.0 else f"{100.0 * share:.0f} %"
 
 
 def estimate(interval: Interval) -> str:

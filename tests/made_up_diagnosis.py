@@ -87,12 +87,16 @@ PLACES = (
     Place("wheel_speed_fl", "tyre", "brake", 15.0, 15.7, 0.21, "fit_2.csv"),
 )
 PROVENANCE = {
-    "files": {
-        "vehicle.yaml": {"sha256": "9f2c" * 16},
-        "road.yaml": {"sha256": "01ab" * 16},
-        "fit_1.csv": {"sha256": "77de" * 16, "rate_hz": 1000.0, "role": "fit"},
-        "holdout.csv": {"sha256": "c0ff" * 16, "rate_hz": 1000.0, "role": "holdout"},
-    },
+    "vehicle": {"path": "vehicle.yaml", "sha256": "9f2c" * 16},
+    "fit": [
+        {
+            "path": "fit_1.csv",
+            "sha256": "77de" * 16,
+            "road": {"path": "road.yaml", "sha256": "01ab" * 16},
+            "rate_hz": 999.9999999,
+        }
+    ],
+    "holdout": {"path": "holdout.csv", "sha256": "c0ff" * 16, "rate_hz": 1000.0},
     "versions": {"trpac-fmu": "0.1.0", "numpy": "2.4.6", "scipy": "1.17.1"},
     "seed": 0,
 }

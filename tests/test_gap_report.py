@@ -112,7 +112,10 @@ def test_where_and_warnings_and_provenance_are_told(pages):
     text = pages["identified"].text
     assert "wheel_speed_fl tyre drive, low speed fit_1.csv 1.20 1.90 31 %" in text
     assert DIAGNOSES["identified"].warnings[0] in text
-    assert made_up.PROVENANCE["files"]["fit_1.csv"]["sha256"] in text
+    assert f"fit 1 fit_1.csv SHA-256 {'77de' * 16}" in text
+    assert f"fit 1 road road.yaml SHA-256 {'01ab' * 16}" in text
+    assert "fit 1 rate hz 1000" in text
+    assert "versions numpy 2.4.6" in text
 
 
 def test_only_what_the_verdict_names_is_marked(pages):
@@ -242,15 +245,22 @@ class TestNumbers:
                 value
             )
 
-    def test_small_shares_keep_a_digit(self):
-        assert [percent(s) for s in (0.0, 0.004, 0.3149, 1.0, math.nan, None)] == [
-            "0 %",
-            "0.4 %",
-            "31 %",
-            "100 %",
-            "–",
-            "–",
-        ]
+    @pytest.mark.parametrize(
+        ("share", "text"),
+        [
+            (0.0, "0 %"),
+            (0.0001, "< 0.1 %"),
+            (0.004, "0.4 %"),
+            (0.3149, "31 %"),
+            (0.994, "99.4 %"),
+            (0.9997, "> 99.9 %"),
+            (1.0, "100 %"),
+            (math.nan, "–"),
+            (None, "–"),
+        ],
+    )
+    def test_shares_keep_a_digit_near_none_and_all(self, share, text):
+        assert percent(share) == text
 
     def test_shrink_follows_from_the_gap_where_no_single_cause_has_it(self):
         gap = replace(DIAGNOSES["compound"].gap, before=Measure(5.0), after=Measure(1.5))

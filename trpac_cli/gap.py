@@ -209,24 +209,26 @@ def _tell_truth(console: Console, case: Case, truth: Truth, said: Diagnosis) -> 
 
 def judge(hidden: str, said: Diagnosis) -> str:
     """Whether the diagnosis found the hidden effect, in a sentence with colours."""
+    from sim2real.report import percent
+
     ranked = [c.effect for c in said.causes]
     if hidden not in ranked:
         return "The diagnosis did [red]not[/red] try it."
     rank = ranked.index(hidden) + 1
     probability = said.causes[rank - 1].probability
     if rank == 1 and said.verdict == "identified":
-        return f"The diagnosis is [green]right[/green], with a probability of {probability:.0%}."
+        return f"The diagnosis is [green]right[/green], with a probability of {percent(probability)}."
     if any(hidden in name.split("+") for group in said.ambiguous_with for name in group):
         return "The diagnosis has it among those that it [yellow]cannot tell apart[/yellow]."
     return (
         f"The diagnosis is [red]not right[/red]: it says '{said.verdict}' and ranks the hidden effect {rank} of "
-        f"{len(ranked)}, with a probability of {probability:.1%}."
+        f"{len(ranked)}, with a probability of {percent(probability)}."
     )
 
 
 def _summarise(console: Console, said: Diagnosis) -> None:
     """Verdict, sizes and the first causes on the terminal."""
-    from sim2real.report import added, estimate, leading
+    from sim2real.report import added, leading
 
     gap = said.gap
     sizes = f"gap {gap.before.total:.2f}"
@@ -236,14 +238,16 @@ def _summarise(console: Console, said: Diagnosis) -> None:
     colour = COLOURS[said.verdict]
     console.print(Panel(text, title=said.verdict.replace("_", " "), title_align="left", border_style=colour))
     if leading(said):
-        console.print(_cause_table(said, estimate))
+        console.print(_cause_table(said))
     if said.next_manoeuvre is not None:
         console.print(f"To tell them apart: {escape(said.next_manoeuvre.sentence)}")
     for warning in said.warnings:
         console.print(f"[yellow]{escape(warning)}[/yellow]")
 
 
-def _cause_table(said: Diagnosis, estimate: Callable) -> Table:
+def _cause_table(said: Diagnosis) -> Table:
+    from sim2real.report import estimate, percent
+
     table = Table(title="Causes, likeliest first", title_justify="left")
     for heading, justify in (
         ("effect", "left"),
@@ -257,7 +261,7 @@ def _cause_table(said: Diagnosis, estimate: Callable) -> Table:
         values = "\n".join(f"{name} {estimate(value)}" for name, value in cause.parameters.items())
         table.add_row(
             cause.effect,
-            f"{cause.probability:.1%}",
+            percent(cause.probability),
             values,
             f"{cause.gap_after:.2f}",
             estimate(cause.shrink_percent),
