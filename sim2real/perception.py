@@ -15,7 +15,7 @@ import numpy as np
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
 from sim2real.perception_chain import Account, Chain
-from sim2real.perception_confidence import confidence_chain
+from sim2real.perception_confidence_chain import confidence_chain
 from sim2real.perception_conflicts import class_conflicts
 from sim2real.perception_frames import Modelled, read_results
 from sim2real.perception_friction import friction_chain
@@ -195,7 +195,9 @@ def _conclude(chains: Sequence[Chain], warnings: tuple[str, ...], seed: int) -> 
             if others
         )
     )
-    unexcited = {effect: why for chain in chains for effect, why in chain.unexcited.items()}
+    unexcited = {
+        effect: why for chain in chains for effect, why in chain.unexcited.items() if effect not in causes
+    }
     return PerceptionFinding(
         verdict=_verdict(causes, bool(ambiguous), bool(unexplained)),
         causes=causes,
@@ -203,7 +205,7 @@ def _conclude(chains: Sequence[Chain], warnings: tuple[str, ...], seed: int) -> 
         before=_measure(chains, nothing),
         after=_measure(chains, best),
         ambiguous_with=ambiguous,
-        cannot_rule_out={effect: why for effect, why in unexcited.items() if effect not in causes},
+        cannot_rule_out=unexcited,
         places=_places(chains, best),
         next_step=" ".join(chain.next_step for chain, others in zip(chains, rivals, strict=True) if others),
         unexplained=unexplained,
@@ -262,13 +264,14 @@ def _places(chains: Sequence[Chain], best: Sequence[Account]) -> tuple[Place, ..
 def _candidates(
     chains: Sequence[Chain], best: Sequence[Account], unexcited: dict[str, str], seed: int
 ) -> tuple[CameraCandidate, ...]:
-    """All accounts of all signals, and the compounds of the best ones of two signals."""
+    """All accounts of all signals, and the compounds of the best ones of several signals."""
     out = []
     for at, chain in enumerate(chains):
         out += [_candidate(chains, {at: account}, unexcited, seed) for account in chain.accounts]
     standing = [at for at, account in enumerate(best) if account.effects]
-    for pair in combinations(standing, 2):
-        out.append(_candidate(chains, {at: best[at] for at in pair}, unexcited, seed))
+    for count in range(2, len(standing) + 1):
+        for together in combinations(standing, count):
+            out.append(_candidate(chains, {at: best[at] for at in together}, unexcited, seed))
     return tuple(sorted(out, key=lambda c: -c.score))
 
 
@@ -286,7 +289,7 @@ def _candidate(
         size=sum(account.size for _, account in own),
         observations=sum(chain.observations for chain, _ in own),
         effective=sum(chain.effective for chain, _ in own),
-        score=sum(chain.score(account) for chain, account in own),
+        score=sum(account.score for _, account in own),
         parameters={name: value for _, account in own for name, value in account.parameters.items()},
         after=_measure(chains, accounts),
         shrink_percent=_shrink(chains, accounts, seed),

@@ -20,6 +20,12 @@ Array = NDArray[np.float64]
 DECISIVE = 3.0
 """Score from which on an account beats another: odds of twenty to one [nats]."""
 FEWEST_EFFECTIVE = 2.0
+"""A parameter costs as if at least so many observations stood behind it."""
+
+
+def price(*effective: float) -> float:
+    """What parameters cost, given how many independent observations stand behind each [nats]."""
+    return float(0.5 * np.log(np.maximum(effective, FEWEST_EFFECTIVE)).sum())
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,8 @@ class Account:
         Its effects; empty for the simulation as it is.
     size : int
         Number of parameters.
+    price : float
+        Half the logarithm of the independent observations behind each parameter, summed, after Schwarz [nats].
     gain_fit, gain_holdout : float
         Over the simulation as it is, on the logs fitted to and on the hold-out at the same parameters [nats].
     parameters : dict
@@ -46,6 +54,7 @@ class Account:
 
     effects: tuple[str, ...]
     size: int
+    price: float
     gain_fit: float
     gain_holdout: float
     parameters: dict[str, Interval]
@@ -53,6 +62,11 @@ class Account:
     excess: float = 0.0
     evidence_for: tuple[str, ...] = ()
     evidence_against: tuple[str, ...] = ()
+
+    @property
+    def score(self) -> float:
+        """Both gains less the price [nats]."""
+        return self.gain_fit + self.gain_holdout - self.price
 
     def left(self) -> float:
         """Root mean square of what is left; noise alone gives about 1, no observations 0 [-]."""
@@ -98,20 +112,15 @@ class Chain:
     @classmethod
     def silent(cls, signal: str, observations: int, effects: Collection[str], why: str) -> Chain:
         """A chain that has too little to say anything."""
-        nothing = Account((), 0, 0.0, 0.0, {}, np.empty(0))
+        nothing = Account((), 0, 0.0, 0.0, 0.0, {}, np.empty(0))
         return cls(signal, observations, 0.0, nothing, (), unexcited=dict.fromkeys(effects, why))
-
-    def score(self, account: Account) -> float:
-        """Gain less half the logarithm of the effective observations per parameter, after Schwarz [nats]."""
-        price = 0.5 * account.size * np.log(max(self.effective, FEWEST_EFFECTIVE))
-        return account.gain_fit + account.gain_holdout - float(price)
 
     def best(self) -> Account:
         """The account that stands: with more effects only where that is decisive."""
         best = self.nothing
-        for account in sorted(self.accounts, key=lambda a: (len(a.effects), -self.score(a))):
+        for account in sorted(self.accounts, key=lambda a: (len(a.effects), -a.score)):
             margin = DECISIVE if len(account.effects) > len(best.effects) else 0.0
-            if self.score(account) > self.score(best) + margin:
+            if account.score > best.score + margin:
                 best = account
         return best
 
@@ -124,5 +133,5 @@ class Chain:
             if a is not best
             and best.effects
             and len(a.effects) == len(best.effects)
-            and self.score(best) - self.score(a) < DECISIVE
+            and best.score - a.score < DECISIVE
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
@@ -30,6 +30,10 @@ FEWEST_SIDE = 2
 """Pictures that must show each of the two classes."""
 MOST_WRONG = 0.3
 """Share of pictures about a border that may contradict it."""
+LEAST_ERROR = 0.02
+"""Share of pictures that are taken to be wrong even where none contradicts."""
+LIKELY_NATS = 2.0
+"""Splits less likely than the best one by no more than this are in the bracket [nats]."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class Crossings:
     way_m : array, shape (k, 201)
         Way driven during each of `AGES_S` before [m].
     ahead_m : array, shape (k,)
-        Stamped distance from the lens [m].
+        Distance of the stamps' near end from the lens [m].
     """
 
     log: NDArray[np.str_]
@@ -68,6 +72,11 @@ class Crossings:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def joined(self, other: Crossings) -> Crossings:
+        """Both together."""
+        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        return Crossings(*(np.concatenate(pair) for pair in pairs))
 
     def shift_by_age(self, delay_s: Array) -> Array:
         """Way driven during delays, shape (len(delay_s), k) [m]."""
@@ -147,7 +156,7 @@ def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:
                 one.to_m[i] - one.from_m[i],
                 one.to_m[j] - one.from_m[j],
                 one.driven_m(one.time_s[[at]], AGES_S)[0],
-                one.ahead_m[at],
+                one.ahead_m,
             )
         )
     return rows
@@ -156,16 +165,17 @@ def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:
 def _bracket(classes: NDArray[np.intp], old: int, new: int) -> tuple[int, int] | None:
     """Last picture before and first after a change of class, by the split that fewest pictures contradict.
 
-    Where several splits do equally well the bracket covers them all. None where too few pictures show either class, or
-    too many contradict.
+    The bracket covers all splits that are nearly as likely, given how often the pictures err. None where too few show
+    either class, or too many contradict.
     """
     is_old, is_new = classes == old, classes == new
     # wrong[s]: pictures that contradict a change between picture s - 1 and picture s
     wrong = np.concatenate(([0], np.cumsum(is_new))) + np.concatenate((np.cumsum(is_old[::-1])[::-1], [0]))
-    best = np.flatnonzero(wrong == wrong.min())
-    first, last = int(best[0]), int(best[-1])
-    if is_old[:first].sum() < FEWEST_SIDE or is_new[last:].sum() < FEWEST_SIDE:
+    error = max(wrong.min() / max(is_old.sum() + is_new.sum(), 1), LEAST_ERROR)
+    if error > MOST_WRONG:
         return None
-    if wrong.min() > MOST_WRONG * (is_old.sum() + is_new.sum()):
+    likely = np.flatnonzero((wrong - wrong.min()) * np.log((1.0 - error) / error) < LIKELY_NATS)
+    first, last = int(likely[0]), int(likely[-1])
+    if is_old[:first].sum() < FEWEST_SIDE or is_new[last:].sum() < FEWEST_SIDE:
         return None
     return first - 1, last

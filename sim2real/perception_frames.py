@@ -68,8 +68,8 @@ class Results:
         When the result arrived, and the speed then [s], [m/s].
     from_m, to_m : array, shape (n,)
         Its stamp [m].
-    ahead_m : array, shape (n,)
-        Distance of the stamp's middle from the lens by the camera file [m].
+    ahead_m : float
+        Distance of the stamps' near end from the lens by the camera file, the median [m].
     classes : array, shape (n,)
         Class index.
     confidence : array, shape (n,)
@@ -86,7 +86,7 @@ class Results:
     speed_m_s: Array
     from_m: Array
     to_m: Array
-    ahead_m: Array
+    ahead_m: float
     classes: NDArray[np.intp]
     confidence: Array
     picture: NDArray[np.str_]
@@ -130,14 +130,13 @@ def read_results(
     clock, speed = _finite(log.time_s, log.signals["vehicle_speed_m_s"])
     speed_m_s = np.interp(time_s, clock, speed)
     lens_m = vehicle.to_core().cog_to_front_axle_m + camera.x_from_front_axle_m
-    ahead_m = 0.5 * (table["from"] + table["to"]).to_numpy()
-    ahead_m = ahead_m - np.interp(time_s, drive_time_s, position_m) - lens_m
-    if np.median(ahead_m) < LEAST_AHEAD_M:
+    ahead_m = float(np.median(table["from"] - np.interp(time_s, drive_time_s, position_m))) - lens_m
+    if ahead_m < LEAST_AHEAD_M:
         warnings.append(
-            f"{log.name}: stamps lie {np.median(ahead_m):.1f} m ahead of the lens; the pitch is reckoned for "
+            f"{log.name}: stamps begin {ahead_m:.1f} m ahead of the lens; the pitch is reckoned for "
             f"{USUAL_AHEAD_M:g} m instead."
         )
-        ahead_m = np.full(len(time_s), USUAL_AHEAD_M)
+        ahead_m = USUAL_AHEAD_M
     results = Results(
         log=log.name,
         road=road,
@@ -145,7 +144,7 @@ def read_results(
         speed_m_s=speed_m_s,
         from_m=table["from"].to_numpy(),
         to_m=table["to"].to_numpy(),
-        ahead_m=np.maximum(ahead_m, LEAST_AHEAD_M),
+        ahead_m=ahead_m,
         classes=table["class"].to_numpy().astype(np.intp),
         confidence=table["confidence"].to_numpy(),
         picture=table["picture"].to_numpy().astype(np.str_),

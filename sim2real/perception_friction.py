@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
 from scenarios.files import RoadFile, RoadSegment, VehicleFile
 from sim2real.logs import Log
-from sim2real.perception_chain import Account, Chain
+from sim2real.perception_chain import Account, Chain, price
 from sim2real.perception_frames import Modelled
 from sim2real.result import Interval, Place
 from trpac_core.tyre import peak_friction
@@ -267,6 +267,7 @@ def _account(fit: FrictionFit, nothing: FrictionFit, known: Stretches, unseen: S
     return Account(
         fit.effects,
         fit.size,
+        price(*[len(known) + len(unseen)] * fit.size),
         fit.log_likelihood(known) - nothing.log_likelihood(known),
         fit.log_likelihood(unseen) - nothing.log_likelihood(unseen),
         fit.parameters,
@@ -300,7 +301,7 @@ def _places(nothing: Account, unseen: Stretches) -> tuple[Place, ...]:
         Place(
             SIGNAL,
             "camera",
-            CLASSES[unseen.classes[k]],
+            f"on {CLASSES[unseen.classes[k]]}",
             float(unseen.from_s[k]),
             float(unseen.to_s[k]),
             float(share[k]),
