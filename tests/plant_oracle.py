@@ -20,12 +20,31 @@ def friction_force(theta, slip, load, stiffness):
     return stiffness * slip / (1.0 - slip) * f * g
 
 
-def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, floor=0.01):
-    """States (n, 6): position, speed, four wheel speeds, at time_s.
+OPTIONS = {
+    "h": 0.0,  # height that acceleration moves load through
+    "k": 0.0,  # drag per speed squared
+    "c": 0.0,  # rolling resistance
+    "drag_torque": 0.0,
+    "grade": 0.0,
+    "falloff": 0.0,
+    "falloff_floor": 1.0,
+    "relaxation": 0.0,
+    "shaft_stiffness": 0.0,
+    "shaft_damping": 0.0,
+    "motor_inertia": 0.0,
+}
 
-    car: dict with m, l_f, l_r, radius, inertia, stiffness, h (load transfer), k (drag per speed squared), c (rolling).
+
+def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, floor=0.01):
+    """States (n, 18) at time_s: position, speed, four each of wheel speed, tyre force, shaft twist, motor speed.
+
+    car: dict with m, l_f, l_r, radius, inertia, stiffness, and those OPTIONS that are not at their defaults.
     road: list of (start, theta left, theta right).
     """
+    car = {**OPTIONS, **car}
+    angle = np.arctan(car["grade"])
+    lags, has_shaft = car["relaxation"] > 0.0, car["motor_inertia"] > 0.0
+    used = np.array([*range(6), *(range(6, 10) if lags else ()), *(range(10, 18) if has_shaft else ())])
 
     def theta_at(x):
         left_right = road[0][1:]
@@ -36,8 +55,8 @@ def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, 
 
     def axle_loads(accel):
         base = car["l_f"] + car["l_r"]
-        front = car["m"] * (G * car["l_r"] - car["h"] * accel) / (2.0 * base)
-        rear = car["m"] * (G * car["l_f"] + car["h"] * accel) / (2.0 * base)
+        front = car["m"] * (G * np.cos(angle) * car["l_r"] - car["h"] * accel) / (2.0 * base)
+        rear = car["m"] * (G * np.cos(angle) * car["l_f"] + car["h"] * accel) / (2.0 * base)
         return np.array([front, front, rear, rear])
 
     def tyre_forces(v, wheels, theta, accel):
@@ -46,25 +65,50 @@ def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, 
         for w, mu, load in zip(wheels, theta, loads, strict=True):
             rim = w * car["radius"]
             slip = (rim - v) / max(rim, v, floor)
-            out.append(np.sign(slip) * friction_force(mu, abs(slip), load, car["stiffness"]))
+            fallen = car["falloff_floor"] + (1.0 - car["falloff_floor"]) * np.exp(
+                -car["falloff"] * abs(rim - v)
+            )
+            out.append(np.sign(slip) * friction_force(mu * fallen, abs(slip), load, car["stiffness"]))
         return np.array(out), loads
 
-    def rates(t, y, theta, guess):
-        v, wheels = y[1], y[2:]
-
+    def rates(t, reduced, theta, guess):
+        y = np.zeros(18)
+        y[used] = reduced
+        v, wheels, lagged, twist, motor = y[1], y[2:6], y[6:10], y[10:14], y[14:18]
         accel = np.inf
         while abs(guess[0] - accel) > 1e-12:  # loads follow acceleration and acceleration follows loads
             accel = guess[0]
-            forces, loads = tyre_forces(v, wheels, theta, accel)
+            steady, loads = tyre_forces(v, wheels, theta, accel)
+            forces = lagged if lags else steady
             guess[0] = (forces.sum() - car["k"] * v * v) / car["m"]
-        spin = (torque_at(t) - (forces + car["c"] * loads) * car["radius"]) / car["inertia"]
-        return np.array([v, guess[0], *spin])
+        transport = np.maximum(np.maximum(wheels * car["radius"], v), floor)
+        force_rate = transport / car["relaxation"] * (steady - lagged) if lags else np.zeros(4)
+        torque = torque_at(t)
+        twist_rate = motor_rate = np.zeros(4)
+        if has_shaft:
+            twist_rate = motor - wheels
+            shaft = car["shaft_stiffness"] * twist + car["shaft_damping"] * twist_rate
+            motor_rate = (torque - shaft) / car["motor_inertia"]
+            torque = shaft
+        resistance = (forces + car["c"] * loads) * car["radius"] + car["drag_torque"]
+        spin = (torque - resistance) / (car["inertia"] - car["motor_inertia"])
+        return np.array([v, guess[0] - G * np.sin(angle), *spin, *force_rate, *twist_rate, *motor_rate])[used]
+
+    def slopes(t, y, theta, guess):
+        """The Jacobian; SciPy's own steps overflow where a rate does not depend on a state at all."""
+        steps = 1e-7 * np.maximum(np.abs(y), 1.0)
+        here = rates(t, y, theta, guess)
+        return np.column_stack(
+            [(rates(t, y + step, theta, guess) - here) / step.sum() for step in np.diag(steps)]
+        )
 
     stops = sorted({float(c) for c in corners_s if time_s[0] < c < time_s[-1]} | {float(time_s[-1])})
-    y = np.array([position, speed, *([speed / car["radius"]] * 4)])
+    rolling = [speed / car["radius"]] * 4
+    y = np.array([position, speed, *rolling, *np.zeros(8), *rolling])[used]
     t = float(time_s[0])
-    result = np.full((len(time_s), 6), np.nan)
-    result[0] = y
+    result = np.zeros((len(time_s), 18))
+    result[1:, used] = np.nan
+    result[0, used] = y
     guess = [0.0]
     for stop in stops:
         while t < stop - 1e-12:
@@ -85,13 +129,14 @@ def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, 
                 (t, stop),
                 y,
                 "Radau",
+                jac=slopes,
                 args=(theta, guess),
                 events=events,
                 dense_output=True,
                 rtol=1e-8,
-                atol=1e-10,
+                atol=np.where((used >= 6) & (used < 10), 1e-6, 1e-10),  # forces carry the slip's rounding errors
             )
             inside = (time_s > t) & (time_s <= part.t[-1] + 1e-12)
-            result[inside] = part.sol(time_s[inside]).T
+            result[np.ix_(inside, used)] = part.sol(time_s[inside]).T
             t, y = float(part.t[-1]), part.y[:, -1]
     return result

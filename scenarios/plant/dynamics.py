@@ -12,6 +12,9 @@ twist and motor speed are states. Both vanish from the step's linear equations b
 The vehicle drives forward or stands: omega >= 0 and v >= 0. A torque that resists (a brake, rolling resistance)
 can bring a wheel to rest and then holds it, it never turns it back; the ground holds a standing car likewise.
 
+All compiled code is in this one file: numba's cache notices changes of a function's own file only, not of those that
+it calls into.
+
 References
 ----------
 .. [1] Tian et al. (2022), Remote Sensing 14, 5583, doi:10.3390/rs14215583.
@@ -78,7 +81,7 @@ compiled = njit(cache=True, error_model="numpy")  # divisions are guarded here, 
 # As calls these would count references of every working array, which takes twice as long as their arithmetic.
 inlined = njit(cache=True, error_model="numpy", inline="always")
 
-_GAIN, _BY_WHEEL, _BY_SPEED, _OWN, _SHARE, _RATIO = range(6)  # rows of the pivots
+_GAIN, _BY_WHEEL, _BY_SPEED, _OWN, _SHARE, _MOTOR, _BRAKE = range(7)  # rows of the pivots
 _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)  # makes the two-stage Rosenbrock method L-stable
 
 
@@ -148,7 +151,7 @@ def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, the
 def new_wheels() -> tuple[Wheels, Wheels]:
     """Working arrays of the two stages; both read the same theta."""
     theta = np.zeros(4)
-    a, free, rates, pivots = np.zeros((14, 4)), np.ones((2, 9)), np.zeros((2, 16)), np.zeros((2, 6, 4))
+    a, free, rates, pivots = np.zeros((14, 4)), np.ones((2, 5)), np.zeros((2, 16)), np.zeros((2, 7, 4))
     first = Wheels(theta, a[0], a[1], a[2], a[3], a[4], a[5], a[6], rates[0], free[0], pivots[0])
     second = Wheels(theta, a[7], a[8], a[9], a[10], a[11], a[12], a[13], rates[1], free[1], pivots[1])
     return first, second
@@ -232,14 +235,17 @@ def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParamet
 
 
 @compiled
-def _motor_torque(speed_rad_s: float, torque_nm: float, shaft_nm: float) -> float:
-    """What accelerates a motor [N m]; a negative torque is a brake, which opposes its motion.
+def _motor_torque(speed_rad_s: float, torque_nm: float) -> tuple[float, float]:
+    """What a motor makes of its torque [N m], and its damping [N m s/rad].
 
-    Within BRAKE_FADE_RAD_S of rest the brake acts like a damper: a brake that reverses at rest would chatter.
+    A negative torque is a brake, which opposes the motor's motion. Within BRAKE_FADE_RAD_S of rest it acts like a
+    damper: a brake that reverses at rest would chatter.
     """
-    if torque_nm >= 0.0:
-        return torque_nm - shaft_nm
-    return torque_nm * min(max(speed_rad_s / BRAKE_FADE_RAD_S, -1.0), 1.0) - shaft_nm
+    if torque_nm >= 0.0 or speed_rad_s >= BRAKE_FADE_RAD_S:
+        return torque_nm, 0.0
+    if speed_rad_s <= -BRAKE_FADE_RAD_S:
+        return -torque_nm, 0.0
+    return torque_nm * speed_rad_s / BRAKE_FADE_RAD_S, -torque_nm / BRAKE_FADE_RAD_S
 
 
 @inlined
@@ -253,10 +259,9 @@ def _fill_rates(
         if p.motor_inertia_kg_m2 > 0.0:
             spread = y[MOTOR + i] - y[WHEEL + i]
             shaft_nm = p.shaft_stiffness_nm_rad * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
-            motor_nm = _motor_torque(y[MOTOR + i], torque, shaft_nm)
+            motor_nm, wheels.pivots[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
             wheels.rates[TWIST - WHEEL + i] = spread
-            wheels.rates[MOTOR - WHEEL + i] = motor_nm / p.motor_inertia_kg_m2
-            wheels.free[4 + i] = 1.0
+            wheels.rates[MOTOR - WHEEL + i] = (motor_nm - shaft_nm) / p.motor_inertia_kg_m2
             torque = shaft_nm
         rate = _wheel_rate(i, y[WHEEL + i], torque, p, wheels)
         wheels.free[i] = 0.0 if y[WHEEL + i] <= 0.0 and rate == 0.0 else 1.0
@@ -265,7 +270,7 @@ def _fill_rates(
             lag_n = wheels.steady_n[i] - y[FORCE + i]
             wheels.rates[FORCE - WHEEL + i] = wheels.lag_rate[i] * lag_n
         total_n += wheels.force_n[i]
-    wheels.free[8] = 0.0 if y[SPEED] <= 0.0 and total_n < p.mass_kg * p.slope_m_s2 else 1.0
+    wheels.free[4] = 0.0 if y[SPEED] <= 0.0 and total_n < p.mass_kg * p.slope_m_s2 else 1.0
 
 
 @inlined
@@ -282,9 +287,8 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
     for i in range(4):
         if p.motor_inertia_kg_m2 > 0.0:
             shaft = gh * (gh * p.shaft_stiffness_nm_rad + p.shaft_damping_nm_s_rad)
-            free = wheels.free[4 + i] > 0.0
-            at[_RATIO, i] = p.motor_inertia_kg_m2 / (p.motor_inertia_kg_m2 + shaft) if free else 1.0
-            inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2 + at[_RATIO, i] * shaft
+            motor = at[_MOTOR, i] = p.motor_inertia_kg_m2 + gh * at[_BRAKE, i]
+            inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2 + motor / (motor + shaft) * shaft
             per_newton = p.wheel_radius_m / inertia
         lagged = gh * wheels.lag_rate[i]
         share = lagged / (1.0 + lagged) if p.relaxation_m > 0.0 else 1.0
@@ -304,28 +308,32 @@ def _solve(
     """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; return the vehicle speed's part."""
     gh = _GAMMA * h
     at = wheels.pivots
-    stiffness, motor = gh * p.shaft_stiffness_nm_rad, p.motor_inertia_kg_m2
+    has_shaft = p.motor_inertia_kg_m2 > 0.0
+    stiffness = gh * p.shaft_stiffness_nm_rad
     shaft = gh * (stiffness + p.shaft_damping_nm_s_rad)
-    inertia = p.wheel_inertia_kg_m2 - motor
+    inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2
     rhs = speed_rhs
     for i in range(4):
-        if motor > 0.0 and wheels.free[i] > 0.0:
+        if has_shaft:
+            k[MOTOR - WHEEL + i] *= p.motor_inertia_kg_m2 / at[_MOTOR, i]
+        if has_shaft and wheels.free[i] > 0.0:
             passed = stiffness * k[TWIST - WHEEL + i] + shaft * k[MOTOR - WHEEL + i]
-            k[i] = (inertia * k[i] + at[_RATIO, i] * passed) / (inertia + at[_RATIO, i] * shaft)
+            share = at[_MOTOR, i] / (at[_MOTOR, i] + shaft)
+            k[i] = (inertia * k[i] + share * passed) / (inertia + share * shaft)
         if p.relaxation_m > 0.0:
             k[FORCE - WHEEL + i] /= 1.0 + gh * wheels.lag_rate[i]
             k[i] -= at[_GAIN, i] * k[FORCE - WHEEL + i]
             rhs += gh / p.mass_kg * k[FORCE - WHEEL + i]
         rhs += at[_SHARE, i] * k[i]
-    k_speed = rhs / pivot if wheels.free[8] > 0.0 else speed_rhs
+    k_speed = rhs / pivot if wheels.free[4] > 0.0 else speed_rhs
     for i in range(4):
         k[i] = (k[i] - at[_GAIN, i] * at[_BY_SPEED, i] * k_speed) / at[_OWN, i]
         if p.relaxation_m > 0.0:
             k[FORCE - WHEEL + i] += at[_BY_WHEEL, i] * k[i] + at[_BY_SPEED, i] * k_speed
-        if motor > 0.0:
-            if wheels.free[4 + i] > 0.0:
-                pull = shaft * k[i] - stiffness * k[TWIST - WHEEL + i]
-                k[MOTOR - WHEEL + i] = (motor * k[MOTOR - WHEEL + i] + pull) / (motor + shaft)
+        if has_shaft:
+            pull = shaft * k[i] - stiffness * k[TWIST - WHEEL + i]
+            motor = at[_MOTOR, i]
+            k[MOTOR - WHEEL + i] = (motor * k[MOTOR - WHEEL + i] + pull) / (motor + shaft)
             k[TWIST - WHEEL + i] += gh * (k[MOTOR - WHEEL + i] - k[i])
     return k_speed
 
@@ -469,12 +477,18 @@ def follow(
 
     Parameters
     ----------
+    y : array, shape (18,)
+        State at the first row; ends as the last row's.
+    torque_nm : array, shape (n, 4)
+        Torque at the wheels, linear between the rows [N m].
     push_m_s2 : array, shape (n,)
         Further acceleration of the vehicle [m/s^2].
     measured : array, shape (n, 6)
         Position, speed and wheel speeds; NaN where there is none.
     memory_s : array, shape (6,)
         Time in which a state comes to its measurement [s]; the first rows are averaged instead.
+    step_s, p, road : float, DynamicsParameters, RoadTable
+        Time between the rows [s], car, road.
 
     Returns
     -------

@@ -75,6 +75,6 @@ class Wheels(NamedTuple):
     rates: NDArray[np.float64]
     """Of y from the wheel speeds on, shape (16,)."""
     free: NDArray[np.float64]
-    """0 for what is held at rest, else 1: four wheels, four motors, the vehicle; shape (9,)."""
+    """0 for what is held at rest, else 1: four wheels and the vehicle, shape (5,)."""
     pivots: NDArray[np.float64]
-    """The step's linear equations after elimination, shape (6, 4); see dynamics.py."""
+    """The step's linear equations after elimination, shape (7, 4); see dynamics.py."""
