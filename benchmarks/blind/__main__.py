@@ -25,7 +25,7 @@ from .runner import RunError, pending, run, seal_run, write_case
 from .scorer import score_run
 from .show import draw_confusion, print_scores
 
-app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
+app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 console, complaints = Console(), Console(stderr=True, soft_wrap=True)
 
 

@@ -99,6 +99,6 @@ def draw_road(rng: Generator, rich: bool) -> Road:
     while starts[-1] < end:
         dry = mus[-1] > 0.8
         starts.append(round(starts[-1] + rng.uniform(*((50.0, 120.0) if dry else (40.0, 100.0))), 1))
-        slippery = rng.choice([0.5, 0.3]) if rich else 0.5
+        slippery = float(rng.choice([0.5, 0.3])) if rich else 0.5
         mus.append(round(slippery * rng.uniform(0.93, 1.07) if dry else rng.uniform(0.85, 0.95), 2))
     return Road(tuple(starts), tuple(mus))
