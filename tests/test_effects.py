@@ -1,12 +1,14 @@
 from dataclasses import dataclass, fields
+from itertools import product
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 import scenarios.effects as effects_module
 from scenarios.effects import EFFECTS, Effect, make_effect
-from scenarios.effects.base import parameter
+from scenarios.effects.base import Stage, Subsystem, parameter
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant import initial_state, make_log, simulate
@@ -32,6 +34,9 @@ CONTRACT_IDS = {
     "wheel_speed_quantisation", "vehicle_speed_delay", "vehicle_speed_scale", "accelerometer_bias", "mu_split",
     "camera_latency", "camera_pitch", "exposure_shift", "motion_blur", "class_friction_offset",
 }  # fmt: skip
+IN_THE_LOG = [key for key, effect in EFFECTS.items() if effect.stage != "perception"]
+"""Effects that act on the plant and its sensors; the camera chain's act on pictures."""
+NOMINAL = CAR.to_core()
 
 
 def car_with(**effects):
@@ -56,17 +61,17 @@ def assert_same(a, b):
 
 @pytest.mark.parametrize("effect_id", EFFECTS)
 def test_neutral_values_reproduce_the_base_plant_bit_for_bit(effect_id):
-    neutral = {p.name: p.neutral_value(CAR.to_core()) for p in EFFECTS[effect_id].parameters()}
+    neutral = {p.name: p.neutral_value(NOMINAL) for p in EFFECTS[effect_id].parameters()}
     base = drive_through_everything(car_with())
     run = drive_through_everything(car_with(**{effect_id: neutral}))
     assert_same(run, base)
     assert make_log(run, car_with(**{effect_id: neutral})).equals(make_log(base, car_with()))
-    assert EFFECTS[effect_id].neutral(CAR.to_core()) == make_effect(effect_id, neutral, CAR.to_core())
+    assert EFFECTS[effect_id].neutral(NOMINAL) == make_effect(effect_id, neutral, NOMINAL)
 
 
-@pytest.mark.parametrize("effect_id", EFFECTS)
+@pytest.mark.parametrize("effect_id", IN_THE_LOG)
 def test_other_values_change_the_log(effect_id):
-    bounds = {p.name: p.bounds(CAR.to_core()) for p in EFFECTS[effect_id].parameters()}
+    bounds = {p.name: p.bounds(NOMINAL) for p in EFFECTS[effect_id].parameters()}
     middle = {name: 0.3 * low + 0.7 * high for name, (low, high) in bounds.items()}
     car = car_with(**{effect_id: middle})
     base = drive_through_everything(car_with())
@@ -80,19 +85,82 @@ def test_each_effect_describes_itself(effect_id):
     assert effect.equation
     assert effect.source
     assert effect.excited_by
+    assert effect.stage in get_args(Stage)
+    assert effect.subsystem in get_args(Subsystem)
+    assert effect.look_alikes
     assert set(effect.look_alikes) <= CONTRACT_IDS - {effect_id}
     assert effect.parameters()
     for p in effect.parameters():
         assert p.unit
         assert p.meaning
-        low, high = p.bounds(CAR.to_core())
-        assert low <= p.neutral_value(CAR.to_core()) <= high
+        low, high = p.bounds(NOMINAL)
+        assert low <= p.neutral_value(NOMINAL) <= high
 
 
-def test_order_of_effects_does_not_matter():
-    values = {"load_transfer": {"cog_height_m": 0.54}, "aero_drag": {"drag_area_m2": 0.65}}
-    backwards = dict(reversed(values.items()))
-    assert_same(drive_through_everything(car_with(**values)), drive_through_everything(car_with(**backwards)))
+def test_every_id_of_the_contract_is_there():
+    assert set(EFFECTS) == CONTRACT_IDS
+
+
+@pytest.mark.parametrize("effect_id", EFFECTS)
+def test_bounds_are_accepted_and_nothing_beyond_them(effect_id):
+    neutral = {p.name: p.neutral_value(NOMINAL) for p in EFFECTS[effect_id].parameters()}
+    for p in EFFECTS[effect_id].parameters():
+        low, high = p.bounds(NOMINAL)
+        for value in (low, high):
+            assert getattr(make_effect(effect_id, {**neutral, p.name: value}, NOMINAL), p.name) == value
+        for value in (low - 1e-6, high + max(1e-6, 1e-9 * high), float("nan")):
+            with pytest.raises(ValueError, match=rf"{effect_id}.{p.name} is .*expected"):
+                make_effect(effect_id, {**neutral, p.name: value}, NOMINAL)
+
+
+@pytest.mark.parametrize("effect_id", IN_THE_LOG)
+def test_a_fit_may_start_at_its_start_values(effect_id):
+    parameters = EFFECTS[effect_id].parameters()
+    for p in parameters:
+        low, high = p.bounds(NOMINAL)
+        starts, neutral = p.start_values(NOMINAL), p.neutral_value(NOMINAL)
+        assert starts
+        assert low <= min(starts) <= max(starts) <= high
+        if low < neutral < high and effect_id not in ("driveline_compliance", "wheel_speed_quantisation"):
+            assert min(starts) < neutral < max(starts)
+    for values in product(*(p.start_values(NOMINAL) for p in parameters)):
+        car = car_with(**{effect_id: dict(zip((p.name for p in parameters), values, strict=True))})
+        run = drive_through_everything(car)
+        assert np.isfinite(make_log(run, car).to_numpy()).all()
+        assert 3.0 < run.speed_m_s.max() < 9.0
+
+
+def test_order_in_the_file_does_not_matter():
+    values = {
+        key: {p.name: p.start_values(NOMINAL)[0] for p in EFFECTS[key].parameters()} for key in IN_THE_LOG
+    }
+    forwards, backwards = car_with(**values), car_with(**dict(reversed(values.items())))
+    assert list(forwards.effects) != list(backwards.effects)
+    assert [effect.id for effect in backwards.make_effects()] == IN_THE_LOG
+    run, other = drive_through_everything(forwards), drive_through_everything(backwards)
+    assert_same(run, other)
+    assert make_log(run, forwards).equals(make_log(other, backwards))
+
+
+@pytest.mark.parametrize(
+    "off",
+    [
+        {"friction_falloff": {"falloff_s_m": 0.0, "floor": 0.3}},
+        {
+            "driveline_compliance": {
+                "stiffness_nm_rad": 500.0,
+                "damping_nm_s_rad": 7.0,
+                "motor_inertia_kg_m2": 0.0,
+            }
+        },
+        {"wheel_speed_quantisation": {"teeth": 7.0, "window_s": 0.0}},
+    ],
+    ids=lambda off: next(iter(off)),
+)
+def test_one_neutral_parameter_switches_an_effect_off_whatever_the_others(off):
+    run, base = drive_through_everything(car_with(**off)), drive_through_everything(car_with())
+    assert_same(run, base)
+    assert make_log(run, car_with(**off)).equals(make_log(base, car_with()))
 
 
 def test_air_drag_coasting_makes_the_inverse_speed_grow_linearly():
@@ -139,17 +207,17 @@ def test_load_transfer_follows_the_closed_form():
 
 def test_unknown_effect_suggests_the_known_one():
     with pytest.raises(ValueError, match=r"'aero_darg' is not an effect.*did you mean 'aero_drag'"):
-        make_effect("aero_darg", {}, CAR.to_core())
+        make_effect("aero_darg", {}, NOMINAL)
 
 
 def test_all_problems_of_an_effect_come_at_once():
     with pytest.raises(
         ValueError, match=r"'drag_aera_m2'.*did you mean 'drag_area_m2'.*needs drag_area_m2"
     ) as caught:
-        make_effect("aero_drag", {"drag_aera_m2": 0.6}, CAR.to_core())
+        make_effect("aero_drag", {"drag_aera_m2": 0.6}, NOMINAL)
     assert "m^2" in str(caught.value)
     with pytest.raises(ValueError, match=r"rolling_resistance.coefficient is 12; expected 0 to 0.3"):
-        make_effect("rolling_resistance", {"coefficient": 12.0}, CAR.to_core())
+        make_effect("rolling_resistance", {"coefficient": 12.0}, NOMINAL)
 
 
 def test_actuators_and_sensors_take_one_file_each(monkeypatch):
