@@ -46,6 +46,8 @@ HIDDEN: dict[str, dict[str, tuple[float, float]]] = {
 NOISE = SensorNoise(wheel_speed_noise_rad_s=0.05, vehicle_speed_noise_m_s=0.02, accel_x_noise_m_s2=0.08)
 LOGS = ("fit_1.csv", "fit_2.csv", "holdout.csv")
 DURATION_S, STEP_S = 30.0, 0.005
+FINE = 5
+"""Steps of the plant per row of a log: the real car is not stepped by its logger."""
 ROAD_M = 1000.0
 THETA: dict[SurfaceName, float] = {"dry": 0.9, "wet": 0.5, "snow_ice": 0.3}
 STRETCHES: tuple[SurfaceName, ...] = ("dry", "dry", "wet", "snow_ice")
@@ -105,11 +107,13 @@ def make_case(folder: Path, seed: int) -> Case:
     (folder / "road.yaml").write_text(yaml.safe_dump(road.model_dump(by_alias=True), sort_keys=False))
     for number, name in enumerate(LOGS):
         speed_m_s = float(rng.uniform(8.0, 14.0))
-        torque_nm = draw_manoeuvre(rng, vehicle, speed_m_s).torque(np.arange(0.0, DURATION_S, STEP_S))
-        trajectory = simulate(real, road, torque_nm, STEP_S, initial_speed_m_s=speed_m_s)
+        fine_s = STEP_S / FINE
+        time_s = np.linspace(0.0, DURATION_S, round(DURATION_S / fine_s), endpoint=False)
+        torque_nm = draw_manoeuvre(rng, vehicle, speed_m_s).torque(time_s)
+        trajectory = simulate(real, road, torque_nm, fine_s, initial_speed_m_s=speed_m_s)
         # the friction reference would give a hidden friction effect away, and few cars have one
         log = make_log(trajectory, real, NOISE, seed=1000 * seed + number).drop(columns="mu_reference")
-        write_log(log, folder / name)
+        write_log(log.iloc[::FINE], folder / name)
     text = json.dumps({"effect": truth.effect, "parameters": truth.parameters}, indent=1) + "\n"
     (folder / "truth.json").write_text(text, encoding="utf-8")
     return Case(

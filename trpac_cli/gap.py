@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.panel import Panel
@@ -248,15 +249,12 @@ def _summarise(console: Console, said: Diagnosis) -> None:
 def _cause_table(said: Diagnosis) -> Table:
     from sim2real.report import estimate, percent
 
-    table = Table(title="Causes, likeliest first", title_justify="left")
-    for heading, justify in (
-        ("effect", "left"),
-        ("probability", "right"),
-        ("estimate, 95 % interval", "left"),
-        ("gap with it", "right"),
-        ("shrink", "left"),
-    ):
-        table.add_column(heading, justify=justify)  # type: ignore[arg-type]
+    table = Table(title="Causes, likeliest first", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("effect", no_wrap=True)
+    table.add_column("prob.", justify="right", no_wrap=True)
+    table.add_column("estimate (95 % interval)")
+    table.add_column("gap", justify="right", no_wrap=True)
+    table.add_column("shrink", justify="right", no_wrap=True)
     for cause in said.causes[:MOST_CAUSES]:
         values = "\n".join(f"{name} {estimate(value)}" for name, value in cause.parameters.items())
         table.add_row(
@@ -264,7 +262,7 @@ def _cause_table(said: Diagnosis) -> Table:
             percent(cause.probability),
             values,
             f"{cause.gap_after:.2f}",
-            estimate(cause.shrink_percent),
+            f"{cause.shrink_percent.value:.0f} %",
         )
     return table
 
@@ -272,7 +270,7 @@ def _cause_table(said: Diagnosis) -> Table:
 @contextmanager
 def _bars() -> Iterator[Told]:
     """A progress bar per stage, and what to tell them."""
-    columns = (TextColumn("{task.description:>14}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description:>20}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns) as bars:
         tasks: dict[str, TaskID] = {}
 
