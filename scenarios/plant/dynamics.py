@@ -62,8 +62,8 @@ TOLERANCE_M_S = 2e-5
 RELATIVE_TOLERANCE = 5e-5
 """What the accepted error estimate grows by with speed, which keeps slip equally accurate at all speeds [-]."""
 
-BRAKE_FADE_RAD_S = 1.0
-"""Motor speed below which its brake fades out [rad/s]."""
+BRAKE_FADE_RAD_S = 0.02
+"""Motor speed below which its brake fades out; the rim then creeps by no more than the slip's floor [rad/s]."""
 
 SHORTEST_STEP_S = 1e-5
 """A sub-step of this length is taken whatever its error estimate says [s]."""
@@ -363,7 +363,7 @@ def _try_step(
     k_1, k_2 = first.rates, second.rates
     _fill_rates(y, torque_nm, next_torque_nm, begin, p, first)
     pivot = _factor(y[SPEED], h, p, first)
-    speed_1 = _solve(accel - p.slope_m_s2 if first.free[8] > 0.0 else 0.0, pivot, h, p, first, k_1)
+    speed_1 = _solve(accel - p.slope_m_s2 if first.free[4] > 0.0 else 0.0, pivot, h, p, first, k_1)
     trial[SPEED] = y[SPEED] + h * speed_1
     for j in range(count):
         trial[WHEEL + j] = y[WHEEL + j] + h * k_1[j]
