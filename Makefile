@@ -3,8 +3,9 @@ PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+BLIND_SEED ?= 1
 
-.PHONY: help demo test check format lock clean
+.PHONY: help demo test check format lock clean blind
 
 help:            ## this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -36,6 +37,10 @@ lock: $(READY)   ## resolve the dependencies anew (needs uv on PATH)
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
 	  --no-emit-index-url --no-emit-find-links \
 	  --extra fmu --extra scenarios --extra design --extra dev pyproject.toml -o requirements/dev.txt
+
+blind: $(READY)  ## the diagnosis on withheld cases, all thresholds (long; BLIND_SEED=n for other cases)
+	$(BIN)/python -m benchmarks.blind run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --jobs 2
+	$(BIN)/python -m benchmarks.blind score --out out/blind-$(BLIND_SEED)
 
 clean:           ## remove what was built and measured
 	rm -rf out dist build

@@ -25,6 +25,9 @@ from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, noise_o
 from benchmarks.blind.generator.table import PAIRS, SIZES, Group, Spec, table
 from benchmarks.blind.generator.tyre import dugoff, magic, peaks
 from benchmarks.blind.generator.world import World, nominal, with_magic
+from scenarios.files import load_road, load_vehicle
+from scenarios.plant import make_log as make_product_log
+from scenarios.plant import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 GENERATOR = ROOT / "benchmarks" / "blind" / "generator"
@@ -276,6 +279,28 @@ def test_integration_has_converged():
     integrate(world.physics, y, 0, len(fine) - 1, 6 * world.split, driven.command, fine)
     off = np.sqrt(np.mean((driven.path - fine)[1:, [V, W, W + 2, N]] ** 2, axis=0))
     assert np.all(off < [1e-4, 2e-3, 2e-3, 2e-3])
+
+
+@pytest.mark.parametrize("name", ["no_gap-0-rich", "no_gap-1-rich", "no_gap-2-calm"])
+def test_the_nominal_car_is_the_products(name, tmp_path):
+    """Two plants, written apart, agree: what is called no gap is none, wheels that lock included."""
+    case = make_case(next(s for s in table("full") if s.name == name), seed=1)
+    case.write(tmp_path)
+    driven = case.drives["fit_1"]
+    path = driven.path[:14_000]
+    clock, command = np.arange(len(path)) * 1e-3, np.arange(len(driven.command)) * 1e-2
+    torque = np.column_stack([np.interp(clock, command, wheel) for wheel in driven.command.T])
+    vehicle, road = load_vehicle(tmp_path / "vehicle.yaml"), load_road(tmp_path / "road.yaml")
+    log = make_product_log(simulate(vehicle, road, torque, 1e-3, path[0, V], path[0, X]), vehicle)
+    signals = [
+        "wheel_speed_fl_rad_s",
+        "wheel_speed_rr_rad_s",
+        "vehicle_speed_m_s",
+        "accel_x_m_s2",
+        "position_m",
+    ]
+    off = np.sqrt(np.mean((path[:, [W, W + 3, V, N, X]] - log[signals].to_numpy()) ** 2, axis=0))
+    assert np.all(off < [0.008, 0.008, 5e-4, 4e-3, 2e-3])
 
 
 NEUTRAL = {

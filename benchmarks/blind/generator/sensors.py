@@ -152,9 +152,14 @@ def noise_of(noise: Noise, time_s: Array, rng: Generator) -> Array:
 def make_log(
     path: Array, command: Array, sensors: Sensors, noise: Noise, rate_hz: float, rng: Generator
 ) -> pd.DataFrame:
-    """The log as the car's logger wrote it: noise, jittered clock, lost samples."""
+    """The log as the car's logger wrote it: noise, jittered clock, lost samples.
+
+    Without jitter every corner of the command falls on a row, so that a straight line between rows is the command.
+    """
     rows = int((len(path) - 1) * RECORD_STEP_S * rate_hz)
-    time_s = (np.arange(rows) + 0.5 + np.clip(rng.normal(0.0, 1.0, rows) * noise.jitter, -0.3, 0.3)) / rate_hz
+    time_s = (
+        np.arange(1, rows + 1) + np.clip(rng.normal(0.0, 1.0, rows) * noise.jitter, -0.3, 0.3)
+    ) / rate_hz
     values = read(path, sensors, time_s) + noise_of(noise, time_s, rng)
     record = np.arange(len(path)) * RECORD_STEP_S
     position = np.interp(time_s, record, path[:, X]) + noise.position_m * rng.standard_normal(rows)

@@ -18,6 +18,8 @@ from .tyre import THETA_GRID, peaks
 Array = NDArray[np.floating[Any]]
 Parameters = dict[str, float]
 
+PITCH_S = 0.0005
+"""How late the loads follow the acceleration, in place of an implicit loop. 4 ms would show in a locking wheel."""
 AIR_KG_M3 = 1.225
 """Of the standard atmosphere (ISO 2533): the density that a drag area refers to."""
 
@@ -79,7 +81,7 @@ def nominal(car: Car, road: Road) -> World:
             front_arm=front,
             rear_arm=car.cog_to_rear_axle_m,
             cog_height=height,
-            pitch_time=0.004,
+            pitch_time=PITCH_S,
             radius=car.wheel_radius_m,
             inertia=car.wheel_inertia_kg_m2,
             stiffness_drive=car.stiffness_n,
