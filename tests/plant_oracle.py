@@ -134,7 +134,9 @@ def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, 
                 events=events,
                 dense_output=True,
                 rtol=1e-8,
-                atol=np.where((used >= 6) & (used < 10), 1e-6, 1e-10),  # forces carry the slip's rounding errors
+                atol=np.where(
+                    (used >= 6) & (used < 10), 1e-6, 1e-10
+                ),  # forces carry the slip's rounding errors
             )
             inside = (time_s > t) & (time_s <= part.t[-1] + 1e-12)
             result[np.ix_(inside, used)] = part.sol(time_s[inside]).T

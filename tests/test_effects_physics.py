@@ -1,0 +1,342 @@
+"""Each effect of actuators, dynamics and road against an oracle of its own: closed forms, SciPy, linear algebra."""
+
+from itertools import pairwise
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+from scipy.signal import StateSpace, lsim
+
+from scenarios.files import RoadFile, VehicleFile, load_vehicle
+from scenarios.plant import dynamics, simulate
+from scenarios.plant.parameters import MOTOR, SPEED, TWIST, WHEEL
+from scenarios.plant.pipeline import actual_torque, make_setup
+from trpac_core.tyre import force as tyre_force
+
+CAR = load_vehicle(
+    Path(__file__).parents[1] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml"
+).model_copy(update={"effects": {}})
+MASS, RADIUS, INERTIA = CAR.mass_kg, CAR.wheel_radius_m, CAR.wheel_inertia_kg_m2
+STIFFNESS = CAR.tyre.longitudinal_stiffness_n
+ROLLING_MASS = MASS + 4.0 * INERTIA / RADIUS**2
+"""What coasting decelerates: the car and its turning wheels [kg]."""
+G = 9.81
+LOCKED = 0.79
+"""Share of theta that a locked modified Dugoff tyre keeps: its shape function at slip 1."""
+
+
+def car_with(**effects):
+    return VehicleFile.model_validate({**CAR.model_dump(by_alias=True), "effects": effects})
+
+
+def make_road(theta):
+    row = {"start_m": 0.0, "mu_left": theta, "mu_right": theta, "surface": "dry"}
+    return RoadFile.model_validate({"schema": 1, "segments": [row]})
+
+
+DRY, ICE = make_road(0.9), make_road(0.3)
+
+
+def drive(car, torque_nm, duration_s, speed=0.0, road=DRY, step_s=1e-3):
+    """Constant torque, or torque through (time, torque) knots, at all wheels."""
+    time_s = np.arange(round(duration_s / step_s) + 1) * step_s
+    knots = torque_nm if isinstance(torque_nm, list) else [(0.0, torque_nm)]
+    times, torques = zip(*knots, strict=True)
+    torque = np.repeat(np.interp(time_s, times, torques)[:, None], 4, axis=1)
+    return simulate(car, road, torque, step_s, speed)
+
+
+def settled_acceleration(run):
+    """Mean acceleration once the slip has settled [m/s^2]."""
+    after = run.time_s > 0.3
+    return np.polyfit(run.time_s[after], run.speed_m_s[after], 1)[0]
+
+
+class TestGrade:
+    UP = 0.08
+    ALONG = G * 0.08 / np.hypot(1.0, 0.08)
+
+    def test_coasting_uphill_slows_linearly_then_rests(self):
+        run = drive(car_with(road_grade={"grade": self.UP}), 0.0, 6.0, 3.0)
+        decel = MASS * self.ALONG / ROLLING_MASS
+        stop_s = 3.0 / decel
+        moving = run.time_s < stop_s - 0.05
+        assert run.speed_m_s[moving] == pytest.approx(3.0 - decel * run.time_s[moving], abs=3e-3)
+        resting = run.time_s > stop_s + 0.05
+        assert resting.sum() > 1000
+        assert not run.speed_m_s[resting].any()
+        assert np.ptp(run.position_m[resting]) == 0.0
+        # Held by the ground, an accelerometer reads gravity's part along the road.
+        assert run.accel_x_m_s2[resting] == pytest.approx(self.ALONG, rel=1e-12)
+
+    @pytest.mark.parametrize("grade", [-0.15, 0.15])
+    def test_accelerometer_reads_the_change_of_speed_and_gravitys_part(self, grade):
+        run = drive(car_with(road_grade={"grade": grade}), [(0.0, 0.0), (0.3, 150.0), (1.0, 50.0)], 1.0, 10.0)
+        along = G * np.sin(np.arctan(grade))
+        change = np.gradient(run.speed_m_s, run.time_s)
+        assert run.accel_x_m_s2[5:-5] == pytest.approx(change[5:-5] + along, abs=2e-3)
+        assert run.vertical_load_n.sum(1) == pytest.approx(MASS * G * np.cos(np.arctan(grade)), rel=1e-12)
+
+    def test_a_parked_car_rolls_downhill_only(self):
+        assert drive(car_with(road_grade={"grade": -0.05}), 0.0, 1.0).speed_m_s[-1] > 0.3
+        assert not drive(car_with(road_grade={"grade": 0.05}), 0.0, 1.0).speed_m_s.any()
+
+    def test_brakes_hold_it_downhill(self):
+        run = drive(car_with(road_grade={"grade": -0.05}), -300.0, 3.0)
+        assert run.speed_m_s[-1] < 1e-3  # what is left is the tyre's creep at its floor speed
+        assert run.position_m[-1] < 1e-3
+        assert run.accel_x_m_s2[-1] == pytest.approx(G * np.sin(np.arctan(-0.05)), rel=1e-3)
+
+    def test_torque_below_the_slopes_pull_does_not_start_the_car(self):
+        pull_nm = MASS * self.ALONG * RADIUS / 4.0
+        car = car_with(road_grade={"grade": self.UP})
+        assert drive(car, 0.98 * pull_nm, 2.0).position_m[-1] < 1e-6
+        assert drive(car, 1.05 * pull_nm, 2.0).speed_m_s[-1] > 0.01
+
+
+@pytest.mark.parametrize("payload_kg", [-250.0, 400.0])
+def test_payload_counts_as_mass_and_load(payload_kg):
+    run = drive(car_with(mass_offset={"mass_kg": payload_kg}), 100.0, 1.5, 15.0)
+    mass = MASS + payload_kg
+    expected = 4.0 * 100.0 / RADIUS / (mass + 4.0 * INERTIA / RADIUS**2)
+    assert settled_acceleration(run) == pytest.approx(expected, rel=2e-3)
+    assert run.vertical_load_n.sum(1) == pytest.approx(mass * G, rel=1e-12)
+
+
+@pytest.mark.parametrize("radius_m", [0.27, 0.31])
+def test_true_radius_sets_free_rolling_and_lever(radius_m):
+    car = car_with(wheel_radius_offset={"radius_m": radius_m})
+    rolling = drive(car, 0.0, 0.5, 20.0)
+    assert rolling.speed_m_s[-1] / rolling.wheel_speed_rad_s[-1] == pytest.approx(radius_m, rel=1e-6)
+    expected = 400.0 / radius_m / (MASS + 4.0 * INERTIA / radius_m**2)
+    assert settled_acceleration(drive(car, 100.0, 1.5, 15.0)) == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("inertia", [0.6, 3.0])
+def test_true_inertia_sets_how_a_wheel_spins_up(inertia):
+    """A spinning wheel: I omega' = T - F R with the force that the log holds."""
+    run = drive(car_with(wheel_inertia_offset={"inertia_kg_m2": inertia}), 600.0, 0.6, 5.0, ICE)
+    rate = np.gradient(run.wheel_speed_rad_s[:, 0], run.time_s)[20:-20]
+    balance = (600.0 - run.tyre_force_n[20:-20, 0] * RADIUS) / rate
+    assert run.slip[-1, 0] > 0.5
+    assert np.median(balance) == pytest.approx(inertia, rel=1e-3)
+
+
+@pytest.mark.parametrize("stiffness_n", [20_000.0, 90_000.0])
+def test_true_stiffness_sets_slip_per_force(stiffness_n):
+    run = drive(car_with(tyre_stiffness_offset={"stiffness_n": stiffness_n}), 150.0, 0.5, 10.0)
+    for wheel in (0, 3):
+        slip, load = run.slip[-1, wheel], run.vertical_load_n[-1, wheel]
+        assert run.tyre_force_n[-1, wheel] == pytest.approx(
+            tyre_force(0.9, slip, load, stiffness_n, 1.0), rel=1e-9
+        )
+    assert run.slip[-1, 0] * stiffness_n == pytest.approx(run.tyre_force_n[-1, 0] / 1.27, rel=0.03)
+
+
+def test_friction_offset_scales_what_a_locked_wheel_keeps():
+    run = drive(car_with(friction_offset={"factor": 0.6}), -2000.0, 0.6, 15.0)
+    assert not run.wheel_speed_rad_s[-1].any()
+    assert run.accel_x_m_s2[-1] == pytest.approx(-LOCKED * 0.6 * 0.9 * G, rel=1e-6)
+
+
+def test_mu_split_gives_each_side_its_own_friction():
+    run = drive(car_with(mu_split={"left_factor": 0.4, "right_factor": 1.1}), -2500.0, 0.8, 15.0, ICE)
+    used = run.tyre_force_n[-1] / run.vertical_load_n[-1]
+    assert not run.wheel_speed_rad_s[-1].any()
+    assert used[[0, 2]] == pytest.approx(-LOCKED * 0.4 * 0.3, rel=1e-6)
+    assert used[[1, 3]] == pytest.approx(-LOCKED * 1.1 * 0.3, rel=1e-6)
+
+
+def test_friction_falls_with_sliding_speed_along_a_locked_stop():
+    run = drive(car_with(friction_falloff={"falloff_s_m": 0.1, "floor": 0.4}), -2500.0, 6.0, 20.0)
+    locked = (run.wheel_speed_rad_s == 0.0).all(axis=1) & (run.speed_m_s > 0.1)
+    theta = 0.9 * (0.4 + 0.6 * np.exp(-0.1 * run.speed_m_s[locked]))
+    assert locked.sum() > 1500
+    assert run.accel_x_m_s2[locked] == pytest.approx(-LOCKED * theta * G, rel=1e-6)
+    assert np.ptp(theta) > 0.15
+
+
+def test_brake_drag_slows_linearly_then_holds():
+    drag_nm = 40.0
+    run = drive(car_with(brake_drag={"torque_nm": drag_nm}), 0.0, 6.0, 2.0)
+    decel = 4.0 * drag_nm / RADIUS / ROLLING_MASS
+    stop_s = 2.0 / decel
+    moving = run.time_s < stop_s - 0.05
+    assert run.speed_m_s[moving] == pytest.approx(2.0 - decel * run.time_s[moving], abs=2e-3)
+    assert not run.speed_m_s[run.time_s > stop_s + 0.05].any()
+    car = car_with(brake_drag={"torque_nm": drag_nm})
+    assert not drive(car, 0.99 * drag_nm, 0.5).speed_m_s.any()
+    assert drive(car, 1.2 * drag_nm, 0.5).speed_m_s[-1] > 0.0
+
+
+class TestActuators:
+    STEP_S = 2e-3
+    TIME = np.arange(800) * 2e-3
+
+    @pytest.fixture
+    def command(self):
+        knots = np.random.default_rng(3).uniform(-300.0, 300.0, (17, 4))
+        return np.column_stack([np.interp(self.TIME, np.linspace(0.0, 1.6, 17), k) for k in knots.T])
+
+    def actuate(self, command, **effects):
+        return actual_torque(car_with(**effects), self.TIME, command)
+
+    def test_gain(self, command):
+        assert (self.actuate(command, torque_gain={"factor": 0.8}) == 0.8 * command).all()
+
+    @pytest.mark.parametrize("time_constant_s", [1e-4, 0.02, 0.3, 2.0])
+    def test_lag_agrees_with_scipys_linear_simulation(self, command, time_constant_s):
+        lagged = self.actuate(command, torque_lag={"time_constant_s": time_constant_s})
+        rate = 1.0 / time_constant_s
+        system = StateSpace([[-rate]], [[rate]], [[1.0]], [[0.0]])
+        for wheel in range(4):
+            _, expected, _ = lsim(system, command[:, wheel], self.TIME, X0=[command[0, wheel]], interp=True)
+            assert lagged[:, wheel] == pytest.approx(expected, abs=1e-6)
+
+    def test_lag_holds_a_constant_command(self):
+        still = np.full((800, 4), -123.0)
+        lagged = self.actuate(still, torque_lag={"time_constant_s": 0.1})
+        assert lagged == pytest.approx(still, rel=1e-12)
+
+    def test_delay_of_whole_steps_shifts_the_rows(self, command):
+        late = self.actuate(command, torque_delay={"delay_s": 25 * self.STEP_S})
+        assert late[25:] == pytest.approx(command[:-25], abs=1e-9)
+        assert (late[:25] == command[0]).all()
+
+    def test_delay_of_half_a_step_lies_between_the_rows(self, command):
+        late = self.actuate(command, torque_delay={"delay_s": 0.5 * self.STEP_S})
+        assert late[1:] == pytest.approx(0.5 * (command[1:] + command[:-1]), abs=1e-9)
+
+    def test_the_car_gets_what_the_actuators_make(self, command):
+        effects = {"torque_gain": {"factor": 0.9}, "torque_lag": {"time_constant_s": 0.05}}
+        run = simulate(car_with(**effects), DRY, command, self.STEP_S, 20.0)
+        direct = simulate(CAR, DRY, self.actuate(command, **effects), self.STEP_S, 20.0)
+        assert (run.speed_m_s == direct.speed_m_s).all()
+        assert (run.wheel_torque_nm == command).all()
+
+
+class TestRelaxation:
+    def test_a_short_length_is_the_plant_without_it(self):
+        knots = [(0.0, 0.0), (0.1, 250.0), (0.6, -200.0), (1.0, -200.0)]
+        base, run = (
+            drive(car_with(**e), knots, 1.0, 15.0) for e in ({}, {"tyre_relaxation": {"length_m": 1e-3}})
+        )
+        assert run.speed_m_s == pytest.approx(base.speed_m_s, abs=1e-3)
+        assert run.tyre_force_n == pytest.approx(base.tyre_force_n, abs=30.0)
+
+    @pytest.mark.parametrize("speed", [5.0, 20.0])
+    def test_force_follows_the_linear_model(self, speed):
+        """Wheel, lagging force and a quarter of the car, at so little slip that the tyre is linear."""
+        length, stiffness = 0.5, 1.27 * STIFFNESS
+        run = drive(car_with(tyre_relaxation={"length_m": length}), [(0.0, 0.0), (1e-3, 20.0)], 0.5, speed)
+        system = StateSpace(
+            [
+                [0.0, -RADIUS / INERTIA, 0.0],
+                [stiffness * RADIUS / length, -speed / length, -stiffness / length],
+                [0.0, 4.0 / MASS, 0.0],
+            ],
+            [[1.0 / INERTIA], [0.0], [0.0]],
+            np.eye(3),
+            np.zeros((3, 1)),
+        )
+        _, expected, _ = lsim(system, run.wheel_torque_nm[:, 0], run.time_s, interp=True)
+        peak_n = expected[:, 1].max()
+        assert peak_n > 1.2 * 20.0 / RADIUS  # it rings
+        assert run.tyre_force_n[:, 0] == pytest.approx(expected[:, 1], abs=0.01 * peak_n)
+
+    def test_a_stop_ends_at_rest_and_what_is_wound_up_does_not_push_the_car(self):
+        knots = [(0.0, 0.0), (0.1, -200.0), (2.0, -200.0), (2.1, 0.0), (6.0, 0.0)]
+        run = drive(car_with(tyre_relaxation={"length_m": 0.5}), knots, 6.0, 3.0)
+        assert (run.speed_m_s >= 0.0).all()
+        stopped = int(np.argmax(run.speed_m_s == 0.0))
+        assert 0 < stopped < 2000
+        assert run.accel_x_m_s2[stopped:2000].max() <= 1e-9
+        assert run.speed_m_s[-1000:].max() < 0.1
+
+
+class TestDriveline:
+    K, D, J = 6000.0, 4.0, 0.5
+    SHAFT = MappingProxyType(
+        {"driveline_compliance": {"stiffness_nm_rad": K, "damping_nm_s_rad": D, "motor_inertia_kg_m2": J}}
+    )
+
+    def states(self, torque_nm, speed, duration_s, effects=None):
+        setup = make_setup(car_with(**(effects or self.SHAFT)), DRY)
+        torque = np.full((round(duration_s / 1e-3) + 1, 4), torque_nm)
+        start = dynamics.initial_y(speed, 0.0, setup.parameters)
+        return dynamics.run(start, torque, 1e-3, setup.parameters, setup.road)[0]
+
+    def test_rings_at_its_natural_frequency(self):
+        """Eigenvalues of the linear model of twist, motor, wheel and a quarter car on the tyre's slip stiffness."""
+        speed = 8.0
+        tyre = 1.27 * STIFFNESS / speed
+        quarter, wheel = MASS / 4.0, INERTIA - self.J
+        a = np.array(
+            [
+                [0.0, 1.0, -1.0, 0.0],
+                [-self.K / self.J, -self.D / self.J, self.D / self.J, 0.0],
+                [self.K / wheel, self.D / wheel, -(self.D + tyre * RADIUS**2) / wheel, tyre * RADIUS / wheel],
+                [0.0, 0.0, tyre * RADIUS / quarter, -tyre / quarter],
+            ]
+        )  # fmt: skip
+        modes = np.linalg.eigvals(a)
+        mode = modes[np.argmax(modes.imag)]
+        twist = self.states(20.0, speed, 0.6)[:, TWIST]
+        swing = twist - np.mean(twist[-100:])
+        crossing = np.flatnonzero((swing[:-1] < 0.0) & (swing[1:] >= 0.0))
+        exact = crossing + swing[crossing] / (swing[crossing] - swing[crossing + 1])
+        period_s = np.diff(exact)[:5].mean() * 1e-3
+        assert 2.0 * np.pi / period_s == pytest.approx(mode.imag, rel=0.01)
+        peaks = [swing[i:j].max() for i, j in pairwise(crossing[:6])]
+        decay = -np.polyfit(np.arange(5) * period_s, np.log(peaks), 1)[0]
+        assert decay == pytest.approx(-mode.real, rel=0.05)
+
+    def test_settles_at_the_torque_that_it_passes_on(self):
+        y = self.states(100.0, 8.0, 2.0)[-1]
+        accel = 400.0 / RADIUS / ROLLING_MASS
+        assert self.K * y[TWIST] == pytest.approx(100.0 - self.J * accel / RADIUS, rel=3e-3)
+        assert y[MOTOR] == pytest.approx(y[WHEEL], rel=1e-6)
+
+    @pytest.mark.parametrize("share", [0.1, 0.7])
+    def test_a_stiff_shaft_is_the_plant_without_it(self, share):
+        stiff = {"stiffness_nm_rad": 1e6, "damping_nm_s_rad": 500.0, "motor_inertia_kg_m2": share * INERTIA}
+        knots = [(0.0, 0.0), (0.1, 250.0), (0.6, -200.0), (1.0, -200.0)]
+        base, run = (drive(car_with(**e), knots, 1.0, 5.0) for e in ({}, {"driveline_compliance": stiff}))
+        assert run.speed_m_s == pytest.approx(base.speed_m_s, abs=1e-4)
+        assert run.wheel_speed_rad_s == pytest.approx(base.wheel_speed_rad_s, abs=5e-3)
+
+    def test_energy_only_falls_once_the_torque_is_gone(self):
+        setup = make_setup(car_with(**self.SHAFT), DRY)
+        torque = np.zeros((1500, 4))
+        torque[:200] = 250.0
+        y = dynamics.run(
+            dynamics.initial_y(6.0, 0.0, setup.parameters), torque, 1e-3, setup.parameters, setup.road
+        )[0]
+        energy = 0.5 * MASS * y[:, SPEED] ** 2
+        energy += 0.5 * (INERTIA - self.J) * (y[:, WHEEL : WHEEL + 4] ** 2).sum(1)
+        energy += 0.5 * self.J * (y[:, MOTOR : MOTOR + 4] ** 2).sum(1) + 0.5 * self.K * (
+            y[:, TWIST : TWIST + 4] ** 2
+        ).sum(1)
+        fall = np.diff(energy[201:])
+        assert fall.max() < 1e-4
+        assert fall.sum() < -5.0
+
+    @pytest.mark.parametrize("torque_nm", [-60.0, -900.0])
+    def test_brakes_to_rest_and_stays_there(self, torque_nm):
+        run = drive(car_with(**self.SHAFT), [(0.0, 0.0), (0.1, torque_nm)], 9.0, 3.0, ICE)
+        assert (run.wheel_speed_rad_s >= 0.0).all()
+        stopped = int(np.argmax(run.speed_m_s < 0.01))
+        assert 0 < stopped < 8000
+        assert run.speed_m_s[stopped + 300 :].max() < 1e-4
+        assert run.wheel_speed_rad_s[stopped + 300 :].max() < 1e-3
+        assert np.ptp(run.position_m[stopped:]) < 0.01
+
+    def test_motor_follows_its_torque(self):
+        """J omega_m' = T - k twist - d (omega_m - omega), integrated over the states that came out."""
+        y = self.states(150.0, 8.0, 0.3)
+        shaft = self.K * y[:, TWIST] + self.D * (y[:, MOTOR] - y[:, WHEEL])
+        time_s = np.arange(len(y)) * 1e-3
+        expected = y[0, MOTOR] + cumulative_trapezoid((150.0 - shaft) / self.J, time_s, initial=0.0)
+        assert y[:, MOTOR] == pytest.approx(expected, abs=0.02)
