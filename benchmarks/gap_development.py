@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant import simulate
-from sim2real.drive import CHANNELS, Drive, decimation, make_drive
+from sim2real.drive import CHANNELS, Drive, grid_step, make_drive
+from sim2real.lattice import find_lattice
 
 Array = NDArray[np.float64]
 CAR = load_vehicle(Path(__file__).parents[1] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml")
@@ -39,7 +40,7 @@ class Case:
     rich: bool = True
     seed: int = 0
     duration_s: float = 30.0
-    rate_hz: float = 200.0
+    rate_hz: float = 500.0
     levels: Levels = field(default_factory=Levels)
     nuisance: dict[str, dict[str, float]] = field(default_factory=dict)
     """Small further effects of the real car that nobody asks for."""
@@ -153,12 +154,16 @@ def _drive(case: Case, car: VehicleFile, rng: np.random.Generator, name: str) ->
         **measured,
         **{f"wheel_torque_{w}_nm": commanded[:, i] for i, w in enumerate(("fl", "fr", "rl", "rr"))},
     }
-    factor = decimation(case.rate_hz)
-    if factor > 1:
-        n = len(time) // factor
-        cut = lambda a: a[: n * factor].reshape(n, factor).mean(axis=1)  # noqa: E731
-        time, table = cut(time), {k: cut(v) for k, v in table.items()}
-    return make_drive(name, road, time, table)
+    wheels = [table[f"wheel_speed_{w}_rad_s"] for w in ("fl", "fr", "rl", "rr")]
+    lattice = find_lattice(time, wheels)
+    factor = max(round(grid_step(case.rate_hz) * case.rate_hz), 1)
+    n = len(time) // factor
+    time, table = _means(time, n, factor), {key: _means(values, n, factor) for key, values in table.items()}
+    return make_drive(name, road, time, table, lattice=lattice)
+
+
+def _means(values: Array, n: int, factor: int) -> Array:
+    return values[: n * factor].reshape(n, factor).mean(axis=1)
 
 
 SEVERITY = {
@@ -183,6 +188,7 @@ SEVERITY = {
     "vehicle_speed_delay": lambda s: {"delay_s": 0.3 * s},
     "vehicle_speed_scale": lambda s: {"factor": 1.0 + 0.15 * s},
     "accelerometer_bias": lambda s: {"bias_m_s2": 1.5 * s},
+    "wheel_speed_quantisation": lambda s: {"teeth": max(round(60 / s / 10), 1), "window_s": 0.04},
     "mu_split": lambda s: {"left_factor": 1.0 - 0.7 * s, "right_factor": 1.0},
 }  # fmt: skip
 """One direction of each effect from nothing (0) to a lot (1)."""

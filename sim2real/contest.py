@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
+from typing import TypeVar
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS
-from sim2real.fitting import Candidate, Evidence, Fit, fit, loss, robust
+from sim2real.fitting import FULL_STEPS, Candidate, Evidence, Fit, fit, loss, robust, robust_weight
 from sim2real.observer import Simulation
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
+T = TypeVar("T")
 
 BEAM = 3
 """Best single effects that pairs are built on."""
 PAIRS_PER_MEMBER = 4
 """Pairs that are fitted per single effect of the beam, the most promising by a linear screening."""
+COUNTER = "wheel_speed_quantisation"
+"""Judged by the mark that it leaves, see `sim2real.lattice`, not by residuals."""
+FINALISTS = 8
+"""Effects that are fitted to all fit logs with full care, after a first round on one log."""
+FIRST_ROUND_STEPS = 4
+"""Steps of the first round's fits."""
 LINEAR_PAIRS = 4
 """Further pairs, the most promising by the slopes at the effects' own fits."""
 
@@ -88,8 +97,25 @@ def hold_contest(
     null = Entry(
         (), None, fit_to.whitened(fit_to.residuals(model)), holdout.whitened(holdout.residuals(model))
     )
-    ids = [key for key, effect in EFFECTS.items() if key not in exclude and effect.stage != "perception"]
-    singles = _fit_all([Candidate(model, (key,)) for key in ids], fit_to, holdout, jobs, progress, "effects")
+    ids = [
+        key
+        for key, effect in EFFECTS.items()
+        if key not in exclude and effect.stage != "perception" and key != COUNTER
+    ]
+    one_log = fit_to.longest()
+    first = run_all(
+        [partial(fit, Candidate(model, (key,)), one_log, None, FIRST_ROUND_STEPS) for key in ids],
+        jobs,
+        progress,
+        "effects, first round",
+    )
+    order = sorted(first, key=lambda found: found.loss)
+    steps = [FULL_STEPS if rank < FINALISTS else 1 for rank in range(len(order))]
+    work = [
+        partial(enter, found.candidate, fit_to, holdout, found.x, count)
+        for found, count in zip(order, steps, strict=True)
+    ]
+    singles = run_all(work, jobs, progress, "effects")
     return Contest(null, tuple(sorted(singles, key=lambda e: e.loss)), ())
 
 
@@ -108,15 +134,10 @@ def add_pairs(
     def start(pair: tuple[str, ...]) -> Array:
         return np.concatenate([entries[key].fit.x for key in pair])  # type: ignore[union-attr]
 
-    pairs = _fit_all(
-        [Candidate(model, pair) for pair in wanted],
-        fit_to,
-        holdout,
-        jobs,
-        progress,
-        "pairs",
-        map(start, wanted),
-    )
+    work = [
+        partial(enter, Candidate(model, pair), fit_to, holdout, start(pair), FULL_STEPS) for pair in wanted
+    ]
+    pairs = run_all(work, jobs, progress, "pairs")
     return Contest(contest.null, contest.singles, tuple(sorted(pairs, key=lambda e: e.loss)))
 
 
@@ -160,35 +181,18 @@ def _foretold(z: Array, *slopes: Array) -> float:
     return float(np.sum(robust(z + jacobian @ step)))
 
 
-def robust_weight(z: Array) -> Array:
-    """Weight of each residual in the robust fit [-]."""
-    from sim2real.fitting import ROBUST_FROM
+def enter(candidate: Candidate, fit_to: Evidence, holdout: Evidence, start: Array, steps: int) -> Entry:
+    """Fit a candidate from a start, and hold it to the hold-out."""
+    found = fit(candidate, fit_to, start, steps)
+    return Entry(candidate.ids, found, found.z, holdout.whitened(holdout.residuals(candidate.model(found.x))))
 
-    return 1.0 / np.sqrt(1.0 + (z / ROBUST_FROM) ** 2)
 
-
-def _fit_all(
-    candidates: Sequence[Candidate],
-    fit_to: Evidence,
-    holdout: Evidence,
-    jobs: int,
-    progress: Progress,
-    stage: str,
-    starts: Iterable[Array] = (),
-) -> list[Entry]:
-    begins: list[Array | None] = [*starts] or [None for _ in candidates]
-
-    def one(candidate: Candidate, begin: Array | None) -> Entry:
-        found = fit(candidate, fit_to, begin)
-        z_hold = holdout.whitened(holdout.residuals(candidate.model(found.x)))
-        return Entry(candidate.ids, found, found.z, z_hold)
-
-    # the compiled step releases the interpreter's lock, so threads do
-    results = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
-        delayed(one)(c, b) for c, b in zip(candidates, begins, strict=True)
-    )
-    entries = []
-    for entry in results:
-        entries.append(entry)
-        progress(stage, len(entries), len(candidates))
-    return entries
+def run_all(work: Sequence[Callable[[], T]], jobs: int, progress: Progress, stage: str) -> list[T]:
+    """Results in order; the compiled step releases the interpreter's lock, so threads do."""
+    results = []
+    for result in Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
+        delayed(job)() for job in work
+    ):
+        results.append(result)
+        progress(stage, len(results), len(work))
+    return results

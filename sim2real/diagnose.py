@@ -8,15 +8,27 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-from sim2real.contest import add_pairs, hold_contest
-from sim2real.drive import Drive
+import numpy as np
+
+from scenarios.effects import EFFECTS
+from scenarios.files import load_vehicle
+from sim2real.contest import COUNTER, add_pairs, hold_contest
+from sim2real.doubt import doubt
+from sim2real.drive import WHEEL, Drive
 from sim2real.findings import Findings, describe
 from sim2real.fitting import Evidence, residuals
-from sim2real.noise import read_noise
+from sim2real.gap import measure
+from sim2real.lattice import common_lattice
+from sim2real.logs import resample
+from sim2real.merge import camera_side, counter_side, merge
+from sim2real.noise import RESOLUTION, read_noise
 from sim2real.observer import Simulation
-from sim2real.result import Diagnosis
+from sim2real.perception import diagnose_perception
+from sim2real.rating import rate
+from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, needs_pairs
 from sim2real.sources import Sources, read_sources
+from sim2real.trpac_error import trpac_error
 
 Progress = Callable[[str, int, int], None]
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
@@ -66,20 +78,35 @@ def diagnose_files(
     sources = read_sources(vehicle, road, fit, holdout, mapping)
     progress("reading", 1, 1)
     drives = [s.drive for s in sources.all]
-    said = diagnose(
-        Simulation(sources.vehicle),
-        drives[:-1],
-        drives[-1],
-        seed=seed,
+    model = Simulation(sources.vehicle)
+    findings = find(model, drives[:-1], drives[-1], exclude=exclude, jobs=jobs, progress=progress)
+    said = _told(findings, exclude, seed, jobs, progress)
+    camera = diagnose_perception(
+        [s.log for s in sources.fit],
+        sources.holdout.log,
+        [s.road for s in sources.all],
+        sources.vehicle,
         exclude=exclude,
-        jobs=jobs,
-        progress=progress,
+        seed=seed,
     )
+    if camera is not None:
+        said = merge(said, camera_side(camera))
     return replace(
         said,
+        trpac=_estimate(findings, sources),
+        rating=rate(said.traces),
         warnings=(*(f"{s.log.name}: {text}" for s in sources.all for text in s.log.warnings), *said.warnings),
-        provenance={**_provenance(sources, road), **said.provenance},
+        provenance={**_provenance(sources), **said.provenance},
     )
+
+
+def _estimate(findings: Findings, sources: Sources) -> TrpacError | None:
+    """What the found effects do to the estimator's own error."""
+    drive = sources.holdout.drive
+    reference = None
+    if "mu_reference" in sources.holdout.log.signals:
+        reference = resample(sources.holdout.log, drive.step_s)[1]["mu_reference"]
+    return trpac_error(sources.vehicle, drive, findings.added(), reference)
 
 
 def diagnose(
@@ -94,7 +121,17 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose drives against a simulation; see `diagnose_files`."""
     findings = find(model, fit, holdout, exclude=exclude, jobs=jobs, progress=progress)
-    return describe(findings, seed=seed, jobs=jobs, progress=progress)
+    return _told(findings, exclude, seed, jobs, progress)
+
+
+def _told(
+    findings: Findings, exclude: Collection[str], seed: int, jobs: int, progress: Progress
+) -> Diagnosis:
+    said = describe(findings, seed=seed, jobs=jobs, progress=progress)
+    if findings.lattice is None:
+        return said
+    step_s = findings.holdout.drives[0].step_s
+    return merge(said, counter_side(findings.lattice, *counter_gap(findings), step_s, COUNTER in exclude))
 
 
 def find(
@@ -107,19 +144,34 @@ def find(
     progress: Progress = _silent,
 ) -> Findings:
     """Hold the contest and decide it."""
-    fit_to, held = evidence(model, fit), evidence(model, [holdout])
-    contest = hold_contest(model, fit_to, held, exclude, jobs, progress)
+    lattice = None if model.has(COUNTER) else common_lattice([d.lattice for d in (*fit, holdout)])
+    base = model.with_effects(lattice.effect()) if lattice else model
+    fit_to, held = evidence(base, fit), evidence(base, [holdout])
+    contest = hold_contest(base, fit_to, held, exclude, jobs, progress)
     if needs_pairs(contest, fit_to, held):
-        contest = add_pairs(contest, model, fit_to, held, jobs, progress)
-    return Findings(model, fit_to, held, contest, decide(contest, fit_to, held))
+        contest = add_pairs(contest, base, fit_to, held, jobs, progress)
+    return Findings(base, fit_to, held, contest, decide(contest, fit_to, held), lattice)
 
 
 def evidence(model: Simulation, drives: Sequence[Drive]) -> Evidence:
     """Drives with their noise, read from what the model leaves."""
-    return Evidence(tuple(drives), tuple(read_noise(d, residuals(model, d)) for d in drives))
+    return Evidence(tuple(drives), tuple(read_noise(d, residuals(model, d), doubt(model, d)) for d in drives))
 
 
-def _provenance(sources: Sources, road: Path | None) -> dict[str, object]:
+def counter_gap(findings: Findings) -> tuple[Measure, Measure]:
+    """The hold-out's gap against the noise beside a counter's rounding, and against both."""
+    held = findings.holdout
+    rests = held.residuals(findings.model)
+    assert findings.lattice is not None
+    fine = []
+    for noise in held.noises:
+        sigma = noise.sigma.copy()
+        sigma[WHEEL] = np.maximum(findings.lattice.sigma_rad_s, RESOLUTION[WHEEL])
+        fine.append(replace(noise, sigma=np.minimum(sigma, noise.sigma)))
+    return measure(replace(held, noises=tuple(fine)), rests), measure(held, rests)
+
+
+def _provenance(sources: Sources) -> dict[str, object]:
     return {
         "vehicle": _file(sources.vehicle_path),
         "fit": [
@@ -136,3 +188,28 @@ def _provenance(sources: Sources, road: Path | None) -> dict[str, object]:
 
 def _file(path: Path) -> dict[str, str]:
     return {"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+
+
+def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
+    """By how much what a diagnosis found shrinks the gap of a log that it has never seen [%].
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        From `diagnose_files`.
+    log, road : Path
+        The further log, and where it was driven.
+    """
+    where = str(diagnosis.provenance["vehicle"]["path"])
+    source = read_sources(Path(where), road, [str(log)], str(log)).holdout
+    model = Simulation(load_vehicle(where))
+    named = diagnosis.causes[: 2 if diagnosis.verdict is Verdict.COMPOUND else 1]
+    effects = [
+        EFFECTS[c.effect](**{name: v.value for name, v in c.parameters.items()})
+        for c in named
+        if EFFECTS[c.effect].stage != "perception"
+    ]
+    added = model.with_effects(*effects)
+    held = evidence(added, [source.drive])
+    before, after = measure(held, held.residuals(model)), measure(held, held.residuals(added))
+    return 100.0 * (1.0 - after.total / before.total)

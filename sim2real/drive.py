@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import WHEELS, RoadFile
+from sim2real.lattice import Lattice
 
 Array = NDArray[np.float64]
 
@@ -28,8 +29,8 @@ GROUPS = {
 """Signals as the verdict names them, and their channels."""
 UNITS = {"position": "m", "vehicle_speed": "m/s", "wheel_speed": "rad/s", "accel_x": "m/s^2"}
 
-ANALYSIS_RATE_HZ = 150.0
-"""Least rate that a faster log is averaged down to: fast enough for driveline oscillation [Hz]."""
+ANALYSIS_RATE_HZ = 125.0
+"""Rate that a faster log is averaged down to: fast enough for driveline oscillation [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class Drive:
         Rows in which the car moves: at rest nothing of the model shows.
     counted : array of bool, shape (7,)
         Channels that are evidence: measured, and not computed from others.
+    lattice : Lattice or None
+        What a pulse-counting sensor left in the wheel speeds, as logged.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Drive:
     measured: Array
     moving: NDArray[np.bool_]
     counted: NDArray[np.bool_]
+    lattice: Lattice | None = None
 
     @property
     def step_s(self) -> float:
@@ -81,6 +85,7 @@ def make_drive(
     time_s: Array,
     columns: dict[str, Array],
     without: frozenset[str] = frozenset(),
+    lattice: Lattice | None = None,
 ) -> Drive:
     """Channels of a log that is on a uniform grid.
 
@@ -94,6 +99,8 @@ def make_drive(
         The contract's columns, shape (n,) each, NaN where lost.
     without : frozenset of str
         Columns that are not evidence of their own (computed from others); they still tell where on the road the car is.
+    lattice : Lattice, optional
+        Found in the wheel speeds at the log's own rate.
     """
     measured = np.column_stack([columns[name] for name in CHANNELS]).astype(np.float64)
     torque = np.column_stack([columns[f"wheel_torque_{w}_nm"] for w in WHEELS]).astype(np.float64)
@@ -104,10 +111,9 @@ def make_drive(
     speed = measured[:, SPEED]
     moving = np.nan_to_num(speed, nan=np.inf) > LEAST_SPEED_M_S
     counted = np.isfinite(measured).any(axis=0) & np.array([name not in without for name in CHANNELS])
-    return Drive(name, road, time_s, torque, measured, moving, counted)
+    return Drive(name, road, time_s, torque, measured, moving, counted, lattice)
 
 
-def decimation(rate_hz: float) -> int:
-    """Odd factor by which a log of this rate is averaged down; odd, so that the average adds no delay."""
-    factor = max(int(rate_hz / ANALYSIS_RATE_HZ), 1)
-    return factor if factor % 2 else factor - 1
+def grid_step(rate_hz: float) -> float:
+    """Step of the diagnosis' grid for a log of this rate [s]."""
+    return 1.0 / min(rate_hz, ANALYSIS_RATE_HZ)

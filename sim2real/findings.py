@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.effects import EFFECTS
+from scenarios.effects import EFFECTS, Effect
 from sim2real import where
 from sim2real.contest import Contest, Entry
+from sim2real.doubt import doubt
 from sim2real.drive import CHANNELS, UNITS
 from sim2real.fitting import Evidence, residuals
 from sim2real.gap import intervals, measure, noise_floor, shrink
+from sim2real.lattice import Lattice
 from sim2real.next_manoeuvre import propose
 from sim2real.noise import read_noise
 from sim2real.observer import Simulation
@@ -52,6 +54,12 @@ class Findings:
     holdout: Evidence
     contest: Contest
     decision: Decision
+    lattice: Lattice | None = None
+
+    def added(self) -> tuple[Effect, ...]:
+        """What the verdict adds to the model."""
+        entry = self.decision.winner
+        return () if entry.fit is None else tuple(entry.fit.candidate.effects(entry.fit.x))
 
 
 def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Diagnosis:
@@ -103,7 +111,7 @@ def _final_noise(found: Findings) -> Evidence:
     model = entry.fit.candidate.model(entry.fit.x)
     noises = []
     for drive, first in zip(found.holdout.drives, found.holdout.noises, strict=True):
-        again = read_noise(drive, residuals(model, drive))
+        again = read_noise(drive, residuals(model, drive), doubt(model, drive))
         noises.append(again if np.all(again.sigma <= first.sigma * 1.001) else first)
     return Evidence(found.holdout.drives, tuple(noises))
 
@@ -155,7 +163,7 @@ def _cause(
         parameters=values,
         gap_after=size,
         shrink_percent=shrunk,
-        fit_bic=float(entry.loss_fit + entry.size * np.log(max(np.count_nonzero(entry.z_fit), 2))),
+        fit_bic=float(entry.loss_fit + entry.size * np.log(max(int(np.count_nonzero(entry.z_fit)), 2))),
         evidence_for=tuple(pro),
         evidence_against=tuple(contra),
         excited=excited,
@@ -182,8 +190,8 @@ EXCITED_SHARE = 1.0
 
 def _excited(entry: Entry, evidence: Evidence) -> bool:
     assert entry.fit is not None
-    half = [(high - low) / 2.0 for _, low, high in intervals(entry.fit, evidence)]
-    return bool(half[0] < EXCITED_SHARE * entry.fit.candidate.scale[0])
+    _, low, high = intervals(entry.fit, evidence)[0]
+    return 0.5 * (high - low) < EXCITED_SHARE * float(entry.fit.candidate.scale[0])
 
 
 def _subsystem(decision: Decision, terms: Sequence[Term]) -> str:
@@ -213,9 +221,7 @@ def _ambiguous(decision: Decision) -> tuple[tuple[str, ...], ...]:
     if not decision.rivals:
         return ()
     members = [decision.winner, *decision.rivals]
-    if decision.verdict is Verdict.AMBIGUOUS:
-        return (tuple(e.ids[0] for e in members),)
-    return tuple("+".join(e.ids) for e in members) and (tuple("+".join(e.ids) for e in members),)
+    return (tuple("+".join(entry.ids) for entry in members),)
 
 
 def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:

@@ -21,8 +21,10 @@ Array = NDArray[np.float64]
 ROBUST_FROM = 5.0
 """Residuals beyond this many standard deviations count by their size, no longer by its square: at a sliding wheel a
 small error of the model makes a large residual [-]."""
-MOST_STARTS = 12
+MOST_STARTS = 8
 """Points of the coarse grid before the local fit."""
+FULL_STEPS = 12
+"""Most steps of a fit with full care."""
 SETTLING_S = 0.3
 """At the start of a drive the observer's state is no better than single samples: not counted [s]."""
 
@@ -42,6 +44,11 @@ class Evidence:
         """All residuals in standard deviations behind each other, 0 where nothing counts."""
         parts = [n.whitened(r).ravel() for n, r in zip(self.noises, found, strict=True)]
         return np.nan_to_num(np.concatenate(parts))
+
+    def longest(self) -> Evidence:
+        """The longest drive alone."""
+        i = int(np.argmax([len(d) for d in self.drives]))
+        return Evidence((self.drives[i],), (self.noises[i],))
 
     @cached_property
     def parts(self) -> tuple[slice, ...]:
@@ -67,6 +74,11 @@ def loss(z: Array) -> float:
 def robust(z: Array) -> Array:
     """Loss of each residual, z^2 near 0 [-]."""
     return 2.0 * ROBUST_FROM**2 * (np.sqrt(1.0 + (z / ROBUST_FROM) ** 2) - 1.0)
+
+
+def robust_weight(z: Array) -> Array:
+    """Weight of each residual in the robust fit [-]."""
+    return 1.0 / np.sqrt(1.0 + (z / ROBUST_FROM) ** 2)
 
 
 @dataclass(frozen=True)
@@ -154,7 +166,7 @@ class Fit:
     passes: int
 
 
-def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None) -> Fit:
+def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None, steps: int = FULL_STEPS) -> Fit:
     """Coarse grid, then a trust-region fit from its best point.
 
     Parameters
@@ -165,21 +177,31 @@ def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None) ->
         What to fit to.
     start : array, shape (k,), optional
         Where to start in place of the grid.
+    steps : int
+        Most steps of the trust-region fit.
     """
     low, high = candidate.bounds
     count = 0
+    seen: dict[bytes, Array] = {}
 
-    def z_at(x: Array) -> Array:
+    def passed(x: Array) -> Array:
         nonlocal count
         count += 1
         return evidence.whitened(evidence.residuals(candidate.model(x)))
 
+    def z_at(x: Array) -> Array:
+        key = np.asarray(x, dtype=np.float64).tobytes()
+        if key not in seen:
+            seen.clear()
+            seen[key] = passed(x)
+        return seen[key]
+
+    def jacobian(x: Array) -> Array:
+        return slopes(passed, x, z_at(x), candidate)
+
     points = candidate.starts if start is None else np.atleast_2d(start)
     tried = [z_at(x) for x in points] if len(points) > 1 else []
     best = points[int(np.argmin([loss(z) for z in tried]))] if tried else points[0]
-
-    def jacobian(x: Array) -> Array:
-        return slopes(z_at, x, z_at(x), candidate)
 
     inside = np.clip(best, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
     found = least_squares(
@@ -193,10 +215,10 @@ def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None) ->
         ftol=1e-4,
         xtol=1e-3,
         gtol=1e-8,
-        max_nfev=12,
+        max_nfev=steps,
     )
     z = z_at(found.x)
-    return Fit(candidate, found.x, z, loss(z), slopes(z_at, found.x, z, candidate), count)
+    return Fit(candidate, found.x, z, loss(z), jacobian(found.x), count)
 
 
 def slopes(z_at: Callable[[Array], Array], x: Array, z: Array, candidate: Candidate) -> Array:

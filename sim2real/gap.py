@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.drive import GROUPS, UNITS, Drive
-from sim2real.fitting import Evidence, Fit
+from sim2real.drive import GROUPS, UNITS
+from sim2real.fitting import Evidence, Fit, residuals, robust_weight
 from sim2real.observer import Simulation
 from sim2real.result import Interval, Measure
 
@@ -23,12 +24,12 @@ BLOCK_S = 1.0
 QUANTILES = (0.025, 0.975)
 
 
-def measure(evidence: Evidence, residuals: Sequence[Array]) -> Measure:
+def measure(evidence: Evidence, rests: Sequence[Array]) -> Measure:
     """Root mean square residual per signal in units of its noise, and over the signals."""
     signals, si = {}, {}
     for name in GAP_SIGNALS:
         z, plain = [], []
-        for noise, rest in zip(evidence.noises, residuals, strict=True):
+        for noise, rest in zip(evidence.noises, rests, strict=True):
             scaled = noise.scaled(rest)[:, GROUPS[name]]
             z.append(scaled[np.isfinite(scaled)])
             plain.append(rest[:, GROUPS[name]][np.isfinite(scaled)])
@@ -42,18 +43,14 @@ def measure(evidence: Evidence, residuals: Sequence[Array]) -> Measure:
 def noise_floor(model: Simulation, evidence: Evidence, seed: int) -> float:
     """What `measure` gives where the model is right: its own prediction plus fresh noise, diagnosed again."""
     generator = np.random.default_rng(seed)
-    residuals = []
+    rests = []
     for drive, noise in zip(evidence.drives, evidence.noises, strict=True):
         clean = model.predict(drive).channels
         lost = ~np.isfinite(drive.measured)
         noisy = np.where(lost, np.nan, clean + noise.draw(len(drive), generator))
-        again = Drive(
-            drive.name, drive.road, drive.time_s, drive.torque_nm, noisy, drive.moving, drive.counted
-        )
-        from sim2real.fitting import residuals as residuals_of
-
-        residuals.append(residuals_of(model, again))
-    return measure(evidence, residuals).total
+        again = replace(drive, measured=noisy)
+        rests.append(residuals(model, again))
+    return measure(evidence, rests).total
 
 
 def shrink(evidence: Evidence, before: Sequence[Array], after: Sequence[Array], seed: int) -> Interval:
@@ -105,8 +102,6 @@ def intervals(found: Fit, evidence: Evidence, noise_factor: float = 1.0) -> list
     ----------
     .. [1] Liang, Zeger (1986), Biometrika 73, 13-22, for the estimator over clusters.
     """
-    from sim2real.contest import robust_weight
-
     weight = robust_weight(found.z)
     jacobian = found.jacobian
     scale = found.candidate.scale

@@ -7,11 +7,16 @@ are multiples of one quantum, 2 pi / (teeth window), and change only when a wind
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
+
+from scenarios.effects.base import Signals
+from scenarios.effects.shifting import delayed
+from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 
 Array = NDArray[np.float64]
 
@@ -27,6 +32,28 @@ HOLD_COHERENCE = 0.8
 LONGEST_WINDOW_S = 0.25
 MOST_SAMPLES = 4000
 SEARCH = 3000
+
+
+@dataclass(frozen=True)
+class SmoothCounter(WheelSpeedQuantisation):
+    """The counter as a prediction takes it: its averaging and its age, without rounding.
+
+    Where in a tooth and in a window the log began is not known, so the rounding itself cannot be foretold.
+    """
+
+    def sense(self, time_s: Array, signals: Signals) -> Signals:
+        """Each wheel's mean speed over a window, half a window old."""
+        if self.window_s == 0.0:
+            return signals
+        read = {k: self._read(time_s, v) for k, v in signals.items() if k.startswith("wheel_speed_")}
+        return {**signals, **read}
+
+    def _read(self, time_s: Array, speed_rad_s: Array) -> Array:
+        turned = cumulative_trapezoid(speed_rad_s, time_s, initial=0.0)
+        before = np.interp(time_s - self.window_s, time_s, turned)
+        span = np.minimum(self.window_s, time_s - time_s[0])
+        mean = np.where(span > 0.0, (turned - before) / np.maximum(span, 1e-12), speed_rad_s)
+        return delayed(time_s, mean, 0.5 * self.window_s)
 
 
 @dataclass(frozen=True)
@@ -49,6 +76,10 @@ class Lattice:
     def teeth(self) -> int:
         """Pulses per revolution."""
         return max(round(2.0 * np.pi / (self.quantum_rad_s * self.window_s)), 1)
+
+    def effect(self) -> SmoothCounter:
+        """The sensor that leaves it."""
+        return SmoothCounter(float(self.teeth), self.window_s)
 
     @property
     def scatter_rad_s(self) -> float:
@@ -82,6 +113,16 @@ def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
     rest = np.concatenate([v - quantum * np.round(v / quantum) for v in values])
     window = _window(time_s, wheels, quantum, step_s)
     return Lattice(quantum, window, 1.4826 * float(np.median(np.abs(rest))))
+
+
+def common_lattice(found: Sequence[Lattice | None]) -> Lattice | None:
+    """The lattice that most logs of a car share: a sensor does not come and go."""
+    there = [lattice for lattice in found if lattice is not None]
+    if 2 * len(there) <= len(found):
+        return None
+    middle = sorted(there, key=lambda lattice: lattice.quantum_rad_s)[len(there) // 2]
+    windows = float(np.median([lattice.window_s for lattice in there]))
+    return replace(middle, window_s=windows)
 
 
 def _coherence(values: Array, periods: Array) -> Array:

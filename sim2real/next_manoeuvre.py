@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from sim2real.noise import Noise
 from sim2real.observer import Simulation
 from sim2real.result import NextManoeuvre
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 STEP_S = 0.005
 DURATION_S = 12.0
@@ -146,7 +147,7 @@ def propose(
 
 def torque_of(profile: Profile, vehicle: VehicleFile, road: RoadFile) -> tuple[Array, Array]:
     """Time (n,) [s] and torque (n, 4) [N m] of a profile for a car."""
-    time_s = np.arange(round(DURATION_S / STEP_S) + 1) * STEP_S
+    time_s: Array = np.arange(round(DURATION_S / STEP_S) + 1) * STEP_S
     share = np.interp(time_s, profile.times_s, profile.shares)
     grip = max(max(s.mu_left, s.mu_right) for s in road.segments)
     car = vehicle.to_core()

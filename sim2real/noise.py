@@ -32,21 +32,24 @@ class Noise:
         Standard deviation, in each channel's unit.
     correlation : array, shape (7,)
         From row to row [-].
+    widening : array, shape (n, 7)
+        By how much more than by noise a right model may be off at each row [-], see `sim2real.doubt`.
     """
 
     sigma: Array
     correlation: Array
+    widening: Array
 
     def scaled(self, residuals: Array) -> Array:
         """Residuals in standard deviations, shape (n, 7)."""
-        return residuals / self.sigma
+        return residuals / (self.sigma * self.widening)
 
     def whitened(self, residuals: Array) -> Array:
         """Residuals without what the row before foretells of them, in standard deviations, shape (n, 7)."""
         z = residuals / self.sigma
         rest = (z[1:] - self.correlation * z[:-1]) / np.sqrt(1.0 - self.correlation**2)
         first = z[:1]
-        return np.concatenate([first, np.where(np.isfinite(rest), rest, z[1:])])
+        return np.concatenate([first, np.where(np.isfinite(rest), rest, z[1:])]) / self.widening
 
     def draw(self, n: int, generator: np.random.Generator) -> Array:
         """Noise of n rows, shape (n, 7), in each channel's unit."""
@@ -59,7 +62,7 @@ class Noise:
         return out * self.sigma
 
 
-def read_noise(drive: Drive, residuals: Array) -> Noise:
+def read_noise(drive: Drive, residuals: Array, doubt: Array) -> Noise:
     """Noise from the second differences of a model's residuals at a short and a long lag.
 
     What the model lacks changes slowly or rarely, so that the median of the differences is the noise's. The two lags
@@ -71,6 +74,8 @@ def read_noise(drive: Drive, residuals: Array) -> Noise:
         The drive.
     residuals : array, shape (n, 7)
         Measured minus predicted, NaN where lost.
+    doubt : array, shape (n, 7)
+        What a right model's prediction may be off by, in each channel's unit.
     """
     long_lag = max(round(LONG_LAG_S / drive.step_s), 2)
     sigma, correlation = RESOLUTION.copy(), np.zeros(len(CHANNELS))
@@ -82,7 +87,7 @@ def read_noise(drive: Drive, residuals: Array) -> Noise:
         rho = _correlation(short / far, long_lag)
         sigma[i] = max(np.sqrt(far / _second_difference(rho**long_lag)), RESOLUTION[i])
         correlation[i] = rho if sigma[i] > RESOLUTION[i] else 0.0
-    return Noise(sigma, correlation)
+    return Noise(sigma, correlation, np.sqrt(1.0 + (doubt / sigma) ** 2))
 
 
 def _spread(values: Array, lag: int) -> float | None:

@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, Effect
+from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant import dynamics
 from scenarios.plant.dynamics import DynamicsParameters, RoadTable
 from scenarios.plant.pipeline import make_setup
 from sim2real.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL, Drive
+from sim2real.lattice import SmoothCounter
 
 Array = NDArray[np.float64]
 
@@ -85,10 +87,14 @@ class Simulation:
     """
 
     def __init__(self, vehicle: VehicleFile, effects: Iterable[Effect] = ()) -> None:
-        chosen = {effect.id: effect for effect in (*vehicle.make_effects(), *effects)}
+        chosen = {effect.id: _foretold(effect) for effect in (*vehicle.make_effects(), *effects)}
         self.vehicle = vehicle
         self.effects = tuple(chosen[key] for key in EFFECTS if key in chosen)
         self._bare = vehicle.model_copy(update={"effects": {}})
+
+    def has(self, effect_id: str) -> bool:
+        """Whether the model has an effect already."""
+        return any(effect.id == effect_id for effect in self.effects)
 
     def with_effects(self, *effects: Effect) -> Simulation:
         """The model with these effects added."""
@@ -134,6 +140,13 @@ class Simulation:
         for effect in self.effects:
             columns = effect.sense(time_s, columns)
         return np.column_stack([columns[name] for name in CHANNELS])
+
+
+def _foretold(effect: Effect) -> Effect:
+    """An effect as a prediction can take it."""
+    return (
+        SmoothCounter(effect.teeth, effect.window_s) if isinstance(effect, WheelSpeedQuantisation) else effect
+    )
 
 
 def start(columns: dict[str, Array], step_s: float, p: DynamicsParameters) -> Array:

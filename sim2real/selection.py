@@ -82,7 +82,7 @@ def probabilities(contest: Contest, entries: list[Entry], fit_to: Evidence, hold
     best = min(everyone, key=lambda e: e.loss)
     factor = inflation(best, fit_to, holdout)
     samples = max(np.count_nonzero(best.z_fit) / factor, 2.0)
-    score = np.array([-0.5 * e.loss / factor - 0.5 * e.size * np.log(samples) for e in everyone]) / SOFTNESS
+    score = np.array([-0.5 * e.loss / (factor * SOFTNESS) - 0.5 * e.size * np.log(samples) for e in everyone])
     weight = np.exp(score - score.max())
     return weight / weight.sum()
 

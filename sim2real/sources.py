@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import ScenarioError
-from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
-from sim2real.drive import Drive, decimation, make_drive
+from scenarios.files import WHEELS, RoadFile, VehicleFile, load_road, load_vehicle
+from sim2real.drive import Drive, grid_step, make_drive
+from sim2real.lattice import find_lattice
 from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
 
 
@@ -93,9 +94,9 @@ def _read_source(text: str, road: Path | None, columns: Mapping | None) -> Sourc
         problems.append(str(error))
     if course is None or log is None:
         raise ScenarioError("\n".join(problems))
-    step_s = decimation(log.rate_hz) / log.rate_hz
-    time_s, signals = resample(log, step_s)
-    drive = make_drive(log_path.name, course, time_s, signals, log.derived)
+    time_s, signals = resample(log, grid_step(log.rate_hz))
+    wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
+    drive = make_drive(log_path.name, course, time_s, signals, log.derived, find_lattice(log.time_s, wheels))
     if not drive.moving.any():
         raise ScenarioError(f"{log_path}: the car never moves; expected a log of driving.")
     return Source(log, course, road_path, drive)
