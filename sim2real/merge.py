@@ -1,0 +1,266 @@
+"""What is judged beside the contest of the car's effects, and how all verdicts become one.
+
+The camera chain and a pulse counter's lattice are seen in data that the other effects do not touch. Each brings its own
+verdict, and the whole is their sum: two gaps at once are a compound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim2real.lattice import Lattice
+from sim2real.perception import CameraCandidate, PerceptionFinding
+from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Unexplained, Verdict
+
+CERTAIN = 0.97
+"""Probability of what a mark that nothing else leaves has shown [-]."""
+LATTICE_TEETH = 0.03
+"""Half width of the interval of the teeth, as a share: the window is known to a part of the log's step [-]."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """A verdict on data of its own.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        Of these data alone.
+    named : tuple of str
+        Effects that it stands by.
+    causes : tuple of Cause
+        Candidates with probabilities, best first.
+    before, after : dict
+        Gap per signal in noise floors; an empty one leaves the signal to the rest.
+    """
+
+    verdict: Verdict
+    named: tuple[str, ...]
+    causes: tuple[Cause, ...]
+    before: dict[str, float]
+    after: dict[str, float]
+    ambiguous_with: tuple[tuple[str, ...], ...] = ()
+    cannot_rule_out: tuple[str, ...] = ()
+    places: tuple[Place, ...] = ()
+    unexplained: Unexplained | None = None
+    sentence: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+def camera_side(found: PerceptionFinding) -> Side:
+    """The camera chain's verdict as a side."""
+    singles: dict[str, CameraCandidate] = {}
+    for candidate in found.candidates:
+        for effect in candidate.effects:
+            singles.setdefault(effect, candidate)
+    share = _shares(found)
+    causes = [
+        Cause(
+            effect=effect,
+            probability=share.get(effect, 0.0),
+            parameters=_own(effect, candidate),
+            gap_after=candidate.after.total,
+            shrink_percent=candidate.shrink_percent,
+            fit_bic=-2.0 * candidate.gain_fit + candidate.size * float(np.log(max(candidate.effective, 2.0))),
+            evidence_for=candidate.evidence_for,
+            evidence_against=candidate.evidence_against,
+            excited=candidate.excited,
+        )
+        for effect, candidate in singles.items()
+    ]
+    term = None
+    if found.verdict is Verdict.UNKNOWN and found.unexplained:
+        term = Unexplained(
+            "camera",
+            "image_class",
+            "place",
+            "-",
+            "",
+            "",
+            0.0,
+            np.array([]),
+            np.array([]),
+            found.unexplained[0],
+        )
+    return Side(
+        verdict=found.verdict,
+        named=found.causes,
+        causes=tuple(sorted(causes, key=lambda c: -c.probability)),
+        before=found.before.signals,
+        after=found.after.signals,
+        ambiguous_with=found.ambiguous_with,
+        cannot_rule_out=tuple(found.cannot_rule_out),
+        places=found.places,
+        unexplained=term,
+        sentence=found.next_step,
+        warnings=(*found.warnings, *found.unexplained),
+    )
+
+
+def _shares(found: PerceptionFinding) -> dict[str, float]:
+    """Probability per effect from the scores of what was tried; "as simulated" scores 0."""
+    scores = np.array([0.0, *(c.score for c in found.candidates)])
+    weight = np.exp(scores - scores.max())
+    weight /= weight.sum()
+    share: dict[str, float] = {}
+    for candidate, w in zip(found.candidates, weight[1:], strict=True):
+        for effect in candidate.effects:
+            share[effect] = share.get(effect, 0.0) + CERTAIN * float(w) / len(candidate.effects)
+    return share
+
+
+def _own(effect: str, candidate: CameraCandidate) -> dict[str, Interval]:
+    if len(candidate.effects) == 1:
+        return candidate.parameters
+    from scenarios.effects import EFFECTS
+
+    names = {p.name for p in EFFECTS[effect].parameters()}
+    return {name: value for name, value in candidate.parameters.items() if name in names}
+
+
+def counter_side(lattice: Lattice, before: Measure, after: Measure, step_s: float, excluded: bool) -> Side:
+    """The verdict on wheel speeds that lie on a lattice.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        What was found.
+    before, after : Measure
+        The hold-out's gap against the noise beside the rounding, and against noise and rounding.
+    step_s : float
+        Of the log [s].
+    excluded : bool
+        Whether the effect was left out of the library.
+    """
+    old, new = before.signals["wheel_speed"], after.signals["wheel_speed"]
+    what = (
+        f"All wheel speeds are multiples of {lattice.quantum_rad_s:.4g} rad/s and change every "
+        f"{1e3 * lattice.window_s:.4g} ms."
+    )
+    if excluded:
+        term = Unexplained(
+            "wheel_speed_sensor", "wheel_speed", "value", "rad/s", "has no sign", "a staircase", 1.0,
+            np.array([]), np.array([]), what,
+        )  # fmt: skip
+        return Side(
+            Verdict.UNKNOWN,
+            (),
+            (),
+            {"wheel_speed": old},
+            {"wheel_speed": old},
+            unexplained=term,
+            sentence=what,
+        )
+    teeth = float(lattice.teeth)
+    cause = Cause(
+        effect="wheel_speed_quantisation",
+        probability=CERTAIN,
+        parameters={
+            "teeth": Interval(
+                teeth, teeth * (1.0 - LATTICE_TEETH) - 0.5, teeth * (1.0 + LATTICE_TEETH) + 0.5, "-"
+            ),
+            "window_s": Interval(
+                lattice.window_s,
+                max(lattice.window_s - 0.5 * step_s, 0.0),
+                lattice.window_s + 0.5 * step_s,
+                "s",
+            ),
+        },
+        gap_after=after.total,
+        shrink_percent=_percent(before.total, after.total),
+        fit_bic=float("-inf"),
+        evidence_for=(
+            what,
+            "A simulated counter scatters as much; where in a tooth it began cannot be known.",
+        ),
+    )
+    return Side(
+        Verdict.IDENTIFIED,
+        ("wheel_speed_quantisation",),
+        (cause,),
+        {"wheel_speed": old},
+        {"wheel_speed": new},
+        sentence=what,
+    )
+
+
+def _percent(before: float, after: float) -> Interval:
+    value = 100.0 * (1.0 - after / before)
+    return Interval(value, value - 5.0, min(value + 5.0, 100.0), "%")
+
+
+def merge(main: Diagnosis, side: Side) -> Diagnosis:
+    """One diagnosis of two; see the module."""
+    before = _join(main.gap.before, side.before)
+    after = _join(main.gap.after, side.after)
+    verdict = _verdict(main.verdict, side.verdict)
+    both = main.verdict is not Verdict.NO_GAP and side.verdict is not Verdict.NO_GAP
+    main_causes, side_causes = list(main.causes), list(side.causes)
+    if both:
+        main_causes = [replace(c, probability=0.5 * c.probability) for c in main_causes]
+        side_causes = [replace(c, probability=0.5 * c.probability) for c in side_causes]
+    elif side.verdict is Verdict.NO_GAP:
+        left = max(0.0, 1.0 - sum(c.probability for c in main_causes))
+        total = max(sum(c.probability for c in side_causes), 1e-12)
+        side_causes = [replace(c, probability=c.probability * min(1.0, left / total)) for c in side_causes]
+    else:
+        left = max(0.0, 1.0 - sum(c.probability for c in side_causes))
+        total = max(sum(c.probability for c in main_causes), 1e-12)
+        main_causes = [replace(c, probability=c.probability * min(1.0, left / total)) for c in main_causes]
+    causes = _ranked(main, side, main_causes, side_causes, verdict)
+    sentence = main.sentence
+    if side.verdict is not Verdict.NO_GAP:
+        told = f"{' and '.join(side.named) or 'Something unknown'}: {side.sentence}".strip(": ")
+        sentence = told if main.verdict is Verdict.NO_GAP else f"{main.sentence} Beside it, {told}"
+    return replace(
+        main,
+        verdict=verdict,
+        sentence=sentence,
+        gap=Gap(before, after, main.gap.noise_floor),
+        where=(*side.places, *main.where) if side.verdict is not Verdict.NO_GAP else main.where,
+        causes=causes,
+        ambiguous_with=(*main.ambiguous_with, *side.ambiguous_with),
+        cannot_rule_out=tuple(dict.fromkeys((*main.cannot_rule_out, *side.cannot_rule_out))),
+        unexplained=main.unexplained or side.unexplained,
+        warnings=(*main.warnings, *side.warnings),
+    )
+
+
+def _verdict(main: Verdict, side: Verdict) -> Verdict:
+    if side is Verdict.NO_GAP:
+        return main
+    if main is Verdict.NO_GAP:
+        return side
+    if Verdict.UNKNOWN in (main, side):
+        return Verdict.UNKNOWN
+    return Verdict.COMPOUND
+
+
+def _ranked(
+    main: Diagnosis, side: Side, main_causes: list[Cause], side_causes: list[Cause], verdict: Verdict
+) -> tuple[Cause, ...]:
+    """Best first; in a compound the named ones before all others. An effect that both judged stands once."""
+    first: list[str] = list(side.named)
+    if main.verdict is Verdict.COMPOUND:
+        first = [*(c.effect for c in main.causes[:2]), *first]
+    elif main.verdict in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS) and main.causes:
+        first = [main.causes[0].effect, *first]
+    best: dict[str, Cause] = {}
+    for cause in (*main_causes, *side_causes):
+        if cause.effect not in best or cause.probability > best[cause.effect].probability:
+            best[cause.effect] = cause
+
+    def key(cause: Cause) -> tuple[bool, float, float]:
+        named = verdict is Verdict.COMPOUND and cause.effect in first
+        return (not named, -cause.probability, cause.gap_after)
+
+    return tuple(sorted(best.values(), key=key))
+
+
+def _join(measure: Measure, signals: dict[str, float]) -> Measure:
+    if not signals:
+        return measure
+    joined = {**measure.signals, **signals}
+    return Measure(float(np.sqrt(np.mean(np.square(list(joined.values()))))), joined, measure.si)
