@@ -229,7 +229,8 @@ def _core(vehicle: VehicleFile, parameters: DynamicsParameters) -> Vehicle:
 
 def _sliding_speed_noise(model: Simulation, drive: Drive, prediction: Prediction) -> float:
     """Standard deviation of omega R - v as the sensors read it [m/s]."""
-    sigma = read_noise(drive, drive.measured - prediction.channels).sigma
+    rests = drive.measured - prediction.channels
+    sigma = read_noise(drive, rests, np.zeros_like(rests)).sigma
     return float(np.hypot(sigma[SPEED], model.vehicle.wheel_radius_m * sigma[WHEEL][0]))
 
 
