@@ -26,8 +26,10 @@ from trpac_core.vision.camera import Camera
 
 NOISE_FLOOR = 1.0
 """Size of the gap that noise alone leaves, per signal and in total [-]."""
-UNEXPLAINED = 2.0
-"""Median rest of a signal, in standard deviations, from which on its best account does not explain it [-]."""
+UNEXPLAINED = 2.5
+"""Rest of a signal, in standard deviations, from which on its best account does not explain it [-]."""
+TYPICAL = 0.75
+"""Quantile that is taken for it: a few odd borders or stretches depend on nothing, a whole class of road does."""
 BOOTSTRAP = 400
 QUANTILES = (0.025, 0.975)
 
@@ -227,8 +229,9 @@ def _unexplained(chain: Chain, account: Account) -> str:
     """What a signal's best account leaves, in a sentence; empty where it leaves noise."""
     if chain.unexplained:
         return chain.unexplained
-    # the median: one odd border or stretch is no gap that depends on anything
-    typical = float(np.median(np.abs(account.z))) if len(account.z) else 0.0
+    if not len(account.z):
+        return ""
+    typical = float(np.hypot(np.quantile(np.abs(account.z), TYPICAL), np.sqrt(account.excess)))
     if typical < UNEXPLAINED:
         return ""
     named = " and ".join(account.effects) or "the simulation as it is"

@@ -28,6 +28,9 @@ NORMAL_SPREAD = 0.125
 """Standard deviation of its logarithm among chains: 0.7 is still normal, 0.5 (the flag's threshold) is not [-]."""
 CLASS_SPREAD = 0.1
 """Standard deviation of its logarithm among the classes of one chain [-]."""
+USUAL_ERROR, ERROR_SPREAD = 0.04, 0.7
+"""Share of wrong classes of an undisturbed chain, and the standard deviation of its logarithm among chains: up to 16 %
+are normal [-]."""
 LEAST_DEVIATION = 0.01
 """Least standard deviation that a block is credited with [-]."""
 LAW_SPREAD = 0.4
@@ -71,6 +74,33 @@ class ConfidenceFit:
 
 
 @dataclass(frozen=True)
+class Signs:
+    """What shows bad pictures beside confidence.
+
+    Attributes
+    ----------
+    class_error : float
+        Share of results that name another class than road.yaml; NaN where not known [-].
+    light : Light or None
+        How the pictures are exposed; None where they are not known.
+    """
+
+    class_error: float
+    light: Light | None
+
+    def log_likelihood(self, loss: Array, stops: Array) -> Array:
+        """Under mean losses of confidence and exposure errors, same shape [nats].
+
+        Bad pictures may make classes err up to a share that goes with the loss, and need not: chains differ.
+        """
+        total = np.zeros(np.shape(loss))
+        if self.class_error > 0.0:
+            explained = 1.0 - (1.0 - USUAL_ERROR) * np.exp(-np.maximum(loss, 0.0))
+            total -= 0.5 * (np.maximum(np.log(self.class_error / explained), 0.0) / ERROR_SPREAD) ** 2
+        return total if self.light is None else total + self.light.log_likelihood(stops)
+
+
+@dataclass(frozen=True)
 class ConfidenceModel:
     """Blocks as Gaussian about an uncertain level: a block's deviation, and its variance's factor for memory."""
 
@@ -86,6 +116,8 @@ class ConfidenceModel:
 
     def weigh(self, blocks: Blocks) -> Array:
         """Inner products of loss, speed and one under the blocks' inverse covariance, shape (3, 3)."""
+        if not len(blocks):
+            return np.zeros((3, 3))
         columns = np.column_stack(
             [blocks.loss + np.log(NORMAL_CONFIDENCE), blocks.speed_m_s, np.ones(len(blocks))]
         )
@@ -99,6 +131,8 @@ class ConfidenceModel:
 
 def read_model(blocks: Blocks) -> ConfidenceModel:
     """Deviation and memory of the blocks about a level per class and a slope over speed."""
+    if not len(blocks):
+        return ConfidenceModel(LEAST_DEVIATION, 1.0)
     design = np.column_stack([blocks.speed_m_s, *(blocks.classes == c for c in np.unique(blocks.classes))])
     solution, *_ = np.linalg.lstsq(design, blocks.loss, rcond=None)
     rest = blocks.loss - design @ solution
@@ -113,7 +147,7 @@ def read_model(blocks: Blocks) -> ConfidenceModel:
 
 def fit_confidence(
     blocks: Blocks,
-    light: Light | None,
+    signs: Signs,
     model: ConfidenceModel,
     effects: tuple[str, ...],
     exposure_s: float,
@@ -125,8 +159,8 @@ def fit_confidence(
     ----------
     blocks : Blocks
         Less what the simulation models already.
-    light : Light or None
-        How the pictures are exposed; None where they are not known.
+    signs : Signs
+        What else shows that pictures are bad.
     model : ConfidenceModel
         Of these blocks.
     effects : tuple of str
@@ -140,19 +174,19 @@ def fit_confidence(
     slopes = np.zeros(len(levels))
     if "motion_blur" in effects:
         least = -exposure_s / TOLERATED_SMEAR_M
-        slopes = np.maximum((products[0, 1] - levels * products[1, 2]) / products[1, 1], least)
+        slopes = np.maximum((products[0, 1] - levels * products[1, 2]) / max(products[1, 1], 1e-12), least)
     ways = np.stack([np.ones(len(levels)), -slopes, -levels])
     profile = -0.5 * np.einsum("ig,ij,jg->g", ways, products, ways)
-    if light is not None:
-        profile = profile + light.log_likelihood(errors)
+    speed = float(blocks.speed_m_s.mean()) if len(blocks) else 0.0
+    profile = profile + signs.log_likelihood(levels + slopes * speed, errors)
     best = int(np.argmax(profile))
     quantile = float(student.ppf(0.975, max(len(blocks) / model.memory - 2.0, 1.0)))
     blur = Interval(exposure_s, exposure_s, exposure_s, "s")
     if "motion_blur" in effects:
-        blur = _exposure_time(exposure_s, float(slopes[best]), quantile / np.sqrt(products[1, 1]))
+        blur = _exposure_time(exposure_s, float(slopes[best]), quantile / np.sqrt(max(products[1, 1], 1e-12)))
     wrong = Interval(stops, stops, stops, "stops")
     if "exposure_shift" in effects:
-        wrong = _exposure_error(profile, 0.5 * quantile**2, signed=light is not None)
+        wrong = _exposure_error(profile, 0.5 * quantile**2, signed=signs.light is not None)
     return ConfidenceFit(effects, float(profile[best]), float(slopes[best]), float(levels[best]), blur, wrong)
 
 

@@ -15,6 +15,7 @@ from sim2real.perception_confidence import (
     NORMAL_SPREAD,
     ConfidenceFit,
     ConfidenceModel,
+    Signs,
     fit_confidence,
     read_model,
 )
@@ -30,23 +31,21 @@ CHOICES = (("motion_blur",), ("exposure_shift",), ("motion_blur", "exposure_shif
 NEXT_STEP = "Drive the same surface slowly and fast, with the pictures recorded."
 LEAST_SPEED_SPREAD_M_S = 1.5
 """Standard deviation of speed below which blur cannot show as a fall with speed [m/s]."""
-MOST_PLACES = 4
+NOTABLE, MOST_PLACES = 2.0, 4
 NORMAL_RANGE = 2.0
-"""Standard deviations of a normal level that are no gap [-]."""
+"""Standard deviations of a normal level, of usual mistakes and of usual light together that are no gap [-]."""
 FEWEST_BLOCKS = 8
 """With fewer blocks nothing is said of confidence."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """Confidence and pictures of the fit logs, and of the hold-out."""
+    """Confidence, and what else shows bad pictures, of the fit logs and of the hold-out."""
 
     known: Blocks
     unseen: Blocks
-    light: Light | None
+    signs: Signs
     light_unseen: Light | None
-    class_error: float
-    """Share of the fit logs' results that name another class than road.yaml, away from borders [-]."""
 
     @property
     def together(self) -> Blocks:
@@ -54,11 +53,18 @@ class Seen:
         pairs = ((getattr(self.known, f.name), getattr(self.unseen, f.name)) for f in fields(Blocks))
         return Blocks(*(np.concatenate(p) for p in pairs))
 
+    def deviance(self, fit: ConfidenceFit) -> float:
+        """Squares by which classes and pictures of the fit logs are beyond what a fit explains [-]."""
+        loss = fit.loss(self.known)
+        mean, stops = np.array(loss.mean() if len(loss) else 0.0), np.array(fit.stops.value)
+        return -2.0 * float(self.signs.log_likelihood(mean, stops))
+
     def log_likelihood(self, fit: ConfidenceFit, model: ConfidenceModel) -> float:
         """Of all there is, at what was fitted [nats]."""
-        lights = [light for light in (self.light, self.light_unseen) if light is not None]
-        pictures = sum(float(light.log_likelihood(np.array(fit.stops.value))) for light in lights)
-        return model.log_likelihood(self.together, fit.loss(self.together)) + pictures
+        total = model.log_likelihood(self.together, fit.loss(self.together)) - 0.5 * self.deviance(fit)
+        if self.light_unseen is None:
+            return total
+        return total + float(self.light_unseen.log_likelihood(np.array(fit.stops.value)))
 
 
 def confidence_chain(
@@ -79,11 +85,16 @@ def confidence_chain(
     )
     if len(known) < FEWEST_BLOCKS:
         why = f"Only {len(known)} s of image_confidence on the fit logs; {FEWEST_BLOCKS} s are needed."
-        return Chain.silent(SIGNAL, pictures, {effect for choice in choices for effect in choice}, why)
-    model, seen = read_model(known), Seen(known, unseen, *lights, class_error(fitted))
+        if lights[0] is None:
+            return Chain.silent(SIGNAL, pictures, {effect for choice in choices for effect in choice}, why)
+        # the pictures alone still tell their exposure
+        known, unseen = make_blocks([]), make_blocks([])
+        choices = [c for c in choices if c == ("exposure_shift",)]
+    model, signs = read_model(known), Signs(class_error(fitted), lights[0])
+    seen = Seen(known, unseen, signs, lights[1])
 
     def fit(effects: tuple[str, ...]) -> ConfidenceFit:
-        return fit_confidence(known, lights[0], model, effects, modelled.exposure_s, modelled.stops)
+        return fit_confidence(known, signs, model, effects, modelled.exposure_s, modelled.stops)
 
     plain, fits = fit(()), [fit(choice) for choice in choices]
     accounts = [_account(f, plain, seen, model) for f in (plain, *fits)]
@@ -93,7 +104,7 @@ def confidence_chain(
         (len(known) + len(unseen)) / model.memory,
         accounts[0],
         tuple(accounts[1:]),
-        places=_places(unseen, model),
+        places=_places(accounts[0], unseen),
         unexcited=_unexcited(seen, choices),
         next_step=NEXT_STEP,
     )
@@ -115,7 +126,7 @@ def _account(f: ConfidenceFit, nothing: ConfidenceFit, seen: Seen, model: Confid
         seen.log_likelihood(f, model) - seen.log_likelihood(nothing, model) - gain_fit,
         parameters,
         z,
-        max(level**2 - NORMAL_RANGE**2, 0.0),
+        max(level**2 + seen.deviance(f) - NORMAL_RANGE**2, 0.0),
         evidence_for=_evidence(f, seen),
         evidence_against=_doubts(f, seen),
     )
@@ -131,6 +142,8 @@ def rest_of(
     array, shape (n,), and float
         Per block in its standard deviations, and the learnt level in standard deviations of the normal one [-].
     """
+    if not len(learnt):
+        return np.empty(0), 0.0
     rest, known = blocks.loss - fit.loss(blocks), learnt.loss - fit.loss(learnt)
     level = np.full(len(blocks), known.mean())
     for c in np.unique(learnt.classes):
@@ -150,16 +163,17 @@ def _evidence(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
             f"Confidence goes from {low:.2f} at {slow:.0f} m/s to {high:.2f} at {fast:.0f} m/s, classes held apart."
         )
     if "exposure_shift" in f.effects:
-        sentences.append(
-            f"Confidence is {np.exp(-blocks.loss.mean()):.2f}; normal is taken as {NORMAL_CONFIDENCE:g} "
-            f"({np.exp(np.log(NORMAL_CONFIDENCE) - 2.0 * NORMAL_SPREAD):.2f} to 1)."
-        )
-        if np.isfinite(seen.class_error):
+        if len(blocks):
             sentences.append(
-                f"The class is not road.yaml's in {100.0 * seen.class_error:.0f} % of the results."
+                f"Confidence is {np.exp(-blocks.loss.mean()):.2f}; normal is taken as {NORMAL_CONFIDENCE:g} "
+                f"({np.exp(np.log(NORMAL_CONFIDENCE) - 2.0 * NORMAL_SPREAD):.2f} to 1)."
             )
-        if seen.light is not None:
-            light = seen.light
+        if np.isfinite(seen.signs.class_error):
+            sentences.append(
+                f"The class is not road.yaml's in {100.0 * seen.signs.class_error:.0f} % of the results."
+            )
+        if seen.signs.light is not None:
+            light = seen.signs.light
             sentences.append(
                 f"{light.count} pictures: road {light.level_ev - NORMAL_LIGHT_EV:+.1f} stops from usual, "
                 f"{100.0 * light.white_share:.1f} % white, {100.0 * light.black_share:.1f} % black."
@@ -174,16 +188,16 @@ def _doubts(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
             "How strongly confidence answers is measured on the shipped networks; another chain's may differ by a "
             "factor of two, which the interval holds."
         )
-    if "exposure_shift" in f.effects and seen.light is None:
+    if "exposure_shift" in f.effects and seen.signs.light is None:
         doubts.append("The log names no pictures: over- and underexposure cannot be told apart.")
     return tuple(doubts)
 
 
-def _places(unseen: Blocks, model: ConfidenceModel) -> tuple[Place, ...]:
-    """The seconds of the hold-out that are least sure, against a normal confidence."""
-    z = (unseen.loss + np.log(NORMAL_CONFIDENCE)) / np.hypot(model.deviation, NORMAL_SPREAD)
-    share = z**2 / max(float((z**2).sum()), 1e-12)
-    worst = [k for k in np.argsort(-z) if z[k] > NORMAL_RANGE][:MOST_PLACES]
+def _places(nothing: Account, unseen: Blocks) -> tuple[Place, ...]:
+    """The seconds of the hold-out that are least sure."""
+    unsure = np.maximum(nothing.z, 0.0) ** 2 + nothing.excess
+    share = unsure / max(float((nothing.z**2 + nothing.excess).sum()), 1e-12)
+    worst = [k for k in np.argsort(-unsure) if unsure[k] > NOTABLE**2][:MOST_PLACES]
     return tuple(
         Place(
             SIGNAL,
@@ -201,12 +215,12 @@ def _places(unseen: Blocks, model: ConfidenceModel) -> tuple[Place, ...]:
 def _unexcited(seen: Seen, choices: Sequence[tuple[str, ...]]) -> dict[str, str]:
     """Effects that these logs could hardly show, and why."""
     why = {}
-    spread = float(seen.known.speed_m_s.std())
+    spread = float(seen.known.speed_m_s.std()) if len(seen.known) else 0.0
     if spread < LEAST_SPEED_SPREAD_M_S:
         why["motion_blur"] = (
             f"Speed varies by {spread:.1f} m/s only: confidence cannot show a fall with speed."
         )
-    if seen.light is None:
+    if seen.signs.light is None:
         why["exposure_shift"] = (
             "Without pictures a moderate exposure error looks like another camera's normal confidence."
         )

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import RoadSegment
+from sim2real.perception_crossings import rough_shift
 from sim2real.perception_frames import Results
 from trpac_core.vision.classes import Surface
+
+Array = NDArray[np.float64]
 
 MARGIN_M = 5.0
 """Way after and before a border that is left out: there a shift shows, not a conflict [m]."""
@@ -20,38 +22,48 @@ MOSTLY = 0.7
 
 
 def class_error(results: Sequence[Results]) -> float:
-    """Share of the results away from borders that name another class than road.yaml; NaN where there are none [-]."""
-    wrong = [
-        one.classes[inside] != segment.surface_class for one in results for segment, inside in _inside(one)
-    ]
-    every = np.concatenate(wrong) if wrong else np.empty(0)
+    """Share of the results away from borders that name another class than road.yaml; NaN where there are none [-].
+
+    Results are laid over the road as they fit best, so that a late camera's are not wrong ones. Segments that mostly
+    show one other class are left out: there the road differs, not the picture.
+    """
+    if not results:
+        return float("nan")
+    age_s, way_m = rough_shift(results)
+    wrong = [np.empty(0, dtype=np.bool_)]
+    for one in results:
+        late_m = one.driven_m(one.time_s, np.array([age_s]))[:, 0] + way_m
+        for segment, inside in _inside(one, 0.5 * (one.from_m + one.to_m) - late_m):
+            if _other_class(one, segment, inside) is None:
+                wrong.append(one.classes[inside] != segment.surface_class)
+    every = np.concatenate(wrong)
     return float(every.mean()) if len(every) else float("nan")
 
 
 def class_conflicts(results: Sequence[Results]) -> tuple[str, ...]:
-    """One sentence per segment on which most results name another class than road.yaml."""
+    """One sentence per segment on which most results name one other class than road.yaml."""
     sentences = []
     for one in results:
-        for segment, inside in _inside(one):
-            seen = np.bincount(one.classes[inside], minlength=len(Surface))
-            most = Surface(int(seen.argmax()))
-            if (
-                inside.sum() >= FEWEST
-                and most != segment.surface_class
-                and seen[most] >= MOSTLY * inside.sum()
-            ):
+        for segment, inside in _inside(one, 0.5 * (one.from_m + one.to_m)):
+            other = _other_class(one, segment, inside)
+            if other is not None and inside.sum() >= FEWEST:
+                share = (one.classes[inside] == other).mean()
                 sentences.append(
-                    f"{one.log}: from {segment.start_m:g} m on the camera sees {most.label} in "
-                    f"{100.0 * seen[most] / inside.sum():.0f} % of its results where road.yaml has {segment.surface}."
+                    f"{one.log}: from {segment.start_m:g} m on the camera sees {other.label} in {100.0 * share:.0f} % "
+                    f"of its results where road.yaml has {segment.surface}."
                 )
     return tuple(sentences)
 
 
-def _inside(one: Results) -> Iterator[tuple[RoadSegment, NDArray[np.bool_]]]:
-    """Each stretch of one surface, and which results are stamped well within it."""
-    middle = 0.5 * (one.from_m + one.to_m)
-    segments = one.road.segments
-    heads = [segments[0], *(b for a, b in pairwise(segments) if a.surface != b.surface)]
-    starts = [-np.inf, *(s.start_m for s in heads[1:]), np.inf]
-    for head, begin, end in zip(heads, starts[:-1], starts[1:], strict=True):
-        yield head, (middle > begin + MARGIN_M) & (middle < end - MARGIN_M)
+def _other_class(one: Results, segment: RoadSegment, inside: NDArray[np.bool_]) -> Surface | None:
+    """The other class that results inside a segment mostly name; None where they do not."""
+    seen = np.bincount(one.classes[inside], minlength=len(Surface))
+    most = Surface(int(seen.argmax()))
+    return most if most != segment.surface_class and seen[most] >= MOSTLY * seen.sum() else None
+
+
+def _inside(one: Results, place_m: Array) -> Iterator[tuple[RoadSegment, NDArray[np.bool_]]]:
+    """Each segment of the road, and which results' places lie well within it."""
+    starts = [-np.inf, *(s.start_m for s in one.road.segments[1:]), np.inf]
+    for segment, begin, end in zip(one.road.segments, starts[:-1], starts[1:], strict=True):
+        yield segment, (place_m > begin + MARGIN_M) & (place_m < end - MARGIN_M)

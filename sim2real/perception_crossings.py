@@ -96,7 +96,7 @@ class Crossings:
 
 def find_crossings(results: Sequence[Results]) -> Crossings:
     """All borders between surfaces that the results of some drives show."""
-    age_s, way_m = _rough_shift(results)
+    age_s, way_m = rough_shift(results)
     rows = [row for one in results for row in _of_one(one, age_s, way_m)]
     columns = list(zip(*rows, strict=True)) if rows else [()] * 9
     names, numbers = columns[0], [np.array(c, dtype=np.float64) for c in columns[1:8]]
@@ -108,7 +108,7 @@ def find_crossings(results: Sequence[Results]) -> Crossings:
     )
 
 
-def _rough_shift(results: Sequence[Results]) -> tuple[float, float]:
+def rough_shift(results: Sequence[Results]) -> tuple[float, float]:
     """The age and the distance at which the classes' sequence lies best over the road's [s], [m]."""
     age, way = np.meshgrid(COARSE_AGES_S, COARSE_WAYS_M, indexing="ij")
     cost = np.hypot(age / COARSE_PRIOR[0], way / COARSE_PRIOR[1])

@@ -278,7 +278,7 @@ def _places(nothing: Account, unseen: Crossings) -> tuple[Place, ...]:
     worst = notable[np.argsort(-share[notable])][:MOST_PLACES]
     return tuple(
         Place(
-            "image_class",
+            SIGNAL,
             "camera",
             "surface change",
             float(begin[k]),
