@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import scenarios.effects as effects_module
-from scenarios.effects import EFFECTS, Effect, make_effect
+from scenarios.effects import EFFECTS, Effect, catalogue, make_effect
 from scenarios.effects.base import Stage, Subsystem, parameter
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
@@ -128,6 +128,12 @@ def test_a_fit_may_start_at_its_start_values(effect_id):
         run = drive_through_everything(car)
         assert np.isfinite(make_log(run, car).to_numpy()).all()
         assert 3.0 < run.speed_m_s.max() < 9.0
+
+
+def test_the_page_about_effects_is_up_to_date():
+    text = catalogue.PAGE.read_text(encoding="utf-8")
+    assert text == catalogue.page(), "run python -m scenarios.effects.catalogue"
+    assert all(f"### {key}\n" in text for key in EFFECTS)
 
 
 def test_order_in_the_file_does_not_matter():

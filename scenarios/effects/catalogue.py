@@ -1,0 +1,85 @@
+"""The page about all effects, made from their classes.
+
+python -m scenarios.effects.catalogue      # writes docs/effects.md
+"""
+
+from __future__ import annotations
+
+from inspect import getdoc
+from pathlib import Path
+
+from scenarios.effects import EFFECTS
+from scenarios.effects.base import Effect, Parameter, Value
+from trpac_core.vehicle import Vehicle
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "effects.md"
+
+CAR = Vehicle()
+"""The car whose values stand for those that depend on the vehicle."""
+
+STAGES = {
+    "actuators": "command to torque at the wheels",
+    "dynamics": "torque to motion",
+    "road": "friction under the left and the right wheels",
+    "sensors": "motion to signals",
+    "perception": "pictures to classes",
+}
+
+HEAD = """# Effects
+
+<!-- Made by `python -m scenarios.effects.catalogue` from scenarios/effects/; change it there. -->
+
+What the reference plant can model beyond its nominal equations ([plant.md](plant.md)), and what a diagnosis may name.
+`effects:` in vehicle.yaml switches them on by id, with all their parameters; values outside the bounds are refused.
+They act in the order of this page, whatever their order in the file. Values marked * depend on the vehicle; shown are
+those of the paper's car (Table 3).
+"""
+
+
+def page() -> str:
+    """The page's text."""
+    parts = [HEAD, "| id | stage | subsystem | parameters |\n|---|---|---|---|"]
+    parts[-1] += "".join(f"\n{_line(effect)}" for effect in EFFECTS.values())
+    for stage, meaning in STAGES.items():
+        parts.append(f"## {stage.capitalize()}: {meaning}")
+        parts += [_section(effect) for effect in EFFECTS.values() if effect.stage == stage]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def _line(effect: type[Effect]) -> str:
+    names = ", ".join(f"`{p.name}`" for p in effect.parameters())
+    return f"| [`{effect.id}`](#{effect.id}) | {effect.stage} | {effect.subsystem} | {names} |"
+
+
+def _section(effect: type[Effect]) -> str:
+    rows = "\n".join(_row(p) for p in effect.parameters())
+    return f"""### {effect.id}
+
+{getdoc(effect)}
+
+- Equation: `{effect.equation}`
+- Source: {effect.source}
+- Seen when: {effect.excited_by}
+- Looks like: {", ".join(f"`{key}`" for key in effect.look_alikes)}
+
+| parameter | unit | meaning | neutral | bounds | a fit starts at |
+|---|---|---|---|---|---|
+{rows}"""
+
+
+def _row(p: Parameter) -> str:
+    low, high = p.bounds(CAR)
+    starts = ", ".join(f"{value:.4g}" for value in p.start_values(CAR))
+    starts += "*" if callable(p.starts) else ""
+    bounds = f"{_value(p.low, low)} to {_value(p.high, high)}"
+    neutral = _value(p.neutral, p.neutral_value(CAR))
+    return f"| `{p.name}` | {p.unit} | {p.meaning} | {neutral} | {bounds} | {starts} |"
+
+
+def _value(declared: Value, value: float) -> str:
+    return f"{value:.4g}" + ("*" if callable(declared) else "")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    print(f"wrote {PAGE}")
