@@ -217,7 +217,9 @@ def missing_term(term: Unexplained) -> bytes:
     with _sheet(1, 1, 2.9) as (_, axes, buffer):
         axis: Axes = axes[0, 0]
         axis.axhline(0.0, color=FLOOR, lw=0.8)
-        axis.plot(term.x, term.y, color=BEFORE, lw=1.8, marker="o", ms=3.5)
+        starts = np.flatnonzero(np.diff(term.x) < 0.0) + 1  # one curve per log where the quantity is time
+        for x, y in zip(np.split(term.x, starts), np.split(term.y, starts), strict=True):
+            axis.plot(x, y, color=BEFORE, lw=1.6, alpha=0.8, marker="o", ms=3.0)
         axis.set_xlabel(label_of(term.depends_on))
         axis.set_ylabel(f"missing term in\n{words(term.subsystem)} [{pretty_unit(term.unit)}]")
     return buffer.getvalue()

@@ -166,12 +166,17 @@ def vehicle_snippet(causes: tuple[Cause, ...]) -> str | None:
 
 
 def shown_traces(diagnosis: Diagnosis) -> list[Trace]:
-    """Traces that have something to compare, worst first, in units of their noise."""
+    """Traces that have something to compare, worst first, in units of their noise.
+
+    Where the verdict adds nothing there is no after: a candidate that was refused is not drawn as if it were taken.
+    """
 
     def size(trace: Trace) -> float:
         return float(np.sqrt(np.nanmean((trace.measured - trace.before) ** 2)) / trace.noise)
 
     comparable = [t for t in diagnosis.traces if np.isfinite(t.measured - t.before).any()]
+    if not added(diagnosis):
+        comparable = [replace(t, after=t.before) for t in comparable]
     return sorted(comparable, key=size, reverse=True)
 
 
@@ -248,10 +253,11 @@ def estimate(interval: Interval) -> str:
     unit = "" if interval.unit in ("-", "") else f" {figures.pretty_unit(interval.unit)}"
     if not math.isfinite(interval.value):
         return DASH
-    width = interval.high - interval.low
-    scale = width if math.isfinite(width) and width > 0.0 else abs(interval.value)
+    known = math.isfinite(interval.low) and math.isfinite(interval.high)
+    width = interval.high - interval.low if known else 0.0
+    scale = max(width, 0.01 * abs(interval.value) if width <= 0.0 else 1e-6 * abs(interval.value))
     digits = 0 if scale == 0.0 else max(0, 1 - math.floor(math.log10(scale)))
     value = f"{interval.value:.{digits}f}"
-    if not (math.isfinite(interval.low) and math.isfinite(interval.high)):
+    if not known:
         return value + unit
     return f"{value}{unit} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"

@@ -158,6 +158,14 @@ def test_a_signal_without_a_common_sample_is_left_out_of_the_traces():
     assert report.shown_traces(replace(DIAGNOSES["identified"], traces=(lost, second))) == [second]
 
 
+def test_a_refused_candidate_is_not_drawn_as_if_it_were_taken(pages):
+    refused = replace(DIAGNOSES["unknown"], traces=made_up.traces(0.9, 0.97))
+    assert all(np.array_equal(t.before, t.after) for t in report.shown_traces(refused))
+    assert not any(np.array_equal(t.before, t.after) for t in report.shown_traces(DIAGNOSES["compound"])[:-1])
+    assert "before after" in pages["identified"].text
+    assert "before after" not in pages["unknown"].text
+
+
 def test_traces_come_worst_first():
     shown = report.shown_traces(DIAGNOSES["identified"])
     assert shown[0].signal.startswith("wheel_speed")
@@ -225,9 +233,9 @@ class TestNumbers:
             (Interval(0.3, 0.25, 0.36, "m"), "0.30 m (0.25 to 0.36)"),
             (Interval(48123.4, 46010.0, 50230.0, "N"), "48123 N (46010 to 50230)"),
             (Interval(0.65, 0.6498, 0.6512, "m^2"), "0.6500 m² (0.6498 to 0.6512)"),
-            (Interval(1.0, 1.0, 1.0), "1.0 (1.0 to 1.0)"),
+            (Interval(1.0, 1.0, 1.0), "1.000 (1.000 to 1.000)"),
             (Interval(0.0, 0.0, 0.0, "s"), "0 s (0 to 0)"),
-            (Interval(73.0, math.nan, math.nan, "%"), "73 %"),
+            (Interval(73.0, math.nan, math.nan, "%"), "73.00 %"),
             (Interval(math.nan, 0.0, 1.0, "m"), "–"),
             (Interval(-0.021, -0.03, -0.012, "rad"), "-0.021 rad (-0.030 to -0.012)"),
         ],
@@ -236,14 +244,12 @@ class TestNumbers:
         assert estimate(interval) == text
 
     @given(st.floats(-1e6, 1e6), st.floats(0.0, 1e6), st.floats(0.0, 1e6))
-    def test_a_shown_interval_is_within_a_tenth_of_its_width(self, value, below, above):
-        shown = estimate(Interval(value, value - below, value + above))
-        numbers = [float(n) for n in shown.replace("(", "").replace(")", "").replace("to ", "").split()]
-        width = below + above
-        for number, true in zip(numbers, (value, value - below, value + above), strict=True):
-            assert abs(number - true) <= 0.051 * width + 0.051 * abs(value) * (width == 0.0) + 1e-6 * abs(
-                value
-            )
+    def test_what_is_shown_is_within_a_tenth_of_the_interval(self, value, below, above):
+        interval = Interval(value, value - below, value + above)
+        shown = estimate(interval).replace("(", "").replace(")", "").replace("to ", "").split()
+        allowed = 0.051 * max(interval.high - interval.low, 0.01 * abs(value))
+        for text, true in zip(shown, (value, interval.low, interval.high), strict=True):
+            assert abs(float(text) - true) <= allowed
 
     @pytest.mark.parametrize(
         ("share", "text"),
