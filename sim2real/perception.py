@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from scenarios.effects import Effect
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
 from sim2real.perception_chain import Account, Chain
@@ -131,6 +132,7 @@ def diagnose_perception(
     camera: Camera | None = None,
     exclude: Collection[str] = (),
     seed: int = 0,
+    found: Sequence[Effect] = (),
 ) -> PerceptionFinding | None:
     """Judge the perception columns and the friction reference of some logs.
 
@@ -148,6 +150,8 @@ def diagnose_perception(
         Effects that are left out of the library.
     seed : int
         Of the resampling behind the shrink's interval.
+    found : sequence of Effect
+        What the dynamics were found to need: a friction reference that agrees with it is not the camera's gap.
 
     Returns
     -------
@@ -172,12 +176,12 @@ def diagnose_perception(
         *yet_more,
         *class_conflicts([*results, *([held_out] if held_out is not None else [])]),
     ]
-    found = (
+    judged = (
         shift_chain(results, held_out, modelled, camera.height_m, exclude),
         confidence_chain(results, held_out, (light, light_unseen), modelled, exclude),
-        friction_chain((logs_fit, roads[:-1]), (log_holdout, roads[-1]), vehicle, modelled, exclude),
+        friction_chain((logs_fit, roads[:-1]), (log_holdout, roads[-1]), vehicle, modelled, exclude, found),
     )
-    chains = [chain for chain in found if chain is not None]
+    chains = [chain for chain in judged if chain is not None]
     return _conclude(chains, tuple(warnings), seed) if chains else None
 
 
@@ -314,8 +318,8 @@ def _shrink(chains: Sequence[Chain], accounts: Sequence[Account], seed: int) -> 
     for nothing, account in seen:
         count = len(account.z)
         rows = np.vstack((np.arange(count), generator.integers(0, count, (BOOTSTRAP, count))))
-        old += (nothing.z**2)[rows].mean(axis=1) + nothing.excess
-        new += (account.z**2)[rows].mean(axis=1) + account.excess
+        old += np.maximum((nothing.z**2)[rows].mean(axis=1) + nothing.excess, NOISE_FLOOR)
+        new += np.maximum((account.z**2)[rows].mean(axis=1) + account.excess, NOISE_FLOOR)
     shrink = 100.0 * (1.0 - np.sqrt(new / np.maximum(old, 1e-12)))
     low, high = np.quantile(shrink[1:], QUANTILES)
     value = float(shrink[0])

@@ -69,8 +69,8 @@ class Account:
         return self.gain_fit + self.gain_holdout - self.price
 
     def left(self) -> float:
-        """Root mean square of what is left; noise alone gives about 1, no observations 0 [-]."""
-        return float(np.sqrt(np.mean(self.z**2) + self.excess)) if len(self.z) else 0.0
+        """Root mean square of what is left, in noise floors: not below 1; no observations give 0 [-]."""
+        return float(np.sqrt(max(float(np.mean(self.z**2)) + self.excess, 1.0))) if len(self.z) else 0.0
 
 
 @dataclass(frozen=True)

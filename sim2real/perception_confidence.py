@@ -186,7 +186,7 @@ def fit_confidence(
         blur = _exposure_time(exposure_s, float(slopes[best]), quantile / np.sqrt(max(products[1, 1], 1e-12)))
     wrong = Interval(stops, stops, stops, "stops")
     if "exposure_shift" in effects:
-        wrong = _exposure_error(profile, 0.5 * quantile**2, signed=signs.light is not None)
+        wrong = _exposure_error(profile, signed=signs.light is not None)
     return ConfidenceFit(effects, float(profile[best]), float(slopes[best]), float(levels[best]), blur, wrong)
 
 
@@ -199,16 +199,15 @@ def _exposure_time(modelled_s: float, slope: float, half: float) -> Interval:
     return Interval(modelled_s + added, modelled_s + added / factor, modelled_s + added * factor, "s")
 
 
-def _exposure_error(profile: Array, allowance: float, *, signed: bool) -> Interval:
-    """Exposure error; without pictures its sign is open, and the interval holds both."""
+def _exposure_error(profile: Array, *, signed: bool) -> Interval:
+    """Exposure error, with the law's uncertainty; without pictures its sign is open, and the interval holds both."""
     law = float(np.exp(0.5 * 1.96 * LAW_SPREAD))
-    inside = STOPS[profile >= profile.max() - allowance]
+    inside = STOPS[profile >= profile.max() - 0.5 * 1.96**2]
     if signed:
         value = float(np.average(STOPS, weights=np.exp(profile - profile.max())))
         low, high = float(inside[0]), float(inside[-1])
-        return Interval(
-            value, low * (law if low < 0.0 else 1.0 / law), high * (law if high > 0.0 else 1.0 / law), "stops"
-        )
+        low, high = low * (law if low < 0.0 else 1.0 / law), high * (law if high > 0.0 else 1.0 / law)
+        return Interval(value, max(low, float(STOPS[0])), min(high, float(STOPS[-1])), "stops")
     size = np.abs(STOPS)
     value = float(np.average(size, weights=np.exp(profile - profile.max())))
     most = min(float(np.abs(inside).max()) * law, float(size.max()))

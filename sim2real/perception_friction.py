@@ -1,7 +1,8 @@
 """The class's friction value against a friction reference, stretch by stretch of road.
 
 The simulation predicts mu_reference as the class's value; a reference that follows road.yaml's own friction, or the
-tyre's peak there, is no gap of the simulation either, which has that friction. A stretch of one segment is one
+tyre's peak there, is no gap of the simulation either, which has that friction. Nor is one that follows the friction
+that the dynamics were found to show. A stretch of one segment is one
 observation.
 """
 
@@ -9,13 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from scenarios.effects import Effect
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
-from scenarios.files import RoadFile, RoadSegment, VehicleFile
+from scenarios.files import RoadFile, VehicleFile
+from scenarios.plant.pipeline import make_setup
 from sim2real.logs import Log
 from sim2real.perception_chain import Account, Chain, price
 from sim2real.perception_frames import Modelled
@@ -35,6 +39,13 @@ TAIL = 4.0
 CALIBRATION = 0.04
 """Standard deviation, as a share, of what references mean by friction: peak or theta, and on which tyre [-]."""
 CLASSES = tuple(s.label for s in Surface)
+SIMULATED = (
+    "road.yaml's friction",
+    "the tyre's peak on road.yaml's friction",
+    "the friction that the dynamics show",
+    "the tyre's peak on the friction that the dynamics show",
+)
+"""Frictions that the simulation has already: a reference that follows one of them is no gap of the camera chain."""
 SIGNAL, OFFSET = "mu_reference", "class_friction_offset"
 NEXT_STEP = (
     "Brake to the limit on each surface: the tyres show the road's friction, and whose value is wrong."
@@ -58,8 +69,8 @@ class Stretches:
         Surface.
     reference, deviation : array, shape (n,)
         Mean mu_reference and its standard deviation, tolerance included [-].
-    theta, peak : array, shape (n,)
-        road.yaml's friction, mean of left and right, and the tyre's peak at it [-].
+    simulated : array, shape (n, 4)
+        Frictions that the simulation has there, mean of left and right, in the order of `SIMULATED` [-].
     """
 
     log: NDArray[np.str_]
@@ -68,8 +79,7 @@ class Stretches:
     classes: NDArray[np.intp]
     reference: Array
     deviation: Array
-    theta: Array
-    peak: Array
+    simulated: Array
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -114,42 +124,42 @@ def calibration_error(value: Array) -> Array:
     return np.maximum(CALIBRATION * value, TOLERANCE)
 
 
-def find_stretches(logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile) -> Stretches:
-    """Stretches of some drives that have a friction reference."""
+def find_stretches(
+    logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile, found: Sequence[Effect] = ()
+) -> Stretches:
+    """Stretches of some drives that have a friction reference; `found` are effects that the dynamics show."""
     rows = [
         row
         for log, road in zip(logs, roads, strict=True)
         if "mu_reference" in log.signals
-        for row in _of_one(log, road, vehicle)
+        for row in _of_one(log, road, vehicle, found)
     ]
-    columns = list(zip(*rows, strict=True)) if rows else [()] * 8
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 7
     numbers = [np.array(c, dtype=np.float64) for c in columns[1:]]
     return Stretches(
         np.array(columns[0], dtype=np.str_),
         numbers[0],
         numbers[1],
         numbers[2].astype(np.intp),
-        *numbers[3:],
+        numbers[3],
+        numbers[4],
+        numbers[5].reshape(len(rows), len(SIMULATED)),
     )
 
 
-def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile) -> list[tuple]:
+def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile, found: Sequence[Effect]) -> list[tuple]:
     core = vehicle.to_core()
-    load_n = core.wheel_load(front=True)
+    simulated = _simulated(road, vehicle, found)
     front_m = log.signals["position_m"] + core.cog_to_front_axle_m
     starts = [-np.inf, *(s.start_m for s in road.segments[1:]), np.inf]
     rows = []
-    for segment, begin, end in zip(road.segments, starts[:-1], starts[1:], strict=True):
+    for segment, begin, end, friction in zip(road.segments, starts[:-1], starts[1:], simulated, strict=True):
         inside = (front_m > begin + BORDER_M) & (front_m < end - BORDER_M)
         inside &= np.isfinite(log.signals["mu_reference"])
         if np.count_nonzero(inside) < FEWEST_ROWS:
             continue
         values = log.signals["mu_reference"][inside]
         wander = float(values.std() / np.sqrt(min(len(values), 10)))
-        peaks = [
-            peak_friction(mu, load_n, core.longitudinal_stiffness_n)
-            for mu in (segment.mu_left, segment.mu_right)
-        ]
         rows.append(
             (
                 log.name,
@@ -158,26 +168,41 @@ def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile) -> list[tuple]:
                 int(segment.surface_class),
                 float(np.median(values)),
                 float(np.hypot(TOLERANCE, wander)),
-                _mean(segment),
-                0.5 * sum(peaks),
+                friction,
             )
         )
     return rows
 
 
-def _mean(segment: RoadSegment) -> float:
-    return 0.5 * (segment.mu_left + segment.mu_right)
+def _simulated(road: RoadFile, vehicle: VehicleFile, found: Sequence[Effect]) -> Array:
+    """Frictions per segment, shape (segments, 4), in the order of `SIMULATED`."""
+    core = vehicle.to_core()
+    table = make_setup(vehicle, road).road
+    with_found = table
+    for effect in found:
+        with_found = effect.road(with_found)
+
+    def peak(theta: float) -> float:
+        return peak_friction(theta, core.wheel_load(front=True), core.longitudinal_stiffness_n)
+
+    columns = [
+        values.mean(axis=1)
+        for each in (table, with_found)
+        for values in (each.theta, np.vectorize(peak, otypes=[float])(each.theta))
+    ]
+    return np.column_stack(columns)
 
 
 def as_simulated(stretches: Stretches, offset: Array) -> FrictionFit:
     """The best of the accounts that mean no gap: class values (with the offsets modelled already), road, tyre."""
-    accounts: dict[str, Callable[[Stretches], Array]] = {
-        "the class's value": lambda s: s.class_value + offset[s.classes],
-        "road.yaml's friction": lambda s: s.theta,
-        "the tyre's peak on road.yaml's friction": lambda s: s.peak,
-    }
-    fits = [FrictionFit((), 0, predict, {}, what) for what, predict in accounts.items()]
+    fits = [FrictionFit((), 0, lambda s: s.class_value + offset[s.classes], {}, "the class's value")]
+    for column, what in enumerate(SIMULATED):
+        fits.append(FrictionFit((), 0, partial(_column, column), {}, what))
     return max(fits, key=lambda f: f.log_likelihood(stretches))
+
+
+def _column(column: int, stretches: Stretches) -> Array:
+    return stretches.simulated[:, column]
 
 
 def with_class_offsets(stretches: Stretches) -> FrictionFit:
@@ -202,11 +227,11 @@ def with_class_offsets(stretches: Stretches) -> FrictionFit:
 
 def with_road_factor(stretches: Stretches) -> FrictionFit:
     """One factor on the road's friction, as the dynamics' friction_offset has it."""
-    ratio = stretches.reference / stretches.theta
-    factor, half = _location(ratio, stretches.deviation / stretches.theta)
+    theta = stretches.simulated[:, 0]
+    factor, half = _location(stretches.reference / theta, stretches.deviation / theta)
 
     def predict(s: Stretches) -> Array:
-        return factor * s.theta
+        return factor * s.simulated[:, 0]
 
     interval = {"factor": Interval(factor, factor - half, factor + half)}
     return FrictionFit(("friction_offset",), 1, predict, interval, "one factor on road.yaml's friction")
@@ -230,13 +255,14 @@ def friction_chain(
     vehicle: VehicleFile,
     modelled: Modelled,
     exclude: Collection[str],
+    found: Sequence[Effect] = (),
 ) -> Chain | None:
     """The friction reference's account; None where no log has one.
 
     Beside class_friction_offset it holds an account of friction_offset, which the dynamics judge too.
     """
-    known = find_stretches(*fitted, vehicle)
-    unseen = find_stretches([held_out[0]], [held_out[1]], vehicle)
+    known = find_stretches(*fitted, vehicle, found)
+    unseen = find_stretches([held_out[0]], [held_out[1]], vehicle, found)
     measured = [log for log in (*fitted[0], held_out[0]) if "mu_reference" in log.signals]
     if not measured:
         return None
@@ -285,7 +311,7 @@ def _evidence(fit: FrictionFit, nothing: FrictionFit, known: Stretches) -> tuple
         if here.any():
             means.append(
                 f"{name} {np.median(known.reference[here]):.2f} (class value {known.class_value[here][0]:g}, "
-                f"road.yaml {np.median(known.theta[here]):.2f})"
+                f"road.yaml {np.median(known.simulated[here, 0]):.2f})"
             )
     return (
         f"mu_reference over {len(known)} stretches: {', '.join(means)}. Nearest without a gap is {nothing.what}; "

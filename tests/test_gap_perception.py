@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from camera_drives import CAR, CLASS_FRICTION, NAMES, Camera, changed, drive, log_of, road
 
+from scenarios.effects import make_effect
 from scenarios.files import VehicleFile
 from scenarios.perception import perceive
 from scenarios.plant import make_log, simulate
@@ -259,6 +260,23 @@ def picture_drive(folder, stops, seed, name):
     return replace(log, image_path=images, path=folder / f"{name}.csv")
 
 
+def test_pictures_alone_tell_their_exposure(tmp_path):
+    logs = [picture_drive(tmp_path, 4.0, seed, f"d{seed}") for seed in range(3)]
+    logs = [changed(log, image_confidence=None) for log in logs]
+    finding = diagnose_perception(logs[:2], logs[2], [road(seed=i) for i in range(3)], BARE)
+    assert finding.causes == ("exposure_shift",)
+    assert candidate(finding, "exposure_shift").parameters["stops"].low > 0.0
+
+
+def test_wrong_classes_and_low_confidence_together_are_bad_pictures():
+    """Either alone is within what cameras do."""
+    assert diagnose(Camera(dimmed=0.8)).verdict is Verdict.NO_GAP
+    assert diagnose(Camera(wrong=0.14)).verdict is Verdict.NO_GAP
+    finding = diagnose(Camera(dimmed=0.75, wrong=0.3))
+    assert finding.causes == ("exposure_shift",)
+    assert "not road.yaml's in" in " ".join(candidate(finding, "exposure_shift").evidence_for)
+
+
 @pytest.mark.parametrize("stops", [-3.0, 0.0, 3.0])
 def test_pictures_tell_overexposed_from_underexposed(tmp_path, stops):
     logs = [picture_drive(tmp_path, stops, seed, f"d{seed}") for seed in range(3)]
@@ -288,7 +306,9 @@ def test_pictures_that_cannot_be_read_are_said(tmp_path):
 
 
 def test_class_offsets_are_found_per_class():
-    for seed, offset in enumerate([(0.0, -0.2, 0.0), (-0.15, 0.0, 0.2), (-0.3, 0.1, 0.1), (0.15, -0.15, 0.0)]):
+    for seed, offset in enumerate(
+        [(0.0, -0.2, 0.0), (-0.15, 0.0, 0.2), (-0.3, 0.1, 0.1), (0.15, -0.15, 0.0)]
+    ):
         finding = diagnose(Camera(offset=offset), seed)
         assert (finding.verdict, finding.causes) == (Verdict.IDENTIFIED, ("class_friction_offset",))
         estimate = candidate(finding, "class_friction_offset").parameters
@@ -314,6 +334,25 @@ def test_one_factor_on_the_roads_friction_is_the_dynamics_own():
     finding = diagnose_perception(logs[:2], logs[2], roads, BARE)
     assert finding.causes == ("friction_offset",)
     assert candidate(finding, "friction_offset").parameters["factor"].value == pytest.approx(0.7, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [("friction_offset", {"factor": 0.7}), ("mu_split", {"left_factor": 0.5, "right_factor": 1.0})],
+)
+def test_a_reference_that_agrees_with_what_the_dynamics_show_is_no_gap_of_the_camera(effect, values):
+    roads = [road(seed=i, mu=(0.9, 0.5, 0.3)) for i in range(3)]
+    torque = np.full((2001, 4), 40.0)
+    logs = []
+    for i, r in enumerate(roads):
+        trajectory = simulate(car_with(**{effect: values}), r, torque, 0.01, 8.0)
+        table = make_log(trajectory, CAR, seed=i)
+        signals = {n: table[n].to_numpy() for n in ("vehicle_speed_m_s", "position_m", "mu_reference")}
+        logs.append(log_of(trajectory.time_s, signals, f"drive{i}.csv"))
+    alone = diagnose_perception(logs[:2], logs[2], roads, BARE)
+    assert alone.verdict is not Verdict.NO_GAP
+    shown = make_effect(effect, values, BARE.to_core())
+    assert diagnose_perception(logs[:2], logs[2], roads, BARE, found=[shown]).verdict is Verdict.NO_GAP
 
 
 # several at once, and what is left out
