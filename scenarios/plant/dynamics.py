@@ -81,7 +81,10 @@ compiled = njit(cache=True, error_model="numpy")  # divisions are guarded here, 
 # As calls these would count references of every working array, which takes twice as long as their arithmetic.
 inlined = njit(cache=True, error_model="numpy", inline="always")
 
-_GAIN, _BY_WHEEL, _BY_SPEED, _OWN, _SHARE, _MOTOR, _BRAKE = range(7)  # rows of the pivots
+# Rows of the wheels' working array. It is one array, since each one that a call passes on costs time.
+_STEADY, _LAG, _SLOPE_WHEEL, _SLOPE_SPEED = range(4)  # the tyre's, filled by `forces`
+_GAIN, _BY_WHEEL, _BY_SPEED, _OWN, _SHARE, _MOTOR, _BRAKE = range(4, 11)  # the step's linear equations
+
 _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)  # makes the two-stage Rosenbrock method L-stable
 
 
@@ -151,9 +154,9 @@ def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, the
 def new_wheels() -> tuple[Wheels, Wheels]:
     """Working arrays of the two stages; both read the same theta."""
     theta = np.zeros(4)
-    a, free, rates, pivots = np.zeros((14, 4)), np.ones((2, 5)), np.zeros((2, 16)), np.zeros((2, 7, 4))
-    first = Wheels(theta, a[0], a[1], a[2], a[3], a[4], a[5], a[6], rates[0], free[0], pivots[0])
-    second = Wheels(theta, a[7], a[8], a[9], a[10], a[11], a[12], a[13], rates[1], free[1], pivots[1])
+    a, free, rates, work = np.zeros((6, 4)), np.ones((2, 5)), np.zeros((2, 16)), np.zeros((2, 11, 4))
+    first = Wheels(theta, a[0], a[1], a[2], rates[0], free[0], work[0])
+    second = Wheels(theta, a[3], a[4], a[5], rates[1], free[1], work[1])
     return first, second
 
 
@@ -195,11 +198,11 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
                 theta *= p.falloff_floor + (1.0 - p.falloff_floor) * left
             force, by_slip, by_load = tyre_force(theta, slip, load_n, p.longitudinal_stiffness_n)
             sign = 1.0 if rim >= speed else -1.0
-            wheels.steady_n[i] = sign * force
+            wheels.work[_STEADY, i] = sign * force
             if p.relaxation_m > 0.0:
                 wheels.force_n[i] = y[FORCE + i]
                 rest = speed <= 0.0 and y[FORCE + i] < 0.0
-                wheels.lag_rate[i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / p.relaxation_m
+                wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / p.relaxation_m
             else:
                 wheels.force_n[i] = sign * force
                 total_by_accel += sign * by_load * (-transfer_kg if i < 2 else transfer_kg)
@@ -208,8 +211,8 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             wheels.slip[i] = slip
             # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
             slope = max(by_slip, 0.0) / scale
-            wheels.force_by_wheel[i] = slope * p.wheel_radius_m * (speed / rim if rim == scale else 1.0)
-            wheels.force_by_speed[i] = -slope * (rim / speed if speed == scale else 1.0)
+            wheels.work[_SLOPE_WHEEL, i] = slope * p.wheel_radius_m * (speed / rim if rim == scale else 1.0)
+            wheels.work[_SLOPE_SPEED, i] = -slope * (rim / speed if speed == scale else 1.0)
         error = (total_n - drag_n) / p.mass_kg - accel
         accel += error / (1.0 - total_by_accel / p.mass_kg)
         if p.transfer_height_m == 0.0 or abs(error) < ACCELERATION_TOLERANCE_M_S2:
@@ -259,7 +262,7 @@ def _fill_rates(
         if p.motor_inertia_kg_m2 > 0.0:
             spread = y[MOTOR + i] - y[WHEEL + i]
             shaft_nm = p.shaft_stiffness_nm_rad * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
-            motor_nm, wheels.pivots[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
+            motor_nm, wheels.work[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
             wheels.rates[TWIST - WHEEL + i] = spread
             wheels.rates[MOTOR - WHEEL + i] = (motor_nm - shaft_nm) / p.motor_inertia_kg_m2
             torque = shaft_nm
@@ -267,8 +270,8 @@ def _fill_rates(
         wheels.free[i] = 0.0 if y[WHEEL + i] <= 0.0 and rate == 0.0 else 1.0
         wheels.rates[i] = rate
         if p.relaxation_m > 0.0:
-            lag_n = wheels.steady_n[i] - y[FORCE + i]
-            wheels.rates[FORCE - WHEEL + i] = wheels.lag_rate[i] * lag_n
+            lag_n = wheels.work[_STEADY, i] - y[FORCE + i]
+            wheels.rates[FORCE - WHEEL + i] = wheels.work[_LAG, i] * lag_n
         total_n += wheels.force_n[i]
     wheels.free[4] = 0.0 if y[SPEED] <= 0.0 and total_n < p.mass_kg * p.slope_m_s2 else 1.0
 
@@ -282,7 +285,7 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
     """
     gh = _GAMMA * h
     pivot = 1.0 + gh * 2.0 * p.drag_kg_m * speed / p.mass_kg
-    at = wheels.pivots
+    at = wheels.work
     per_newton = p.wheel_radius_m / p.wheel_inertia_kg_m2
     for i in range(4):
         if p.motor_inertia_kg_m2 > 0.0:
@@ -290,10 +293,10 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
             motor = at[_MOTOR, i] = p.motor_inertia_kg_m2 + gh * at[_BRAKE, i]
             inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2 + motor / (motor + shaft) * shaft
             per_newton = p.wheel_radius_m / inertia
-        lagged = gh * wheels.lag_rate[i]
+        lagged = gh * wheels.work[_LAG, i]
         share = lagged / (1.0 + lagged) if p.relaxation_m > 0.0 else 1.0
-        at[_BY_WHEEL, i] = wheels.force_by_wheel[i] * share
-        at[_BY_SPEED, i] = wheels.force_by_speed[i] * share
+        at[_BY_WHEEL, i] = wheels.work[_SLOPE_WHEEL, i] * share
+        at[_BY_SPEED, i] = wheels.work[_SLOPE_SPEED, i] * share
         at[_GAIN, i] = gh * per_newton * wheels.free[i]
         at[_OWN, i] = 1.0 + at[_GAIN, i] * at[_BY_WHEEL, i]
         at[_SHARE, i] = gh * at[_BY_WHEEL, i] / (p.mass_kg * at[_OWN, i])
@@ -307,7 +310,7 @@ def _solve(
 ) -> float:
     """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; return the vehicle speed's part."""
     gh = _GAMMA * h
-    at = wheels.pivots
+    at = wheels.work
     has_shaft = p.motor_inertia_kg_m2 > 0.0
     stiffness = gh * p.shaft_stiffness_nm_rad
     shaft = gh * (stiffness + p.shaft_damping_nm_s_rad)
@@ -321,7 +324,7 @@ def _solve(
             share = at[_MOTOR, i] / (at[_MOTOR, i] + shaft)
             k[i] = (inertia * k[i] + share * passed) / (inertia + share * shaft)
         if p.relaxation_m > 0.0:
-            k[FORCE - WHEEL + i] /= 1.0 + gh * wheels.lag_rate[i]
+            k[FORCE - WHEEL + i] /= 1.0 + gh * wheels.work[_LAG, i]
             k[i] -= at[_GAIN, i] * k[FORCE - WHEEL + i]
             rhs += gh / p.mass_kg * k[FORCE - WHEEL + i]
         rhs += at[_SHARE, i] * k[i]

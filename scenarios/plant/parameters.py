@@ -61,20 +61,12 @@ class Wheels(NamedTuple):
 
     theta: NDArray[np.float64]
     force_n: NDArray[np.float64]
-    """What the tyre does; with relaxation that lags behind steady_n."""
+    """What the tyre does; with relaxation it lags behind its steady value."""
     load_n: NDArray[np.float64]
     slip: NDArray[np.float64]
-    steady_n: NDArray[np.float64]
-    """What the tyre would do if the slip stayed."""
-    lag_rate: NDArray[np.float64]
-    """Transport speed per relaxation length [1/s]."""
-    force_by_wheel: NDArray[np.float64]
-    """Slope of the steady force by wheel speed [N s/rad]."""
-    force_by_speed: NDArray[np.float64]
-    """Slope of the steady force by vehicle speed [N s/m]."""
     rates: NDArray[np.float64]
     """Of y from the wheel speeds on, shape (16,)."""
     free: NDArray[np.float64]
     """0 for what is held at rest, else 1: four wheels and the vehicle, shape (5,)."""
-    pivots: NDArray[np.float64]
-    """The step's linear equations after elimination, shape (7, 4); see dynamics.py."""
+    work: NDArray[np.float64]
+    """What only the step itself needs, shape (11, 4); dynamics.py names the rows."""
