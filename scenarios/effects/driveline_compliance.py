@@ -20,7 +20,8 @@ LEAST_MOTOR_SHARE = 0.02
 class DrivelineCompliance(Effect):
     """Motor and wheel turn on the two ends of a shaft; driving and braking torque both act at the motor.
 
-    The motor's inertia J is a part of the wheel's I, so that a stiff shaft is the plant without it.
+    The motor's inertia J is a part of the wheel's I, so that a stiff shaft is the plant without it; below 2 % of I the
+    driveline counts as rigid.
     """
 
     id = "driveline_compliance"
