@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 BEAM = 3
 """Best single effects that pairs are built on."""
-PAIRS_PER_MEMBER = 4
+PAIRS_PER_MEMBER = 3
 """Pairs that are fitted per single effect of the beam, the most promising by a linear screening."""
 COUNTER = "wheel_speed_quantisation"
 """Judged by the mark that it leaves, see `sim2real.lattice`, not by residuals."""
@@ -30,6 +30,8 @@ FINALISTS = 8
 """Effects that are fitted to all fit logs with full care, after a first round on one log."""
 FIRST_ROUND_STEPS = 4
 """Steps of the first round's fits."""
+SWAPS_PER_MEMBER = 3
+"""Partners that are tried anew for each member of the best pair."""
 LINEAR_PAIRS = 4
 """Further pairs, the most promising by the slopes at the effects' own fits."""
 
@@ -128,17 +130,41 @@ def add_pairs(
     progress: Progress = lambda stage, done, total: None,
 ) -> Contest:
     """The contest with the most promising pairs fitted too."""
-    wanted = promising_pairs(contest)
     entries = {e.ids[0]: e for e in contest.singles}
 
     def start(pair: tuple[str, ...]) -> Array:
-        return np.concatenate([entries[key].fit.x for key in pair])  # type: ignore[union-attr]
+        return np.concatenate([_fitted(entries[key]).x for key in pair])
 
-    work = [
-        partial(enter, Candidate(model, pair), fit_to, holdout, start(pair), FULL_STEPS) for pair in wanted
-    ]
-    pairs = run_all(work, jobs, progress, "pairs")
+    def fit_pairs(wanted: Sequence[tuple[str, ...]], stage: str) -> list[Entry]:
+        work = [
+            partial(enter, Candidate(model, pair), fit_to, holdout, start(pair), FULL_STEPS)
+            for pair in wanted
+        ]
+        return run_all(work, jobs, progress, stage)
+
+    pairs = fit_pairs(promising_pairs(contest), "pairs")
+    best = min(pairs, key=lambda e: e.loss)
+    pairs += fit_pairs(swapped_pairs(contest, best, {e.ids for e in pairs}, model, fit_to), "pairs, swapped")
     return Contest(contest.null, contest.singles, tuple(sorted(pairs, key=lambda e: e.loss)))
+
+
+def swapped_pairs(
+    contest: Contest, best: Entry, tried: Collection[tuple[str, ...]], model: Simulation, fit_to: Evidence
+) -> list[tuple[str, ...]]:
+    """Pairs that keep one member of the best pair, at its value in the pair, and look for another partner."""
+    chosen = []
+    for keep in best.ids:
+        found = _fitted(best)
+        mine = [i for i, (key, _) in enumerate(found.candidate.parameters) if key == keep]
+        alone = Candidate(model, (keep,))
+        z = fit_to.whitened(fit_to.residuals(alone.model(found.x[mine])))
+        foretold = sorted(
+            (_foretold(z, _slopes(other), found.jacobian[:, mine]), _ordered(keep, other.ids[0]))
+            for other in contest.singles
+            if other.ids[0] not in best.ids
+        )
+        chosen += [pair for _, pair in foretold if pair not in tried][:SWAPS_PER_MEMBER]
+    return list(dict.fromkeys(chosen))
 
 
 def promising_pairs(contest: Contest) -> list[tuple[str, ...]]:
@@ -169,8 +195,12 @@ def _ordered(a: str, b: str) -> tuple[str, ...]:
 
 
 def _slopes(entry: Entry) -> Array:
-    assert entry.fit is not None
-    return entry.fit.jacobian
+    return _fitted(entry).jacobian
+
+
+def _fitted(entry: Entry) -> Fit:
+    assert entry.fit is not None, "the model as it is has no fit"
+    return entry.fit
 
 
 def _foretold(z: Array, *slopes: Array) -> float:

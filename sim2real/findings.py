@@ -128,8 +128,8 @@ def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int)
     out = []
     for entry in found.contest.singles:
         out.append(_cause(found, entry, held, before, seed, together))
-    order = {key: -i for i, key in enumerate(together.ids)} if together else {}
-    return tuple(sorted(out, key=lambda c: (c.effect not in order, -c.probability, c.gap_after)))
+    first = set(together.ids) if together else set()
+    return tuple(sorted(out, key=lambda c: (c.effect not in first, -c.probability, c.gap_after)))
 
 
 def _cause(

@@ -89,12 +89,18 @@ def probabilities(contest: Contest, entries: list[Entry], fit_to: Evidence, hold
 
 NO_GAP_MISFIT = 1.6
 """Up to this misfit of the model as it is, what is left is noise [-]."""
+NO_GAP_DOUBT = 0.03
+"""Probability that something is left of the candidates where the misfit says there is no gap [-]."""
 EXPLAINED_MISFIT = 2.0
 """Up to this misfit an entry explains everything [-]."""
-EXPLAINED_SHARE = 0.08
+EXPLAINED_SHARE = 0.1
 """Where the gap is large, an entry explains it if it leaves this share of the misfit: no form is exact [-]."""
 PAIR_LEAVES = 0.5
 """A pair is taken in place of one effect only where it at least halves the misfit [-]."""
+PAIR_MISFIT = 1.6
+"""Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
+PAIR_SHARE = 0.05
+"""As `EXPLAINED_SHARE`, for a pair [-]."""
 RIVAL = 0.1
 """An entry with more than this share of the winner's probability is not told apart from it [-]."""
 SOFTNESS = 4.0
@@ -152,13 +158,14 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     weight = probabilities(contest, singles, fit_to, holdout)
     share = dict(zip((e.ids[0] for e in singles), weight[1:], strict=True))
     if before.misfit <= NO_GAP_MISFIT or not singles:
-        return Decision(Verdict.NO_GAP, contest.null, (), _scaled(share, 1.0 - weight[0]), before, before)
+        return Decision(Verdict.NO_GAP, contest.null, (), _scaled(share, NO_GAP_DOUBT), before, before)
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
     if contest.pairs:
         pair = contest.pairs[0]
         paired = fitness(pair, fit_to, holdout)
-        if paired.misfit < PAIR_LEAVES * after.misfit and explains(paired, before):
+        enough = max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
+        if paired.misfit < min(PAIR_LEAVES * after.misfit, enough):
             return _compound(contest, pair, fit_to, holdout, before, paired)
     if not explains(after, before):
         return Decision(Verdict.UNKNOWN, best, (), _scaled(share, _belief(after, before)), before, after)
