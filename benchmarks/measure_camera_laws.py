@@ -1,6 +1,6 @@
 """How the shipped networks' confidence falls with exposure and motion blur, on rendered roads.
 
-``python benchmarks/measure_camera_laws.py --worlds 24`` prints, per strength of a disturbance, the image estimator's
+``python benchmarks/measure_camera_laws.py --worlds 20`` prints, per strength of a disturbance, the image estimator's
 mean log confidence against the undisturbed picture and its share of wrong classes: the source of the constants of
 ``scenarios/effects/exposure_shift.py`` and ``motion_blur.py``. Exposure multiplies the linear light and clips it;
 blur is the mean, in linear light, of pictures along the way driven while the shutter is open.
@@ -53,7 +53,7 @@ def developed(light: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--worlds", type=int, default=24, help="random worlds per surface")
+    parser.add_argument("--worlds", type=int, default=20, help="random worlds per surface")
     parser.add_argument("--scale", type=float, default=0.5, help="of the paper's 1920 x 1200 pixels")
     arguments = parser.parse_args()
     cv2.setNumThreads(1)

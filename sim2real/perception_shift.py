@@ -33,8 +33,8 @@ SHARE_SPREAD, SHARE_SPREAD_SIMULATED = 0.2, 0.3
 the road has it anywhere in the stretch, so that any share is nearly as good [-]."""
 LEAST_WIDTH_M = 0.02
 DELAYS_S, PITCHES_RAD = (0.0, 1.0), (-0.4, 0.4)
-GRID, ZOOMS = 41, 2
-"""Points per axis of the search, and how often it is drawn closer about what matters."""
+GRID, GRID_OF_TWO, ZOOMS = 41, 25, 3
+"""Points per axis of the search over one parameter, and over two; how often it is drawn closer about what matters."""
 SIGNAL = "image_place"
 CHOICES = (("camera_latency",), ("camera_pitch",), ("camera_latency", "camera_pitch"))
 NEXT_STEP = "Pass the same borders once slowly and once fast, five times each at about 10 and 25 m/s."
@@ -110,8 +110,9 @@ def fit_shift(
     delay_s, pitch_rad : float
         What the simulation models already; effects that do not move stay there [s], [rad].
     """
-    delays = np.linspace(*DELAYS_S, GRID) if "camera_latency" in effects else np.array([delay_s])
-    pitches = np.linspace(*PITCHES_RAD, GRID) if "camera_pitch" in effects else np.array([pitch_rad])
+    grid = GRID_OF_TWO if len(effects) == 2 else GRID
+    delays = np.linspace(*DELAYS_S, grid) if "camera_latency" in effects else np.array([delay_s])
+    pitches = np.linspace(*PITCHES_RAD, grid) if "camera_pitch" in effects else np.array([pitch_rad])
     allowance = 0.5 * student.ppf(0.975, max(len(crossings) - 1, 1)) ** 2
     for _ in range(ZOOMS):
         profile = _profiles(crossings, delays, pitches, height_m).max(axis=(0, 1))
@@ -172,7 +173,7 @@ def _about(grid: Array, profile: Array, allowance: float) -> Array:
         return grid
     matters = np.flatnonzero(profile >= profile.max() - allowance)
     first, last = max(int(matters[0]) - 1, 0), min(int(matters[-1]) + 1, len(grid) - 1)
-    return np.linspace(grid[first], grid[last], GRID)
+    return np.linspace(grid[first], grid[last], len(grid))
 
 
 def _interval(grid: Array, likely: Array, profile: Array, allowance: float, unit: str) -> Interval:
