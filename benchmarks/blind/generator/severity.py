@@ -57,7 +57,7 @@ def size_of(difference: Array, noise: Noise) -> Size:
     return Size(float(np.sqrt(1.0 + np.mean(np.square(list(parts.values()))))), parts)
 
 
-def find_severity(gap_at: Callable[[float], float], target: float, tries: int = 4) -> float:
+def find_severity(gap_at: Callable[[float], float], target: float, tries: int = 6) -> float:
     """Severity in 0..1 at which the gap, growing with it, is `target` within a tenth; the nearest end where none is.
 
     By the secant in the gap's logarithm, kept off the ends so that a gap that jumps is still bracketed.
