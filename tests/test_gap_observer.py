@@ -162,7 +162,7 @@ def test_a_push_that_is_not_felt_is_gravity(tame):
     np.testing.assert_allclose(pushed.states, graded.states, atol=5e-3)
     moved = graded.channels - MODEL.predict(tame).channels
     assert np.abs(moved[:, SPEED]).max() > 0.5 * abs(pull[0])
-    assert np.abs(moved[:, ACCEL]).max() < 0.1 * abs(pull[0])
+    assert np.abs(moved[:, ACCEL]).max() < 0.2 * abs(pull[0])
 
 
 def test_a_push_that_is_felt_is_a_force(tame):
