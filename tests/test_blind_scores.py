@@ -13,10 +13,11 @@ import pytest
 import yaml
 
 from benchmarks.blind import runner
+from benchmarks.blind.__main__ import Size
 from benchmarks.blind.baselines import cosine
 from benchmarks.blind.command import watch
 from benchmarks.blind.generator.cases import make_case
-from benchmarks.blind.generator.table import Group, Spec, table
+from benchmarks.blind.generator.table import SIZES, Group, Spec, table
 from benchmarks.blind.outcome import ResultError, outcome_of, read_outcomes
 from benchmarks.blind.scorer import Scores, load_thresholds, score, score_run
 from benchmarks.blind.show import draw_confusion
@@ -326,3 +327,7 @@ def test_a_watched_command_tells_memory_of_all_its_processes():
     assert usage.seconds > 1.0
     failed = watch([sys.executable, "-c", "import sys; sys.exit('column missing')"])
     assert (failed.code, failed.errors) == (1, "column missing")
+
+
+def test_every_size_can_be_asked_for():
+    assert [size.value for size in Size] == list(SIZES)

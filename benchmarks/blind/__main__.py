@@ -34,6 +34,7 @@ class Size(StrEnum):
 
     DEV = "dev"
     SMALL = "small"
+    MEDIUM = "medium"
     FULL = "full"
 
 
