@@ -271,7 +271,8 @@ def _confusion(outcomes: Iterable[Outcome]) -> dict[str, dict[str, int]]:
             cells[o.truth[0]][o.answer] += 1
         elif o.group in (Group.NO_GAP, Group.OUTSIDE):
             cells[f"({o.group})"][o.answer] += 1
-    return {truth: dict(row) for truth, row in sorted(cells.items())}
+    order = [*LIBRARY, *sorted(set(cells) - set(LIBRARY))]
+    return {truth: dict(cells[truth]) for truth in order if truth in cells}
 
 
 def _baselines(rich: Sequence[Outcome]) -> dict[str, dict[str, float]]:

@@ -11,6 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from .generator.library import LIBRARY
@@ -48,7 +49,7 @@ def print_scores(scores: Scores, console: Console) -> None:
         table.add_row(group, ", ".join(f"{n} {verdict}" for verdict, n in sorted(verdicts.items())))
     console.print(table)
     for name, error in scores.errors.items():
-        console.print(f"[red]{name}[/red]: {error}", highlight=False)
+        console.print(f"[red]{name}[/red]: {escape(error)}", highlight=False)
     if scores.pending:
         console.print(f"{len(scores.pending)} cases have no result yet: the figures are not the run's.")
 
