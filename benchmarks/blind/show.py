@@ -68,7 +68,12 @@ def _lines(lines: list[Line], title: str) -> Table:
             "" if not line.limits else "-" if line.n == 0 else "holds" if line.holds else "[red]missed[/red]"
         )
         table.add_row(
-            line.text, value, f"{line.hits}/{line.n}" if counted else f"n = {line.n}", between, limit, mark
+            escape(line.text),
+            value,
+            f"{line.hits}/{line.n}" if counted else f"n = {line.n}",
+            between,
+            limit,
+            mark,
         )
     return table
 
