@@ -26,7 +26,7 @@ PAIRS_PER_MEMBER = 3
 """Pairs that are fitted per single effect of the beam, the most promising by a linear screening."""
 COUNTER = "wheel_speed_quantisation"
 """Judged by the mark that it leaves, see `sim2real.lattice`, not by residuals."""
-FINALISTS = 8
+FINALISTS = 6
 """Effects that are fitted to all fit logs with full care, after a first round on one log."""
 FIRST_ROUND_STEPS = 4
 """Steps of the first round's fits."""

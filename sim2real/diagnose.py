@@ -24,7 +24,6 @@ from sim2real.merge import camera_side, counter_side, merge
 from sim2real.noise import RESOLUTION, read_noise
 from sim2real.observer import Simulation
 from sim2real.perception import diagnose_perception
-from sim2real.rating import rate
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, needs_pairs
 from sim2real.sources import Sources, read_sources
@@ -88,13 +87,13 @@ def diagnose_files(
         sources.vehicle,
         exclude=exclude,
         seed=seed,
+        found=findings.added(),
     )
     if camera is not None:
         said = merge(said, camera_side(camera))
     return replace(
         said,
         trpac=_estimate(findings, sources),
-        rating=rate(said.traces),
         warnings=(*(f"{s.log.name}: {text}" for s in sources.all for text in s.log.warnings), *said.warnings),
         provenance={**_provenance(sources), **said.provenance},
     )

@@ -81,7 +81,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         progress("equations", 0, 1)
         drives = (*found.fit_to.drives, *held.drives) if decision.verdict is Verdict.UNKNOWN else held.drives
         noises = (*found.fit_to.noises, *held.noises) if decision.verdict is Verdict.UNKNOWN else held.noises
-        terms = fit_terms(found.model, drives, noises, jobs)
+        terms = fit_terms(found.model, drives, noises, jobs, decision.verdict is not Verdict.UNKNOWN)
         progress("equations", 1, 1)
         if decision.verdict is Verdict.UNKNOWN:
             unexplained = characterise(terms)

@@ -74,7 +74,7 @@ def camera_side(found: PerceptionFinding) -> Side:
     if found.verdict is Verdict.UNKNOWN and found.unexplained:
         term = Unexplained(
             "camera",
-            "image_class",
+            "image_place",
             "place",
             "-",
             "",
@@ -195,7 +195,7 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
     """One diagnosis of two; see the module."""
     before = _join(main.gap.before, side.before)
     after = _join(main.gap.after, side.after)
-    verdict = _verdict(main.verdict, side.verdict)
+    verdict = _verdict(main, side)
     both = main.verdict is not Verdict.NO_GAP and side.verdict is not Verdict.NO_GAP
     main_causes, side_causes = list(main.causes), list(side.causes)
     if both:
@@ -228,13 +228,15 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
     )
 
 
-def _verdict(main: Verdict, side: Verdict) -> Verdict:
-    if side is Verdict.NO_GAP:
-        return main
-    if main is Verdict.NO_GAP:
-        return side
-    if Verdict.UNKNOWN in (main, side):
+def _verdict(main: Diagnosis, side: Side) -> Verdict:
+    if side.verdict is Verdict.NO_GAP:
+        return main.verdict
+    if main.verdict is Verdict.NO_GAP:
+        return side.verdict
+    if Verdict.UNKNOWN in (main.verdict, side.verdict):
         return Verdict.UNKNOWN
+    if main.causes and side.named == (main.causes[0].effect,):  # seen twice, still one effect
+        return main.verdict
     return Verdict.COMPOUND
 
 

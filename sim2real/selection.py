@@ -121,7 +121,7 @@ def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     return fitness(contest.singles[0], fit_to, holdout).misfit > FLOOR_MISFIT
 
 
-FLOOR_MISFIT = 1.25
+FLOOR_MISFIT = 1.5
 """Above this misfit an entry is worth a second effect's try [-]."""
 
 

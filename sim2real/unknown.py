@@ -10,25 +10,27 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from scenarios.files import WHEELS
-from sim2real.contest import robust_weight
 from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
-from sim2real.fitting import SETTLING_S, robust
+from sim2real.fitting import SETTLING_S, robust, robust_weight
 from sim2real.noise import Noise
 from sim2real.observer import Prediction, Push, Simulation
 from sim2real.result import Unexplained
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 KNOTS = 6
 """Values of a curve over a quantity of the motion."""
 KNOT_S = 2.0
 """Distance of the knots of a curve over time [s]."""
+PRICE_PER_KNOT = 10.0
+"""Price of a fitted value, about the logarithm of the number of residuals [-]."""
 RIDGE = 1e-6
 """Share of the greatest slope that a term's values are held to zero with [-]."""
 
@@ -142,8 +144,8 @@ class Term:
         What it leaves of the loss on all drives.
     null_loss : float
         The loss without it.
-    size : int
-        Values that were fitted.
+    size, samples : int
+        Values that were fitted, and residuals behind them.
     """
 
     equation: Equation
@@ -153,19 +155,30 @@ class Term:
     loss: float
     null_loss: float
     size: int
+    samples: int
 
 
 def fit_terms(
-    model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], jobs: int = 1
+    model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], jobs: int = 1, shared: bool = False
 ) -> list[Term]:
-    """All free terms, fitted to these drives, best quasi-likelihood first."""
+    """All free terms, fitted to these drives, best quasi-likelihood first; `shared` leaves out `PER_DRIVE`."""
     seen = [model.predict(drive) for drive in drives]
     z = [_whitened(drive, noise, p.channels) for drive, noise, p in zip(drives, noises, seen, strict=True)]
-    work = [(equation, quantity) for equation in EQUATIONS for quantity in equation.quantities]
+    work = [
+        (equation, quantity)
+        for equation in EQUATIONS
+        for quantity in equation.quantities
+        if not (shared and quantity in PER_DRIVE)
+    ]
     found = Parallel(n_jobs=jobs, prefer="threads")(
         delayed(_fit_term)(model, drives, noises, seen, z, equation, quantity) for equation, quantity in work
     )
-    return sorted(found, key=lambda term: term.loss)
+    return sorted(found, key=score)
+
+
+def score(term: Term) -> float:
+    """Loss and a price for each value of the curve, in units of what the loss leaves per degree of freedom."""
+    return term.loss + PRICE_PER_KNOT * term.size * max(term.loss, 1.0) / max(term.samples, 1)
 
 
 def _whitened(drive: Drive, noise: Noise, channels: Array) -> Array:
@@ -201,7 +214,8 @@ def _fit_term(
     every = np.concatenate([part.ravel() for part in z])
     y, left = _solve(every, slopes)
     null = float(np.sum(robust(every)))
-    return Term(equation, quantity, np.array([place for place, _ in columns]), y, left, null, len(columns))
+    x = np.array([place for place, _ in columns])
+    return Term(equation, quantity, x, y, left, null, len(columns), int(np.count_nonzero(every)))
 
 
 def _knots(values: Sequence[Array], drives: Sequence[Drive], quantity: str) -> list[Array]:
@@ -231,7 +245,7 @@ def _hats(
 
 def _solve(z: Array, slopes: Array) -> tuple[Array, float]:
     """Values of the term by reweighted least squares, and the loss that they leave."""
-    y = np.zeros(slopes.shape[1])
+    y: Array = np.zeros(slopes.shape[1])
     for _ in range(3):
         rest = z + slopes @ y
         weight = robust_weight(rest)
