@@ -113,7 +113,7 @@ class Counts:
 SIZES: dict[str, Counts] = {
     "dev": Counts(rich=1, tyre=0, mild=0, no_gap=1, pairs=1, outside=1, removed=0, timing=0, every=8),
     "small": Counts(rich=1, tyre=1, mild=1, no_gap=3, pairs=1, outside=1, removed=1, timing=0, every=5),
-    "medium": Counts(rich=3, tyre=1, mild=1, no_gap=50, pairs=1, outside=2, removed=1, timing=1),
+    "medium": Counts(rich=2, tyre=1, mild=1, no_gap=50, pairs=1, outside=1, removed=1, timing=1),
     "full": Counts(rich=5, tyre=1, mild=2, no_gap=75, pairs=1, outside=3, removed=2, timing=1),
 }
 """Full: 22 x 5 rich, 22 with another tyre, 22 x 2 mild, 75 without a gap, 24 pairs, 15 x 3 outside, 22 x 2 removed."""
