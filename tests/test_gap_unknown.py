@@ -1,0 +1,198 @@
+"""What no effect explains: free terms name the equation, the quantity, the sign and the shape."""
+
+import numpy as np
+import pytest
+from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of
+
+from sim2real.diagnose import evidence
+from sim2real.drive import ACCEL, SPEED
+from sim2real.unknown import (
+    EQUATIONS,
+    PER_DRIVE,
+    QUANTITIES,
+    Term,
+    characterise,
+    fit_terms,
+    score,
+    shape_of,
+    sign_of,
+)
+
+EQUATION = {equation.key: equation for equation in EQUATIONS}
+
+
+def terms_of(*drives):
+    held = evidence(MODEL, drives)
+    return fit_terms(MODEL, held.drives, held.noises, 2)
+
+
+def curve(quantity, x, y, equation="force"):
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    return Term(EQUATION[equation], quantity, x, y, 10.0, 100.0, len(x), 1000)
+
+
+# --- found on drives
+
+
+@pytest.fixture(scope="module")
+def dragged():
+    """A force that grows with the square of speed, between 3 and 35 m/s."""
+    hidden = {"aero_drag": {"drag_area_m2": 1.5}}
+    drives = [
+        noisy(clean(pulses(10.0) * 1.3, v0, effects=hidden), seed) for seed, v0 in enumerate((6.0, 24.0))
+    ]
+    return terms_of(*drives)
+
+
+def test_a_hidden_drag_is_a_force_on_the_car_that_depends_on_speed(dragged):
+    found = characterise(dragged)
+    assert (found.subsystem, found.depends_on, found.unit) == ("vehicle", "speed", "N")
+    assert found.sign == "is negative throughout"
+    assert found.share > 0.8
+    np.testing.assert_allclose(found.y, -0.5 * 1.2 * 1.5 * found.x**2, atol=60.0)
+    assert all(word in found.sentence for word in ("vehicle", "speed", "[m/s]", "negative"))
+
+
+def test_terms_are_ranked_by_what_they_leave_and_what_they_take(dragged):
+    assert [score(t) for t in dragged] == sorted(score(t) for t in dragged)
+    assert len(dragged) == sum(len(e.quantities) for e in EQUATIONS)
+    assert all(t.loss <= 1.01 * t.null_loss for t in dragged)
+
+
+def test_a_hidden_scale_of_the_accelerometer_is_found_there():
+    drive = noisy(clean(pulses(10.0), 14.0))
+    measured = drive.measured.copy()
+    measured[:, ACCEL] *= 1.1
+    found = characterise(terms_of(remeasured(drive, measured)))
+    assert (found.subsystem, found.depends_on) == ("accelerometer", "acceleration")
+    assert found.shape in ("is proportional to it", "is a straight line")
+    slope = np.polyfit(found.x, found.y, 1)[0]
+    assert slope == pytest.approx(0.1, abs=0.015)
+
+
+def test_a_dead_band_of_the_torque_is_found_at_the_wheels():
+    commanded = pulses(12.0)
+    band = 25.0
+    actual = np.sign(commanded) * np.maximum(np.abs(commanded) - band, 0.0)
+    found = characterise(terms_of(noisy(clean(actual, 14.0, commanded_nm=commanded))))
+    assert found.subsystem in ("powertrain", "wheel")
+    assert found.depends_on in ("torque", "acceleration")
+    assert found.sign == "opposes it"
+    driving = found.x > 0.5 * found.x.max()
+    np.testing.assert_allclose(found.y[driving], -band, atol=8.0)
+
+
+def test_a_speed_sensor_that_reads_too_much_at_speed_is_found_there():
+    drive = noisy(clean(pulses(10.0), 14.0))
+    measured = drive.measured.copy()
+    measured[:, SPEED] += 0.003 * (measured[:, SPEED] - 10.0) ** 2
+    found = characterise(terms_of(remeasured(drive, measured)))
+    assert (found.subsystem, found.depends_on) == ("vehicle_speed_sensor", "speed")
+
+
+def test_a_hill_is_found_in_the_road():
+    """A grade that comes after five seconds: neither the car's nor the sensors' quantities tell of it."""
+    flat = clean(pulses(10.0), 14.0)
+    hilly = clean(pulses(10.0), 14.0, effects={"road_grade": {"grade": 0.04}})
+    found = characterise(terms_of(noisy(hilly)))
+    assert flat.time_s.size == hilly.time_s.size
+    assert found.subsystem == "road"
+    assert found.depends_on in ("time", "position")
+    assert np.median(found.y) == pytest.approx(-9.81 * 0.04, rel=0.1)
+
+
+def test_without_a_gap_no_term_takes_much():
+    best = terms_of(noisy(clean(pulses(8.0), 14.0)))[0]
+    assert 1.0 - best.loss / best.null_loss < 0.03
+
+
+def test_a_term_is_fitted_through_a_sliding_wheel_too():
+    """Other friction on ice is a term of the tyre."""
+    drives = [
+        noisy(
+            clean(
+                pulses(8.0) * 1.5, 14.0, road_of(0.9, 0.35, 0.9, 0.35), {"friction_offset": {"factor": 0.8}}
+            )
+        )
+    ]
+    best = terms_of(*drives)[0]
+    assert best.equation.subsystem in ("tyre", "powertrain", "wheel", "wheel_speed_sensor")
+    assert 1.0 - best.loss / best.null_loss > 0.2
+
+
+def test_a_log_whose_gap_is_elsewhere_in_time_shares_no_curve():
+    """Curves over time are each log's own, so knots double with the logs."""
+    drives = random_drives({}, count=2, seed=4, duration_s=6.0)
+    terms = {(t.equation.key, t.quantity): t for t in terms_of(*drives)}
+    one = {(t.equation.key, t.quantity): t for t in terms_of(drives[0])}
+    assert terms["gravity", "time"].size == 2 * one["gravity", "time"].size
+    assert terms["force", "speed"].size == one["force", "speed"].size
+
+
+def test_a_curve_of_more_values_has_to_leave_less():
+    short, long = curve("speed", [1, 2], [1, 1]), curve("time", range(30), np.ones(30))
+    assert score(short) < score(long)
+
+
+def test_what_is_shared_leaves_the_curves_over_time_out():
+    held = evidence(MODEL, [noisy(clean(pulses(3.0), 14.0))])
+    found = fit_terms(MODEL, held.drives, held.noises, 1, shared=True)
+    assert found
+    assert not {t.quantity for t in found} & set(PER_DRIVE)
+
+
+# --- words
+
+X = np.linspace(-2.0, 5.0, 8)
+
+
+@pytest.mark.parametrize(
+    ("y", "words"),
+    [
+        (np.full(8, -3.0), "is constant"),
+        (2.0 * X, "is proportional to it"),
+        (-0.3 * X * np.abs(X), "grows with its square"),
+        (-4.0 * np.sign(X), "has one size with the quantity's sign"),
+        (1.0 + 2.0 * X, "is a straight line"),
+        (4.0 - X + 2.0 * X * X, "is a parabola"),
+        (np.sin(2.5 * X), "bends in its own way"),
+    ],
+)
+def test_shapes_in_words(y, words):
+    assert shape_of(curve("torque", X, y)) == words
+
+
+def test_noise_on_a_curve_does_not_change_its_shape():
+    rng = np.random.default_rng(0)
+    assert shape_of(curve("torque", X, 2.0 * X + 0.2 * rng.standard_normal(8))) == "is proportional to it"
+
+
+def test_a_curve_over_time_has_no_shape():
+    assert shape_of(curve("time", X, 2.0 * X)) == "comes and goes"
+
+
+@pytest.mark.parametrize(
+    ("quantity", "y", "words"),
+    [
+        ("speed", np.full(8, 2.0), "is positive throughout"),
+        ("speed", np.full(8, -2.0), "is negative throughout"),
+        ("torque", -X, "opposes it"),
+        ("torque", X, "changes sign"),
+        ("speed", -X, "changes sign"),
+    ],
+)
+def test_signs_in_words(quantity, y, words):
+    assert sign_of(curve(quantity, X, y)) == words
+
+
+def test_a_characterised_term_keeps_its_curve():
+    found = characterise([curve("speed", X, 2.0 * X), curve("time", X, X)])
+    np.testing.assert_array_equal(found.x, X)
+    np.testing.assert_array_equal(found.y, 2.0 * X)
+    assert found.share == pytest.approx(0.9)
+    assert "90 %" in found.sentence
+
+
+def test_every_quantity_has_a_unit_and_every_equation_asks_for_known_ones():
+    assert {q for e in EQUATIONS for q in e.quantities} <= set(QUANTITIES)
+    assert len({e.key for e in EQUATIONS}) == len(EQUATIONS)
