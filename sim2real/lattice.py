@@ -27,10 +27,12 @@ QUANTUM_RANGE = (1.2, 4.6)
 standard deviation of 0.41 quanta, of a slowly moving value 0.29 [-]."""
 LATTICE_COHERENCE = 0.6
 """Least coherence of the values with a lattice; Gaussian noise reaches 0.36 within the range looked at [-]."""
-HOLD_COHERENCE = 0.8
-"""Least coherence of the times at which values change [-]."""
+HOLD_COHERENCE = 0.6
+"""Least coherence of the times at which values change: a log of two rows per window shows 0.64 of it [-]."""
+CHANGES_S = 4.0
+"""Time over which changes are looked at: over a longer one the window would have to be known too well [s]."""
 LONGEST_WINDOW_S = 0.25
-MOST_SAMPLES = 4000
+MOST_SAMPLES = 1200
 SEARCH = 3000
 
 
@@ -138,7 +140,7 @@ def _best_quantum(values: Array, low: float, high: float) -> tuple[float, float]
     found = _coherence(values, periods)
     best = float(periods[int(found.argmax())])
     near = 1.0 / np.linspace(1.0 / best - 1.0 / reach, 1.0 / best + 1.0 / reach, 201)
-    near = near[near > 0.0]
+    near = near[(near >= low) & (near <= high)]
     finer = _coherence(values, near)
     return float(near[int(finer.argmax())]), float(finer.max())
 
@@ -152,12 +154,14 @@ def _window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s: floa
     if len(changes) < 20:
         return step_s
     # the counter's window need not be a multiple of the log's step, and the log sees its end a part of a step late
-    periods = np.arange(LONGEST_WINDOW_S, 1.5 * step_s, -0.1 * step_s)
-    found = _coherence(changes - changes[0], periods)
-    good = np.flatnonzero(found > HOLD_COHERENCE)
+    start = float(changes.min())
+    early = np.sort(changes[changes < start + CHANGES_S]) - start
+    low, high = 1.0 / LONGEST_WINDOW_S, 1.0 / (1.5 * step_s)
+    if high <= low or len(early) < 20:
+        return step_s
+    rates = np.linspace(low, high, max(int(4.0 * CHANGES_S * (high - low)), 2))
+    good = np.flatnonzero(_coherence(early, 1.0 / rates) > HOLD_COHERENCE)
     if not len(good):
         return step_s
-    top = good[0]
-    while top + 1 < len(periods) and found[top + 1] > found[top]:
-        top += 1
-    return float(periods[top])
+    near = rates[good[0]] + np.linspace(0.0, 1.0 / CHANGES_S, 41)
+    return float(1.0 / near[int(_coherence(early, 1.0 / near).argmax())])
