@@ -27,7 +27,8 @@ from .generator.table import Group, Spec, table
 
 HERE = Path(__file__).resolve().parent
 THRESHOLDS = HERE / "thresholds.yaml"
-COSINE_GROUPS = (Group.RICH,)
+COSINE_CASE = "-0"
+"""Cases of the cosine baseline, one per effect: it simulates every effect anew, longer than a diagnosis takes."""
 
 
 class RunError(ValueError):
@@ -101,7 +102,11 @@ def run_case(spec: Spec, seed: int, out: Path, keep: bool) -> dict[str, Any]:
     case = make_case(spec, seed)
     folder = write_case(case, seed, out)
     said = _timed(folder) if spec.group is Group.TIMING else _in_process(case, folder, seed)
-    result = {"case": spec.name, **said, "cosine": cosine(case) if spec.group in COSINE_GROUPS else None}
+    result = {
+        "case": spec.name,
+        **said,
+        "cosine": cosine(case) if spec.group is Group.RICH and spec.name.endswith(COSINE_CASE) else None,
+    }
     _write(result_path(out, spec), result | {"seal": case.seal()})
     if not keep:
         shutil.rmtree(folder)
