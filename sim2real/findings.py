@@ -59,7 +59,9 @@ class Findings:
     def added(self) -> tuple[Effect, ...]:
         """What the verdict adds to the model."""
         entry = self.decision.winner
-        return () if entry.fit is None else tuple(entry.fit.candidate.effects(entry.fit.x))
+        if entry.fit is None or self.decision.verdict is Verdict.UNKNOWN:
+            return ()
+        return tuple(entry.fit.candidate.effects(entry.fit.x))
 
 
 def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Diagnosis:
@@ -67,11 +69,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     decision = found.decision
     held = _final_noise(found)
     before = held.residuals(found.model)
-    added = _added(found)
+    added = found.model.with_effects(*found.added())
     after = held.residuals(added)
     floor = noise_floor(added, held, seed)
     old, new = measure(held, before), measure(held, after)
-    gap = Gap(old, old if decision.verdict in (Verdict.NO_GAP, Verdict.UNKNOWN) else new, floor)
+    gap = Gap(old, new, floor)
     causes = _causes(found, held, before, seed)
     terms: list[Term] = []
     unexplained = None
@@ -105,20 +107,14 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
 
 def _final_noise(found: Findings) -> Evidence:
     """The hold-out with its noise read anew from what the winner leaves: a gap may have looked like noise."""
-    entry = found.decision.winner
-    if entry.fit is None:
+    if not found.added():
         return found.holdout
-    model = entry.fit.candidate.model(entry.fit.x)
+    model = found.model.with_effects(*found.added())
     noises = []
     for drive, first in zip(found.holdout.drives, found.holdout.noises, strict=True):
         again = read_noise(drive, residuals(model, drive), doubt(model, drive))
         noises.append(again if np.all(again.sigma <= first.sigma * 1.001) else first)
     return Evidence(found.holdout.drives, tuple(noises))
-
-
-def _added(found: Findings) -> Simulation:
-    entry = found.decision.winner
-    return found.model if entry.fit is None else entry.fit.candidate.model(entry.fit.x)
 
 
 def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int) -> tuple[Cause, ...]:

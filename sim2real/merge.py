@@ -218,7 +218,7 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         main,
         verdict=verdict,
         sentence=sentence,
-        gap=Gap(before, after, main.gap.noise_floor),
+        gap=Gap(before, after, 1.0 if "wheel_speed" in side.before else main.gap.noise_floor),
         where=(*side.places, *main.where) if side.verdict is not Verdict.NO_GAP else main.where,
         causes=causes,
         ambiguous_with=(*main.ambiguous_with, *side.ambiguous_with),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,10 @@ from scenarios.effects import Effect
 from scenarios.files import WHEELS, RoadFile, VehicleFile
 from scenarios.plant import simulate
 from sim2real.contest import Entry
+from sim2real.doubt import doubt
 from sim2real.drive import CHANNELS, Drive, make_drive
 from sim2real.fitting import Evidence, fit
-from sim2real.noise import Noise
+from sim2real.noise import Noise, widening
 from sim2real.observer import Simulation
 from sim2real.result import NextManoeuvre
 
@@ -137,8 +138,8 @@ def propose(
     return NextManoeuvre(
         f"{profile.sentence} {verdict}; the logs at hand have {now_sigma:.1f}.",
         profile.initial_speed_m_s,
-        time_s[::10],
-        torque[::10],
+        time_s[::2],
+        torque[::2],
         names,
         power,
         now_sigma,
@@ -170,7 +171,8 @@ def separation(
 ) -> float:
     """Distance that is left when the rival is fitted to what the truth would do, in standard deviations."""
     drive = imagined(model, truth, road, profile, time_s, torque)
-    evidence = Evidence((drive,), (noise,))
+    sure = replace(noise, widening=widening(doubt(model, drive), noise.sigma))
+    evidence = Evidence((drive,), (sure,))
     assert rival.fit is not None
     refit = fit(rival.fit.candidate, evidence, rival.fit.x)
     return float(np.sqrt(refit.loss))

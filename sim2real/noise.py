@@ -87,7 +87,12 @@ def read_noise(drive: Drive, residuals: Array, doubt: Array) -> Noise:
         rho = _correlation(short / far, long_lag)
         sigma[i] = max(np.sqrt(far / _second_difference(rho**long_lag)), RESOLUTION[i])
         correlation[i] = rho if sigma[i] > RESOLUTION[i] else 0.0
-    return Noise(sigma, correlation, np.sqrt(1.0 + (doubt / sigma) ** 2))
+    return Noise(sigma, correlation, widening(doubt, sigma))
+
+
+def widening(doubt: Array, sigma: Array) -> Array:
+    """By how much more than by noise a prediction with a doubt may be off, shape of `doubt` [-]."""
+    return np.asarray(np.sqrt(1.0 + (doubt / sigma) ** 2))
 
 
 def _spread(values: Array, lag: int) -> float | None:

@@ -162,7 +162,7 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
     if contest.pairs:
-        pair = contest.pairs[0]
+        pair = _best(contest, list(contest.pairs), fit_to, holdout)
         paired = fitness(pair, fit_to, holdout)
         enough = max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
         if paired.misfit < min(PAIR_LEAVES * after.misfit, enough):
@@ -172,6 +172,11 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     rivals = tuple(e for e in singles if e is not best and share[e.ids[0]] > RIVAL * share[best.ids[0]])
     verdict = Verdict.AMBIGUOUS if rivals else Verdict.IDENTIFIED
     return Decision(verdict, best, rivals, _scaled(share, _belief(after, before)), before, after)
+
+
+def _best(contest: Contest, entries: list[Entry], fit_to: Evidence, holdout: Evidence) -> Entry:
+    """The entry of the greatest probability: what needs fewer parameters wins among equals."""
+    return entries[int(probabilities(contest, entries, fit_to, holdout)[1:].argmax())]
 
 
 def _compound(

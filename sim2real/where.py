@@ -27,6 +27,8 @@ DRIVE_NM = 15.0
 """Torque per wheel from which on the car drives or brakes, below it coasts [N m]."""
 NEAR_LIMIT = 0.8
 """Used share of theta from which on a tyre is near its limit [-]."""
+SLIDING = 0.2
+"""Slip from which on a tyre is beyond its peak, whatever it still holds [-]."""
 LOW_SPEED_M_S = 8.0
 """Border between low and high speed [m/s]."""
 NOTABLE = 3.0
@@ -73,7 +75,7 @@ def regimes(drive: Drive, seen: Prediction) -> NDArray[np.str_]:
         np.where(torque < -DRIVE_NM, "brake", "coast"),
     ).astype("<U20")
     used = np.abs(seen.force_n) / np.maximum(seen.load_n * seen.theta, 1.0)
-    out[(used > NEAR_LIMIT).any(axis=1)] = "near the limit"
+    out[((used > NEAR_LIMIT) | (seen.slip > SLIDING)).any(axis=1)] = "near the limit"
     changed = np.flatnonzero((np.diff(seen.theta, axis=0) != 0.0).any(axis=1))
     for k in changed:
         out[k : k + max(round(SURFACE_CHANGE_S / drive.step_s), 1)] = "surface change"
