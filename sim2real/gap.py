@@ -22,6 +22,8 @@ BOOTSTRAP = 400
 BLOCK_S = 1.0
 """Length of the blocks that are resampled: beyond the observer's memory [s]."""
 QUANTILES = (0.025, 0.975)
+START_S = 0.2
+"""A free run begins from what was measured over this time [s]."""
 
 
 def measure(evidence: Evidence, rests: Sequence[Array]) -> Measure:
@@ -41,11 +43,12 @@ def measure(evidence: Evidence, rests: Sequence[Array]) -> Measure:
 
 
 def noise_floor(model: Simulation, evidence: Evidence, seed: int) -> float:
-    """What `measure` gives where the model is right: its own prediction plus fresh noise, diagnosed again."""
+    """What `measure` gives where the model is right: a free run of the model itself with fresh noise, followed."""
     generator = np.random.default_rng(seed)
     rests = []
     for drive, noise in zip(evidence.drives, evidence.noises, strict=True):
-        clean = model.predict(drive).channels
+        begun = np.where((drive.time_s < drive.time_s[0] + START_S)[:, None], drive.measured, np.nan)
+        clean = model.predict(replace(drive, measured=begun)).channels
         lost = ~np.isfinite(drive.measured)
         noisy = np.where(lost, np.nan, clean + noise.draw(len(drive), generator))
         again = replace(drive, measured=noisy)
