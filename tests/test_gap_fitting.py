@@ -426,7 +426,6 @@ def test_two_effects_are_found_together(pair):
     assert all(found.decision.probability[key] > 0.4 for key in pair)
 
 
-@pytest.mark.xfail(strict=True, reason="the pair of the least loss wins, whatever parameters it takes")
 def test_of_two_pairs_that_explain_alike_the_one_with_fewer_parameters_wins():
     """A split of friction holds a common factor too, with one parameter more."""
     logs = random_drives(

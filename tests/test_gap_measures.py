@@ -220,9 +220,6 @@ def test_the_regimes_are_what_was_driven(tour):
     assert found[change + 10] == "surface change"
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a locked tyre holds 0.79 of theta, less than what counts as near the limit"
-)
 def test_a_locked_wheel_is_near_the_limit():
     drive = clean(trace((0, 0), (1, 0), (1.1, -400), (3, -400), duration_s=3.0), 16.0, road_of(0.3))
     seen = MODEL.predict(drive)
