@@ -1,0 +1,312 @@
+"""Verdicts on data of their own, the camera's and the pulse counter's, become one with that on the car's motion."""
+
+import json
+from dataclasses import replace
+from itertools import product
+
+import made_up_diagnosis as made_up
+import numpy as np
+import pytest
+
+from sim2real.lattice import Lattice
+from sim2real.merge import Side, camera_side, counter_side, merge
+from sim2real.perception import CameraCandidate, PerceptionFinding
+from sim2real.report import jsonable
+from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict
+
+TURN = 2.0 * np.pi
+QUIET = {"image_class": 1.0}
+LOUD = {"image_class": 5.0}
+CAUSE = Cause("camera_latency", 0.95, {}, 1.1, Interval(80.0, 70.0, 85.0, "%"), 10.0)
+WEAK = Cause("camera_pitch", 0.02, {}, 3.0, Interval(10.0, 0.0, 20.0, "%"), 50.0)
+TERM = Unexplained(
+    "camera", "image_class", "place", "-", "", "", 0.3, np.array([]), np.array([]), "Classes come and go."
+)
+PLACE = Place("image_class", "camera", "drive, low speed", 1.0, 2.0, 0.5)
+
+
+def side_of(verdict, **more):
+    """A camera's verdict."""
+    named = () if verdict in (Verdict.NO_GAP, Verdict.UNKNOWN) else ("camera_latency",)
+    shares = (0.95, 0.02) if named else (0.02, 0.01)
+    causes = tuple(replace(c, probability=p) for c, p in zip((CAUSE, WEAK), shares, strict=True))
+    before = QUIET if verdict is Verdict.NO_GAP else LOUD
+    after = QUIET if named else before
+    term = TERM if verdict is Verdict.UNKNOWN else None
+    return Side(
+        verdict,
+        named,
+        causes,
+        before,
+        after,
+        places=(PLACE,),
+        unexplained=term,
+        sentence="It is late.",
+        **more,
+    )
+
+
+def main_of(verdict):
+    """A verdict on the car's motion."""
+    found = getattr(made_up, str(verdict))()
+    # the made-up causes have a camera's effect among them; the contest has none
+    return replace(found, causes=tuple(c for c in found.causes if not c.effect.startswith("camera")))
+
+
+# --- verdicts
+
+EXPECTED = {
+    (Verdict.NO_GAP, Verdict.NO_GAP): Verdict.NO_GAP,
+    (Verdict.IDENTIFIED, Verdict.IDENTIFIED): Verdict.COMPOUND,
+    (Verdict.COMPOUND, Verdict.IDENTIFIED): Verdict.COMPOUND,
+    (Verdict.AMBIGUOUS, Verdict.IDENTIFIED): Verdict.COMPOUND,
+    (Verdict.IDENTIFIED, Verdict.AMBIGUOUS): Verdict.COMPOUND,
+    (Verdict.IDENTIFIED, Verdict.COMPOUND): Verdict.COMPOUND,
+    (Verdict.UNKNOWN, Verdict.IDENTIFIED): Verdict.UNKNOWN,
+    (Verdict.IDENTIFIED, Verdict.UNKNOWN): Verdict.UNKNOWN,
+    (Verdict.UNKNOWN, Verdict.UNKNOWN): Verdict.UNKNOWN,
+}
+
+
+@pytest.mark.parametrize(("main", "side"), EXPECTED)
+def test_two_verdicts_make_one(main, side):
+    assert merge(main_of(main), side_of(side)).verdict is EXPECTED[main, side]
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_no_gap_leaves_the_other_verdict_alone(verdict):
+    assert merge(main_of(verdict), side_of(Verdict.NO_GAP)).verdict is verdict
+    assert merge(main_of(Verdict.NO_GAP), side_of(verdict)).verdict is verdict
+
+
+@pytest.mark.parametrize(("main", "side"), list(product(Verdict, Verdict)))
+def test_whatever_is_merged_is_a_diagnosis_by_the_contract(main, side):
+    found = merge(main_of(main), side_of(side))
+    probabilities = [c.probability for c in found.causes]
+    assert sum(probabilities) <= 1.0 + 1e-9
+    assert all(p >= 0.0 for p in probabilities)
+    effects = [c.effect for c in found.causes]
+    assert len(effects) == len(set(effects))
+    assert {c.effect for c in main_of(main).causes} | {"camera_latency", "camera_pitch"} == set(effects)
+    assert (found.unexplained is None) == (Verdict.UNKNOWN not in (main, side))
+    assert found.to_json()["verdict"] == str(found.verdict)
+    if found.verdict is not Verdict.COMPOUND:
+        assert probabilities == sorted(probabilities, reverse=True)
+
+
+def test_a_compounds_members_come_first():
+    found = merge(main_of(Verdict.IDENTIFIED), side_of(Verdict.IDENTIFIED))
+    assert {c.effect for c in found.causes[:2]} == {"tyre_relaxation", "camera_latency"}
+    assert all(c.probability > 0.4 for c in found.causes[:2])
+    three = merge(main_of(Verdict.COMPOUND), side_of(Verdict.IDENTIFIED))
+    assert {c.effect for c in three.causes[:3]} == {"tyre_relaxation", "aero_drag", "camera_latency"}
+
+
+def test_a_side_without_a_gap_gets_only_what_probability_is_left():
+    main = main_of(Verdict.IDENTIFIED)
+    eager = side_of(Verdict.NO_GAP)
+    eager = replace(eager, causes=tuple(replace(c, probability=0.5) for c in eager.causes))
+    found = merge(main, eager)
+    top = {c.effect: c.probability for c in found.causes}
+    assert top["tyre_relaxation"] == main.causes[0].probability
+    assert sum(top.values()) <= 1.0 + 1e-9
+
+
+# --- gap, sentence, places
+
+
+def test_the_gap_is_over_the_signals_of_both():
+    main = main_of(Verdict.IDENTIFIED)
+    found = merge(main, side_of(Verdict.IDENTIFIED))
+    assert found.gap.before.signals == {**main.gap.before.signals, **LOUD}
+    assert found.gap.after.signals == {**main.gap.after.signals, **QUIET}
+    squares = [v**2 for v in found.gap.before.signals.values()]
+    assert found.gap.before.total == pytest.approx(np.sqrt(np.mean(squares)))
+    assert found.gap.noise_floor == main.gap.noise_floor
+
+
+def test_a_side_without_signals_leaves_the_gap_alone():
+    main = main_of(Verdict.IDENTIFIED)
+    silent = replace(side_of(Verdict.IDENTIFIED), before={}, after={})
+    assert merge(main, silent).gap == main.gap
+
+
+def test_the_sentence_tells_of_both():
+    both = merge(main_of(Verdict.IDENTIFIED), side_of(Verdict.IDENTIFIED)).sentence
+    assert both.startswith(main_of(Verdict.IDENTIFIED).sentence)
+    assert "camera_latency: It is late." in both
+    alone = merge(main_of(Verdict.NO_GAP), side_of(Verdict.IDENTIFIED)).sentence
+    assert alone == "camera_latency: It is late."
+    assert (
+        merge(main_of(Verdict.IDENTIFIED), side_of(Verdict.NO_GAP)).sentence
+        == main_of(Verdict.IDENTIFIED).sentence
+    )
+    assert "Something unknown" in merge(main_of(Verdict.NO_GAP), side_of(Verdict.UNKNOWN)).sentence
+
+
+def test_places_are_those_of_a_side_that_has_a_gap():
+    main = main_of(Verdict.IDENTIFIED)
+    assert merge(main, side_of(Verdict.IDENTIFIED)).where == (PLACE, *main.where)
+    assert merge(main, side_of(Verdict.NO_GAP)).where == main.where
+
+
+def test_what_both_say_is_kept():
+    main = replace(main_of(Verdict.AMBIGUOUS), cannot_rule_out=("aero_drag",), warnings=("a",))
+    side = side_of(
+        Verdict.AMBIGUOUS,
+        ambiguous_with=(("camera_latency", "camera_pitch"),),
+        cannot_rule_out=("motion_blur", "aero_drag"),
+        warnings=("b",),
+    )
+    found = merge(main, side)
+    assert found.ambiguous_with == (("mass_offset", "torque_gain"), ("camera_latency", "camera_pitch"))
+    assert found.cannot_rule_out == ("aero_drag", "motion_blur")
+    assert found.warnings == ("a", "b")
+    assert found.next_manoeuvre is main.next_manoeuvre
+
+
+def test_an_effect_that_both_saw_is_one_effect():
+    """A friction reference and the wheels tell of the same friction."""
+    main = main_of(Verdict.IDENTIFIED)
+    seen = replace(CAUSE, effect="tyre_relaxation", probability=0.9)
+    side = replace(side_of(Verdict.IDENTIFIED), named=("tyre_relaxation",), causes=(seen,))
+    found = merge(main, side)
+    assert found.verdict is Verdict.IDENTIFIED
+    assert found.causes[0].effect == "tyre_relaxation"
+    assert [c.effect for c in found.causes].count("tyre_relaxation") == 1
+
+
+@pytest.mark.xfail(strict=True, reason="both sides' probabilities are halved though they name one effect")
+def test_what_both_saw_is_as_probable_as_what_either_saw():
+    main = main_of(Verdict.IDENTIFIED)
+    seen = replace(CAUSE, effect="tyre_relaxation", probability=0.9)
+    side = replace(side_of(Verdict.IDENTIFIED), named=("tyre_relaxation",), causes=(seen,))
+    assert merge(main, side).causes[0].probability >= 0.9
+
+
+# --- the counter's side
+
+LATTICE = Lattice(TURN / (48 * 0.04), 0.04, 0.05)
+BEFORE = Measure(10.0, {"wheel_speed": 17.0, "vehicle_speed": 1.0, "accel_x": 1.0})
+AFTER = Measure(1.0, {"wheel_speed": 1.1, "vehicle_speed": 1.0, "accel_x": 1.0})
+
+
+def test_a_counter_is_identified_with_its_teeth_and_window():
+    side = counter_side(LATTICE, BEFORE, AFTER, 0.008, excluded=False)
+    assert side.verdict is Verdict.IDENTIFIED
+    assert side.named == ("wheel_speed_quantisation",)
+    (cause,) = side.causes
+    teeth, window = cause.parameters["teeth"], cause.parameters["window_s"]
+    assert teeth.low < 48.0 == teeth.value < teeth.high
+    assert window.low < 0.04 == window.value < window.high
+    assert window.high - window.low == pytest.approx(0.008)
+    assert cause.shrink_percent.value == pytest.approx(90.0)
+    assert cause.shrink_percent.low <= 90.0 <= cause.shrink_percent.high <= 100.0
+    assert side.before == {"wheel_speed": 17.0}
+    assert side.after == {"wheel_speed": 1.1}
+
+
+def test_a_counter_that_was_left_out_of_the_library_is_unknown():
+    side = counter_side(LATTICE, BEFORE, AFTER, 0.008, excluded=True)
+    assert side.verdict is Verdict.UNKNOWN
+    assert side.causes == ()
+    assert side.unexplained is not None
+    assert side.unexplained.subsystem == "wheel_speed_sensor"
+    assert "multiples of 3.272 rad/s" in side.unexplained.sentence
+    assert "40 ms" in side.unexplained.sentence
+    found = merge(main_of(Verdict.NO_GAP), side)
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.gap.after.signals["wheel_speed"] == 17.0
+
+
+def test_a_counter_beside_another_effect_is_a_compound():
+    found = merge(main_of(Verdict.IDENTIFIED), counter_side(LATTICE, BEFORE, AFTER, 0.008, excluded=False))
+    assert found.verdict is Verdict.COMPOUND
+    assert {c.effect for c in found.causes[:2]} == {"tyre_relaxation", "wheel_speed_quantisation"}
+
+
+def test_a_counter_alone_is_by_the_contract():
+    found = merge(main_of(Verdict.NO_GAP), counter_side(LATTICE, BEFORE, AFTER, 0.008, excluded=False))
+    written = json.dumps(jsonable(found.to_json()), allow_nan=False)
+    (row,) = [c for c in json.loads(written)["causes"] if c["effect"] == "wheel_speed_quantisation"]
+    assert row["probability"] > 0.9
+    assert row["parameters"]["teeth"]["value"] == 48.0
+
+
+# --- the camera's side
+
+
+def candidate(effects, score, **parameters):
+    return CameraCandidate(
+        effects=effects,
+        signal="image_place",
+        gain_fit=score,
+        gain_holdout=score,
+        size=len(effects),
+        observations=100,
+        effective=20.0,
+        score=score,
+        parameters=parameters,
+        after=Measure(1.2, {"image_place": 1.2}),
+        shrink_percent=Interval(70.0, 60.0, 80.0, "%"),
+        evidence_for=("Borders come late.",),
+        evidence_against=(),
+        excited=True,
+    )
+
+
+LATE = candidate(("camera_latency",), 30.0, delay_s=Interval(0.2, 0.15, 0.25, "s"))
+TILTED = candidate(("camera_pitch",), 10.0, pitch_rad=Interval(0.02, 0.0, 0.04, "rad"))
+BOTH = candidate(
+    ("camera_pitch", "camera_latency"), 29.0,
+    delay_s=Interval(0.1, 0.0, 0.3, "s"), pitch_rad=Interval(0.01, -0.1, 0.1, "rad"),
+)  # fmt: skip
+
+
+def finding(verdict, *candidates, causes=(), **more):
+    values = {
+        "before": Measure(6.0, {"image_place": 6.0}),
+        "after": Measure(1.2, {"image_place": 1.2}),
+        "ambiguous_with": (),
+        "cannot_rule_out": {},
+        "places": (),
+        "next_step": "",
+        "unexplained": (),
+        "warnings": (),
+    }
+    return PerceptionFinding(verdict=verdict, causes=causes, candidates=candidates, **{**values, **more})
+
+
+def test_a_cameras_candidates_become_causes():
+    side = camera_side(finding(Verdict.IDENTIFIED, LATE, BOTH, TILTED, causes=("camera_latency",)))
+    assert [c.effect for c in side.causes] == ["camera_latency", "camera_pitch"]
+    late, tilted = side.causes
+    assert late.probability > 0.7 > tilted.probability
+    assert late.probability + tilted.probability < 1.0
+    assert late.parameters == {"delay_s": Interval(0.2, 0.15, 0.25, "s")}
+    # the first candidate that has an effect speaks for it: of a pair's parameters, its own
+    assert tilted.parameters == {"pitch_rad": Interval(0.01, -0.1, 0.1, "rad")}
+    assert side.named == ("camera_latency",)
+    assert (side.before, side.after) == ({"image_place": 6.0}, {"image_place": 1.2})
+
+
+def test_a_candidate_that_explains_no_more_than_nothing_is_not_probable():
+    side = camera_side(finding(Verdict.NO_GAP, candidate(("motion_blur",), -4.0)))
+    assert side.causes[0].probability < 0.05
+
+
+def test_what_the_camera_cannot_explain_is_told():
+    side = camera_side(finding(Verdict.UNKNOWN, TILTED, unexplained=("Classes change in tunnels.",)))
+    assert side.unexplained is not None
+    assert side.unexplained.sentence == "Classes change in tunnels."
+    assert side.unexplained.subsystem == "camera"
+    known = camera_side(
+        finding(Verdict.IDENTIFIED, LATE, causes=("camera_latency",), unexplained=("Beside it.",))
+    )
+    assert known.unexplained is None
+    assert "Beside it." in known.warnings
+
+
+def test_reasons_of_what_cannot_be_ruled_out_are_kept_by_effect():
+    side = camera_side(finding(Verdict.NO_GAP, LATE, cannot_rule_out={"motion_blur": "always slow"}))
+    assert side.cannot_rule_out == ("motion_blur",)
