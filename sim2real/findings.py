@@ -12,7 +12,7 @@ from scenarios.effects import EFFECTS, Effect
 from sim2real import where
 from sim2real.contest import Contest, Entry
 from sim2real.doubt import doubt
-from sim2real.drive import CHANNELS, UNITS
+from sim2real.drive import CHANNELS
 from sim2real.fitting import Evidence, residuals
 from sim2real.gap import intervals, measure, noise_floor, shrink
 from sim2real.lattice import Lattice
@@ -24,7 +24,6 @@ from sim2real.result import (
     Diagnosis,
     Gap,
     Interval,
-    Measure,
     NextManoeuvre,
     Place,
     Trace,
@@ -255,13 +254,11 @@ def _sentence(decision: Decision, gap: Gap, causes: Sequence[Cause], term: str) 
     if decision.verdict is Verdict.AMBIGUOUS:
         others = ", ".join(e.ids[0] for e in decision.rivals)
         return f"The gap of {size} is {top.effect} or as well {others}: these logs cannot tell them apart."
-    values = ", ".join(f"{name} {v.value:.4g} {v.unit}" for name, v in top.parameters.items())
+    values = ", ".join(f"{name} {_number(v)}" for name, v in top.parameters.items())
     return f"The gap of {size} is {top.effect} ({values}): {cut}."
 
 
-def unit_of(signal: str) -> str:
-    """Unit of a signal group."""
-    return UNITS[signal]
-
-
-__all__ = ["Findings", "Measure", "describe"]
+def _number(value: Interval) -> str:
+    """A value in four digits with its unit, if it has one."""
+    text = np.format_float_positional(value.value, precision=4, fractional=False, trim="-")
+    return text if value.unit == "-" else f"{text} {value.unit}"

@@ -106,10 +106,10 @@ def heat_map(found: Sequence[Blocks], shares: dict[str, float]) -> dict[str, dic
     shares : dict
         Share of the gap that each subsystem's equation takes [-].
     """
-    energy = dict.fromkeys(REGIMES, 0.0)
+    energy = {name: 0.0 for name in REGIMES if any((part.regime == name).any() for part in found)}
     for part in found:
         excess = np.maximum(part.z**2 - 1.0, 0.0).sum(axis=1)
-        for name in REGIMES:
+        for name in energy:
             energy[name] += float(excess[part.regime == name].sum())
     total = max(sum(energy.values()), 1e-12)
     return {sub: {name: share * e / total for name, e in energy.items()} for sub, share in shares.items()}

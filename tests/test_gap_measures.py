@@ -304,7 +304,7 @@ def test_the_heat_map_holds_the_whole_gap_once():
     assert found["tyre"]["brake"] / found["tyre"]["coast"] == pytest.approx(
         2.0
     )  # four wheels, two blocks of one
-    assert list(found["vehicle"]) == list(REGIMES)
+    assert set(found["vehicle"]) == set(part.regime), "a regime that was not driven has no share"
 
 
 def test_the_equation_that_takes_most_has_the_greatest_share():
