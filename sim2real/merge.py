@@ -196,7 +196,10 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
     before = _join(main.gap.before, side.before)
     after = _join(main.gap.after, side.after)
     verdict = _verdict(main, side)
-    both = main.verdict is not Verdict.NO_GAP and side.verdict is not Verdict.NO_GAP
+    both = verdict in (Verdict.COMPOUND, Verdict.UNKNOWN) and Verdict.NO_GAP not in (
+        main.verdict,
+        side.verdict,
+    )
     main_causes, side_causes = list(main.causes), list(side.causes)
     if both:
         main_causes = [replace(c, probability=0.5 * c.probability) for c in main_causes]

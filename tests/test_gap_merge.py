@@ -176,7 +176,6 @@ def test_an_effect_that_both_saw_is_one_effect():
     assert [c.effect for c in found.causes].count("tyre_relaxation") == 1
 
 
-@pytest.mark.xfail(strict=True, reason="both sides' probabilities are halved though they name one effect")
 def test_what_both_saw_is_as_probable_as_what_either_saw():
     main = main_of(Verdict.IDENTIFIED)
     seen = replace(CAUSE, effect="tyre_relaxation", probability=0.9)
