@@ -69,7 +69,9 @@ def main() -> None:
                 _, result = ife.process(IfeState(), image, Motion(15.0))
                 found.setdefault(key, []).append((result.Q_v, result.surface == surface, surface))
     plain = np.log([max(q, LEAST_CONFIDENCE) for q, _, _ in found["none", 0.0]])
-    print(f"{'disturbance':>16} {'strength':>8} {'mean log drop':>14} {'median Q_v':>11} {'wrong':>6}   by class")
+    print(
+        f"{'disturbance':>16} {'strength':>8} {'mean log drop':>14} {'median Q_v':>11} {'wrong':>6}   by class"
+    )
     for (name, strength), rows in found.items():
         logs = np.log([max(q, LEAST_CONFIDENCE) for q, _, _ in rows])
         wrong = 1.0 - np.mean([right for _, right, _ in rows])
