@@ -9,7 +9,7 @@ from sim2real.cases.case import FOLDER, budget, case_names, load_case, stages
 from sim2real.diagnose import diagnose
 from sim2real.result import Verdict
 
-# The share of the first residuals that the last step may leave: of wheel speed and vehicle speed in SI units, their mean.
+# Share of the first residuals that the last step may leave: mean of wheel and vehicle speed, each in SI units.
 LEFT = {
     "bmw_m8": 0.25,
     "carsim_city": 0.15,
