@@ -20,6 +20,11 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 T = TypeVar("T")
 
+
+def silent(stage: str, done: int, total: int) -> None:
+    """No progress shown."""
+
+
 BEAM = 3
 """Best single effects that pairs are built on."""
 PAIRS_PER_MEMBER = 3
@@ -73,6 +78,12 @@ class Entry:
         return self.loss_fit + self.loss_hold
 
     @property
+    def fitted(self) -> Fit:
+        """The fit, of an entry that has one."""
+        assert self.fit is not None, "the model as it is has no fit"
+        return self.fit
+
+    @property
     def size(self) -> int:
         """Number of parameters."""
         return 0 if self.fit is None else len(self.fit.x)
@@ -93,7 +104,7 @@ def hold_contest(
     holdout: Evidence,
     exclude: Collection[str] = (),
     jobs: int = 1,
-    progress: Progress = lambda stage, done, total: None,
+    progress: Progress = silent,
 ) -> Contest:
     """Fit every effect that acts on the car's motion or its sensors, then pairs of them where one is not enough."""
     null = Entry(
@@ -127,13 +138,13 @@ def add_pairs(
     fit_to: Evidence,
     holdout: Evidence,
     jobs: int = 1,
-    progress: Progress = lambda stage, done, total: None,
+    progress: Progress = silent,
 ) -> Contest:
     """The contest with the most promising pairs fitted too."""
     entries = {e.ids[0]: e for e in contest.singles}
 
     def start(pair: tuple[str, ...]) -> Array:
-        return np.concatenate([_fitted(entries[key]).x for key in pair])
+        return np.concatenate([entries[key].fitted.x for key in pair])
 
     def fit_pairs(wanted: Sequence[tuple[str, ...]], stage: str) -> list[Entry]:
         work = [
@@ -154,7 +165,7 @@ def swapped_pairs(
     """Pairs that keep one member of the best pair, at its value in the pair, and look for another partner."""
     chosen = []
     for keep in best.ids:
-        found = _fitted(best)
+        found = best.fitted
         mine = [i for i, (key, _) in enumerate(found.candidate.parameters) if key == keep]
         alone = Candidate(model, (keep,))
         z = fit_to.whitened(fit_to.residuals(alone.model(found.x[mine])))
@@ -195,12 +206,7 @@ def _ordered(a: str, b: str) -> tuple[str, ...]:
 
 
 def _slopes(entry: Entry) -> Array:
-    return _fitted(entry).jacobian
-
-
-def _fitted(entry: Entry) -> Fit:
-    assert entry.fit is not None, "the model as it is has no fit"
-    return entry.fit
+    return entry.fitted.jacobian
 
 
 def _foretold(z: Array, *slopes: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS
 from scenarios.files import load_vehicle
-from sim2real.contest import COUNTER, add_pairs, hold_contest
+from sim2real.contest import COUNTER, Progress, add_pairs, hold_contest, silent
 from sim2real.doubt import doubt
 from sim2real.drive import WHEEL, Drive
 from sim2real.findings import Findings, describe
@@ -26,15 +26,10 @@ from sim2real.observer import Simulation
 from sim2real.perception import diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, needs_pairs
-from sim2real.sources import Sources, read_sources
+from sim2real.sources import Sources, read_source, read_sources
 from sim2real.trpac_error import trpac_error
 
-Progress = Callable[[str, int, int], None]
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    """No progress shown."""
 
 
 def diagnose_files(
@@ -47,7 +42,7 @@ def diagnose_files(
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> Diagnosis:
     """Diagnose recorded logs against the simulation of a vehicle.
 
@@ -116,7 +111,7 @@ def diagnose(
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> Diagnosis:
     """Diagnose drives against a simulation; see `diagnose_files`."""
     findings = find(model, fit, holdout, exclude=exclude, jobs=jobs, progress=progress)
@@ -140,7 +135,7 @@ def find(
     *,
     exclude: Collection[str] = (),
     jobs: int = 1,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> Findings:
     """Hold the contest and decide it."""
     lattice = None if model.has(COUNTER) else common_lattice([d.lattice for d in (*fit, holdout)])
@@ -199,9 +194,7 @@ def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
     log, road : Path
         The further log, and where it was driven.
     """
-    where = str(diagnosis.provenance["vehicle"]["path"])
-    source = read_sources(Path(where), road, [str(log)], str(log)).holdout
-    model = Simulation(load_vehicle(where))
+    model = Simulation(load_vehicle(diagnosis.provenance["vehicle"]["path"]))
     named = diagnosis.causes[: 2 if diagnosis.verdict is Verdict.COMPOUND else 1]
     effects = [
         EFFECTS[c.effect](**{name: v.value for name, v in c.parameters.items()})
@@ -209,6 +202,6 @@ def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
         if EFFECTS[c.effect].stage != "perception"
     ]
     added = model.with_effects(*effects)
-    held = evidence(added, [source.drive])
+    held = evidence(added, [read_source(str(log), road).drive])
     before, after = measure(held, held.residuals(model)), measure(held, held.residuals(added))
     return 100.0 * (1.0 - after.total / before.total)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, Effect
 from sim2real import where
-from sim2real.contest import Contest, Entry
+from sim2real.contest import Contest, Entry, Progress
 from sim2real.doubt import doubt
 from sim2real.drive import CHANNELS
 from sim2real.fitting import Evidence, residuals
@@ -33,7 +33,6 @@ from sim2real.selection import Decision, fitness
 from sim2real.unknown import Term, characterise, fit_terms
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 SHOWN = {
     "vehicle_speed_m_s": "m/s",
@@ -80,11 +79,12 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     heat: dict[str, dict[str, float]] = {}
     if decision.verdict is not Verdict.NO_GAP:
         progress("equations", 0, 1)
-        drives = (*found.fit_to.drives, *held.drives) if decision.verdict is Verdict.UNKNOWN else held.drives
-        noises = (*found.fit_to.noises, *held.noises) if decision.verdict is Verdict.UNKNOWN else held.noises
-        terms = fit_terms(found.model, drives, noises, jobs, decision.verdict is not Verdict.UNKNOWN)
+        unknown = decision.verdict is Verdict.UNKNOWN
+        seen = [found.fit_to, held] if unknown else [held]
+        drives, noises = [d for e in seen for d in e.drives], [n for e in seen for n in e.noises]
+        terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown)
         progress("equations", 1, 1)
-        if decision.verdict is Verdict.UNKNOWN:
+        if unknown:
             unexplained = characterise(terms)
         subsystem = _subsystem(decision, terms)
         places, heat = _where(found, held, before, terms, subsystem)
@@ -118,26 +118,29 @@ def _final_noise(found: Findings) -> Evidence:
 
 def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int) -> tuple[Cause, ...]:
     """All single candidates, ranked; a compound's members first, with their joint parameters."""
-    decision = found.decision
-    together = decision.winner if decision.verdict is Verdict.COMPOUND else None
-    out = []
-    for entry in found.contest.singles:
-        out.append(_cause(found, entry, held, before, seed, together))
-    first = set(together.ids) if together else set()
+    winner = found.decision.winner
+    compound = found.decision.verdict is Verdict.COMPOUND
+    together = _joint(found, winner) if compound else {}
+    out = [_cause(found, entry, held, before, seed, together) for entry in found.contest.singles]
+    first = winner.ids if compound else ()
     return tuple(sorted(out, key=lambda c: (c.effect not in first, -c.probability, c.gap_after)))
 
 
 def _cause(
-    found: Findings, entry: Entry, held: Evidence, before: Sequence[Array], seed: int, together: Entry | None
+    found: Findings,
+    entry: Entry,
+    held: Evidence,
+    before: Sequence[Array],
+    seed: int,
+    together: dict[tuple[str, str], Interval],
 ) -> Cause:
-    assert entry.fit is not None
-    key = entry.ids[0]
-    after = held.residuals(entry.fit.candidate.model(entry.fit.x))
+    key, best = entry.ids[0], entry.fitted
+    after = held.residuals(best.candidate.model(best.x))
     size = measure(held, after).total
-    values = _parameters(found, entry)
-    if together is not None and key in together.ids:
-        values = {name: value for (effect, name), value in _joint(found, together).items() if effect == key}
-    excited = _excited(entry, found.fit_to)
+    alone = _joint(found, entry)
+    values = {name: value for (effect, name), value in together.items() if effect == key}
+    values = values or {name: value for (_, name), value in alone.items()}
+    excited = _excited(next(iter(alone.values())), float(best.candidate.scale[0]))
     fit_ok = fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
     shrunk = shrink(held, before, after, seed)
@@ -165,17 +168,12 @@ def _cause(
     )
 
 
-def _parameters(found: Findings, entry: Entry) -> dict[str, Interval]:
-    return {name: value for (_, name), value in _joint(found, entry).items()}
-
-
 def _joint(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
     """Effect id and parameter to its interval."""
-    assert entry.fit is not None
-    triples = intervals(entry.fit, found.fit_to)
+    triples = intervals(entry.fitted, found.fit_to)
     return {
         (key, p.name): Interval(*triple, unit=p.unit)
-        for (key, p), triple in zip(entry.fit.candidate.parameters, triples, strict=True)
+        for (key, p), triple in zip(entry.fitted.candidate.parameters, triples, strict=True)
     }
 
 
@@ -183,10 +181,9 @@ EXCITED_SHARE = 1.0
 """A parameter is seen when its interval's half width is below this many noticeable changes of it [-]."""
 
 
-def _excited(entry: Entry, evidence: Evidence) -> bool:
-    assert entry.fit is not None
-    _, low, high = intervals(entry.fit, evidence)[0]
-    return 0.5 * (high - low) < EXCITED_SHARE * float(entry.fit.candidate.scale[0])
+def _excited(first: Interval, noticeable: float) -> bool:
+    """Whether an effect's first parameter is seen."""
+    return 0.5 * (first.high - first.low) < EXCITED_SHARE * noticeable
 
 
 def _subsystem(decision: Decision, terms: Sequence[Term]) -> str:

@@ -59,7 +59,12 @@ class Evidence:
 
 def residuals(model: Simulation, drive: Drive) -> Array:
     """Measured minus predicted, shape (n, 7); NaN where a sample is lost or does not count."""
-    rest = drive.measured - model.predict(drive).channels
+    return rest_of(drive, model.predict(drive).channels)
+
+
+def rest_of(drive: Drive, channels: Array) -> Array:
+    """Measured minus given channels, shape (n, 7); NaN where a sample is lost or does not count."""
+    rest = drive.measured - channels
     rest[~drive.moving] = np.nan
     rest[:, ~drive.counted] = np.nan
     rest[drive.time_s < drive.time_s[0] + SETTLING_S] = np.nan

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from scenarios.effects import Effect
 from scenarios.files import WHEELS, RoadFile, VehicleFile
 from scenarios.plant import simulate
-from sim2real.contest import Entry
+from sim2real.contest import Entry, Progress, silent
 from sim2real.doubt import doubt
 from sim2real.drive import CHANNELS, Drive, make_drive
 from sim2real.fitting import Evidence, fit
@@ -98,7 +97,7 @@ def propose(
     road: RoadFile,
     noise: Noise,
     now_sigma: float,
-    progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
+    progress: Progress = silent,
 ) -> NextManoeuvre:
     """The profile that tells two fitted entries apart best.
 
@@ -173,8 +172,7 @@ def separation(
     drive = imagined(model, truth, road, profile, time_s, torque)
     sure = replace(noise, widening=widening(doubt(model, drive), noise.sigma))
     evidence = Evidence((drive,), (sure,))
-    assert rival.fit is not None
-    refit = fit(rival.fit.candidate, evidence, rival.fit.x)
+    refit = fit(rival.fitted.candidate, evidence, rival.fitted.x)
     return float(np.sqrt(refit.loss))
 
 
@@ -182,8 +180,8 @@ def imagined(
     model: Simulation, entry: Entry, road: RoadFile, profile: Profile, time_s: Array, torque: Array
 ) -> Drive:
     """The drive as a car with the entry's effects would do it, without noise."""
-    assert entry.fit is not None
-    effects: list[Effect] = list(model.with_effects(*entry.fit.candidate.effects(entry.fit.x)).effects)
+    found = entry.fitted
+    effects: list[Effect] = list(model.with_effects(*found.candidate.effects(found.x)).effects)
     car = model.vehicle.model_copy(update={"effects": {e.id: asdict(e) for e in effects}})
     run = simulate(car, road, torque, STEP_S, profile.initial_speed_m_s, 0.0)
     columns = dict(

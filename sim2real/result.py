@@ -262,17 +262,10 @@ class Diagnosis:
 
 def _cause(cause: Cause) -> dict[str, Any]:
     return {
-        "effect": cause.effect,
-        "probability": cause.probability,
-        "parameters": {
-            name: {**interval.to_json(), "unit": interval.unit} for name, interval in cause.parameters.items()
-        },
-        "gap_after": cause.gap_after,
+        **asdict(cause),
         "shrink_percent": cause.shrink_percent.to_json(),
-        "fit_bic": cause.fit_bic,
         "evidence_for": list(cause.evidence_for),
         "evidence_against": list(cause.evidence_against),
-        "excited": cause.excited,
     }
 
 
@@ -280,28 +273,12 @@ def _profile(manoeuvre: NextManoeuvre | None) -> dict[str, Any] | None:
     if manoeuvre is None:
         return None
     return {
-        "sentence": manoeuvre.sentence,
-        "initial_speed_m_s": manoeuvre.initial_speed_m_s,
+        **asdict(manoeuvre),
         "time_s": manoeuvre.time_s.tolist(),
         "wheel_torque_nm": manoeuvre.wheel_torque_nm.tolist(),
         "separates": list(manoeuvre.separates),
-        "power_sigma": manoeuvre.power_sigma,
-        "power_now_sigma": manoeuvre.power_now_sigma,
     }
 
 
 def _term(term: Unexplained | None) -> dict[str, Any] | None:
-    if term is None:
-        return None
-    return {
-        "subsystem": term.subsystem,
-        "signal": term.signal,
-        "depends_on": term.depends_on,
-        "unit": term.unit,
-        "sign": term.sign,
-        "shape": term.shape,
-        "share": term.share,
-        "x": term.x.tolist(),
-        "y": term.y.tolist(),
-        "sentence": term.sentence,
-    }
+    return None if term is None else {**asdict(term), "x": term.x.tolist(), "y": term.y.tolist()}

@@ -18,6 +18,27 @@ BLOCK_S = 0.2
 """Residuals are averaged over blocks of this length to see what noise would average out [s]."""
 LONG_BLOCK_S = 1.0
 """Blocks over which the residuals' sums are taken to see how correlated they are [s]."""
+NO_GAP_MISFIT = 1.6
+"""Up to this misfit of the model as it is, what is left is noise [-]."""
+NO_GAP_DOUBT = 0.03
+"""Probability that something is left of the candidates where the misfit says there is no gap [-]."""
+EXPLAINED_MISFIT = 2.0
+"""Up to this misfit an entry explains everything [-]."""
+EXPLAINED_SHARE = 0.1
+"""Where the gap is large, an entry explains it if it leaves this share of the misfit: no form is exact [-]."""
+PAIR_LEAVES = 0.5
+"""A pair is taken in place of one effect only where it at least halves the misfit [-]."""
+PAIR_MISFIT = 1.6
+"""Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
+PAIR_SHARE = 0.05
+"""As `EXPLAINED_SHARE`, for a pair [-]."""
+RIVAL = 0.1
+"""An entry with more than this share of the winner's probability is not told apart from it [-]."""
+SOFTNESS = 4.0
+"""Tempering of the quasi-likelihood: the library's forms are not nature's, so evidence counts for less than noise alone
+would say [-]."""
+FLOOR_MISFIT = 1.5
+"""Above this misfit an entry is worth a second effect's try [-]."""
 
 
 @dataclass(frozen=True)
@@ -87,30 +108,14 @@ def probabilities(contest: Contest, entries: list[Entry], fit_to: Evidence, hold
     return weight / weight.sum()
 
 
-NO_GAP_MISFIT = 1.6
-"""Up to this misfit of the model as it is, what is left is noise [-]."""
-NO_GAP_DOUBT = 0.03
-"""Probability that something is left of the candidates where the misfit says there is no gap [-]."""
-EXPLAINED_MISFIT = 2.0
-"""Up to this misfit an entry explains everything [-]."""
-EXPLAINED_SHARE = 0.1
-"""Where the gap is large, an entry explains it if it leaves this share of the misfit: no form is exact [-]."""
-PAIR_LEAVES = 0.5
-"""A pair is taken in place of one effect only where it at least halves the misfit [-]."""
-PAIR_MISFIT = 1.6
-"""Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
-PAIR_SHARE = 0.05
-"""As `EXPLAINED_SHARE`, for a pair [-]."""
-RIVAL = 0.1
-"""An entry with more than this share of the winner's probability is not told apart from it [-]."""
-SOFTNESS = 4.0
-"""Tempering of the quasi-likelihood: the library's forms are not nature's, so evidence counts for less than noise alone
-would say [-]."""
-
-
 def explains(after: Fitness, before: Fitness) -> bool:
     """Whether what is left is noise, or small against the gap."""
-    return after.misfit <= max(EXPLAINED_MISFIT, EXPLAINED_SHARE * before.misfit)
+    return after.misfit <= allowed(before)
+
+
+def allowed(before: Fitness) -> float:
+    """The greatest misfit that an entry may leave and still explain the gap [-]."""
+    return max(EXPLAINED_MISFIT, EXPLAINED_SHARE * before.misfit)
 
 
 def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
@@ -119,10 +124,6 @@ def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     if before.misfit <= NO_GAP_MISFIT or not contest.singles:
         return False
     return fitness(contest.singles[0], fit_to, holdout).misfit > FLOOR_MISFIT
-
-
-FLOOR_MISFIT = 1.5
-"""Above this misfit an entry is worth a second effect's try [-]."""
 
 
 @dataclass(frozen=True)
@@ -162,11 +163,12 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
     if contest.pairs:
-        pair = _best(contest, list(contest.pairs), fit_to, holdout)
+        shares = probabilities(contest, list(contest.pairs), fit_to, holdout)[1:]
+        pair = contest.pairs[int(shares.argmax())]  # of equals, the one that needs fewer parameters
         paired = fitness(pair, fit_to, holdout)
         enough = max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
         if paired.misfit < min(PAIR_LEAVES * after.misfit, enough):
-            return _compound(contest, pair, fit_to, holdout, before, paired)
+            return _compound(contest, pair, shares, before, paired)
     if not explains(after, before):
         return Decision(Verdict.UNKNOWN, best, (), _scaled(share, _belief(after, before)), before, after)
     rivals = tuple(e for e in singles if e is not best and share[e.ids[0]] > RIVAL * share[best.ids[0]])
@@ -174,21 +176,11 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     return Decision(verdict, best, rivals, _scaled(share, _belief(after, before)), before, after)
 
 
-def _best(contest: Contest, entries: list[Entry], fit_to: Evidence, holdout: Evidence) -> Entry:
-    """The entry of the greatest probability: what needs fewer parameters wins among equals."""
-    return entries[int(probabilities(contest, entries, fit_to, holdout)[1:].argmax())]
-
-
-def _compound(
-    contest: Contest, pair: Entry, fit_to: Evidence, holdout: Evidence, before: Fitness, after: Fitness
-) -> Decision:
-    pairs = list(contest.pairs)
-    weight = probabilities(contest, pairs, fit_to, holdout)[1:]
-    rivals = tuple(
-        e for e, w in zip(pairs, weight, strict=True) if e is not pair and w > RIVAL * weight.max()
-    )
+def _compound(contest: Contest, pair: Entry, weight: Array, before: Fitness, after: Fitness) -> Decision:
+    weighed = list(zip(contest.pairs, weight, strict=True))
+    rivals = tuple(e for e, w in weighed if e is not pair and w > RIVAL * weight.max())
     share: dict[str, float] = {e.ids[0]: 0.0 for e in contest.singles}
-    for entry, w in zip(pairs, weight, strict=True):
+    for entry, w in weighed:
         for key in entry.ids:
             share[key] += w / len(entry.ids)
     return Decision(Verdict.COMPOUND, pair, rivals, _scaled(share, _belief(after, before)), before, after)
@@ -196,8 +188,7 @@ def _compound(
 
 def _belief(after: Fitness, before: Fitness) -> float:
     """Probability that the cause is in the library at all, from how well the best entry does [-]."""
-    allowed = max(EXPLAINED_MISFIT, EXPLAINED_SHARE * before.misfit)
-    return float(1.0 / (1.0 + (after.misfit / allowed) ** 6))
+    return float(1.0 / (1.0 + (after.misfit / allowed(before)) ** 6))
 
 
 def _scaled(share: dict[str, float], factor: float) -> dict[str, float]:

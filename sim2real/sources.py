@@ -72,7 +72,7 @@ def read_sources(
         problems.append("No log to fit to; expected at least one --fit LOG.")
     for text in (*fit, holdout):
         try:
-            found.append(_read_source(text, road, columns))
+            found.append(read_source(text, road, columns))
         except ScenarioError as error:
             problems.append(str(error))
     if problems or car is None:
@@ -80,7 +80,8 @@ def read_sources(
     return Sources(car, vehicle, tuple(found[:-1]), found[-1])
 
 
-def _read_source(text: str, road: Path | None, columns: Mapping | None) -> Source:
+def read_source(text: str, road: Path | None, columns: Mapping | None = None) -> Source:
+    """Read one log, `log.csv` or `log.csv@road.yaml`, and its road; raises ScenarioError with all problems of both."""
     log_path, road_path = split(text, road)
     problems: list[str] = []
     course, log = None, None

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from scenarios.files import WHEELS
 from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
-from sim2real.fitting import SETTLING_S, robust, robust_weight
+from sim2real.fitting import rest_of, robust, robust_weight
 from sim2real.noise import Noise
 from sim2real.observer import Prediction, Push, Simulation
 from sim2real.result import Unexplained
@@ -88,7 +88,6 @@ def _one(column: int) -> slice:
     return slice(column, column + 1)
 
 
-MOTION = ("speed", "torque", "acceleration", "time")
 EQUATIONS = (
     Equation("torque", "powertrain", "wheel_torque", "N m", 5.0, _torque, ("torque", "acceleration", "time")),
     Equation("bearing", "wheel", "wheel_torque", "N m", 5.0, _torque, ("speed",)),
@@ -182,11 +181,7 @@ def score(term: Term) -> float:
 
 
 def _whitened(drive: Drive, noise: Noise, channels: Array) -> Array:
-    rest = drive.measured - channels
-    rest[~drive.moving] = np.nan
-    rest[:, ~drive.counted] = np.nan
-    rest[drive.time_s < drive.time_s[0] + SETTLING_S] = np.nan
-    return np.nan_to_num(noise.whitened(rest))
+    return np.nan_to_num(noise.whitened(rest_of(drive, channels)))
 
 
 def _fit_term(
