@@ -17,6 +17,7 @@ from numpy.testing import assert_allclose
 from benchmarks.blind.generator import kernel, severity
 from benchmarks.blind.generator.car import Car, Road
 from benchmarks.blind.generator.cases import make_case
+from benchmarks.blind.generator.forms import Family
 from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, begin, integrate
 from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, noise_of, read
 from benchmarks.blind.generator.table import SIZES, Group, Spec, table
@@ -212,8 +213,10 @@ def test_drives_stay_on_the_road_that_the_plant_is_for(case):
 
 def test_tables_have_unique_names_and_the_sizes_that_are_stated():
     for size in SIZES:
-        names = [spec.name for spec in table(size)]
-        assert len(set(names)) == len(names)
+        for family in Family:
+            names = [spec.name for spec in table(size, family)]
+            assert len(set(names)) == len(names)
+    assert set(table("full")) < set(table("full", Family.SECOND))
     groups = [spec.group for spec in table("full")]
     counts = {group: groups.count(group) for group in Group}
     assert counts == {

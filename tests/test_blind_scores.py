@@ -17,12 +17,14 @@ from benchmarks.blind.__main__ import Size
 from benchmarks.blind.baselines import cosine
 from benchmarks.blind.command import watch
 from benchmarks.blind.generator.cases import make_case
+from benchmarks.blind.generator.forms import EFFECT_FORMS, Family
 from benchmarks.blind.generator.table import SIZES, Group, Spec, table
 from benchmarks.blind.outcome import ResultError, outcome_of, read_outcomes
 from benchmarks.blind.scorer import Scores, load_thresholds, score, score_run
 from benchmarks.blind.show import draw_confusion
 from benchmarks.blind.statistics import calibration_error, reliability, wilson
 
+FIRST = Family.FIRST
 LIMITS = yaml.safe_load(runner.THRESHOLDS.read_text(encoding="utf-8"))
 
 
@@ -132,6 +134,15 @@ def test_only_a_blamed_effect_is_right():
     assert scores.verdicts["rich"] == {"identified": 1, "ambiguous": 1, "unknown": 1, "error": 1}
 
 
+def test_further_forms_are_told_apart():
+    effect, forms = next(iter(EFFECT_FORMS.items()))
+    cases = [result("rich", {effect: {}}, answer("identified", cause(effect, 0.9))) for _ in forms]
+    for case, form in zip(cases, forms, strict=True):
+        case["seal"]["forms"] = {effect: form}
+    further = {a.text: (a.hits, a.n) for a in scored(*cases, result("rich", LAG, RIGHT)).asides}
+    assert further["rich, a further form of the effect: right first"] == (len(forms) - 1, len(forms) - 1)
+
+
 def test_small_gaps_do_not_count():
     scores = scored(result("rich", LAG, RIGHT), result("rich", LAG, SHY, gap=4.9))
     assert counted(scores, "right_first") == (1, 1)
@@ -218,15 +229,18 @@ def test_calibration_error():
 
 
 def test_a_folder_keeps_one_run(tmp_path):
-    runner.seal_run(tmp_path, "small", 7)
-    runner.seal_run(tmp_path, "small", 7)
+    runner.seal_run(tmp_path, "small", 7, FIRST)
+    runner.seal_run(tmp_path, "small", 7, FIRST)
     with pytest.raises(runner.RunError, match="seed: 7 there, 8 now"):
-        runner.seal_run(tmp_path, "small", 8)
-    assert json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["seed"] == 7
+        runner.seal_run(tmp_path, "small", 8, FIRST)
+    with pytest.raises(runner.RunError, match="forms: first there, second now"):
+        runner.seal_run(tmp_path, "small", 7, Family.SECOND)
+    run = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
+    assert (run["seed"], run["forms"]) == (7, "first")
 
 
 def test_thresholds_are_frozen_with_the_run(tmp_path, monkeypatch):
-    runner.seal_run(tmp_path, "small", 7)
+    runner.seal_run(tmp_path, "small", 7, FIRST)
     assert load_thresholds(tmp_path) == LIMITS
     easier = tmp_path / "thresholds.yaml"
     easier.write_text(runner.THRESHOLDS.read_text(encoding="utf-8").replace("0.85", "0.50"), encoding="utf-8")
@@ -280,7 +294,7 @@ BIAS = Spec(
 
 
 def test_the_diagnosis_sees_files_and_no_truth(tmp_path, fake_diagnose):
-    runner.run_case(BIAS, 1, tmp_path, keep=False)
+    runner.run_case(BIAS, 1, FIRST, tmp_path, keep=False)
     (names, options), *_ = fake_diagnose.calls
     assert options["exclude"] == ("accelerometer_bias",)
     assert not any("bias" in str(path.relative_to(tmp_path)) or path.stem == "fresh" for path in names)
@@ -295,17 +309,19 @@ def test_the_diagnosis_sees_files_and_no_truth(tmp_path, fake_diagnose):
 
 def test_a_diagnosis_that_fails_is_counted_and_not_repeated(tmp_path, fake_diagnose):
     fake_diagnose.problem = ValueError("no such column")
-    waiting, total = runner.pending(tmp_path, "small")
+    waiting, total = runner.pending(tmp_path, "small", FIRST)
     spec = next(s for s in waiting if s.group is Group.NO_GAP)
-    assert runner.run_case(spec, 1, tmp_path, keep=True)["error"] == "ValueError: no such column"
-    assert runner.pending(tmp_path, "small")[0] == [s for s in waiting if s != spec]
+    assert runner.run_case(spec, 1, FIRST, tmp_path, keep=True)["error"] == "ValueError: no such column"
+    assert runner.pending(tmp_path, "small", FIRST)[0] == [s for s in waiting if s != spec]
     assert len(waiting) == total
     assert counted(score(read_outcomes(tmp_path), LIMITS), "false_alarm") == (1, 1)
 
 
 def test_scores_tell_what_is_pending_and_are_drawn(tmp_path, fake_diagnose):
-    runner.seal_run(tmp_path, "small", 1)
-    runner.run_case(next(s for s in table("small") if s.group is Group.NO_GAP), 1, tmp_path, keep=False)
+    runner.seal_run(tmp_path, "small", 1, FIRST)
+    runner.run_case(
+        next(s for s in table("small") if s.group is Group.NO_GAP), 1, FIRST, tmp_path, keep=False
+    )
     scores = score_run(tmp_path)
     assert len(scores.pending) == len(table("small")) - 1
     assert json.loads(json.dumps(scores.to_json()))["lines"][3]["holds"] is False

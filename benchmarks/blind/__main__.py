@@ -19,6 +19,7 @@ from rich.progress import (
 )
 
 from .generator.cases import make_case
+from .generator.forms import Family
 from .generator.table import table
 from .outcome import ResultError
 from .runner import RunError, pending, run, seal_run, write_case
@@ -43,15 +44,20 @@ Cases = Annotated[Size, typer.Option(help="How many: a handful, a few of each ki
 Seed = Annotated[
     int, typer.Option(min=0, help="1 is for development; a seal wants one that nobody has looked at.")
 ]
+Forms = Annotated[
+    Family,
+    typer.Option(help="What is drawn from: one form of everything, or several that no development has seen."),
+]
 
 
 @app.command("cases")
-def cases_command(out: Out, cases: Cases = Size.DEV, seed: Seed = 1) -> None:
+def cases_command(out: Out, cases: Cases = Size.DEV, seed: Seed = 1, forms: Forms = Family.FIRST) -> None:
     """Only write the cases' files, with their seals beside, to look at."""
     with _progress() as progress:
-        task = progress.add_task("cases", total=len(table(cases.value)))
-        for spec in table(cases.value):
-            case = make_case(spec, seed)
+        specs = table(cases.value, forms)
+        task = progress.add_task("cases", total=len(specs))
+        for spec in specs:
+            case = make_case(spec, seed, forms)
             folder = write_case(case, seed, out)
             folder.with_suffix(".seal.json").write_text(json.dumps(case.seal(), indent=1), encoding="utf-8")
             progress.advance(task)
@@ -62,16 +68,17 @@ def run_command(
     out: Out,
     cases: Cases = Size.SMALL,
     seed: Seed = 1,
+    forms: Forms = Family.SECOND,
     jobs: Annotated[int, typer.Option(min=1, help="Cases side by side.")] = 2,
     keep: Annotated[bool, typer.Option(help="Keep the cases' logs.")] = False,
 ) -> None:
     """Make the cases and have each diagnosed; a stopped run goes on where it stopped."""
-    seal_run(out, cases.value, seed)
-    waiting, total = pending(out, cases.value)
+    seal_run(out, cases.value, seed, forms)
+    waiting, total = pending(out, cases.value, forms)
     failed = 0
     with _progress() as progress:
         task = progress.add_task("diagnoses", total=total, completed=total - len(waiting))
-        for result in run(out, cases.value, seed, jobs, keep):
+        for result in run(out, cases.value, seed, forms, jobs, keep):
             failed += result["error"] is not None
             progress.update(
                 task, advance=1, description=f"diagnoses, {failed} failed" if failed else "diagnoses"

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .baselines import closure, in_sample_bic
+from .generator.forms import is_further
 from .generator.table import Group
 
 NONE = "none of these"
@@ -28,6 +29,8 @@ class Outcome:
     ----------
     truth : tuple of str
         Effects that were there.
+    further : bool
+        One of them has a form that the first family lacks.
     subsystems : tuple of str
         Right answers to where.
     gap : float
@@ -42,6 +45,7 @@ class Outcome:
     group: Group
     truth: tuple[str, ...]
     parameters: Mapping[str, float]
+    further: bool
     subsystems: tuple[str, ...]
     gap: float
     verdict: str
@@ -145,6 +149,7 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         group=Group(seal["group"]),
         truth=truth,
         parameters=seal["effects"][truth[0]] if truth else {},
+        further=any(is_further(seal.get("forms", {}), effect) for effect in truth),
         subsystems=tuple(seal["subsystems"]),
         gap=float(seal["gap"]),
         verdict=said["verdict"],

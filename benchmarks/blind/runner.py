@@ -23,6 +23,7 @@ from joblib import Parallel, delayed, parallel_config
 from .baselines import cosine
 from .command import arguments, watch
 from .generator.cases import Case, make_case
+from .generator.forms import Family
 from .generator.table import Group, Spec, table
 
 HERE = Path(__file__).resolve().parent
@@ -43,13 +44,13 @@ def digest(*paths: Path) -> str:
     return total.hexdigest()
 
 
-def seal_run(out: Path, size: str, seed: int) -> None:
+def seal_run(out: Path, size: str, seed: int, family: Family) -> None:
     """Write what the run is before any case is made; refuse a folder that holds another one.
 
     Raises
     ------
     RunError
-        `out` holds a run of another seed, size, generator or thresholds.
+        `out` holds a run of another seed, size, family of forms, generator or thresholds.
     """
     commit = subprocess.run(
         ["git", "rev-parse", "HEAD"], cwd=HERE, capture_output=True, text=True, check=False
@@ -57,6 +58,7 @@ def seal_run(out: Path, size: str, seed: int) -> None:
     run = {
         "seed": seed,
         "size": size,
+        "forms": family.value,
         "generator_sha256": digest(*(HERE / "generator").glob("*.py")),
         "thresholds_sha256": digest(THRESHOLDS),
     }
@@ -73,9 +75,11 @@ def seal_run(out: Path, size: str, seed: int) -> None:
     _write(path, run | {"commit": commit.stdout.strip() or None})
 
 
-def pending(out: Path, size: str) -> tuple[list[Spec], int]:
+def pending(out: Path, size: str, family: Family) -> tuple[list[Spec], int]:
     """Cases without a result, and how many there are in all; in mixed order, so that a stopped run is a fair sample."""
-    specs = sorted(table(size), key=lambda spec: (spec.group is Group.TIMING, zlib.crc32(spec.name.encode())))
+    specs = sorted(
+        table(size, family), key=lambda spec: (spec.group is Group.TIMING, zlib.crc32(spec.name.encode()))
+    )
     return [spec for spec in specs if not result_path(out, spec).exists()], len(specs)
 
 
@@ -84,22 +88,22 @@ def result_path(out: Path, spec: Spec) -> Path:
     return out / "results" / f"{spec.name}.json"
 
 
-def run(out: Path, size: str, seed: int, jobs: int, keep: bool) -> Iterator[dict[str, Any]]:
+def run(out: Path, size: str, seed: int, family: Family, jobs: int, keep: bool) -> Iterator[dict[str, Any]]:
     """Run what is pending; results come as they are done, the timed cases last and alone."""
-    specs, _ = pending(out, size)
+    specs, _ = pending(out, size, family)
     side_by_side = [spec for spec in specs if spec.group is not Group.TIMING]
     with parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
         yield from Parallel(return_as="generator_unordered")(
-            delayed(run_case)(spec, seed, out, keep) for spec in side_by_side
+            delayed(run_case)(spec, seed, family, out, keep) for spec in side_by_side
         )
     for spec in specs:
         if spec.group is Group.TIMING:
-            yield run_case(spec, seed, out, keep)
+            yield run_case(spec, seed, family, out, keep)
 
 
-def run_case(spec: Spec, seed: int, out: Path, keep: bool) -> dict[str, Any]:
+def run_case(spec: Spec, seed: int, family: Family, out: Path, keep: bool) -> dict[str, Any]:
     """Make one case, have it diagnosed, write the result."""
-    case = make_case(spec, seed)
+    case = make_case(spec, seed, family)
     folder = write_case(case, seed, out)
     said = _timed(folder) if spec.group is Group.TIMING else _in_process(case, folder, seed)
     result = {

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from .generator.forms import Family
 from .generator.library import LIBRARY
 from .generator.table import Group, table
 from .outcome import Outcome, ResultError, read_outcomes
@@ -91,9 +92,10 @@ def score_run(folder: Path) -> Scores:
     """Scores of a run's folder, with what is still pending."""
     limits = load_thresholds(folder)
     outcomes = read_outcomes(folder)
-    size = json.loads((folder / "run.json").read_text(encoding="utf-8"))["size"]
+    run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    specs = table(run["size"], Family(run.get("forms", Family.FIRST)))
     done = {o.name for o in outcomes}
-    return score(outcomes, limits, [spec.name for spec in table(size) if spec.name not in done])
+    return score(outcomes, limits, [spec.name for spec in specs if spec.name not in done])
 
 
 def score(outcomes: Sequence[Outcome], limits: dict[str, Any], pending: Sequence[str] = ()) -> Scores:
@@ -228,6 +230,11 @@ def _asides(
         aside(f"rich, gap {low:g} to {high:g}: right first", inside, lambda o: o.right_within(1))
     aside("rich, the simulation's tyre: right first", of[Group.RICH], lambda o: o.right_within(1))
     aside("rich, another tyre: right first", of[Group.TYRE], lambda o: o.right_within(1))
+    aside(
+        "rich, a further form of the effect: right first",
+        [o for o in rich if o.further],
+        lambda o: o.right_within(1),
+    )
     aside("rich: ranked first, whatever the verdict", rich, lambda o: o.ranked_within(1))
     aside("rich: ranked first or second, whatever the verdict", rich, lambda o: o.ranked_within(2))
     aside("rich: called compound though one effect", rich, lambda o: o.verdict == "compound")

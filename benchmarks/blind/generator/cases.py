@@ -15,16 +15,13 @@ from numpy.random import Generator
 
 from .car import Car, Road, draw_car, draw_road
 from .driver import Drive, UndrivableError, drive
-from .library import LIBRARY
-from .outside import OUTSIDE
+from .forms import DIGITS, FOREIGN, NOISES, RATES_HZ, STYLES, Family, Forms, draw_forms, effect_in
 from .sensors import Noise, draw_noise, make_log
 from .severity import CEILING, Size, drive_or_none, find_severity, residual, size_of
 from .table import Group, Spec
-from .world import Effect, Parameters, World, nominal, with_magic
+from .world import Parameters, World, nominal
 
-EFFECTS: dict[str, Effect] = {**LIBRARY, **OUTSIDE}
 LOGS = ("fit_1", "fit_2", "holdout", "fresh")
-RATES_HZ, RATE_ODDS = (100.0, 200.0, 500.0, 1000.0), (0.35, 0.4, 0.15, 0.1)
 GOOD = {"wheel_rad_s": 0.02, "speed_m_s": 0.01, "accel_m_s2": 0.03}
 """Noise of test equipment, where a deviation would drown in anything else."""
 MISMATCH_GAP = 2.0
@@ -41,7 +38,7 @@ class Truth:
 
     effects: dict[str, Parameters]
     tyre: Parameters
-    """Share, shape and curvature of the magic formula; empty for the simulation's own tyre."""
+    """Share and parameters of the foreign curve; empty for the simulation's own tyre."""
     gap: Size
     """On the hold-out [noise floors]."""
     gap_of: dict[str, float]
@@ -53,6 +50,7 @@ class Case:
     """All that a case is; `logs` are ready to be written, `drives` the truth behind them."""
 
     spec: Spec
+    forms: Forms
     car: Car
     roads: dict[str, Road]
     noise: Noise
@@ -70,7 +68,8 @@ class Case:
             "case": self.spec.name,
             "group": str(self.spec.group),
             "effects": truth.effects,
-            "subsystems": sorted({s for e in truth.effects for s in EFFECTS[e].subsystems}),
+            "subsystems": sorted({s for e in truth.effects for s in effect_in(self.forms, e).subsystems}),
+            "forms": self.forms,
             "tyre": truth.tyre,
             "target": self.spec.target,
             "gap": truth.gap.total,
@@ -96,8 +95,8 @@ def generator_of(seed: int, *names: str) -> Generator:
     return np.random.default_rng([seed, *(zlib.crc32(name.encode()) for name in names)])
 
 
-def make_case(spec: Spec, seed: int) -> Case:
-    """Draw a case.
+def make_case(spec: Spec, seed: int, family: Family = Family.FIRST) -> Case:
+    """Draw a case, with forms of the `family`.
 
     Raises
     ------
@@ -107,7 +106,7 @@ def make_case(spec: Spec, seed: int) -> Case:
     problems = []
     for attempt in range(TRIES):
         try:
-            return _draw(spec, seed, f"{spec.data}/{attempt}")
+            return _draw(spec, seed, f"{spec.data}/{attempt}", family)
         except UndrivableError as problem:
             problems.append(str(problem))
     raise UndrivableError(f"{spec.name}: no drivable car in {TRIES} draws; the last: {problems[-1]}")
@@ -118,18 +117,21 @@ class _Stage:
     """Where the severities are set: the hold-out's road and driver."""
 
     spec: Spec
+    forms: Forms
     car: Car
     base: World
     duration_s: float
     seeds: tuple[int, str, str]
 
     def gap(self, world: World, noise: Noise) -> float:
-        driven = drive_or_none(self.car, world, self.spec.rich, self.duration_s, generator_of(*self.seeds))
+        style = STYLES[self.forms["driver"]]
+        rng = generator_of(*self.seeds)
+        driven = drive_or_none(self.car, world, self.spec.rich, self.duration_s, rng, style)
         return CEILING if driven is None else size_of(residual(world, self.base, driven), noise).total
 
 
-def _draw(spec: Spec, seed: int, key: str) -> Case:
-    rng = generator_of(seed, key)
+def _draw(spec: Spec, seed: int, key: str, family: Family) -> Case:
+    rng, forms = generator_of(seed, key), draw_forms(family, generator_of(seed, key, "forms"))
     car = draw_car(rng, spec.effects)
     road, elsewhere = draw_road(rng, spec.rich), draw_road(rng, spec.rich)
     hold = elsewhere if rng.random() < 0.25 else road
@@ -137,22 +139,27 @@ def _draw(spec: Spec, seed: int, key: str) -> Case:
     base = {name: nominal(car, place) for name, place in roads.items()}
     timing = spec.group is Group.TIMING
     durations = {name: 60.0 if timing else float(rng.uniform(24.0, 34.0)) for name in LOGS}
-    noise, rate = draw_noise(rng), 1000.0 if timing else float(rng.choice(RATES_HZ, p=RATE_ODDS))
-    stage = _Stage(spec, car, base["holdout"], durations["holdout"], (seed, key, "holdout"))
+    rates = RATES_HZ[family]
+    noise = draw_noise(rng)
+    rate = 1000.0 if timing else float(rng.choice(list(rates), p=list(rates.values())))
+    stage = _Stage(spec, forms, car, base["holdout"], durations["holdout"], (seed, key, "holdout"))
     parts, gap_of, noise = _deviations(stage, noise, rng)
     tyre = _tyre(stage, noise, rng) if spec.group is Group.TYRE else {}
     pulses = int(rng.integers(2**31))
     worlds, logs, drives = {}, {}, {}
     for name in LOGS:
-        world = with_magic(base[name], **tyre) if tyre else base[name]
+        world = FOREIGN[forms["foreign_tyre"]].apply(base[name], **tyre) if tyre else base[name]
         for effect, parameters in parts.items():
-            world = EFFECTS[effect].apply(world, parameters)
+            world = effect_in(forms, effect).apply(world, parameters)
         worlds[name] = world.sensed(seed=pulses)
         own = generator_of(seed, key, name)
-        drives[name] = drive(car, world, spec.rich, durations[name], own)
-        logs[name] = make_log(drives[name].path, drives[name].command, worlds[name].sensors, noise, rate, own)
+        driven = drive(car, world, spec.rich, durations[name], own, STYLES[forms["driver"]])
+        log = make_log(
+            driven.path, driven.command, worlds[name].sensors, noise, rate, own, NOISES[forms["noise"]]
+        )
+        drives[name], logs[name] = driven, DIGITS[forms["digits"]](log)
     gap = size_of(residual(worlds["holdout"], base["holdout"], drives["holdout"]), noise)
-    return Case(spec, car, roads, noise, rate, Truth(parts, tyre, gap, gap_of), logs, drives, base)
+    return Case(spec, forms, car, roads, noise, rate, Truth(parts, tyre, gap, gap_of), logs, drives, base)
 
 
 def _deviations(
@@ -160,10 +167,11 @@ def _deviations(
 ) -> tuple[dict[str, Parameters], dict[str, float], Noise]:
     """Parameters of each effect at the wanted gap, that gap, and the noise: better sensors where it is out of reach."""
     spec = stage.spec
-    chosen = {effect: EFFECTS[effect].at(stage.car, rng) for effect in spec.effects}
+    deviations = {effect: effect_in(stage.forms, effect) for effect in spec.effects}
+    chosen = {effect: deviation.at(stage.car, rng) for effect, deviation in deviations.items()}
 
     def gap_with(effect: str, noise: Noise) -> Callable[[float], float]:
-        apply, at = EFFECTS[effect].apply, chosen[effect]
+        apply, at = deviations[effect].apply, chosen[effect]
         return lru_cache(lambda severity: stage.gap(apply(stage.base, at(severity)), noise))
 
     gaps = {effect: gap_with(effect, noise) for effect in chosen}
@@ -178,9 +186,10 @@ def _deviations(
 
 
 def _tyre(stage: _Stage, noise: Noise, rng: Generator) -> Parameters:
-    """A share of the magic formula that leaves `MISMATCH_GAP` at most."""
-    shape, curvature = float(rng.uniform(1.4, 1.6)), float(rng.uniform(-1.0, 0.3))
+    """A share of the foreign curve that leaves `MISMATCH_GAP` at most, and the curve's own parameters."""
+    foreign = FOREIGN[stage.forms["foreign_tyre"]]
+    own = foreign.draw(rng)
     share = find_severity(
-        lambda share: stage.gap(with_magic(stage.base, share, shape, curvature), noise), MISMATCH_GAP
+        lambda share: stage.gap(foreign.apply(stage.base, share, **own), noise), MISMATCH_GAP
     )
-    return {"share": share, "shape": shape, "curvature": curvature}
+    return {"share": share, **own}

@@ -24,7 +24,6 @@ LOOK = 5
 """Command steps between two looks at the car."""
 ROWS_PER_COMMAND = round(COMMAND_STEP_S / RECORD_STEP_S)
 SLOWEST_M_S, FASTEST_M_S = 4.0, 30.0
-BRAKES_FRONT = 0.6
 
 
 class UndrivableError(RuntimeError):
@@ -61,6 +60,26 @@ class Piece:
     patience_s: tuple[float, float] = (0.05, 0.3)
 
 
+@dataclass(frozen=True)
+class Style:
+    """What a driver does with his car, and how the car shares it out.
+
+    Attributes
+    ----------
+    rich, mild : tuple of Piece
+        Pieces of driving that excite everything, and calm ones; each is done once before any is repeated.
+    drive_front : tuple of float
+        Front shares of the motors, one of which is drawn for each piece [-].
+    brake_front : float
+        Front share of the brakes [-].
+    """
+
+    rich: tuple[Piece, ...]
+    mild: tuple[Piece, ...]
+    drive_front: tuple[float, ...]
+    brake_front: float
+
+
 def _line(*corners: tuple[float, float]) -> Array:
     """Torque through corners of (duration from the corner before [s], torque [N m])."""
     durations, levels = zip(*corners, strict=True)
@@ -74,7 +93,7 @@ def _accelerate(car: Car, rng: Generator) -> Array:
     return _line((rng.uniform(0.2, 0.8), level), (rng.uniform(1.5, 3.5), level), (rng.uniform(0.2, 0.8), 0.0))
 
 
-def _launch(car: Car, rng: Generator) -> Array:
+def launch(car: Car, rng: Generator) -> Array:
     """All that the motors have, until the wheels spin (the driver lets go)."""
     level = car.motor_peak_torque_nm
     return _line((rng.uniform(0.1, 0.4), level), (rng.uniform(0.8, 2.0), level), (0.15, 0.0), (0.3, 0.0))
@@ -89,7 +108,7 @@ def _brake(car: Car, rng: Generator) -> Array:
     return _line((rng.uniform(0.2, 0.5), level), (rng.uniform(0.8, 2.0), level), (rng.uniform(0.2, 0.5), 0.0))
 
 
-def _brake_to_limit(car: Car, rng: Generator) -> Array:
+def brake_to_limit(car: Car, rng: Generator) -> Array:
     """Ever harder until the wheels slide (the driver lets go) or a dry road's grip is passed."""
     limit = -rng.uniform(1.0, 1.15) * car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
     return _line((0.3, 0.35 * limit), (rng.uniform(0.8, 1.6), limit), (0.15, 0.0), (0.3, 0.0))
@@ -146,9 +165,9 @@ RICH = (
     ACCELERATE,
     Piece(7.0, 99.0, _coast),
     BRAKE,
-    Piece(12.0, 99.0, _brake_to_limit),
-    Piece(0.0, 22.0, _launch),
-    Piece(12.0, 99.0, _brake_to_limit),
+    Piece(12.0, 99.0, brake_to_limit),
+    Piece(0.0, 22.0, launch),
+    Piece(12.0, 99.0, brake_to_limit),
     Piece(8.0, 25.0, _steps),
     Piece(7.0, 26.0, _tips),
     Piece(8.0, 26.0, _sweep),
@@ -157,12 +176,15 @@ GENTLY = Piece(0.0, 22.0, _gently)
 COAST = Piece(8.0, 99.0, _coast)
 EASE = Piece(13.0, 99.0, _ease)
 MILD = (Piece(7.0, 99.0, _cruise), GENTLY, COAST)
+BRISK = Style(RICH, MILD, (0.5, 0.5, 0.4, 0.6, 0.7), 0.6)
+"""Straight ramps and plateaus, one kind of driving after the other."""
 
 
-def _next_piece(waiting: list[Piece], rich: bool, speed: float, rng: Generator) -> Piece:
+def _next_piece(waiting: list[Piece], style: Style, rich: bool, speed: float, rng: Generator) -> Piece:
     """The next one waiting that suits the speed, else one that mends the speed; refills when all are done."""
     if not waiting:
-        waiting += [(RICH if rich else MILD)[i] for i in rng.permutation(len(RICH if rich else MILD))]
+        pieces = style.rich if rich else style.mild
+        waiting += [pieces[i] for i in rng.permutation(len(pieces))]
     for piece in waiting:
         if piece.slow_m_s <= speed <= piece.fast_m_s:
             waiting.remove(piece)
@@ -172,15 +194,17 @@ def _next_piece(waiting: list[Piece], rich: bool, speed: float, rng: Generator) 
     return BRAKE if rich else EASE
 
 
-def _distribute(torque: Array, peak: float, rng: Generator) -> Array:
-    """To four wheels: motors evenly or with a front share and up to their peak, brakes 60 to 40."""
-    front = rng.choice([0.5, 0.5, 0.4, 0.6, 0.7])
-    share = np.where(torque < 0.0, BRAKES_FRONT, front)
+def _distribute(torque: Array, peak: float, style: Style, rng: Generator) -> Array:
+    """To four wheels: motors with a front share and up to their peak, brakes with their own."""
+    front = rng.choice(style.drive_front)
+    share = np.where(torque < 0.0, style.brake_front, front)
     wheels = 2.0 * torque[:, None] * np.column_stack([share, share, 1.0 - share, 1.0 - share])
     return np.minimum(wheels, peak)
 
 
-def drive(car: Car, world: World, rich: bool, duration_s: float, rng: Generator) -> Drive:
+def drive(
+    car: Car, world: World, rich: bool, duration_s: float, rng: Generator, style: Style = BRISK
+) -> Drive:
     """Drive the real car.
 
     Parameters
@@ -195,6 +219,8 @@ def drive(car: Car, world: World, rich: bool, duration_s: float, rng: Generator)
         Length of the drive [s].
     rng : Generator
         What the driver feels like.
+    style : Style
+        What he is like.
 
     Raises
     ------
@@ -211,8 +237,8 @@ def drive(car: Car, world: World, rich: bool, duration_s: float, rng: Generator)
     path[0, :N] = y
     at, waiting = 0, list[Piece]()
     while at < steps:
-        piece = _next_piece(waiting, rich, y[V], rng)
-        plan = _distribute(piece.torque(car, rng), car.motor_peak_torque_nm, rng)
+        piece = _next_piece(waiting, style, rich, y[V], rng)
+        plan = _distribute(piece.torque(car, rng), car.motor_peak_torque_nm, style, rng)
         patience = rng.uniform(*piece.patience_s)
         at = _perform(world, plan, patience, at, y, command, path)
         if y[V] < 0.5 * SLOWEST_M_S:

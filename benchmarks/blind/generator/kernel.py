@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .tyre import THETA_GRID, dugoff, magic
+from .tyre import THETA_GRID, dugoff, foreign
 
 Array = NDArray[np.floating[Any]]
 
@@ -22,9 +22,16 @@ GRAVITY = 9.81
 FLOOR_M_S = 1.5
 COMMAND_STEP_S = 0.01
 RECORD_STEP_S = 0.001
+LEAST_LAG_S = 0.001
+"""Of a motor whose torque rises at a limited rate: how closely it follows below the limit."""
+EXPONENTIAL, HYPERBOLIC, SATURATING = 0, 1, 2
+"""Codes of the ways in which friction falls."""
 
 X, V, W, MOTOR, TWIST, SLIP, LAG, ANGLE, HEAT, PITCH, N = 0, 1, 2, 6, 10, 14, 18, 22, 26, 30, 31
-"""Where the states lie: position, speed; each wheel's speed, motor speed, twist, slip, torque, angle, heat; pitch."""
+"""Where the states lie: position, speed; each wheel's speed, motor speed, twist, slip, torque, angle, heat; pitch.
+
+Where the force is what relaxes, `SLIP` holds the force [N].
+"""
 
 
 class Physics(NamedTuple):
@@ -43,10 +50,13 @@ class Physics(NamedTuple):
     factor_right: float
     falloff: float
     falloff_floor: float
+    falloff_curve: int
     relaxation: float
-    magic_share: float
-    magic_shape: float
-    magic_curvature: float
+    force_relaxation: float
+    foreign_share: float
+    foreign_curve: int
+    foreign_first: float
+    foreign_second: float
     peak: Array
     heating: float
     cooling: float
@@ -61,7 +71,9 @@ class Physics(NamedTuple):
     wave_slope: float
     wave_length: float
     delay: float
+    message: float
     lag: float
+    slew: float
     gain: Array
     dead_band: float
     torque_limit: float
@@ -110,6 +122,19 @@ def slip_of(rim: float, speed: float) -> float:
 
 
 @njit(cache=True)
+def fallen(curve: int, sliding: float, floor: float) -> float:
+    """Share of the friction that is left; `sliding` is the speed times the falloff [-].
+
+    Whatever the curve, it is 1 with the slope -(1 - `floor`) at rest, and `floor` in the end.
+    """
+    if curve == HYPERBOLIC:
+        return floor + (1.0 - floor) / (1.0 + sliding)
+    if curve == SATURATING:
+        return floor + (1.0 - floor) * (1.0 - np.tanh(sliding))
+    return floor + (1.0 - floor) * np.exp(-sliding)
+
+
+@njit(cache=True)
 def tyre_force(p: Physics, slip: float, sliding: float, theta: float, load: float, heat: float) -> float:
     """Signed longitudinal force of one tyre [N]."""
     size = min(abs(slip), 1.0)
@@ -117,19 +142,23 @@ def tyre_force(p: Physics, slip: float, sliding: float, theta: float, load: floa
     fade = 1.0 / (1.0 + heat)
     grip = theta * fade
     if p.falloff > 0.0:
-        grip *= p.falloff_floor + (1.0 - p.falloff_floor) * np.exp(-p.falloff * abs(sliding))
+        grip *= fallen(p.falloff_curve, p.falloff * abs(sliding), p.falloff_floor)
     force = dugoff(size, stiffness * fade, grip, load)
-    if p.magic_share > 0.0:
+    if p.foreign_share > 0.0:
         top = load * on_grid(p.peak, (grip - THETA_GRID[0]) / (THETA_GRID[1] - THETA_GRID[0]))
-        other = magic(size, 1.27 * stiffness * fade, top, p.magic_shape, p.magic_curvature)
-        force += p.magic_share * (other - force)
+        rise = 1.27 * stiffness * fade
+        other = foreign(p.foreign_curve, size, rise, top, p.foreign_first, p.foreign_second)
+        force += p.foreign_share * (other - force)
     return force if slip >= 0.0 else -force
 
 
 @njit(cache=True)
 def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: float) -> float:
     """What the motor is told after dead time, dead band, limit, gain and ripple, before its lag [N m]."""
-    torque = commanded(command, wheel, time - p.delay)
+    heard = time - p.delay
+    if p.message > 0.0:
+        heard = np.floor((heard + 0.5 * p.message) / p.message + 1e-9) * p.message
+    torque = commanded(command, wheel, heard)
     if p.dead_band > 0.0:
         torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
     torque = min(max(torque, -p.torque_limit), p.torque_limit)
@@ -158,6 +187,9 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / p.relaxation
             slip = y[SLIP + w]
         force = tyre_force(p, slip, rim - speed, friction(p, w, y[X]), load, y[HEAT + w])
+        if p.force_relaxation > 0.0:
+            dy[SLIP + w] = (force - y[SLIP + w]) * max(abs(speed), FLOOR_M_S) / p.force_relaxation
+            force = y[SLIP + w]
         total += force
         dy[HEAT + w] = p.heating * abs(force * (rim - speed)) - p.cooling * y[HEAT + w]
         dy[ANGLE + w] = y[W + w]
@@ -166,8 +198,11 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             resisting *= np.tanh(y[W + w] / 0.2)
         resisting += p.bearing * y[W + w]
         told = motor_torque(p, command, w, time, y[ANGLE + w])
-        dy[LAG + w] = (told - y[LAG + w]) / p.lag if p.lag > 0.0 else 0.0
-        torque = y[LAG + w] if p.lag > 0.0 else told
+        follows = p.lag > 0.0 or p.slew > 0.0
+        dy[LAG + w] = (told - y[LAG + w]) / max(p.lag, LEAST_LAG_S) if follows else 0.0
+        if p.slew > 0.0:
+            dy[LAG + w] = min(max(dy[LAG + w], -p.slew), p.slew)
+        torque = y[LAG + w] if follows else told
         inertia = p.inertia - p.motor_inertia
         dy[MOTOR + w] = dy[TWIST + w] = 0.0
         if p.motor_inertia > 0.0:
@@ -240,13 +275,15 @@ def begin(p: Physics, position: float, speed: float, wheels: Array, time: float,
     y[X], y[V] = position, speed
     for w in range(4):
         y[W + w] = y[MOTOR + w] = wheels[w]
-        y[SLIP + w] = slip_of(wheels[w] * p.radius, speed)
+        y[SLIP + w] = 0.0 if p.force_relaxation > 0.0 else slip_of(wheels[w] * p.radius, speed)
         y[LAG + w] = motor_torque(p, command, w, time, 0.0)
         if p.motor_inertia > 0.0:
             y[TWIST + w] = y[LAG + w] / p.shaft_stiffness
     dy = np.empty(N)
     for _ in range(6):
         y[PITCH] = slope(p, y, time, command, dy)
+        if p.force_relaxation > 0.0:
+            y[SLIP : SLIP + 4] += dy[SLIP : SLIP + 4] * p.force_relaxation / max(abs(speed), FLOOR_M_S)
     return y
 
 

@@ -123,4 +123,21 @@ OUTSIDE: dict[str, Effect] = {
         growing("nm_s_rad", 0.05, 1.5), lambda w, g: w.moved(bearing=g["nm_s_rad"]), ("wheel", "powertrain")
     ),
 }
-"""With the subsystems that are a right answer."""
+"""Of both families, with the subsystems that are a right answer."""
+
+FURTHER: dict[str, Effect] = {
+    "torque_slew": Effect(
+        growing("nm_s", 20_000.0, 250.0), lambda w, g: w.moved(slew=g["nm_s"]), ("powertrain",)
+    ),
+    "tone_wheel_runout": Effect(
+        growing("share", 0.001, 0.05),
+        lambda w, g: w.sensed(wheel_runout=g["share"]),
+        ("wheel_speed_sensor", "wheel"),
+    ),
+    "speed_clock_drift": Effect(
+        growing("share", 0.0005, 0.02),
+        lambda w, g: w.sensed(speed_clock=g["share"]),
+        ("vehicle_speed_sensor",),
+    ),
+}
+"""Of the second family alone."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,13 +20,27 @@ WHEELS = ("fl", "fr", "rl", "rr")
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the sensors do; the defaults are ideal ones."""
+    """What the sensors do; the defaults are ideal ones.
+
+    A late signal may be one that is averaged or held: `*_average_s` is the time that a reading is the mean of,
+    `*_message_s` the time from one message to the next. Its mean age stays the delay.
+    """
 
     wheel_delay_s: float = 0.0
+    wheel_average_s: float = 0.0
+    wheel_message_s: float = 0.0
     wheel_teeth: float = 0.0
     wheel_window_s: float = 0.0
+    wheel_window_runs: bool = False
+    """The window ends at the row, instead of one after the other."""
     wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    wheel_runout: float = 0.0
+    """Amplitude of the reading over a turn of the wheel, each wheel with its own phase [-]."""
     speed_delay_s: float = 0.0
+    speed_average_s: float = 0.0
+    speed_message_s: float = 0.0
+    speed_clock: float = 0.0
+    """Share by which the speed sensor's clock is slow: its signal is ever later [-]."""
     speed_scale: float = 1.0
     speed_lag_s: float = 0.0
     speed_hold_s: float = 0.0
@@ -33,7 +48,7 @@ class Sensors:
     accel_scale: float = 1.0
     accel_lag_s: float = 0.0
     seed: int = 0
-    """For pulse phases and the moments of dropouts."""
+    """For pulse phases, messages and the moments of dropouts."""
 
 
 @dataclass(frozen=True)
@@ -90,25 +105,51 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     """
     record = np.arange(len(path)) * RECORD_STEP_S
     rng = np.random.default_rng([sensors.seed, 11])
+    wheel_phase, speed_phase, *turns = np.random.default_rng([sensors.seed, 12]).uniform(0.0, 1.0, 6)
+    wheel_at = _sent(time_s - sensors.wheel_delay_s, sensors.wheel_message_s, wheel_phase)
+    speed_at = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
+    speed_at = _sent(speed_at, sensors.speed_message_s, speed_phase)
     out = np.empty((time_s.size, 6))
     for w in range(4):
         if sensors.wheel_window_s > 0.0:
-            wheel = _count(record, path[:, ANGLE + w], sensors, time_s - sensors.wheel_delay_s, rng)
+            wheel = _count(record, path[:, ANGLE + w], sensors, wheel_at, rng)
         else:
-            wheel = np.interp(time_s - sensors.wheel_delay_s, record, path[:, W + w])
+            wheel = _mean(record, path[:, W + w], wheel_at, sensors.wheel_average_s)
+        if sensors.wheel_runout > 0.0:
+            angle = np.interp(wheel_at, record, path[:, ANGLE + w])
+            wheel = wheel * (1.0 + sensors.wheel_runout * np.cos(angle + 2.0 * np.pi * turns[w]))
         out[:, w] = wheel * sensors.wheel_scale[w]
     speed = _hold(_lag(path[:, V], sensors.speed_lag_s), sensors.speed_hold_s, rng)
-    out[:, 4] = sensors.speed_scale * np.interp(time_s - sensors.speed_delay_s, record, speed)
+    out[:, 4] = sensors.speed_scale * _mean(record, speed, speed_at, sensors.speed_average_s)
     accel = _lag(path[:, N], sensors.accel_lag_s)
     out[:, 5] = sensors.accel_scale * np.interp(time_s, record, accel) + sensors.accel_bias_m_s2
     return out
+
+
+def _sent(at: Array, message_s: float, phase: float) -> Array:
+    """The messages' times nearest to `at` [s]."""
+    if message_s == 0.0:
+        return at
+    return (np.floor(at / message_s - phase + 0.5) + phase) * message_s
+
+
+def _mean(record: Array, signal: Array, at: Array, over_s: float) -> Array:
+    """Mean of the signal over `over_s` around `at`; what it was when the record began stands for all before."""
+    if over_s == 0.0:
+        return np.interp(at, record, signal)
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))]) * RECORD_STEP_S
+
+    def until(end: Array) -> Array:
+        return np.interp(end, record, area) + signal[0] * np.minimum(end, 0.0)
+
+    return (until(at + 0.5 * over_s) - until(at - 0.5 * over_s)) / over_s
 
 
 def _count(record: Array, angle: Array, sensors: Sensors, time_s: Array, rng: Generator) -> Array:
     """Speed from the pulses of each finished window [rad/s]; a wheel that was rolling before the record began."""
     teeth, window = sensors.wheel_teeth, sensors.wheel_window_s
     phase, first = rng.uniform(0.0, 1.0), rng.uniform(0.0, window)
-    ends = np.floor((time_s - first) / window) * window + first
+    ends = time_s if sensors.wheel_window_runs else np.floor((time_s - first) / window) * window + first
     before = np.gradient(angle[:3], RECORD_STEP_S)[0]
 
     def pulses(at: Array) -> Array:
@@ -150,17 +191,24 @@ def noise_of(noise: Noise, time_s: Array, rng: Generator) -> Array:
 
 
 def make_log(
-    path: Array, command: Array, sensors: Sensors, noise: Noise, rate_hz: float, rng: Generator
+    path: Array,
+    command: Array,
+    sensors: Sensors,
+    noise: Noise,
+    rate_hz: float,
+    rng: Generator,
+    noisy: Callable[[Noise, Array, Generator], Array] = noise_of,
 ) -> pd.DataFrame:
     """The log as the car's logger wrote it: noise, jittered clock, lost samples.
 
-    Without jitter every corner of the command falls on a row, so that a straight line between rows is the command.
+    Without jitter every corner of the command falls on a row, so that a straight line between rows is the command;
+    at 250 Hz every second one does, which leaves no gap that shows.
     """
     rows = int((len(path) - 1) * RECORD_STEP_S * rate_hz)
     time_s = (
         np.arange(1, rows + 1) + np.clip(rng.normal(0.0, 1.0, rows) * noise.jitter, -0.3, 0.3)
     ) / rate_hz
-    values = read(path, sensors, time_s) + noise_of(noise, time_s, rng)
+    values = read(path, sensors, time_s) + noisy(noise, time_s, rng)
     record = np.arange(len(path)) * RECORD_STEP_S
     position = np.interp(time_s, record, path[:, X]) + noise.position_m * rng.standard_normal(rows)
     values[rng.random(values.shape) < noise.lost] = np.nan

@@ -15,7 +15,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .car import Car
-from .driver import Drive, UndrivableError, drive
+from .driver import Drive, Style, UndrivableError, drive
 from .kernel import RECORD_STEP_S, X, replay
 from .sensors import Noise, read
 from .world import World
@@ -78,9 +78,11 @@ def find_severity(gap_at: Callable[[float], float], target: float, tries: int = 
     return middle
 
 
-def drive_or_none(car: Car, world: World, rich: bool, duration_s: float, rng: Generator) -> Drive | None:
+def drive_or_none(
+    car: Car, world: World, rich: bool, duration_s: float, rng: Generator, style: Style
+) -> Drive | None:
     """`drive`, or nothing where the car cannot be driven."""
     try:
-        return drive(car, world, rich, duration_s, rng)
+        return drive(car, world, rich, duration_s, rng, style)
     except UndrivableError:
         return None

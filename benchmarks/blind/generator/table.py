@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from .forms import Family, outside_of
 from .library import LIBRARY
-from .outside import OUTSIDE
 
 
 class Group(StrEnum):
@@ -15,7 +15,7 @@ class Group(StrEnum):
     RICH = "rich"
     """One effect, driving that excites everything."""
     TYRE = "tyre_mismatch"
-    """As rich, and the tyre's curve is partly a magic formula."""
+    """As rich, and the tyre's curve is partly of another formula."""
     MILD = "mild"
     """One effect, calm driving."""
     NO_GAP = "no_gap"
@@ -116,13 +116,14 @@ SIZES: dict[str, Counts] = {
     "medium": Counts(rich=2, tyre=1, mild=1, no_gap=50, pairs=1, outside=1, removed=1, timing=1),
     "full": Counts(rich=5, tyre=1, mild=2, no_gap=75, pairs=1, outside=3, removed=2, timing=1),
 }
-"""Full: 22 x 5 rich, 22 with another tyre, 22 x 2 mild, 75 without a gap, 24 pairs, 15 x 3 outside, 22 x 2 removed."""
+"""Full: 22 x 5 rich, 22 with another tyre, 22 x 2 mild, 75 without a gap, 24 pairs, 22 x 2 removed, and 3 of each
+deviation outside: 15, in the second family 18."""
 
 
-def table(size: str) -> list[Spec]:
+def table(size: str, family: Family = Family.FIRST) -> list[Spec]:
     """All cases of a size, in a fixed order."""
     counts = SIZES[size]
-    inside, outside = list(LIBRARY)[:: counts.every], list(OUTSIDE)[:: counts.every]
+    inside, outside = list(LIBRARY)[:: counts.every], list(outside_of(family))[:: counts.every]
     specs = [_single(Group.RICH, e, i) for e in inside for i in range(counts.rich)]
     specs += [_single(Group.TYRE, e, i + 1) for e in inside for i in range(counts.tyre)]
     specs += [_single(Group.MILD, e, i + 1) for e in inside for i in range(counts.mild)]

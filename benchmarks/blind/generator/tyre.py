@@ -1,4 +1,4 @@
-"""Longitudinal tyre curves: the modified Dugoff tyre, and a magic formula of the same initial slope and peak."""
+"""Longitudinal tyre curves: the modified Dugoff tyre, and foreign ones of the same initial slope and peak."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 THETA_GRID = np.linspace(0.02, 1.5, 75)
+MAGIC, BRUSH, RATIONAL = 0, 1, 2
+"""Codes of the foreign curves."""
 
 
 @njit(cache=True)
@@ -60,6 +62,61 @@ def magic(slip: float, slope: float, peak: float, shape: float, curvature: float
         return 0.0
     b = slope / (shape * peak) * slip
     return peak * np.sin(shape * np.arctan(b - curvature * (b - np.arctan(b))))
+
+
+@njit(cache=True)
+def brush(slip: float, slope: float, peak: float) -> float:
+    """Force of the brush model under a parabolic pressure [N] (Pacejka 2012, Sec. 3.2): cubic, then all of it slides.
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero [N].
+    peak : float
+        Largest force [N].
+    """
+    if peak <= 0.0:
+        return 0.0
+    gripping = max(1.0 - slope * slip / (3.0 * peak), 0.0)
+    return peak * (1.0 - gripping**3)
+
+
+@njit(cache=True)
+def rational(slip: float, slope: float, peak: float, stretch: float, sliding: float) -> float:
+    """Force of a rational function up to the peak and a cubic fall beyond [N] (Rill 2013, the TMeasy tyre).
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero [N].
+    peak : float
+        Largest force [N].
+    stretch : float
+        Slip of the peak over peak / slope, at least 2 [-].
+    sliding : float
+        Force from five times the peak's slip on, over the peak [-].
+    """
+    if peak <= 0.0:
+        return 0.0
+    x = slip * slope / (stretch * peak)
+    if x <= 1.0:
+        return slope * slip / (1.0 + x * (x + stretch - 2.0))
+    z = min((x - 1.0) / 4.0, 1.0)
+    return peak * (1.0 - (1.0 - sliding) * z * z * (3.0 - 2.0 * z))
+
+
+@njit(cache=True)
+def foreign(curve: int, slip: float, slope: float, peak: float, first: float, second: float) -> float:
+    """Force of a foreign curve by its code [N]; `first` and `second` are its own parameters."""
+    if curve == BRUSH:
+        return brush(slip, slope, peak)
+    if curve == RATIONAL:
+        return rational(slip, slope, peak, first, second)
+    return magic(slip, slope, peak, first, second)
 
 
 def peaks(stiffness: float, load: float) -> Array:

@@ -11,9 +11,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .car import Car, Road
-from .kernel import FLOOR_M_S, GRAVITY, RECORD_STEP_S, Physics
+from .kernel import EXPONENTIAL, FLOOR_M_S, GRAVITY, RECORD_STEP_S, Physics
 from .sensors import Sensors
-from .tyre import THETA_GRID, peaks
+from .tyre import MAGIC, THETA_GRID, peaks
 
 Array = NDArray[np.floating[Any]]
 Parameters = dict[str, float]
@@ -90,10 +90,13 @@ def nominal(car: Car, road: Road) -> World:
             factor_right=1.0,
             falloff=0.0,
             falloff_floor=1.0,
+            falloff_curve=EXPONENTIAL,
             relaxation=0.0,
-            magic_share=0.0,
-            magic_shape=1.45,
-            magic_curvature=0.0,
+            force_relaxation=0.0,
+            foreign_share=0.0,
+            foreign_curve=MAGIC,
+            foreign_first=1.45,
+            foreign_second=0.0,
             peak=np.zeros(THETA_GRID.size),
             heating=0.0,
             cooling=0.0,
@@ -108,7 +111,9 @@ def nominal(car: Car, road: Road) -> World:
             wave_slope=0.0,
             wave_length=1.0,
             delay=0.0,
+            message=0.0,
             lag=0.0,
+            slew=0.0,
             gain=np.ones(4),
             dead_band=0.0,
             torque_limit=1e9,
@@ -126,10 +131,16 @@ def nominal(car: Car, road: Road) -> World:
 
 def with_magic(world: World, share: float, shape: float, curvature: float) -> World:
     """With a tyre that is the magic formula to `share`: same initial slope, same peak."""
+    return with_foreign(world, MAGIC, share, shape, curvature)
+
+
+def with_foreign(world: World, curve: int, share: float, first: float = 0.0, second: float = 0.0) -> World:
+    """With a tyre that is another curve of `tyre.py` to `share`; `first` and `second` are that curve's parameters."""
     p = world.physics
     return world.moved(
-        magic_share=share,
-        magic_shape=shape,
-        magic_curvature=curvature,
+        foreign_share=share,
+        foreign_curve=curve,
+        foreign_first=first,
+        foreign_second=second,
         peak=peaks(p.stiffness_drive, p.mass * GRAVITY / 4.0),
     )

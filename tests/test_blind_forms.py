@@ -1,0 +1,347 @@
+"""The two families of forms: the first stays as it was, the second keeps the nominal car and what parameters mean."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_blind_plant import CAR, ICE, NEUTRAL, QUIET, carried, readings, roll
+
+from benchmarks.blind.generator import kernel
+from benchmarks.blind.generator.car import Car, Road
+from benchmarks.blind.generator.cases import make_case
+from benchmarks.blind.generator.driver import drive
+from benchmarks.blind.generator.forms import (
+    ASPECTS,
+    DIGITS,
+    EFFECT_FORMS,
+    FOREIGN,
+    NOISES,
+    STYLES,
+    Family,
+    draw_forms,
+    effect_in,
+)
+from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, W, fallen, integrate
+from benchmarks.blind.generator.outside import FURTHER
+from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
+from benchmarks.blind.generator.table import Group, table
+from benchmarks.blind.generator.tyre import dugoff
+from benchmarks.blind.generator.world import World, nominal
+
+FIRST, SECOND = Family.FIRST, Family.SECOND
+CASES = {spec.name: spec for spec in table("full", SECOND)}
+
+
+def numbered(items):
+    """Parameters without their names in the test's: what the forms are is for the seal to tell."""
+    return [pytest.param(item, id=str(i)) for i, item in enumerate(items)]
+
+
+def forms_of(*effects: str):
+    return numbered((effect, form) for effect in effects for form in EFFECT_FORMS[effect])
+
+
+def with_form(effect: str, form: str, car: Car = CAR, road: Road | None = None, **given: float) -> World:
+    return effect_in({effect: form}, effect).apply(nominal(car, road or Road()), given)
+
+
+def driven(world: World, command: np.ndarray) -> np.ndarray:
+    """Path of a car that begins freely rolling at 10 m/s."""
+    rows = 10 * (len(command) - 1)
+    path = np.zeros((rows + 1, N + 1))
+    y = kernel.begin(world.physics, 0.0, 10.0, np.full(4, 10.0 / world.physics.radius), 0.0, command)
+    path[0, :N] = y
+    integrate(world.physics, y, 0, rows, world.split, command, path)
+    return path
+
+
+def reading(path: np.ndarray, sensors: Sensors) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows' times, ideal readings and the sensors', away from the path's ends."""
+    at = np.arange(1.0, len(path) * 1e-3 - 1.0, 0.0137)
+    return at, read(path, Sensors(), at), read(path, sensors, at)
+
+
+# --- the families
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "means"),
+    [
+        (
+            "no_gap-2-calm",
+            2590,
+            [2.654038, 5.794179, 73.006508, 73.008343, 73.0164, 73.017294, 22.752997, 0.036643, 313.767558],
+        ),
+        (
+            "tyre_mismatch-torque_gain-1",
+            15550,
+            [
+                -12.157052,
+                14.645592,
+                72.617575,
+                72.617145,
+                73.247645,
+                73.247112,
+                21.218391,
+                0.010789,
+                355.99812,
+            ],
+        ),
+    ],
+)
+def test_the_first_family_is_as_it_was_opened(name, rows, means):
+    log = make_case(CASES[name], 1, FIRST).logs["fit_2"]
+    assert len(log) == rows
+    told = log.drop(columns=["time_s", "wheel_torque_fr_nm", "wheel_torque_rr_nm"]).mean()
+    assert_allclose(told, means, rtol=1e-5, atol=1e-5)
+
+
+def test_the_first_family_has_one_form_of_everything():
+    only = {aspect: next(iter(forms)) for aspect, forms in ASPECTS.items()}
+    assert all(draw_forms(FIRST, np.random.default_rng(seed)) == only for seed in range(3))
+
+
+def test_the_second_family_draws_every_form():
+    drawn = [draw_forms(SECOND, np.random.default_rng(seed)) for seed in range(60)]
+    assert {a: {forms[a] for forms in drawn} for a in ASPECTS} == {a: set(f) for a, f in ASPECTS.items()}
+
+
+def test_forms_change_no_other_draw(tmp_path):
+    first, second = (make_case(CASES["no_gap-0-rich"], 4, family) for family in Family)
+    assert (first.car, first.roads, first.noise) == (second.car, second.roads, second.noise)
+    for case in (first, second):
+        case.write(tmp_path / str(case is second))
+    for name in ("vehicle.yaml", "road.yaml", "road_holdout.yaml"):
+        assert (tmp_path / "True" / name).read_bytes() == (tmp_path / "False" / name).read_bytes()
+    assert second.truth.gap.total < 1.05
+
+
+def test_the_seal_tells_the_forms():
+    case = make_case(CASES["rich-vehicle_speed_delay-1"], 3, SECOND)
+    seal = json.loads(json.dumps(case.seal()))
+    assert set(seal["forms"]) == set(ASPECTS)
+    assert all(seal["forms"][aspect] in forms for aspect, forms in ASPECTS.items())
+
+
+def test_removed_cases_have_the_forms_of_their_twins():
+    removed = next(s for s in CASES.values() if s.group is Group.REMOVED)
+    shown, told = make_case(removed, 5, SECOND), make_case(CASES[removed.data], 5, SECOND)
+    assert shown.forms == told.forms
+    assert shown.logs["holdout"].equals(told.logs["holdout"])
+
+
+@pytest.fixture(scope="module")
+def limit():
+    """A rich drive with ice in it, and the nominal world that was driven."""
+    world = nominal(CAR, ICE)
+    return world, drive(CAR, world, True, 16.0, np.random.default_rng(2))
+
+
+# --- effects: each form is the nominal car where the effect is none, and keeps its known limit
+
+
+@pytest.mark.parametrize("chosen", forms_of(*EFFECT_FORMS))
+def test_a_neutral_effect_is_the_nominal_car_in_every_form(chosen, limit):
+    world, drove = limit
+    effect, form = chosen
+    neutral = effect_in({effect: form}, effect).apply(world, NEUTRAL[effect])
+    assert_allclose(readings(neutral, drove), readings(world, drove), rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("chosen", forms_of(*EFFECT_FORMS))
+def test_the_severest_effect_shows_in_every_form(chosen, limit):
+    world, drove = limit
+    effect = effect_in(dict([chosen]), chosen[0])
+    given = effect.at(CAR, np.random.default_rng(0))(1.0)
+    other = readings(effect.apply(world, given), drove) - readings(world, drove)
+    assert np.any(np.sqrt(np.mean(other**2, axis=0)) > 2.0 * QUIET.sigmas)
+
+
+@pytest.mark.parametrize("chosen", forms_of("rolling_resistance"))
+def test_resistance_is_the_coefficient_times_the_weight(chosen):
+    path = roll(with_form(*chosen, coefficient=0.015), 20.0, 5.0)
+    assert path[-1, V] == pytest.approx(20.0 - 5.0 * 0.015 * CAR.mass_kg * 9.81 / carried(CAR), rel=1e-4)
+
+
+@pytest.mark.parametrize("chosen", forms_of("mass_offset"))
+def test_payload_adds_to_the_mass_and_keeps_the_wheelbase(chosen):
+    world = with_form(*chosen, mass_kg=300.0)
+    gained = [roll(w, 10.0, 4.0, 150.0)[-1, V] - 10.0 for w in (world, nominal(CAR, Road()))]
+    assert gained[0] / gained[1] == pytest.approx(carried(CAR) / (carried(CAR) + 300.0), rel=2e-3)
+    assert world.physics.front_arm + world.physics.rear_arm == pytest.approx(CAR.wheelbase_m)
+    assert world.physics.rear_arm > 0.5 * CAR.cog_to_rear_axle_m
+
+
+@pytest.mark.parametrize("chosen", forms_of("load_transfer"))
+def test_loads_settle_at_the_moment_of_the_inertia(chosen):
+    """Slip in steady acceleration goes with force over stiffness, and the rear can bear more before it spins."""
+    path = roll(with_form(*chosen, road=Road((0.0,), (0.3,)), cog_height_m=0.6), 10.0, 2.0, 180.0)
+    first = roll(
+        with_form("load_transfer", "at_once", road=Road((0.0,), (0.3,)), cog_height_m=0.6), 10.0, 2.0, 180.0
+    )
+    assert_allclose(path[-1, [W, W + 2, V, N]], first[-1, [W, W + 2, V, N]], rtol=2e-3)
+    assert path[-1, kernel.PITCH] == pytest.approx(path[-1, N], rel=1e-2)
+
+
+@pytest.mark.parametrize("chosen", forms_of("tyre_relaxation"))
+def test_relaxation_rings_over_the_travelled_length(chosen):
+    """w' and the lagged force are a damped oscillator of 1.27 C R^2 / (I L), damping v / (2 L), in every form."""
+    length, speed, heavy = 0.5, 20.0, replace(CAR, mass_kg=1e5)
+    path = roll(with_form(*chosen, heavy, length_m=length), speed, 0.5, 20.0)
+    ringing = path[1:, N] - path[-1, N]
+    crossings = np.flatnonzero(np.diff(np.sign(ringing[:250])) != 0)
+    natural = 1.27 * 50_000.0 * 0.29**2 / (1.2 * length)
+    expected = np.pi / np.sqrt(natural - (speed / length / 2.0) ** 2)
+    assert 1e-3 * np.mean(np.diff(crossings)) == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("curve", range(3))
+def test_friction_starts_with_its_slope_and_ends_at_its_floor(curve):
+    assert fallen(curve, 0.0, 0.4) == pytest.approx(1.0)
+    assert (fallen(curve, 1e-6, 0.4) - 1.0) / 1e-6 == pytest.approx(-0.6, rel=1e-4)
+    assert fallen(curve, 1e9, 0.4) == pytest.approx(0.4)
+    assert np.all(np.diff([fallen(curve, x, 0.4) for x in np.linspace(0.0, 5.0, 50)]) < 0.0)
+
+
+@pytest.mark.parametrize("chosen", forms_of("friction_falloff"))
+def test_locked_wheels_slide_at_what_is_left(chosen):
+    world = with_form(*chosen, falloff_s_m=0.1, floor=0.5)
+    at = roll(world, 20.0, 1.0, -2000.0)[400:]
+    left = [fallen(world.physics.falloff_curve, 0.1 * speed, 0.5) for speed in at[:, V]]
+    assert_allclose(at[:, N], -0.79 * 0.9 * np.array(left) * 9.81, rtol=2e-3)
+
+
+@pytest.mark.parametrize("chosen", forms_of("torque_delay"))
+def test_torque_comes_late_by_the_delay(chosen):
+    """A ramp that comes late ends where the ramp begun later by the delay ends."""
+    ramp = np.maximum(np.arange(301) - 100.0, 0.0)[:, None] * np.ones(4)
+    later = np.vstack([np.zeros((10, 4)), ramp[:-10]])
+    late = driven(with_form(*chosen, delay_s=0.1), ramp)
+    assert late[-1, V] - 10.0 == pytest.approx(driven(nominal(CAR, Road()), later)[-1, V] - 10.0, rel=2e-3)
+    assert_allclose(late[1:1090, V], 10.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("chosen", forms_of("wheel_speed_delay", "vehicle_speed_delay"))
+@pytest.mark.parametrize("delay", [0.004, 0.05])
+def test_sensors_are_late_by_the_delay_on_average(chosen, delay):
+    path = roll(nominal(CAR, Road()), 10.0, 20.0, 50.0)
+    sensors = with_form(*chosen, delay_s=delay).sensors
+    at, true, late = reading(path, sensors)
+    column = 0 if chosen[0] == "wheel_speed_delay" else 4
+    rate = np.gradient(true[:, column], at)
+    ages = (true - late)[:, column] / rate
+    assert np.mean(ages) == pytest.approx(delay, rel=0.02)
+    assert ages.min() > -1e-3
+
+
+@pytest.mark.parametrize("chosen", forms_of("wheel_speed_quantisation"))
+def test_counts_are_whole_and_keep_the_mean_speed(chosen):
+    path = roll(nominal(CAR, Road()), 20.3, 20.0)
+    world = with_form(*chosen, teeth=96.0, window_s=0.02)
+    _, true, counted = reading(path, world.sensors)
+    pulses = counted[:, 0] * 96.0 * 0.02 / (2.0 * np.pi)
+    assert_allclose(pulses, np.round(pulses), atol=1e-6)
+    assert counted[:, 0].mean() == pytest.approx(true[:, 0].mean(), rel=3e-3)
+
+
+# --- tyres, noise, logger, drivers
+
+
+@pytest.mark.parametrize("foreign", numbered(FOREIGN.values()))
+def test_foreign_tyres_have_the_slope_and_the_peak(foreign):
+    own = foreign.draw(np.random.default_rng(0))
+    world = nominal(CAR, Road())
+    p = foreign.apply(world, share=1.0, **own).physics
+    load = p.mass * 9.81 / 4.0
+    for theta in (0.3, 0.9):
+        slips = np.linspace(0.0, 1.0, 2001)
+        force = np.array([kernel.tyre_force(p, s, 0.0, theta, load, 0.0) for s in slips])
+        expected = np.array([dugoff(s, CAR.stiffness_n, theta, load) for s in slips])
+        assert kernel.tyre_force(p, 1e-5, 0.0, theta, load, 0.0) == pytest.approx(1.27 * 0.5, rel=2e-3)
+        assert force.max() == pytest.approx(expected.max(), rel=2e-3)
+        assert np.all(np.diff(force[: int(np.argmax(force))]) > 0.0)
+        assert force[-1] > 0.5 * expected[-1]
+
+
+@pytest.mark.parametrize("foreign", numbered(FOREIGN.values()))
+def test_a_foreign_share_of_nothing_is_the_nominal_tyre(foreign, limit):
+    world, drove = limit
+    none = foreign.apply(world, share=0.0, **foreign.draw(np.random.default_rng(0)))
+    assert_allclose(readings(none, drove), readings(world, drove), rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("noisy", numbered(NOISES.values()))
+def test_noise_of_every_kind_has_its_size(noisy):
+    noise = Noise(0.05, 0.02, 0.1, 0.0, 0.4, 0.01, 0.0, 0.0)
+    values = noisy(noise, np.arange(400_000) * 2e-3, np.random.default_rng(0))
+    assert_allclose(values.std(axis=0), noise.sigmas, rtol=0.02)
+    assert np.all(np.abs(values.mean(axis=0)) < 0.05 * noise.sigmas)
+
+
+@pytest.mark.parametrize("digits", numbered(DIGITS.values()))
+def test_digits_take_no_more_than_the_noise(digits):
+    path = roll(nominal(CAR, Road()), 10.0, 6.0, 150.0)
+    log = make_log(path, np.full((601, 4), 150.0), Sensors(), QUIET, 200.0, np.random.default_rng(0))
+    log.loc[7, "vehicle_speed_m_s"] = np.nan
+    off = (digits(log) - log).std()
+    assert list(digits(log)) == list(log)
+    assert digits(log).isna().equals(log.isna())
+    assert off["time_s"] == 0.0
+    assert np.all(off[["wheel_speed_fl_rad_s", "vehicle_speed_m_s", "accel_x_m_s2"]] < QUIET.sigmas[3:] / 2.0)
+
+
+@pytest.mark.parametrize("rich", [True, False])
+@pytest.mark.parametrize("style", numbered(STYLES.values()))
+def test_every_driver_stays_within_the_car_and_excites_what_he_should(style, rich):
+    world = nominal(CAR, Road((0.0, 60.0, 120.0), (0.9, 0.3, 0.9)) if rich else Road())
+    done = drive(CAR, world, rich, 30.0, np.random.default_rng(6), style)
+    speed, wheels = done.path[:, V], done.path[:, W : W + 4]
+    slides = np.any(np.abs(wheels * CAR.wheel_radius_m - speed[:, None]) > 0.15 * speed[:, None], axis=1)
+    assert speed.min() > FLOOR_M_S
+    assert speed.max() < 45.0
+    assert done.command.max() <= CAR.motor_peak_torque_nm
+    assert np.any(slides) == rich
+
+
+# --- deviations outside the library
+
+
+def by_further(name: str, **given: float) -> World:
+    return FURTHER[name].apply(nominal(CAR, Road()), given)
+
+
+@pytest.mark.parametrize("name", numbered(FURTHER))
+def test_further_deviations_show(name, limit):
+    world, drove = limit
+    entry = FURTHER[name]
+    other = readings(entry.apply(world, entry.at(CAR, np.random.default_rng(0))(1.0)), drove)
+    assert np.any(np.sqrt(np.mean((other - readings(world, drove)) ** 2, axis=0)) > 2.0 * QUIET.sigmas)
+
+
+def test_further_deviation_of_the_powertrain():
+    """100 N m, told in 10 ms, take 0.1 s at 1000 N m/s: half of the difference is lost, and the follower's time."""
+    command = np.zeros((301, 4))
+    command[101:] = 100.0
+    free = driven(nominal(CAR, Road()), command)[:, V]
+    limited = driven(by_further("torque_slew", nm_s=1000.0), command)[:, V]
+    lost = 0.5 * (0.1 - 0.01) + kernel.LEAST_LAG_S
+    assert free[-1] - limited[-1] == pytest.approx((free[-1] - free[2000]) * lost, rel=0.05)
+
+
+def test_further_deviation_of_the_wheel_speed_sensors():
+    path = roll(nominal(CAR, Road()), 20.0, 10.0)
+    _, true, off = reading(path, by_further("tone_wheel_runout", share=0.01).sensors)
+    shares = off[:, :4] / true[:, :4] - 1.0
+    assert_allclose(np.abs(shares).max(axis=0), 0.01, rtol=1e-2)
+    assert_allclose(shares.mean(axis=0), 0.0, atol=5e-4)
+
+
+def test_further_deviation_of_the_vehicle_speed_sensor():
+    path = roll(nominal(CAR, Road()), 10.0, 20.0, 50.0)
+    at, true, off = reading(path, by_further("speed_clock_drift", share=0.01).sensors)
+    late = (true - off)[:, 4] / np.gradient(true[:, 4], at)
+    assert_allclose(late, 0.01 * at, rtol=0.02)
