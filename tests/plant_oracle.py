@@ -24,11 +24,13 @@ OPTIONS = {
     "h": 0.0,  # height that acceleration moves load through
     "k": 0.0,  # drag per speed squared
     "c": 0.0,  # rolling resistance
+    "c_hub": 0.0,  # the same as a force on the body
     "drag_torque": 0.0,
     "grade": 0.0,
     "falloff": 0.0,
     "falloff_floor": 1.0,
     "relaxation": 0.0,
+    "slip_lags": False,
     "shaft_stiffness": 0.0,
     "shaft_damping": 0.0,
     "motor_inertia": 0.0,
@@ -36,7 +38,7 @@ OPTIONS = {
 
 
 def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, floor=0.01):
-    """States (n, 18) at time_s: position, speed, four each of wheel speed, tyre force, shaft twist, motor speed.
+    """States (n, 18) at time_s: position, speed, four each of wheel speed, tyre force or slip, twist, motor speed.
 
     car: dict with m, l_f, l_r, radius, inertia, stiffness, and those OPTIONS that are not at their defaults.
     road: list of (start, theta left, theta right).
@@ -59,12 +61,15 @@ def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, 
         rear = car["m"] * (G * np.cos(angle) * car["l_f"] + car["h"] * accel) / (2.0 * base)
         return np.array([front, front, rear, rear])
 
-    def tyre_forces(v, wheels, theta, accel):
+    def slips(v, wheels):
+        rims = wheels * car["radius"]
+        return (rims - v) / np.maximum(np.maximum(rims, v), floor)
+
+    def tyre_forces(v, wheels, acting, theta, accel):
         loads = axle_loads(accel)
         out = []
-        for w, mu, load in zip(wheels, theta, loads, strict=True):
+        for w, slip, mu, load in zip(wheels, acting, theta, loads, strict=True):
             rim = w * car["radius"]
-            slip = (rim - v) / max(rim, v, floor)
             fallen = car["falloff_floor"] + (1.0 - car["falloff_floor"]) * np.exp(
                 -car["falloff"] * abs(rim - v)
             )
@@ -75,14 +80,17 @@ def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, 
         y = np.zeros(18)
         y[used] = reduced
         v, wheels, lagged, twist, motor = y[1], y[2:6], y[6:10], y[10:14], y[14:18]
+        slip = slips(v, wheels)
+        acting = lagged if car["slip_lags"] else slip
         accel = np.inf
         while abs(guess[0] - accel) > 1e-12:  # loads follow acceleration and acceleration follows loads
             accel = guess[0]
-            steady, loads = tyre_forces(v, wheels, theta, accel)
-            forces = lagged if lags else steady
-            guess[0] = (forces.sum() - car["k"] * v * v) / car["m"]
+            steady, loads = tyre_forces(v, wheels, acting, theta, accel)
+            forces = lagged if lags and not car["slip_lags"] else steady
+            guess[0] = (forces.sum() - car["k"] * v * v - car["c_hub"] * loads.sum()) / car["m"]
         transport = np.maximum(np.maximum(wheels * car["radius"], v), floor)
-        force_rate = transport / car["relaxation"] * (steady - lagged) if lags else np.zeros(4)
+        behind = (slip if car["slip_lags"] else steady) - lagged
+        force_rate = transport / car["relaxation"] * behind if lags else np.zeros(4)
         torque = torque_at(t)
         twist_rate = motor_rate = np.zeros(4)
         if has_shaft:

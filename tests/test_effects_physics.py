@@ -9,9 +9,10 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import StateSpace, lsim
 
+from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant import dynamics, simulate
-from scenarios.plant.parameters import MOTOR, SPEED, TWIST, WHEEL
+from scenarios.plant.parameters import MOTOR, POSITION, SPEED, TWIST, WHEEL
 from scenarios.plant.pipeline import actual_torque, make_setup
 from trpac_core.tyre import force as tyre_force
 
@@ -340,3 +341,42 @@ class TestDriveline:
         time_s = np.arange(len(y)) * 1e-3
         expected = y[0, MOTOR] + cumulative_trapezoid((150.0 - shaft) / self.J, time_s, initial=0.0)
         assert y[:, MOTOR] == pytest.approx(expected, abs=0.02)
+
+
+class TestRollingResistanceAsAForce:
+    """The body form against its closed forms; the wheel form is held above."""
+
+    C = 0.02
+
+    def run(self, torque_nm, duration_s, speed, coefficient=C):
+        setup = make_setup(CAR, DRY)
+        p = RollingResistanceForce(coefficient).dynamics(setup.parameters)
+        time_s = np.arange(round(duration_s / 1e-3) + 1) * 1e-3
+        torque = np.full((len(time_s), 4), float(torque_nm))
+        y = dynamics.initial_y(speed, 0.0, p)
+        return time_s, *dynamics.run(y, torque, 1e-3, p, setup.road)
+
+    def test_coasting_slows_linearly_then_rests(self):
+        time_s, states, accel, *_ = self.run(0.0, 6.0, 1.0)
+        decel = MASS * self.C * G / ROLLING_MASS
+        stop_s = 1.0 / decel
+        moving = time_s < stop_s - 0.05
+        assert states[moving, SPEED] == pytest.approx(1.0 - decel * time_s[moving], abs=3e-3)
+        resting = time_s > stop_s + 0.05
+        assert resting.sum() > 500
+        assert not states[resting, SPEED].any()
+        assert not accel[resting].any()
+
+    def test_the_accelerometer_feels_it(self):
+        _, states, accel, _, force_n, *_ = self.run(100.0, 1.0, 10.0)
+        assert accel == pytest.approx(force_n.sum(axis=1) / MASS - self.C * G, rel=1e-9)
+        assert np.gradient(states[:, SPEED], 1e-3)[100:-5] == pytest.approx(accel[100:-5], abs=2e-3)
+
+    def test_it_holds_a_standing_car_against_less_than_itself(self):
+        least_nm = self.C * MASS * G * RADIUS / 4.0
+        assert self.run(0.98 * least_nm, 2.0, 0.0)[1][-1, POSITION] < 1e-4
+        assert self.run(1.05 * least_nm, 2.0, 0.0)[1][-1, SPEED] > 0.01
+
+    def test_without_a_coefficient_nothing_changes(self):
+        plain = drive(CAR, 100.0, 1.0, 10.0)
+        assert np.array_equal(self.run(100.0, 1.0, 10.0, 0.0)[1][:, SPEED], plain.speed_m_s)

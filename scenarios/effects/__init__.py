@@ -21,11 +21,11 @@ from scenarios.effects.mass_offset import MassOffset
 from scenarios.effects.motion_blur import MotionBlur
 from scenarios.effects.mu_split import MuSplit
 from scenarios.effects.road_grade import RoadGrade
-from scenarios.effects.rolling_resistance import RollingResistance
+from scenarios.effects.rolling_resistance import RollingResistance, RollingResistanceForce
 from scenarios.effects.torque_delay import TorqueDelay
 from scenarios.effects.torque_gain import TorqueGain
 from scenarios.effects.torque_lag import TorqueLag
-from scenarios.effects.tyre_relaxation import TyreRelaxation
+from scenarios.effects.tyre_relaxation import TyreRelaxation, TyreRelaxationOfSlip
 from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset
 from scenarios.effects.vehicle_speed_delay import VehicleSpeedDelay
 from scenarios.effects.vehicle_speed_scale import VehicleSpeedScale
@@ -74,7 +74,13 @@ EFFECTS: dict[str, type[Effect]] = {
 }
 """All effects by id, in the order in which they act: along the plant, and within a stage as the signal passes them."""
 
-__all__ = ["EFFECTS", "Effect", "Parameter", "make_effect", "problems_of"]
+FORMS: dict[str, tuple[type[Effect], ...]] = {
+    key: (effect, *(other for other in (RollingResistanceForce, TyreRelaxationOfSlip) if other.id == key))
+    for key, effect in EFFECTS.items()
+}
+"""Every form of each effect, the plant's own first: what goes by one name in the field may act in more than one way."""
+
+__all__ = ["EFFECTS", "FORMS", "Effect", "Parameter", "make_effect", "problems_of"]
 
 
 def suggestion(word: str, known: list[str]) -> str:

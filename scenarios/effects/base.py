@@ -84,6 +84,8 @@ class Effect:
     """Base of all effects: describes itself and leaves every stage as it is."""
 
     id: ClassVar[str]
+    form: ClassVar[str] = ""
+    """Which of several forms of the effect this is; empty where there is one."""
     stage: ClassVar[Stage]
     subsystem: ClassVar[Subsystem]
     equation: ClassVar[str]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from inspect import getdoc
 from pathlib import Path
 
-from scenarios.effects import EFFECTS
+from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.base import Effect, Parameter, Value
 from trpac_core.vehicle import Vehicle
 
@@ -60,11 +60,15 @@ def _section(effect: type[Effect]) -> str:
 - Equation: `{effect.equation}`
 - Source: {effect.source}
 - Seen when: {effect.excited_by}
-- Looks like: {", ".join(f"`{key}`" for key in effect.look_alikes)}
+- Looks like: {", ".join(f"`{key}`" for key in effect.look_alikes)}{"".join(map(_form, FORMS[effect.id][1:]))}
 
 | parameter | unit | meaning | neutral | bounds | a fit starts at |
 |---|---|---|---|---|---|
 {rows}"""
+
+
+def _form(other: type[Effect]) -> str:
+    return f"\n- A diagnosis also tries it as {other.form}: `{other.equation}`. {getdoc(other)}"
 
 
 def _row(p: Parameter) -> str:

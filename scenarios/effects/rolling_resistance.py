@@ -16,6 +16,7 @@ class RollingResistance(Effect):
     """A moment against each loaded wheel's rotation; it holds a resting wheel and never turns it back."""
 
     id = "rolling_resistance"
+    form = "moment at the wheels"
     stage = "dynamics"
     subsystem = "wheel"
     equation = "I omega' = T - F_x R - c F_z R"
@@ -35,3 +36,15 @@ class RollingResistance(Effect):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The moment is proportional to each wheel's own load."""
         return parameters._replace(rolling_coefficient=self.coefficient)
+
+
+@dataclass(frozen=True)
+class RollingResistanceForce(RollingResistance):
+    """The same as a force on the body, at the wheels' hubs: the wheels' own balance does not see it."""
+
+    form = "force on the body"
+    equation = "m v' = sum F_x - c sum F_z"
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The force is proportional to all wheels' load; it holds a standing car."""
+        return parameters._replace(hub_resistance=self.coefficient)

@@ -16,6 +16,7 @@ class TyreRelaxation(Effect):
     """The tyre's force follows the slip only as the tyre rolls on."""
 
     id = "tyre_relaxation"
+    form = "the force lags"
     stage = "dynamics"
     subsystem = "tyre"
     equation = "F_x' = (V / length) (F_steady - F_x), V = max(omega R, v, 0.01 m/s)"
@@ -35,3 +36,15 @@ class TyreRelaxation(Effect):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The force becomes a state."""
         return parameters._replace(relaxation_m=self.length_m)
+
+
+@dataclass(frozen=True)
+class TyreRelaxationOfSlip(TyreRelaxation):
+    """The slip lags in place of the force: alike at small slip, sooner at its limit where the tyre slides."""
+
+    form = "the slip lags"
+    equation = "s' = (V / length) (slip - s), F_x = F_steady(s), V = max(omega R, v, 0.01 m/s)"
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The lagging slip becomes a state."""
+        return parameters._replace(relaxation_m=self.length_m, slip_lags=1.0)

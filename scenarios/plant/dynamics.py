@@ -3,7 +3,7 @@
 Equations (docs/plant.md has them with their sources):
 
     I omega' = T - F_x R - c F_z R - T_drag          Eq. (12) of [1]_, with resistances
-    m v'     = sum F_x - k v^2 - m g sin
+    m v'     = sum F_x - k v^2 - c_hub F_z - m g sin
     lambda   = abs(omega R - v) / max(omega R, v, floor)        Eq. (13) of [1]_
 
 With relaxation each tyre force is a state that follows its steady value; with a driveline T is a shaft's torque, and
@@ -74,6 +74,9 @@ ACCELERATION_TOLERANCE_M_S2 = 1e-7
 RELEASE_SPEED_M_S = 1.0
 """At rest a lagging force that still brakes is released as at this speed: the car would rock back on it [m/s]."""
 
+LEAST_SLOPE = 1e-3
+"""Where the slip lags, the force's slope by it counts as at least this share of C_x in the Jacobian [-]."""
+
 BORDER_TOLERANCE_M = 1e-7
 """A contact point this close to the next road segment counts as being on it [m]."""
 
@@ -84,6 +87,7 @@ inlined = njit(cache=True, error_model="numpy", inline="always")
 # Rows of the wheels' working array. It is one array, since each one that a call passes on costs time.
 _STEADY, _LAG, _SLOPE_WHEEL, _SLOPE_SPEED = range(4)  # the tyre's, filled by `forces`
 _GAIN, _BY_WHEEL, _BY_SPEED, _OWN, _SHARE, _MOTOR, _BRAKE = range(4, 11)  # the step's linear equations
+_PER_STATE = 11  # force per lagging state: 1 where the force itself lags, C_x or less where the slip does
 
 _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)  # makes the two-stage Rosenbrock method L-stable
 
@@ -154,7 +158,7 @@ def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, the
 def new_wheels() -> tuple[Wheels, Wheels]:
     """Working arrays of the two stages; both read the same theta."""
     theta = np.zeros(4)
-    a, free, rates, work = np.zeros((6, 4)), np.ones((2, 5)), np.zeros((2, 16)), np.zeros((2, 11, 4))
+    a, free, rates, work = np.zeros((6, 4)), np.ones((2, 5)), np.zeros((2, 16)), np.zeros((2, 12, 4))
     first = Wheels(theta, a[0], a[1], a[2], rates[0], free[0], work[0])
     second = Wheels(theta, a[3], a[4], a[5], rates[1], free[1], work[1])
     return first, second
@@ -183,6 +187,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
     rear_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_front_axle_m * half_base
     transfer_kg = p.mass_kg * p.transfer_height_m * half_base
     drag_n = p.drag_kg_m * speed * speed
+    most_n = p.hub_resistance * p.mass_kg * p.gravity_m_s2
     for _ in range(8):
         shift_n = transfer_kg * accel
         total_n = 0.0
@@ -196,24 +201,35 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             if p.falloff_s_m > 0.0:
                 left = np.exp(-p.falloff_s_m * abs(rim - speed))
                 theta *= p.falloff_floor + (1.0 - p.falloff_floor) * left
-            force, by_slip, by_load = tyre_force(theta, slip, load_n, p.longitudinal_stiffness_n)
-            sign = 1.0 if rim >= speed else -1.0
-            wheels.work[_STEADY, i] = sign * force
+            acting = slip if rim >= speed else -slip
+            if p.relaxation_m > 0.0 and p.slip_lags > 0.0:
+                wheels.work[_STEADY, i] = acting
+                acting = min(max(y[FORCE + i], -1.0), 1.0)
+            force, by_slip, by_load = tyre_force(theta, abs(acting), load_n, p.longitudinal_stiffness_n)
+            force, by_load = np.copysign(force, acting), np.copysign(by_load, acting)
+            # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
+            slope = max(by_slip, 0.0)
             if p.relaxation_m > 0.0:
-                wheels.force_n[i] = y[FORCE + i]
                 rest = speed <= 0.0 and y[FORCE + i] < 0.0
                 wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / p.relaxation_m
+                wheels.work[_PER_STATE, i] = 1.0
+            if p.relaxation_m > 0.0 and p.slip_lags > 0.0:
+                slope = wheels.work[_PER_STATE, i] = max(slope, LEAST_SLOPE * p.longitudinal_stiffness_n)
+            if p.relaxation_m > 0.0 and p.slip_lags == 0.0:
+                wheels.work[_STEADY, i] = force
+                wheels.force_n[i] = y[FORCE + i]
             else:
-                wheels.force_n[i] = sign * force
-                total_by_accel += sign * by_load * (-transfer_kg if i < 2 else transfer_kg)
+                wheels.force_n[i] = force
+                total_by_accel += by_load * (-transfer_kg if i < 2 else transfer_kg)
             total_n += wheels.force_n[i]
             wheels.load_n[i] = load_n
             wheels.slip[i] = slip
-            # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
-            slope = max(by_slip, 0.0) / scale
+            slope /= scale
             wheels.work[_SLOPE_WHEEL, i] = slope * p.wheel_radius_m * (speed / rim if rim == scale else 1.0)
             wheels.work[_SLOPE_SPEED, i] = -slope * (rim / speed if speed == scale else 1.0)
-        error = (total_n - drag_n) / p.mass_kg - accel
+        # At rest it holds the car and never pushes it back.
+        hub_n = most_n if speed > 0.0 else min(most_n, max(total_n - p.mass_kg * p.slope_m_s2, 0.0))
+        error = (total_n - drag_n - hub_n) / p.mass_kg - accel
         accel += error / (1.0 - total_by_accel / p.mass_kg)
         if p.transfer_height_m == 0.0 or abs(error) < ACCELERATION_TOLERANCE_M_S2:
             break
@@ -270,10 +286,11 @@ def _fill_rates(
         wheels.free[i] = 0.0 if y[WHEEL + i] <= 0.0 and rate == 0.0 else 1.0
         wheels.rates[i] = rate
         if p.relaxation_m > 0.0:
-            lag_n = wheels.work[_STEADY, i] - y[FORCE + i]
-            wheels.rates[FORCE - WHEEL + i] = wheels.work[_LAG, i] * lag_n
+            behind = wheels.work[_STEADY, i] - y[FORCE + i]
+            wheels.rates[FORCE - WHEEL + i] = wheels.work[_LAG, i] * behind
         total_n += wheels.force_n[i]
-    wheels.free[4] = 0.0 if y[SPEED] <= 0.0 and total_n < p.mass_kg * p.slope_m_s2 else 1.0
+    held_n = p.mass_kg * (p.slope_m_s2 + p.hub_resistance * p.gravity_m_s2)
+    wheels.free[4] = 0.0 if y[SPEED] <= 0.0 and total_n < held_n else 1.0
 
 
 @inlined
@@ -325,14 +342,15 @@ def _solve(
             k[i] = (inertia * k[i] + share * passed) / (inertia + share * shaft)
         if p.relaxation_m > 0.0:
             k[FORCE - WHEEL + i] /= 1.0 + gh * wheels.work[_LAG, i]
-            k[i] -= at[_GAIN, i] * k[FORCE - WHEEL + i]
-            rhs += gh / p.mass_kg * k[FORCE - WHEEL + i]
+            lagging_n = at[_PER_STATE, i] * k[FORCE - WHEEL + i]
+            k[i] -= at[_GAIN, i] * lagging_n
+            rhs += gh / p.mass_kg * lagging_n
         rhs += at[_SHARE, i] * k[i]
     k_speed = rhs / pivot if wheels.free[4] > 0.0 else speed_rhs
     for i in range(4):
         k[i] = (k[i] - at[_GAIN, i] * at[_BY_SPEED, i] * k_speed) / at[_OWN, i]
         if p.relaxation_m > 0.0:
-            k[FORCE - WHEEL + i] += at[_BY_WHEEL, i] * k[i] + at[_BY_SPEED, i] * k_speed
+            k[FORCE - WHEEL + i] += (at[_BY_WHEEL, i] * k[i] + at[_BY_SPEED, i] * k_speed) / at[_PER_STATE, i]
         if has_shaft:
             pull = shaft * k[i] - stiffness * k[TWIST - WHEEL + i]
             motor = at[_MOTOR, i]

@@ -11,8 +11,8 @@ from trpac_core.vehicle import GRAVITY_M_S2
 
 POSITION, SPEED, WHEEL, FORCE, TWIST, MOTOR, STATES = 0, 1, 2, 6, 10, 14, 18
 """Where the state vector y holds what: position [m], vehicle speed [m/s], and four each of wheel speed [rad/s], tyre
-force [N] (with relaxation), shaft twist [rad] and motor speed [rad/s] (with a driveline); unused ones stay as they
-are."""
+force [N] or lagging slip [-] (with relaxation), shaft twist [rad] and motor speed [rad/s] (with a driveline); unused
+ones stay as they are."""
 
 
 class DynamicsParameters(NamedTuple):
@@ -30,6 +30,8 @@ class DynamicsParameters(NamedTuple):
     """Air drag per squared speed, 0.5 rho C_d A [kg/m]."""
     rolling_coefficient: float = 0.0
     """Rolling resistance moment per load and radius [-]."""
+    hub_resistance: float = 0.0
+    """Rolling resistance as a force on the body per load [-]."""
     drag_torque_nm: float = 0.0
     """Torque against each wheel's rotation [N m]."""
     slope_m_s2: float = 0.0
@@ -42,6 +44,8 @@ class DynamicsParameters(NamedTuple):
     """Share of the adhesion that is left at high sliding speed [-]."""
     relaxation_m: float = 0.0
     """Way over which the tyre force follows its steady value; 0: at once [m]."""
+    slip_lags: float = 0.0
+    """1: over that way it is the slip that follows, and the force is the steady one of the lagging slip [-]."""
     shaft_stiffness_nm_rad: float = 1e4
     shaft_damping_nm_s_rad: float = 0.0
     motor_inertia_kg_m2: float = 0.0
@@ -69,4 +73,4 @@ class Wheels(NamedTuple):
     free: NDArray[np.float64]
     """0 for what is held at rest, else 1: four wheels and the vehicle, shape (5,)."""
     work: NDArray[np.float64]
-    """What only the step itself needs, shape (11, 4); dynamics.py names the rows."""
+    """What only the step itself needs, shape (12, 4); dynamics.py names the rows."""
