@@ -198,7 +198,7 @@ def severity_for(effect: str, target: float, case: Case) -> tuple[dict[str, floa
     """Parameters at which the gap is about `target` noise floors, and the gap that they reach."""
     from dataclasses import replace
 
-    from sim2real.diagnose import evidence
+    from sim2real.evidence import gather
     from sim2real.gap import measure
     from sim2real.observer import Simulation
 
@@ -206,7 +206,7 @@ def severity_for(effect: str, target: float, case: Case) -> tuple[dict[str, floa
 
     def gap(s: float) -> float:
         found = drives(replace(case, effects={effect: SEVERITY[effect](s)}), 2)
-        held = evidence(model, found)
+        held = gather(model, found)
         return measure(held, held.residuals(model)).total
 
     low, high = 0.005, 1.0

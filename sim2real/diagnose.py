@@ -10,22 +10,22 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.effects import EFFECTS
+from scenarios.effects import EFFECTS, FORMS, Effect
 from scenarios.files import load_vehicle
-from sim2real.contest import COUNTER, Progress, add_pairs, hold_contest, silent
-from sim2real.doubt import doubt
+from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
+from sim2real.evidence import gather
 from sim2real.findings import Findings, describe
-from sim2real.fitting import Evidence, residuals
 from sim2real.gap import measure
 from sim2real.lattice import common_lattice
 from sim2real.logs import resample
 from sim2real.merge import camera_side, counter_side, merge
-from sim2real.noise import RESOLUTION, read_noise
+from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
-from sim2real.perception import diagnose_perception
-from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
-from sim2real.selection import decide, needs_pairs
+from sim2real.pairs import add_pairs, add_partners
+from sim2real.perception.diagnose import diagnose_perception
+from sim2real.result import Cause, Diagnosis, Measure, TrpacError, Verdict
+from sim2real.selection import decide, fitness, is_noise, needs_pairs
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.trpac_error import trpac_error
 
@@ -140,16 +140,17 @@ def find(
     """Hold the contest and decide it."""
     lattice = None if model.has(COUNTER) else common_lattice([d.lattice for d in (*fit, holdout)])
     base = model.with_effects(lattice.effect()) if lattice else model
-    fit_to, held = evidence(base, fit), evidence(base, [holdout])
-    contest = hold_contest(base, fit_to, held, exclude, jobs, progress)
-    if needs_pairs(contest, fit_to, held):
-        contest = add_pairs(contest, base, fit_to, held, jobs, progress)
+    fit_to, held = gather(base, fit), gather(base, [holdout])
+    first = first_round(base, fit_to, exclude, jobs, progress)
+    if first:
+        best = first[0].candidate.model(first[0].x)
+        fit_to, held = fit_to.sharpened(best), held.sharpened(best)
+    contest = hold_contest(base, fit_to, held, first, jobs, progress)
+    if not is_noise(contest, fitness(contest.null, fit_to, held)):
+        contest = add_partners(contest, fit_to, jobs, progress)
+        if needs_pairs(contest, fit_to, held):
+            contest = add_pairs(contest, base, fit_to, held, jobs, progress)
     return Findings(base, fit_to, held, contest, decide(contest, fit_to, held), lattice)
-
-
-def evidence(model: Simulation, drives: Sequence[Drive]) -> Evidence:
-    """Drives with their noise, read from what the model leaves."""
-    return Evidence(tuple(drives), tuple(read_noise(d, residuals(model, d), doubt(model, d)) for d in drives))
 
 
 def counter_gap(findings: Findings) -> tuple[Measure, Measure]:
@@ -184,6 +185,11 @@ def _file(path: Path) -> dict[str, str]:
     return {"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
 
 
+def _kind(cause: Cause) -> type[Effect]:
+    """The effect's class, in the form that the cause has."""
+    return next(kind for kind in FORMS[cause.effect] if kind.form == cause.form)
+
+
 def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
     """By how much what a diagnosis found shrinks the gap of a log that it has never seen [%].
 
@@ -197,11 +203,11 @@ def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
     model = Simulation(load_vehicle(diagnosis.provenance["vehicle"]["path"]))
     named = diagnosis.causes[: 2 if diagnosis.verdict is Verdict.COMPOUND else 1]
     effects = [
-        EFFECTS[c.effect](**{name: v.value for name, v in c.parameters.items()})
+        _kind(c)(**{name: v.value for name, v in c.parameters.items()})
         for c in named
         if EFFECTS[c.effect].stage != "perception"
     ]
     added = model.with_effects(*effects)
-    held = evidence(added, [read_source(str(log), road).drive])
+    held = gather(added, [read_source(str(log), road).drive])
     before, after = measure(held, held.residuals(model)), measure(held, held.residuals(added))
     return 100.0 * (1.0 - after.total / before.total)

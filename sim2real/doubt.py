@@ -16,11 +16,11 @@ from sim2real.observer import Push, Simulation
 
 Array = NDArray[np.float64]
 
-FRICTION = 0.01
+FRICTION = 0.002
 """Share that a road's friction is known to at best [-]."""
-PLACE_M = 0.05
+PLACE_M = 0.01
 """What a border's place is known to at best [m]."""
-CLOCK_S = 0.001
+CLOCK_S = 0.0005
 """What a row's time is known to at best [s]."""
 NEARBY_S = 0.05
 """A doubt holds this long before and after its row [s]."""

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from scenarios.effects import EFFECTS, Effect
 from sim2real import where
 from sim2real.contest import Contest, Entry, Progress
-from sim2real.doubt import doubt
 from sim2real.drive import CHANNELS
-from sim2real.fitting import Evidence, residuals
+from sim2real.evidence import Evidence
 from sim2real.gap import intervals, measure, noise_floor, shrink
 from sim2real.lattice import Lattice
 from sim2real.next_manoeuvre import propose
-from sim2real.noise import read_noise
 from sim2real.observer import Simulation
 from sim2real.result import (
     Cause,
@@ -30,6 +28,7 @@ from sim2real.result import (
     Verdict,
 )
 from sim2real.selection import Decision, fitness
+from sim2real.suspect import lone_sensor
 from sim2real.unknown import Term, characterise, fit_terms
 
 Array = NDArray[np.float64]
@@ -82,10 +81,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         unknown = decision.verdict is Verdict.UNKNOWN
         seen = [found.fit_to, held] if unknown else [held]
         drives, noises = [d for e in seen for d in e.drives], [n for e in seen for n in e.noises]
-        terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown)
+        suspect = lone_sensor(found.model, found.fit_to, held) if unknown else None
+        terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown, only=suspect)
         progress("equations", 1, 1)
         if unknown:
-            unexplained = characterise(terms)
+            unexplained = characterise(terms, suspect)
         subsystem = _subsystem(decision, terms)
         places, heat = _where(found, held, before, terms, subsystem)
     return Diagnosis(
@@ -108,12 +108,7 @@ def _final_noise(found: Findings) -> Evidence:
     """The hold-out with its noise read anew from what the winner leaves: a gap may have looked like noise."""
     if not found.added():
         return found.holdout
-    model = found.model.with_effects(*found.added())
-    noises = []
-    for drive, first in zip(found.holdout.drives, found.holdout.noises, strict=True):
-        again = read_noise(drive, residuals(model, drive), doubt(model, drive))
-        noises.append(again if np.all(again.sigma <= first.sigma * 1.001) else first)
-    return Evidence(found.holdout.drives, tuple(noises))
+    return found.holdout.sharpened(found.model.with_effects(*found.added()))
 
 
 def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int) -> tuple[Cause, ...]:
@@ -165,6 +160,7 @@ def _cause(
         evidence_for=tuple(pro),
         evidence_against=tuple(contra),
         excited=excited,
+        form=best.candidate.kinds[0].form,
     )
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import islice, product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from scenarios.effects import EFFECTS, Effect, Parameter
-from sim2real.drive import Drive
-from sim2real.noise import Noise
+from scenarios.effects import FORMS, Effect, Parameter
+from sim2real.evidence import Evidence
 from sim2real.observer import Simulation
 
 Array = NDArray[np.float64]
@@ -25,50 +24,6 @@ MOST_STARTS = 8
 """Points of the coarse grid before the local fit."""
 FULL_STEPS = 12
 """Most steps of a fit with full care."""
-SETTLING_S = 0.3
-"""At the start of a drive the observer's state is no better than single samples: not counted [s]."""
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Drives with the noise of their channels: what a model is held against."""
-
-    drives: tuple[Drive, ...]
-    noises: tuple[Noise, ...]
-
-    def residuals(self, model: Simulation) -> tuple[Array, ...]:
-        """Measured minus predicted per drive, shape (n, 7) each; NaN where nothing counts."""
-        return tuple(residuals(model, drive) for drive in self.drives)
-
-    def whitened(self, found: Sequence[Array]) -> Array:
-        """All residuals in standard deviations behind each other, 0 where nothing counts."""
-        parts = [n.whitened(r).ravel() for n, r in zip(self.noises, found, strict=True)]
-        return np.nan_to_num(np.concatenate(parts))
-
-    def longest(self) -> Evidence:
-        """The longest drive alone."""
-        i = int(np.argmax([len(d) for d in self.drives]))
-        return Evidence((self.drives[i],), (self.noises[i],))
-
-    @cached_property
-    def parts(self) -> tuple[slice, ...]:
-        """Where each drive's residuals stand in `whitened`."""
-        ends = np.cumsum([0, *(d.measured.size for d in self.drives)])
-        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-
-
-def residuals(model: Simulation, drive: Drive) -> Array:
-    """Measured minus predicted, shape (n, 7); NaN where a sample is lost or does not count."""
-    return rest_of(drive, model.predict(drive).channels)
-
-
-def rest_of(drive: Drive, channels: Array) -> Array:
-    """Measured minus given channels, shape (n, 7); NaN where a sample is lost or does not count."""
-    rest = drive.measured - channels
-    rest[~drive.moving] = np.nan
-    rest[:, ~drive.counted] = np.nan
-    rest[drive.time_s < drive.time_s[0] + SETTLING_S] = np.nan
-    return rest
 
 
 def loss(z: Array) -> float:
@@ -92,11 +47,20 @@ class Candidate:
 
     base: Simulation
     ids: tuple[str, ...]
+    forms: tuple[int, ...] = ()
+    """Which of its `FORMS` each effect has; empty: the first."""
+
+    @cached_property
+    def kinds(self) -> tuple[type[Effect], ...]:
+        """The effects' classes."""
+        return tuple(
+            FORMS[key][i] for key, i in zip(self.ids, self.forms or (0,) * len(self.ids), strict=True)
+        )
 
     @cached_property
     def parameters(self) -> tuple[tuple[str, Parameter], ...]:
         """Effect id and parameter, in the order of all vectors."""
-        return tuple((key, p) for key in self.ids for p in EFFECTS[key].parameters())
+        return tuple((kind.id, p) for kind in self.kinds for p in kind.parameters())
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -112,6 +76,12 @@ class Candidate:
         return np.array([_scale(p.start_values(car), p.neutral_value(car)) for _, p in self.parameters])
 
     @cached_property
+    def neutral(self) -> Array:
+        """Where the effects vanish."""
+        car = self.base.vehicle.to_core()
+        return np.array([p.neutral_value(car) for _, p in self.parameters])
+
+    @cached_property
     def starts(self) -> Array:
         """Points to start from, shape (m, k)."""
         car = self.base.vehicle.to_core()
@@ -124,14 +94,8 @@ class Candidate:
     def effects(self, x: Array) -> list[Effect]:
         """The effects at a parameter vector."""
         low, high = self.bounds
-        values = dict.fromkeys(self.ids, ())
-        out, at = [], 0
-        for key in values:
-            count = len(EFFECTS[key].parameters())
-            part = np.clip(x[at : at + count], low[at : at + count], high[at : at + count])
-            out.append(EFFECTS[key](*map(float, part)))
-            at += count
-        return out
+        values = iter(map(float, np.clip(x, low, high)))
+        return [kind(*islice(values, len(kind.parameters()))) for kind in self.kinds]
 
     def model(self, x: Array) -> Simulation:
         """The base model with the effects at x."""
@@ -180,8 +144,8 @@ def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None, st
         With k parameters.
     evidence : Evidence
         What to fit to.
-    start : array, shape (k,), optional
-        Where to start in place of the grid.
+    start : array, shape (k,) or (m, k), optional
+        Where to start in place of the grid; of several, the best.
     steps : int
         Most steps of the trust-region fit.
     """

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.drive import GROUPS, UNITS
-from sim2real.fitting import Evidence, Fit, residuals, robust_weight
+from sim2real.evidence import Evidence, residuals
+from sim2real.fitting import Fit, robust_weight
 from sim2real.observer import Simulation
 from sim2real.result import Interval, Measure
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim2real.lattice import Lattice
-from sim2real.perception import CameraCandidate, PerceptionFinding
+from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Unexplained, Verdict
 
 CERTAIN = 0.97

@@ -14,7 +14,8 @@ from scenarios.plant import simulate
 from sim2real.contest import Entry, Progress, silent
 from sim2real.doubt import doubt
 from sim2real.drive import CHANNELS, Drive, make_drive
-from sim2real.fitting import Evidence, fit
+from sim2real.evidence import Evidence
+from sim2real.fitting import fit
 from sim2real.noise import Noise, widening
 from sim2real.observer import Simulation
 from sim2real.result import NextManoeuvre

@@ -51,6 +51,14 @@ class Noise:
         first = z[:1]
         return np.concatenate([first, np.where(np.isfinite(rest), rest, z[1:])]) / self.widening
 
+    def sharper(self, other: Noise) -> Noise:
+        """Of two readings the smaller one, channel by channel; the doubt is the other's."""
+        smaller = other.sigma < self.sigma
+        sigma = np.where(smaller, other.sigma, self.sigma)
+        correlation = np.where(smaller, other.correlation, self.correlation)
+        share = other.sigma / sigma
+        return Noise(sigma, correlation, np.sqrt(1.0 + (other.widening**2 - 1.0) * share**2))
+
     def draw(self, n: int, generator: np.random.Generator) -> Array:
         """Noise of n rows, shape (n, 7), in each channel's unit."""
         white = generator.standard_normal((n, len(CHANNELS)))

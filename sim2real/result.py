@@ -109,6 +109,8 @@ class Cause:
         Sentences.
     excited : bool
         Whether the manoeuvres could have shown it; if not, it cannot be ruled out.
+    form : str
+        Which of several forms of the effect it is; empty where there is one.
     """
 
     effect: str
@@ -120,6 +122,7 @@ class Cause:
     evidence_for: tuple[str, ...] = ()
     evidence_against: tuple[str, ...] = ()
     excited: bool = True
+    form: str = ""
 
 
 @dataclass(frozen=True)

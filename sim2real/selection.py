@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from sim2real.contest import Contest, Entry
 from sim2real.drive import GROUPS
-from sim2real.fitting import Evidence, robust
+from sim2real.evidence import Evidence
+from sim2real.fitting import robust
 from sim2real.result import Verdict
 
 Array = NDArray[np.float64]
@@ -18,25 +19,34 @@ BLOCK_S = 0.2
 """Residuals are averaged over blocks of this length to see what noise would average out [s]."""
 LONG_BLOCK_S = 1.0
 """Blocks over which the residuals' sums are taken to see how correlated they are [s]."""
-NO_GAP_MISFIT = 1.6
+NO_GAP_MISFIT = 1.4
 """Up to this misfit of the model as it is, what is left is noise [-]."""
+NO_GAP_GAIN = 0.01
+"""As long as no effect takes more than this share off the loss [-]."""
 NO_GAP_DOUBT = 0.03
 """Probability that something is left of the candidates where the misfit says there is no gap [-]."""
-EXPLAINED_MISFIT = 2.0
+EXPLAINED_MISFIT = 1.5
 """Up to this misfit an entry explains everything [-]."""
-EXPLAINED_SHARE = 0.1
+EXPLAINED_SHARE = 0.125
 """Where the gap is large, an entry explains it if it leaves this share of the misfit: no form is exact [-]."""
+EXPLAINED_MOST = 3.0
+"""Beyond this misfit nothing is explained, whatever the gap was [-]."""
+FURTHER_GAIN = 100.0
+"""With more than this to gain from a second effect, in units of what noise leaves, one effect may not be all [-]."""
+FURTHER_BELIEF = 0.8
+"""Probability that one effect is the cause though something beside it is left [-]."""
 PAIR_LEAVES = 0.5
 """A pair is taken in place of one effect only where it at least halves the misfit [-]."""
-PAIR_MISFIT = 1.6
+PAIR_MISFIT = 1.4
 """Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
-PAIR_SHARE = 0.05
+PAIR_SHARE = 0.02
 """As `EXPLAINED_SHARE`, for a pair [-]."""
 RIVAL = 0.1
 """An entry with more than this share of the winner's probability is not told apart from it [-]."""
 SOFTNESS = 4.0
-"""Tempering of the quasi-likelihood: the library's forms are not nature's, so evidence counts for less than noise alone
-would say [-]."""
+"""Tempering of the quasi-likelihood: evidence counts for less than noise alone would say [-]."""
+FORM = 1e-3
+"""Share of what the best entry explains that no entry is held to: the library's forms are not nature's [-]."""
 FLOOR_MISFIT = 1.5
 """Above this misfit an entry is worth a second effect's try [-]."""
 
@@ -103,7 +113,8 @@ def probabilities(contest: Contest, entries: list[Entry], fit_to: Evidence, hold
     best = min(everyone, key=lambda e: e.loss)
     factor = inflation(best, fit_to, holdout)
     samples = max(np.count_nonzero(best.z_fit) / factor, 2.0)
-    score = np.array([-0.5 * e.loss / (factor * SOFTNESS) - 0.5 * e.size * np.log(samples) for e in everyone])
+    tempered = SOFTNESS * factor + FORM * (contest.null.loss - best.loss)
+    score = np.array([-0.5 * e.loss / tempered - 0.5 * e.size * np.log(samples) for e in everyone])
     weight = np.exp(score - score.max())
     return weight / weight.sum()
 
@@ -115,15 +126,26 @@ def explains(after: Fitness, before: Fitness) -> bool:
 
 def allowed(before: Fitness) -> float:
     """The greatest misfit that an entry may leave and still explain the gap [-]."""
-    return max(EXPLAINED_MISFIT, EXPLAINED_SHARE * before.misfit)
+    return max(EXPLAINED_MISFIT, min(EXPLAINED_SHARE * before.misfit, EXPLAINED_MOST))
+
+
+def is_noise(contest: Contest, before: Fitness) -> bool:
+    """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
+    if not contest.singles:
+        return True
+    gain = 1.0 - contest.singles[0].loss / contest.null.loss
+    return before.misfit <= NO_GAP_MISFIT and gain <= NO_GAP_GAIN
 
 
 def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
-    """Whether one effect is not enough."""
-    before = fitness(contest.null, fit_to, holdout)
-    if before.misfit <= NO_GAP_MISFIT or not contest.singles:
+    """Whether one effect is not enough; of a contest with partners."""
+    if len(contest.singles) < 2:
         return False
-    return fitness(contest.singles[0], fit_to, holdout).misfit > FLOOR_MISFIT
+    best = contest.singles[0]
+    if fitness(best, fit_to, holdout).misfit > FLOOR_MISFIT:
+        return True
+    least = min((loss for loss, _ in contest.partners), default=best.loss_fit)
+    return best.loss_fit - least > FURTHER_GAIN * inflation(best, fit_to, holdout)
 
 
 @dataclass(frozen=True)
@@ -158,7 +180,7 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     singles = list(contest.singles)
     weight = probabilities(contest, singles, fit_to, holdout)
     share = dict(zip((e.ids[0] for e in singles), weight[1:], strict=True))
-    if before.misfit <= NO_GAP_MISFIT or not singles:
+    if is_noise(contest, before):
         return Decision(Verdict.NO_GAP, contest.null, (), _scaled(share, NO_GAP_DOUBT), before, before)
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
@@ -171,9 +193,23 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
             return _compound(contest, pair, shares, before, paired)
     if not explains(after, before):
         return Decision(Verdict.UNKNOWN, best, (), _scaled(share, _belief(after, before)), before, after)
-    rivals = tuple(e for e in singles if e is not best and share[e.ids[0]] > RIVAL * share[best.ids[0]])
+    rivals = [e for e in singles if e is not best and share[e.ids[0]] > RIVAL * share[best.ids[0]]]
+    belief = _belief(after, before)
+    further = _further(contest, best, fit_to, holdout)
+    if further:
+        rivals.append(further)
+        belief *= FURTHER_BELIEF
     verdict = Verdict.AMBIGUOUS if rivals else Verdict.IDENTIFIED
-    return Decision(verdict, best, rivals, _scaled(share, _belief(after, before)), before, after)
+    return Decision(verdict, best, tuple(rivals), _scaled(share, belief), before, after)
+
+
+def _further(contest: Contest, best: Entry, fit_to: Evidence, holdout: Evidence) -> Entry | None:
+    """The pair that fits so much better than the best single effect that this one may not be all, or not be it."""
+    if not contest.pairs:
+        return None
+    pair = contest.pairs[0]
+    gain = best.loss - pair.loss
+    return pair if gain > FURTHER_GAIN * inflation(best, fit_to, holdout) else None
 
 
 def _compound(contest: Contest, pair: Entry, weight: Array, before: Fitness, after: Fitness) -> Decision:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from scenarios.files import WHEELS
 from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
-from sim2real.fitting import rest_of, robust, robust_weight
+from sim2real.evidence import rest_of
+from sim2real.fitting import robust, robust_weight
 from sim2real.noise import Noise
 from sim2real.observer import Prediction, Push, Simulation
 from sim2real.result import Unexplained
@@ -47,6 +48,8 @@ class Equation:
     """Size of the term for finite differences, in `unit`."""
     push: Callable[[Simulation, Drive, Prediction, Array], Push]
     quantities: tuple[str, ...]
+    channel: int | None = None
+    """Of a single sensor's equation: its channel."""
 
 
 def _none(drive: Drive) -> dict[str, Array]:
@@ -56,6 +59,19 @@ def _none(drive: Drive) -> dict[str, Array]:
 
 def _torque(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
     return Push(**{**_none(drive), "torque_nm": np.repeat(term[:, None], 4, axis=1)}, felt=False)
+
+
+def _motor(wheel: int, model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
+    none = _none(drive)
+    none["torque_nm"][:, wheel] = term
+    return Push(**none, felt=False)
+
+
+def _creep(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
+    """A slip that the tyre has beside its own: the wheel turns faster or slower at the same force."""
+    none = _none(drive)
+    none["offset"][:, WHEEL] = (term * seen.states[:, SPEED] / model.vehicle.wheel_radius_m)[:, None]
+    return Push(**none, felt=False)
 
 
 def _force(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
@@ -94,13 +110,14 @@ EQUATIONS = (
     Equation("force", "vehicle", "accel_x", "N", 50.0, _force, ("speed", "acceleration", "time", "position")),
     Equation("gravity", "road", "vehicle_speed", "m/s^2", 0.05, _gravity, ("time", "position")),
     Equation("tyre", "tyre", "wheel_speed", "-", 0.02, _tyre, ("speed", "torque", "slip", "time", "position")),
+    Equation("creep", "tyre", "wheel_speed", "-", 0.005, _creep, ("acceleration",)),
     Equation(
         "speed sensor", "vehicle_speed_sensor", "vehicle_speed", "m/s", 0.05,
-        partial(_sensor, _one(SPEED)), ("speed", "acceleration", "time"),
+        partial(_sensor, _one(SPEED)), ("speed", "acceleration", "time"), SPEED,
     ),
     Equation(
         "accelerometer", "accelerometer", "accel_x", "m/s^2", 0.05,
-        partial(_sensor, _one(ACCEL)), ("speed", "acceleration", "time"),
+        partial(_sensor, _one(ACCEL)), ("speed", "acceleration", "time"), ACCEL,
     ),
     Equation(
         "wheel sensors", "wheel_speed_sensor", "wheel_speed", "rad/s", 0.1,
@@ -109,7 +126,13 @@ EQUATIONS = (
     *(
         Equation(
             f"wheel sensor {name}", "wheel_speed_sensor", f"wheel_speed_{name}", "rad/s", 0.1,
-            partial(_sensor, _one(WHEEL.start + i)), ("speed", "acceleration"),
+            partial(_sensor, _one(WHEEL.start + i)), ("speed", "acceleration"), WHEEL.start + i,
+        )
+        for i, name in enumerate(WHEELS)
+    ),
+    *(
+        Equation(
+            f"motor {name}", "powertrain", f"wheel_torque_{name}", "N m", 5.0, partial(_motor, i), ("torque",)
         )
         for i, name in enumerate(WHEELS)
     ),
@@ -158,14 +181,23 @@ class Term:
 
 
 def fit_terms(
-    model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], jobs: int = 1, shared: bool = False
+    model: Simulation,
+    drives: Sequence[Drive],
+    noises: Sequence[Noise],
+    jobs: int = 1,
+    *,
+    shared: bool = False,
+    only: Equation | None = None,
 ) -> list[Term]:
-    """All free terms, fitted to these drives, best quasi-likelihood first; `shared` leaves out `PER_DRIVE`."""
+    """All free terms, fitted to these drives, best quasi-likelihood first.
+
+    `shared` leaves out `PER_DRIVE`; `only` keeps the terms of one equation.
+    """
     seen = [model.predict(drive) for drive in drives]
     z = [_whitened(drive, noise, p.channels) for drive, noise, p in zip(drives, noises, seen, strict=True)]
     work = [
         (equation, quantity)
-        for equation in EQUATIONS
+        for equation in ((only,) if only else EQUATIONS)
         for quantity in equation.quantities
         if not (shared and quantity in PER_DRIVE)
     ]
@@ -250,8 +282,8 @@ def _solve(z: Array, slopes: Array) -> tuple[Array, float]:
     return y, float(np.sum(robust(z + slopes @ y)))
 
 
-def characterise(terms: Sequence[Term]) -> Unexplained:
-    """The best term in the form of a result."""
+def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unexplained:
+    """The best term in the form of a result; `suspect` is a sensor without which all else agrees."""
     best = terms[0]
     share = 1.0 - best.loss / max(best.null_loss, 1e-12)
     shape, sign = shape_of(best), sign_of(best)
@@ -261,6 +293,8 @@ def characterise(terms: Sequence[Term]) -> Unexplained:
         f"{best.equation.unit} that depends on {best.quantity} [{unit}]: it {sign} and {shape}. "
         f"Such a term takes {100.0 * share:.0f} % of the misfit."
     )
+    if suspect:
+        sentence = f"Without the {suspect.key.removesuffix(' sensor')}'s signal all else agrees. {sentence}"
     return Unexplained(
         best.equation.subsystem,
         best.equation.signal,

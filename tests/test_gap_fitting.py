@@ -10,18 +10,16 @@ from benchmarks.gap_development import SEVERITY, Levels
 from scenarios.effects import EFFECTS
 from scenarios.effects.mass_offset import MassOffset
 from scenarios.effects.torque_gain import TorqueGain
-from sim2real.contest import COUNTER, Contest, Entry, add_pairs, hold_contest, promising_pairs
-from sim2real.diagnose import evidence, find
+from sim2real.contest import COUNTER, Contest, Entry, add_pairs, first_round, hold_contest, promising_pairs
+from sim2real.diagnose import find
 from sim2real.drive import ACCEL, SPEED
+from sim2real.evidence import SETTLING_S, Evidence, gather, residuals
 from sim2real.fitting import (
     MOST_STARTS,
     ROBUST_FROM,
-    SETTLING_S,
     Candidate,
-    Evidence,
     fit,
     loss,
-    residuals,
     robust,
     robust_weight,
 )
@@ -57,13 +55,13 @@ def with_effect(*keys, size=0.3):
 @pytest.fixture(scope="module")
 def calm():
     """Evidence of two drives without a gap."""
-    return evidence(MODEL, random_drives({}, seed=21))
+    return gather(MODEL, random_drives({}, seed=21))
 
 
 @pytest.fixture(scope="module")
 def heavy():
     """Two drives of a car with 200 kg more."""
-    return evidence(MODEL, random_drives({"mass_offset": {"mass_kg": 200.0}}, seed=22))
+    return gather(MODEL, random_drives({"mass_offset": {"mass_kg": 200.0}}, seed=22))
 
 
 # --- residuals and their loss
@@ -93,7 +91,7 @@ def test_what_does_not_count_weighs_nothing(calm):
 
 def test_the_longest_drive_alone():
     drives = [noisy(clean(pulses(t), 12.0)) for t in (3.0, 5.0, 4.0)]
-    longest = evidence(MODEL, drives).longest()
+    longest = gather(MODEL, drives).longest()
     assert longest.drives == (drives[1],)
     assert longest.whitened(longest.residuals(MODEL)).size == drives[1].measured.size
 
@@ -163,7 +161,7 @@ STIFF_SHAFT = pytest.mark.xfail(
 )
 def test_a_fit_finds_the_parameters_within_their_intervals(effect, size):
     true = SEVERITY[effect](size)
-    held = evidence(MODEL, random_drives({effect: true}, seed=11))
+    held = gather(MODEL, random_drives({effect: true}, seed=11))
     found = fit(Candidate(MODEL, (effect,)), held)
     for (value, low, high), truth in zip(intervals(found, held), true.values(), strict=True):
         assert low <= value <= high
@@ -176,7 +174,7 @@ def test_a_fit_finds_the_parameters_within_their_intervals(effect, size):
 )
 def test_intervals_are_not_so_wide_that_they_say_nothing(effect):
     """Rich driving shows these to a tenth of what is noticeable."""
-    held = evidence(MODEL, random_drives(with_effect(effect), seed=11))
+    held = gather(MODEL, random_drives(with_effect(effect), seed=11))
     found = fit(Candidate(MODEL, (effect,)), held)
     ((_, low, high),) = intervals(found, held)
     assert 0.5 * (high - low) < 0.1 * found.candidate.scale[0]
@@ -248,12 +246,18 @@ def test_a_model_that_has_an_effect_already_is_fitted_on_top_of_it(heavy):
 # --- the contest
 
 
+def contest_of(fit_to, held, exclude, jobs=1, told=None):
+    progress = told.append if told is not None else lambda step: None
+    first = first_round(MODEL, fit_to, exclude, jobs, lambda *step: progress(step))
+    return hold_contest(MODEL, fit_to, held, first, jobs, lambda *step: progress(step))
+
+
 @pytest.fixture(scope="module")
 def heavy_contest(heavy):
     """A contest of few effects about 200 kg more; the second drive is the hold-out."""
     fit_to, held = Evidence(heavy.drives[:1], heavy.noises[:1]), Evidence(heavy.drives[1:], heavy.noises[1:])
     told = []
-    contest = hold_contest(MODEL, fit_to, held, only(*FEW), 1, lambda *step: told.append(step))
+    contest = contest_of(fit_to, held, only(*FEW), told=told)
     return contest, fit_to, held, told
 
 
@@ -281,7 +285,7 @@ def test_a_contest_tells_how_far_it_is(heavy_contest):
 
 def test_any_number_of_threads_gives_the_same_contest(heavy_contest):
     contest, fit_to, held, _ = heavy_contest
-    again = hold_contest(MODEL, fit_to, held, only(*FEW), 3)
+    again = contest_of(fit_to, held, only(*FEW), 3)
     assert [e.ids for e in again.singles] == [e.ids for e in contest.singles]
     for one, other in zip(contest.singles, again.singles, strict=True):
         np.testing.assert_array_equal(one.fit.x, other.fit.x)
@@ -289,14 +293,14 @@ def test_any_number_of_threads_gives_the_same_contest(heavy_contest):
 
 
 def test_neither_the_camera_nor_the_counter_compete(calm):
-    judged = hold_contest(MODEL, calm, calm, only("camera_latency", COUNTER, "mass_offset"))
+    judged = contest_of(calm, calm, only("camera_latency", COUNTER, "mass_offset"))
     assert [e.ids for e in judged.singles] == [("mass_offset",)]
 
 
 def test_the_true_pair_is_promising_though_neither_of_it_is_enough():
     logs = random_drives(with_effect("mass_offset", "torque_lag", size=0.2), count=2, seed=3)
-    fit_to, held = evidence(MODEL, logs[:1]), evidence(MODEL, logs[1:])
-    contest = hold_contest(MODEL, fit_to, held, only(*FEW, "brake_drag", "torque_delay"))
+    fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
+    contest = contest_of(fit_to, held, only(*FEW, "brake_drag", "torque_delay"))
     assert ("torque_lag", "mass_offset") in promising_pairs(contest)
 
 
@@ -320,13 +324,13 @@ def made_up(loss_fit, loss_hold, size, count=1000):
 
 def fit_of(ids):
     drive = noisy(clean(pulses(1.5), 12.0))
-    return fit(Candidate(MODEL, ids), evidence(MODEL, [drive]), steps=1)
+    return fit(Candidate(MODEL, ids), gather(MODEL, [drive]), steps=1)
 
 
 @pytest.fixture(scope="module")
 def tiny():
     """Evidence of one drive of 143 rows, 1001 values."""
-    return evidence(MODEL, [noisy(clean(pulses(142 * STEP_S), 12.0))])
+    return gather(MODEL, [noisy(clean(pulses(142 * STEP_S), 12.0))])
 
 
 def test_probabilities_follow_loss_and_pay_for_parameters(tiny):

@@ -9,9 +9,9 @@ from gap_drives import MODEL, SIGMA, clean, noisy, pulses, rms, road_of, trace
 from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.mass_offset import MassOffset
 from sim2real import gap, where
-from sim2real.diagnose import evidence
 from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
-from sim2real.fitting import Candidate, Evidence, fit, residuals
+from sim2real.evidence import Evidence, gather, residuals
+from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
 from sim2real.where import REGIMES, Blocks, blocks, equation_shares, heat_map, places, regimes
 
@@ -61,7 +61,7 @@ def test_logs_are_measured_as_one(tame):
 
 
 def test_the_true_model_leaves_the_noise_floor(tame):
-    held = evidence(MODEL, [tame])
+    held = gather(MODEL, [tame])
     left = gap.measure(held, held.residuals(MODEL)).total
     floor = gap.noise_floor(MODEL, held, 0)
     assert left == pytest.approx(1.0, abs=0.1)
@@ -70,7 +70,7 @@ def test_the_true_model_leaves_the_noise_floor(tame):
 
 
 def test_the_noise_floor_is_the_seeds(tame):
-    held = evidence(MODEL, [tame])
+    held = gather(MODEL, [tame])
     assert gap.noise_floor(MODEL, held, 4) == gap.noise_floor(MODEL, held, 4)
     assert gap.noise_floor(MODEL, held, 4) != gap.noise_floor(MODEL, held, 5)
 

@@ -10,7 +10,7 @@ import pytest
 
 from sim2real.lattice import Lattice
 from sim2real.merge import Side, camera_side, counter_side, merge
-from sim2real.perception import CameraCandidate, PerceptionFinding
+from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.report import jsonable
 from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict
 

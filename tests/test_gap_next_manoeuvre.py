@@ -7,10 +7,11 @@ import pytest
 from gap_drives import BARE, DRY, MODEL, STEP_S, clean, noisy, road_of, trace
 
 from scenarios.effects import EFFECTS
-from sim2real.contest import Contest, hold_contest
-from sim2real.diagnose import evidence, find
+from sim2real.contest import Contest, first_round, hold_contest
+from sim2real.diagnose import find
 from sim2real.drive import Drive
-from sim2real.fitting import Evidence, fit
+from sim2real.evidence import Evidence, gather
+from sim2real.fitting import fit
 from sim2real.next_manoeuvre import PROFILES, SEPARATE_SIGMA, propose, torque_of
 from sim2real.result import NextManoeuvre, Verdict
 from sim2real.selection import decide
@@ -57,8 +58,8 @@ def proposed(request) -> Proposed:
     case = request.param
     torque = trace(*case.points, duration_s=10.0)
     logs = [noisy(clean(f * torque, 12.0, effects=case.truth), seed) for seed, f in enumerate((1.0, 0.8))]
-    fit_to, held = evidence(MODEL, logs[:1]), evidence(MODEL, logs[1:])
-    contest = hold_contest(MODEL, fit_to, held, case.exclude)
+    fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
+    contest = hold_contest(MODEL, fit_to, held, first_round(MODEL, fit_to, case.exclude))
     assert decide(contest, fit_to, held).verdict is Verdict.AMBIGUOUS
     entries = {e.ids[0]: e for e in contest.singles}
     profile = propose(MODEL, entries[case.effect], entries[case.rival], DRY, held.noises[0], 1.0)
@@ -76,7 +77,7 @@ def drive_it(profile: NextManoeuvre, effects, seed=5) -> Drive:
 def distance(proposed: Proposed, drive: Drive) -> float:
     """By how many standard deviations the truth fits a drive better than the rival, both at their best."""
     entries = {e.ids[0]: e for e in proposed.contest.singles}
-    held = evidence(MODEL.with_effects(*entries[proposed.case.effect].fit.candidate.effects(
+    held = gather(MODEL.with_effects(*entries[proposed.case.effect].fit.candidate.effects(
         entries[proposed.case.effect].fit.x)), [drive])  # fmt: skip
     true, rival = (
         fit(entries[key].fit.candidate, held, entries[key].fit.x)

@@ -30,7 +30,7 @@ from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.files import VehicleFile
 from scenarios.plant import simulate
 from sim2real.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL
-from sim2real.fitting import residuals
+from sim2real.evidence import residuals
 from sim2real.lattice import SmoothCounter
 from sim2real.observer import MEMORY_S, Push, Simulation
 

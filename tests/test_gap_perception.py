@@ -10,7 +10,7 @@ from scenarios.effects import make_effect
 from scenarios.files import VehicleFile
 from scenarios.perception import perceive
 from scenarios.plant import make_log, simulate
-from sim2real.perception import diagnose_perception
+from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Verdict
 
 SLOW_AND_FAST = (10.0, 10.0, 10.0, 10.0, 25.0, 25.0)

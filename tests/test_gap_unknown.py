@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of
 
-from sim2real.diagnose import evidence
 from sim2real.drive import ACCEL, SPEED
+from sim2real.evidence import gather
 from sim2real.unknown import (
     EQUATIONS,
     PER_DRIVE,
@@ -22,7 +22,7 @@ EQUATION = {equation.key: equation for equation in EQUATIONS}
 
 
 def terms_of(*drives):
-    held = evidence(MODEL, drives)
+    held = gather(MODEL, drives)
     return fit_terms(MODEL, held.drives, held.noises, 2)
 
 
@@ -135,7 +135,7 @@ def test_a_curve_of_more_values_has_to_leave_less():
 
 
 def test_what_is_shared_leaves_the_curves_over_time_out():
-    held = evidence(MODEL, [noisy(clean(pulses(3.0), 14.0))])
+    held = gather(MODEL, [noisy(clean(pulses(3.0), 14.0))])
     found = fit_terms(MODEL, held.drives, held.noises, 1, shared=True)
     assert found
     assert not {t.quantity for t in found} & set(PER_DRIVE)

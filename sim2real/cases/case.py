@@ -12,9 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from scenarios.errors import ScenarioError
 from scenarios.files import WHEELS, VehicleFile, load_road, load_vehicle
-from sim2real.diagnose import evidence
 from sim2real.drive import Drive, grid_step, make_drive
-from sim2real.fitting import Evidence
+from sim2real.evidence import Evidence, gather
 from sim2real.gap import measure
 from sim2real.lattice import find_lattice
 from sim2real.logs import load_mapping, read_log, resample
@@ -130,7 +129,7 @@ def budget(found: list[Stage]) -> list[Measure]:
 
     A diagnosis reads the noise anew with the model that it ends with: its totals do not compare between steps.
     """
-    noise = evidence(found[-1].model, [found[-1].holdout]).noises
+    noise = gather(found[-1].model, [found[-1].holdout]).noises
     out = []
     for stage in found:
         held = Evidence((stage.holdout,), noise)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.perception_blocks import BLOCK_S, Blocks, make_blocks
-from sim2real.perception_chain import Account, Chain, price
-from sim2real.perception_confidence import (
+from sim2real.perception.blocks import BLOCK_S, Blocks, make_blocks
+from sim2real.perception.chain import Account, Chain, price
+from sim2real.perception.confidence import (
     NORMAL_CONFIDENCE,
     NORMAL_SPREAD,
     ConfidenceFit,
@@ -19,9 +19,9 @@ from sim2real.perception_confidence import (
     fit_confidence,
     read_model,
 )
-from sim2real.perception_conflicts import class_error
-from sim2real.perception_frames import Modelled, Results
-from sim2real.perception_pictures import NORMAL_LIGHT_EV, Light
+from sim2real.perception.conflicts import class_error
+from sim2real.perception.frames import Modelled, Results
+from sim2real.perception.pictures import NORMAL_LIGHT_EV, Light
 from sim2real.result import Place
 
 Array = NDArray[np.float64]

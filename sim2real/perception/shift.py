@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from sim2real.perception_chain import Account, Chain, price
-from sim2real.perception_crossings import Crossings, find_crossings
-from sim2real.perception_frames import Modelled, Results
+from sim2real.perception.chain import Account, Chain, price
+from sim2real.perception.crossings import Crossings, find_crossings
+from sim2real.perception.frames import Modelled, Results
 from sim2real.result import Interval, Place
 
 Array = NDArray[np.float64]

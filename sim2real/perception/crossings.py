@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenarios.effects.camera_pitch import seen_distance_m
 from scenarios.perception import surfaces_at
-from sim2real.perception_frames import Results
+from sim2real.perception.frames import Results
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import RoadSegment
-from sim2real.perception_crossings import rough_shift
-from sim2real.perception_frames import Results
+from sim2real.perception.crossings import rough_shift
+from sim2real.perception.frames import Results
 from trpac_core.vision.classes import Surface
 
 Array = NDArray[np.float64]

@@ -15,13 +15,13 @@ import numpy as np
 from scenarios.effects import Effect
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
-from sim2real.perception_chain import Account, Chain
-from sim2real.perception_confidence_chain import confidence_chain
-from sim2real.perception_conflicts import class_conflicts
-from sim2real.perception_frames import Modelled, read_results
-from sim2real.perception_friction import friction_chain
-from sim2real.perception_pictures import read_light
-from sim2real.perception_shift import shift_chain
+from sim2real.perception.chain import Account, Chain
+from sim2real.perception.confidence_chain import confidence_chain
+from sim2real.perception.conflicts import class_conflicts
+from sim2real.perception.frames import Modelled, read_results
+from sim2real.perception.friction import friction_chain
+from sim2real.perception.pictures import read_light
+from sim2real.perception.shift import shift_chain
 from sim2real.result import Interval, Measure, Place, Verdict
 from trpac_core.vision.camera import Camera
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.perception_frames import Results
+from sim2real.perception.frames import Results
 from trpac_core.vision.images import ImageError, decode_image
 
 Array = NDArray[np.float64]

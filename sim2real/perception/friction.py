@@ -21,8 +21,8 @@ from scenarios.effects.class_friction_offset import ClassFrictionOffset
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant.pipeline import make_setup
 from sim2real.logs import Log
-from sim2real.perception_chain import Account, Chain, price
-from sim2real.perception_frames import Modelled
+from sim2real.perception.chain import Account, Chain, price
+from sim2real.perception.frames import Modelled
 from sim2real.result import Interval, Place
 from trpac_core.tyre import peak_friction
 from trpac_core.vision.classes import CLASS_THETA, Surface

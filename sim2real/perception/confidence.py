@@ -16,8 +16,8 @@ from scipy.stats import t as student
 
 from scenarios.effects.exposure_shift import TOLERATED_STOPS
 from scenarios.effects.motion_blur import TOLERATED_SMEAR_M
-from sim2real.perception_blocks import Blocks
-from sim2real.perception_pictures import Light
+from sim2real.perception.blocks import Blocks
+from sim2real.perception.pictures import Light
 from sim2real.result import Interval
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenarios.effects.exposure_shift import TOLERATED_STOPS
 from scenarios.effects.motion_blur import TOLERATED_SMEAR_M
-from sim2real.perception_frames import Results
+from sim2real.perception.frames import Results
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,76 @@
+"""What a model is held against: drives with the noise of their channels, and what the model leaves of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.doubt import doubt
+from sim2real.drive import Drive
+from sim2real.noise import Noise, read_noise
+from sim2real.observer import Simulation
+
+Array = NDArray[np.float64]
+
+SETTLING_S = 0.3
+"""At the start of a drive the observer's state is no better than single samples: not counted [s]."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Drives with the noise of their channels: what a model is held against."""
+
+    drives: tuple[Drive, ...]
+    noises: tuple[Noise, ...]
+
+    def residuals(self, model: Simulation) -> tuple[Array, ...]:
+        """Measured minus predicted per drive, shape (n, 7) each; NaN where nothing counts."""
+        return tuple(residuals(model, drive) for drive in self.drives)
+
+    def whitened(self, found: Sequence[Array]) -> Array:
+        """All residuals in standard deviations behind each other, 0 where nothing counts."""
+        parts = [n.whitened(r).ravel() for n, r in zip(self.noises, found, strict=True)]
+        return np.nan_to_num(np.concatenate(parts))
+
+    def sharpened(self, model: Simulation) -> Evidence:
+        """The same drives with their noise as a better model leaves it; a channel that it fits worse keeps its own.
+
+        Before anything is known a gap passes for noise in part, and then hides in it what a wrong effect leaves.
+        """
+        noises = [n.sharper(m) for n, m in zip(self.noises, gather(model, self.drives).noises, strict=True)]
+        return replace(self, noises=tuple(noises))
+
+    def longest(self) -> Evidence:
+        """The longest drive alone."""
+        i = int(np.argmax([len(d) for d in self.drives]))
+        return Evidence((self.drives[i],), (self.noises[i],))
+
+    @cached_property
+    def parts(self) -> tuple[slice, ...]:
+        """Where each drive's residuals stand in `whitened`."""
+        ends = np.cumsum([0, *(d.measured.size for d in self.drives)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+
+def residuals(model: Simulation, drive: Drive) -> Array:
+    """Measured minus predicted, shape (n, 7); NaN where a sample is lost or does not count."""
+    return rest_of(drive, model.predict(drive).channels)
+
+
+def rest_of(drive: Drive, channels: Array) -> Array:
+    """Measured minus given channels, shape (n, 7); NaN where a sample is lost or does not count."""
+    rest = drive.measured - channels
+    rest[~drive.moving] = np.nan
+    rest[:, ~drive.counted] = np.nan
+    rest[drive.time_s < drive.time_s[0] + SETTLING_S] = np.nan
+    return rest
+
+
+def gather(model: Simulation, drives: Sequence[Drive]) -> Evidence:
+    """Drives with their noise, read from what a model leaves of them."""
+    return Evidence(tuple(drives), tuple(read_noise(d, residuals(model, d), doubt(model, d)) for d in drives))

@@ -1,0 +1,56 @@
+"""A sensor that stands alone: without its signal the model foretells all the others.
+
+The observer follows the log once more without one channel. Where what it leaves of the other channels is noise, while
+with that channel it was not, the fault lies in its sensor, whatever its shape; Frank's bank of dedicated observers.
+
+References
+----------
+.. [1] Frank (1990), Automatica 26, 459-474, doi:10.1016/0005-1098(90)90018-D.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.contest import Entry
+from sim2real.drive import SPEED, WHEEL
+from sim2real.evidence import SETTLING_S, Evidence
+from sim2real.observer import Simulation
+from sim2real.selection import fitness
+from sim2real.unknown import EQUATIONS, Equation
+
+Array = NDArray[np.float64]
+
+CLEARED = 1.4
+"""Up to this misfit what is left of the other channels is noise [-]."""
+
+
+def lone_sensor(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Equation | None:
+    """The equation of the one sensor that everything else speaks against; None where there is none."""
+    candidates = [e for e in EQUATIONS if e.channel is not None]
+    left = [_misfit_without(e.channel, model, fit_to, holdout) for e in candidates if e.channel is not None]
+    best = int(np.argmin(left))
+    return candidates[best] if left[best] <= CLEARED else None
+
+
+def _misfit_without(channel: int, model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:
+    z_fit, z_hold = (_z_without(channel, model, e) for e in (fit_to, holdout))
+    return fitness(Entry((), None, z_fit, z_hold), fit_to, holdout).misfit
+
+
+def _z_without(channel: int, model: Simulation, evidence: Evidence) -> Array:
+    drives = []
+    for drive in evidence.drives:
+        measured, counted = drive.measured.copy(), drive.counted.copy()
+        # The observer needs a state to start from; these first rows do not count.
+        begun = drive.time_s < drive.time_s[0] + SETTLING_S
+        if channel == SPEED:
+            measured[begun, SPEED] = model.vehicle.wheel_radius_m * measured[begun, WHEEL].mean(axis=1)
+        measured[~begun, channel] = np.nan
+        counted[channel] = False
+        drives.append(replace(drive, measured=measured, counted=counted))
+    without = replace(evidence, drives=tuple(drives))
+    return without.whitened(without.residuals(model))
