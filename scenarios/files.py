@@ -15,7 +15,7 @@ import yaml
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from scenarios.effects import EFFECTS, Effect, make_effect, problems_of, suggestion
+from scenarios.effects import EFFECTS, FORMS, Effect, make_effect, problems_of, suggestion
 from scenarios.errors import ScenarioError
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
@@ -56,11 +56,14 @@ class VehicleFile(_FileModel):
     motor_peak_torque_nm: Positive
     tyre: TyreSection
     effects: dict[str, dict[str, float]] = Field(default_factory=dict)
+    forms: dict[str, str] = Field(default_factory=dict)
+    """Which form of an effect is meant, where there are several; else the plant's own."""
 
     @model_validator(mode="after")
     def _check(self) -> VehicleFile:
         core = self.to_core()
         problems = [text for key, values in self.effects.items() for text in problems_of(key, values, core)]
+        problems += [text for key, form in self.forms.items() for text in self._problems_of_form(key, form)]
         if self.cog_to_rear_axle_m >= self.wheelbase_m:
             problems.append(
                 f"cog_to_rear_axle_m is {self.cog_to_rear_axle_m:g}; expected less than wheelbase_m "
@@ -82,13 +85,31 @@ class VehicleFile(_FileModel):
             wheel_inertia_kg_m2=self.wheel_inertia_kg_m2,
             motor_peak_torque_nm=self.motor_peak_torque_nm,
             longitudinal_stiffness_n=self.tyre.longitudinal_stiffness_n,
-            rolling_resistance=self.effects.get("rolling_resistance", {}).get("coefficient", 0.0),
+            rolling_resistance=self._rolling_moment(),
         )
+
+    def _rolling_moment(self) -> float:
+        """The rolling resistance that acts in a wheel's own balance of torque [-]."""
+        key = "rolling_resistance"
+        at_the_wheels = self.forms.get(key, "") in ("", EFFECTS[key].form)
+        return self.effects.get(key, {}).get("coefficient", 0.0) if at_the_wheels else 0.0
+
+    def _problems_of_form(self, effect_id: str, form: str) -> list[str]:
+        if effect_id not in self.effects:
+            return [
+                f"forms names {effect_id!r}, which effects does not switch on; remove it there or add it here."
+            ]
+        known = [kind.form for kind in FORMS.get(effect_id, ())]
+        if form in known:
+            return []
+        return [f"forms.{effect_id} is {form!r}; expected one of {', '.join(map(repr, known))}."]
 
     def make_effects(self) -> tuple[Effect, ...]:
         """The effects that the file switches on, in the order in which they act."""
         core, order = self.to_core(), list(EFFECTS)
-        made = [make_effect(key, values, core) for key, values in self.effects.items()]
+        made = [
+            make_effect(key, values, core, self.forms.get(key, "")) for key, values in self.effects.items()
+        ]
         return tuple(sorted(made, key=lambda effect: order.index(effect.id)))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.effects import EFFECTS, FORMS, Effect
+from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
@@ -24,7 +24,7 @@ from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
 from sim2real.pairs import add_pairs, add_partners
 from sim2real.perception.diagnose import diagnose_perception
-from sim2real.result import Cause, Diagnosis, Measure, TrpacError, Verdict
+from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, fitness, is_noise, needs_pairs
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.trpac_error import trpac_error
@@ -146,7 +146,7 @@ def find(
         best = first[0].candidate.model(first[0].x)
         fit_to, held = fit_to.sharpened(best), held.sharpened(best)
     contest = hold_contest(base, fit_to, held, first, jobs, progress)
-    if not is_noise(contest, fitness(contest.null, fit_to, held)):
+    if contest.singles and not is_noise(contest, fitness(contest.null, fit_to, held)):
         contest = add_partners(contest, fit_to, jobs, progress)
         if needs_pairs(contest, fit_to, held):
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)
@@ -185,11 +185,6 @@ def _file(path: Path) -> dict[str, str]:
     return {"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
 
 
-def _kind(cause: Cause) -> type[Effect]:
-    """The effect's class, in the form that the cause has."""
-    return next(kind for kind in FORMS[cause.effect] if kind.form == cause.form)
-
-
 def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
     """By how much what a diagnosis found shrinks the gap of a log that it has never seen [%].
 
@@ -203,7 +198,7 @@ def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
     model = Simulation(load_vehicle(diagnosis.provenance["vehicle"]["path"]))
     named = diagnosis.causes[: 2 if diagnosis.verdict is Verdict.COMPOUND else 1]
     effects = [
-        _kind(c)(**{name: v.value for name, v in c.parameters.items()})
+        form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()})
         for c in named
         if EFFECTS[c.effect].stage != "perception"
     ]

@@ -245,7 +245,7 @@ def _sentence(decision: Decision, gap: Gap, causes: Sequence[Cause], term: str) 
     if decision.verdict is Verdict.COMPOUND:
         return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
     if decision.verdict is Verdict.AMBIGUOUS:
-        others = ", ".join(e.ids[0] for e in decision.rivals)
+        others = ", ".join(" with ".join(e.ids) for e in decision.rivals)
         return f"The gap of {size} is {top.effect} or as well {others}: these logs cannot tell them apart."
     values = ", ".join(f"{name} {_number(v)}" for name, v in top.parameters.items())
     return f"The gap of {size} is {top.effect} ({values}): {cut}."

@@ -123,6 +123,7 @@ def propose(
         power = min(
             separation(model, truth, rival, road, noise, profile, time_s, torque)
             for truth, rival in ((a, b), (b, a))
+            if not set(truth.ids) < set(rival.ids)  # a pair holds its members: it never differs from them
         )
         if best is None or power > best[0]:
             best = (power, profile, time_s, torque)
@@ -183,7 +184,8 @@ def imagined(
     """The drive as a car with the entry's effects would do it, without noise."""
     found = entry.fitted
     effects: list[Effect] = list(model.with_effects(*found.candidate.effects(found.x)).effects)
-    car = model.vehicle.model_copy(update={"effects": {e.id: asdict(e) for e in effects}})
+    forms = {e.id: e.form for e in effects if e.form}
+    car = model.vehicle.model_copy(update={"effects": {e.id: asdict(e) for e in effects}, "forms": forms})
     run = simulate(car, road, torque, STEP_S, profile.initial_speed_m_s, 0.0)
     columns = dict(
         zip(

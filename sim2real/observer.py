@@ -90,7 +90,7 @@ class Simulation:
         chosen = {effect.id: _foretold(effect) for effect in (*vehicle.make_effects(), *effects)}
         self.vehicle = vehicle
         self.effects = tuple(chosen[key] for key in EFFECTS if key in chosen)
-        self._bare = vehicle.model_copy(update={"effects": {}})
+        self._bare = vehicle.model_copy(update={"effects": {}, "forms": {}})
 
     def has(self, effect_id: str) -> bool:
         """Whether the model has an effect already."""

@@ -162,6 +162,8 @@ def vehicle_snippet(causes: tuple[Cause, ...]) -> str | None:
     for cause in causes:
         values = ", ".join(f"{name}: {interval.value:.4g}" for name, interval in cause.parameters.items())
         lines.append(f"  {cause.effect}: {{{values}}}")
+    forms = [f"  {cause.effect}: {cause.form}" for cause in causes if cause.form]
+    lines += ["forms:", *forms] if forms else []
     return "\n".join(lines)
 
 

@@ -131,9 +131,7 @@ def allowed(before: Fitness) -> float:
 
 def is_noise(contest: Contest, before: Fitness) -> bool:
     """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
-    if not contest.singles:
-        return True
-    gain = 1.0 - contest.singles[0].loss / contest.null.loss
+    gain = 1.0 - min((e.loss for e in contest.singles), default=contest.null.loss) / contest.null.loss
     return before.misfit <= NO_GAP_MISFIT and gain <= NO_GAP_GAIN
 
 
@@ -182,6 +180,8 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     share = dict(zip((e.ids[0] for e in singles), weight[1:], strict=True))
     if is_noise(contest, before):
         return Decision(Verdict.NO_GAP, contest.null, (), _scaled(share, NO_GAP_DOUBT), before, before)
+    if not singles:
+        return Decision(Verdict.UNKNOWN, contest.null, (), {}, before, before)
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
     if contest.pairs:

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.effects import make_effect
-from scenarios.files import load_vehicle
+from scenarios.files import VehicleFile, load_vehicle
 from sim2real import figures, report
 from sim2real.demo import VEHICLE
 from sim2real.rating import LEAST_SAMPLES, MOST_SAMPLES, rating
@@ -177,6 +177,14 @@ def test_the_snippet_is_what_vehicle_yaml_takes():
     assert list(snippet["effects"]) == ["tyre_relaxation", "aero_drag"]
     for effect, values in snippet["effects"].items():
         assert make_effect(effect, values, load_vehicle(VEHICLE)).id == effect
+
+
+def test_the_snippet_names_the_form_where_there_are_several():
+    cause = replace(DIAGNOSES["compound"].causes[0], form="the slip lags")
+    snippet = yaml.safe_load(vehicle_snippet((cause, DIAGNOSES["compound"].causes[1])))
+    assert snippet["forms"] == {"tyre_relaxation": "the slip lags"}
+    car = load_vehicle(VEHICLE).model_dump(by_alias=True) | snippet
+    assert type(VehicleFile.model_validate(car).make_effects()[1]).form == "the slip lags"
 
 
 class TestWriting:

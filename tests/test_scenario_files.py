@@ -224,3 +224,24 @@ def test_misspelt_nested_scenario_key_is_suggested(tmp_path):
     with pytest.raises(ScenarioError, match="did you mean 'wheel_speed_noise_rad_s'") as caught:
         load_scenario(path)
     assert "step_s: is 1.0" in str(caught.value)
+
+
+def test_the_file_says_which_form_of_an_effect_is_meant(tmp_path):
+    plain = load_vehicle(VEHICLE)
+    wanted = changed(VEHICLE, tmp_path, lambda d: d.update(forms={"rolling_resistance": "force on the body"}))
+    other = load_vehicle(wanted)
+    assert {e.id: e.form for e in plain.make_effects()}["rolling_resistance"] == "moment at the wheels"
+    assert {e.id: e.form for e in other.make_effects()}["rolling_resistance"] == "force on the body"
+    assert other.to_core().rolling_resistance == 0.0  # the wheels' own balance does not feel it
+
+
+@pytest.mark.parametrize(
+    ("forms", "words"),
+    [
+        ({"rolling_resistance": "moment"}, "expected one of 'moment at the wheels', 'force on the body'"),
+        ({"mu_split": ""}, "effects does not switch on"),
+    ],
+)
+def test_a_form_that_is_not_known_is_told(tmp_path, forms, words):
+    with pytest.raises(ScenarioError, match=words):
+        load_vehicle(changed(VEHICLE, tmp_path, lambda d: d.update(forms=forms)))

@@ -80,7 +80,7 @@ FORMS: dict[str, tuple[type[Effect], ...]] = {
 }
 """Every form of each effect, the plant's own first: what goes by one name in the field may act in more than one way."""
 
-__all__ = ["EFFECTS", "FORMS", "Effect", "Parameter", "make_effect", "problems_of"]
+__all__ = ["EFFECTS", "FORMS", "Effect", "Parameter", "form_of", "make_effect", "problems_of"]
 
 
 def suggestion(word: str, known: list[str]) -> str:
@@ -113,8 +113,13 @@ def problems_of(effect_id: str, values: Mapping[str, float], vehicle: Vehicle) -
     return problems
 
 
-def make_effect(effect_id: str, values: Mapping[str, float], vehicle: Vehicle) -> Effect:
-    """The effect with these parameter values on this vehicle.
+def form_of(effect_id: str, form: str) -> type[Effect]:
+    """The class of an effect in one of its forms; the plant's own for an empty one."""
+    return next(kind for kind in FORMS[effect_id] if form in ("", kind.form))
+
+
+def make_effect(effect_id: str, values: Mapping[str, float], vehicle: Vehicle, form: str = "") -> Effect:
+    """The effect with these parameter values on this vehicle, in a form of it; the plant's own for an empty one.
 
     Raises
     ------
@@ -124,4 +129,4 @@ def make_effect(effect_id: str, values: Mapping[str, float], vehicle: Vehicle) -
     problems = problems_of(effect_id, values, vehicle)
     if problems:
         raise ValueError(" ".join(problems))
-    return EFFECTS[effect_id](**values)
+    return form_of(effect_id, form)(**values)

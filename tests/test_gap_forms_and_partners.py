@@ -1,0 +1,219 @@
+"""Forms of an effect, noise read anew, partners of the best effect, a sensor that stands alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_drives import BARE, MODEL, SIGMA, STEP_S, clean, noisy, pulses, random_drives, remeasured, road_of
+
+from scenarios.effects import EFFECTS, FORMS
+from scenarios.effects.rolling_resistance import RollingResistanceForce
+from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip
+from scenarios.plant import dynamics
+from scenarios.plant.pipeline import make_setup
+from sim2real.contest import first_round, hold_contest
+from sim2real.diagnose import diagnose, find
+from sim2real.drive import ACCEL, SPEED, WHEEL
+from sim2real.evidence import Evidence, gather
+from sim2real.fitting import Candidate, fit
+from sim2real.noise import Noise
+from sim2real.pairs import add_pairs, add_partners
+from sim2real.result import Verdict
+from sim2real.selection import decide, fitness, is_noise, needs_pairs
+from sim2real.suspect import lone_sensor
+
+
+def only(*keys):
+    return set(EFFECTS) - set(keys)
+
+
+SLIPPERY = road_of(0.9, 0.35, 0.9, 0.35, 0.9, 0.35)
+
+
+def driven_by(effect, torque_nm, speed_m_s, seed=0):
+    """A drive of a car with an effect in a form of it, over ice where its wheels slide."""
+    setup = make_setup(BARE, SLIPPERY)
+    p = effect.dynamics(setup.parameters)
+    y = dynamics.initial_y(speed_m_s, 0.0, p)
+    states, accel, *_ = dynamics.run(y, torque_nm, STEP_S, p, setup.road)
+    measured = np.column_stack([states[:, :6], accel])
+    return noisy(remeasured(clean(torque_nm, speed_m_s, SLIPPERY), measured), seed)
+
+
+# --- forms
+
+
+@pytest.mark.parametrize("effect", [RollingResistanceForce(0.03), TyreRelaxationOfSlip(0.5)])
+def test_the_form_that_the_car_has_is_the_one_that_is_told(effect):
+    logs = [driven_by(effect, pulses(8.0) * 1.4, v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
+    found = find(MODEL, logs[:1], logs[1], exclude=only(effect.id, "mass_offset", "road_grade"))
+    assert found.decision.winner.ids == (effect.id,)
+    candidate, x = found.decision.winner.fit.candidate, found.decision.winner.fit.x
+    assert candidate.kinds == (type(effect),)
+    (name,) = (p.name for p in effect.parameters())
+    assert x[0] == pytest.approx(getattr(effect, name), rel=0.1)
+    assert type(found.added()[0]) is type(effect)
+
+
+def test_each_effect_enters_the_contest_once():
+    held = gather(MODEL, random_drives({}, count=1, seed=3, duration_s=5.0))
+    found = first_round(MODEL, held, only("rolling_resistance", "tyre_relaxation", "mass_offset"))
+    assert sorted(f.candidate.ids[0] for f in found) == [
+        "mass_offset",
+        "rolling_resistance",
+        "tyre_relaxation",
+    ]
+
+
+def test_forms_differ_in_name_and_share_id_and_parameters():
+    for key, kinds in FORMS.items():
+        assert {kind.id for kind in kinds} == {key}
+        assert len({kind.form for kind in kinds}) == len(kinds)
+        assert len(kinds) == 1 or all(kind.form for kind in kinds)
+        assert len({kind.parameters() for kind in kinds}) == 1
+
+
+# --- noise
+
+
+def test_the_smaller_reading_of_the_noise_counts_channel_by_channel():
+    first = Noise(np.array([1.0, 2.0]), np.array([0.1, 0.2]), np.array([[1.0, 1.0], [2.0, 2.0]]))
+    other = Noise(np.array([2.0, 1.0]), np.array([0.5, 0.6]), np.array([[1.0, 1.0], [3.0, 3.0]]))
+    both = first.sharper(other)
+    np.testing.assert_array_equal(both.sigma, [1.0, 1.0])
+    np.testing.assert_array_equal(both.correlation, [0.1, 0.6])
+    # a doubt of sqrt(8) sigma of the other, in units of what is kept
+    np.testing.assert_allclose(both.widening[1], [np.sqrt(1.0 + 8.0 * 4.0), 3.0])
+
+
+def test_a_gap_that_looked_like_noise_no_longer_does_once_its_cause_is_known():
+    """A driveline's ringing is as fast as noise."""
+    ringing = {
+        "driveline_compliance": {
+            "stiffness_nm_rad": 1500.0, "damping_nm_s_rad": 1.0, "motor_inertia_kg_m2": 0.6,
+        }
+    }  # fmt: skip
+    drive = noisy(clean(pulses(8.0) * 1.5, 12.0, effects=ringing))
+    blind = gather(MODEL, [drive])
+    knowing = MODEL.with_effects(EFFECTS["driveline_compliance"](1500.0, 1.0, 0.6))
+    seen = blind.sharpened(knowing)
+    assert blind.noises[0].sigma[WHEEL].max() > 1.3 * SIGMA[WHEEL].max()
+    np.testing.assert_allclose(seen.noises[0].sigma[WHEEL], SIGMA[WHEEL], rtol=0.15)
+    assert seen.drives == blind.drives
+
+
+# --- no gap
+
+
+def test_a_gap_that_the_blocks_average_out_is_none_the_less_one():
+    held = gather(MODEL, random_drives({"mass_offset": {"mass_kg": 150.0}}, count=1, seed=5, duration_s=6.0))
+    contest = hold_contest(MODEL, held, held, first_round(MODEL, held, only("mass_offset")))
+    quiet = fitness(contest.null, held, held)
+    assert not is_noise(contest, replace(quiet, misfit=1.0))
+
+
+def test_a_gap_without_a_library_is_unknown():
+    logs = random_drives({"mass_offset": {"mass_kg": 150.0}}, count=2, seed=5, duration_s=6.0)
+    assert diagnose(MODEL, logs[:1], logs[1], exclude=set(EFFECTS)).verdict is Verdict.UNKNOWN
+
+
+# --- partners
+
+
+@pytest.fixture(scope="module")
+def two_causes():
+    """Drag with a light wheel: the wheel's inertia alone is fitted far from where it belongs."""
+    effects = {"aero_drag": {"drag_area_m2": 1.6}, "wheel_inertia_offset": {"inertia_kg_m2": 0.9}}
+    logs = random_drives(effects, count=2, seed=6, duration_s=8.0)
+    fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
+    few = only(
+        "aero_drag", "wheel_inertia_offset", "friction_offset", "mass_offset", "torque_lag", "brake_drag"
+    )
+    contest = hold_contest(MODEL, fit_to, held, first_round(MODEL, fit_to, few))
+    return add_partners(contest, fit_to), fit_to, held
+
+
+def test_the_missing_effect_is_the_first_partner(two_causes):
+    contest, fit_to, held = two_causes
+    assert contest.singles[0].ids == ("aero_drag",)
+    assert contest.partners[0][1] == "wheel_inertia_offset"
+    assert [loss for loss, _ in contest.partners] == sorted(loss for loss, _ in contest.partners)
+    assert needs_pairs(contest, fit_to, held)
+
+
+def test_a_pair_leaves_no_more_than_its_members(two_causes):
+    contest, fit_to, held = two_causes
+    paired = add_pairs(contest, MODEL, fit_to, held)
+    single = {e.ids[0]: e.loss_fit for e in contest.singles}
+    for pair in paired.pairs:
+        assert pair.loss_fit <= 1.001 * min(single[key] for key in pair.ids)
+    assert decide(paired, fit_to, held).winner.ids == ("aero_drag", "wheel_inertia_offset")
+
+
+def test_one_effect_beside_which_much_is_left_is_ambiguous():
+    """Of two causes the small one is too small for a compound, but large enough that the great one is not all."""
+    effects = {"mass_offset": {"mass_kg": 200.0}, "torque_lag": {"time_constant_s": 0.0016}}
+    logs = random_drives(effects, count=2, seed=7, duration_s=8.0)
+    found = find(MODEL, logs[:1], logs[1], exclude=only("mass_offset", "torque_lag", "aero_drag"))
+    assert found.decision.verdict is Verdict.AMBIGUOUS
+    assert found.decision.winner.ids == ("mass_offset",)
+    assert [e.ids for e in found.decision.rivals] == [("torque_lag", "mass_offset")]
+    assert found.decision.probability["mass_offset"] < 0.85
+
+
+# --- a sensor that stands alone
+
+
+def spoiled(channel, how, seed=0):
+    drive = noisy(clean(pulses(10.0), 14.0), seed)
+    measured = drive.measured.copy()
+    measured[:, channel] = how(measured[:, channel])
+    return remeasured(drive, measured)
+
+
+@pytest.mark.parametrize(
+    ("channel", "how", "key"),
+    [
+        (SPEED, lambda v: np.repeat(v[::60], 60)[: len(v)], "speed sensor"),
+        (SPEED, lambda v: 1.03 * v, "speed sensor"),
+        (ACCEL, lambda a: a + 0.3 * np.abs(a), "accelerometer"),
+        (WHEEL.start + 2, lambda w: 1.02 * w, "wheel sensor rl"),
+    ],
+    ids=["held", "scaled", "one-sided", "one wheel"],
+)
+def test_the_faulty_sensor_is_the_one_without_which_all_else_agrees(channel, how, key):
+    held = gather(MODEL, [spoiled(channel, how)])
+    found = lone_sensor(MODEL, held, held)
+    assert found is not None
+    assert (found.key, found.channel) == (key, channel)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"mass_offset": {"mass_kg": 300.0}},
+        {"road_grade": {"grade": 0.03}},
+        {"tyre_stiffness_offset": {"stiffness_n": 25000.0}},
+        {"torque_lag": {"time_constant_s": 0.1}},
+    ],
+    ids=lambda effects: next(iter(effects)),
+)
+def test_where_the_car_itself_differs_no_sensor_stands_alone(effects):
+    held = gather(MODEL, random_drives(effects, count=2, seed=8, duration_s=8.0))
+    one, other = (Evidence(held.drives[i : i + 1], held.noises[i : i + 1]) for i in (0, 1))
+    assert lone_sensor(MODEL, one, other) is None
+
+
+def test_an_unknown_sensor_fault_is_told_in_words():
+    logs = [spoiled(ACCEL, lambda a: a + 0.3 * np.abs(a), seed) for seed in (0, 1)]
+    said = diagnose(MODEL, logs[:1], logs[1], exclude=only("mass_offset", "aero_drag"))
+    assert said.verdict is Verdict.UNKNOWN
+    assert said.unexplained.subsystem == "accelerometer"
+    assert "Without the accelerometer's signal all else agrees" in said.unexplained.sentence
+    assert {place.subsystem for place in said.where} == {"accelerometer"}
+
+
+def test_fits_take_the_best_of_several_starts():
+    held = gather(MODEL, random_drives({"mass_offset": {"mass_kg": 200.0}}, count=1, seed=9, duration_s=6.0))
+    found = fit(Candidate(MODEL, ("mass_offset",)), held, np.array([[-300.0], [190.0]]), 1)
+    assert found.x[0] == pytest.approx(200.0, rel=0.05)
