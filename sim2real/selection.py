@@ -45,7 +45,7 @@ RIVAL = 0.1
 """An entry with more than this share of the winner's probability is not told apart from it [-]."""
 SOFTNESS = 4.0
 """Tempering of the quasi-likelihood: evidence counts for less than noise alone would say [-]."""
-FORM = 1e-3
+FORM = 3e-4
 """Share of what the best entry explains that no entry is held to: the library's forms are not nature's [-]."""
 FLOOR_MISFIT = 1.5
 """Above this misfit an entry is worth a second effect's try [-]."""

@@ -241,6 +241,7 @@ def test_actuators_and_sensors_take_one_file_each(monkeypatch):
             return {**signals, "vehicle_speed_m_s": signals["vehicle_speed_m_s"] * 2.0}
 
     monkeypatch.setitem(effects_module.EFFECTS, "torque_gain", Gain)
+    monkeypatch.setitem(effects_module.FORMS, "torque_gain", (Gain,))
     torque = np.full((500, 4), 100.0)
     half = simulate(car_with(torque_gain={"factor": 0.5}), ROAD, torque, 1e-3)
     assert (half.speed_m_s == simulate(car_with(), ROAD, 0.5 * torque, 1e-3).speed_m_s).all()

@@ -10,7 +10,7 @@ from benchmarks.gap_development import SEVERITY, Levels
 from scenarios.effects import EFFECTS
 from scenarios.effects.mass_offset import MassOffset
 from scenarios.effects.torque_gain import TorqueGain
-from sim2real.contest import COUNTER, Contest, Entry, add_pairs, first_round, hold_contest, promising_pairs
+from sim2real.contest import COUNTER, Contest, Entry, first_round, hold_contest
 from sim2real.diagnose import find
 from sim2real.drive import ACCEL, SPEED
 from sim2real.evidence import SETTLING_S, Evidence, gather, residuals
@@ -24,9 +24,11 @@ from sim2real.fitting import (
     robust_weight,
 )
 from sim2real.gap import intervals
+from sim2real.pairs import add_pairs, add_partners, promising_pairs
 from sim2real.result import Verdict
 from sim2real.selection import (
     EXPLAINED_MISFIT,
+    EXPLAINED_MOST,
     EXPLAINED_SHARE,
     Fitness,
     decide,
@@ -301,7 +303,7 @@ def test_the_true_pair_is_promising_though_neither_of_it_is_enough():
     logs = random_drives(with_effect("mass_offset", "torque_lag", size=0.2), count=2, seed=3)
     fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
     contest = contest_of(fit_to, held, only(*FEW, "brake_drag", "torque_delay"))
-    assert ("torque_lag", "mass_offset") in promising_pairs(contest)
+    assert ("torque_lag", "mass_offset") in promising_pairs(add_partners(contest, fit_to))
 
 
 # --- probabilities and goodness
@@ -374,8 +376,9 @@ def test_a_small_rest_of_a_large_gap_counts_as_explained():
 
     assert explains(fit_as(EXPLAINED_MISFIT), fit_as(3.0))
     assert not explains(fit_as(1.01 * EXPLAINED_MISFIT), fit_as(3.0))
-    assert explains(fit_as(0.9 * EXPLAINED_SHARE * 500.0), fit_as(500.0))
-    assert not explains(fit_as(1.1 * EXPLAINED_SHARE * 500.0), fit_as(500.0))
+    assert explains(fit_as(0.9 * EXPLAINED_SHARE * 20.0), fit_as(20.0))
+    assert not explains(fit_as(1.1 * EXPLAINED_SHARE * 20.0), fit_as(20.0))
+    assert not explains(fit_as(1.01 * EXPLAINED_MOST), fit_as(500.0))
 
 
 # --- verdicts
@@ -400,7 +403,7 @@ def test_coloured_noise_is_no_gap(memory_s):
 
 def test_one_effect_is_identified(heavy_contest):
     contest, fit_to, held, _ = heavy_contest
-    assert not needs_pairs(contest, fit_to, held)
+    assert not needs_pairs(add_partners(contest, fit_to), fit_to, held)
     decision = decide(contest, fit_to, held)
     assert decision.verdict is Verdict.IDENTIFIED
     assert decision.winner.ids == ("mass_offset",)
@@ -470,7 +473,7 @@ def test_an_effect_that_is_not_in_the_library_is_unknown(effect, others):
 def test_a_pair_is_tried_with_other_partners(heavy_contest):
     """What the screening overlooked comes in when a partner is looked for anew."""
     contest, fit_to, held, _ = heavy_contest
-    pairs = add_pairs(contest, MODEL, fit_to, held).pairs
+    pairs = add_pairs(add_partners(contest, fit_to), MODEL, fit_to, held).pairs
     assert len({e.ids for e in pairs}) == len(pairs)
     assert [e.loss for e in pairs] == sorted(e.loss for e in pairs)
     assert all(e.loss_fit <= contest.singles[0].loss_fit * 1.02 for e in pairs if "mass_offset" in e.ids)

@@ -97,10 +97,11 @@ def test_the_proposed_profile_when_driven_tells_the_effects_apart(proposed):
 def test_with_the_proposed_drive_the_diagnosis_is_sure(proposed):
     logs = [*proposed.logs, drive_it(proposed.profile, proposed.case.truth)]
     decision = find(MODEL, logs[1:], logs[0], exclude=proposed.case.exclude).decision
+    assert decision.winner.ids == (proposed.case.effect,)
+    # A few sigmas between two forms that may both be a little off make nobody sure.
     if proposed.profile.power_sigma > 3.0 * SEPARATE_SIGMA:
         assert decision.verdict is Verdict.IDENTIFIED
-    assert decision.winner.ids == (proposed.case.effect,)
-    assert decision.probability[proposed.case.effect] > 0.8
+        assert decision.probability[proposed.case.effect] > 0.8
 
 
 def test_a_proposal_says_what_to_drive_and_what_for(proposed):
