@@ -124,8 +124,7 @@ def _told(
     said = describe(findings, seed=seed, jobs=jobs, progress=progress)
     if findings.lattice is None:
         return said
-    step_s = findings.holdout.drives[0].step_s
-    return merge(said, counter_side(findings.lattice, *counter_gap(findings), step_s, COUNTER in exclude))
+    return merge(said, counter_side(findings.lattice, *counter_gap(findings), COUNTER in exclude))
 
 
 def find(

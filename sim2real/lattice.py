@@ -31,7 +31,11 @@ HOLD_COHERENCE = 0.6
 """Least coherence of the times at which values change: a log of two rows per window shows 0.64 of it [-]."""
 CHANGES_S = 4.0
 """Time over which changes are looked at: over a longer one the window would have to be known too well [s]."""
+FEWEST_CHANGES = 20
+"""Changes of one wheel that a window is read from."""
 LONGEST_WINDOW_S = 0.25
+UNSEEN = 0.1
+"""A window that the log is too slow for may be as short as this share of the log's step [-]."""
 MOST_SAMPLES = 1200
 SEARCH = 3000
 
@@ -68,11 +72,14 @@ class Lattice:
         Step of the values [rad/s] and of their times [s].
     sigma_rad_s : float
         Noise beside the rounding [rad/s].
+    step_s : float
+        The log's own; a window of no more than it cannot be seen [s].
     """
 
     quantum_rad_s: float
     window_s: float
     sigma_rad_s: float
+    step_s: float
 
     @property
     def teeth(self) -> int:
@@ -84,9 +91,19 @@ class Lattice:
         return SmoothCounter(float(self.teeth), self.window_s)
 
     @property
-    def scatter_rad_s(self) -> float:
-        """Standard deviation of a difference of rounded counts [rad/s]."""
-        return self.quantum_rad_s / np.sqrt(6.0)
+    def window_range_s(self) -> tuple[float, float]:
+        """What the window may be [s]."""
+        least = (
+            UNSEEN * self.step_s if self.window_s <= 1.5 * self.step_s else self.window_s - 0.5 * self.step_s
+        )
+        return least, self.window_s + 0.5 * self.step_s
+
+    @property
+    def teeth_range(self) -> tuple[float, float]:
+        """What the teeth may be: their product with the window is what the values tell."""
+        short, long = self.window_range_s
+        turns = 2.0 * np.pi / self.quantum_rad_s
+        return turns / long - 0.5, turns / short + 0.5
 
 
 def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
@@ -114,7 +131,7 @@ def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
         return None
     rest = np.concatenate([v - quantum * np.round(v / quantum) for v in values])
     window = _window(time_s, wheels, quantum, step_s)
-    return Lattice(quantum, window, 1.4826 * float(np.median(np.abs(rest))))
+    return Lattice(quantum, window, 1.4826 * float(np.median(np.abs(rest))), step_s)
 
 
 def common_lattice(found: Sequence[Lattice | None]) -> Lattice | None:
@@ -147,21 +164,23 @@ def _best_quantum(values: Array, low: float, high: float) -> tuple[float, float]
 
 def _window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s: float) -> float:
     """The longest window at whose ends alone the values change; the log's step where they change at any row [s]."""
-    changes = np.concatenate(
-        [time_s[1:][np.abs(np.diff(np.round(w / quantum))) > 0.5] for w in wheels if np.isfinite(w).all()]
-        or [np.array([])]
-    )
-    if len(changes) < 20:
-        return step_s
+    changes = [
+        time_s[1:][np.abs(np.diff(np.round(w / quantum))) > 0.5] for w in wheels if np.isfinite(w).all()
+    ]
     # the counter's window need not be a multiple of the log's step, and the log sees its end a part of a step late
-    start = float(changes.min())
-    early = np.sort(changes[changes < start + CHANGES_S]) - start
+    early = [c[c < c[0] + CHANGES_S] - c[0] for c in changes if len(c)]
+    early = [c for c in early if len(c) >= FEWEST_CHANGES]
     low, high = 1.0 / LONGEST_WINDOW_S, 1.0 / (1.5 * step_s)
-    if high <= low or len(early) < 20:
+    if high <= low or not early:
         return step_s
+
+    def coherence(rates: Array) -> Array:
+        """Each wheel's windows may begin at times of their own."""
+        return np.asarray(np.mean([_coherence(c, 1.0 / rates) for c in early], axis=0))
+
     rates = np.linspace(low, high, max(int(4.0 * CHANGES_S * (high - low)), 2))
-    good = np.flatnonzero(_coherence(early, 1.0 / rates) > HOLD_COHERENCE)
+    good = np.flatnonzero(coherence(rates) > HOLD_COHERENCE)
     if not len(good):
         return step_s
     near = rates[good[0]] + np.linspace(0.0, 1.0 / CHANGES_S, 41)
-    return float(1.0 / near[int(_coherence(early, 1.0 / near).argmax())])
+    return float(1.0 / near[int(coherence(near).argmax())])

@@ -16,8 +16,6 @@ from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Une
 
 CERTAIN = 0.97
 """Probability of what a mark that nothing else leaves has shown [-]."""
-LATTICE_TEETH = 0.03
-"""Half width of the interval of the teeth, as a share: the window is known to a part of the log's step [-]."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,7 @@ def _own(effect: str, candidate: CameraCandidate) -> dict[str, Interval]:
     return {name: value for name, value in candidate.parameters.items() if name in names}
 
 
-def counter_side(lattice: Lattice, before: Measure, after: Measure, step_s: float, excluded: bool) -> Side:
+def counter_side(lattice: Lattice, before: Measure, after: Measure, excluded: bool) -> Side:
     """The verdict on wheel speeds that lie on a lattice.
 
     Parameters
@@ -129,8 +127,6 @@ def counter_side(lattice: Lattice, before: Measure, after: Measure, step_s: floa
         What was found.
     before, after : Measure
         The hold-out's gap against the noise beside the rounding, and against noise and rounding.
-    step_s : float
-        Of the log [s].
     excluded : bool
         Whether the effect was left out of the library.
     """
@@ -158,15 +154,8 @@ def counter_side(lattice: Lattice, before: Measure, after: Measure, step_s: floa
         effect="wheel_speed_quantisation",
         probability=CERTAIN,
         parameters={
-            "teeth": Interval(
-                teeth, teeth * (1.0 - LATTICE_TEETH) - 0.5, teeth * (1.0 + LATTICE_TEETH) + 0.5, "-"
-            ),
-            "window_s": Interval(
-                lattice.window_s,
-                max(lattice.window_s - 0.5 * step_s, 0.0),
-                lattice.window_s + 0.5 * step_s,
-                "s",
-            ),
+            "teeth": Interval(teeth, *lattice.teeth_range, "-"),
+            "window_s": Interval(lattice.window_s, *lattice.window_range_s, "s"),
         },
         gap_after=after.total,
         shrink_percent=_percent(before.total, after.total),

@@ -100,6 +100,14 @@ def test_lost_samples_do_not_hide_it():
     assert found.quantum_rad_s == pytest.approx(TURN / (48 * 0.04), rel=1e-3)
 
 
+def test_wheels_whose_windows_begin_at_times_of_their_own_share_one_window():
+    time_s, speed = driving()
+    wheels = [count(time_s, speed, 48, 0.04, 0.3 * i, begin_s=0.011 * i) for i in range(4)]
+    found = find_lattice(time_s, wheels)
+    assert found is not None
+    assert found.window_s == pytest.approx(0.04, abs=0.5 / RATE_HZ)
+
+
 # --- not found
 
 
@@ -159,22 +167,18 @@ def test_coloured_noise_has_no_lattice(seed, correlation):
 
 
 def test_a_sensor_is_there_if_most_logs_show_it():
-    found = [Lattice(3.27, 0.04, 0.05), None, Lattice(3.28, 0.041, 0.05), Lattice(3.26, 0.04, 0.06)]
+    found = [
+        Lattice(3.27, 0.04, 0.05, 0.01),
+        None,
+        Lattice(3.28, 0.041, 0.05, 0.01),
+        Lattice(3.26, 0.04, 0.06, 0.01),
+    ]
     shared = common_lattice(found)
     assert shared is not None
     assert (shared.quantum_rad_s, shared.window_s) == (3.27, 0.04)
     assert common_lattice([*found[:2]]) is None
     assert common_lattice([None, None, None]) is None
     assert common_lattice([]) is None
-
-
-def test_the_scatter_is_that_of_a_difference_of_counts():
-    """Of a rounded difference of two angles, each of any phase."""
-    rng = np.random.default_rng(0)
-    angle = rng.uniform(0.0, 1000.0, 200_000)
-    turned = rng.uniform(20.0, 40.0, 200_000)
-    error = np.floor(angle + turned) - np.floor(angle) - turned
-    assert Lattice(2.0, 0.04, 0.0).scatter_rad_s == pytest.approx(2.0 * error.std(), rel=0.01)
 
 
 def test_the_smooth_counter_is_the_counter_on_average():
@@ -201,7 +205,7 @@ def test_a_counter_without_a_window_is_an_ideal_sensor():
 
 
 def test_the_effect_of_a_lattice_is_its_counter():
-    assert Lattice(TURN / (48 * 0.04), 0.04, 0.0).effect() == SmoothCounter(48.0, 0.04)
+    assert Lattice(TURN / (48 * 0.04), 0.04, 0.0, 0.002).effect() == SmoothCounter(48.0, 0.04)
 
 
 def test_the_own_counter_of_this_file_is_the_plants():

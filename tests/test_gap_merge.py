@@ -185,13 +185,13 @@ def test_what_both_saw_is_as_probable_as_what_either_saw():
 
 # --- the counter's side
 
-LATTICE = Lattice(TURN / (48 * 0.04), 0.04, 0.05)
+LATTICE = Lattice(TURN / (48 * 0.04), 0.04, 0.05, 0.008)
 BEFORE = Measure(10.0, {"wheel_speed": 17.0, "vehicle_speed": 1.0, "accel_x": 1.0})
 AFTER = Measure(1.0, {"wheel_speed": 1.1, "vehicle_speed": 1.0, "accel_x": 1.0})
 
 
 def test_a_counter_is_identified_with_its_teeth_and_window():
-    side = counter_side(LATTICE, BEFORE, AFTER, 0.008, excluded=False)
+    side = counter_side(LATTICE, BEFORE, AFTER, excluded=False)
     assert side.verdict is Verdict.IDENTIFIED
     assert side.named == ("wheel_speed_quantisation",)
     (cause,) = side.causes
@@ -205,8 +205,16 @@ def test_a_counter_is_identified_with_its_teeth_and_window():
     assert side.after == {"wheel_speed": 1.1}
 
 
+def test_a_window_that_the_log_is_too_slow_for_may_be_shorter():
+    slow = Lattice(TURN / (100 * 0.01), 0.01, 0.05, 0.01)
+    (cause,) = counter_side(slow, BEFORE, AFTER, excluded=False).causes
+    teeth, window = cause.parameters["teeth"], cause.parameters["window_s"]
+    assert window.low < 0.005 < window.high
+    assert teeth.low < 100.0 < 200.0 < teeth.high  # 200 teeth over 5 ms leave the same values
+
+
 def test_a_counter_that_was_left_out_of_the_library_is_unknown():
-    side = counter_side(LATTICE, BEFORE, AFTER, 0.008, excluded=True)
+    side = counter_side(LATTICE, BEFORE, AFTER, excluded=True)
     assert side.verdict is Verdict.UNKNOWN
     assert side.causes == ()
     assert side.unexplained is not None
@@ -219,13 +227,13 @@ def test_a_counter_that_was_left_out_of_the_library_is_unknown():
 
 
 def test_a_counter_beside_another_effect_is_a_compound():
-    found = merge(main_of(Verdict.IDENTIFIED), counter_side(LATTICE, BEFORE, AFTER, 0.008, excluded=False))
+    found = merge(main_of(Verdict.IDENTIFIED), counter_side(LATTICE, BEFORE, AFTER, excluded=False))
     assert found.verdict is Verdict.COMPOUND
     assert {c.effect for c in found.causes[:2]} == {"tyre_relaxation", "wheel_speed_quantisation"}
 
 
 def test_a_counter_alone_is_by_the_contract():
-    found = merge(main_of(Verdict.NO_GAP), counter_side(LATTICE, BEFORE, AFTER, 0.008, excluded=False))
+    found = merge(main_of(Verdict.NO_GAP), counter_side(LATTICE, BEFORE, AFTER, excluded=False))
     written = json.dumps(jsonable(found.to_json()), allow_nan=False)
     (row,) = [c for c in json.loads(written)["causes"] if c["effect"] == "wheel_speed_quantisation"]
     assert row["probability"] > 0.9
