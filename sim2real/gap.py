@@ -95,7 +95,7 @@ def _block_squares(
 
 
 INTERVAL_FACTOR = 2.0
-"""Intervals are wider than the sandwich by this, since forms differ: 92 % of the opened cases' values lie within [-]."""
+"""Intervals are wider than the sandwich by this: forms differ, and so 92 % of the opened cases' values lie within."""
 LEAST_HALF_WIDTH = 0.01
 """No interval is narrower than this share of a noticeable change to either side: grids and integrators differ [-]."""
 
