@@ -1,6 +1,6 @@
-"""Development cases of the gap diagnosis: drives of the product's own plant with known effects.
+"""Drives of the product's own plant with known effects: what the tests of the diagnosis are held on, and a first look.
 
-The gates of `sim2real.selection` were set on these; the withheld cases of `benchmarks/blind` share no code with them.
+They flatter it, since plant and library share their forms: its gates were set on opened cases of `benchmarks/blind`.
 
 python -m benchmarks.gap_development --help
 """
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant import simulate
+from scenarios.plant.sensors import sense
 from sim2real.drive import CHANNELS, Drive, grid_step, make_drive
 from sim2real.lattice import find_lattice
 
@@ -136,8 +137,7 @@ def _drive(case: Case, car: VehicleFile, rng: np.random.Generator, name: str) ->
         },
         "accel_x_m_s2": run.accel_x_m_s2,
     }
-    for effect in car.make_effects():
-        columns = effect.sense(run.time_s, columns)
+    columns = sense(car, run.time_s, columns)
     every = round(1.0 / case.rate_hz / fine)
     time, commanded = run.time_s[::every], commanded[::every]
     levels = case.levels

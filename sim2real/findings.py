@@ -13,6 +13,7 @@ from sim2real import where
 from sim2real.contest import Contest, Entry, Progress
 from sim2real.drive import CHANNELS
 from sim2real.evidence import Evidence
+from sim2real.fitting import Fit, loss
 from sim2real.gap import intervals, measure, noise_floor, shrink
 from sim2real.lattice import Lattice
 from sim2real.next_manoeuvre import propose
@@ -87,7 +88,8 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         if unknown:
             unexplained = characterise(terms, suspect)
         subsystem = _subsystem(decision, terms)
-        places, heat = _where(found, held, before, terms, subsystem)
+        taken = loss(held.whitened(before)) - loss(held.whitened(after)) if found.added() else 0.0
+        places, heat = _where(found, held, before, terms, subsystem, taken)
     return Diagnosis(
         verdict=decision.verdict,
         sentence=_sentence(decision, gap, causes, unexplained.sentence if unexplained else ""),
@@ -148,6 +150,10 @@ def _cause(
         contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
+    for name in at_bound(best):
+        contra.append(
+            f"{name} lies at its bound: more of it is not thought plausible, so look for another cause."
+        )
     if shrunk.high <= 1.0:
         contra.append("Does not shrink the gap on the hold-out.")
     return Cause(
@@ -162,6 +168,20 @@ def _cause(
         excited=excited,
         form=best.candidate.kinds[0].form,
     )
+
+
+AT_BOUND = 1e-3
+"""An estimate this close to a bound, in shares of the range, lies at it [-]."""
+
+
+def at_bound(found: Fit) -> list[str]:
+    """Parameters whose estimate lies at a bound that is not the effect's absence."""
+    low, high = found.candidate.bounds
+    near = AT_BOUND * (high - low)
+    off = ((found.x - low < near) & (found.candidate.neutral > low + near)) | (
+        (high - found.x < near) & (found.candidate.neutral < high - near)
+    )
+    return [p.name for (_, p), is_off in zip(found.candidate.parameters, off, strict=True) if is_off]
 
 
 def _joint(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
@@ -189,10 +209,18 @@ def _subsystem(decision: Decision, terms: Sequence[Term]) -> str:
 
 
 def _where(
-    found: Findings, held: Evidence, before: Sequence[Array], terms: Sequence[Term], subsystem: str
+    found: Findings,
+    held: Evidence,
+    before: Sequence[Array],
+    terms: Sequence[Term],
+    subsystem: str,
+    taken: float,
 ) -> tuple[tuple[Place, ...], dict[str, dict[str, float]]]:
+    """Places and heat map; what the verdict adds is a term of its subsystem too, and takes `taken` off the loss."""
     null = sum(term.null_loss for term in terms[:1])
-    shares = where.equation_shares([(t.equation.subsystem, null - t.loss) for t in terms])
+    shares = where.equation_shares(
+        [(subsystem, taken), *((t.equation.subsystem, null - t.loss) for t in terms)]
+    )
     parts = [
         where.blocks(drive, noise, found.model.predict(drive), rest)
         for drive, noise, rest in zip(held.drives, held.noises, before, strict=True)
@@ -217,7 +245,7 @@ def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:
     if decision.verdict is not Verdict.AMBIGUOUS:
         return None
     a, b = decision.winner, decision.rivals[0]
-    now = float(np.sqrt(max(b.loss - a.loss, 0.0)))
+    now = float(np.sqrt(abs(b.loss - a.loss)))
     drive, noise = found.holdout.drives[0], found.holdout.noises[0]
     return propose(found.model, a, b, drive.road, noise, now, progress)
 

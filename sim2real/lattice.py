@@ -34,6 +34,12 @@ CHANGES_S = 4.0
 FEWEST_CHANGES = 20
 """Changes of one wheel that a window is read from."""
 LONGEST_WINDOW_S = 0.25
+DIGITS = 2e-4
+"""How closely the logarithm of a quantum has to be that of a round number for it to be one [-]."""
+FIVES = 5
+"""Greatest power of five in a round number."""
+MOST_TEETH = 20_000
+"""More pulses per revolution than any counter has."""
 UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
 MOST_SAMPLES = 1200
@@ -131,7 +137,14 @@ def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
         return None
     rest = np.concatenate([v - quantum * np.round(v / quantum) for v in values])
     window = _window(time_s, wheels, quantum, step_s)
-    return Lattice(quantum, window, 1.4826 * float(np.median(np.abs(rest))), step_s)
+    found = Lattice(quantum, window, 1.4826 * float(np.median(np.abs(rest))), step_s)
+    return None if is_digit(quantum) or found.teeth > MOST_TEETH else found
+
+
+def is_digit(quantum: float) -> bool:
+    """Whether a quantum is the last digit of a file or of a bus signal: a product of powers of two and five."""
+    turns = np.log2(quantum / 5.0 ** np.arange(-FIVES, FIVES + 1))
+    return bool((np.abs(turns - np.round(turns)) < DIGITS).any())
 
 
 def common_lattice(found: Sequence[Lattice | None]) -> Lattice | None:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
-from sim2real.lattice import Lattice, SmoothCounter, common_lattice, find_lattice
+from sim2real.lattice import Lattice, SmoothCounter, common_lattice, find_lattice, is_digit
 
 RATE_HZ = 500.0
 TURN = 2.0 * np.pi
@@ -217,3 +217,20 @@ def test_the_own_counter_of_this_file_is_the_plants():
     late = time_s > 0.2
     off = (theirs["wheel_speed_fl_rad_s"] - ours)[late] / quantum
     assert np.mean(np.abs(off) < 1e-6) > 0.95  # the others: a tooth that passes just at a window's end
+
+
+@pytest.mark.parametrize("digit", [0.1, 0.01, 0.05, 1.0 / 64.0, 1e-3])
+def test_the_last_digit_of_a_file_is_no_counter(digit):
+    rng = np.random.default_rng(4)
+    time_s, speed = driving()
+    wheels = [
+        np.round((speed + 0.3 * digit * rng.standard_normal(len(speed))) / digit) * digit for _ in range(4)
+    ]
+    assert find_lattice(time_s, wheels) is None
+
+
+def test_round_numbers_are_told_from_a_counters_quanta():
+    assert all(is_digit(q) for q in (0.1, 0.02, 0.05, 0.0025, 1.0, 1.0 / 64.0, 0.00625, 0.0015625))
+    assert not any(
+        is_digit(TURN / (teeth * w)) for teeth in (48, 96, 100, 1018, 4096) for w in (0.005, 0.01, 0.04)
+    )

@@ -4,13 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, SIGMA, clean, noisy, pulses, rms, road_of, trace
+from gap_drives import MODEL, SIGMA, clean, noisy, pulses, random_drives, rms, road_of, trace
 
+from scenarios.effects import EFFECTS
 from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.mass_offset import MassOffset
 from sim2real import gap, where
+from sim2real.diagnose import diagnose
 from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
 from sim2real.evidence import Evidence, gather, residuals
+from sim2real.findings import at_bound
 from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
 from sim2real.where import REGIMES, Blocks, blocks, equation_shares, heat_map, places, regimes
@@ -315,3 +318,20 @@ def test_the_equation_that_takes_most_has_the_greatest_share():
     assert found["road"] == 0.0
     assert equation_shares([("tyre", 0.0)]) == {}
     assert equation_shares([]) == {}
+
+
+def test_an_estimate_at_a_bound_is_told_unless_it_means_no_effect(tame):
+    found = fit(Candidate(MODEL, ("aero_drag",)), known(tame), np.array([0.1]), 1)
+    low, high = found.candidate.bounds
+    assert at_bound(replace(found, x=high)) == ["drag_area_m2"]
+    assert at_bound(replace(found, x=0.5 * (low + high))) == []
+    assert at_bound(replace(found, x=low)) == []  # no drag at all is the neutral value
+
+
+def test_the_part_of_the_car_that_the_cause_lies_in_has_the_most_of_the_heat_map():
+    """A lag of the torque is no function of torque or speed, so that no free term of the powertrain shows it."""
+    logs = random_drives({"torque_lag": {"time_constant_s": 0.08}}, count=2, seed=4, duration_s=6.0)
+    exclude = set(EFFECTS) - {"torque_lag", "mass_offset"}
+    said = diagnose(MODEL, logs[:1], logs[1], exclude=exclude)
+    shares = {part: sum(row.values()) for part, row in said.heat_map.items()}
+    assert max(shares, key=lambda part: shares[part]) == "powertrain"
