@@ -25,7 +25,7 @@ from sim2real.observer import Simulation
 from sim2real.pairs import add_pairs, add_partners
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
-from sim2real.selection import decide, fitness, is_noise, needs_pairs
+from sim2real.selection import decide, is_noise, needs_pairs
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.trpac_error import trpac_error
 
@@ -145,7 +145,7 @@ def find(
         best = first[0].candidate.model(first[0].x)
         fit_to, held = fit_to.sharpened(best), held.sharpened(best)
     contest = hold_contest(base, fit_to, held, first, jobs, progress)
-    if contest.singles and not is_noise(contest, fitness(contest.null, fit_to, held)):
+    if contest.singles and not is_noise(contest, fit_to, held):
         contest = add_partners(contest, fit_to, jobs, progress)
         if needs_pairs(contest, fit_to, held):
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)

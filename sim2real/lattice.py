@@ -36,7 +36,7 @@ FEWEST_CHANGES = 20
 LONGEST_WINDOW_S = 0.25
 DIGITS = 2e-4
 """How closely the logarithm of a quantum has to be that of a round number for it to be one [-]."""
-FIVES = 5
+FIVES = 4
 """Greatest power of five in a round number."""
 MOST_TEETH = 20_000
 """More pulses per revolution than any counter has."""

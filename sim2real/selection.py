@@ -21,7 +21,9 @@ LONG_BLOCK_S = 1.0
 """Blocks over which the residuals' sums are taken to see how correlated they are [s]."""
 NO_GAP_MISFIT = 1.4
 """Up to this misfit of the model as it is, what is left is noise [-]."""
-NO_GAP_GAIN = 0.01
+DRIFT = 0.25
+"""Sensors may drift over seconds by this share of their noise, and still there is no gap [-]."""
+NO_GAP_GAIN = 0.03
 """As long as no effect takes more than this share off the loss [-]."""
 NO_GAP_DOUBT = 0.03
 """Probability that something is left of the candidates where the misfit says there is no gap [-]."""
@@ -67,13 +69,14 @@ class Fitness:
     signals: dict[str, float]
 
 
-def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Fitness:
-    """Absolute goodness of fit of an entry on all logs."""
+def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence, drift: float = 0.0) -> Fitness:
+    """Absolute goodness of fit of an entry on all logs, with sensors that drift by a share of their noise."""
     squares: dict[str, list[Array]] = {name: [] for name in GROUPS}
     for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
         for part, drive in zip(evidence.parts, evidence.drives, strict=True):
             rows = z[part].reshape(-1, drive.measured.shape[1])
-            sums = _block_sums(rows, max(round(BLOCK_S / drive.step_s), 1))
+            length = max(round(BLOCK_S / drive.step_s), 1)
+            sums = _block_sums(rows, length) / np.sqrt(1.0 + drift**2 * length)
             for name, channels in GROUPS.items():
                 squares[name].append(sums[:, channels][np.abs(sums[:, channels]) > 0.0] ** 2)
     signals = {
@@ -129,10 +132,12 @@ def allowed(before: Fitness) -> float:
     return max(EXPLAINED_MISFIT, min(EXPLAINED_SHARE * before.misfit, EXPLAINED_MOST))
 
 
-def is_noise(contest: Contest, before: Fitness) -> bool:
+def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
     gain = 1.0 - min((e.loss for e in contest.singles), default=contest.null.loss) / contest.null.loss
-    return before.misfit <= NO_GAP_MISFIT and gain <= NO_GAP_GAIN
+    if gain > NO_GAP_GAIN:
+        return False
+    return fitness(contest.null, fit_to, holdout, DRIFT).misfit <= NO_GAP_MISFIT
 
 
 def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
@@ -178,7 +183,7 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     singles = list(contest.singles)
     weight = probabilities(contest, singles, fit_to, holdout)
     share = dict(zip((e.ids[0] for e in singles), weight[1:], strict=True))
-    if is_noise(contest, before):
+    if is_noise(contest, fit_to, holdout):
         return Decision(Verdict.NO_GAP, contest.null, (), _scaled(share, NO_GAP_DOUBT), before, before)
     if not singles:
         return Decision(Verdict.UNKNOWN, contest.null, (), {}, before, before)

@@ -1,7 +1,5 @@
 """Forms of an effect, noise read anew, partners of the best effect, a sensor that stands alone."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from gap_drives import BARE, MODEL, SIGMA, STEP_S, clean, noisy, pulses, random_drives, remeasured, road_of
@@ -19,7 +17,7 @@ from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
 from sim2real.pairs import add_pairs, add_partners
 from sim2real.result import Verdict
-from sim2real.selection import decide, fitness, is_noise, needs_pairs
+from sim2real.selection import decide, is_noise, needs_pairs
 from sim2real.suspect import lone_sensor
 
 
@@ -108,8 +106,22 @@ def test_a_gap_that_looked_like_noise_no_longer_does_once_its_cause_is_known():
 def test_a_gap_that_the_blocks_average_out_is_none_the_less_one():
     held = gather(MODEL, random_drives({"mass_offset": {"mass_kg": 150.0}}, count=1, seed=5, duration_s=6.0))
     contest = hold_contest(MODEL, held, held, first_round(MODEL, held, only("mass_offset")))
-    quiet = fitness(contest.null, held, held)
-    assert not is_noise(contest, replace(quiet, misfit=1.0))
+    assert not is_noise(contest, held, held)
+
+
+def test_sensors_that_drift_are_no_gap():
+    """A quarter of the noise, over seconds: more than white noise averages to, less than anyone would call a gap."""
+    rng = np.random.default_rng(2)
+    logs = []
+    for drive in random_drives({}, count=2, seed=11, duration_s=12.0):
+        knots = 0.25 * SIGMA * rng.standard_normal((5, 7))
+        at = np.linspace(drive.time_s[0], drive.time_s[-1], 5)
+        slow = np.column_stack([np.interp(drive.time_s, at, k) for k in knots.T])
+        logs.append(remeasured(drive, drive.measured + slow))
+    assert (
+        find(MODEL, logs[:1], logs[1], exclude=only("mass_offset", "torque_lag")).decision.verdict
+        is Verdict.NO_GAP
+    )
 
 
 def test_a_gap_without_a_library_is_unknown():
