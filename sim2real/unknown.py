@@ -150,6 +150,8 @@ QUANTITIES: dict[str, tuple[str, Callable[[Drive, Prediction], Array]]] = {
 """Unit and values of what a term may depend on; acceleration is the tyres' force, scaled by the mass later."""
 PER_DRIVE = ("time", "position")
 """Quantities whose curve is another one in each drive."""
+PRICE_PER_DRIVE = 1.4
+"""By how much more such a curve has to explain: it tells less than one over the car's own motion [-]."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +211,8 @@ def fit_terms(
 
 def score(term: Term) -> float:
     """Loss and a price for each value of the curve, in units of what the loss leaves per degree of freedom."""
-    return term.loss + PRICE_PER_KNOT * term.size * max(term.loss, 1.0) / max(term.samples, 1)
+    priced = term.loss + PRICE_PER_KNOT * term.size * max(term.loss, 1.0) / max(term.samples, 1)
+    return priced * (PRICE_PER_DRIVE if term.quantity in PER_DRIVE else 1.0)
 
 
 def _whitened(drive: Drive, noise: Noise, channels: Array) -> Array:
