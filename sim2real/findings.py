@@ -88,7 +88,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         if unknown:
             unexplained = characterise(terms, suspect)
         subsystem = _subsystem(decision, terms)
-        taken = loss(held.whitened(before)) - loss(held.whitened(after)) if found.added() else 0.0
+        taken = loss(held.whitened(before)) - loss(held.whitened(after))
         places, heat = _where(found, held, before, terms, subsystem, taken)
     return Diagnosis(
         verdict=decision.verdict,

@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 
 from scenarios.effects.base import Signals
 from scenarios.effects.shifting import delayed
-from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
+from scenarios.effects.wheel_speed_quantisation import MOST_TEETH, WheelSpeedQuantisation
 
 Array = NDArray[np.float64]
 
@@ -38,8 +38,8 @@ DIGITS = 2e-4
 """How closely the logarithm of a quantum has to be that of a round number for it to be one [-]."""
 FIVES = 4
 """Greatest power of five in a round number."""
-MOST_TEETH = 20_000
-"""More pulses per revolution than any counter has."""
+SEEN = 1.5
+"""Least window that a log shows, in steps of the log [-]."""
 UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
 MOST_SAMPLES = 1200
@@ -100,7 +100,7 @@ class Lattice:
     def window_range_s(self) -> tuple[float, float]:
         """What the window may be [s]."""
         least = (
-            UNSEEN * self.step_s if self.window_s <= 1.5 * self.step_s else self.window_s - 0.5 * self.step_s
+            UNSEEN * self.step_s if self.window_s <= SEEN * self.step_s else self.window_s - 0.5 * self.step_s
         )
         return least, self.window_s + 0.5 * self.step_s
 
@@ -183,7 +183,7 @@ def _window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s: floa
     # the counter's window need not be a multiple of the log's step, and the log sees its end a part of a step late
     early = [c[c < c[0] + CHANGES_S] - c[0] for c in changes if len(c)]
     early = [c for c in early if len(c) >= FEWEST_CHANGES]
-    low, high = 1.0 / LONGEST_WINDOW_S, 1.0 / (1.5 * step_s)
+    low, high = 1.0 / LONGEST_WINDOW_S, 1.0 / (SEEN * step_s)
     if high <= low or not early:
         return step_s
 

@@ -9,6 +9,9 @@ import numpy as np
 from scenarios.effects.base import Array, Effect, Signals, parameter
 from scenarios.effects.shifting import advanced
 
+MOST_TEETH = 20_000.0
+"""More pulses per revolution than any counter has [-]."""
+
 
 @dataclass(frozen=True)
 class WheelSpeedQuantisation(Effect):
@@ -26,7 +29,7 @@ class WheelSpeedQuantisation(Effect):
     look_alikes = ("wheel_speed_delay",)
 
     teeth: float = parameter(
-        "-", "pulses per revolution", neutral=48.0, low=1.0, high=20_000.0, starts=(48.0, 100.0)
+        "-", "pulses per revolution", neutral=48.0, low=1.0, high=MOST_TEETH, starts=(48.0, 100.0)
     )
     window_s: float = parameter(
         "s", "counting time; 0 is an ideal sensor", neutral=0.0, low=0.0, high=0.5, starts=(0.01, 0.02, 0.05)

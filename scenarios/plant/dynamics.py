@@ -187,6 +187,8 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
     rear_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_front_axle_m * half_base
     transfer_kg = p.mass_kg * p.transfer_height_m * half_base
     drag_n = p.drag_kg_m * speed * speed
+    force_lags = p.relaxation_m > 0.0 and p.slip_lags == 0.0
+    slip_lags = p.relaxation_m > 0.0 and p.slip_lags > 0.0
     most_n = p.hub_resistance * p.mass_kg * p.gravity_m_s2
     for _ in range(8):
         shift_n = transfer_kg * accel
@@ -202,7 +204,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
                 left = np.exp(-p.falloff_s_m * abs(rim - speed))
                 theta *= p.falloff_floor + (1.0 - p.falloff_floor) * left
             acting = slip if rim >= speed else -slip
-            if p.relaxation_m > 0.0 and p.slip_lags > 0.0:
+            if slip_lags:
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
             force, by_slip, by_load = tyre_force(theta, abs(acting), load_n, p.longitudinal_stiffness_n)
@@ -213,9 +215,9 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
                 rest = speed <= 0.0 and y[FORCE + i] < 0.0
                 wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / p.relaxation_m
                 wheels.work[_PER_STATE, i] = 1.0
-            if p.relaxation_m > 0.0 and p.slip_lags > 0.0:
+            if slip_lags:
                 slope = wheels.work[_PER_STATE, i] = max(slope, LEAST_SLOPE * p.longitudinal_stiffness_n)
-            if p.relaxation_m > 0.0 and p.slip_lags == 0.0:
+            if force_lags:
                 wheels.work[_STEADY, i] = force
                 wheels.force_n[i] = y[FORCE + i]
             else:
