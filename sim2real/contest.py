@@ -11,7 +11,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from scenarios.effects import FORMS
+from scenarios.effects import EFFECTS, FORMS
 from sim2real.evidence import Evidence
 from sim2real.fitting import FULL_STEPS, Candidate, Fit, fit, loss
 from sim2real.observer import Simulation
@@ -55,6 +55,11 @@ class Entry:
     z_hold: Array
 
     @property
+    def name(self) -> str:
+        """Its effects in a word; structural ones are not blamed, and left out."""
+        return "+".join(key for key in self.ids if not EFFECTS[key].structural)
+
+    @property
     def loss_fit(self) -> float:
         """Loss on the fit logs."""
         return loss(self.z_fit)
@@ -93,12 +98,15 @@ class Contest:
         See `sim2real.pairs` for the latter.
     partners : tuple of (float, str)
         What a second effect beside the best single one promises to leave of the fit logs [loss], best first.
+    structured : tuple of Entry
+        Single effects with a structural one beside them, see `sim2real.structure`.
     """
 
     null: Entry
     singles: tuple[Entry, ...]
     pairs: tuple[Entry, ...] = ()
     partners: tuple[tuple[float, str], ...] = ()
+    structured: tuple[Entry, ...] = ()
 
 
 def hold_contest(
@@ -109,17 +117,32 @@ def hold_contest(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Contest:
-    """Every effect alone, fitted to all fit logs from where its first round ended."""
+    """Every effect alone, fitted to all fit logs from where its first round ended; each in its best form."""
     null = Entry(
         (), None, fit_to.whitened(fit_to.residuals(model)), holdout.whitened(holdout.residuals(model))
     )
-    steps = [FULL_STEPS if rank < FINALISTS else 1 for rank in range(len(first))]
+    finalists = list(dict.fromkeys(found.candidate.ids for found in first))[:FINALISTS]
     work = [
-        partial(enter, found.candidate, fit_to, holdout, found.x, count)
-        for found, count in zip(first, steps, strict=True)
+        partial(
+            enter,
+            found.candidate,
+            fit_to,
+            holdout,
+            found.x,
+            FULL_STEPS if found.candidate.ids in finalists else 1,
+        )
+        for found in first
     ]
-    singles = run_all(work, jobs, progress, "effects")
-    return Contest(null, tuple(sorted(singles, key=lambda e: e.loss)))
+    best: dict[tuple[str, ...], Entry] = {}
+    for entry in sorted(run_all(work, jobs, progress, "effects"), key=lambda e: e.loss):
+        best.setdefault(entry.ids, entry)
+    return Contest(null, tuple(entry for entry in best.values() if is_proper(entry)))
+
+
+def is_proper(entry: Entry) -> bool:
+    """Whether every effect of an entry is itself at its values, see `Effect.is_itself`."""
+    found = entry.fitted
+    return all(effect.is_itself() for effect in found.candidate.effects(found.x))
 
 
 def first_round(
@@ -129,11 +152,11 @@ def first_round(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> list[Fit]:
-    """Every effect that acts on the car's motion or its sensors, fitted roughly to one log, each in its best form."""
+    """Every form of every effect that acts on the car's motion or its sensors, fitted roughly to one log."""
     candidates = [
         Candidate(model, (key,), (form,))
         for key, kinds in FORMS.items()
-        if key not in exclude and kinds[0].stage != "perception" and key != COUNTER
+        if key not in {*exclude, COUNTER} and kinds[0].stage != "perception" and not kinds[0].structural
         for form in range(len(kinds))
     ]
     one_log = fit_to.longest()
@@ -143,10 +166,7 @@ def first_round(
         progress,
         "effects, first round",
     )
-    best: dict[str, Fit] = {}
-    for each in sorted(found, key=lambda fit: fit.loss):
-        best.setdefault(each.candidate.ids[0], each)
-    return list(best.values())
+    return sorted(found, key=lambda fit: fit.loss)
 
 
 def enter(candidate: Candidate, fit_to: Evidence, holdout: Evidence, start: Array, steps: int) -> Entry:

@@ -14,7 +14,7 @@ from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
-from sim2real.evidence import gather
+from sim2real.evidence import drift_of, gather
 from sim2real.findings import Findings, describe
 from sim2real.gap import measure
 from sim2real.lattice import common_lattice
@@ -27,6 +27,7 @@ from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, is_noise, needs_pairs
 from sim2real.sources import Sources, read_source, read_sources
+from sim2real.structure import add_structure
 from sim2real.trpac_error import trpac_error
 
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
@@ -144,11 +145,14 @@ def find(
     if first:
         best = first[0].candidate.model(first[0].x)
         fit_to, held = fit_to.sharpened(best), held.sharpened(best)
+        drift = drift_of(best, fit_to, held)
+        fit_to, held = fit_to.drifting(best, drift), held.drifting(best, drift)
     contest = hold_contest(base, fit_to, held, first, jobs, progress)
     if contest.singles and not is_noise(contest, fit_to, held):
         contest = add_partners(contest, fit_to, jobs, progress)
         if needs_pairs(contest, fit_to, held):
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)
+            contest = add_structure(contest, base, fit_to, held, exclude, jobs, progress)
     return Findings(base, fit_to, held, contest, decide(contest, fit_to, held), lattice)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.doubt import doubt
+from sim2real.drift import read_drift, with_drift
 from sim2real.drive import Drive
 from sim2real.noise import Noise, read_noise
 from sim2real.observer import Simulation
@@ -45,6 +46,11 @@ class Evidence:
         noises = [n.sharper(m) for n, m in zip(self.noises, gather(model, self.drives).noises, strict=True)]
         return replace(self, noises=tuple(noises))
 
+    def drifting(self, model: Simulation, drift: float) -> Evidence:
+        """The same drives with sensors that drift by a share of their noise."""
+        pairs = zip(self.drives, self.noises, strict=True)
+        return replace(self, noises=tuple(with_drift(model, d, n, drift) for d, n in pairs))
+
     def longest(self) -> Evidence:
         """The longest drive alone."""
         i = int(np.argmax([len(d) for d in self.drives]))
@@ -74,3 +80,10 @@ def rest_of(drive: Drive, channels: Array) -> Array:
 def gather(model: Simulation, drives: Sequence[Drive]) -> Evidence:
     """Drives with their noise, read from what a model leaves of them."""
     return Evidence(tuple(drives), tuple(read_noise(d, residuals(model, d), doubt(model, d)) for d in drives))
+
+
+def drift_of(model: Simulation, *evidence: Evidence) -> float:
+    """The sensors' drift over all drives [standard deviations of the noise]."""
+    drives = [d for e in evidence for d in e.drives]
+    noises = [n for e in evidence for n in e.noises]
+    return read_drift(drives, noises, [residuals(model, d) for d in drives])

@@ -25,6 +25,7 @@ from sim2real.result import (
     Interval,
     NextManoeuvre,
     Place,
+    Structure,
     Trace,
     Verdict,
 )
@@ -55,7 +56,14 @@ class Findings:
     lattice: Lattice | None = None
 
     def added(self) -> tuple[Effect, ...]:
-        """What the verdict adds to the model."""
+        """What the verdict blames, to be added to the model."""
+        return tuple(effect for effect in self._of_winner() if not effect.structural)
+
+    def structure(self) -> tuple[Effect, ...]:
+        """What stands beside it and is not blamed."""
+        return tuple(effect for effect in self._of_winner() if effect.structural)
+
+    def _of_winner(self) -> tuple[Effect, ...]:
         entry = self.decision.winner
         if entry.fit is None or self.decision.verdict is Verdict.UNKNOWN:
             return ()
@@ -69,9 +77,9 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     before = held.residuals(found.model)
     added = found.model.with_effects(*found.added())
     after = held.residuals(added)
-    floor = noise_floor(added, held, seed)
-    old, new = measure(held, before), measure(held, after)
-    gap = Gap(old, new, floor)
+    whole = added.with_effects(*found.structure())
+    gap = Gap(measure(held, before), measure(held, after), noise_floor(whole, held, seed))
+    structure = _structure(found, held, whole)
     causes = _causes(found, held, before, seed)
     terms: list[Term] = []
     unexplained = None
@@ -92,12 +100,20 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         places, heat = _where(found, held, before, terms, subsystem, taken)
     return Diagnosis(
         verdict=decision.verdict,
-        sentence=_sentence(decision, gap, causes, unexplained.sentence if unexplained else ""),
+        sentence=" ".join(
+            part
+            for part in (
+                _sentence(decision, gap, causes, unexplained.sentence if unexplained else ""),
+                _beside(structure),
+            )
+            if part
+        ),
         gap=gap,
         where=places,
         heat_map=heat,
         causes=causes,
         ambiguous_with=_ambiguous(decision),
+        structure=structure,
         cannot_rule_out=tuple(c.effect for c in causes if not c.excited),
         next_manoeuvre=_next(found, progress),
         unexplained=unexplained,
@@ -110,14 +126,14 @@ def _final_noise(found: Findings) -> Evidence:
     """The hold-out with its noise read anew from what the winner leaves: a gap may have looked like noise."""
     if not found.added():
         return found.holdout
-    return found.holdout.sharpened(found.model.with_effects(*found.added()))
+    return found.holdout.sharpened(found.model.with_effects(*found.added(), *found.structure()))
 
 
 def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int) -> tuple[Cause, ...]:
     """All single candidates, ranked; a compound's members first, with their joint parameters."""
     winner = found.decision.winner
     compound = found.decision.verdict is Verdict.COMPOUND
-    together = _joint(found, winner) if compound else {}
+    together = _joint(found, winner) if compound or found.structure() else {}
     out = [_cause(found, entry, held, before, seed, together) for entry in found.contest.singles]
     first = winner.ids if compound else ()
     return tuple(sorted(out, key=lambda c: (c.effect not in first, -c.probability, c.gap_after)))
@@ -132,13 +148,14 @@ def _cause(
     together: dict[tuple[str, str], Interval],
 ) -> Cause:
     key, best = entry.ids[0], entry.fitted
-    after = held.residuals(best.candidate.model(best.x))
+    blamed = [e for e in found.added() if e.id == key] if found.structure() else []
+    after = held.residuals(found.model.with_effects(*blamed) if blamed else best.candidate.model(best.x))
     size = measure(held, after).total
     alone = _joint(found, entry)
     values = {name: value for (effect, name), value in together.items() if effect == key}
     values = values or {name: value for (_, name), value in alone.items()}
     excited = _excited(next(iter(alone.values())), float(best.candidate.scale[0]))
-    fit_ok = fitness(entry, found.fit_to, found.holdout)
+    fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
     shrunk = shrink(held, before, after, seed)
     pro, contra = [], []
@@ -233,11 +250,20 @@ def _where(
     return places, where.heat_map(parts, shares)
 
 
+def _structure(found: Findings, held: Evidence, whole: Simulation) -> Structure | None:
+    """What stands beside the cause, with its estimates and the gap that both leave."""
+    for effect in found.structure():
+        joint = _joint(found, found.decision.winner)
+        values = {name: value for (key, name), value in joint.items() if key == effect.id}
+        return Structure(effect.id, values, measure(held, held.residuals(whole)).total)
+    return None
+
+
 def _ambiguous(decision: Decision) -> tuple[tuple[str, ...], ...]:
     if not decision.rivals:
         return ()
     members = [decision.winner, *decision.rivals]
-    return (tuple("+".join(entry.ids) for entry in members),)
+    return (tuple(entry.name for entry in members),)
 
 
 def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:
@@ -273,10 +299,21 @@ def _sentence(decision: Decision, gap: Gap, causes: Sequence[Cause], term: str) 
     if decision.verdict is Verdict.COMPOUND:
         return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
     if decision.verdict is Verdict.AMBIGUOUS:
-        others = ", ".join(" with ".join(e.ids) for e in decision.rivals)
+        others = ", ".join(e.name.replace("+", " with ") for e in decision.rivals)
         return f"The gap of {size} is {top.effect} or as well {others}: these logs cannot tell them apart."
     values = ", ".join(f"{name} {_number(v)}" for name, v in top.parameters.items())
     return f"The gap of {size} is {top.effect} ({values}): {cut}."
+
+
+def _beside(structure: Structure | None) -> str:
+    """The structural part in a sentence."""
+    if structure is None:
+        return ""
+    values = ", ".join(f"{name} {100.0 * v.value:+.0f} %" for name, v in structure.parameters.items())
+    return (
+        f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}), "
+        f"which leaves {structure.gap_after:.1f}: a difference of the models, not a fault."
+    )
 
 
 def _number(value: Interval) -> str:

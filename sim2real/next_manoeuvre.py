@@ -130,7 +130,7 @@ def propose(
         progress("next manoeuvre", number + 1, len(PROFILES))
     assert best is not None
     power, profile, time_s, torque = best
-    names = tuple("+".join(e.ids) for e in (a, b))
+    names = (a.name, b.name)
     verdict = (
         f"It would leave {power:.0f} standard deviations between {names[0]} and {names[1]}"
         if power >= SEPARATE_SIGMA

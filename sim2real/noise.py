@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +34,14 @@ class Noise:
         From row to row [-].
     widening : array, shape (n, 7)
         By how much more than by noise a right model may be off at each row [-], see `sim2real.doubt`.
+    slow : array, shape (7,)
+        What drifting sensors add to the variance of the blocks' means, 1 without [-], see `sim2real.drift`.
     """
 
     sigma: Array
     correlation: Array
     widening: Array
+    slow: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))
 
     def scaled(self, residuals: Array) -> Array:
         """Residuals in standard deviations, shape (n, 7)."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS
-from sim2real.contest import Contest, Entry, Progress, enter, run_all, silent
+from sim2real.contest import Contest, Entry, Progress, enter, is_proper, run_all, silent
 from sim2real.evidence import Evidence
 from sim2real.fitting import FULL_STEPS, Candidate, robust, robust_weight
 from sim2real.observer import Simulation
@@ -92,7 +92,8 @@ def add_pairs(
     best = min(pairs, key=lambda e: e.loss)
     again = _swapped_pairs(contest, best, {e.ids for e in pairs}, model, fit_to, jobs, progress)
     pairs += fit_pairs(again, "pairs, swapped")
-    return replace(contest, pairs=tuple(sorted(pairs, key=lambda e: e.loss)))
+    proper = [pair for pair in pairs if is_proper(pair)]
+    return replace(contest, pairs=tuple(sorted(proper, key=lambda e: e.loss)))
 
 
 def _starts(entries: dict[str, Entry], pair: tuple[str, ...]) -> Array:

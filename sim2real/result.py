@@ -126,6 +126,25 @@ class Cause:
 
 
 @dataclass(frozen=True)
+class Structure:
+    """A difference between the models that stands beside the cause and is nobody's fault, as another tyre formula.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    parameters : dict
+        Parameter name to its estimate.
+    gap_after : float
+        Gap that is left on the hold-out with the cause and with it [noise floors].
+    """
+
+    effect: str
+    parameters: dict[str, Interval]
+    gap_after: float
+
+
+@dataclass(frozen=True)
 class NextManoeuvre:
     """What to drive next, and which pair of effects it would tell apart.
 
@@ -226,6 +245,7 @@ class Diagnosis:
     """Subsystem to regime to the share of the gap [-]."""
     causes: tuple[Cause, ...]
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
+    structure: Structure | None = None
     cannot_rule_out: tuple[str, ...] = ()
     next_manoeuvre: NextManoeuvre | None = None
     unexplained: Unexplained | None = None
@@ -253,6 +273,7 @@ class Diagnosis:
             "heat_map": self.heat_map,
             "causes": [_cause(cause) for cause in self.causes],
             "ambiguous_with": [list(group) for group in self.ambiguous_with],
+            "structure": None if self.structure is None else asdict(self.structure),
             "cannot_rule_out": list(self.cannot_rule_out),
             "next_manoeuvre": _profile(self.next_manoeuvre),
             "unexplained": _term(self.unexplained),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.contest import Contest, Entry
+from sim2real.drift import block_length, block_sums
 from sim2real.drive import GROUPS
 from sim2real.evidence import Evidence
 from sim2real.fitting import robust
@@ -15,16 +16,14 @@ from sim2real.result import Verdict
 
 Array = NDArray[np.float64]
 
-BLOCK_S = 0.2
-"""Residuals are averaged over blocks of this length to see what noise would average out [s]."""
 LONG_BLOCK_S = 1.0
 """Blocks over which the residuals' sums are taken to see how correlated they are [s]."""
 NO_GAP_MISFIT = 1.4
 """Up to this misfit of the model as it is, what is left is noise [-]."""
-DRIFT = 0.25
-"""Sensors may drift over seconds by this share of their noise, and still there is no gap [-]."""
 NO_GAP_GAIN = 0.03
 """As long as no effect takes more than this share off the loss [-]."""
+DRIFT_GAIN = 0.2
+"""And of the share of the loss that drifting sensors cause, an effect may take this, too [-]."""
 NO_GAP_DOUBT = 0.03
 """Probability that something is left of the candidates where the misfit says there is no gap [-]."""
 EXPLAINED_MISFIT = 1.5
@@ -43,6 +42,8 @@ PAIR_MISFIT = 1.4
 """Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
 PAIR_SHARE = 0.02
 """As `EXPLAINED_SHARE`, for a pair [-]."""
+MOST_LEFT = 0.7
+"""An effect that a structural difference stands beside leaves alone at most this share of the misfit [-]."""
 RIVAL = 0.1
 """An entry with more than this share of the winner's probability is not told apart from it [-]."""
 SOFTNESS = 4.0
@@ -69,14 +70,13 @@ class Fitness:
     signals: dict[str, float]
 
 
-def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence, drift: float = 0.0) -> Fitness:
-    """Absolute goodness of fit of an entry on all logs, with sensors that drift by a share of their noise."""
+def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Fitness:
+    """Absolute goodness of fit of an entry on all logs."""
     squares: dict[str, list[Array]] = {name: [] for name in GROUPS}
     for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
-        for part, drive in zip(evidence.parts, evidence.drives, strict=True):
+        for part, drive, noise in zip(evidence.parts, evidence.drives, evidence.noises, strict=True):
             rows = z[part].reshape(-1, drive.measured.shape[1])
-            length = max(round(BLOCK_S / drive.step_s), 1)
-            sums = _block_sums(rows, length) / np.sqrt(1.0 + drift**2 * length)
+            sums = block_sums(rows, block_length(drive)) / np.sqrt(1.0 + noise.slow)
             for name, channels in GROUPS.items():
                 squares[name].append(sums[:, channels][np.abs(sums[:, channels]) > 0.0] ** 2)
     signals = {
@@ -87,14 +87,6 @@ def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence, drift: float = 0.
     return Fitness(float(np.sqrt(np.mean(np.square(list(signals.values()))))), signals)
 
 
-def _block_sums(rows: Array, length: int) -> Array:
-    """Sums over blocks, divided by the root of the number of rows that count: of unit variance for white noise."""
-    count = len(rows) // length
-    cut = rows[: count * length].reshape(count, length, -1)
-    used = np.maximum((cut != 0.0).sum(axis=1), 1)
-    return cut.sum(axis=1) / np.sqrt(used)
-
-
 def inflation(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
     """By how much the entry's residuals carry less information than white unit noise: their size times their memory."""
     losses, counts, sums = 0.0, 0, []
@@ -103,7 +95,7 @@ def inflation(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
         counts += int(np.count_nonzero(z))
         for part, drive in zip(evidence.parts, evidence.drives, strict=True):
             rows = np.clip(z[part].reshape(-1, drive.measured.shape[1]), -5.0, 5.0)
-            sums.append(_block_sums(rows, max(round(LONG_BLOCK_S / drive.step_s), 1)).ravel())
+            sums.append(block_sums(rows, max(round(LONG_BLOCK_S / drive.step_s), 1)).ravel())
     size = max(losses / max(counts, 1), 1.0)
     every = np.concatenate(sums)
     memory = max(float(np.mean(every[every != 0.0] ** 2)) / size, 1.0) if np.any(every) else 1.0
@@ -135,9 +127,19 @@ def allowed(before: Fitness) -> float:
 def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
     gain = 1.0 - min((e.loss for e in contest.singles), default=contest.null.loss) / contest.null.loss
-    if gain > NO_GAP_GAIN:
+    if gain > NO_GAP_GAIN + DRIFT_GAIN * _drifting(fit_to, holdout):
         return False
-    return fitness(contest.null, fit_to, holdout, DRIFT).misfit <= NO_GAP_MISFIT
+    return fitness(contest.null, fit_to, holdout).misfit <= NO_GAP_MISFIT
+
+
+def _drifting(*evidence: Evidence) -> float:
+    """Share of the residuals' variance that is the sensors' drift [-]."""
+    parts = [
+        noise.slow / block_length(drive)
+        for each in evidence
+        for drive, noise in zip(each.drives, each.noises, strict=True)
+    ]
+    return float(np.mean(parts))
 
 
 def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
@@ -196,6 +198,9 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         enough = max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
         if paired.misfit < min(PAIR_LEAVES * after.misfit, enough):
             return _compound(contest, pair, shares, before, paired)
+    structured = _structured(contest, before, fit_to, holdout)
+    if structured:
+        return structured
     if not explains(after, before):
         return Decision(Verdict.UNKNOWN, best, (), _scaled(share, _belief(after, before)), before, after)
     rivals = [e for e in singles if e is not best and share[e.ids[0]] > RIVAL * share[best.ids[0]]]
@@ -215,6 +220,29 @@ def _further(contest: Contest, best: Entry, fit_to: Evidence, holdout: Evidence)
     pair = contest.pairs[0]
     gain = best.loss - pair.loss
     return pair if gain > FURTHER_GAIN * inflation(best, fit_to, holdout) else None
+
+
+def _structured(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Evidence) -> Decision | None:
+    """The verdict on an effect beside a structural difference; None where that is not needed, or not enough."""
+    if not contest.structured:
+        return None
+    entries = [*contest.structured, *contest.pairs]
+    weight = probabilities(contest, entries, fit_to, holdout)[1:]
+    of = dict(zip((e.ids for e in entries), map(float, weight), strict=True))
+    best = max(contest.structured, key=lambda e: of[e.ids])
+    beside = fitness(best, fit_to, holdout)
+    alone = next(e for e in contest.singles if e.ids[0] == best.ids[0])
+    needed = alone.loss - best.loss > FURTHER_GAIN * inflation(best, fit_to, holdout)
+    major = fitness(alone, fit_to, holdout).misfit <= MOST_LEFT * before.misfit
+    if not (needed and major and explains(beside, before)):
+        return None
+    rivals = tuple(e for e in entries if e is not best and of[e.ids] > RIVAL * of[best.ids])
+    among = sum(of[e.ids] for e in contest.structured)
+    share = {e.ids[0]: 0.0 for e in contest.singles}
+    share |= {e.ids[0]: of[e.ids] / among for e in contest.structured}
+    verdict = Verdict.AMBIGUOUS if rivals else Verdict.IDENTIFIED
+    belief = _belief(beside, before) * FURTHER_BELIEF
+    return Decision(verdict, best, rivals, _scaled(share, belief), before, beside)
 
 
 def _compound(contest: Contest, pair: Entry, weight: Array, before: Fitness, after: Fitness) -> Decision:

@@ -81,7 +81,7 @@ def test_other_values_change_the_log(effect_id):
 @pytest.mark.parametrize("effect_id", EFFECTS)
 def test_each_effect_describes_itself(effect_id):
     effect = EFFECTS[effect_id]
-    assert effect_id in CONTRACT_IDS
+    assert (effect_id in CONTRACT_IDS) != effect.structural
     assert effect.equation
     assert effect.source
     assert effect.excited_by
@@ -98,7 +98,7 @@ def test_each_effect_describes_itself(effect_id):
 
 
 def test_every_id_of_the_contract_is_there():
-    assert set(EFFECTS) == CONTRACT_IDS
+    assert CONTRACT_IDS <= set(EFFECTS)
 
 
 @pytest.mark.parametrize("effect_id", EFFECTS)

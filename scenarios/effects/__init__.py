@@ -26,6 +26,7 @@ from scenarios.effects.torque_delay import TorqueDelay
 from scenarios.effects.torque_gain import TorqueGain
 from scenarios.effects.torque_lag import TorqueLag
 from scenarios.effects.tyre_relaxation import TyreRelaxation, TyreRelaxationOfSlip
+from scenarios.effects.tyre_shape import TyreShape
 from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset
 from scenarios.effects.vehicle_speed_delay import VehicleSpeedDelay
 from scenarios.effects.vehicle_speed_scale import VehicleSpeedScale
@@ -55,6 +56,7 @@ EFFECTS: dict[str, type[Effect]] = {
         TyreStiffnessOffset,
         TyreRelaxation,
         FrictionFalloff,
+        TyreShape,
         # road
         FrictionOffset,
         MuSplit,

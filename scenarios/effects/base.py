@@ -86,6 +86,8 @@ class Effect:
     id: ClassVar[str]
     form: ClassVar[str] = ""
     """Which of several forms of the effect this is; empty where there is one."""
+    structural: ClassVar[bool] = False
+    """Whether it is a difference between models rather than a fault or a setting: a diagnosis never blames it."""
     stage: ClassVar[Stage]
     subsystem: ClassVar[Subsystem]
     equation: ClassVar[str]
@@ -102,6 +104,10 @@ class Effect:
     def neutral(cls, vehicle: Vehicle) -> Effect:
         """The effect with all parameters at their neutral values for this vehicle."""
         return cls(**{p.name: p.neutral_value(vehicle) for p in cls.parameters()})
+
+    def is_itself(self) -> bool:
+        """Whether these values are this effect, not a look-alike of fewer parameters."""
+        return True
 
     def actuate(self, time_s: Array, torque_nm: Array) -> Array:
         """Actuators: the torque at the wheels for a commanded one, both shape (n, 4), at uniform times [N m]."""

@@ -29,7 +29,7 @@ class FrictionOffset(Effect):
         neutral=1.0,
         low=0.1,
         high=3.0,
-        starts=(0.6, 0.85, 1.15, 1.4),
+        starts=(0.6, 0.85, 0.95, 1.05, 1.15, 1.4),
     )
 
     def road(self, table: RoadTable) -> RoadTable:

@@ -12,6 +12,9 @@ from scenarios.effects.base import Effect, parameter
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import RoadTable
 
+LEAST_SPLIT = 0.01
+"""Difference of the factors from which the sides differ [-]."""
+
 
 @dataclass(frozen=True)
 class MuSplit(Effect):
@@ -44,6 +47,10 @@ class MuSplit(Effect):
         high=3.0,
         starts=(0.6, 1.0, 1.4),
     )
+
+    def is_itself(self) -> bool:
+        """Equal factors are no split."""
+        return abs(self.left_factor - self.right_factor) >= LEAST_SPLIT
 
     def road(self, table: RoadTable) -> RoadTable:
         """Each side's friction is scaled."""

@@ -49,6 +49,7 @@ __all__ = [
     "look_up_theta",
     "new_wheels",
     "refresh",
+    "reshaped",
     "run",
     "tyre_force",
 ]
@@ -73,6 +74,12 @@ ACCELERATION_TOLERANCE_M_S2 = 1e-7
 
 RELEASE_SPEED_M_S = 1.0
 """At rest a lagging force that still brakes is released as at this speed: the car would rock back on it [m/s]."""
+
+KNEE_AT, CREST_AT, SLIDING_FROM = 0.6, 2.4, 5.0
+"""Stretches, in units of the grip, at which a tyre's deviations are greatest; the last one's half is there [-]."""
+
+LEAST_GRIP_N = 1.0
+"""Grip that a tyre's stretch is at least related to [N]."""
 
 LEAST_SLOPE = 1e-3
 """Where the slip lags, the force's slope by it counts as at least this share of C_x in the Jacobian [-]."""
@@ -126,6 +133,31 @@ def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> 
     force = grip_n * (1.0 - 0.5 * adhering) * shape
     by_slip = grip_n * ((1.0 - 0.5 * adhering) * shape_by_slip - 0.5 * adhering_by_slip * shape)
     return force, by_slip, theta * (1.0 - adhering) * shape
+
+
+@compiled
+def bump(x: float, at: float) -> tuple[float, float]:
+    """A deviation that is 1 at a place and vanishes far from it on both sides, and its slope."""
+    square = (x / at) ** 2
+    return 4.0 * square / (1.0 + square) ** 2, 8.0 * x / (at * at) * (1.0 - square) / (1.0 + square) ** 3
+
+
+@compiled
+def reshaped(
+    tyre: tuple[float, float, float], slip: float, grip_n: float, load_n: float, p: DynamicsParameters
+) -> tuple[float, float, float]:
+    """A tyre's force and slopes with another curve of the same initial slope, over x = C_x lambda / (theta F_z)."""
+    force, by_slip, by_load = tyre
+    grip_n = max(grip_n, LEAST_GRIP_N)
+    x = p.longitudinal_stiffness_n * slip / grip_n
+    knee, knee_by_x = bump(x, KNEE_AT)
+    crest, crest_by_x = bump(x, CREST_AT)
+    far = SLIDING_FROM * SLIDING_FROM
+    ratio = 1.0 + p.knee * knee + p.crest * crest + p.sliding * x * x / (x * x + far)
+    by_x = p.knee * knee_by_x + p.crest * crest_by_x + p.sliding * 2.0 * x * far / (x * x + far) ** 2
+    by_slip = by_slip * ratio + force * by_x * p.longitudinal_stiffness_n / grip_n
+    by_load = by_load * ratio - force * by_x * x / max(load_n, LEAST_GRIP_N)
+    return force * ratio, by_slip, by_load
 
 
 @compiled
@@ -207,7 +239,10 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             if slip_lags:
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
-            force, by_slip, by_load = tyre_force(theta, abs(acting), load_n, p.longitudinal_stiffness_n)
+            tyre = tyre_force(theta, abs(acting), load_n, p.longitudinal_stiffness_n)
+            if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
+                tyre = reshaped(tyre, abs(acting), theta * load_n, load_n, p)
+            force, by_slip, by_load = tyre
             force, by_load = np.copysign(force, acting), np.copysign(by_load, acting)
             # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
             slope = max(by_slip, 0.0)

@@ -42,6 +42,12 @@ class DynamicsParameters(NamedTuple):
     """Rate at which adhesion falls with sliding speed; 0: it does not [s/m]."""
     falloff_floor: float = 1.0
     """Share of the adhesion that is left at high sliding speed [-]."""
+    knee: float = 0.0
+    """By how much the tyre's force is off where adhesion begins to give way to sliding [-]."""
+    crest: float = 0.0
+    """By how much the tyre's force is off near its maximum [-]."""
+    sliding: float = 0.0
+    """By how much the tyre's force is off where it slides all over [-]."""
     relaxation_m: float = 0.0
     """Way over which the tyre force follows its steady value; 0: at once [m]."""
     slip_lags: float = 0.0
