@@ -55,8 +55,9 @@ def test_the_form_that_the_car_has_is_the_one_that_is_told(effect):
 
 def test_each_effect_enters_the_contest_once():
     held = gather(MODEL, random_drives({}, count=1, seed=3, duration_s=5.0))
-    found = first_round(MODEL, held, only("rolling_resistance", "tyre_relaxation", "mass_offset"))
-    assert sorted(f.candidate.ids[0] for f in found) == [
+    first = first_round(MODEL, held, only("rolling_resistance", "tyre_relaxation", "mass_offset"))
+    found = hold_contest(MODEL, held, held, first).singles
+    assert sorted(e.ids[0] for e in found) == [
         "mass_offset",
         "rolling_resistance",
         "tyre_relaxation",

@@ -44,7 +44,7 @@ class TyreShape(Effect):
         neutral=0.0,
         low=-0.35,
         high=0.35,
-        starts=(0.05,),
+        starts=(-0.05, 0.05),
     )
     sliding: float = parameter(
         "-",
@@ -52,7 +52,7 @@ class TyreShape(Effect):
         neutral=0.0,
         low=-0.35,
         high=0.35,
-        starts=(-0.05,),
+        starts=(-0.05, 0.05),
     )
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
