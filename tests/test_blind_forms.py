@@ -73,14 +73,16 @@ def reading(path: np.ndarray, sensors: Sensors) -> tuple[np.ndarray, np.ndarray,
 
 
 @pytest.mark.parametrize(
-    ("name", "rows", "means"),
+    ("family", "name", "rows", "means"),
     [
         (
+            FIRST,
             "no_gap-2-calm",
             2590,
             [2.654038, 5.794179, 73.006508, 73.008343, 73.0164, 73.017294, 22.752997, 0.036643, 313.767558],
         ),
         (
+            FIRST,
             "tyre_mismatch-torque_gain-1",
             15550,
             [
@@ -95,10 +97,32 @@ def reading(path: np.ndarray, sensors: Sensors) -> tuple[np.ndarray, np.ndarray,
                 355.99812,
             ],
         ),
+        (
+            SECOND,
+            "no_gap-2-calm",
+            2590,
+            [8.847051, 6.864563, 73.757385, 73.746643, 73.753448, 73.741436, 22.983636, 0.069498, 315.250653],
+        ),
+        (
+            SECOND,
+            "rich-rolling_resistance-0",
+            2550,
+            [
+                45.277307,
+                78.267811,
+                71.318445,
+                71.320652,
+                71.389543,
+                71.390802,
+                21.188499,
+                0.41303,
+                277.483247,
+            ],
+        ),
     ],
 )
-def test_the_first_family_is_as_it_was_opened(name, rows, means):
-    log = make_case(CASES[name], 1, FIRST).logs["fit_2"]
+def test_opened_families_are_as_they_were(family, name, rows, means):
+    log = make_case(CASES[name], 1, family).logs["fit_2"]
     assert len(log) == rows
     told = log.drop(columns=["time_s", "wheel_torque_fr_nm", "wheel_torque_rr_nm"]).mean()
     assert_allclose(told, means, rtol=1e-5, atol=1e-5)

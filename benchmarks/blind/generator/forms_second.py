@@ -54,19 +54,24 @@ def message_of(delay_s: float) -> float:
     return min(MESSAGE_S, 2.0 * delay_s)
 
 
-def _payload(world: World, given: Parameters) -> World:
-    """On the rear seats: the centre of gravity moves back with it."""
-    p = world.physics
-    mass = p.mass + given["mass_kg"]
-    back = PAYLOAD_BEHIND * p.rear_arm * given["mass_kg"] / mass
-    return world.moved(mass=mass, front_arm=p.front_arm + back, rear_arm=p.rear_arm - back)
+def payload(behind: float) -> Apply:
+    """Behind the centre of gravity by a share of the way to the rear axle: the centre of gravity moves back with it."""
+
+    def apply(world: World, given: Parameters) -> World:
+        p = world.physics
+        mass = p.mass + given["mass_kg"]
+        back = behind * p.rear_arm * given["mass_kg"] / mass
+        return world.moved(mass=mass, front_arm=p.front_arm + back, rear_arm=p.rear_arm - back)
+
+    return apply
 
 
 def _running(world: World, given: Parameters) -> World:
     return world.sensed(wheel_teeth=given["teeth"], wheel_window_s=given["window_s"], wheel_window_runs=True)
 
 
-def _falling(curve: int) -> Apply:
+def falling(curve: int) -> Apply:
+    """Friction that falls by a curve of the kernel's."""
     return lambda w, g: w.moved(falloff=g["falloff_s_m"], falloff_floor=g["floor"], falloff_curve=curve)
 
 
@@ -94,7 +99,7 @@ EFFECT_FORMS: dict[str, dict[str, Apply]] = {
         "force_on_body": LIBRARY["rolling_resistance"].apply,
         "moment_at_wheel": lambda w, g: w.moved(roll_moment=g["coefficient"]),
     },
-    "mass_offset": {"at_centre": LIBRARY["mass_offset"].apply, "rear_seats": _payload},
+    "mass_offset": {"at_centre": LIBRARY["mass_offset"].apply, "rear_seats": payload(PAYLOAD_BEHIND)},
     "load_transfer": {
         "at_once": LIBRARY["load_transfer"].apply,
         "through_springs": lambda w, g: w.moved(cog_height=g["cog_height_m"], pitch_time=SPRINGS_S),
@@ -105,8 +110,8 @@ EFFECT_FORMS: dict[str, dict[str, Apply]] = {
     },
     "friction_falloff": {
         "exponential": LIBRARY["friction_falloff"].apply,
-        "hyperbolic": _falling(HYPERBOLIC),
-        "saturating": _falling(SATURATING),
+        "hyperbolic": falling(HYPERBOLIC),
+        "saturating": falling(SATURATING),
     },
     "torque_delay": {
         "shifted": LIBRARY["torque_delay"].apply,

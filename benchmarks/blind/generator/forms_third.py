@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .forms_second import Apply, Foreign, message_of
+from .forms_second import Apply, Foreign, falling, message_of, payload
 from .kernel import POWER, STRAIGHT
 from .library import LIBRARY
 from .recording import DIGITS_THIRD, NOISES_THIRD
@@ -42,9 +42,14 @@ AXLES = np.array([1.15, 1.15, 0.85, 0.85])
 DRAG_AXLES = np.array([0.75, 0.75, 1.25, 1.25])
 PULSE = 0.4
 """Of a pad's drag over a turn of a disc that wobbles."""
-INERTIA_TILT, STIFFNESS_LOAD = 0.25, 0.5
+INERTIA_TILT = 0.25
+"""How much more of the deviation the rear wheels have, and the front ones less."""
+STIFFNESS_LOAD = 0.5
+"""How much of the deviation goes with the load."""
 TEETH_OFF = 0.4
+"""Of a tone wheel that sits off its centre [teeth]."""
 WARMING, SWAY = 0.1, 0.12
+"""How much more or less of a deviation there is from time to time."""
 
 
 def _first(effect: str) -> Apply:
@@ -57,13 +62,6 @@ def _air(**more: float) -> Apply:
         return world.moved(drag=drag, lift=more.get("lift", 0.0) * drag, drag_height=more.get("height", 0.0))
 
     return apply
-
-
-def _boot(world: World, given: Parameters) -> World:
-    p = world.physics
-    mass = p.mass + given["mass_kg"]
-    back = BOOT * p.rear_arm * given["mass_kg"] / mass
-    return world.moved(mass=mass, front_arm=p.front_arm + back, rear_arm=p.rear_arm - back)
 
 
 def _rolling_alone(world: World, given: Parameters) -> World:
@@ -85,10 +83,6 @@ def _stiffness(world: World, given: Parameters) -> World:
 
 def _patchy(effect: str) -> Apply:
     return lambda world, given: _first(effect)(world, given).moved(patch_depth=PATCHY)
-
-
-def _falling(curve: int) -> Apply:
-    return lambda w, g: w.moved(falloff=g["falloff_s_m"], falloff_floor=g["floor"], falloff_curve=curve)
 
 
 def _stages(world: World, given: Parameters) -> World:
@@ -134,7 +128,7 @@ EFFECTS: dict[str, dict[str, Apply]] = {
             grade=g["grade"], wave_slope=UNEVEN_GRADE * g["grade"], wave_length=GRADE_M
         ),
     },
-    "mass_offset": {"boot": _boot},
+    "mass_offset": {"boot": payload(BOOT)},
     "wheel_radius_offset": {"lever_too": _first("wheel_radius_offset"), "rolling_alone": _rolling_alone},
     "wheel_inertia_offset": {"all_alike": _first("wheel_inertia_offset"), "unlike_axles": _inertia},
     "load_transfer": {
@@ -148,7 +142,7 @@ EFFECTS: dict[str, dict[str, Apply]] = {
         "shrinks_in_sliding": lambda w, g: w.moved(relaxation=g["length_m"], relaxation_shrinks=True),
     },
     "tyre_stiffness_offset": {"everywhere": _first("tyre_stiffness_offset"), "with_load": _stiffness},
-    "friction_falloff": {"straight": _falling(STRAIGHT), "power": _falling(POWER)},
+    "friction_falloff": {"straight": falling(STRAIGHT), "power": falling(POWER)},
     "friction_offset": {"everywhere": _first("friction_offset"), "patchy": _patchy("friction_offset")},
     "torque_lag": {"one_stage": _first("torque_lag"), "two_stages": _stages},
     "torque_delay": {
