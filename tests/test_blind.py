@@ -216,7 +216,7 @@ def test_tables_have_unique_names_and_the_sizes_that_are_stated():
         for family in Family:
             names = [spec.name for spec in table(size, family)]
             assert len(set(names)) == len(names)
-    assert set(table("full")) < set(table("full", Family.SECOND))
+    assert set(table("full")) < set(table("full", Family.SECOND)) < set(table("full", Family.THIRD))
     groups = [spec.group for spec in table("full")]
     counts = {group: groups.count(group) for group in Group}
     assert counts == {

@@ -17,7 +17,7 @@ from benchmarks.blind.__main__ import Size
 from benchmarks.blind.baselines import cosine
 from benchmarks.blind.command import watch
 from benchmarks.blind.generator.cases import make_case
-from benchmarks.blind.generator.forms import EFFECT_FORMS, Family
+from benchmarks.blind.generator.forms import ASPECTS, EFFECT_FORMS, Family
 from benchmarks.blind.generator.table import SIZES, Group, Spec, table
 from benchmarks.blind.outcome import ResultError, outcome_of, read_outcomes
 from benchmarks.blind.scorer import Scores, load_thresholds, score, score_run
@@ -135,12 +135,27 @@ def test_only_a_blamed_effect_is_right():
 
 
 def test_further_forms_are_told_apart():
-    effect, forms = next(iter(EFFECT_FORMS.items()))
+    effect = "load_transfer"
+    forms = EFFECT_FORMS[effect]
     cases = [result("rich", {effect: {}}, answer("identified", cause(effect, 0.9))) for _ in forms]
     for case, form in zip(cases, forms, strict=True):
         case["seal"]["forms"] = {effect: form}
     further = {a.text: (a.hits, a.n) for a in scored(*cases, result("rich", LAG, RIGHT)).asides}
-    assert further["rich, a further form of the effect: right first"] == (len(forms) - 1, len(forms) - 1)
+    n, of_second = len(forms), len(ASPECTS[Family.SECOND][effect])
+    assert 1 < of_second < n
+    assert further["rich, a form that the first family lacks: right first"] == (n - 1, n - 1)
+    assert further["rich, a form that the second family lacks: right first"] == (n - of_second, n - of_second)
+
+
+def test_forms_of_effects_that_had_one_are_further_than_both_families():
+    effect, forms = next((e, f) for e, f in EFFECT_FORMS.items() if e not in ASPECTS[Family.SECOND])
+    cases = [result("rich", {effect: {}}, RIGHT) for _ in forms]
+    for case, form in zip(cases, forms, strict=True):
+        case["seal"]["forms"] = {effect: form}
+    assert [outcome_of(case).further for case in cases] == [
+        frozenset(),
+        *[frozenset({FIRST, Family.SECOND})] * (len(forms) - 1),
+    ]
 
 
 def test_small_gaps_do_not_count():

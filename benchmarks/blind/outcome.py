@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .baselines import closure, in_sample_bic
-from .generator.forms import is_further
+from .generator.forms import Family, is_further
 from .generator.table import Group
 
 NONE = "none of these"
@@ -29,8 +29,8 @@ class Outcome:
     ----------
     truth : tuple of str
         Effects that were there.
-    further : bool
-        One of them has a form that the first family lacks.
+    further : frozenset of Family
+        Families that lack the form that one of them has.
     subsystems : tuple of str
         Right answers to where.
     gap : float
@@ -45,7 +45,7 @@ class Outcome:
     group: Group
     truth: tuple[str, ...]
     parameters: Mapping[str, float]
-    further: bool
+    further: frozenset[Family]
     subsystems: tuple[str, ...]
     gap: float
     verdict: str
@@ -149,7 +149,11 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         group=Group(seal["group"]),
         truth=truth,
         parameters=seal["effects"][truth[0]] if truth else {},
-        further=any(is_further(seal.get("forms", {}), effect) for effect in truth),
+        further=frozenset(
+            family
+            for family in Family
+            if any(is_further(seal.get("forms", {}), effect, family) for effect in truth)
+        ),
         subsystems=tuple(seal["subsystems"]),
         gap=float(seal["gap"]),
         verdict=said["verdict"],

@@ -230,11 +230,12 @@ def _asides(
         aside(f"rich, gap {low:g} to {high:g}: right first", inside, lambda o: o.right_within(1))
     aside("rich, the simulation's tyre: right first", of[Group.RICH], lambda o: o.right_within(1))
     aside("rich, another tyre: right first", of[Group.TYRE], lambda o: o.right_within(1))
-    aside(
-        "rich, a further form of the effect: right first",
-        [o for o in rich if o.further],
-        lambda o: o.right_within(1),
-    )
+    for family in (Family.FIRST, Family.SECOND):
+        aside(
+            f"rich, a form that the {family} family lacks: right first",
+            [o for o in rich if family in o.further],
+            lambda o: o.right_within(1),
+        )
     aside("rich: ranked first, whatever the verdict", rich, lambda o: o.ranked_within(1))
     aside("rich: ranked first or second, whatever the verdict", rich, lambda o: o.ranked_within(2))
     aside("rich: called compound though one effect", rich, lambda o: o.verdict == "compound")

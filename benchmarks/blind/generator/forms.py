@@ -2,152 +2,54 @@
 
 A form never changes the nominal car or what a parameter means: it acts only through the effect that is hidden, the
 tyre's foreign share, the noise, the logger or the driver. The first form of each aspect is the first family's only one;
-the second family draws among all, from a generator of its own, so that whatever else is drawn stays as it was.
+the families after it draw among theirs, from a generator of its own, so that whatever else is drawn stays as it was.
+What a family adds stands in a file of its own, and its lists are never changed: what was drawn from them stays too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import Any
 
 from numpy.random import Generator
 
-from .driver import BRISK
-from .kernel import HYPERBOLIC, SATURATING
+from . import forms_second, forms_third
+from .forms_second import Foreign
 from .library import LIBRARY
-from .outside import FURTHER, OUTSIDE
-from .recording import DIGITS, NOISES
-from .styles import RESTLESS, SQUEEZING
-from .tyre import BRUSH, RATIONAL
-from .world import Effect, Parameters, World, with_foreign, with_magic
+from .outside import FURTHER, OUTSIDE, STILL_FURTHER
+from .world import Effect
 
-Apply = Callable[[World, Parameters], World]
 Forms = dict[str, str]
-
-SPRINGS_S = 0.04
-"""How late the loads follow where springs carry the body: a damped pitch of about 2 Hz, less what the links carry."""
-PAYLOAD_BEHIND = 0.5
-"""Where a payload lies behind the centre of gravity, as a share of the way to the rear axle: the rear seats."""
-MESSAGE_S = 0.02
-"""Of a vehicle's bus, one to the next; a delay shorter than half of it has them follow at twice the delay."""
-AVERAGE_S = 0.04
-"""What a speed sensor averages over; no more than its delay, so that it is late rather than slow."""
+Aspects = dict[str, dict[str, Any]]
 
 
 class Family(StrEnum):
-    """Which forms are drawn from."""
+    """Which forms are drawn from; each later one holds all of the earlier ones."""
 
     FIRST = "first"
     """One form of each aspect."""
     SECOND = "second"
-    """All forms, more log rates, more deviations outside the library."""
+    """More forms, more log rates, more deviations outside the library."""
+    THIRD = "third"
+    """Forms of nearly every effect; again more of all else."""
 
 
-@dataclass(frozen=True)
-class Foreign:
-    """A tyre of another formula: its own parameters, and how a world gets a share of it."""
-
-    draw: Callable[[Generator], Parameters]
-    apply: Callable[..., World]
+def _joined(aspects: Aspects, more: Aspects) -> Aspects:
+    """What has had forms before comes first, as do those forms."""
+    return {name: {**aspects.get(name, {}), **more.get(name, {})} for name in {**aspects, **more}}
 
 
-FOREIGN: dict[str, Foreign] = {
-    "magic_formula": Foreign(
-        lambda rng: {"shape": float(rng.uniform(1.4, 1.6)), "curvature": float(rng.uniform(-1.0, 0.3))},
-        with_magic,
-    ),
-    "brush": Foreign(lambda rng: {}, lambda world, share: with_foreign(world, BRUSH, share)),
-    "rational": Foreign(
-        lambda rng: {"stretch": float(rng.uniform(2.3, 3.2)), "sliding": float(rng.uniform(0.7, 0.9))},
-        lambda world, share, stretch, sliding: with_foreign(world, RATIONAL, share, stretch, sliding),
-    ),
+THIRD: Aspects = _joined(forms_second.ASPECTS, forms_third.MORE)
+ASPECTS: dict[Family, Aspects] = {
+    Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
+    Family.SECOND: forms_second.ASPECTS,
+    Family.THIRD: THIRD,
 }
-"""Curves with the slope and the peak of the simulation's tyre."""
-
-
-def _message_of(delay_s: float) -> float:
-    return min(MESSAGE_S, 2.0 * delay_s)
-
-
-def _payload(world: World, given: Parameters) -> World:
-    """On the rear seats: the centre of gravity moves back with it."""
-    p = world.physics
-    mass = p.mass + given["mass_kg"]
-    back = PAYLOAD_BEHIND * p.rear_arm * given["mass_kg"] / mass
-    return world.moved(mass=mass, front_arm=p.front_arm + back, rear_arm=p.rear_arm - back)
-
-
-def _running(world: World, given: Parameters) -> World:
-    return world.sensed(wheel_teeth=given["teeth"], wheel_window_s=given["window_s"], wheel_window_runs=True)
-
-
-def _falling(curve: int) -> Apply:
-    return lambda w, g: w.moved(falloff=g["falloff_s_m"], falloff_floor=g["floor"], falloff_curve=curve)
-
-
-def _late(sensor: str, how: str, duration: Callable[[float], float]) -> Apply:
-    """A sensor's delay as one of averaging or of messages, whose duration follows from it."""
-
-    def apply(world: World, given: Parameters) -> World:
-        delay = given["delay_s"]
-        return world.sensed(**{f"{sensor}_delay_s": delay, f"{sensor}_{how}_s": duration(delay)})
-
-    return apply
-
-
-def _sensor_delays(effect: str, sensor: str) -> dict[str, Apply]:
-    """As a shift; as a mean over a while that long ago; as messages of that mean age."""
-    return {
-        "shifted": LIBRARY[effect].apply,
-        "averaged": _late(sensor, "average", lambda delay: min(AVERAGE_S, delay)),
-        "messages": _late(sensor, "message", _message_of),
-    }
-
-
-EFFECT_FORMS: dict[str, dict[str, Apply]] = {
-    "rolling_resistance": {
-        "force_on_body": LIBRARY["rolling_resistance"].apply,
-        "moment_at_wheel": lambda w, g: w.moved(roll_moment=g["coefficient"]),
-    },
-    "mass_offset": {"at_centre": LIBRARY["mass_offset"].apply, "rear_seats": _payload},
-    "load_transfer": {
-        "at_once": LIBRARY["load_transfer"].apply,
-        "through_springs": lambda w, g: w.moved(cog_height=g["cog_height_m"], pitch_time=SPRINGS_S),
-    },
-    "tyre_relaxation": {
-        "slip": LIBRARY["tyre_relaxation"].apply,
-        "force": lambda w, g: w.moved(force_relaxation=g["length_m"]),
-    },
-    "friction_falloff": {
-        "exponential": LIBRARY["friction_falloff"].apply,
-        "hyperbolic": _falling(HYPERBOLIC),
-        "saturating": _falling(SATURATING),
-    },
-    "torque_delay": {
-        "shifted": LIBRARY["torque_delay"].apply,
-        "messages": lambda w, g: w.moved(delay=g["delay_s"], message=_message_of(g["delay_s"])),
-    },
-    "wheel_speed_delay": _sensor_delays("wheel_speed_delay", "wheel"),
-    "wheel_speed_quantisation": {
-        "window_by_window": LIBRARY["wheel_speed_quantisation"].apply,
-        "running_window": _running,
-    },
-    "vehicle_speed_delay": _sensor_delays("vehicle_speed_delay", "speed"),
-}
-"""Effects of the library that can be read in more than one way."""
-
-STYLES = {"brisk": BRISK, "squeezing": SQUEEZING, "restless": RESTLESS}
-
-ASPECTS: dict[str, dict[str, Any]] = {
-    **EFFECT_FORMS,
-    "foreign_tyre": FOREIGN,
-    "noise": NOISES,
-    "digits": DIGITS,
-    "driver": STYLES,
-}
-"""All that has forms; the first of each is the first family's."""
+"""All that has forms in each family; what a family does not list has the library's form."""
+EFFECT_FORMS: Aspects = {name: forms for name, forms in THIRD.items() if name in LIBRARY}
+FOREIGN: dict[str, Foreign] = THIRD["foreign_tyre"]
+NOISES, DIGITS, STYLES = THIRD["noise"], THIRD["digits"], THIRD["driver"]
 
 RATES_HZ: dict[Family, dict[float, float]] = {
     Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
@@ -160,29 +62,33 @@ RATES_HZ: dict[Family, dict[float, float]] = {
         800.0: 0.05,
         2000.0: 0.05,
     },
+    Family.THIRD: {100.0: 0.2, 200.0: 0.2, 250.0: 0.1, 300.0: 0.2, 500.0: 0.1, 600.0: 0.15, 1200.0: 0.05},
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
-
-def outside_of(family: Family) -> dict[str, Effect]:
-    """A family's deviations outside the library."""
-    return OUTSIDE if family is Family.FIRST else {**OUTSIDE, **FURTHER}
+OUTSIDES: dict[Family, dict[str, Effect]] = {
+    Family.FIRST: OUTSIDE,
+    Family.SECOND: {**OUTSIDE, **FURTHER},
+    Family.THIRD: {**OUTSIDE, **FURTHER, **STILL_FURTHER},
+}
+"""Each family's deviations outside the library."""
 
 
 def draw_forms(family: Family, rng: Generator) -> Forms:
-    """A form of each aspect, all equally likely in the second family."""
+    """A form of each of the family's aspects, all equally likely."""
+    aspects = ASPECTS[family]
     if family is Family.FIRST:
-        return {aspect: next(iter(forms)) for aspect, forms in ASPECTS.items()}
-    return {aspect: str(rng.choice(list(forms))) for aspect, forms in ASPECTS.items()}
+        return {aspect: next(iter(forms)) for aspect, forms in aspects.items()}
+    return {aspect: str(rng.choice(list(forms))) for aspect, forms in aspects.items()}
 
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDE, **FURTHER}[name]
-    return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in EFFECT_FORMS else effect
+    effect = {**LIBRARY, **OUTSIDES[Family.THIRD]}[name]
+    return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
 
 
-def is_further(forms: Forms, name: str) -> bool:
-    """Whether an effect has another form than the first family's."""
-    first = next(iter(EFFECT_FORMS.get(name, [""])))
-    return forms.get(name, first) != first
+def is_further(forms: Forms, name: str, family: Family) -> bool:
+    """Whether an effect has a form that the `family` lacks."""
+    known = ASPECTS[family].get(name) or list(EFFECT_FORMS.get(name, {}))[:1]
+    return name in forms and forms[name] not in known

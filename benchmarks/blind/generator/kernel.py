@@ -1,6 +1,6 @@
 """The plant's equations and their integration, compiled.
 
-A straight-line car in 31 states, integrated by the classical Runge-Kutta method at one fixed step per car, small enough
+A straight-line car in 36 states, integrated by the classical Runge-Kutta method at one fixed step per car, small enough
 for the stiffest mode: the wheel's eigenvalue is 1.27 C_x R^2 / (I v), so the slip's denominator has a floor of
 `FLOOR_M_S`, below which the drives do not go. A wheel that a brake has stopped stays at rest until the road or the
 motor turns it.
@@ -8,12 +8,13 @@ motor turns it.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .physics import Physics
 from .tyre import THETA_GRID, dugoff, foreign
 
 Array = NDArray[np.floating[Any]]
@@ -24,67 +25,29 @@ COMMAND_STEP_S = 0.01
 RECORD_STEP_S = 0.001
 LEAST_LAG_S = 0.001
 """Of a motor whose torque rises at a limited rate: how closely it follows below the limit."""
-EXPONENTIAL, HYPERBOLIC, SATURATING = 0, 1, 2
+EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER = range(5)
 """Codes of the ways in which friction falls."""
 
-X, V, W, MOTOR, TWIST, SLIP, LAG, ANGLE, HEAT, PITCH, N = 0, 1, 2, 6, 10, 14, 18, 22, 26, 30, 31
-"""Where the states lie: position, speed; each wheel's speed, motor speed, twist, slip, torque, angle, heat; pitch.
+BODY_DAMPING = 0.4
+"""Of a body that pitches on its springs, over the critical one [-]."""
+PATCH_M = 23.0
+"""From one patch of the road to the next [m]."""
+BEAT_S = 0.7
+"""In which two clocks of nearly the same cycle pass each other once [s]."""
+ROLL_M_S = 17.0
+"""Speed that a rolling resistance is stated at where it grows with speed [m/s]."""
+DERATING_S = 12.0
+"""In which a motor gets hot [s]."""
+
+X, V, W, MOTOR, TWIST, SLIP, LAG, ANGLE, HEAT, PITCH, BODY, STAGE, N = (
+    *(0, 1, 2, 6, 10, 14, 18, 22, 26, 30),
+    *(31, 32, 36),
+)
+"""Where the states lie: position, speed; each wheel's speed, motor speed, twist, slip, torque, angle, heat; pitch; what
+the springs carry of it, or its rate; each motor's first stage.
 
 Where the force is what relaxes, `SLIP` holds the force [N].
 """
-
-
-class Physics(NamedTuple):
-    """Everything that moves the car; SI units. Wheel order fl, fr, rl, rr."""
-
-    mass: float
-    front_arm: float
-    rear_arm: float
-    cog_height: float
-    pitch_time: float
-    radius: float
-    inertia: float
-    stiffness_drive: float
-    stiffness_brake: float
-    factor_left: float
-    factor_right: float
-    falloff: float
-    falloff_floor: float
-    falloff_curve: int
-    relaxation: float
-    force_relaxation: float
-    foreign_share: float
-    foreign_curve: int
-    foreign_first: float
-    foreign_second: float
-    peak: Array
-    heating: float
-    cooling: float
-    drag: float
-    gust_drag: float
-    wind: Array
-    roll_force: float
-    roll_moment: float
-    brake_drag: float
-    bearing: float
-    grade: float
-    wave_slope: float
-    wave_length: float
-    delay: float
-    message: float
-    lag: float
-    slew: float
-    gain: Array
-    dead_band: float
-    torque_limit: float
-    ripple: float
-    ripple_order: float
-    shaft_stiffness: float
-    shaft_damping: float
-    motor_inertia: float
-    border: Array
-    mu_left: Array
-    mu_right: Array
 
 
 @njit(cache=True)
@@ -110,9 +73,11 @@ def friction(p: Physics, wheel: int, position: float) -> float:
     k = p.border.size - 1
     while k > 0 and p.border[k] > at:
         k -= 1
-    if wheel % 2 == 0:
-        return p.mu_left[k] * p.factor_left
-    return p.mu_right[k] * p.factor_right
+    mu = p.mu_left[k] if wheel % 2 == 0 else p.mu_right[k]
+    factor = p.factor_left if wheel % 2 == 0 else p.factor_right
+    if p.patch_depth > 0.0:
+        factor = 1.0 + (factor - 1.0) * (1.0 + p.patch_depth * np.sin(2.0 * np.pi * at / PATCH_M))
+    return mu * factor
 
 
 @njit(cache=True)
@@ -131,6 +96,10 @@ def fallen(curve: int, sliding: float, floor: float) -> float:
         return floor + (1.0 - floor) / (1.0 + sliding)
     if curve == SATURATING:
         return floor + (1.0 - floor) * (1.0 - np.tanh(sliding))
+    if curve == STRAIGHT:
+        return 1.0 - (1.0 - floor) * min(sliding, 1.0)
+    if curve == POWER:
+        return floor + (1.0 - floor) / (1.0 + 0.5 * sliding) ** 2
     return floor + (1.0 - floor) * np.exp(-sliding)
 
 
@@ -139,6 +108,8 @@ def tyre_force(p: Physics, slip: float, sliding: float, theta: float, load: floa
     """Signed longitudinal force of one tyre [N]."""
     size = min(abs(slip), 1.0)
     stiffness = p.stiffness_drive if slip >= 0.0 else p.stiffness_brake
+    if p.stiffness_load != 0.0:
+        stiffness += p.stiffness_load * (min(load / (0.25 * p.mass * GRAVITY), 2.0) - 1.0)
     fade = 1.0 / (1.0 + heat)
     grip = theta * fade
     if p.falloff > 0.0:
@@ -153,18 +124,50 @@ def tyre_force(p: Physics, slip: float, sliding: float, theta: float, load: floa
 
 
 @njit(cache=True)
-def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: float) -> float:
-    """What the motor is told after dead time, dead band, limit, gain and ripple, before its lag [N m]."""
+def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: float, turning: float) -> float:
+    """What the motor is told after dead time, dead band, limits, gain and ripple, before its lag [N m]."""
     heard = time - p.delay
+    if p.beat > 0.0:
+        heard -= p.beat * (time / BEAT_S - np.floor(time / BEAT_S) - 0.5)
     if p.message > 0.0:
         heard = np.floor((heard + 0.5 * p.message) / p.message + 1e-9) * p.message
     torque = commanded(command, wheel, heard)
     if p.dead_band > 0.0:
         torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
     torque = min(max(torque, -p.torque_limit), p.torque_limit)
+    if p.power > 0.0:
+        torque = min(torque, p.power / max(turning, 1.0))
+    if p.derating > 0.0:
+        torque *= 1.0 - p.derating * (1.0 - np.exp(-time / DERATING_S))
     if p.ripple > 0.0:
         torque *= 1.0 + p.ripple * np.cos(p.ripple_order * angle)
     return torque * p.gain[wheel]
+
+
+@njit(cache=True)
+def relaxing(p: Physics, slip: float, theta: float, load: float) -> float:
+    """Relaxation length of a tyre whose lagged slip is `slip` [m].
+
+    A brush's contact shortens as it begins to slide (Pacejka 2012, Sec. 7.1); a fifth is left of it here.
+    """
+    length = p.relaxation
+    if p.relaxation_load:
+        length *= max(load / (0.25 * p.mass * GRAVITY), 0.2)
+    if p.relaxation_shrinks:
+        gone = 1.27 * p.stiffness_drive * abs(slip) / max(3.0 * theta * load, 1.0)
+        length *= max(1.0 - gone, 0.2)
+    return length
+
+
+@njit(cache=True)
+def lean(p: Physics, y: Array, reading: float, dy: Array) -> None:
+    """How the body follows its acceleration, into `dy`: at once and in part through springs, or as a mass on them."""
+    if p.body_rate > 0.0:
+        dy[PITCH] = y[BODY]
+        dy[BODY] = p.body_rate * (p.body_rate * (reading - y[PITCH]) - 2.0 * BODY_DAMPING * y[BODY])
+        return
+    dy[PITCH] = (reading - y[PITCH]) / p.pitch_time
+    dy[BODY] = (reading - y[BODY]) / p.springs_time if p.springs_share > 0.0 else 0.0
 
 
 @njit(cache=True)
@@ -175,42 +178,59 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
     if p.wave_slope != 0.0:
         grade += p.wave_slope * np.sin(2.0 * np.pi * y[X] / p.wave_length)
     press = p.mass * GRAVITY / np.sqrt(1.0 + grade * grade)
+    shifted = y[PITCH]
+    if p.springs_share > 0.0:
+        shifted += p.springs_share * (y[BODY] - y[PITCH])
     total = 0.0
     for w in range(4):
         arm = p.rear_arm if w < 2 else p.front_arm
-        pitch = -y[PITCH] if w < 2 else y[PITCH]
-        load = max((press * arm + pitch * p.mass * p.cog_height) / (2.0 * length), 0.0)
+        pitch = -shifted if w < 2 else shifted
+        tilt = 0.5 * p.drag * p.drag_height / length
+        air = speed * speed * (0.25 * p.lift + (tilt if w < 2 else -tilt))
+        load = max((press * arm + pitch * p.mass * p.cog_height) / (2.0 * length) - air, 0.0)
+        theta = friction(p, w, y[X])
         rim = y[W + w] * p.radius
         slip = slip_of(rim, speed)
         dy[SLIP + w] = 0.0
         if p.relaxation > 0.0:
-            dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / p.relaxation
+            path = relaxing(p, y[SLIP + w], theta, load)
+            dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / path
             slip = y[SLIP + w]
-        force = tyre_force(p, slip, rim - speed, friction(p, w, y[X]), load, y[HEAT + w])
+        force = tyre_force(p, slip, rim - speed, theta, load, y[HEAT + w])
         if p.force_relaxation > 0.0:
             dy[SLIP + w] = (force - y[SLIP + w]) * max(abs(speed), FLOOR_M_S) / p.force_relaxation
             force = y[SLIP + w]
         total += force
         dy[HEAT + w] = p.heating * abs(force * (rim - speed)) - p.cooling * y[HEAT + w]
         dy[ANGLE + w] = y[W + w]
-        resisting = p.brake_drag + p.roll_moment * load * p.radius
+        resisting = p.brake_drag * p.brake_share[w]
+        if p.brake_pulse > 0.0:
+            resisting *= 1.0 + p.brake_pulse * np.cos(y[ANGLE + w] + 1.7 * w)
+        rolling = p.roll_moment * load * p.radius
+        if p.roll_growth > 0.0:
+            rolling *= 1.0 + p.roll_growth * ((speed / ROLL_M_S) ** 2 - 1.0)
+        resisting += rolling
         if resisting > 0.0:
             resisting *= np.tanh(y[W + w] / 0.2)
         resisting += p.bearing * y[W + w]
-        told = motor_torque(p, command, w, time, y[ANGLE + w])
+        told = motor_torque(p, command, w, time, y[ANGLE + w], y[W + w])
+        dy[STAGE + w] = 0.0
+        if p.lag_first > 0.0:
+            dy[STAGE + w] = (told - y[STAGE + w]) / p.lag_first
+            told = y[STAGE + w]
         follows = p.lag > 0.0 or p.slew > 0.0
         dy[LAG + w] = (told - y[LAG + w]) / max(p.lag, LEAST_LAG_S) if follows else 0.0
         if p.slew > 0.0:
             dy[LAG + w] = min(max(dy[LAG + w], -p.slew), p.slew)
         torque = y[LAG + w] if follows else told
-        inertia = p.inertia - p.motor_inertia
+        inertia = p.inertia - p.motor_inertia + (-p.inertia_tilt if w < 2 else p.inertia_tilt)
         dy[MOTOR + w] = dy[TWIST + w] = 0.0
         if p.motor_inertia > 0.0:
             dy[TWIST + w] = y[MOTOR + w] - y[W + w]
             shaft = p.shaft_stiffness * y[TWIST + w] + p.shaft_damping * dy[TWIST + w]
             dy[MOTOR + w] = (torque - shaft) / p.motor_inertia
             torque = shaft
-        dy[W + w] = (torque - force * p.radius - resisting) / inertia
+        dy[W + w] = (torque - force * p.radius * p.lever - resisting) / inertia
     total -= p.drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
     if p.gust_drag > 0.0:
         against = speed + on_grid(p.wind, time / COMMAND_STEP_S)
@@ -218,7 +238,7 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
     reading = total / p.mass
     dy[X] = speed
     dy[V] = reading - press * grade / p.mass
-    dy[PITCH] = (reading - y[PITCH]) / p.pitch_time
+    lean(p, y, reading, dy)
     return reading
 
 
@@ -276,12 +296,14 @@ def begin(p: Physics, position: float, speed: float, wheels: Array, time: float,
     for w in range(4):
         y[W + w] = y[MOTOR + w] = wheels[w]
         y[SLIP + w] = 0.0 if p.force_relaxation > 0.0 else slip_of(wheels[w] * p.radius, speed)
-        y[LAG + w] = motor_torque(p, command, w, time, 0.0)
+        y[LAG + w] = y[STAGE + w] = motor_torque(p, command, w, time, 0.0, wheels[w])
         if p.motor_inertia > 0.0:
             y[TWIST + w] = y[LAG + w] / p.shaft_stiffness
     dy = np.empty(N)
     for _ in range(6):
         y[PITCH] = slope(p, y, time, command, dy)
+        if p.springs_share > 0.0:
+            y[BODY] = y[PITCH]
         if p.force_relaxation > 0.0:
             y[SLIP : SLIP + 4] += dy[SLIP : SLIP + 4] * p.force_relaxation / max(abs(speed), FLOOR_M_S)
     return y

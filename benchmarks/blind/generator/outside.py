@@ -123,7 +123,7 @@ OUTSIDE: dict[str, Effect] = {
         growing("nm_s_rad", 0.05, 1.5), lambda w, g: w.moved(bearing=g["nm_s_rad"]), ("wheel", "powertrain")
     ),
 }
-"""Of both families, with the subsystems that are a right answer."""
+"""Of all families, with the subsystems that are a right answer."""
 
 FURTHER: dict[str, Effect] = {
     "torque_slew": Effect(
@@ -140,4 +140,40 @@ FURTHER: dict[str, Effect] = {
         ("vehicle_speed_sensor",),
     ),
 }
-"""Of the second family alone."""
+"""From the second family on."""
+
+
+def _power(car: Car, rng: Generator) -> Scale:
+    """Of a motor that gives its peak torque up to ever lower speeds."""
+    peak_per_m_s = car.motor_peak_torque_nm / car.wheel_radius_m
+    return lambda severity: {"power_w": peak_per_m_s * 22.0 * 0.2**severity}
+
+
+def _one_caliper(car: Car, rng: Generator) -> Scale:
+    wheel = float(rng.integers(4))
+    return lambda severity: {"wheel": wheel, "torque_nm": 8.0 * 20.0**severity}
+
+
+def _drag_on_one(world: World, given: Parameters) -> World:
+    share = np.arange(4) == int(given["wheel"])
+    return world.moved(brake_drag=given["torque_nm"], brake_share=share.astype(float))
+
+
+STILL_FURTHER: dict[str, Effect] = {
+    "motor_power_limit": Effect(_power, lambda w, g: w.moved(power=g["power_w"]), ("powertrain",)),
+    "motor_derating": Effect(
+        growing("share", 0.05, 0.6), lambda w, g: w.moved(derating=g["share"]), ("powertrain",)
+    ),
+    "one_brake_drags": Effect(_one_caliper, _drag_on_one, ("wheel", "powertrain")),
+    "accelerometer_limit": Effect(
+        growing("limit_m_s2", 7.5, 1.5),
+        lambda w, g: w.sensed(accel_limit_m_s2=g["limit_m_s2"]),
+        ("accelerometer",),
+    ),
+    "speed_offset": Effect(
+        growing("offset_m_s", 0.03, 1.5),
+        lambda w, g: w.sensed(speed_offset_m_s=g["offset_m_s"]),
+        ("vehicle_speed_sensor",),
+    ),
+}
+"""From the third family on."""

@@ -12,10 +12,11 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .kernel import ANGLE, COMMAND_STEP_S, RECORD_STEP_S, N, V, W, X
+from .kernel import ANGLE, BEAT_S, COMMAND_STEP_S, RECORD_STEP_S, N, V, W, X
 
 Array = NDArray[np.floating[Any]]
 WHEELS = ("fl", "fr", "rl", "rr")
+SWAY_S, WARM_S = 9.0, 15.0
 
 
 @dataclass(frozen=True)
@@ -23,28 +24,43 @@ class Sensors:
     """What the sensors do; the defaults are ideal ones.
 
     A late signal may be one that is averaged or held: `*_average_s` is the time that a reading is the mean of,
-    `*_message_s` the time from one message to the next. Its mean age stays the delay.
+    `*_message_s` the time from one message to the next, `*_joined` says that straight lines join the messages, and
+    `*_beat_s` is by how much the age differs over a beat of two clocks. Its mean age stays the delay.
     """
 
     wheel_delay_s: float = 0.0
     wheel_average_s: float = 0.0
     wheel_message_s: float = 0.0
+    wheel_joined: bool = False
+    wheel_beat_s: float = 0.0
     wheel_teeth: float = 0.0
     wheel_window_s: float = 0.0
     wheel_window_runs: bool = False
     """The window ends at the row, instead of one after the other."""
+    wheel_window_shared: bool = False
+    """All wheels are counted over the same windows."""
+    wheel_uneven: float = 0.0
+    """How far the teeth lie off their places, over a turn [teeth]."""
     wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     wheel_runout: float = 0.0
     """Amplitude of the reading over a turn of the wheel, each wheel with its own phase [-]."""
     speed_delay_s: float = 0.0
     speed_average_s: float = 0.0
     speed_message_s: float = 0.0
+    speed_joined: bool = False
+    speed_beat_s: float = 0.0
     speed_clock: float = 0.0
     """Share by which the speed sensor's clock is slow: its signal is ever later [-]."""
     speed_scale: float = 1.0
+    speed_sway: float = 0.0
+    """By which the scale's deviation differs over `SWAY_S` [-]."""
+    speed_offset_m_s: float = 0.0
     speed_lag_s: float = 0.0
     speed_hold_s: float = 0.0
     accel_bias_m_s2: float = 0.0
+    accel_warming: float = 0.0
+    """By which the bias differs before and after the sensor is warm, over `WARM_S` [-]."""
+    accel_limit_m_s2: float = np.inf
     accel_scale: float = 1.0
     accel_lag_s: float = 0.0
     seed: int = 0
@@ -106,24 +122,50 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     record = np.arange(len(path)) * RECORD_STEP_S
     rng = np.random.default_rng([sensors.seed, 11])
     wheel_phase, speed_phase, *turns = np.random.default_rng([sensors.seed, 12]).uniform(0.0, 1.0, 6)
-    wheel_at = _sent(time_s - sensors.wheel_delay_s, sensors.wheel_message_s, wheel_phase)
-    speed_at = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
-    speed_at = _sent(speed_at, sensors.speed_message_s, speed_phase)
+    wheel_at: Array = time_s - sensors.wheel_delay_s - _beat(time_s, sensors.wheel_beat_s, wheel_phase)
+    if not sensors.wheel_joined:
+        wheel_at = _sent(wheel_at, sensors.wheel_message_s, wheel_phase)
+    speed_at: Array = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
+    speed_at = speed_at - _beat(time_s, sensors.speed_beat_s, speed_phase)
+    if not sensors.speed_joined:
+        speed_at = _sent(speed_at, sensors.speed_message_s, speed_phase)
     out = np.empty((time_s.size, 6))
     for w in range(4):
         if sensors.wheel_window_s > 0.0:
-            wheel = _count(record, path[:, ANGLE + w], sensors, wheel_at, rng)
+            wheel = _count(record, path[:, ANGLE + w], sensors, wheel_at, rng, wheel_phase)
         else:
-            wheel = _mean(record, path[:, W + w], wheel_at, sensors.wheel_average_s)
+            turning = path[:, W + w]
+            if sensors.wheel_joined:
+                turning = _joined(record, turning, sensors.wheel_message_s, wheel_phase)
+            wheel = _mean(record, turning, wheel_at, sensors.wheel_average_s)
         if sensors.wheel_runout > 0.0:
             angle = np.interp(wheel_at, record, path[:, ANGLE + w])
             wheel = wheel * (1.0 + sensors.wheel_runout * np.cos(angle + 2.0 * np.pi * turns[w]))
         out[:, w] = wheel * sensors.wheel_scale[w]
     speed = _hold(_lag(path[:, V], sensors.speed_lag_s), sensors.speed_hold_s, rng)
-    out[:, 4] = sensors.speed_scale * _mean(record, speed, speed_at, sensors.speed_average_s)
+    if sensors.speed_joined:
+        speed = _joined(record, speed, sensors.speed_message_s, speed_phase)
+    sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
+    scale = sensors.speed_scale if sensors.speed_sway == 0.0 else 1.0 + (sensors.speed_scale - 1.0) * sway
+    out[:, 4] = scale * _mean(record, speed, speed_at, sensors.speed_average_s) + sensors.speed_offset_m_s
     accel = _lag(path[:, N], sensors.accel_lag_s)
-    out[:, 5] = sensors.accel_scale * np.interp(time_s, record, accel) + sensors.accel_bias_m_s2
+    bias = sensors.accel_bias_m_s2 * (1.0 + sensors.accel_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S)))
+    shown = sensors.accel_scale * np.interp(time_s, record, accel) + bias
+    out[:, 5] = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
     return out
+
+
+def _beat(time_s: Array, size_s: float, phase: float) -> Array:
+    """How much later than on average a value comes whose sender's clock passes the reader's [s]."""
+    return size_s * (np.mod(time_s / BEAT_S + phase, 1.0) - 0.5)
+
+
+def _joined(record: Array, signal: Array, message_s: float, phase: float) -> Array:
+    """The signal as straight lines between its messages."""
+    if message_s == 0.0:
+        return signal
+    sent = np.arange(phase * message_s, record[-1], message_s)
+    return np.interp(record, sent, np.interp(sent, record, signal))
 
 
 def _sent(at: Array, message_s: float, phase: float) -> Array:
@@ -145,16 +187,23 @@ def _mean(record: Array, signal: Array, at: Array, over_s: float) -> Array:
     return (until(at + 0.5 * over_s) - until(at - 0.5 * over_s)) / over_s
 
 
-def _count(record: Array, angle: Array, sensors: Sensors, time_s: Array, rng: Generator) -> Array:
+def _count(
+    record: Array, angle: Array, sensors: Sensors, time_s: Array, rng: Generator, shared: float
+) -> Array:
     """Speed from the pulses of each finished window [rad/s]; a wheel that was rolling before the record began."""
     teeth, window = sensors.wheel_teeth, sensors.wheel_window_s
     phase, first = rng.uniform(0.0, 1.0), rng.uniform(0.0, window)
+    if sensors.wheel_window_shared:
+        first = shared * window
     ends = time_s if sensors.wheel_window_runs else np.floor((time_s - first) / window) * window + first
     before = np.gradient(angle[:3], RECORD_STEP_S)[0]
 
     def pulses(at: Array) -> Array:
         turned = np.interp(at, record, angle) + before * np.minimum(at, 0.0)
-        return np.floor(turned * teeth / (2.0 * np.pi) + phase)
+        passed = turned * teeth / (2.0 * np.pi) + phase
+        if sensors.wheel_uneven > 0.0:
+            passed = passed + sensors.wheel_uneven * np.sin(turned + 2.0 * np.pi * phase)
+        return np.floor(passed)
 
     return (pulses(ends) - pulses(ends - window)) * 2.0 * np.pi / (teeth * window)
 

@@ -16,21 +16,21 @@ from .kernel import COMMAND_STEP_S, GRAVITY
 Array = NDArray[np.floating[Any]]
 
 
-def _clock(duration_s: float) -> Array:
+def clock_of(duration_s: float) -> Array:
     return np.arange(1, round(duration_s / COMMAND_STEP_S) + 1) * COMMAND_STEP_S
 
 
-def _squeezed(*corners: tuple[float, float]) -> Array:
+def squeezed(*corners: tuple[float, float]) -> Array:
     """Torque through corners of (duration from the corner before [s], torque [N m]), at rest in each."""
     parts, last = [], 0.0
     for duration, level in corners:
-        z = np.minimum(_clock(duration) / duration, 1.0)
+        z = np.minimum(clock_of(duration) / duration, 1.0)
         parts.append(last + (level - last) * z * z * (3.0 - 2.0 * z))
         last = level
     return np.concatenate(parts)
 
 
-def _faded(torque: Array) -> Array:
+def faded(torque: Array) -> Array:
     """From nothing and back to nothing, over 0.3 s each."""
     to_go = np.arange(torque.size)
     return torque * np.clip(np.minimum(to_go, to_go[::-1]) * COMMAND_STEP_S / 0.3, 0.0, 1.0)
@@ -41,7 +41,7 @@ def _faded(torque: Array) -> Array:
 
 def _swell(car: Car, rng: Generator) -> Array:
     level = car.motor_peak_torque_nm * rng.uniform(0.4, 0.95)
-    return _squeezed(
+    return squeezed(
         (rng.uniform(0.8, 2.0), level), (rng.uniform(0.2, 1.0), level), (rng.uniform(0.8, 2.0), 0.0)
     )
 
@@ -49,18 +49,18 @@ def _swell(car: Car, rng: Generator) -> Array:
 def _surge(car: Car, rng: Generator) -> Array:
     """All that the motors have (the driver lets go when the wheels spin)."""
     level = car.motor_peak_torque_nm
-    return _squeezed((rng.uniform(0.3, 0.6), level), (rng.uniform(0.8, 2.0), level), (0.3, 0.0))
+    return squeezed((rng.uniform(0.3, 0.6), level), (rng.uniform(0.8, 2.0), level), (0.3, 0.0))
 
 
 def _lift(car: Car, rng: Generator) -> Array:
     """Off the pedal: the motors brake a little."""
     level = -car.motor_peak_torque_nm * rng.uniform(0.03, 0.12)
-    return _squeezed((rng.uniform(0.3, 0.8), level), (rng.uniform(1.5, 3.5), level), (0.4, 0.0))
+    return squeezed((rng.uniform(0.3, 0.8), level), (rng.uniform(1.5, 3.5), level), (0.4, 0.0))
 
 
 def _squeeze(car: Car, rng: Generator) -> Array:
     level = -car.motor_peak_torque_nm * rng.uniform(0.3, 1.0)
-    return _squeezed(
+    return squeezed(
         (rng.uniform(0.4, 1.0), level), (rng.uniform(0.6, 1.8), level), (rng.uniform(0.4, 1.0), 0.0)
     )
 
@@ -68,32 +68,30 @@ def _squeeze(car: Car, rng: Generator) -> Array:
 def _squeeze_to_limit(car: Car, rng: Generator) -> Array:
     """Ever harder and ever faster, until the wheels slide (the driver lets go) or a dry road's grip is passed."""
     limit = -rng.uniform(1.0, 1.15) * car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
-    clock = _clock(rng.uniform(1.2, 2.2))
+    clock = clock_of(rng.uniform(1.2, 2.2))
     return np.concatenate([limit * (clock / clock[-1]) ** 2, np.linspace(limit, 0.0, 20), np.zeros(30)])
 
 
 def _waver(car: Car, rng: Generator) -> Array:
     """Three sines at once."""
-    clock = _clock(rng.uniform(3.0, 5.0))
+    clock = clock_of(rng.uniform(3.0, 5.0))
     tones = zip(rng.uniform([0.3, 1.0, 3.0], [1.0, 3.0, 7.0]), rng.uniform(0.0, 2.0 * np.pi, 3), strict=True)
     waves = sum(np.sin(2.0 * np.pi * hertz * clock + phase) for hertz, phase in tones)
-    return _faded(car.motor_peak_torque_nm * (0.06 + rng.uniform(0.12, 0.28) * waves))
+    return faded(car.motor_peak_torque_nm * (0.06 + rng.uniform(0.12, 0.28) * waves))
 
 
 def _swell_gently(car: Car, rng: Generator) -> Array:
     level = car.motor_peak_torque_nm * rng.uniform(0.08, 0.25)
-    return _squeezed(
+    return squeezed(
         (rng.uniform(1.0, 2.0), level), (rng.uniform(1.0, 4.0), level), (rng.uniform(1.0, 2.0), 0.0)
     )
 
 
 def _hum(car: Car, rng: Generator) -> Array:
     """A held speed, the foot a little up and down."""
-    clock = _clock(rng.uniform(4.0, 7.0))
+    clock = clock_of(rng.uniform(4.0, 7.0))
     up, down = rng.uniform(0.03, 0.07), rng.uniform(0.01, 0.04)
-    return _faded(
-        car.motor_peak_torque_nm * (up + down * np.sin(2.0 * np.pi * clock / rng.uniform(2.0, 4.0)))
-    )
+    return faded(car.motor_peak_torque_nm * (up + down * np.sin(2.0 * np.pi * clock / rng.uniform(2.0, 4.0))))
 
 
 SQUEEZING = Style(
@@ -122,7 +120,7 @@ def _wander(car: Car, rng: Generator, mean: float = 0.1, spread: float = 0.4) ->
     keep = np.exp(-COMMAND_STEP_S / rng.uniform(0.1, 0.4))
     wave = lfilter([1.0], [1.0, -2.0 * keep, keep**2], rng.standard_normal(rows + 200))[200:]
     share = np.clip(mean + spread * wave / max(wave.std(), 1e-12), -0.7, 0.95)
-    return _faded(car.motor_peak_torque_nm * share)
+    return faded(car.motor_peak_torque_nm * share)
 
 
 def _wander_gently(car: Car, rng: Generator) -> Array:
@@ -136,7 +134,7 @@ def _pump(car: Car, rng: Generator) -> Array:
     for _ in range(rng.integers(3, 6)):
         level = limit * rng.uniform(0.4, 1.0)
         pulses += [(0.08, level), (rng.uniform(0.1, 0.35), level), (0.1, 0.0), (rng.uniform(0.1, 0.3), 0.0)]
-    return _squeezed(*pulses)
+    return squeezed(*pulses)
 
 
 def _stairs(car: Car, rng: Generator) -> Array:
@@ -144,7 +142,7 @@ def _stairs(car: Car, rng: Generator) -> Array:
     steps = int(rng.integers(3, 5))
     height, tread = rng.uniform(0.6, 1.0) * car.motor_peak_torque_nm / steps, rng.uniform(0.3, 0.6)
     levels = [*range(1, steps + 1), *range(steps - 1, -1, -1)]
-    return _squeezed(*(corner for n in levels for corner in ((0.1, n * height), (tread, n * height))))
+    return squeezed(*(corner for n in levels for corner in ((0.1, n * height), (tread, n * height))))
 
 
 RESTLESS = Style(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 THETA_GRID = np.linspace(0.02, 1.5, 75)
-MAGIC, BRUSH, RATIONAL = 0, 1, 2
+MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED = range(5)
 """Codes of the foreign curves."""
 
 
@@ -110,12 +110,61 @@ def rational(slip: float, slope: float, peak: float, stretch: float, sliding: fl
 
 
 @njit(cache=True)
+def decaying(slip: float, slope: float, peak: float, loss: float) -> float:
+    """Force of c (1 - exp(-b s) - `loss` s) [N] (Burckhardt 1993, Fahrwerktechnik: Radschlupf-Regelsysteme).
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero [N].
+    peak : float
+        Largest force [N].
+    loss : float
+        What a locked wheel's force lacks, over c; above 0 [-].
+    """
+    if peak <= 0.0:
+        return 0.0
+    top = peak
+    for _ in range(6):
+        ratio = loss * top / (slope + loss * top)
+        top = peak / (1.0 - ratio + ratio * np.log(ratio))
+    return top * (1.0 - np.exp(-(slope / top + loss) * slip) - loss * slip)
+
+
+@njit(cache=True)
+def saturated(slip: float, slope: float, peak: float) -> float:
+    """Force of a straight line, then a hyperbola that has its peak at the locked wheel [N] (Fiala's, as Adams has it).
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero, above `peak` [N].
+    peak : float
+        Largest force [N].
+    """
+    if peak <= 0.0:
+        return 0.0
+    grip = 2.0 * slope * (1.0 - np.sqrt(max(1.0 - peak / slope, 0.0)))
+    if slip <= 0.5 * grip / slope:
+        return slope * slip
+    return grip - 0.25 * grip * grip / (slope * slip)
+
+
+@njit(cache=True)
 def foreign(curve: int, slip: float, slope: float, peak: float, first: float, second: float) -> float:
     """Force of a foreign curve by its code [N]; `first` and `second` are its own parameters."""
     if curve == BRUSH:
         return brush(slip, slope, peak)
     if curve == RATIONAL:
         return rational(slip, slope, peak, first, second)
+    if curve == DECAYING:
+        return decaying(slip, slope, peak, first)
+    if curve == SATURATED:
+        return saturated(slip, slope, peak)
     return magic(slip, slope, peak, first, second)
 
 

@@ -11,7 +11,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .car import Car, Road
-from .kernel import EXPONENTIAL, FLOOR_M_S, GRAVITY, RECORD_STEP_S, Physics
+from .kernel import EXPONENTIAL, FLOOR_M_S, GRAVITY, RECORD_STEP_S
+from .physics import Physics
 from .sensors import Sensors
 from .tyre import MAGIC, THETA_GRID, peaks
 
@@ -43,8 +44,9 @@ class World:
     def split(self) -> int:
         """Integration steps per record that keep the classical Runge-Kutta method well inside its stability (2.78)."""
         p = self.physics
-        wheel = p.radius**2 / (p.inertia - p.motor_inertia) + 4.0 / p.mass
-        rate = 1.27 * max(p.stiffness_drive, p.stiffness_brake) * wheel / FLOOR_M_S
+        wheel = p.radius**2 / (p.inertia - abs(p.inertia_tilt) - p.motor_inertia) + 4.0 / p.mass
+        stiffness = max(p.stiffness_drive, p.stiffness_brake) + abs(p.stiffness_load)
+        rate = 1.27 * stiffness * wheel / FLOOR_M_S
         return max(3, int(np.ceil(rate * RECORD_STEP_S / 2.0)))
 
 
@@ -82,16 +84,25 @@ def nominal(car: Car, road: Road) -> World:
             rear_arm=car.cog_to_rear_axle_m,
             cog_height=height,
             pitch_time=PITCH_S,
+            springs_share=0.0,
+            springs_time=1.0,
+            body_rate=0.0,
             radius=car.wheel_radius_m,
+            lever=1.0,
             inertia=car.wheel_inertia_kg_m2,
+            inertia_tilt=0.0,
             stiffness_drive=car.stiffness_n,
             stiffness_brake=car.stiffness_n,
+            stiffness_load=0.0,
             factor_left=1.0,
             factor_right=1.0,
+            patch_depth=0.0,
             falloff=0.0,
             falloff_floor=1.0,
             falloff_curve=EXPONENTIAL,
             relaxation=0.0,
+            relaxation_load=False,
+            relaxation_shrinks=False,
             force_relaxation=0.0,
             foreign_share=0.0,
             foreign_curve=MAGIC,
@@ -101,22 +112,31 @@ def nominal(car: Car, road: Road) -> World:
             heating=0.0,
             cooling=0.0,
             drag=0.5 * AIR_KG_M3 * area,
+            drag_height=0.0,
+            lift=0.0,
             gust_drag=0.0,
             wind=np.zeros(2),
             roll_force=0.0,
             roll_moment=coefficient,
+            roll_growth=0.0,
             brake_drag=0.0,
+            brake_share=np.ones(4),
+            brake_pulse=0.0,
             bearing=0.0,
             grade=0.0,
             wave_slope=0.0,
             wave_length=1.0,
             delay=0.0,
             message=0.0,
+            beat=0.0,
             lag=0.0,
+            lag_first=0.0,
             slew=0.0,
             gain=np.ones(4),
             dead_band=0.0,
             torque_limit=1e9,
+            power=0.0,
+            derating=0.0,
             ripple=0.0,
             ripple_order=1.0,
             shaft_stiffness=1.0,
