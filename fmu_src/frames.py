@@ -5,19 +5,33 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trpac_core.estimator import RoadClass
+from trpac_core.four_wheels import SideClasses
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.images import MOST_PIXELS, ImageError, decode_image, raw_bgr_image
 
 from .signals import NO_ROAD_CLASS
 
-Frame = NDArray[np.uint8] | RoadClass
+Frame = NDArray[np.uint8] | RoadClass | SideClasses
 
+
+class BusClass(NamedTuple):
+    """The inputs in which one surface class comes by bus."""
+
+    surface: str
+    confidence: str
+
+
+ONE_CLASS = (BusClass("road_class", "road_class_confidence"),)
+CLASS_PER_SIDE = (
+    BusClass("road_class.left", "road_class_confidence.left"),
+    BusClass("road_class.right", "road_class_confidence.right"),
+)
 
 BUS = "<road_class>"
 """Source of a frame whose class came by bus."""
@@ -37,8 +51,10 @@ class FrameState:
     failed: bool = False
 
 
-def next_frame(seen: FrameState, values: Mapping[str, Any]) -> tuple[FrameState, Frame | None, str | None]:
-    """The frame of this step, if it is a new one.
+def next_frame(
+    seen: FrameState, values: Mapping[str, Any], bus: tuple[BusClass, ...]
+) -> tuple[FrameState, Frame | None, str | None]:
+    """The frame of this step, if it is a new one; `bus` names where classes come, for the road or for each side.
 
     A changed path or a changed frame number is a new frame. Without numbers (0) each picture in memory is one, and
     so is each step in which a class comes by bus, since a bus signal holds its value. After a frame that cannot
@@ -49,7 +65,7 @@ def next_frame(seen: FrameState, values: Mapping[str, Any]) -> tuple[FrameState,
     FrameState, frame or None, problem or None
         The problem is one sentence that says why a new frame could not be used.
     """
-    frame_id, source = values["frame_id"], _source(values)
+    frame_id, source = values["frame_id"], _source(values, bus)
     if not source:
         # A picture in memory is set for one step: that none is set now ends nothing.
         return (seen if seen.source == BUFFER else FrameState("", frame_id, seen.failed)), None, None
@@ -57,23 +73,24 @@ def next_frame(seen: FrameState, values: Mapping[str, Any]) -> tuple[FrameState,
     if (source, frame_id) == (seen.source, seen.frame_id) and not unnumbered:
         return seen, None, None
     try:
-        frame = _read(source, values)
+        frame = _read(source, values, bus)
     except ValueError as error:
         return FrameState(source, frame_id, failed=True), None, str(error)
     return FrameState(source, frame_id), frame, None
 
 
-def _source(values: Mapping[str, Any]) -> str:
-    if values["road_class"] != NO_ROAD_CLASS:
-        return BUS
+def _source(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> str:
+    for place in bus:
+        if values[place.surface] != NO_ROAD_CLASS:
+            return BUS
     if values["image.size"] != 0 and (values["image.base.lo"] != 0 or values["image.base.hi"] != 0):
         return BUFFER
     return str(values["image_path"])
 
 
-def _read(source: str, values: Mapping[str, Any]) -> Frame:
+def _read(source: str, values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> Frame | None:
     if source == BUS:
-        return _road_class(values)
+        return _by_bus(values, bus)
     if source == BUFFER:
         return _picture_in_memory(values)
     return decode_image(source)
@@ -95,14 +112,27 @@ def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
     return raw_bgr_image(data, width, height) if raw else decode_image(data, "picture in memory")
 
 
-def _road_class(values: Mapping[str, Any]) -> RoadClass:
-    number, confidence = values["road_class"], values["road_class_confidence"]
-    surface = SURFACES.get(number)
-    if surface is not None and 0.0 <= confidence <= 1.0:
-        return RoadClass(surface, confidence)
+def _by_bus(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> RoadClass | SideClasses | None:
+    """The class of the road, or those of its sides, of which one may be none; all problems in one ValueError."""
+    problems = [text for place in bus for text in _problems(place, values)]
+    if problems:
+        raise ValueError("; ".join(problems) + ".")
+    classes = [_road_class(place, values) for place in bus]
+    return SideClasses(*classes) if bus == CLASS_PER_SIDE else classes[0]
+
+
+def _road_class(place: BusClass, values: Mapping[str, Any]) -> RoadClass | None:
+    surface = SURFACES.get(values[place.surface])
+    return None if surface is None else RoadClass(surface, values[place.confidence])
+
+
+def _problems(place: BusClass, values: Mapping[str, Any]) -> list[str]:
+    number, confidence = values[place.surface], values[place.confidence]
     problems = []
-    if surface is None:
-        problems.append(f"road_class is {number}, expected -1 (none), 0 (dry), 1 (wet) or 2 (snow or ice)")
-    if not 0.0 <= confidence <= 1.0:
-        problems.append(f"road_class_confidence is {confidence}, expected 0 to 1")
-    raise ValueError("; ".join(problems) + ".")
+    if number not in SURFACES and number != NO_ROAD_CLASS:
+        problems.append(
+            f"{place.surface} is {number}, expected -1 (none), 0 (dry), 1 (wet) or 2 (snow or ice)"
+        )
+    if number != NO_ROAD_CLASS and not 0.0 <= confidence <= 1.0:
+        problems.append(f"{place.confidence} is {confidence}, expected 0 to 1")
+    return problems

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import importlib
+import os
+import shutil
 import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
-PIP_NAMES = {"numpy": "numpy", "cv2": "opencv-python-headless", "onnxruntime": "onnxruntime"}
-"""Modules that the carried estimator imports, and the packages that bring them."""
-
+CACHE_FOLDER = "trpac-fmu"
+"""Folder of kept code within the user's cache."""
 
 _KEPT: list[dict[str, Any]] = []
 
@@ -26,15 +30,17 @@ class MissingPackagesError(ImportError):
     """The host's Python lacks packages of the unit; the text says which, where and how to install them."""
 
 
-def require_packages(modules: dict[str, str] | None = None) -> None:
+def require_packages(unit: str, modules: Mapping[str, str]) -> None:
     """Import what the unit needs, or say everything that is missing in one error.
 
     A per cent sign is doubled: the wrapper hands the text to a printf-like logger.
 
     Parameters
     ----------
-    modules : dict, optional
-        Module names and the packages that bring them; by default those of the estimator.
+    unit : str
+        The unit's name.
+    modules : mapping
+        Module names and the packages that bring them.
 
     Raises
     ------
@@ -43,7 +49,7 @@ def require_packages(modules: dict[str, str] | None = None) -> None:
         standard error, because hosts show no log of a unit that could not be instantiated.
     """
     problems, packages = [], []
-    for module, package in (PIP_NAMES if modules is None else modules).items():
+    for module, package in modules.items():
         try:
             importlib.import_module(module)
         except ImportError as error:
@@ -51,10 +57,48 @@ def require_packages(modules: dict[str, str] | None = None) -> None:
             packages.append(package)
     if problems:
         message = (
-            f"TrpacEstimator needs Python packages that {sys.executable or 'the embedded interpreter'} "
+            f"{unit} needs Python packages that {sys.executable or 'the embedded interpreter'} "
             f"(Python {sys.version_info.major}.{sys.version_info.minor}, prefix {sys.prefix}) cannot import: "
             f"{'; '.join(problems)}. Install them with: "
             f"{sys.executable or 'python3'} -m pip install {' '.join(packages)}"
         )
         print(message, file=sys.stderr)
         raise MissingPackagesError(message.replace("%", "%%"))
+
+
+def import_kept(package: str) -> None:
+    """Import a carried package from a copy that stays when the unit's folder goes, with its compiled code beside it.
+
+    Hosts unpack a unit to a new temporary folder for each run, and numba would compile for half a minute each time. The
+    package's name holds the hash of its content, so that a copy never changes. Where the user's cache cannot be
+    written the package is imported where it lies.
+    """
+    if package in sys.modules:
+        return
+    carried = Path(__file__).parent.parent / package
+    try:
+        folder = _kept(carried)
+    except OSError:
+        folder = carried.parent
+    sys.path.insert(0, str(folder))
+    try:
+        importlib.import_module(package)
+    finally:
+        sys.path.remove(str(folder))
+
+
+def _kept(carried: Path) -> Path:
+    """Folder of the copy; it is made whole elsewhere and moved in, since several processes may start at once."""
+    root = Path(os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache")
+    folder = root / CACHE_FOLDER / carried.name
+    if not (folder / carried.name).is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(dir=folder.parent))
+        try:
+            shutil.copytree(carried, made / carried.name)
+            os.replace(made, folder)
+        except OSError:
+            shutil.rmtree(made, ignore_errors=True)
+            if not (folder / carried.name).is_dir():
+                raise
+    return folder

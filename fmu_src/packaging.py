@@ -6,31 +6,18 @@ import hashlib
 import re
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distribution, version
 from pathlib import Path
 
 import pythonfmu
 
-import trpac_core
-
 from .model_description import UnitInfo, model_description
 from .variables import Variable
 
-CARRIED_SLAVE_FILES = (
-    "__init__.py",
-    "fields.py",
-    "frames.py",
-    "guarded_slave.py",
-    "host.py",
-    "interface.py",
-    "parameters.py",
-    "settings.py",
-    "signals.py",
-    "variables.py",
-)
-"""Files of this package that every unit carries; its slave's own file comes on top."""
+SLAVE_FILES = ("__init__.py", "guarded_slave.py", "host.py", "variables.py")
+"""Files of this package that every unit carries; what a unit needs besides comes on top."""
 
 PYTHONFMU_FILES = (
     "__init__.py",
@@ -51,12 +38,38 @@ SAFE_PATH = re.compile(r"[A-Za-z0-9_./ -]*")
 
 @dataclass(frozen=True)
 class Slave:
-    """One unit that can be built: its slave class and file, its variables, and what it carries besides."""
+    """One unit that can be built.
+
+    Parameters
+    ----------
+    info : UnitInfo
+        What its description says of it as a whole; its name is its slave class's.
+    files : tuple of str
+        Files of this package that it carries besides `SLAVE_FILES`; the slave's own comes last.
+    variables : sequence of Variable
+        In the order of their value references.
+    modules : mapping
+        Folder or file by its place among the unit's modules: the code of other packages that it carries.
+    packages : mapping
+        Modules that the host must have, and the PyPI packages that bring them.
+    resources : sequence of Path
+        Files beside the code.
+    compiled : str
+        Package among `modules` whose compiled code is kept from one unpacking to the next; empty if none.
+    """
 
     info: UnitInfo
-    module: str
+    files: tuple[str, ...]
     variables: Sequence[Variable]
+    modules: Mapping[str, Path]
+    packages: Mapping[str, str]
     resources: Sequence[Path]
+    compiled: str = ""
+
+    @property
+    def module(self) -> str:
+        """Module of the slave class."""
+        return self.files[-1].removesuffix(".py")
 
 
 class BuildError(ValueError):
@@ -120,18 +133,22 @@ def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _package_files(package: Path) -> dict[str, bytes]:
+def _module_files(place: str, path: Path) -> dict[str, bytes]:
+    if path.is_file():
+        return {place: path.read_bytes()}
     return {
-        path.relative_to(package).as_posix(): path.read_bytes()
-        for path in package.rglob("*.py")
-        if "__pycache__" not in path.parts
+        f"{place}/{file.relative_to(path).as_posix()}": file.read_bytes()
+        for file in path.rglob("*.py")
+        if "__pycache__" not in file.parts
     }
 
 
 def _resources(slave: Slave) -> dict[str, bytes]:
-    here, core, wrapper = Path(__file__).parent, _folder(trpac_core), _folder(pythonfmu)
-    files = {f"resources/trpac_core/{name}": data for name, data in _package_files(core).items()}
-    for name in (*CARRIED_SLAVE_FILES, f"{slave.module}.py"):
+    here, wrapper = Path(__file__).parent, _folder(pythonfmu)
+    files: dict[str, bytes] = {}
+    for place, path in slave.modules.items():
+        files |= {f"resources/{name}": data for name, data in _module_files(place, path).items()}
+    for name in (*SLAVE_FILES, *slave.files):
         files[f"resources/fmu_src/{name}"] = (here / name).read_bytes()
     for name in PYTHONFMU_FILES:
         files[f"resources/pythonfmu/{name}"] = (wrapper / name).read_bytes()
@@ -172,11 +189,11 @@ def _digest(slave: Slave, content: dict[str, bytes]) -> str:
     return total.hexdigest()[:HASH_DIGITS]
 
 
-_CARRIED = re.compile(rb"^(\s*(?:from|import) )(trpac_core|fmu_src|pythonfmu)\b", re.MULTILINE)
+_CARRIED = re.compile(rb"^(\s*(?:from|import) )(trpac_core|scenarios|fmu_src|pythonfmu)\b", re.MULTILINE)
 
 
 def _renamed(path: str, digest: str) -> str:
-    return re.sub(r"^resources/(trpac_core|fmu_src|pythonfmu)/", rf"resources/\1_{digest}/", path)
+    return re.sub(r"^resources/(trpac_core|scenarios|fmu_src|pythonfmu)/", rf"resources/\1_{digest}/", path)
 
 
 def _renamed_imports(path: str, data: bytes, digest: str) -> bytes:
@@ -185,13 +202,15 @@ def _renamed_imports(path: str, data: bytes, digest: str) -> bytes:
 
 def _entry(slave: Slave, digest: str) -> bytes:
     """The script that the wrapper runs at each instantiation: so it holds little but imports."""
-    lines = (
+    lines = [
         f'"""Entry of the unit {slave.info.name}."""',
-        f"from fmu_src_{digest}.host import keep, require_packages",
+        f"from fmu_src_{digest}.host import import_kept, keep, require_packages",
         "keep(globals())",
-        "require_packages()",
-        f"from fmu_src_{digest}.{slave.module} import {slave.info.name}",
-    )
+        f"require_packages({slave.info.name!r}, {dict(slave.packages)!r})",
+    ]
+    if slave.compiled:
+        lines.append(f"import_kept({f'{slave.compiled}_{digest}'!r})")
+    lines.append(f"from fmu_src_{digest}.{slave.module} import {slave.info.name}")
     return "\n".join(lines).encode() + b"\n"
 
 

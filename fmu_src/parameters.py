@@ -1,32 +1,37 @@
-"""From the unit's parameters to the estimator's configuration."""
+"""From a unit's parameters to the configuration of what it wraps."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
-
-from trpac_core.estimator import EstimatorConfig
+from typing import Any, TypeVar
 
 from .fields import with_fields
 from .variables import Kind, Variable
 
+Config = TypeVar("Config")
 
-def configuration(variables: Sequence[Variable], values: Mapping[str, Any]) -> EstimatorConfig:
-    """The estimator's configuration under these parameters.
+
+def configuration(variables: Sequence[Variable], values: Mapping[str, Any], default: Config) -> Config:
+    """A unit's configuration: its default with these parameters at their sources.
 
     Raises
     ------
     ValueError
         Lists every parameter that is not finite or out of its range; or what the configuration refuses.
     """
+    check_parameters(variables, values)
+    settings = {v.source: values[v.name] for v in variables if v.causality == "parameter"}
+    configured: Config = with_fields(default, settings)
+    return configured
+
+
+def check_parameters(variables: Sequence[Variable], values: Mapping[str, Any]) -> None:
+    """Raise one ValueError that lists every parameter that is not finite or out of its range."""
     parameters = [v for v in variables if v.causality == "parameter"]
     problems = [problem for v in parameters if (problem := _problem(v, values[v.name]))]
     if problems:
         raise ValueError(f"{len(problems)} parameter(s) cannot be used: {'; '.join(problems)}.")
-    settings = {v.source: values[v.name] for v in parameters}
-    configured: EstimatorConfig = with_fields(EstimatorConfig(), settings)
-    return configured
 
 
 def _problem(variable: Variable, value: Any) -> str | None:

@@ -6,23 +6,90 @@ from importlib.metadata import version
 from pathlib import Path
 
 from .interface import TRPAC_ESTIMATOR
+from .interface_4w import TRPAC_ESTIMATOR_4W
+from .interface_plant import REFERENCE_PLANT
 from .model_description import UnitInfo
 from .packaging import Slave
 
-MODELS = Path(__file__).parent.parent / "models"
+ROOT = Path(__file__).parent.parent
+MODELS = ROOT / "models"
+NETWORKS = (MODELS / "segmenter.onnx", MODELS / "surface.onnx")
+STEP_S, STOP_S = 0.001, 10.0
+
+ESTIMATOR_PACKAGES = {"numpy": "numpy", "cv2": "opencv-python-headless", "onnxruntime": "onnxruntime"}
+ESTIMATOR_FILES = (
+    "camera_slave.py",
+    "estimate_outputs.py",
+    "fields.py",
+    "frames.py",
+    "parameters.py",
+    "settings.py",
+    "signals.py",
+)
+
+PLANT_PACKAGES = {"numpy": "numpy", "numba": "numba", "pydantic": "pydantic", "yaml": "PyYAML"}
+PLANT_MODULES = (
+    "trpac_core/__init__.py",
+    "trpac_core/vehicle.py",
+    "trpac_core/vision/__init__.py",
+    "trpac_core/vision/classes.py",
+    "scenarios/__init__.py",
+    "scenarios/errors.py",
+    "scenarios/files.py",
+    "scenarios/effects",
+    "scenarios/plant/dynamics.py",
+    "scenarios/plant/parameters.py",
+    "scenarios/plant/pipeline.py",
+)
+"""What the plant is made of, without its sensors and what they need."""
+
+
+def _info(name: str, description: str) -> UnitInfo:
+    return UnitInfo(
+        name=name,
+        description=description,
+        version=version("trpac-fmu"),
+        step_size_s=STEP_S,
+        stop_time_s=STOP_S,
+    )
+
 
 UNITS = {
     "TrpacEstimator": Slave(
-        UnitInfo(
-            name="TrpacEstimator",
-            description="Peak adhesion coefficient of tyre and road at one wheel, from dynamics and camera",
-            version=version("trpac-fmu"),
-            step_size_s=0.001,
-            stop_time_s=10.0,
+        _info(
+            "TrpacEstimator",
+            "Peak adhesion coefficient of tyre and road at one wheel, from dynamics and camera",
         ),
-        module="trpac_estimator",
+        files=(*ESTIMATOR_FILES, "interface.py", "trpac_estimator.py"),
         variables=TRPAC_ESTIMATOR,
-        resources=(MODELS / "segmenter.onnx", MODELS / "surface.onnx"),
+        modules={"trpac_core": ROOT / "trpac_core"},
+        packages=ESTIMATOR_PACKAGES,
+        resources=NETWORKS,
+    ),
+    "TrpacEstimator4W": Slave(
+        _info(
+            "TrpacEstimator4W",
+            "Peak adhesion coefficient of tyre and road at four wheels and of the car, from dynamics and camera",
+        ),
+        files=(*ESTIMATOR_FILES, "interface_4w.py", "trpac_estimator_4w.py"),
+        variables=TRPAC_ESTIMATOR_4W,
+        modules={"trpac_core": ROOT / "trpac_core"},
+        packages=ESTIMATOR_PACKAGES,
+        resources=NETWORKS,
+    ),
+    "ReferencePlant": Slave(
+        _info(
+            "ReferencePlant", "A car on a road of known friction: four driven or braked wheels, straight on"
+        ),
+        files=("parameters.py", "fields.py", "interface_plant.py", "reference_plant.py"),
+        variables=REFERENCE_PLANT,
+        modules={
+            "scenarios/plant/__init__.py": Path(__file__).parent / "carried_plant.py",
+            **{place: ROOT / place for place in PLANT_MODULES},
+        },
+        packages=PLANT_PACKAGES,
+        resources=(ROOT / "scenarios" / "roads" / "paper_simulation.yaml",),
+        compiled="scenarios",
     ),
 }
 """Units by the name that `build_fmu.py --slave` takes."""

@@ -1,20 +1,25 @@
-"""Writes docs/fmu_variables.md: `python -m fmu_src.variable_table`."""
+"""Writes the units' variable tables to docs: `python -m fmu_src.variable_table`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from .interface import TRPAC_ESTIMATOR
+from .units import UNITS
 from .variables import Variable
 
-TARGET = Path(__file__).parent.parent / "docs" / "fmu_variables.md"
+DOCS = Path(__file__).parent.parent / "docs"
+TARGETS = {
+    "TrpacEstimator": DOCS / "fmu_variables.md",
+    "TrpacEstimator4W": DOCS / "fmu_variables_4w.md",
+    "ReferencePlant": DOCS / "fmu_variables_plant.md",
+}
 
 
-def table(variables: Sequence[Variable]) -> str:
-    """The variables as a Markdown document."""
+def table(unit: str, variables: Sequence[Variable]) -> str:
+    """The variables of a unit as a Markdown document."""
     lines = [
-        "# Variables of the unit TrpacEstimator",
+        f"# Variables of the unit {unit}",
         "",
         "Written by `python -m fmu_src.variable_table`; do not edit.",
     ]
@@ -33,5 +38,6 @@ def _row(v: Variable) -> str:
 
 
 if __name__ == "__main__":
-    TARGET.write_text(table(TRPAC_ESTIMATOR), encoding="utf-8")
-    print(TARGET)
+    for name, target in TARGETS.items():
+        target.write_text(table(name, UNITS[name].variables), encoding="utf-8")
+        print(target)

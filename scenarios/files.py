@@ -114,17 +114,25 @@ class VehicleFile(_FileModel):
 
 
 class RoadSegment(_FileModel):
-    """One stretch of road; it holds to the next one's start."""
+    """One stretch of road; it holds to the next one's start. Its sides may have other surfaces than `surface`."""
 
     start_m: float
     mu_left: Friction
     mu_right: Friction
     surface: SurfaceName
+    surface_left: SurfaceName | None = None
+    surface_right: SurfaceName | None = None
 
     @property
     def surface_class(self) -> Surface:
         """The surface as class index."""
         return Surface[self.surface.upper()]
+
+    @property
+    def surface_classes(self) -> tuple[Surface, Surface]:
+        """The surfaces of the left and of the right side."""
+        left, right = (name or self.surface for name in (self.surface_left, self.surface_right))
+        return Surface[left.upper()], Surface[right.upper()]
 
 
 class RoadFile(_FileModel):

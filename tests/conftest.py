@@ -62,13 +62,46 @@ def unit_folder(unit_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return unpack_unit(unit_file, tmp_path_factory.mktemp("unpacked"))
 
 
+@pytest.fixture(scope="session")
+def unit_folder_4w(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The unit TrpacEstimator4W, built and unpacked once per test run."""
+    return _built("TrpacEstimator4W", tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def plant_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The unit ReferencePlant, built and unpacked once per test run."""
+    return _built("ReferencePlant", tmp_path_factory)
+
+
+def _built(name: str, folders: pytest.TempPathFactory) -> Path:
+    archive = build_unit(UNITS[name], folders.mktemp("unit") / f"{name}.fmu")
+    return unpack_unit(archive, folders.mktemp("unpacked"))
+
+
 @pytest.fixture
 def open_unit(unit_folder: Path) -> Iterator[Callable[..., Unit]]:
     """Opens initialised instances of the unit, with parameters by name, and frees them after the test."""
+    yield from _opener(unit_folder)
+
+
+@pytest.fixture
+def open_4w(unit_folder_4w: Path) -> Iterator[Callable[..., Unit]]:
+    """The same for TrpacEstimator4W."""
+    yield from _opener(unit_folder_4w)
+
+
+@pytest.fixture
+def open_plant(plant_folder: Path) -> Iterator[Callable[..., Unit]]:
+    """The same for ReferencePlant."""
+    yield from _opener(plant_folder)
+
+
+def _opener(folder: Path) -> Iterator[Callable[..., Unit]]:
     opened: list[Unit] = []
 
     def open_one(initialise: bool = True, **parameters: object) -> Unit:
-        unit = Unit(unit_folder)
+        unit = Unit(folder)
         opened.append(unit)
         unit.set({name.replace("__", "."): value for name, value in parameters.items()})
         if initialise:

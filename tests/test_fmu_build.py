@@ -116,13 +116,16 @@ def test_interface_has_the_documented_variables(causality: str) -> None:
     assert {v.name for v in TRPAC_ESTIMATOR if v.causality == causality} == INTERFACE[causality]
 
 
+ALL_VARIABLES = [v for unit in UNITS.values() for v in unit.variables]
+
+
 def test_every_variable_has_a_description_and_every_real_a_known_unit() -> None:
-    for v in TRPAC_ESTIMATOR:
+    for v in ALL_VARIABLES:
         assert v.description
         assert (v.unit in SI_UNITS) == (v.kind is Kind.REAL), v.name
 
 
-@pytest.mark.parametrize("v", TRPAC_ESTIMATOR, ids=lambda v: v.name)
+@pytest.mark.parametrize("v", ALL_VARIABLES, ids=lambda v: v.name)
 def test_start_lies_within_the_range(v: Variable) -> None:
     if isinstance(v.start, (int, float)):
         assert v.minimum is None or v.minimum <= v.start
@@ -146,7 +149,7 @@ def test_parameters_start_at_the_estimators_defaults() -> None:
 
 def test_untouched_parameters_give_the_default_configuration() -> None:
     starts = {v.name: v.start for v in TRPAC_ESTIMATOR}
-    assert configuration(TRPAC_ESTIMATOR, starts) == EstimatorConfig()
+    assert configuration(TRPAC_ESTIMATOR, starts, EstimatorConfig()) == EstimatorConfig()
 
 
 DERIVED = {
@@ -187,7 +190,7 @@ def test_each_parameter_reaches_its_field(v: Variable) -> None:
     changed = not v.start if v.kind is Kind.BOOLEAN else v.start + (1 if v.kind is Kind.INTEGER else 1e-6)
     if v.maximum == v.start:
         changed = v.minimum
-    configured = configuration(TRPAC_ESTIMATOR, values | {v.name: changed})
+    configured = configuration(TRPAC_ESTIMATOR, values | {v.name: changed}, EstimatorConfig())
     assert plain(field_value(configured, v.source)) == changed
     others = {
         w.source: plain(field_value(configured, w.source)) for w in TRPAC_ESTIMATOR if w.source and w is not v
@@ -198,7 +201,11 @@ def test_each_parameter_reaches_its_field(v: Variable) -> None:
 def test_all_bad_parameters_are_named_in_one_error() -> None:
     values = {v.name: v.start for v in TRPAC_ESTIMATOR}
     with pytest.raises(ValueError, match=r"vehicle\.mass.*camera\.pitch"):
-        configuration(TRPAC_ESTIMATOR, values | {"vehicle.mass": -1.0, "camera.pitch": float("nan")})
+        configuration(
+            TRPAC_ESTIMATOR,
+            values | {"vehicle.mass": -1.0, "camera.pitch": float("nan")},
+            EstimatorConfig(),
+        )
 
 
 @pytest.mark.e2e
@@ -298,9 +305,11 @@ def test_command_line_says_which_folder_cannot_be_written(
     assert str(blocked) in capsys.readouterr().err
 
 
-def test_variable_table_is_current() -> None:
-    written = variable_table.TARGET.read_text(encoding="utf-8")
-    assert written == variable_table.table(TRPAC_ESTIMATOR), "run: python -m fmu_src.variable_table"
+@pytest.mark.parametrize("unit", UNITS)
+def test_variable_table_is_current(unit: str) -> None:
+    written = variable_table.TARGETS[unit].read_text(encoding="utf-8")
+    expected = variable_table.table(unit, UNITS[unit].variables)
+    assert written == expected, "run: python -m fmu_src.variable_table"
 
 
 @pytest.mark.e2e
@@ -309,7 +318,7 @@ def test_missing_packages_are_named_with_interpreter_and_command(unit_folder: Pa
         f"import sys; sys.path.insert(0, {str(unit_folder / 'resources')!r})\n"
         "sys.modules['cv2'] = None\nsys.modules['onnxruntime'] = None\n"
         f"from fmu_src_{_folder_guid(unit_folder)}.host import require_packages\n"
-        "require_packages()"
+        f"require_packages('TrpacEstimator', {dict(SLAVE.packages)!r})"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     first_line = done.stderr.splitlines()[0]

@@ -1,6 +1,7 @@
 """Displacement stamps: which frame speaks of the road under the wheel now."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -171,3 +172,16 @@ def test_state_survives_json_bit_for_bit(bounds, confidence, surface, flag):
 def test_negative_distances_are_refused():
     with pytest.raises(ValueError, match="negative"):
         PreviewConfig(hold_m=-1.0)
+
+
+@given(st.lists(st.floats(0.0, 20.0), max_size=12).map(sorted), st.floats(0.0, 25.0))
+def test_forward_drive_is_searched_as_any_other(positions_m, asked_m):
+    state = drive(positions_m)
+    assert state.ascending
+    assert covering(state, CONFIG, asked_m) == covering(replace(state, ascending=False), CONFIG, asked_m)
+
+
+def test_a_rolled_back_drive_is_known_as_one_after_json_too():
+    state = drive([0.0, 1.0, 0.5])
+    assert not state.ascending
+    assert not PreviewState.from_json(json.loads(json.dumps(state.to_json()))).ascending

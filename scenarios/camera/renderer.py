@@ -183,6 +183,11 @@ class Renderer:
         return (exposure * TONE_STEPS_PER_UNIT * np.array(look.white_balance)).astype(np.float32)
 
 
+def ground_beside(camera: Camera) -> NDArray[np.float32]:
+    """How far to the left of the car each pixel's ground lies, shape (height, width) [m]; -1 above the horizon."""
+    return _pixels(camera).y
+
+
 @lru_cache(maxsize=3)
 def _pixels(camera: Camera) -> Pixels:
     """Where each pixel of a camera meets the ground, how large it is there, and where it looks."""

@@ -149,7 +149,7 @@ class IfeState:
 
 
 @dataclass(frozen=True)
-class _Region:
+class Region:
     """One group before the classifier: its corners, and the patches drawn from them."""
 
     corners: Corners
@@ -158,7 +158,7 @@ class _Region:
     ellipses: tuple[Ellipses, ...]
     patches: tuple[NDArray[np.uint8], ...] = ()
 
-    def seen_in(self, image: NDArray[np.uint8]) -> _Region:
+    def seen_in(self, image: NDArray[np.uint8]) -> Region:
         """The region with the patches cut, those without contrast left out."""
         cut = [
             cut_patch(image, centre, width)
@@ -216,19 +216,41 @@ class Ife:
         camera = fit_camera(self.config.camera, image)
         masks = self._segmenter.segment(image) if masks is None else masks
         usable = usable_road(masks, self.config.remove_shadow)
+        regions = self.look(state, image, motion, camera, masks, usable)
+        evidence = self.classify(regions)
+        state, result = self.judge(state, regions, evidence)
+        if with_view:
+            result = replace(result, view=_view(camera, masks, usable, regions, evidence))
+        return state, result
+
+    def look(
+        self,
+        state: IfeState,
+        image: NDArray[np.uint8],
+        motion: Motion,
+        camera: Camera,
+        masks: RoadMasks,
+        usable: NDArray[np.bool_],
+        groups: int = len(GROUP_NAMES),
+    ) -> list[Region]:
+        """The nearest groups' corners and patches in a picture of this camera's size."""
         tracks = self._tracks(motion) if self.config.use_trajectory else []
-        regions = [
+        return [
             self._region(index, state.frame_count, tracks, camera, masks, usable).seen_in(image)
-            for index in range(len(GROUP_NAMES))
+            for index in range(groups)
         ]
-        evidence = self._classify(regions)
+
+    def judge(
+        self, state: IfeState, regions: list[Region], evidence: list[NDArray[np.float64]]
+    ) -> tuple[IfeState, FrameResult]:
+        """The state after a frame and its verdict, from the regions and their patches' probabilities."""
         verdicts = [
             self._fuse(index, state.evidence[index], region.corners, probabilities)
             for index, (region, probabilities) in enumerate(zip(regions, evidence, strict=True))
         ]
-        view = _view(camera, masks, usable, regions, evidence) if with_view else None
-        result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count, view)
-        return IfeState(tuple(weights for weights, _ in verdicts), state.frame_count + 1), result
+        after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
+        result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)
+        return IfeState(after, state.frame_count + 1), result
 
     def _region(
         self,
@@ -238,7 +260,7 @@ class Ife:
         camera: Camera,
         masks: RoadMasks,
         usable: NDArray[np.bool_],
-    ) -> _Region:
+    ) -> Region:
         config = self.config
         low, high = config.ranges_m[index]
         ellipses = tuple(track.within(low, high) for track in tracks)
@@ -252,7 +274,7 @@ class Ife:
         key = (config.seed, frame, index, list(SIDES).index(config.side))
         drawn = sample(corners, config.b[index], key)
         widths = roi_widths_px(camera, corners.ground_m[drawn], config.roi_width_m)
-        return _Region(corners, corners.pixel[drawn], widths, ellipses)
+        return Region(corners, corners.pixel[drawn], widths, ellipses)
 
     def _tracks(self, motion: Motion) -> list[Ellipses]:
         config = self.config
@@ -270,7 +292,7 @@ class Ife:
             for sign in SIDES[config.side]
         ]
 
-    def _classify(self, regions: list[_Region]) -> list[NDArray[np.float64]]:
+    def classify(self, regions: list[Region]) -> list[NDArray[np.float64]]:
         """Calibrated probabilities of the patches of each group, all in one run of the network."""
         patches = [patch for region in regions for patch in region.patches]
         if not patches:
@@ -341,7 +363,7 @@ def _view(
     camera: Camera,
     masks: RoadMasks,
     usable: NDArray[np.bool_],
-    regions: list[_Region],
+    regions: list[Region],
     evidence: list[NDArray[np.float64]],
 ) -> FrameView:
     groups = []

@@ -18,11 +18,16 @@ the tiling is read as:
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from operator import attrgetter
 from typing import Any
 
 from .classes import Surface
+
+_begin = attrgetter("X_lb_m")
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,8 @@ class PreviewState:
 
     stamps: tuple[Stamp, ...] = ()
     captured_at_m: float | None = None
+    ascending: bool = field(default=True, compare=False)
+    """Whether no stamp begins before one of an older frame: so it is unless the car has rolled back."""
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
@@ -96,7 +103,8 @@ class PreviewState:
             Stamp(X_lb, X_ub, Outcome(Surface(surface), Q_v, flag, captured_s))
             for X_lb, X_ub, surface, Q_v, flag, captured_s in data["stamps"]
         )
-        return cls(stamps, data["captured_at_m"])
+        ascending = all(older.X_lb_m <= newer.X_lb_m for older, newer in pairwise(stamps))
+        return cls(stamps, data["captured_at_m"], ascending)
 
 
 def add_frame(
@@ -132,13 +140,18 @@ def add_frame(
     kept = state.stamps
     captured_at_m = position_m
     if kept and 0.0 <= X_lb - kept[-1].X_lb_m < config.resolution_m:
-        newest = replace(kept[-1], X_ub_m=max(kept[-1].X_ub_m, newest.X_ub_m), outcome=outcome)
+        newest = Stamp(kept[-1].X_lb_m, max(kept[-1].X_ub_m, newest.X_ub_m), outcome)
         kept = kept[:-1]
-    return PreviewState((*kept, newest), captured_at_m)
+    ascending = state.ascending and (not kept or kept[-1].X_lb_m <= newest.X_lb_m)
+    return PreviewState((*kept, newest), captured_at_m, ascending)
 
 
 def covering(state: PreviewState, config: PreviewConfig, position_m: float) -> Outcome | None:
     """Outcome for the road at a coordinate now, of the newest frame that covers it; None in a gap."""
+    if state.ascending:
+        begun = bisect_right(state.stamps, position_m, key=_begin)
+        newest = state.stamps[begun - 1] if begun else None
+        return newest.outcome if newest and position_m < newest.X_ub_m + config.hold_m else None
     begun_m = -math.inf
     for stamp in reversed(state.stamps):
         if begun_m < stamp.X_lb_m <= position_m:
@@ -150,13 +163,14 @@ def covering(state: PreviewState, config: PreviewConfig, position_m: float) -> O
 
 
 def prune(state: PreviewState, config: PreviewConfig, position_m: float) -> PreviewState:
-    """The state without the stamps that lie behind the wheels when the front wheel is at a coordinate."""
+    """The state without the oldest stamps that lie behind the wheels when the front wheel is at a coordinate.
+
+    An expired stamp after one that still holds stays: it ends the older ones that began before it.
+    """
     rear_m = position_m - config.behind_m
-    kept: list[Stamp] = []
-    first_m = math.inf
+    expired = 0
     for stamp in state.stamps:
-        # An expired stamp still ends the older ones that began before it.
-        if stamp.X_ub_m + config.hold_m > rear_m or stamp.X_lb_m >= first_m:
-            kept.append(stamp)
-            first_m = min(first_m, stamp.X_lb_m)
-    return state if len(kept) == len(state.stamps) else replace(state, stamps=tuple(kept))
+        if stamp.X_ub_m + config.hold_m > rear_m:
+            break
+        expired += 1
+    return replace(state, stamps=state.stamps[expired:]) if expired else state

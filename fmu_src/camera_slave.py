@@ -1,0 +1,127 @@
+"""What the estimators' units have in common: networks, frames, optional inputs, the estimator's state."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+from pythonfmu.enums import Fmi2Status
+
+from trpac_core.vision.images import ImageError
+from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
+
+from .frames import BusClass, FrameState, next_frame
+from .guarded_slave import GuardedSlave
+
+SEGMENTER_FILE = "segmenter.onnx"
+CLASSIFIER_FILE = "surface.onnx"
+
+
+class Estimator(Protocol):
+    """What a unit's step needs of the estimator that it wraps."""
+
+    @property
+    def last(self) -> Any:
+        """The estimate of the step before."""
+
+    def step(self, step_s: float, sensors: Any, frame: Any = None, *, frame_failed: bool = False) -> Any:
+        """One step."""
+
+    def state(self) -> Mapping[str, Any]:
+        """All that is remembered."""
+
+    def restore(self, data: Mapping[str, Any]) -> None:
+        """Go back to what `state` gave."""
+
+
+class CameraSlave(GuardedSlave):
+    """Sensors and camera frames into an estimator, its estimate out.
+
+    A unit gives `bus` and overrides `build`, `sensors`, `publish` and `problems`.
+    """
+
+    bus: ClassVar[tuple[BusClass, ...]]
+    """Inputs in which a surface class may come by bus."""
+    _networks: ClassVar[tuple[Segmenter, SurfaceClassifier] | None] = None
+
+    @abstractmethod
+    def build(
+        self, values: Mapping[str, Any], networks: tuple[Segmenter, SurfaceClassifier] | None
+    ) -> Estimator:
+        """The estimator under these parameters; ValueError where they cannot be applied."""
+
+    @abstractmethod
+    def sensors(self) -> Any:
+        """The inputs as the estimator's sensors."""
+
+    @abstractmethod
+    def publish(self, estimate: Any) -> None:
+        """Set the outputs."""
+
+    @abstractmethod
+    def problems(self, estimate: Any) -> Iterable[tuple[str, str]]:
+        """Unusable readings: what distinguishes one from another in the log, and a sentence."""
+
+    def prepare(self) -> None:
+        """Load the networks, once per process; raises ModelError.
+
+        In the unit this module's name holds the hash of all that the unit carries, networks included:
+        those of another unit cannot be meant.
+        """
+        if CameraSlave._networks is None:
+            folder = Path(str(self.resources))
+            CameraSlave._networks = (
+                Segmenter(folder / SEGMENTER_FILE),
+                SurfaceClassifier(folder / CLASSIFIER_FILE),
+            )
+
+    def initialise(self) -> None:
+        """Apply the parameters; ValueError where they cannot be applied."""
+        self._estimator = self.build(self.values, self._networks)
+        self._connected: set[str] = set()
+        self._frame = FrameState()
+        self.publish(self._estimator.last)
+
+    def step(self, step_s: float) -> None:
+        """Hand sensors and a new frame to the estimator, and publish its estimate."""
+        sensors = self.sensors()
+        self._frame, frame, problem = next_frame(self._frame, self.values, self.bus)
+        self.clear_volatile()
+        try:
+            estimate = self._estimator.step(step_s, sensors, frame, frame_failed=self._frame.failed)
+        except (ImageError, ModelError) as error:
+            problem = str(error)
+            self._frame = replace(self._frame, failed=True)
+            estimate = self._estimator.step(step_s, sensors, frame_failed=True)
+        self.publish(estimate)
+        if problem:
+            self.report("frame", Fmi2Status.warning, f"{self.modelName}: {problem}")
+        for kind, text in self.problems(estimate):
+            self.report(f"sensors {kind}", Fmi2Status.warning, f"{self.modelName}: {text}")
+
+    def optional(self, name: str) -> float | None:
+        """An input that counts as connected from its first value other than 0; None before."""
+        value: float = self.values[name]
+        if value != 0.0:
+            self._connected.add(name)
+        elif name not in self._connected:
+            return None
+        return value
+
+    def inner_state(self) -> dict[str, Any]:
+        """Estimator, frames and connected inputs, JSON-able and exact."""
+        return {
+            "estimator": self._estimator.state(),
+            "frame": asdict(self._frame),
+            "connected": sorted(self._connected),
+        }
+
+    def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
+        """Take back what `inner_state` gave under these variable values."""
+        frame = FrameState(**state["frame"])
+        estimator = self.build(values, self._networks)
+        estimator.restore(state["estimator"])
+        self._estimator, self._frame, self._connected = estimator, frame, set(state["connected"])

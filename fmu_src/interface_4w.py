@@ -1,0 +1,106 @@
+"""The variables of the unit `TrpacEstimator4W`, in the order of their value references.
+
+They are those of one wheel: what each wheel has is there four times, what each side of the road has is there twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from trpac_core.dife import GREATEST_THETA
+from trpac_core.four_wheels import WHEELS, FourWheelsConfig
+
+from .settings import PARAMETERS
+from .signals import INPUTS, OUTPUTS
+from .variables import Kind, Variable
+
+PER_WHEEL = ("wheel_speed", "wheel_torque", "vertical_load")
+PER_SIDE = ("road_class", "road_class_confidence")
+SIDES = ("left", "right")
+WHICH_WHEEL = ("wheel.front", "wheel.left")
+"""Parameters of the one-wheel unit that say which wheel it is."""
+PLACES = dict(zip(WHEELS, ("front left", "front right", "rear left", "rear right"), strict=True))
+
+
+def _at_each_wheel(variable: Variable) -> Iterator[Variable]:
+    for wheel, place in PLACES.items():
+        yield replace(
+            variable,
+            name=f"{variable.name}.{wheel}",
+            description=f"{_capital(place)} wheel: {variable.description}",
+        )
+
+
+def _input(variable: Variable) -> Iterator[Variable]:
+    if variable.name in PER_WHEEL:
+        yield from _at_each_wheel(variable)
+    elif variable.name in PER_SIDE:
+        for side in SIDES:
+            yield replace(
+                variable,
+                name=f"{variable.name}.{side}",
+                description=f"{_capital(side)} track: {variable.description}",
+            )
+    else:
+        yield variable
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+_LATERAL = Variable(
+    "lateral_acceleration",
+    Kind.REAL,
+    "input",
+    "continuous",
+    "Lateral acceleration, positive to the left; counts from its first value other than 0, beside a longitudinal one",
+    "m/s2",
+    0.0,
+    nominal=10.0,
+)
+_OF_THE_CAR = (
+    Variable(
+        "TRPAC.vehicle",
+        Kind.REAL,
+        "output",
+        "continuous",
+        "Adhesion that the braking car can use: front wheels each their own, rear axle that of its more slippery side",
+        "1",
+        None,
+        0.0,
+        GREATEST_THETA,
+    ),
+    Variable(
+        "TRPAC_std.vehicle",
+        Kind.REAL,
+        "output",
+        "continuous",
+        "Standard deviation of TRPAC.vehicle",
+        "1",
+        None,
+        0.0,
+    ),
+)
+_AXLE_DEVIATION = Variable(
+    "estimator.axle_deviation",
+    Kind.REAL,
+    "parameter",
+    "fixed",
+    "Standard deviation of the road's change between the wheels of one side, a wheelbase apart",
+    "1",
+    FourWheelsConfig().axle_deviation,
+    0.0,
+    source="axle_deviation",
+)
+
+TRPAC_ESTIMATOR_4W = (
+    *(made for variable in INPUTS for made in _input(variable)),
+    _LATERAL,
+    *(made for variable in OUTPUTS for made in _at_each_wheel(variable)),
+    *_OF_THE_CAR,
+    _AXLE_DEVIATION,
+    *(replace(v, source=f"wheel.{v.source}") for v in PARAMETERS if v.name not in WHICH_WHEEL),
+)
+"""Variables of the unit `TrpacEstimator4W`."""

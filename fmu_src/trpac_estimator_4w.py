@@ -1,0 +1,74 @@
+"""The unit `TrpacEstimator4W`: the estimators of four wheels behind the FMI 2.0 co-simulation interface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import chain
+from typing import Any, ClassVar
+
+from trpac_core.four_wheels import WHEELS, CarEstimate, CarSensors, FourWheels, FourWheelsConfig
+from trpac_core.vision.networks import Segmenter, SurfaceClassifier
+from trpac_core.vision.sides import SidesIfe
+
+from .camera_slave import CameraSlave
+from .estimate_outputs import OF_ESTIMATE, OUTPUTS
+from .frames import CLASS_PER_SIDE, BusClass
+from .interface_4w import TRPAC_ESTIMATOR_4W
+from .parameters import configuration
+from .variables import Variable
+
+_OUTPUTS = (
+    *(f"{name}.{wheel}" for wheel in WHEELS for name in OUTPUTS),
+    "TRPAC.vehicle",
+    "TRPAC_std.vehicle",
+)
+_LOADS = tuple(f"vertical_load.{wheel}" for wheel in WHEELS)
+
+
+class TrpacEstimator4W(CameraSlave):
+    """Sensors of the car and camera frames in, TRPAC, flag and K_v of each wheel and the car's TRPAC out."""
+
+    variables: ClassVar[tuple[Variable, ...]] = TRPAC_ESTIMATOR_4W
+    volatile: ClassVar[frozenset[str]] = frozenset(v.name for v in TRPAC_ESTIMATOR_4W if v.binary)
+    bus: ClassVar[tuple[BusClass, ...]] = CLASS_PER_SIDE
+
+    def build(
+        self, values: Mapping[str, Any], networks: tuple[Segmenter, SurfaceClassifier] | None
+    ) -> FourWheels:
+        """The estimators under these parameters; ValueError where they cannot be applied."""
+        config = configuration(self.variables, values, FourWheelsConfig())
+        return FourWheels(config, SidesIfe(config.wheel.image_settings, *networks) if networks else None)
+
+    def sensors(self) -> CarSensors:
+        """The inputs as the estimators' sensors."""
+        values = self.values
+        fl, fr, rl, rr = (self.optional(name) for name in _LOADS)
+        return CarSensors(
+            (
+                values["wheel_speed.fl"],
+                values["wheel_speed.fr"],
+                values["wheel_speed.rl"],
+                values["wheel_speed.rr"],
+            ),
+            (
+                values["wheel_torque.fl"],
+                values["wheel_torque.fr"],
+                values["wheel_torque.rl"],
+                values["wheel_torque.rr"],
+            ),
+            values["vehicle_speed"],
+            (fl, fr, rl, rr),
+            values["steering_angle"],
+            self.optional("longitudinal_acceleration"),
+            self.optional("lateral_acceleration"),
+            self.optional("yaw_rate"),
+        )
+
+    def publish(self, estimate: CarEstimate) -> None:
+        """Set the outputs."""
+        car = (estimate.TRPAC, estimate.TRPAC_std)
+        self.values.update(zip(_OUTPUTS, chain(*map(OF_ESTIMATE, estimate.wheels), car), strict=True))
+
+    def problems(self, estimate: CarEstimate) -> Iterable[tuple[str, str]]:
+        """Unusable readings, by the wheel that holds."""
+        return ((who, f"{who}: {text}") for who, text in estimate.problems)

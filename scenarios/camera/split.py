@@ -1,0 +1,54 @@
+"""Pictures of a road whose sides differ: two worlds of one look, joined along the car's middle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trpac_core.vision.camera import Camera
+
+from .renderer import Renderer, ground_beside
+from .scene import RenderedFrame, SceneLook, SurfaceSegment
+
+
+class _Side(Renderer):
+    """One side's world, exposed as the camera that sees both."""
+
+    other: Renderer | None = None
+
+    def _gains(self, position_m: float) -> NDArray[np.float32]:
+        own = super()._gains(position_m)
+        if self.other is None:
+            return own
+        return np.sqrt(own * Renderer._gains(self.other, position_m)).astype(np.float32)
+
+
+class SplitRenderer:
+    """Like `Renderer`, with a list of surfaces for each side of the lane's middle.
+
+    One exposure serves the whole picture: the geometric mean of what each side's road would ask for.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        left: Sequence[SurfaceSegment],
+        right: Sequence[SurfaceSegment],
+        look: SceneLook,
+    ) -> None:
+        self._left, self._right = _Side(camera, left, look), _Side(camera, right, look)
+        self._left.other, self._right.other = self._right, self._left
+        self._on_left = ground_beside(camera) > 0.0
+
+    def frame(self, front_axle_position_m: float) -> RenderedFrame:
+        """The picture and labels from a car in its lane's middle; see `Renderer.frame`."""
+        left, right = (side.frame(front_axle_position_m) for side in (self._left, self._right))
+        on_left = self._on_left
+        return RenderedFrame(
+            np.where(on_left[..., None], left.image, right.image),
+            np.where(on_left, left.drivable, right.drivable),
+            np.where(on_left, left.shadow, right.shadow),
+            np.where(on_left, left.surface, right.surface),
+        )

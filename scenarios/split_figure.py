@@ -1,0 +1,67 @@
+"""The figure of a drive on split friction: each wheel on its own side's road, and the car."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+
+ESTIMATE, CAMERA, TRUTH, EXCITED = "#c0272d", "#d08a00", "#222222", "#dfe8d8"
+PANELS = (("fl", "front left"), ("fr", "front right"), ("rl", "rear left"), ("rr", "rear right"))
+
+
+def draw_split(table: pd.DataFrame, path: Path) -> None:
+    """Write the figure: four panels placed as the wheels are, the car below, the speed last."""
+    time = table["time_s"].to_numpy()
+    with plt.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}):
+        figure, axes = plt.subplot_mosaic(
+            [["fl", "fr"], ["rl", "rr"], ["vehicle", "vehicle"], ["speed", "speed"]],
+            figsize=(10.0, 9.5),
+            height_ratios=[2.0, 2.0, 2.0, 0.9],
+            sharex=True,
+        )
+        for wheel, title in PANELS:
+            _estimates(axes[wheel], table, time, wheel)
+            axes[wheel].set_title(title)
+        _estimates(axes["vehicle"], table, time, "vehicle")
+        axes["vehicle"].set_title("car: what braking can use")
+        handles, labels = axes["fl"].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper center", ncols=len(labels), frameon=False)
+        axes["speed"].plot(time, table["speed_m_s"], color=TRUTH, linewidth=1.2)
+        axes["speed"].set_ylabel("speed [m/s]")
+        axes["speed"].set_xlabel("time [s]")
+        axes["speed"].set_xlim(time[0], time[-1])
+        figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.97))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=120)
+        plt.close(figure)
+
+
+def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray, place: str) -> None:
+    theta, deviation = table[f"TRPAC.{place}"].to_numpy(), table[f"TRPAC_std.{place}"].to_numpy()
+    if f"excitation_flag.{place}" in table:
+        excited = table[f"excitation_flag.{place}"].to_numpy() > 0.5
+        axis.fill_between(
+            time, 0.0, 1.2, where=excited, color=EXCITED, linewidth=0.0, label="tyre excited", step="mid"
+        )
+        seen = np.where(table[f"flag.{place}"] > 0.5, table[f"TRPAC_image.{place}"], np.nan)
+        axis.plot(time, seen, color=CAMERA, linewidth=1.0, label="camera's class")
+    axis.fill_between(
+        time,
+        theta - 2.0 * deviation,
+        theta + 2.0 * deviation,
+        color=ESTIMATE,
+        alpha=0.15,
+        linewidth=0.0,
+        label="+-2 TRPAC_std",
+    )
+    axis.plot(time, table[f"theta.{place}"], color=TRUTH, linewidth=1.2, linestyle="--", label="true")
+    axis.plot(time, theta, color=ESTIMATE, linewidth=1.4, label="TRPAC")
+    axis.set_ylim(0.0, 1.2)
+    axis.set_ylabel("theta [-]")

@@ -1,0 +1,237 @@
+"""Braking on split friction: plant and four-wheel estimator as two units under fmpy.
+
+``python -m scenarios.split_friction --out DIR [--pictures] [--figure FILE.png]``
+
+The car comes at 22 m/s onto a road whose left side is ice, later its right side, and brakes in pulses. In a pulse each
+wheel is braked to a share of what its own road carries, as anti-lock control does. The camera side is either the
+plant's class by bus or rendered pictures that show each side's surface.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+from fmpy import read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.units import UNITS
+from scenarios.camera.files import load_camera
+from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.split import SplitRenderer
+from scenarios.files import WHEELS, load_road, load_vehicle
+from trpac_core.car_friction import Friction, car_friction
+
+HERE = Path(__file__).parent
+ROAD = HERE / "roads" / "split_friction.yaml"
+VEHICLE = HERE / "vehicles" / "four_in_wheel_motor_ev.yaml"
+CAMERA = HERE / "cameras" / "paper.yaml"
+
+STEP_S, FRAME_STEPS = 0.001, 50
+START_M_S, END_M = 22.0, 95.0
+PULSE_S, PERIOD_S, RAMP_S = 0.4, 0.6, 0.05
+FIRST_PULSE_S = 0.3
+USED_SHARE = 0.9
+"""Share of theta F_z that each wheel is braked with in a pulse [-]."""
+NOISE = {"wheel_speed": 0.01, "wheel_torque": 3.2, "vehicle_speed": 0.003, "longitudinal_acceleration": 0.05}
+"""Standard deviations as in the paper's scenario, in the units of the signals."""
+NAMES = ("TRPAC", "TRPAC_std", "TRPAC_image", "excitation_flag", "flag")
+
+
+class Unit:
+    """A unit in a host's hands, variables by name."""
+
+    def __init__(self, folder: Path, parameters: Mapping[str, float | str]) -> None:
+        description = read_model_description(str(folder))
+        self._variables = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
+        self._unit = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=description.modelName,
+        )
+        self._unit.instantiate()
+        self._unit.setupExperiment(startTime=0.0)
+        self.set(parameters)
+        self._unit.enterInitializationMode()
+        self._unit.exitInitializationMode()
+
+    def set(self, values: Mapping[str, float | str]) -> None:
+        """Set variables of any type."""
+        for name, value in values.items():
+            reference, kind = self._variables[name]
+            getattr(self._unit, f"set{kind}")([reference], [value])
+
+    def get(self, name: str) -> float:
+        """A numeric variable's value."""
+        reference, kind = self._variables[name]
+        return float(getattr(self._unit, f"get{kind}")([reference])[0])
+
+    def at_wheels(self, name: str) -> list[float]:
+        """Values of a variable that each wheel has."""
+        references, kinds = zip(*(self._variables[f"{name}.{wheel}"] for wheel in WHEELS), strict=True)
+        return [float(value) for value in getattr(self._unit, f"get{kinds[0]}")(list(references))]
+
+    def step(self, time_s: float) -> None:
+        """One communication step."""
+        self._unit.doStep(time_s, STEP_S)
+
+    def free(self) -> None:
+        """Let the instance go."""
+        self._unit.freeInstance()
+
+
+@contextmanager
+def opened(name: str, folder: Path, parameters: Mapping[str, float | str]) -> Iterator[Unit]:
+    """Build a unit and open it; unpacked and freed for this run alone."""
+    unpacked = unpack_unit(build_unit(UNITS[name], folder / f"{name}.fmu"))
+    unit = Unit(unpacked, parameters)
+    try:
+        yield unit
+    finally:
+        unit.free()
+        shutil.rmtree(unpacked, ignore_errors=True)
+
+
+def pulse(time_s: float) -> float:
+    """Share of the full braking torque at a time, a trapezium per period [-]."""
+    since = (time_s - FIRST_PULSE_S) % PERIOD_S
+    if time_s < FIRST_PULSE_S:
+        return 0.0
+    return float(np.clip(min(since, PULSE_S - since) / RAMP_S, 0.0, 1.0))
+
+
+def run(out: Path, *, pictures: bool = False, seed: int = 1, road: Path = ROAD) -> pd.DataFrame:
+    """Drive both units over a road; returns one row per step, in the order of time.
+
+    Parameters
+    ----------
+    out : Path
+        Where units and pictures go.
+    pictures : bool
+        Whether the estimator sees rendered pictures, or is given the plant's class.
+    seed : int
+        Of the sensors' noise and of the pictures' world.
+    road : Path
+        The road file.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    radius_m = load_vehicle(VEHICLE).wheel_radius_m
+    settings: dict[str, float | str] = {
+        "tyre.rolling_resistance": 0.0065,
+        "camera.fps": 1.0 / (FRAME_STEPS * STEP_S),
+    }
+    start: dict[str, float | str] = {"road_path": str(road), "initial.vehicle_speed": START_M_S}
+    rng = np.random.default_rng([seed, 3])
+    world = _world(road, seed) if pictures else None
+    rows = []
+    with (
+        opened("ReferencePlant", out, start) as plant,
+        opened("TrpacEstimator4W", out, settings) as estimator,
+    ):
+        step = 0
+        while plant.get("position") < END_M and plant.get("vehicle_speed") > 2.0:
+            share = USED_SHARE * pulse(step * STEP_S)
+            loads, thetas = plant.at_wheels("vertical_load"), plant.at_wheels("theta")
+            torques = [-share * theta * load * radius_m for theta, load in zip(thetas, loads, strict=True)]
+            estimator.set(_measured(plant, torques, rng))
+            if step % FRAME_STEPS == 0:
+                estimator.set(_frame(plant, world, out / "frames", step // FRAME_STEPS + 1))
+            # Both start at the same time: what the car measures now, and what it is told to do from now on.
+            estimator.step(step * STEP_S)
+            rows.append(_row(step * STEP_S, plant, estimator, loads, thetas))
+            plant.set({f"wheel_torque.{w}": torque for w, torque in zip(WHEELS, torques, strict=True)})
+            plant.step(step * STEP_S)
+            step += 1
+    return pd.DataFrame(rows)
+
+
+def _measured(plant: Unit, torques: list[float], rng: np.random.Generator) -> dict[str, float | str]:
+    """The car's sensors: the plant's truth with noise; torque as commanded for the step to come."""
+    values: dict[str, float | str] = {}
+    for wheel, torque, speed in zip(WHEELS, torques, plant.at_wheels("wheel_speed"), strict=True):
+        values[f"wheel_torque.{wheel}"] = torque + NOISE["wheel_torque"] * rng.standard_normal()
+        values[f"wheel_speed.{wheel}"] = speed + NOISE["wheel_speed"] * rng.standard_normal()
+    for name in ("vehicle_speed", "longitudinal_acceleration"):
+        values[name] = plant.get(name) + NOISE[name] * rng.standard_normal()
+    return values
+
+
+def _world(road: Path, seed: int) -> SplitRenderer:
+    segments = load_road(road).segments
+    left, right = ([SurfaceSegment(s.start_m, s.surface_classes[side]) for s in segments] for side in (0, 1))
+    look = SceneLook(seed=seed, sky="overcast", sun_share=0.0, trees_per_100_m=0.0, bridges_per_100_m=0.0)
+    return SplitRenderer(load_camera(CAMERA), _joined(left), _joined(right), look)
+
+
+def _joined(segments: list[SurfaceSegment]) -> list[SurfaceSegment]:
+    """Neighbours of one surface as one segment."""
+    return [s for i, s in enumerate(segments) if i == 0 or s.surface != segments[i - 1].surface]
+
+
+def _frame(plant: Unit, world: SplitRenderer | None, folder: Path, number: int) -> dict[str, float | str]:
+    """The inputs that hand a new frame over: a picture's path, or the plant's class of each side."""
+    if world is None:
+        sides = ("left", "right")
+        classes = {f"road_class.{side}": int(plant.get(f"road_class.{side}")) for side in sides}
+        return {**classes, **{f"road_class_confidence.{side}": 0.95 for side in sides}, "frame_id": number}
+    folder.mkdir(exist_ok=True)
+    path = folder / f"{number:05d}.jpg"
+    if not cv2.imwrite(str(path), world.frame(plant.get("position")).image):
+        raise OSError(f"{path}: the picture could not be written; is the disk full?")
+    return {"image_path": str(path.resolve()), "frame_id": number}
+
+
+def _row(
+    time_s: float, plant: Unit, estimator: Unit, loads: list[float], thetas: list[float]
+) -> dict[str, float]:
+    row = {"time_s": time_s, "position_m": plant.get("position"), "speed_m_s": plant.get("vehicle_speed")}
+    for name in NAMES:
+        row |= {
+            f"{name}.{wheel}": value for wheel, value in zip(WHEELS, estimator.at_wheels(name), strict=True)
+        }
+    row |= {f"theta.{wheel}": theta for wheel, theta in zip(WHEELS, thetas, strict=True)}
+    row |= {f"vertical_load.{wheel}": load for wheel, load in zip(WHEELS, loads, strict=True)}
+    row |= {name: estimator.get(name) for name in ("TRPAC.vehicle", "TRPAC_std.vehicle")}
+    fl, fr, rl, rr = (Friction(theta, 0.0) for theta in thetas)
+    row["theta.vehicle"] = car_friction((fl, fr, rl, rr), _four(loads), 0.0).theta
+    return row
+
+
+def _four(values: list[float]) -> tuple[float, float, float, float]:
+    fl, fr, rl, rr = values
+    return fl, fr, rl, rr
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/split_friction"), help="folder (default: %(default)s)"
+    )
+    parser.add_argument("--pictures", action="store_true", help="rendered pictures instead of classes by bus")
+    parser.add_argument("--figure", type=Path, help="picture file; default: split_friction.png in the folder")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    from scenarios.split_figure import draw_split
+
+    table = run(options.out, pictures=options.pictures, seed=options.seed)
+    table.to_csv(options.out / "log.csv", index=False)
+    figure = options.figure or options.out / "split_friction.png"
+    draw_split(table, figure)
+    print(f"{options.out / 'log.csv'}\n{figure}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,63 @@
+"""One picture, two verdicts: each side as its own estimator would judge it, at the cost of one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_ife import CAMERA, DRY, SNOW, Masks, Middle, paint
+
+from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.sides import SidesIfe, SidesState
+from trpac_core.vision.trajectory import Motion
+
+STRAIGHT = Motion(12.0)
+SPLIT = np.array([int(DRY), int(SNOW)])
+
+
+def split_road(border_y_m: float = 0.0):
+    """Snow on the left of a line along the road, dry on the right."""
+    return paint(lambda x, y: SPLIT[(y > border_y_m).astype(int)])
+
+
+class Counting(Middle):
+    """The classifier that reads the paint, and counts its runs."""
+
+    runs = 0
+
+    def logits(self, patches):
+        self.runs += 1
+        return super().logits(patches)
+
+
+def test_each_side_gets_its_own_surface_from_one_segmentation_and_one_run():
+    masks, classifier = Masks(), Counting()
+    sides = SidesIfe(IfeConfig(camera=CAMERA), masks, classifier)
+    _, left, right = sides.process(SidesState(), split_road(), STRAIGHT)
+    assert (left.surface, right.surface) == (SNOW, DRY)
+    assert left.flag
+    assert right.flag
+    assert (masks.calls, classifier.runs) == (1, 1)
+    assert len(classifier.patches) == 2 * 4, "the near groups' patches alone"
+
+
+@pytest.mark.parametrize("yaw_rate", [0.0, 0.2, -0.2])
+def test_verdicts_are_those_of_two_estimators_bit_by_bit(yaw_rate):
+    picture = split_road(0.3)
+    motion = Motion(12.0, yaw_rate_rad_s=yaw_rate)
+    sides, state = SidesIfe(IfeConfig(camera=CAMERA), Masks(), Middle()), SidesState()
+    alone = {side: Ife(IfeConfig(camera=CAMERA, side=side), Masks(), Middle()) for side in ("left", "right")}
+    states = dict.fromkeys(alone, IfeState())
+    for _ in range(3):
+        state, *verdicts = sides.process(state, picture, motion)
+        for (side, ife), verdict in zip(alone.items(), verdicts, strict=True):
+            states[side], own = ife.process(states[side], picture, motion)
+            assert verdict.near == own.near
+    for side, one in (("left", state.left), ("right", state.right)):
+        assert one.evidence[0] == states[side].evidence[0]
+
+
+def test_state_survives_json():
+    sides = SidesIfe(IfeConfig(camera=CAMERA), Masks(), Middle())
+    after, *_ = sides.process(SidesState(), split_road(), STRAIGHT)
+    assert SidesState.from_json(after.to_json()) == after
+    assert after != SidesState()

@@ -1,0 +1,305 @@
+"""The estimators of all four wheels behind one camera, and one TRPAC for the car."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .car_friction import Friction, car_friction
+from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
+from .readings import PLAUSIBLE, Sensors
+from .vision.results import FrameResult
+from .vision.sides import SidesIfe, SidesState
+from .vision.trajectory import Motion
+
+WHEELS = ("fl", "fr", "rl", "rr")
+"""Order of all fours: front left, front right, rear left, rear right."""
+CAR = "car"
+"""Whom a problem of a shared signal concerns."""
+LIFTED_N = 1.0
+"""Load of a wheel that lateral acceleration lifts: the tyre's equations need one above 0 [N]."""
+
+_STEEPEST = PLAUSIBLE["longitudinal_acceleration_m_s2"]
+_FASTEST, _TURNING, _STEERED = (
+    PLAUSIBLE[name] for name in ("vehicle_speed_m_s", "yaw_rate_rad_s", "steering_angle_rad")
+)
+
+Four = tuple[float, float, float, float]
+OptionalFour = tuple[float | None, float | None, float | None, float | None]
+
+
+_UNKNOWN: OptionalFour = (None, None, None, None)
+
+
+class CarSensors(NamedTuple):
+    """What the car measures now; what is None is not connected. Signs as in `Sensors`."""
+
+    wheel_speed_rad_s: Four
+    wheel_torque_nm: Four
+    vehicle_speed_m_s: float
+    """At the middle of the rear axle."""
+    vertical_load_n: OptionalFour = _UNKNOWN
+    steering_angle_rad: float = 0.0
+    longitudinal_acceleration_m_s2: float | None = None
+    lateral_acceleration_m_s2: float | None = None
+    """Positive to the left; counts only beside a longitudinal one."""
+    yaw_rate_rad_s: float | None = None
+
+
+class SideClasses(NamedTuple):
+    """Surface classes that another classifier found on the left and on the right, in place of a picture."""
+
+    left: RoadClass | None
+    right: RoadClass | None
+
+
+@dataclass(frozen=True)
+class FourWheelsConfig:
+    """Settings of the four estimators.
+
+    Parameters
+    ----------
+    wheel : EstimatorConfig
+        Of each wheel; which wheel it is, is set for each.
+    axle_deviation : float
+        How far friction may differ between the wheels of one side, a wheelbase apart: the standard deviation of the
+        road's change over that way, about 0.05 per root of a metre [-].
+    """
+
+    wheel: EstimatorConfig = field(default_factory=EstimatorConfig)
+    axle_deviation: float = 0.08
+
+    def of_wheel(self, name: str) -> EstimatorConfig:
+        """Settings of the wheel fl, fr, rl or rr."""
+        return replace(self.wheel, front_axle=name.startswith("f"), left_side=name.endswith("l"))
+
+
+class CarEstimate(NamedTuple):
+    """What the estimators say at a step."""
+
+    wheels: tuple[Estimate, Estimate, Estimate, Estimate]
+    TRPAC: float
+    """The car's adhesion, see `car_friction` [-]."""
+    TRPAC_std: float
+    """Its standard deviation [-]."""
+    problems: tuple[tuple[str, str], ...] = ()
+    """Who could not be estimated (a wheel's name, or `CAR` where all could not), and why."""
+
+
+class FourWheels:
+    """Four one-wheel estimators that share a camera; each goes on where another's sensors fail.
+
+    A picture is segmented once; the patches of the left and of the right track are classified in one run, and each
+    side's verdict goes to its two wheels. A rear wheel reaches the road that was seen a wheelbase later.
+
+    Parameters
+    ----------
+    config : FourWheelsConfig
+        Settings.
+    ife : SidesIfe or None
+        Classifies pictures; None where only classes come, or nothing.
+
+    Notes
+    -----
+    In a curve each wheel rolls at the speed of its own place on the rigid car, turned by yaw rate or else steering. A
+    measured lateral acceleration moves load between the sides of each axle in the share of the axle's mass.
+    """
+
+    def __init__(self, config: FourWheelsConfig, ife: SidesIfe | None = None) -> None:
+        self.config = config
+        self._ife = ife
+        self._wheels = tuple(TrpacEstimator(config.of_wheel(name)) for name in WHEELS)
+        car = config.wheel.vehicle
+        self._half_track_m, self._wheelbase_m = car.track_m / 2.0, car.wheelbase_m
+        front_n, rear_n = car.wheel_load(True), car.wheel_load(False)
+        self._static_n = (front_n, front_n, rear_n, rear_n)
+        per_m_s2 = car.mass_kg * car.cog_height_m / (car.track_m * car.wheelbase_m)
+        self._roll_kg = (per_m_s2 * car.cog_to_rear_axle_m, per_m_s2 * car.cog_to_front_axle_m)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        for wheel in self._wheels:
+            wheel.reset()
+        self._camera = SidesState()
+        self._last = self._together(self._static_n, ())
+
+    @property
+    def last(self) -> CarEstimate:
+        """The estimate of the step before."""
+        return self._last
+
+    def step(
+        self,
+        step_s: float,
+        sensors: CarSensors,
+        frame: NDArray[np.uint8] | SideClasses | None = None,
+        *,
+        frame_failed: bool = False,
+    ) -> CarEstimate:
+        """One step of all wheels; parameters as in `TrpacEstimator.step`, for the whole car.
+
+        Returns
+        -------
+        CarEstimate
+            A wheel whose readings are unusable holds its last good estimate, and `problems` says why; the others go on.
+
+        Raises
+        ------
+        ImageError
+            If the picture does not fit the camera; nothing has changed then.
+        """
+        left, right = self._verdicts(sensors, frame)
+        speeds_m_s = self._local_speeds(sensors)
+        loads_n, given_n = self._loads(sensors)
+        omega, torque = sensors.wheel_speed_rad_s, sensors.wheel_torque_nm
+        steering, yaw = sensors.steering_angle_rad, sensors.yaw_rate_rad_s
+        accel = sensors.longitudinal_acceleration_m_s2
+        sides = (left, right, left, right)
+        problems = []
+        for i, wheel in enumerate(self._wheels):
+            one = Sensors(omega[i], torque[i], speeds_m_s[i], given_n[i], steering, accel, yaw)
+            estimate = wheel.step(step_s, one, sides[i], frame_failed=frame_failed)
+            if estimate.problem is not None:
+                problems.append((WHEELS[i], estimate.problem))
+        self._last = self._together(loads_n, self._told(sensors, problems) if problems else ())
+        return self._last
+
+    def _together(self, loads_n: Four, problems: tuple[tuple[str, str], ...]) -> CarEstimate:
+        """The wheels' estimates and the car's."""
+        fl, fr, rl, rr = (wheel.last for wheel in self._wheels)
+        theta, deviation = car_friction(
+            (
+                Friction(fl.TRPAC, fl.TRPAC_std),
+                Friction(fr.TRPAC, fr.TRPAC_std),
+                Friction(rl.TRPAC, rl.TRPAC_std),
+                Friction(rr.TRPAC, rr.TRPAC_std),
+            ),
+            loads_n,
+            self.config.axle_deviation,
+        )
+        return CarEstimate((fl, fr, rl, rr), theta, deviation, problems)
+
+    def _told(self, sensors: CarSensors, problems: list[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
+        """Problems by whom they concern; one that all wheels share is the car's."""
+        lateral = sensors.lateral_acceleration_m_s2
+        if lateral is not None and not abs(lateral) <= _STEEPEST:
+            expected = f"expected a number within +-{_STEEPEST:g}. Check the signal's source and unit."
+            return ((CAR, f"lateral_acceleration_m_s2 is {lateral:g}, {expected}"),)
+        if len(problems) == len(WHEELS) and len({text for _, text in problems}) == 1:
+            return ((CAR, problems[0][1]),)
+        return tuple(problems)
+
+    def _verdicts(
+        self, sensors: CarSensors, frame: NDArray[np.uint8] | SideClasses | None
+    ) -> tuple[RoadClass | None, RoadClass | None]:
+        """What a new frame says of the left and of the right track; nothing where the car's motion is not known."""
+        if frame is None or isinstance(frame, SideClasses):
+            return frame or (None, None)
+        if self._ife is None:
+            raise TypeError("A picture came, but the estimator was made without an image estimator.")
+        if not self._motion_known(sensors):
+            return None, None
+        accel = sensors.longitudinal_acceleration_m_s2
+        motion = Motion(
+            sensors.vehicle_speed_m_s,
+            accel if accel is not None and abs(accel) <= _STEEPEST else 0.0,
+            sensors.steering_angle_rad,
+            sensors.yaw_rate_rad_s,
+        )
+        self._camera, left, right = self._ife.process(self._camera, frame, motion)
+        return self._as_class(left), self._as_class(right)
+
+    def _as_class(self, result: FrameResult) -> RoadClass:
+        """A verdict in the form that a wheel takes: its flag is up where the confidence is above the threshold."""
+        threshold = self.config.wheel.vision.flag_threshold
+        return RoadClass(result.surface, result.Q_v if result.flag else min(result.Q_v, threshold))
+
+    @staticmethod
+    def _motion_known(sensors: CarSensors) -> bool:
+        return (
+            abs(sensors.vehicle_speed_m_s) <= _FASTEST
+            and abs(sensors.steering_angle_rad) <= _STEERED
+            and abs(sensors.yaw_rate_rad_s or 0.0) <= _TURNING
+        )
+
+    def _local_speeds(self, sensors: CarSensors) -> Four:
+        """Speed of the road under each wheel, along the wheel: rigid car that turns about the rear axle's line [m/s].
+
+        Where steering or yaw rate are no good readings the car's speed stands for all: each wheel will say so itself.
+        """
+        speed, steering, yaw = (
+            sensors.vehicle_speed_m_s,
+            sensors.steering_angle_rad,
+            sensors.yaw_rate_rad_s,
+        )
+        if not (steering or yaw) or not self._motion_known(sensors):
+            return (speed, speed, speed, speed)
+        if yaw is None:
+            yaw = speed * math.tan(steering) / self._wheelbase_m
+        across = yaw * self._half_track_m
+        ahead, aside = math.cos(steering), yaw * self._wheelbase_m * math.sin(steering)
+        left, right = speed - across, speed + across
+        return (left * ahead + aside, right * ahead + aside, left, right)
+
+    def _loads(self, sensors: CarSensors) -> tuple[Four, OptionalFour]:
+        """Vertical loads for the car's sum, and what the wheels are given of them [N].
+
+        A wheel works the load out itself, from the filtered acceleration, unless a sensor or a lateral transfer tells.
+        """
+        given, loads = sensors.vertical_load_n, self._static_n
+        accel, lateral = sensors.longitudinal_acceleration_m_s2, sensors.lateral_acceleration_m_s2
+        if accel is not None and abs(accel) <= _STEEPEST:
+            car = self.config.wheel.vehicle
+            front_n, rear_n = car.wheel_load(True, accel), car.wheel_load(False, accel)
+            loads = (front_n, front_n, rear_n, rear_n)
+            if lateral is not None:
+                loads = self._leaning(front_n, rear_n, lateral)
+                given = _first_known(given, loads)
+        if given == _UNKNOWN:
+            return loads, given
+        total = _first_known(given, loads)
+        return (total if all(load > 0.0 and math.isfinite(load) for load in total) else self._static_n), given
+
+    def _leaning(self, front_n: float, rear_n: float, lateral_m_s2: float) -> Four:
+        """Loads under lateral acceleration; NaN where that is none, so that no wheel takes them [N]."""
+        if not abs(lateral_m_s2) <= _STEEPEST:
+            return (math.nan, math.nan, math.nan, math.nan)
+        front, rear = self._roll_kg[0] * lateral_m_s2, self._roll_kg[1] * lateral_m_s2
+        return (
+            max(front_n - front, LIFTED_N),
+            max(front_n + front, LIFTED_N),
+            max(rear_n - rear, LIFTED_N),
+            max(rear_n + rear, LIFTED_N),
+        )
+
+    def state(self) -> dict[str, Any]:
+        """All that is remembered as JSON-able values; floats survive the round trip bit by bit."""
+        return {
+            "wheels": [wheel.state() for wheel in self._wheels],
+            "camera": self._camera.to_json(),
+            "car": [self._last.TRPAC, self._last.TRPAC_std],
+            "problems": [list(problem) for problem in self._last.problems],
+        }
+
+    def restore(self, data: Mapping[str, Any]) -> None:
+        """Go back to what `state` gave."""
+        camera = SidesState.from_json(data["camera"])
+        theta, deviation = data["car"]
+        for wheel, saved in zip(self._wheels, data["wheels"], strict=True):
+            wheel.restore(saved)
+        self._camera = camera
+        fl, fr, rl, rr = (wheel.last for wheel in self._wheels)
+        problems = tuple((who, text) for who, text in data["problems"])
+        self._last = CarEstimate((fl, fr, rl, rr), theta, deviation, problems)
+
+
+def _first_known(measured: OptionalFour, other: Four) -> Four:
+    """Each wheel's measured value, or the other one where there is none."""
+    fl, fr, rl, rr = (own if own is not None else load for own, load in zip(measured, other, strict=True))
+    return (fl, fr, rl, rr)
