@@ -3,8 +3,8 @@
     python -m benchmarks.tune_peers tune     # writes scenarios/peers/tuning.yaml
     python -m benchmarks.tune_peers judge    # table on drives that nothing was tuned on
 
-A drive is the paper's (0.9 / 0.3 / 0.5, seed of the noise) or one with three frictions drawn by the seed. The objective is
-the mean absolute error of theta where the front left tyre truly shows it (d mu / d theta of at least 0.1 at its true
+A drive is the paper's (0.9 / 0.3 / 0.5, seed of the noise) or one with three frictions drawn by the seed. The objective
+is the mean absolute error of theta where the front left tyre truly shows it (d mu / d theta of at least 0.1 at its true
 slip), over the two slippery stretches, plus half of the mean absolute error on the grippy first one: an estimate
 that sinks there because noise looks like sliding is worth as little as one that is late.
 """
@@ -21,12 +21,23 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from scenarios.files import RoadFile, RoadSegment, Scenario, load_scenario
 from scenarios.metrics import score_segment
-from scenarios.peers import EkfPeer, KalmanTuning, PeerSetup, SlipSlopePeer, SlipSlopeTuning, Tuning, UkfPeer, make_peers
+from scenarios.peers import (
+    PEER_NAMES,
+    EkfPeer,
+    PeerSetup,
+    SlipSlopePeer,
+    SlipSlopeTuning,
+    Tuning,
+    UkfPeer,
+    load_tuning,
+    make_peers,
+)
 from scenarios.peers.base import Peer
 from scenarios.peers.tuning import TUNING_FILE, write_tuning
 from scenarios.plant.pipeline import drive
@@ -47,6 +58,26 @@ JUDGING_SEEDS = tuple(range(4000, 4012))
 EVERY = 4
 """Of the 1 kHz log each so many samples while tuning (250 Hz); judged at 1 kHz."""
 GRIPPY_WEIGHT = 0.5
+NOISE = ("torque_share", "acceleration_noise_m_s2", "theta_walk", "measurement_share")
+BOUNDS = {
+    "filter_s": (0.005, 0.05),
+    "memory_s": (0.02, 2.0),
+    "least_slip": (0.002, 0.02),
+    "sliding_slip": (0.03, 0.2),
+    "torque_share": (0.1, 100.0),
+    "acceleration_noise_m_s2": (0.001, 1.0),
+    "theta_walk": (0.002, 1.0),
+    "measurement_share": (0.3, 10.0),
+    "spread": (0.01, 4.0),
+}
+"""Where a value still means what it is called. Without bounds slip-slope goes to a filter of 1.1 s: it then
+tells roads apart by when this one manoeuvre crosses them."""
+TUNED = {
+    SlipSlopePeer.name: ("slip_slope", ("filter_s", "memory_s", "least_slip", "sliding_slip"), SlipSlopePeer),
+    EkfPeer.name: ("ekf", NOISE, EkfPeer),
+    UkfPeer.name: ("ukf", (*NOISE, "spread"), UkfPeer),
+}
+"""By peer: its part of the tuning file, what is searched in it, its class."""
 RANGES = {"dry": (0.7, 1.0), "snow_ice": (0.15, 0.35), "wet": (0.45, 0.65)}
 """Friction that each class is drawn from [-]."""
 
@@ -116,12 +147,14 @@ def run_peer(peer: Peer, d: Drive) -> tuple[Array, Array, NDArray[np.bool_]]:
 
 def objective(theta: Array, d: Drive) -> float:
     error = np.abs(theta - d.theta)
-    slippery = [error[d.shown & (d.segment == i)].mean() for i in (1, 2) if (d.shown & (d.segment == i)).any()]
+    slippery = [
+        error[d.shown & (d.segment == i)].mean() for i in (1, 2) if (d.shown & (d.segment == i)).any()
+    ]
     return float(np.mean(slippery) + GRIPPY_WEIGHT * error[d.moving & (d.segment == 0)].mean())
 
 
 def calibrated(tuning: SlipSlopeTuning, drives: Sequence[Drive]) -> SlipSlopeTuning:
-    """The tuning with the line through slopes and frictions of these drives: least squares, each stretch counts the same."""
+    """The tuning with the line through slopes and frictions of these drives; each stretch counts the same."""
     slopes, thetas, weights = [], [], []
     for d in drives:
         peer, rows = SlipSlopePeer(d.setup, tuning), []
@@ -145,7 +178,15 @@ def calibrated(tuning: SlipSlopeTuning, drives: Sequence[Drive]) -> SlipSlopeTun
     return replace(tuning, gain=float(gain), intercept=float(intercept), map_deviation=deviation)
 
 
-def tune(name: str, start: object, free: Sequence[str], finish: Callable, drives: Sequence[Drive], peer: type, most: int):
+def tune(
+    name: str,
+    start: object,
+    free: Sequence[str],
+    finish: Callable,
+    drives: Sequence[Drive],
+    peer: type,
+    most: int,
+):
     """Nelder-Mead on the logarithms of the free values; also the objective at the start, at the end, and the runs."""
     best: list = [np.inf, start]
     first: list[float] = []
@@ -164,42 +205,51 @@ def tune(name: str, start: object, free: Sequence[str], finish: Callable, drives
 
     logs = np.log([getattr(start, n) for n in free])
     simplex = np.vstack([logs, *(logs + 0.8 * row for row in np.eye(len(free)))])
-    minimize(cost, logs, method="Nelder-Mead", options={"maxfev": most, "initial_simplex": simplex, "fatol": 1e-4, "xatol": 0.02})
+    bounds = [tuple(np.log(BOUNDS[n])) for n in free]
+    options = {"maxfev": most, "initial_simplex": simplex, "fatol": 1e-4, "xatol": 0.02}
+    minimize(cost, logs, method="Nelder-Mead", bounds=bounds, options=options)
     print(file=sys.stderr)
     return best[1], {"start": round(first[0], 4), "end": round(best[0], 4), "runs": len(first)}
 
 
-def tune_all(path: Path) -> None:
+def tune_peers(path: Path, names: Sequence[str], most: int) -> None:
+    """Tune some peers from where the file stands, or from the defaults; the file is written after each."""
     drives = [driven(seed, EVERY) for seed in TUNING_SEEDS]
-    start = time.process_time()
-    slope, of_slope = tune(
-        "slip-slope", SlipSlopeTuning(), ("filter_s", "memory_s", "least_slip", "sliding_slip"),
-        lambda t: calibrated(t, drives), drives, SlipSlopePeer, 120,
-    )
-    noise = ("torque_share", "acceleration_noise_m_s2", "theta_walk", "measurement_share")
-    ekf, of_ekf = tune("EKF", KalmanTuning(), noise, lambda t: t, drives, EkfPeer, 140)
-    ukf, of_ukf = tune("UKF", ekf, (*noise, "spread"), lambda t: t, drives, UkfPeer, 90)
-    how = {
+    known = load_tuning(path) if path.is_file() else Tuning()
+    how = yaml.safe_load(path.read_text(encoding="utf-8"))["how"] if path.is_file() else {}
+    how |= {
         "scenario": SCENARIO.name,
         "seeds": list(TUNING_SEEDS),
         "rate_hz": round(1.0 / drives[0].step_s),
         "method": "Nelder-Mead on logarithms (scipy.optimize.minimize)",
         "objective": "mean abs error where the tyre shows theta, mean of both slippery stretches, "
         f"plus {GRIPPY_WEIGHT} times that on the grippy one",
-        "objective_by_peer": {"slip_slope": of_slope, "ekf": of_ekf, "ukf": of_ukf},
-        "cpu_s": round(time.process_time() - start),
     }
-    write_tuning(path, Tuning(slope, ekf, ukf), how)
+    for name in names:
+        attribute, free, peer = TUNED[name]
+        finish = (lambda t: calibrated(t, drives)) if name == SlipSlopePeer.name else (lambda t: t)
+        start = time.process_time()
+        tuned, found = tune(name, getattr(known, attribute), free, finish, drives, peer, most)
+        known = replace(known, **{attribute: tuned})
+        found["cpu_s"] = round(time.process_time() - start)
+        how.setdefault("runs_by_peer", {}).setdefault(attribute, []).append(found)
+        write_tuning(path, known, how)
     print(path.read_text())
 
 
 def run_de(d: Drive) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Our estimator without a camera, and its start/stop flag."""
-    noise_m_s = float(np.hypot(d.setup.vehicle_speed_noise_m_s, d.setup.vehicle.wheel_radius_m * d.setup.wheel_speed_noise_rad_s))
+    noise_m_s = float(
+        np.hypot(
+            d.setup.vehicle_speed_noise_m_s, d.setup.vehicle.wheel_radius_m * d.setup.wheel_speed_noise_rad_s
+        )
+    )
     estimator = TrpacEstimator(EstimatorConfig(vehicle=d.setup.vehicle, sliding_speed_noise_m_s=noise_m_s))
     said = []
     for omega, torque, speed, acceleration in d.readings.tolist():
-        e = estimator.step(d.step_s, Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration))
+        e = estimator.step(
+            d.step_s, Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
+        )
         said.append((e.TRPAC, e.TRPAC_std, e.excitation_flag))
     theta, std, excited = np.array(said, dtype=np.float64).T
     return theta, std, excited > 0.0
@@ -272,12 +322,20 @@ def _summed(rows: list[dict[str, float | None]]) -> dict[str, str]:
     }
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("what", choices=("tune", "judge"))
     parser.add_argument("--out", type=Path, help="tuning.yaml to write, or a JSON file for the judgement")
+    parser.add_argument("--peers", nargs="+", choices=PEER_NAMES, default=PEER_NAMES, help="which to tune")
+    parser.add_argument("--most", type=int, default=90, help="runs of the objective per peer")
     arguments = parser.parse_args()
     if arguments.what == "tune":
-        tune_all(arguments.out or TUNING_FILE)
+        tune_peers(arguments.out or TUNING_FILE, arguments.peers, arguments.most)
     else:
         judge(arguments.out)
+
+
+if __name__ == "__main__":
+    main()

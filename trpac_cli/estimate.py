@@ -25,14 +25,17 @@ def estimate(
     ] = None,
     camera: Annotated[
         Path | None,
-        typer.Option(help="The camera: camera.yaml; then the pictures that column image_path names are used."),
+        typer.Option(
+            help="The camera: camera.yaml; then the pictures that column image_path names are used."
+        ),
     ] = None,
     mapping: Annotated[
         Path | None,
         typer.Option("--map", help="How the log's columns and units become the contract's: mapping.yaml."),
     ] = None,
     peers: Annotated[
-        bool, typer.Option("--peers", help="Also slip-slope and two Kalman filters; takes a few times as long.")
+        bool,
+        typer.Option("--peers", help="Also slip-slope and two Kalman filters; takes a few times as long."),
     ] = False,
 ) -> None:
     """Estimate the road's adhesion along a recorded drive.
@@ -82,7 +85,9 @@ def estimate(
 def _error_table(errors: dict[str, Any]) -> Table:
     from sim2real.replay.report import number, percent
 
-    table = Table(title="TRPAC_peak against mu_reference", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(
+        title="TRPAC_peak against mu_reference", title_justify="left", box=SIMPLE_HEAD, pad_edge=False
+    )
     for heading in ("estimator", "rows", "time [s]", "mean abs. error", "within 2 std"):
         table.add_column(heading, justify="left" if heading in ("estimator", "rows") else "right")
     for name, sets in errors.items():
@@ -90,6 +95,10 @@ def _error_table(errors: dict[str, Any]) -> Table:
             continue
         for label, score in sets.items():
             table.add_row(
-                name, label, number(score["time_s"], 1), number(score["mean_abs"]), percent(score["within_2_std"])
+                name,
+                label,
+                number(score["time_s"], 1),
+                number(score["mean_abs"]),
+                percent(score["within_2_std"]),
             )
     return table

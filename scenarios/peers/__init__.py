@@ -7,6 +7,7 @@ from scenarios.peers.tuning import TUNING_FILE, Tuning, load_tuning
 
 __all__ = [
     "PEER_NAMES",
+    "TUNING_FILE",
     "EkfPeer",
     "KalmanTuning",
     "Peer",
@@ -14,7 +15,6 @@ __all__ = [
     "PeerSetup",
     "SlipSlopePeer",
     "SlipSlopeTuning",
-    "TUNING_FILE",
     "Tuning",
     "UkfPeer",
     "load_tuning",

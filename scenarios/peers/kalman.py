@@ -1,9 +1,9 @@
 """Extended and unscented Kalman filters on the modified Dugoff tyre.
 
-State (omega, v, theta) as in `scenarios.peers.wheel_model`; measured are omega and v; torque, acceleration and load go in.
-Adhesion as a state with a random walk, beside wheel and vehicle speed: Ray (1997), Automatica 33(10), 1819-1833, for the
-extended filter; the unscented one follows Wan and van der Merwe (2000), IEEE AS-SPCC, 153-158. The filters themselves
-are those of bayesian-filters, FilterPy's successor.
+State (omega, v, theta) as in `scenarios.peers.wheel_model`; measured are omega and v; torque, acceleration and load go
+in. Adhesion as a state with a random walk, beside wheel and vehicle speed: Ray (1997), Automatica 33(10), 1819-1833,
+for the extended filter; the unscented one follows Wan and van der Merwe (2000), IEEE AS-SPCC, 153-158. The filters
+themselves are those of bayesian-filters, FilterPy's successor.
 """
 
 from __future__ import annotations

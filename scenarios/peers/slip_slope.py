@@ -1,13 +1,13 @@
 """Slip-slope: friction from the slope of used friction over slip, by recursive least squares.
 
-Below the limit rho = K lambda, rho = abs(F_x) / F_z; the slope K is estimated by recursive least squares with forgetting
-(Gustafsson 1997, Automatica 33(6), 1087-1099), here with padasip's filter. That the slope tells the peak is a
-hypothesis from measurements (Mueller, Uchanski, Hedrick 2003, doi:10.1115/1.1636773), and the map is calibrated on
-drives on known roads: theta = intercept + gain * K, a straight line. Where slip is so large that the tyre slides as a whole,
-used friction is the peak friction itself, and a first-order filter over it is the estimate.
+Below the limit rho = K lambda, rho = abs(F_x) / F_z; the slope K is estimated by recursive least squares with
+forgetting (Gustafsson 1997, Automatica 33(6), 1087-1099), here with padasip's filter. That the slope tells the peak is
+a hypothesis from measurements (Mueller, Uchanski, Hedrick 2003, doi:10.1115/1.1636773), and the map is calibrated on
+drives on known roads: theta = intercept + gain * K, a straight line. Where slip is so large that the tyre slides as a
+whole, used friction is the peak friction itself, and a first-order filter over it is the estimate.
 
-On the modified Dugoff tyre the slope at no slip is 1.27 C_x / F_z on every road: what the slope shows is the bend of the
-curve between it and the limit, so the line is a compromise there. It is the method's, and is left as it is.
+On the modified Dugoff tyre the slope at no slip is 1.27 C_x / F_z on every road: what the slope shows is the bend of
+the curve between it and the limit, so the line is a compromise there. It is the method's, and is left as it is.
 """
 
 from __future__ import annotations

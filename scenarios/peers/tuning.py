@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,9 @@ HEADER = "# Written by `python -m benchmarks.tune_peers tune`; see docs/peers.md
 class Tuning:
     """Settings of all peers."""
 
-    slip_slope: SlipSlopeTuning = SlipSlopeTuning()
-    ekf: KalmanTuning = KalmanTuning()
-    ukf: KalmanTuning = KalmanTuning()
+    slip_slope: SlipSlopeTuning = field(default_factory=SlipSlopeTuning)
+    ekf: KalmanTuning = field(default_factory=KalmanTuning)
+    ukf: KalmanTuning = field(default_factory=KalmanTuning)
 
 
 class _TuningFile(BaseModel):

@@ -1,8 +1,8 @@
 r"""The wheel on the modified Dugoff tyre as a state equation for Kalman filters.
 
-State (omega, v, theta): I omega' = T - R F_x(theta, lambda(omega, v)), v' = a_x as measured, theta' = 0. At small slip the
-first equation is stiff (1,000 1/s at walking speed), so a step is that of the exponential Rosenbrock-Euler method [1]_:
-exact for the equation linearised at the step's start, stable for any step.
+State (omega, v, theta): I omega' = T - R F_x(theta, lambda(omega, v)), v' = a_x as measured, theta' = 0. At small slip
+the first equation is stiff (1,000 1/s at walking speed), so a step is that of the exponential Rosenbrock-Euler
+method [1]_: exact for the equation linearised at the step's start, stable for any step.
 
 References
 ----------
@@ -21,6 +21,9 @@ from trpac_core.vehicle import Vehicle
 
 MOST_GROWTH = 2.0
 """Bound of rate times step where the slope is positive, on the tyre's falling branch [-]."""
+
+MOST_STEP_S = 0.002
+"""The knee of the tyre's curve is crossed in a few milliseconds: a longer step would go on along the old slope [s]."""
 
 
 class WheelState(NamedTuple):
@@ -83,7 +86,7 @@ def advanced(
     step_s: float,
     floor_m_s: float,
 ) -> WheelStep:
-    """The state one step later under held torque and acceleration.
+    """The state one step later under held torque and acceleration, in parts of at most `MOST_STEP_S`.
 
     Parameters
     ----------
@@ -96,6 +99,27 @@ def advanced(
     step_s, floor_m_s : float
         Step [s], and the speed below which there is no slip [m/s].
     """
+    parts = max(math.ceil(step_s / MOST_STEP_S - 1e-9), 1)
+    by_wheel_speed, by_speed, by_theta = 1.0, 0.0, 0.0
+    for _ in range(parts):
+        part = _part(state, torque_nm, acceleration_m_s2, load_n, vehicle, step_s / parts, floor_m_s)
+        state = part.state
+        by_wheel_speed *= part.by_wheel_speed
+        by_speed = part.by_wheel_speed * by_speed + part.by_speed
+        by_theta = part.by_wheel_speed * by_theta + part.by_theta
+    return WheelStep(state, by_wheel_speed, by_speed, by_theta)
+
+
+def _part(
+    state: WheelState,
+    torque_nm: float,
+    acceleration_m_s2: float,
+    load_n: float,
+    vehicle: Vehicle,
+    step_s: float,
+    floor_m_s: float,
+) -> WheelStep:
+    """One exponential step."""
     slope = tyre_slope(state, load_n, vehicle, floor_m_s)
     inertia, radius_m = vehicle.wheel_inertia_kg_m2, vehicle.wheel_radius_m
     rate = -radius_m * slope.by_wheel_speed / inertia

@@ -108,7 +108,9 @@ def _from_columns(log: Log, inputs: Inputs, vehicle: VehicleFile) -> CameraSide:
     from_m = results.from_m[known]
     ahead_m = float(np.nanquantile(from_m - front_m[arrived], 0.05))
     preview = PreviewConfig(P_0_m=max(ahead_m, 0.0))
-    reached = np.searchsorted(np.maximum.accumulate(np.nan_to_num(front_m, nan=-np.inf)), from_m - preview.P_0_m)
+    reached = np.searchsorted(
+        np.maximum.accumulate(np.nan_to_num(front_m, nan=-np.inf)), from_m - preview.P_0_m
+    )
     rows = np.maximum(arrived, reached)
     frames: Frames = {
         int(row): RoadClass(Surface(int(surface)), float(Q_v))
@@ -124,8 +126,13 @@ def _from_pictures(log: Log, inputs: Inputs, camera: Camera, models: Path, told:
     classifier = SurfaceClassifier(models / "surface.onnx")
     preview = PreviewConfig()
     estimators = [
-        Ife(EstimatorConfig(inputs.vehicle, left_side=side == "left", vision=IfeConfig(camera=camera)).image_settings,
-            segmenter, classifier)
+        Ife(
+            EstimatorConfig(
+                inputs.vehicle, left_side=side == "left", vision=IfeConfig(camera=camera)
+            ).image_settings,
+            segmenter,
+            classifier,
+        )
         for side in SIDES
     ]
     states = [IfeState(), IfeState()]
@@ -144,7 +151,9 @@ def _from_pictures(log: Log, inputs: Inputs, camera: Camera, models: Path, told:
             frames[0][row] = frames[1][row] = None
         told(done + 1, len(rows))
     if len(unreadable) == len(rows):
-        raise LogError(f"{log.path}: none of its {len(rows)} pictures can be used, the first: {unreadable[0]}")
+        raise LogError(
+            f"{log.path}: none of its {len(rows)} pictures can be used, the first: {unreadable[0]}"
+        )
     return CameraSide("pictures of the log", *frames, preview, _unreadable(unreadable, len(rows)))
 
 
@@ -162,7 +171,9 @@ def _motion(inputs: Inputs, row: int) -> Motion:
     """The car's motion when a picture was taken; a lost sample is taken as standing, or as no change."""
     accel = 0.0 if inputs.accel_m_s2 is None else inputs.accel_m_s2[row]
     speed, acceleration = np.nan_to_num([inputs.speed_m_s[row], accel]).tolist()
-    return Motion(speed, acceleration, float(inputs.steering_angle_rad[row]), float(inputs.yaw_rate_rad_s[row]))
+    return Motion(
+        speed, acceleration, float(inputs.steering_angle_rad[row]), float(inputs.yaw_rate_rad_s[row])
+    )
 
 
 def _unreadable(texts: list[str], pictures: int) -> tuple[str, ...]:

@@ -65,7 +65,13 @@ def estimate_files(
     guessed = (f"no vehicle file was given: the car is taken to be {car.name} of {TABLE_3.name}.",)
     summary = {
         "schema": 1,
-        "log": {"name": read.name, "path": str(log), "sha256": read.sha256, "rate_hz": read.rate_hz, "rows": len(read)},
+        "log": {
+            "name": read.name,
+            "path": str(log),
+            "sha256": read.sha256,
+            "rate_hz": read.rate_hz,
+            "rows": len(read),
+        },
         "vehicle": {"name": car.name, "path": str(car_path), "sha256": _sha256(car_path)},
         "camera": seen.source,
         "noise": {

@@ -57,13 +57,26 @@ def estimate(done: Replay) -> bytes:
     with _sheet(4, 6.6, (2.6, 0.5, 1.0, 1.0)) as (axes, buffer):
         top, flags, speed, torque = axes
         top.fill_between(
-            time_s, share * (theta - 2 * std), share * (theta + 2 * std), color=BAND, lw=0, label="within 2 TRPAC_std"
+            time_s,
+            share * (theta - 2 * std),
+            share * (theta + 2 * std),
+            color=BAND,
+            lw=0,
+            label="within 2 TRPAC_std",
         )
         top.plot(time_s, peak, color=AFTER, lw=1.6, label="TRPAC_peak (DIFE)")
         if done.camera.left or done.camera.right:
-            top.plot(time_s, done.traces[DYNAMICS].of_the_car()[2], color=BEFORE, lw=1.0, label="without camera (DE)")
+            top.plot(
+                time_s,
+                done.traces[DYNAMICS].of_the_car()[2],
+                color=BEFORE,
+                lw=1.0,
+                label="without camera (DE)",
+            )
         if done.inputs.mu_reference is not None:
-            top.plot(time_s, done.inputs.mu_reference, color=MEASURED, lw=1.2, ls=(0, (4, 3)), label="mu_reference")
+            top.plot(
+                time_s, done.inputs.mu_reference, color=MEASURED, lw=1.2, ls=(0, (4, 3)), label="mu_reference"
+            )
         top.set_ylim(0.0, TOP_THETA)
         top.set_ylabel("peak friction [-]")
         top.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8)
@@ -71,7 +84,9 @@ def estimate(done: Replay) -> bytes:
         speed.plot(time_s, done.inputs.speed_m_s, color=MEASURED, lw=1.2)
         speed.set_ylabel("speed [m/s]")
         for i, wheel in enumerate(WHEELS):
-            torque.plot(time_s, done.inputs.wheel_torque_nm[:, i], color=WHEEL_COLOURS[i], lw=0.9, label=wheel)
+            torque.plot(
+                time_s, done.inputs.wheel_torque_nm[:, i], color=WHEEL_COLOURS[i], lw=0.9, label=wheel
+            )
         torque.set_ylabel("torque [N m]")
         torque.legend(loc="upper right", fontsize=8, ncols=4)
         top.set_xlim(time_s[0], time_s[-1])
@@ -87,7 +102,13 @@ def _flags(axis: Axes, done: Replay) -> None:
     )
     for height, (_, rows, colour) in enumerate(strips):
         axis.fill_between(
-            done.inputs.time_s, height + 0.15, height + 0.85, where=rows.tolist(), color=colour, lw=0, step="post"
+            done.inputs.time_s,
+            height + 0.15,
+            height + 0.85,
+            where=rows.tolist(),
+            color=colour,
+            lw=0,
+            step="post",
         )
     axis.set_yticks([0.5, 1.5, 2.5], [name for name, _, _ in strips])
     axis.set_ylim(0.0, 3.0)
@@ -111,7 +132,9 @@ def wheels(done: Replay) -> bytes:
             axis.set_ylabel(label)
             axis.set_ylim(*limits)
         if done.inputs.mu_reference is not None:
-            axes[0].plot(time_s, done.inputs.mu_reference, color=MEASURED, lw=1.2, ls=(0, (4, 3)), label="mu_reference")
+            axes[0].plot(
+                time_s, done.inputs.mu_reference, color=MEASURED, lw=1.2, ls=(0, (4, 3)), label="mu_reference"
+            )
         axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, fontsize=8)
         axes[0].set_xlim(time_s[0], time_s[-1])
     return buffer.getvalue()
@@ -154,7 +177,9 @@ def compared(done: Replay) -> bytes:
         axis.plot(time_s, done.traces[DYNAMICS].of_the_car()[2], color=FLOOR, lw=1.0, label=DYNAMICS)
         axis.plot(time_s, done.traces[OURS].of_the_car()[2], color=AFTER, lw=1.6, label=OURS)
         if done.inputs.mu_reference is not None:
-            axis.plot(time_s, done.inputs.mu_reference, color=MEASURED, lw=1.2, ls=(0, (4, 3)), label="mu_reference")
+            axis.plot(
+                time_s, done.inputs.mu_reference, color=MEASURED, lw=1.2, ls=(0, (4, 3)), label="mu_reference"
+            )
         axis.set_ylim(0.0, TOP_THETA)
         axis.set_xlim(time_s[0], time_s[-1])
         axis.set_ylabel("TRPAC_peak [-]")

@@ -24,9 +24,7 @@ SECOND_DIFFERENCE = 6.0**0.5
 """Standard deviation of the second difference of white noise of deviation 1 [-]."""
 TO_SIGMA = 1.4826
 """From the median size of normal values to their standard deviation [-]."""
-ANY_ROAD = RoadFile(
-    schema=1, segments=[RoadSegment(start_m=0.0, mu_left=0.8, mu_right=0.8, surface="dry")]
-)
+ANY_ROAD = RoadFile(schema=1, segments=[RoadSegment(start_m=0.0, mu_left=0.8, mu_right=0.8, surface="dry")])
 """The plant's parameters are asked for with a road, which changes nothing of the car's."""
 
 
@@ -99,10 +97,8 @@ class Inputs:
 
     def load_n(self) -> Array:
         """Vertical loads as the estimators without a load sensor reckon them, shape (n, 4) [N]."""
-        if self.accel_m_s2 is None:
-            accel = np.gradient(self.speed_m_s, self.step_s)
-        else:
-            accel = self.accel_m_s2
+        measured = self.accel_m_s2
+        accel = np.gradient(self.speed_m_s, self.step_s) if measured is None else measured
         filled = np.nan_to_num(accel)
         front, rear = (
             self.vehicle.wheel_load(is_front)

@@ -95,11 +95,12 @@ def verdict(summary: dict[str, Any]) -> str:
     """What the log showed, in sentences that follow from its numbers."""
     said, driven = summary["excitation"], summary["estimate"]
     sentences = [
-        f"The car drove for {said['driven_s']:.1f} s; the tyres showed the road for {percent(said['seen_share'])} of it."
+        f"The car drove for {said['driven_s']:.1f} s; "
+        f"the tyres showed the road for {percent(said['seen_share'])} of it."
     ]
     if said["seen_share"] < HARDLY and said["camera_share"] < HARDLY:
         sentences.append(
-            "So the estimate is hardly more than its start value: brake or accelerate harder, up to a slip of 0.02 or more."
+            "So the estimate is hardly more than its start value: brake or accelerate harder, up to a slip of 0.02."
         )
     sentences.append(
         f"TRPAC at the end is {driven['TRPAC_end']:.2f} with a standard deviation of {driven['TRPAC_std_end']:.2f}."

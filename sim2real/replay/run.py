@@ -112,17 +112,13 @@ def replay(
         return np.array([[getattr(e, name) for e in column] for column in columns], dtype=np.float64).T
 
     load_n = inputs.load_n()
-    theta, alone, std, excited = of("TRPAC"), of("TRPAC_dynamics"), of("TRPAC_std"), of("excitation_flag") > 0.0
-    no_camera = not camera.left and not camera.right
-    traces = {
-        OURS: Trace(theta, std, of("TRPAC_peak"), excited),
-        DYNAMICS: Trace(
-            alone,
-            std if no_camera else np.full_like(std, np.nan),
-            _peaks(alone, load_n, inputs.vehicle.longitudinal_stiffness_n),
-            excited,
-        ),
-    }
+    theta, alone, excited = of("TRPAC"), of("TRPAC_dynamics"), of("excitation_flag") > 0.0
+    ours = Trace(theta, of("TRPAC_std"), of("TRPAC_peak"), excited)
+    dynamics = ours
+    if camera.left or camera.right:
+        peak = _peaks(alone, load_n, inputs.vehicle.longitudinal_stiffness_n)
+        dynamics = Trace(alone, np.full_like(alone, np.nan), peak, excited)
+    traces = {OURS: ours, DYNAMICS: dynamics}
     if peers:
         traces |= _peer_traces(inputs, load_n, told)
     moved = np.diff(alone, axis=0, prepend=EstimatorConfig.theta_initial) != 0.0

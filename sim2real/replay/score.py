@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.replay.run import Replay
+from sim2real.replay.run import OURS, Replay
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -86,13 +86,14 @@ def excitation(done: Replay) -> dict[str, float]:
     moving = done.inputs.moving
     count = max(int(np.count_nonzero(moving)), 1)
 
-    def share(rows: Mask) -> float:
-        return float(np.count_nonzero(rows & moving) / count)
+    def share(wheels: Mask) -> float:
+        """Of the driving, where this holds for any wheel."""
+        return float(np.count_nonzero(np.logical_or.reduce(wheels, axis=1) & moving) / count)
 
     return {
         "driven_s": float(np.count_nonzero(moving) * done.inputs.step_s),
-        "excited_share": share(done.traces["DIFE"].excited.any(axis=1)),
-        "seen_share": share(done.seen.any(axis=1)),
-        "camera_share": share(done.flag.any(axis=1)),
-        "unusable_share": share(~done.usable.any(axis=1)),
+        "excited_share": share(done.traces[OURS].excited),
+        "seen_share": share(done.seen),
+        "camera_share": share(done.flag),
+        "unusable_share": share(~done.usable),
     }

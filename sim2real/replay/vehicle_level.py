@@ -11,9 +11,9 @@ Array = NDArray[np.float64]
 def vehicle_level(theta: Array, std: Array) -> tuple[Array, Array]:
     """Mean over the wheels, each weighted with the inverse of its variance, and its standard deviation.
 
-    The wheels share tyre model, vehicle speed and accelerometer, so their errors are not independent: the deviation is that
-    of the mixture (mean variance plus the wheels' spread), which does not shrink with their number and grows where
-    left and right, or front and rear, see different roads.
+    The wheels share tyre model, vehicle speed and accelerometer, so their errors are not independent: the deviation is
+    that of the mixture (mean variance plus the wheels' spread), which does not shrink with their number and grows
+    where left and right, or front and rear, see different roads.
 
     Parameters
     ----------
