@@ -276,10 +276,10 @@ def judged(d: Drive, theta: Array, std: Array, clock: NDArray[np.bool_]) -> dict
     return row
 
 
-def judge(out: Path | None) -> None:
+def judge(out: Path | None, seeds: Sequence[int]) -> None:
     """The table of docs/peers.md."""
     rows: dict[str, dict[str, list[dict]]] = {"the paper's road": {}, "drawn frictions": {}}
-    for n, seed in enumerate(JUDGING_SEEDS):
+    for n, seed in enumerate(seeds):
         d = driven(seed, 1)
         kind = rows["the paper's road" if seed % 2 == 0 else "drawn frictions"]
         theta, std, clock = run_de(d)
@@ -287,7 +287,7 @@ def judge(out: Path | None) -> None:
         for peer in make_peers(d.setup):
             theta, std, _ = run_peer(peer, d)
             kind.setdefault(peer.name, []).append(judged(d, theta, std, clock))
-        print(f"\r{n + 1} of {len(JUDGING_SEEDS)} drives", end="", file=sys.stderr, flush=True)
+        print(f"\r{n + 1} of {len(seeds)} drives", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     summary = {kind: {name: _summed(of) for name, of in names.items()} for kind, names in rows.items()}
     for kind, names in summary.items():
@@ -329,12 +329,13 @@ def main() -> None:
     parser.add_argument("what", choices=("tune", "judge"))
     parser.add_argument("--out", type=Path, help="tuning.yaml to write, or a JSON file for the judgement")
     parser.add_argument("--peers", nargs="+", choices=PEER_NAMES, default=PEER_NAMES, help="which to tune")
+    parser.add_argument("--drives", type=int, default=len(JUDGING_SEEDS), help="how many to judge on")
     parser.add_argument("--most", type=int, default=90, help="runs of the objective per peer")
     arguments = parser.parse_args()
     if arguments.what == "tune":
         tune_peers(arguments.out or TUNING_FILE, arguments.peers, arguments.most)
     else:
-        judge(arguments.out)
+        judge(arguments.out, JUDGING_SEEDS[: arguments.drives])
 
 
 if __name__ == "__main__":
