@@ -1,0 +1,53 @@
+"""The peers' tuning as a file: values, and how they were found."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel, ConfigDict
+
+from scenarios.files import load_strict
+from scenarios.peers.kalman import KalmanTuning
+from scenarios.peers.slip_slope import SlipSlopeTuning
+
+TUNING_FILE = Path(__file__).with_name("tuning.yaml")
+HEADER = "# Written by `python -m benchmarks.tune_peers tune`; see docs/peers.md.\n"
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Settings of all peers."""
+
+    slip_slope: SlipSlopeTuning = field(default_factory=SlipSlopeTuning)
+    ekf: KalmanTuning = field(default_factory=KalmanTuning)
+    ukf: KalmanTuning = field(default_factory=KalmanTuning)
+
+
+class _TuningFile(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    how: dict[str, Any]
+    slip_slope: SlipSlopeTuning
+    ekf: KalmanTuning
+    ukf: KalmanTuning
+
+
+@lru_cache
+def load_tuning(path: Path = TUNING_FILE) -> Tuning:
+    """Read a tuning; raises ScenarioError."""
+    file = load_strict(path, _TuningFile)
+    return Tuning(file.slip_slope, file.ekf, file.ukf)
+
+
+def write_tuning(path: Path, tuning: Tuning, how: dict[str, Any]) -> None:
+    """Write a tuning with how it was found."""
+    values = {name: _rounded(part) for name, part in asdict(tuning).items()}
+    path.write_text(HEADER + yaml.safe_dump({"how": how, **values}, sort_keys=False), encoding="utf-8")
+
+
+def _rounded(part: dict[str, float]) -> dict[str, float]:
+    return {name: float(f"{value:.4g}") for name, value in part.items()}

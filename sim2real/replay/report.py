@@ -1,0 +1,130 @@
+"""estimates.csv, summary.json and report.html: what a replay says, for machines and for people."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from base64 import b64encode
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import pandas as pd
+
+from scenarios.files import WHEELS
+from sim2real.replay import figures
+from sim2real.replay.run import DYNAMICS, OURS, Replay
+from sim2real.report import DASH, jsonable
+
+TEMPLATE = Path(__file__).with_name("report.html.jinja")
+CSV_NAME, SUMMARY_NAME, REPORT_NAME = "estimates.csv", "summary.json", "report.html"
+HARDLY = 0.01
+"""Share of the driving below which the tyre counts as not seen [-]."""
+WIDE_STD = 0.15
+"""Mean standard deviation above which an estimate says little [-]."""
+
+
+def estimates_table(done: Replay) -> pd.DataFrame:
+    """estimates.csv: the car's estimate, then TRPAC per wheel, then TRPAC_peak and the deviation per wheel."""
+    ours = done.traces[OURS]
+    theta, std, peak = ours.of_the_car()
+    flags = done.flag.any(axis=1), ours.excited.any(axis=1)
+    columns: dict[str, Any] = {
+        "time_s": done.inputs.time_s,
+        "TRPAC": theta,
+        "TRPAC_std": std,
+        "flag": flags[0].astype(int),
+        "K_v": done.K_v.max(axis=1),
+        "excitation_flag": flags[1].astype(int),
+        **{f"TRPAC_{w}": ours.theta[:, i] for i, w in enumerate(WHEELS)},
+        "TRPAC_peak": peak,
+        **{f"TRPAC_std_{w}": ours.std[:, i] for i, w in enumerate(WHEELS)},
+    }
+    for name, trace in done.traces.items():
+        if name not in (OURS, DYNAMICS):
+            columns[f"TRPAC_{name.replace('-', '_')}"] = trace.of_the_car()[0]
+    return pd.DataFrame(columns)
+
+
+def write_replay(done: Replay, summary: dict[str, Any], folder: Path) -> tuple[Path, ...]:
+    """Write all three files; they are made whole beside the folder first, so it never holds half a result.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be written to.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=folder.parent) as scratch:
+        made = Path(scratch)
+        estimates_table(done).to_csv(made / CSV_NAME, index=False, float_format="%.6g")
+        text = json.dumps(jsonable(summary), indent=1, allow_nan=False)
+        (made / SUMMARY_NAME).write_text(text + "\n", encoding="utf-8")
+        (made / REPORT_NAME).write_text(render(done, summary), encoding="utf-8")
+        folder.mkdir(exist_ok=True)
+        for name in (CSV_NAME, SUMMARY_NAME, REPORT_NAME):
+            os.replace(made / name, folder / name)
+    return tuple(folder / name for name in (REPORT_NAME, CSV_NAME, SUMMARY_NAME))
+
+
+def render(done: Replay, summary: dict[str, Any]) -> str:
+    """The report as one HTML page that needs nothing beside it."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATE.parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(number=number, percent=percent)
+    pictures = {
+        "estimate": _address(figures.estimate(done)),
+        "wheels": _address(figures.wheels(done)),
+        "curve": _address(figures.curve(done)),
+    }
+    if len(done.traces) > 2:
+        pictures["compared"] = _address(figures.compared(done))
+    return environment.get_template(TEMPLATE.name).render(
+        s=summary, pictures=pictures, verdict=verdict(summary), ours=OURS, dynamics=DYNAMICS
+    )
+
+
+def verdict(summary: dict[str, Any]) -> str:
+    """What the log showed, in sentences that follow from its numbers."""
+    said, driven = summary["excitation"], summary["estimate"]
+    sentences = [
+        f"The car drove for {said['driven_s']:.1f} s; "
+        f"the tyres showed the road for {percent(said['seen_share'])} of it."
+    ]
+    if said["seen_share"] < HARDLY and said["camera_share"] < HARDLY:
+        sentences.append(
+            "So the estimate is hardly more than its start value: brake or accelerate harder, up to a slip of 0.02."
+        )
+    sentences.append(
+        f"TRPAC at the end is {driven['TRPAC_end']:.2f} with a standard deviation of {driven['TRPAC_std_end']:.2f}."
+    )
+    if driven["mean_std_seen"] is not None and driven["mean_std_seen"] > WIDE_STD:
+        sentences.append("Its deviation is wide even where the tyre is seen: take it as a hint.")
+    error = (summary["errors"] or {}).get(OURS, {}).get("seen", {})
+    if error.get("mean_abs") is not None:
+        sentences.append(
+            f"Where the tyre is seen, TRPAC_peak is {error['mean_abs']:.3f} off the reference in the mean, and "
+            f"{percent(error['within_2_std'])} of these rows lie within two standard deviations."
+        )
+    return " ".join(sentences)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number as the tables show it; a dash where there is none."""
+    return DASH if value is None or not np.isfinite(value) else f"{value:.{digits}f}"
+
+
+def percent(share: float | None) -> str:
+    """A share of 1 as per cent."""
+    return DASH if share is None or not np.isfinite(share) else f"{100.0 * share:.0f} %"
+
+
+def _address(png: bytes) -> str:
+    return f"data:image/png;base64,{b64encode(png).decode('ascii')}"
