@@ -17,6 +17,7 @@ from rich.table import Table
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
 from trpac_cli import gap, vision
+from trpac_cli.sweep import sweep
 
 EXIT_INPUT = 2
 """Unusable input: one message on standard error, and nothing written."""
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 app.add_typer(vision.app, name="vision")
 app.add_typer(gap.app, name="gap")
+app.command()(sweep)
 
 
 @app.callback()
