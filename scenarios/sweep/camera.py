@@ -2,10 +2,10 @@
 
 `camera_process.yaml` holds what the image estimator said along rendered, disturbed worlds (`measure_camera.py`). A run
 draws one of these worlds and, for each stretch of road, a place in that world's record of the surface; from there
-on the record is played back by the way driven. So wrong classes come as often, as long and with as high a confidence as
-they did there, and worlds that are hard stay hard for the whole run. A verdict comes in the step of its picture, as from
-the unit, which stamps a picture onto the road where it was taken however long it then thinks; `late_s` is what a
-bus adds to that.
+on the record is played back by the way driven. So wrong classes come as often, as long and with as high a confidence
+as they did there, and worlds that are hard stay hard for the whole run. A verdict comes in the step of its picture, as
+from the unit, which stamps a picture onto the road where it was taken however long it then thinks; `late_s` is what
+a bus adds to that.
 """
 
 from __future__ import annotations
@@ -137,9 +137,7 @@ class RenderedFrames:
         As for `class_verdicts`; the world follows the scenario's seed.
     """
 
-    def __init__(
-        self, scenario: Scenario, trajectory: PlantTrajectory, camera: Camera, seed: int
-    ) -> None:
+    def __init__(self, scenario: Scenario, trajectory: PlantTrajectory, camera: Camera, seed: int) -> None:
         self._scenario = scenario
         self._renderer = scene(scenario)
         disturbing = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
@@ -156,7 +154,9 @@ class RenderedFrames:
             return RoadClass(Surface(int(self._wrong[place])), CERTAIN)
         pictures = self._scenario.pictures
         image = self._renderer.frame(float(self._front_m[place])).image
-        seed = int(np.random.SeedSequence([self._scenario.seed, int(self._taken[place])]).generate_state(1)[0])
+        seed = int(
+            np.random.SeedSequence([self._scenario.seed, int(self._taken[place])]).generate_state(1)[0]
+        )
         image = disturb(image, DISTURBANCES[pictures.disturbance], seed)
         _, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality])
         return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), dtype=np.uint8)

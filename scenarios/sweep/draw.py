@@ -143,9 +143,7 @@ def _numbers(sweep: Sweep, key: RunKey, stream: np.random.SeedSequence) -> dict[
     return values
 
 
-def _scenario(
-    sweep: Sweep, numbers: dict[str, float], stream: dict[str, np.random.SeedSequence]
-) -> Scenario:
+def _scenario(sweep: Sweep, numbers: dict[str, float], stream: dict[str, np.random.SeedSequence]) -> Scenario:
     base, vehicle = sweep.scenario, sweep.scenario.vehicle
     tyre, factor = vehicle.tyre, numbers["vehicle.stiffness_factor"]
     tyre = tyre.model_copy(update={"longitudinal_stiffness_n": tyre.longitudinal_stiffness_n * factor})
@@ -171,8 +169,7 @@ def draw_road(draw: RoadDraw, random: np.random.Generator) -> tuple[RoadFile, fl
         surfaces = [surfaces[i] for i in random.permutation(len(surfaces))]
     segments = []
     for place, surface in enumerate(surfaces):
-        mu = float(random.uniform(*draw.friction[surface]))
-        segments.append(
-            RoadSegment(start_m=place * draw.stretch_m, mu_left=mu, mu_right=mu, surface=surface)
-        )
+        low, high = draw.friction[surface]
+        mu = float(random.uniform(low, high))
+        segments.append(RoadSegment(start_m=place * draw.stretch_m, mu_left=mu, mu_right=mu, surface=surface))
     return RoadFile(schema=1, segments=segments), len(segments) * draw.stretch_m

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -41,13 +42,15 @@ class _Finished:
     """What comes back from a worker."""
 
     rows: list[dict[str, Any]]
+    cpu_s: float
     source_sha256: str
 
 
 def run_one(sweep: Sweep, key: RunKey) -> _Finished:
     """One run, where a worker does it."""
+    began = time.process_time()
     rows = run_plan(plan_run(sweep, key), sweep.file.estimators, sweep.file.unit)
-    return _Finished(rows, source_digest())
+    return _Finished(rows, time.process_time() - began, source_digest())
 
 
 def execute(
@@ -96,7 +99,7 @@ def execute(
             if future.status == "finished":
                 result = future.result()
                 _same_code(result.source_sha256)
-                parts.keep(key.index, result.rows)
+                parts.keep(key.index, result.rows, result.cpu_s)
             else:
                 failures.append(Failure(key.index, _why(future)))
             finished += 1
@@ -127,7 +130,7 @@ def connected(scheduler: str | None, jobs: int) -> Iterator[Client]:
     with (
         dask.config.set(settings),
         LocalCluster(
-            n_workers=jobs, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0
+            n_workers=jobs, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0
         ) as cluster,
         Client(cluster) as client,
     ):
@@ -145,7 +148,7 @@ def _stream(client: Client, sweep: Sweep, todo: list[RunKey]) -> Iterator[tuple[
         running[future.key] = key
         return future
 
-    running: dict[str, RunKey] = {}
+    running: dict[Any, RunKey] = {}
     first = [submit(key) for key, _ in zip(waiting, range(AHEAD * threads), strict=False)]
     completed = as_completed(first)
     for future in completed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from io import BytesIO
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -20,7 +21,9 @@ COLOURS = {"IFE": "#d08a00", "DE": "#4c8fd0", "DIFE": "#c0272d"}
 OTHERS = ("#2c9c5a", "#7a4fb5", "#777777", "#b06d3a")
 ERROR_GOALS, TIME_GOALS = (0.01, 0.02), (0.3, 0.5)
 """Median and 95th percentile that are asked for: steady-state error [-], excited convergence time [s]."""
-STYLE = {"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}
+STYLE: Any = {"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}
+THETA_BIN = 0.1
+"""Width of the bins of true friction [-]."""
 ERROR_SPAN, TIME_SPAN = (1e-4, 1.0), (0.0, 1.5)
 
 
@@ -70,19 +73,33 @@ def _cumulative(axis: Axes, values: pd.Series, name: str, shade: str) -> None:
     if not len(values):
         return
     found = np.sort(values.dropna().to_numpy(dtype=np.float64))
-    axis.step(found, np.arange(1, len(found) + 1) / len(values), where="post", color=shade, label=name, lw=1.6)
+    axis.step(
+        found, np.arange(1, len(found) + 1) / len(values), where="post", color=shade, label=name, lw=1.6
+    )
 
 
 def errors_by_friction(table: pd.DataFrame) -> bytes:
     """Steady-state error of each stretch over its true friction, DE and DIFE side by side."""
     names = [n for n in table["estimator"].unique() if n != "IFE"]
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(1, len(names), figsize=(4.6 * len(names), 3.8), sharey=True, squeeze=False)
+        figure, axes = plt.subplots(
+            1, len(names), figsize=(4.6 * len(names), 3.8), sharey=True, squeeze=False
+        )
         for axis, name in zip(axes[0], names, strict=True):
             rows = table[table["estimator"] == name]
             enough = rows["shown_s"] >= ENOUGH_SHOWN_S
-            for mask, mark, label in ((~enough, "#bbbbbb", "tyre showed it too briefly"), (enough, colour(name, names), "tyre showed it")):
-                axis.plot(rows["theta"][mask], rows["steady_state_error"][mask].clip(ERROR_SPAN[0]), ".", ms=3, color=mark, label=label)
+            for mask, mark, label in (
+                (~enough, "#bbbbbb", "tyre showed it too briefly"),
+                (enough, colour(name, names), "tyre showed it"),
+            ):
+                axis.plot(
+                    rows["theta"][mask],
+                    rows["steady_state_error"][mask].clip(ERROR_SPAN[0]),
+                    ".",
+                    ms=3,
+                    color=mark,
+                    label=label,
+                )
             axis.set_yscale("log")
             axis.set_ylim(*ERROR_SPAN)
             axis.axhline(ERROR_GOALS[1], color="#222222", lw=0.8, ls="--")
@@ -100,20 +117,22 @@ def coverage_figure(table: pd.DataFrame) -> bytes | None:
     if rows.empty:
         return None
     names = list(rows["estimator"].unique())
-    edges = np.arange(0.0, 1.31, 0.1)
+    kinds = (
+        ("covered_share", "time_s", "o-", "all time"),
+        ("covered_share_shown", "shown_s", "s--", "while the tyre shows it"),
+    )
     with plt.rc_context(STYLE):
         figure, axis = plt.subplots(figsize=(8.0, 3.8))
         axis.axhspan(*COVERAGE_SPAN, color="#2c9c5a", alpha=0.15, lw=0, label="asked for")
         for name in names:
-            mine = rows[rows["estimator"] == name]
-            groups = mine.groupby(pd.cut(mine["theta"], edges), observed=True)
-            centres = [0.5 * (bin_.left + bin_.right) for bin_, _ in groups]
-            shade = colour(name, names)
-            axis.plot(centres, [np.average(g["covered_share"], weights=g["time_s"]) for _, g in groups], "o-", color=shade, label=f"{name}, all time")
-            seen = mine[mine["covered_share_shown"].notna()]
-            groups = seen.groupby(pd.cut(seen["theta"], edges), observed=True)
-            centres = [0.5 * (bin_.left + bin_.right) for bin_, _ in groups]
-            axis.plot(centres, [np.average(g["covered_share_shown"], weights=g["shown_s"]) for _, g in groups], "s--", color=shade, label=f"{name}, while the tyre shows it")
+            for column, weight, style, said in kinds:
+                mine = rows[(rows["estimator"] == name) & rows[column].notna()]
+                groups = list(mine.groupby(np.floor(mine["theta"] / THETA_BIN).astype(int)))
+                centres = [
+                    THETA_BIN * (float(part["theta"].iloc[0]) // THETA_BIN + 0.5) for _, part in groups
+                ]
+                shares = [np.average(part[column], weights=part[weight]) for _, part in groups]
+                axis.plot(centres, shares, style, color=colour(name, names), label=f"{name}, {said}")
         axis.set_ylim(0.0, 1.02)
         axis.set_xlabel("true TRPAC [-]")
         axis.set_ylabel("share within 2 TRPAC_std")
@@ -148,10 +167,14 @@ def _degradation(axes: np.ndarray, part: pd.DataFrame, names: list[str]) -> None
             error = [quantile(judged[judged["level"] == x]["steady_state_error"], share) for x in levels]
             axes[0].plot(levels, _plain(error), style, color=shade, label=label)
             if name != "IFE":
-                time = [quantile(judged[judged["level"] == x]["band_time_s"], share, never=True) for x in levels]
+                time = [
+                    quantile(judged[judged["level"] == x]["band_time_s"], share, never=True) for x in levels
+                ]
                 axes[1].plot(levels, _plain(time), style, color=shade)
         mean = [mine[mine["level"] == x] for x in levels]
-        axes[2].plot(levels, [np.average(m["error_mean"], weights=m["time_s"]) for m in mean], "o-", color=shade)
+        axes[2].plot(
+            levels, [np.average(m["error_mean"], weights=m["time_s"]) for m in mean], "o-", color=shade
+        )
     axes[0].set_ylabel("steady-state error [-]\nmedian (line), 95th percentile (dots)")
     axes[0].set_yscale("log")
     axes[0].axhline(ERROR_GOALS[1], color="#222222", lw=0.8, ls="--")

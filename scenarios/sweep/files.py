@@ -176,10 +176,10 @@ class SweepFile(_Section):
             for i, axis in enumerate(self.vary)
             if axis.parameter not in known
         ]
-        reals = [
-            v.name for v in UNITS["TrpacEstimator"].variables if v.causality == "parameter" and v.unit
+        reals = [v.name for v in UNITS["TrpacEstimator"].variables if v.causality == "parameter" and v.unit]
+        problems += [
+            f"unit.{name}: unknown; {suggestion(name, reals)}" for name in self.unit if name not in reals
         ]
-        problems += [f"unit.{name}: unknown; {suggestion(name, reals)}" for name in self.unit if name not in reals]
         problems += [text for name in self.estimators if (text := problem_of_tracker(name))]
         twice = sorted({name for name in self.estimators if self.estimators.count(name) > 1})
         problems += [f"estimators names {name} twice." for name in twice]
@@ -267,6 +267,15 @@ def load_sweep(path: str | Path) -> Sweep:
     problems = []
     if file.camera.source == "rendered" and scenario.camera_path is None:
         problems.append(f"{path}: camera.source is 'rendered', but {scenario.path} names no camera.")
+    confidence = [file.camera.confidence_factor]
+    confidence += [
+        x for axis in file.vary if axis.parameter == "camera.confidence_factor" for x in axis.levels
+    ]
+    if file.camera.source == "rendered" and any(value != 1.0 for value in confidence):
+        problems.append(
+            f"{path}: camera.confidence_factor is not 1, but camera.source is 'rendered': pictures have the "
+            "confidence that the networks give them. Expected 'class_process' or a factor of 1."
+        )
     if file.road is not None and file.pedal is None:
         problems.append(
             f"{path}: road is drawn and pedal is not; expected both, for a pedal trace made for one friction "

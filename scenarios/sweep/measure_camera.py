@@ -12,6 +12,7 @@ import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,14 @@ def world(base: Scenario, seed: int) -> Scenario:
     """The scenario with a world of its own: surfaces in a random order; friction does not show in pictures."""
     order = np.random.default_rng([seed, 1]).permutation(len(Surface))
     segments = [
-        RoadSegment(start_m=STRETCH_M * place, mu_left=0.5, mu_right=0.5, surface=Surface(int(index)).label)
+        RoadSegment.model_validate(
+            {
+                "start_m": STRETCH_M * place,
+                "mu_left": 0.5,
+                "mu_right": 0.5,
+                "surface": Surface(int(index)).label,
+            }
+        )
         for place, index in enumerate(order)
     ]
     return replace(base, seed=seed, road=RoadFile(schema=1, segments=segments))
@@ -101,9 +109,11 @@ def statistics(worlds: list[list[Verdict]]) -> dict[str, Any]:
         flags[surface.label] = {
             "flag_share": round(float(np.mean([v.flag for v in here])), 3),
             "flag_share_of_wrong": _mean([v.flag for v in here if v.given != surface]),
-            "wrong_share_by_world": [_mean([v.given != s for v in w if (s := v.surface) == surface]) for w in worlds],
+            "wrong_share_by_world": [
+                _mean([v.given != s for v in w if (s := v.surface) == surface]) for w in worlds
+            ],
         }
-    pairs = [(a, b) for w in worlds for a, b in zip(w, w[1:], strict=False) if a.surface == b.surface is not None]
+    pairs = [(a, b) for w in worlds for a, b in pairwise(w) if a.surface == b.surface is not None]
     wrong_before = [b.given != b.surface for a, b in pairs if a.given != a.surface]
     mixed = [v for v in found if v.surface is None]
     seconds = np.array([v.seconds for v in found])

@@ -42,10 +42,15 @@ def drive_pedal(scenario: Scenario, pedal: PedalDraw, random: np.random.Generato
     random : Generator
         Where they are drawn from.
     """
-    setup, car, step_s = make_setup(scenario.vehicle, scenario.road), scenario.vehicle.to_core(), scenario.step_s
+    setup, car, step_s = (
+        make_setup(scenario.vehicle, scenario.road),
+        scenario.vehicle.to_core(),
+        scenario.step_s,
+    )
     to_front_m = car.cog_to_front_axle_m
     y = dynamics.initial_y(0.0, -to_front_m, setup.parameters)
-    begin_s, made, pulses = 0.0, FIRST_S, []
+    begin_s, made = 0.0, FIRST_S
+    pulses: list[Pulse] = []
     while made < scenario.end.time_s and y[POSITION] + to_front_m < scenario.end.position_m:
         here = scenario.road.segment_at(float(y[POSITION]) + to_front_m)
         use, length_s = _sample(pedal.grip_use, random), _sample(pedal.pulse_s, random)
@@ -84,7 +89,8 @@ def _advance(
     y: NDArray[np.float64], pulse: Pulse, from_s: float, to_s: float, step_s: float, setup: PlantSetup
 ) -> float | None:
     """Move y on over one pulse and what follows it; when a front wheel spins up, or None [s]."""
-    time_s = from_s + np.arange(round((to_s - from_s) / step_s) + 1) * step_s
+    steps = np.arange(round((to_s - from_s) / step_s) + 1, dtype=np.float64)
+    time_s: NDArray[np.float64] = from_s + step_s * steps
     torque = np.repeat(pulse.torque(time_s)[:, None], 4, axis=1)
     states, _, slip, *_ = dynamics.run(y, torque, step_s, setup.parameters, setup.road)
     spinning = (slip[:, :2].max(axis=1) > SPINNING) & (states[:, SPEED] > NOTICED_M_S)

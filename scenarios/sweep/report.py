@@ -47,9 +47,9 @@ def _pictures(table: pd.DataFrame) -> list[tuple[str, str, bytes]]:
     """Title, sentence and picture of each figure."""
     shown = []
     if table["parameter"].nunique() == 1 and table["level"].nunique() <= 1:
-        said = "Share of stretches that are at most so far off, or take at most so long. The crosses are what is asked for."
+        said = "Share of stretches that are at most so far off, or take at most so long. Crosses: what is asked for."
         shown.append(("Error and convergence", said, figures.distributions(table)))
-        said = "Every stretch of every run. Grey: by the plant's own slip and load nothing could be seen there for long enough."
+        said = "Every stretch of every run. Grey: the tyre did not truly show its friction for long enough there."
         shown.append(("Error over true friction", said, figures.errors_by_friction(table)))
     covered = figures.coverage_figure(table)
     if covered is not None:

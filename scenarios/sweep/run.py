@@ -79,7 +79,7 @@ def believed_config(plan: RunPlan, unit: dict[str, float]) -> EstimatorConfig:
     told["vehicle.wheel_radius"] *= believed.radius_factor
     told["tyre.longitudinal_stiffness"] *= believed.stiffness_factor
     variables = UNITS["TrpacEstimator"].variables
-    values = {v.name: v.start for v in variables if v.causality == "parameter"} | told | unit
+    values: dict[str, Any] = {v.name: v.start for v in variables if v.causality == "parameter"} | told | unit
     for surface in Surface:
         name = f"estimator.theta_{surface.label}"
         values[name] = min(max(values[name] + plan.camera.class_value_offset, LEAST_THETA), GREATEST_THETA)
@@ -107,7 +107,9 @@ def step_all(
     std = np.full((len(trajectory), len(names)), np.nan)
     excited = np.empty(len(trajectory), dtype=bool)
     fused = names.index("DIFE")
-    for row, (omega, torque, speed, acceleration) in enumerate(zip(*signals_of(plan, trajectory), strict=True)):
+    for row, (omega, torque, speed, acceleration) in enumerate(
+        zip(*signals_of(plan, trajectory), strict=True)
+    ):
         sensors = Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
         estimate = estimator.step(step_s, sensors, frames.get(row))
         theta[row, : len(OWN)] = estimate.TRPAC_image, estimate.TRPAC_dynamics, estimate.TRPAC

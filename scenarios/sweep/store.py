@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -92,9 +92,10 @@ class Parts:
         write_whole(known, json.dumps(self._identity, indent=1).encode())
         return {int(path.stem) for path in self._folder.glob("*.json")}
 
-    def keep(self, index: int, rows: list[dict[str, Any]]) -> None:
-        """Write one run's rows."""
-        write_whole(self._folder / f"{index:07d}.json", json.dumps(rows).encode())
+    def keep(self, index: int, rows: list[dict[str, Any]], cpu_s: float) -> None:
+        """Write one run's rows and the processor time that it took [s]."""
+        part = {"cpu_s": cpu_s, "rows": rows}
+        write_whole(self._folder / f"{index:07d}.json", json.dumps(part).encode())
 
     def empty(self) -> bool:
         """Whether no run is there."""
@@ -102,8 +103,15 @@ class Parts:
 
     def table(self) -> pd.DataFrame:
         """All runs kept, sorted, with the same columns and types whatever the order of work."""
-        rows = [row for path in sorted(self._folder.glob("*.json")) for row in _read(path)]
-        return as_table(rows)
+        return as_table(row for part in self._all() for row in part["rows"])
+
+    def cpu_s(self) -> list[float]:
+        """Processor time of each run, in the order of their numbers [s]."""
+        return [float(part["cpu_s"]) for part in self._all()]
+
+    def _all(self) -> Iterator[dict[str, Any]]:
+        for path in sorted(self._folder.glob("*.json")):
+            yield _read(path)
 
 
 def as_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:

@@ -12,7 +12,7 @@ SLIPPERY = ("wet", "snow_ice")
 """The paper claims its figures for these."""
 ENOUGH_SHOWN_S = 0.5
 """Time for which the tyre must truly show theta for a stretch to be judged: the time in which to converge [s]."""
-MEASURES = ("steady_state_error", "convergence_time_s", "band_time_s")
+MEASURES = ("steady_state_error", "convergence_time_s", "wall_convergence_time_s", "band_time_s")
 COVERAGE_SPAN = (0.90, 0.99)
 """Between these shares of true values shall lie within 2 TRPAC_std, at a nominal 0.95 [-]."""
 
@@ -73,16 +73,25 @@ def summarise(table: pd.DataFrame) -> dict[str, Any]:
     Returns
     -------
     dict
-        `levels`: a list of parameter, level and, per estimator, `slippery`, `shown`, `after_a_change`, `from_standstill` and `by_surface` distributions and
-        `coverage`.
+        `levels`: a list of parameter, level and, per estimator, distributions over `slippery` stretches, those of them
+        that the tyre has `shown`, these `after_a_change` of road and `from_standstill`, all shown ones `by_surface`,
+        and `coverage`.
     """
     levels = []
-    for (parameter, level), part in table.groupby(["parameter", "level"], dropna=False, sort=False):
+    for (parameter, _), part in table.groupby(["parameter", "level"], dropna=False, sort=False):
         estimators = {
             str(name): estimator_summary(rows) for name, rows in part.groupby("estimator", sort=True)
         }
-        value = None if np.isnan(level) else float(level)
-        levels.append({"parameter": parameter, "level": value, "runs": int(part["run"].nunique()), "estimators": estimators})
+        level = float(part["level"].iloc[0])
+        value = None if np.isnan(level) else level
+        levels.append(
+            {
+                "parameter": parameter,
+                "level": value,
+                "runs": int(part["run"].nunique()),
+                "estimators": estimators,
+            }
+        )
     return {"levels": levels}
 
 
@@ -96,10 +105,13 @@ def estimator_summary(rows: pd.DataFrame) -> dict[str, Any]:
         "after_a_change": distribution(judged[judged["stretch"] > 0]),
         "from_standstill": distribution(judged[judged["stretch"] == 0]),
         "by_surface": {
-            str(surface): distribution(shown_enough(part)) for surface, part in rows.groupby("surface", sort=True)
+            str(surface): distribution(shown_enough(part))
+            for surface, part in rows.groupby("surface", sort=True)
         },
         "mean_error": float(np.average(rows["error_mean"], weights=rows["time_s"])),
-        "mean_error_slippery": float(np.average(slick["error_mean"], weights=slick["time_s"])) if len(slick) else None,
+        "mean_error_slippery": float(np.average(slick["error_mean"], weights=slick["time_s"]))
+        if len(slick)
+        else None,
         "coverage": coverage(rows),
         "coverage_by_surface": {
             str(surface): coverage(part) for surface, part in rows.groupby("surface", sort=True)
