@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ HISTORY = Path(__file__).with_name("history") / "fusion.jsonl"
 NAMES = ("paper_simulation", "road_test", "road_test_brakes", "degradation", "rendered")
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 DASH = "–"
+FRICTION_EDGES = (0.1, 0.15, 0.2, 0.25, 0.35, 0.4, 0.45, 0.5, 0.55, 0.7)
 
 
 def run(out: Path, names: list[str], runs: int | None, jobs: int | None, scheduler: str | None) -> None:
@@ -122,6 +124,23 @@ def accuracy(found: dict[str, Any]) -> str:
     return markdown(heads, rows)
 
 
+def by_friction(found: dict[str, Any]) -> str:
+    """DIFE after a change of road over true friction: where errors and slow convergence come from."""
+    table = found["table"]
+    judged = shown_enough(slippery(table[(table["estimator"] == "DIFE") & (table["stretch"] > 0)]))
+    rows = []
+    for low, high in pairwise(FRICTION_EDGES):
+        mine = distribution(judged[(judged["theta"] >= low) & (judged["theta"] < high)])
+        measures = (
+            pair(mine["steady_state_error"], 4),
+            pair(mine["convergence_time_s"], 2, "never"),
+            pair(mine["band_time_s"], 2, "never"),
+        )
+        rows.append([f"{low:g} to {high:g}", str(mine["stretches"]), *measures])
+    heads = ["true friction", "stretches", "steady-state error", "5 % of the step [s]", "within 0.02 [s]"]
+    return markdown(heads, rows)
+
+
 def names_of(table: Any) -> list[str]:
     """Estimators in a table, ours first."""
     own = [n for n in ("IFE", "DE", "DIFE") if n in set(table["estimator"])]
@@ -195,6 +214,7 @@ def degradation(found: dict[str, Any]) -> str:
             rows.append(
                 [
                     f"{level['parameter']} {level['level']:g}",
+                    str(level["runs"]),
                     name,
                     pair(shown["steady_state_error"], 3),
                     pair(shown["band_time_s"], 2, "never"),
@@ -221,6 +241,7 @@ def blocks(found: dict[str, dict[str, Any]]) -> Iterator[str]:
     yield "### In the form of Table 5\n\n" + table_5(found)
     if "paper_simulation" in found:
         yield "### The simulation condition\n\n" + accuracy(found["paper_simulation"])
+        yield "DIFE after a change of road, by true friction:\n\n" + by_friction(found["paper_simulation"])
         yield "Where the tyre never showed its friction for 0.5 s:\n\n" + not_shown(found["paper_simulation"])
     yield "### Coverage of 2 TRPAC_std\n\n" + coverage_rows(found)
     if "degradation" in found:

@@ -327,3 +327,30 @@ def test_coverage_is_weighted_by_time(sweep_of):
     assert found["coverage"]["all_time"] == pytest.approx(share)
     assert summarise(table)["levels"][0]["estimators"]["DE"]["coverage"] is None
     assert distribution(fused)["stretches"] == 2
+
+
+@pytest.mark.e2e
+def test_rendered_pictures_go_through_the_image_estimator(tmp_path):
+    """A short drive on dry road at a quarter of the camera's size: verdicts come from the networks."""
+    camera = yaml.safe_load((ROOT / "scenarios" / "cameras" / "paper.yaml").read_text())
+    camera |= {key: camera[key] / 4 for key in ("fx_px", "fy_px", "cx_px", "cy_px")}
+    camera |= {"width_px": 480, "height_px": 300}
+    (tmp_path / "camera.yaml").write_text(yaml.safe_dump(camera))
+    scenario = yaml.safe_load(SCENARIO.read_text()) | {"camera": str(tmp_path / "camera.yaml")}
+    scenario["pictures"] = {"disturbance": "paper", "fps": 4.0}
+    for key in ("vehicle", "road", "manoeuvre"):
+        scenario[key] = str(SCENARIO.parent / scenario[key])
+    (tmp_path / "scenario.yaml").write_text(yaml.safe_dump(scenario))
+    road = {"stretch_m": 5.0, "friction": {"snow_ice": [0.3, 0.3]}}
+    changes = {"scenario": "scenario.yaml", "road": road, "camera": {"source": "rendered"}, "runs": 1}
+    (tmp_path / "sweep.yaml").write_text(yaml.safe_dump(SHORT | changes))
+    sweep = load_sweep(tmp_path / "sweep.yaml")
+    plan = plan_run(sweep, run_keys(sweep)[0])
+    trajectory = drive(plan.scenario)
+    tracks = step_all(plan, trajectory, believed_config(plan, {}), ["IFE", "DIFE"])
+    again = step_all(plan, trajectory, believed_config(plan, {}), ["IFE", "DIFE"])
+    np.testing.assert_array_equal(tracks.by_name["IFE"].TRPAC, again.by_name["IFE"].TRPAC)
+    front = trajectory.position_m + plan.scenario.vehicle.to_core().cog_to_front_axle_m
+    judged = tracks.by_name["IFE"].TRPAC[front > 2.6]
+    assert set(np.unique(judged)) <= {0.2, 0.6, 0.8}
+    assert (judged == 0.2).mean() > 0.5
