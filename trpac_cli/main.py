@@ -18,6 +18,7 @@ from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
 from trpac_cli import gap, vision
 from trpac_cli.estimate import estimate
+from trpac_cli.sweep import sweep
 
 EXIT_INPUT = 2
 """Unusable input: one message on standard error, and nothing written."""
@@ -31,6 +32,7 @@ app = typer.Typer(
 app.add_typer(vision.app, name="vision")
 app.add_typer(gap.app, name="gap")
 app.command()(estimate)
+app.command()(sweep)
 
 
 @app.callback()

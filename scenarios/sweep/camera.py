@@ -1,0 +1,199 @@
+"""The camera of a run without pictures: verdicts drawn from records of the real image estimator.
+
+`camera_process.yaml` holds what the image estimator said along rendered, disturbed worlds (`measure_camera.py`). A run
+draws one of these worlds and, for each stretch of road, a place in that world's record of the surface; from there
+on the record is played back by the way driven. So wrong classes come as often, as long and with as high a confidence
+as they did there, and worlds that are hard stay hard for the whole run. A verdict comes in the step of its picture, as
+from the unit, which stamps a picture onto the road where it was taken however long it then thinks; `late_s` is what
+a bus adds to that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from scenarios.camera.disturbances import disturb
+from scenarios.files import Scenario
+from scenarios.pictures import DISTURBANCES, frame_steps, scene
+from scenarios.plant.pipeline import PlantTrajectory
+from scenarios.sweep.draw import Camera
+from trpac_core.estimator import RoadClass
+from trpac_core.vision.classes import Surface
+
+RECORDS = Path(__file__).with_name("camera_process.yaml")
+CERTAIN = 0.95
+"""Confidence of a wrong class that is given on purpose [-]."""
+
+
+class Record(NamedTuple):
+    """Verdicts along one surface of one world, at equal spacing: class index and Q_v, shape (n,) each."""
+
+    given: NDArray[np.int64]
+    Q_v: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CameraProcess:
+    """The records, with the way between their verdicts, and ahead of the wheel to what they speak of [m]."""
+
+    spacing_m: float
+    near_m: float
+    worlds: tuple[dict[Surface, Record], ...]
+
+
+@lru_cache(maxsize=1)
+def measured_process() -> CameraProcess:
+    """The shipped records."""
+    data = yaml.safe_load(RECORDS.read_text(encoding="utf-8"))
+    return CameraProcess(
+        spacing_m=float(data["spacing_m"]),
+        near_m=float(data["near_m"]),
+        worlds=tuple({s: _record(world[s.label]) for s in Surface} for world in data["worlds"]),
+    )
+
+
+def _record(entry: dict[str, Any]) -> Record:
+    given = np.array([int(digit) for digit in entry["given"]])
+    return Record(given, np.array([float(q) for q in str(entry["Q_v_percent"]).split()]) / 100.0)
+
+
+class Frames(NamedTuple):
+    """The frames of a drive that arrive, and what disturbs them, shape (n,) each."""
+
+    taken: NDArray[np.int64]
+    """Step at which the picture is taken."""
+    arrives: NDArray[np.int64]
+    """Step at which its verdict comes."""
+    front_m: NDArray[np.float64]
+    """Where the front axle is when the picture is taken [m]."""
+    wrong: NDArray[np.int64]
+    """The wrong class that is given on purpose; -1 where none is."""
+
+
+def frames_of(
+    scenario: Scenario,
+    trajectory: PlantTrajectory,
+    camera: Camera,
+    process: CameraProcess,
+    random: np.random.Generator,
+) -> Frames:
+    """The frames of a drive with the run's disturbances drawn.
+
+    Parameters
+    ----------
+    scenario, trajectory : Scenario, PlantTrajectory
+        Road and frame rate, and the drive.
+    camera : Camera
+        How much disturbs the frames.
+    process : CameraProcess
+        For how far ahead the verdict's middle lies.
+    random : Generator
+        Where the disturbances are drawn from.
+    """
+    taken = np.arange(0, len(trajectory), frame_steps(scenario))
+    front_m = trajectory.position_m[taken] + scenario.vehicle.to_core().cog_to_front_axle_m
+    true = np.array([int(scenario.road.segment_at(float(m)).surface_class) for m in front_m + process.near_m])
+    turn = int(random.integers(1, len(Surface)))
+    wrong = np.where(_wrong_way(front_m, camera, random), (true + turn) % len(Surface), -1)
+    kept = random.uniform(size=len(taken)) >= camera.lost_share
+    late = round(camera.late_s / scenario.step_s)
+    return Frames(taken[kept], taken[kept] + late, front_m[kept], wrong[kept])
+
+
+def class_verdicts(
+    scenario: Scenario,
+    trajectory: PlantTrajectory,
+    camera: Camera,
+    seed: int,
+    process: CameraProcess | None = None,
+) -> dict[int, RoadClass]:
+    """Verdicts of a drive, by the step at which they arrive; world and disturbances are drawn from the seed."""
+    process = process or measured_process()
+    random, disturbing = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
+    frames = frames_of(scenario, trajectory, camera, process, disturbing)
+    given, Q_v = _played_back(scenario, frames.front_m + process.near_m, process, random)
+    given = np.where(frames.wrong >= 0, frames.wrong, given)
+    Q_v = np.where(frames.wrong >= 0, CERTAIN, Q_v) * camera.confidence_factor
+    return {
+        int(row): RoadClass(Surface(int(index)), float(q))
+        for row, index, q in zip(frames.arrives, given, Q_v, strict=True)
+    }
+
+
+class RenderedFrames:
+    """Pictures of a drive, drawn, disturbed and packed as JPEG when they are asked for.
+
+    Parameters
+    ----------
+    scenario, trajectory, camera, seed
+        As for `class_verdicts`; the world follows the scenario's seed.
+    """
+
+    def __init__(self, scenario: Scenario, trajectory: PlantTrajectory, camera: Camera, seed: int) -> None:
+        self._scenario = scenario
+        self._renderer = scene(scenario)
+        disturbing = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
+        frames = frames_of(scenario, trajectory, camera, measured_process(), disturbing)
+        self._frames = {int(row): place for place, row in enumerate(frames.arrives)}
+        self._taken, self._front_m, self._wrong = frames.taken, frames.front_m, frames.wrong
+
+    def get(self, row: int) -> NDArray[np.uint8] | RoadClass | None:
+        """The picture that arrives at a step, a wrong class in its place, or None where none arrives."""
+        place = self._frames.get(row)
+        if place is None:
+            return None
+        if self._wrong[place] >= 0:
+            return RoadClass(Surface(int(self._wrong[place])), CERTAIN)
+        pictures = self._scenario.pictures
+        image = self._renderer.frame(float(self._front_m[place])).image
+        seed = int(
+            np.random.SeedSequence([self._scenario.seed, int(self._taken[place])]).generate_state(1)[0]
+        )
+        image = disturb(image, DISTURBANCES[pictures.disturbance], seed)
+        _, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality])
+        return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), dtype=np.uint8)
+
+
+def _played_back(
+    scenario: Scenario, place_m: NDArray[np.float64], process: CameraProcess, random: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Class and confidence for the road at places."""
+    world = process.worlds[int(random.integers(len(process.worlds)))]
+    given, Q_v = np.empty(len(place_m), dtype=np.int64), np.empty(len(place_m))
+    starts = np.array([s.start_m for s in scenario.road.segments])
+    stretch = np.clip(np.searchsorted(starts, place_m, side="right") - 1, 0, None)
+    for index, segment in enumerate(scenario.road.segments):
+        record, here = world[segment.surface_class], stretch == index
+        offset = int(random.integers(len(record.given)))
+        cell = np.floor((place_m[here] - starts[index]) / process.spacing_m).astype(np.int64)
+        at = (offset + cell) % len(record.given)
+        given[here], Q_v[here] = record.given[at], record.Q_v[at]
+    return given, Q_v
+
+
+def _wrong_way(
+    front_m: NDArray[np.float64], camera: Camera, random: np.random.Generator
+) -> NDArray[np.bool_]:
+    """Where on the way a wrong class is given: stretches and gaps of exponential length in the asked share."""
+    if camera.wrong_share <= 0.0:
+        return np.zeros(len(front_m), dtype=bool)
+    if camera.wrong_share >= 1.0:
+        return np.ones(len(front_m), dtype=bool)
+    gap_m = camera.wrong_length_m * (1.0 - camera.wrong_share) / camera.wrong_share
+    wrong = bool(random.uniform() < camera.wrong_share)
+    borders, states = [-np.inf], [wrong]
+    place = float(front_m[0])
+    while place < front_m[-1]:
+        place += float(random.exponential(camera.wrong_length_m if wrong else gap_m))
+        wrong = not wrong
+        borders.append(place)
+        states.append(wrong)
+    return np.array(states)[np.searchsorted(np.array(borders), front_m, side="right") - 1]

@@ -1,0 +1,291 @@
+"""The sweep file: which scenario, how often, what is drawn, what is varied level by level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from fmu_src.units import UNITS
+from scenarios.effects import suggestion
+from scenarios.errors import ScenarioError
+from scenarios.files import Scenario, SurfaceName, load_scenario, load_strict
+from scenarios.sweep.trackers import problem_of_tracker
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Drawn(_Section):
+    """How a number is drawn for each run; exactly one of the kinds."""
+
+    uniform: list[float] | None = None
+    """Lowest and highest."""
+    normal: list[float] | None = None
+    """Mean and standard deviation."""
+    choice: Annotated[list[float], Field(min_length=1)] | None = None
+    """One of these, all equally likely."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Drawn:
+        given = [kind for kind in ("uniform", "normal", "choice") if getattr(self, kind) is not None]
+        if len(given) != 1:
+            raise ValueError(f"names {given or 'no kind'}; expected exactly one of uniform, normal, choice.")
+        if self.uniform is not None and not (len(self.uniform) == 2 and self.uniform[0] <= self.uniform[1]):
+            raise ValueError(f"uniform is {self.uniform}; expected [lowest, highest].")
+        if self.normal is not None and not (len(self.normal) == 2 and self.normal[1] >= 0.0):
+            raise ValueError(f"normal is {self.normal}; expected [mean, standard deviation].")
+        return self
+
+    def sample(self, random: np.random.Generator) -> float:
+        """One value."""
+        if self.uniform is not None:
+            return float(random.uniform(self.uniform[0], self.uniform[1]))
+        if self.normal is not None:
+            return float(random.normal(self.normal[0], self.normal[1]))
+        return float(random.choice(np.array(self.choice)))
+
+
+Number = float | Drawn
+"""A number, or how it is drawn."""
+
+
+def extremes(number: Number) -> tuple[float, float]:
+    """Lowest and highest that a number can be, a normal one within 4 deviations."""
+    if not isinstance(number, Drawn):
+        return number, number
+    if number.uniform is not None:
+        return number.uniform[0], number.uniform[1]
+    if number.normal is not None:
+        mean, deviation = number.normal
+        return mean - 4.0 * deviation, mean + 4.0 * deviation
+    values = number.choice or [0.0]
+    return min(values), max(values)
+
+
+class RoadDraw(_Section):
+    """A road per run: one stretch of each surface, its friction drawn within the class's range."""
+
+    order: Literal["random", "as_listed"] = "random"
+    stretch_m: Annotated[float, Field(gt=0.0)] = 20.0
+    friction: Annotated[dict[SurfaceName, list[float]], Field(min_length=1)]
+    """Surface to its lowest and highest friction [-]."""
+
+    @model_validator(mode="after")
+    def _check(self) -> RoadDraw:
+        for surface, span in self.friction.items():
+            if not (len(span) == 2 and 0.02 <= span[0] <= span[1] <= 1.2):
+                raise ValueError(
+                    f"friction.{surface} is {span}; expected [lowest, highest] within 0.02 and 1.2."
+                )
+        return self
+
+
+class PedalDraw(_Section):
+    """A driver who pulses the pedal and uses some of the grip; see `scenarios.sweep.pedal`."""
+
+    grip_use: Number = Field(default_factory=lambda: Drawn(uniform=[0.75, 0.95]))
+    """Share of the grip that a pulse asks for, per pulse [-]."""
+    pulse_s: Number = Field(default_factory=lambda: Drawn(uniform=[0.34, 0.5]))
+    """Length of a pulse, per pulse [s]."""
+    period_s: Annotated[float, Field(ge=0.3, le=5.0)] = 0.58
+    light_torque_nm: Annotated[float, Field(ge=0.0)] = 60.0
+    """On roads that the motors cannot excite, after the launch [N m]."""
+
+
+class VehicleDraw(_Section):
+    """The car itself, which plant and estimator both know; factors on the scenario's vehicle file."""
+
+    mass_factor: Number = 1.0
+    stiffness_factor: Number = 1.0
+
+
+class Believed(_Section):
+    """What the estimator takes for true, as a factor on what is true [-]."""
+
+    mass_factor: Number = 1.0
+    radius_factor: Number = 1.0
+    stiffness_factor: Number = 1.0
+    torque_factor: Number = 1.0
+
+
+class SensorDraw(_Section):
+    """Errors of the sensors."""
+
+    noise_factor: Number = 1.0
+    noise_known_factor: Number | None = None
+    """What the estimator takes the noise for, as a factor on the scenario's; left out: what it is."""
+    speed_bias_m_s: Number = 0.0
+    """Constant error of the vehicle speed [m/s]."""
+
+
+class CameraDraw(_Section):
+    """Disturbances of the camera's verdicts, on top of what the camera process or the pictures already do."""
+
+    source: Literal["class_process", "rendered", "none"] = "class_process"
+    wrong_share: Number = 0.0
+    """Share of the way for which another class is given with confidence 0.95: flag 1 [-]."""
+    wrong_length_m: Annotated[float, Field(gt=0.0)] = 5.0
+    """Mean length of such a stretch [m]."""
+    lost_share: Number = 0.0
+    """Share of frames that never come [-]."""
+    late_s: Number = 0.0
+    """How much later than its picture a verdict comes over the bus, and is stamped [s]."""
+    class_value_offset: Number = 0.0
+    """Added to what the estimator takes each class's adhesion for [-]."""
+    confidence_factor: Number = 1.0
+    """On every Q_v; 0: the flag is never up [-]."""
+
+
+class Axis(_Section):
+    """One quantity that takes several levels, `runs` runs on each, all else drawn alike on every level."""
+
+    parameter: str
+    levels: Annotated[list[float], Field(min_length=1)]
+
+
+class SweepFile(_Section):
+    """sweep.yaml as written; the scenario's path is relative to it."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    name: str
+    description: str = ""
+    scenario: str
+    runs: Annotated[int, Field(ge=1, le=1_000_000)]
+    seed: Annotated[int, Field(ge=0)] = 0
+    estimators: Annotated[list[str], Field(min_length=1)] = ["IFE", "DE", "DIFE"]
+    road: RoadDraw | None = None
+    pedal: PedalDraw | None = None
+    vehicle: VehicleDraw = Field(default_factory=VehicleDraw)
+    believed: Believed = Field(default_factory=Believed)
+    sensors: SensorDraw = Field(default_factory=SensorDraw)
+    camera: CameraDraw = Field(default_factory=CameraDraw)
+    unit: dict[str, float] = Field(default_factory=dict)
+    """Parameters of the estimator by the unit's names, in place of the delivered ones."""
+    vary: list[Axis] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _check(self) -> SweepFile:
+        known = list(drawn_numbers(self))
+        problems = [
+            f"vary[{i}].parameter is {axis.parameter!r}; {suggestion(axis.parameter, known)}"
+            for i, axis in enumerate(self.vary)
+            if axis.parameter not in known
+        ]
+        reals = [v.name for v in UNITS["TrpacEstimator"].variables if v.causality == "parameter" and v.unit]
+        problems += [
+            f"unit.{name}: unknown; {suggestion(name, reals)}" for name in self.unit if name not in reals
+        ]
+        problems += [text for name in self.estimators if (text := problem_of_tracker(name))]
+        twice = sorted({name for name in self.estimators if self.estimators.count(name) > 1})
+        problems += [f"estimators names {name} twice." for name in twice]
+        problems += [text for name, value in _all_numbers(self) if (text := _out_of_range(name, value))]
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+
+RANGES = {
+    "pedal.grip_use": (0.05, 3.0),
+    "pedal.pulse_s": (0.1, 5.0),
+    "vehicle.mass_factor": (0.3, 3.0),
+    "vehicle.stiffness_factor": (0.2, 5.0),
+    "believed.mass_factor": (0.3, 3.0),
+    "believed.radius_factor": (0.5, 2.0),
+    "believed.stiffness_factor": (0.2, 5.0),
+    "believed.torque_factor": (0.1, 5.0),
+    "sensors.noise_factor": (0.0, 1000.0),
+    "sensors.noise_known_factor": (0.0, 1000.0),
+    "sensors.speed_bias_m_s": (-5.0, 5.0),
+    "camera.wrong_share": (0.0, 1.0),
+    "camera.lost_share": (0.0, 1.0),
+    "camera.late_s": (0.0, 10.0),
+    "camera.class_value_offset": (-0.4, 0.4),
+    "camera.confidence_factor": (0.0, 1.0),
+}
+"""What each drawn number may be, in the unit of its name."""
+
+PER_PULSE = ("pedal.grip_use", "pedal.pulse_s")
+"""Drawn anew for every pulse, not once a run."""
+
+
+def drawn_numbers(file: SweepFile) -> dict[str, Number]:
+    """Every number that is drawn once a run, by its path in the file."""
+    return {name: value for name, value in _numbers(file) if name not in PER_PULSE}
+
+
+def _numbers(file: SweepFile) -> list[tuple[str, Number]]:
+    found: list[tuple[str, Number]] = []
+    for path in RANGES:
+        section, key = path.split(".")
+        owner = getattr(file, section)
+        value = None if owner is None else getattr(owner, key)
+        if path == "sensors.noise_known_factor" or value is not None:
+            found.append((path, 1.0 if value is None else value))
+    return found
+
+
+def _all_numbers(file: SweepFile) -> list[tuple[str, Number]]:
+    """The numbers as written and the levels that take their place."""
+    levels = [(axis.parameter, level) for axis in file.vary for level in axis.levels]
+    return [*_numbers(file), *levels]
+
+
+def _out_of_range(name: str, value: Number) -> str | None:
+    if name not in RANGES:
+        return None
+    low, high = extremes(value)
+    least, most = RANGES[name]
+    if isinstance(value, Drawn) and value.normal is not None:
+        low, high = max(low, value.normal[0]), min(high, value.normal[0])
+    if least <= low and high <= most:
+        return None
+    return f"{name} reaches from {low:g} to {high:g}; expected within {least:g} and {most:g}."
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep with its scenario read."""
+
+    path: Path
+    file: SweepFile
+    scenario: Scenario
+
+
+def load_sweep(path: str | Path) -> Sweep:
+    """Read a sweep file and its scenario; raises ScenarioError with all problems."""
+    path = Path(path)
+    file = load_strict(path, SweepFile)
+    try:
+        scenario = load_scenario(path.parent / file.scenario)
+    except ScenarioError as error:
+        raise ScenarioError(f"{path}: scenario: {error}") from error
+    problems = []
+    if file.camera.source == "rendered" and scenario.camera_path is None:
+        problems.append(f"{path}: camera.source is 'rendered', but {scenario.path} names no camera.")
+    confidence = [file.camera.confidence_factor]
+    confidence += [
+        x for axis in file.vary if axis.parameter == "camera.confidence_factor" for x in axis.levels
+    ]
+    if file.camera.source == "rendered" and any(value != 1.0 for value in confidence):
+        problems.append(
+            f"{path}: camera.confidence_factor is not 1, but camera.source is 'rendered': pictures have the "
+            "confidence that the networks give them. Expected 'class_process' or a factor of 1."
+        )
+    if file.road is not None and file.pedal is None:
+        problems.append(
+            f"{path}: road is drawn and pedal is not; expected both, for a pedal trace made for one friction "
+            "spins the wheels on a lower one."
+        )
+    if problems:
+        raise ScenarioError("\n".join(problems))
+    return Sweep(path, file, scenario)
+
+
+def content(file: SweepFile) -> dict[str, Any]:
+    """The file as plain values, defaults filled in."""
+    return file.model_dump(by_alias=True)

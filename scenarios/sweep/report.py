@@ -1,0 +1,65 @@
+"""report.html of a sweep: one file that needs nothing beside it."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pandas as pd
+
+from scenarios.report import number
+from scenarios.sweep import figures
+from scenarios.sweep.execute import Failure
+from scenarios.sweep.files import Sweep
+from scenarios.sweep.summary import ENOUGH_SHOWN_S
+
+TEMPLATE = Path(__file__).with_name("report.html.jinja")
+
+
+def write_report(
+    sweep: Sweep, table: pd.DataFrame, summary: dict[str, Any], failures: list[Failure], path: Path
+) -> None:
+    """Write the report of a finished sweep."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATE.parent), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters["number"] = number
+    environment.filters["never"] = lambda value: "never" if value is None else f"{value:.2f}"
+    file = sweep.file
+    text = environment.get_template(TEMPLATE.name).render(
+        name=file.name,
+        description=file.description,
+        runs=table["run"].nunique(),
+        scenario=sweep.scenario.name,
+        camera=file.camera.source,
+        seed=file.seed,
+        levels=summary["levels"],
+        failures=[f"run {f.run} ({f.why})" for f in failures],
+        enough_s=ENOUGH_SHOWN_S,
+        pictures=[(title, said, _address(data)) for title, said, data in _pictures(table)],
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+def _pictures(table: pd.DataFrame) -> list[tuple[str, str, bytes]]:
+    """Title, sentence and picture of each figure."""
+    shown = []
+    if table["parameter"].nunique() == 1 and table["level"].nunique() <= 1:
+        said = "Share of stretches that are at most so far off, or take at most so long. Crosses: what is asked for."
+        shown.append(("Error and convergence", said, figures.distributions(table)))
+        said = "Every stretch of every run. Grey: the tyre did not truly show its friction for long enough there."
+        shown.append(("Error over true friction", said, figures.errors_by_friction(table)))
+    covered = figures.coverage_figure(table)
+    if covered is not None:
+        said = "Share of time with the true value within 2 TRPAC_std."
+        shown.append(("Coverage of TRPAC_std", said, covered))
+    for parameter, picture in figures.degradations(table):
+        said = "Slippery stretches that the tyre showed; on the right all the time on slippery stretches."
+        shown.append((f"Degradation over {parameter}", said, picture))
+    return shown
+
+
+def _address(data: bytes) -> str:
+    return f"data:image/png;base64,{b64encode(data).decode('ascii')}"

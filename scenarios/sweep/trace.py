@@ -1,0 +1,56 @@
+"""One run of a sweep in full: every output of the estimator at every step, for figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from scenarios.metrics import score_run
+from scenarios.plant.pipeline import drive
+from scenarios.plant.sensors import make_scenario_log
+from scenarios.runner import ESTIMATORS, Run, segment_starts, under_the_wheel
+from scenarios.sweep.draw import RunPlan
+from scenarios.sweep.run import believed_config, camera_of, signals_of
+from trpac_core.estimator import Estimate, TrpacEstimator
+from trpac_core.readings import Sensors
+
+RENAMED = {"tyre_force_n": "tyre_force", "frame_age_s": "frame_age"}
+"""Fields of an estimate whose column has the unit's name."""
+
+
+def trace(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:
+    """A run as `runner.run_scenario` gives it, stepped in Python with the sweep's camera.
+
+    Parameters
+    ----------
+    plan : RunPlan
+        The run.
+    unit : mapping, optional
+        Parameters by the unit's names, in place of the delivered ones.
+    """
+    trajectory = drive(plan.scenario)
+    frames, ife = camera_of(plan, trajectory)
+    estimator = TrpacEstimator(believed_config(plan, dict(unit or {})), ife)
+    rows = []
+    signals = zip(*signals_of(plan, trajectory), strict=True)
+    for row, (omega, torque, speed, acceleration) in enumerate(signals):
+        sensors = Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
+        rows.append(estimator.step(plan.scenario.step_s, sensors, frames.get(row)))
+    outputs = pd.DataFrame([{name: getattr(e, name) for name in Estimate.__slots__} for e in rows])
+    parts = [
+        make_scenario_log(plan.scenario, trajectory),
+        outputs.rename(columns=RENAMED).drop(columns="problem"),
+        under_the_wheel(plan.scenario, trajectory),
+    ]
+    table = pd.concat(parts, axis=1)
+    scores = score_run(
+        segment_starts(plan.scenario),
+        table["segment"].to_numpy(),
+        table["theta_true"].to_numpy(),
+        float(table["TRPAC_dynamics"].iloc[0]),
+        {name: table[column].to_numpy() for name, column in ESTIMATORS.items()},
+        table["excitation_flag"].to_numpy(),
+        plan.scenario.step_s,
+    )
+    return Run(plan.scenario, trajectory, pd.DataFrame(), table, {"estimators": scores})

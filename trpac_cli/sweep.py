@@ -1,0 +1,155 @@
+"""The command `trpac sweep`: many runs on Dask."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from scenarios.errors import ScenarioError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from scenarios.sweep.execute import Failure
+    from scenarios.sweep.files import Sweep
+    from scenarios.sweep.store import Parts
+
+EXIT_SOME_FAILED = 1
+"""Done, but some runs failed; they are named on standard error."""
+EXIT_INPUT = 2
+"""Unusable input: one message on standard error, and nothing written."""
+MOST_NAMED = 5
+
+
+def sweep(
+    file: Annotated[Path, typer.Argument(help="Sweep file, such as scenarios/sweeps/paper_simulation.yaml.")],
+    out: Annotated[Path, typer.Option(help="Folder for runs.parquet, report.html and summary.json.")],
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a running Dask cluster; without it processes of this machine."),
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes of this machine; one per core.")] = None,
+) -> None:
+    """Run a scenario many times over drawn roads, noise, errors and disturbances; write table and report.
+
+    Stopped, it goes on where it was when called again with the same folder: every finished run is kept at once.
+
+    Example: trpac sweep scenarios/sweeps/paper_simulation.yaml --out out/sweep
+
+    Exit codes: 0 done, 1 done but some runs failed, 2 unusable input.
+    """
+    from scenarios.sweep.execute import execute
+    from scenarios.sweep.files import load_sweep
+
+    columns = (
+        TextColumn("runs"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    console = Console()
+    try:
+        _require(scheduler, jobs)
+        loaded = load_sweep(file)
+        with Progress(*columns, console=console) as bars:
+            task = bars.add_task("runs", total=None)
+            parts, failures = execute(
+                loaded,
+                out,
+                scheduler,
+                jobs,
+                lambda done, total: bars.update(task, completed=done, total=total),
+            )
+        if not parts.empty():
+            _finish(loaded, parts, failures, out, console)
+    except ScenarioError as error:
+        print(f"trpac sweep: {error}", file=sys.stderr)
+        raise typer.Exit(EXIT_INPUT) from error
+    if failures:
+        named = "; ".join(f"run {f.run}: {f.why}" for f in failures[:MOST_NAMED])
+        print(
+            f"trpac sweep: {len(failures)} runs failed: {named}. Call again to try these once more.",
+            file=sys.stderr,
+        )
+        raise typer.Exit(EXIT_SOME_FAILED)
+
+
+def _require(scheduler: str | None, jobs: int | None) -> None:
+    """Refuse options that say two things."""
+    if scheduler is not None and jobs is not None:
+        raise ScenarioError("--jobs goes with processes of this machine; leave it out with --scheduler.")
+
+
+def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, console: Console) -> None:
+    """Write what the runs make together."""
+    from scenarios.sweep.report import write_report
+    from scenarios.sweep.store import write_table, write_whole
+    from scenarios.sweep.summary import summarise
+
+    table: pd.DataFrame = parts.table()
+    cpu_s = parts.cpu_s()
+    summary: dict[str, Any] = {
+        "name": loaded.file.name,
+        "seed": loaded.file.seed,
+        "cpu_s": {"total": sum(cpu_s), "median_per_run": sorted(cpu_s)[len(cpu_s) // 2]},
+        **summarise(table),
+    }
+    write_table(table, out / "runs.parquet")
+    write_whole(out / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+    write_report(loaded, table, summary, failures, out / "report.html")
+    console.print(_shown(summary))
+    console.print(f"Report: {out / 'report.html'}   table: {out / 'runs.parquet'}", soft_wrap=True)
+
+
+def _shown(summary: dict[str, Any]) -> Table:
+    """Medians and 95th percentiles for the terminal."""
+    from scenarios.report import number
+
+    table = Table(
+        title=f"{summary['name']}: slippery stretches that the tyre showed, median / 95th percentile"
+    )
+    for heading in (
+        "level",
+        "estimator",
+        "steady-state error",
+        "5 % of step [s]",
+        "within 0.02 [s]",
+        "in 2 std",
+    ):
+        table.add_column(heading, justify="left" if heading in ("level", "estimator") else "right")
+    for level in summary["levels"]:
+        where = f"{level['parameter']} {level['level']:g}" if level["parameter"] else ""
+        for name, found in level["estimators"].items():
+            shown, covered = found["shown"], found["coverage"]
+            times = [
+                " / ".join(
+                    "never" if shown[m][q] is None else f"{shown[m][q]:.2f}"
+                    for q in ("median", "percentile_95")
+                )
+                for m in ("convergence_time_s", "band_time_s")
+            ]
+            error = shown["steady_state_error"]
+            table.add_row(
+                where,
+                name,
+                f"{number(error['median'], 4)} / {number(error['percentile_95'], 4)}",
+                *times,
+                number(covered["all_time"], 3) if covered else number(None),
+                style="bold" if name == "DIFE" else None,
+            )
+    return table
