@@ -95,7 +95,7 @@ def _block_squares(
 
 
 INTERVAL_FACTOR = 2.4
-"""Intervals are wider than the sandwich by this: forms differ, and so nine of ten of the opened cases' values lie within."""
+"""Intervals are wider than the sandwich by this, since forms differ: nine of ten opened cases lie within so."""
 LEAST_HALF_WIDTH = 0.01
 """No interval is narrower than this share of a noticeable change to either side: grids and integrators differ [-]."""
 

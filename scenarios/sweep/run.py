@@ -83,7 +83,7 @@ def believed_config(plan: RunPlan, unit: dict[str, float]) -> EstimatorConfig:
     for surface in Surface:
         name = f"estimator.theta_{surface.label}"
         values[name] = min(max(values[name] + plan.camera.class_value_offset, LEAST_THETA), GREATEST_THETA)
-    return configuration(variables, values)
+    return configuration(variables, values, EstimatorConfig())
 
 
 def signals_of(plan: RunPlan, trajectory: PlantTrajectory) -> list[list[float]]:
