@@ -108,7 +108,7 @@ def test_2_cure_two_builds_of_the_unit_run_their_own_code(unit_folder: Path, tmp
     other = replace(slave, info=replace(slave.info, description="another build"))
     folder = unpack_unit(build_unit(other, tmp_path / "TrpacEstimator.fmu"), tmp_path / "unpacked")
     script = next((folder / "resources").glob("fmu_src_*/trpac_estimator.py"))
-    doubled = "lambda self, vrs: [2.0 * value for value in GuardedSlave.get_real(self, vrs)]"
+    doubled = "lambda self, vrs: [2.0 * value for value in CameraSlave.get_real(self, vrs)]"
     script.write_text(f"{script.read_text()}\nTrpacEstimator.get_real = {doubled}\n")
     units = [Unit(unit_folder), Unit(folder)]
     for unit in units:
