@@ -20,6 +20,7 @@ from trpac_core.dife import (
     WheelInputs,
     fusion_step,
     least_theta,
+    look_at,
     settled,
     visible_theta,
 )
@@ -40,11 +41,16 @@ def on_road(theta, slip=0.03, deviation=0.0, change=0.0):
     return WheelInputs(omega, omega, force * WHEEL.radius_m, Slip(slip, 1.0), LOAD_N, deviation, change)
 
 
+def stepped(state, inputs, gains=GAINS, theta_img=None, step_s=STEP_S):
+    look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+    return fusion_step(state, inputs, look, WHEEL, gains, SCHEDULER, theta_img, step_s)
+
+
 def run(inputs, theta_hat, seconds, gains=GAINS, theta_img=None):
-    state = settled(theta_hat, NEVER_SEEN_M, inputs, WHEEL, gains)
+    state = settled(FusionState(theta_hat, 0.0), inputs, WHEEL, gains)
     trace = []
     for _ in range(round(seconds / STEP_S)):
-        step = fusion_step(state, inputs, WHEEL, gains, SCHEDULER, theta_img, STEP_S)
+        step = stepped(state, inputs, gains, theta_img)
         state = step.state
         trace.append(state.theta_hat)
     return np.array(trace), step
@@ -131,7 +137,7 @@ def test_whatever_comes_the_estimate_stays_in_its_domain(slip, direction, torque
     inputs = WheelInputs(40.0, 40.0, torque, Slip(slip, direction if slip else 0.0), LOAD_N, 1e-4, 0.0)
     state = FusionState(0.5, 0.0)
     for _ in range(5):
-        state = fusion_step(state, inputs, WHEEL, GAINS, SCHEDULER, theta_img, step_s).state
+        state = stepped(state, inputs, GAINS, theta_img, step_s).state
         assert LEAST_THETA <= state.theta_hat <= GREATEST_THETA
         assert np.isfinite(state.s)
 
@@ -139,11 +145,11 @@ def test_whatever_comes_the_estimate_stays_in_its_domain(slip, direction, torque
 def test_ten_short_steps_are_one_long_one():
     """Both equations are solved exactly over a step: with the target at rest the step size does not matter."""
     inputs = on_road(0.3)
-    start = settled(0.32, NEVER_SEEN_M, inputs, WHEEL, GAINS)
-    long = fusion_step(start, inputs, WHEEL, GAINS, SCHEDULER, None, 0.01).state.theta_hat
+    start = settled(FusionState(0.32, 0.0), inputs, WHEEL, GAINS)
+    long = stepped(start, inputs, step_s=0.01).state.theta_hat
     short = start
     for _ in range(10):
-        short = fusion_step(short, inputs, WHEEL, GAINS, SCHEDULER, None, 0.001).state
+        short = stepped(short, inputs).state
     # The target moves a little with F_hat meanwhile: a first-order remainder of (gamma + K) dt of the way made.
     assert short.theta_hat == pytest.approx(long, abs=2e-4)
 
@@ -170,10 +176,10 @@ def test_least_theta_never_exceeds_the_truth(theta, slip, deviation):
 def test_the_camera_rests_for_a_way_after_the_tyre_was_seen():
     """Elastic again after it slid: a wrong class must not undo what the tyre just showed, but may speak later on."""
     elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
-    state = settled(0.5, 0.0, elastic, WHEEL, GAINS)
+    state = settled(FusionState(0.5, 0.0, 0.0), elastic, WHEEL, GAINS)
     trace = []
     for _ in range(round(1.5 * SEEN_HOLD_M / elastic.way_m)):
-        step = fusion_step(state, elastic, WHEEL, GAINS, SCHEDULER, 0.8, STEP_S)
+        step = stepped(state, elastic, theta_img=0.8)
         state = step.state
         trace.append(state.theta_hat)
     assert step.sensitivity == 0.0
