@@ -8,11 +8,13 @@ a stiffness that is off moves all that is read from it. Both show where a tyre s
 with the bias b of the speed signals [m/s], the share r by which the radius or the speed's scale is off, and the share c
 by which the tyre is softer than thought. The three are estimated by a Kalman filter (their covariance
 is what the estimate's own standard deviation rests on); a torque that is off by a factor is taken up by c, one
-that is off by a constant by b and r, so that force and slip agree with each other on the elastic line.
+that is off by a constant by b and r, so that force and slip agree with each other on the elastic line. What is learned is
+used as far as it lies beyond two deviations, and all of it counts in the estimate's own deviation.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,6 +24,10 @@ REJECTED = 3.0
 """Standard deviations beyond which a reading contradicts what is known [-]."""
 CORRELATED = 2.2
 """Samples one filter constant apart are alike by 1/e: the variance of their mean is greater by (1 + 1/e) / (1 - 1/e) [-]."""
+SETTLING = 5.0
+"""F_hat settles after slip does: so many times the slip's distance from its own course is a reading's error [-]."""
+CONTRADICTED = 2.0
+"""Deviations up to which the car is taken to be as told: a car that is as told is not spoilt by what noise teaches [-]."""
 SOFTEST, STIFFEST = 1.0, -0.5
 """Bounds of c [-]: half and double the stiffness that is known."""
 
@@ -40,6 +46,8 @@ class ElasticModel:
         Standard deviation of r: a tyre's rolling radius over load and temperature [-].
     compliance : float
         Standard deviation of c [-].
+    force_doubt_n : float
+        Standard deviation of F_hat, per reading, beside what noise makes of it [N].
     coasting : float
         Used friction below which no driven road lets a tyre slide: whatever slip reads is off [-].
     gentle : float
@@ -52,6 +60,7 @@ class ElasticModel:
     compliance: float = 0.05
     coasting: float = 0.02
     gentle: float = 0.06
+    force_doubt_n: float = 15.0
 
     @property
     def start(self) -> ElasticLine:
@@ -62,6 +71,12 @@ class ElasticModel:
 
 AS_TOLD = ElasticModel(0.0, 0.0, 0.0, 0.0)
 """The car is as it is told: nothing is learned of it."""
+
+
+def beyond(value: float, variance: float) -> float:
+    """What of a value lies beyond `CONTRADICTED` deviations [-]."""
+    least = CONTRADICTED * math.sqrt(variance)
+    return value - least if value > least else value + least if value < -least else 0.0
 
 
 class ElasticLine(NamedTuple):
@@ -78,17 +93,23 @@ class ElasticLine(NamedTuple):
     cc: float
 
     def offset(self, speed_m_s: float) -> float:
-        """What the slip reads too much [-]."""
-        return self.b / speed_m_s + self.r
+        """What is taken off the slip that is read [-]."""
+        return beyond(self.b / speed_m_s + self.r, self.offset_variance(speed_m_s))
+
+    def compliance(self) -> float:
+        """What the tyre is taken to be softer by [-]."""
+        return beyond(self.c, self.cc)
 
     def offset_variance(self, speed_m_s: float) -> float:
-        """Its variance [-]."""
+        """Variance of what the slip reads too much [-]."""
         return max(0.0, (self.bb / speed_m_s + 2.0 * self.br) / speed_m_s + self.rr)
 
     def slip_variance(self, slip: float, speed_m_s: float) -> float:
-        """Variance of the slip at a given force, or of where the elastic line has it [-]."""
+        """Mean square error of where the elastic line has a slip, with what was learned and not used in it [-]."""
         cross = 2.0 * slip * (self.bc / speed_m_s + self.rc)
-        return max(0.0, self.offset_variance(speed_m_s) + cross + slip * slip * self.cc)
+        variance = self.offset_variance(speed_m_s) + cross + slip * slip * self.cc
+        unused = self.b / speed_m_s + self.r - self.offset(speed_m_s) + slip * (self.c - self.compliance())
+        return max(0.0, variance) + unused * unused
 
     def drifted(self, model: ElasticModel, passed_s: float) -> ElasticLine:
         """The line after a time in which the speed signals may have drifted."""
@@ -136,7 +157,9 @@ def learned(
     known = by_b * inverse_v + by_r + by_c * elastic
     if known <= 0.0:
         return line
-    total = known + CORRELATED * deviation * deviation + slip_change * slip_change
+    doubt = model.force_doubt_n / (INITIAL_SLOPE * longitudinal_stiffness_n)
+    settling = SETTLING * slip_change
+    total = known + CORRELATED * deviation * deviation + doubt * doubt + settling * settling
     off = slip - (b * inverse_v + r + (1.0 + c) * elastic)
     if off * off > REJECTED * REJECTED * total:
         if used > model.coasting:

@@ -227,7 +227,7 @@ class TrpacEstimator:
         config, known = self.config, self._wheel
         scheduler, gains = config.scheduler, config.gains
         readings, inputs, read_slip, smoothed_slip, locked_s = self._inputs(state, sensors, step_s, load_n)
-        C_x = known.longitudinal_stiffness_n / (1.0 + state.line.c)
+        C_x = known.longitudinal_stiffness_n / (1.0 + state.line.compliance())
         wheel = Wheel(known.inertia_kg_m2, known.radius_m, C_x)
         fusion, dynamics = state.fusion, state.dynamics
         if not state.settled:
@@ -327,7 +327,7 @@ class TrpacEstimator:
             ahead(torque_nm, before.wheel_torque_nm, ratio) - rolling_nm,
             slip,
             load_n,
-            math.sqrt(noise * noise + offset_variance),
+            max(noise, math.sqrt(offset_variance)),
             abs(signed - smoothed_slip),
             sensors.vehicle_speed_m_s * step_s,
             locked_s > RELEASED * config.sensor_filter_s,
