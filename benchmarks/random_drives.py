@@ -134,7 +134,7 @@ def make_drive(seed: int, error: CarError | None = None, noise: float | None = N
     actual = _actual(car, error)
     run = _driven(actual, road, 1.0 + error.torque)
     louder = NOISE.model_copy(update={name: scale * value for name, value in NOISE.model_dump().items()})
-    rows = make_log(run, actual, louder, seed)[COLUMNS].to_numpy()
+    rows = make_log(run, actual, louder, seed)[COLUMNS].to_numpy(copy=True)
     rows[:, 1] /= 1.0 + error.torque
     rows[:, 2] += error.speed_bias_m_s
     front_m = run.position_m + car.to_core().cog_to_front_axle_m
@@ -154,5 +154,7 @@ def estimated(drive: Drive, config: EstimatorConfig, with_frames: bool = True) -
 def told(noise: float = 1.0) -> EstimatorConfig:
     """The estimator's settings for the nominal car with sensors this noisy."""
     core = load_vehicle(CAR_FILE).to_core()
-    deviation = float(np.hypot(NOISE.vehicle_speed_noise_m_s, core.wheel_radius_m * NOISE.wheel_speed_noise_rad_s))
+    deviation = float(
+        np.hypot(NOISE.vehicle_speed_noise_m_s, core.wheel_radius_m * NOISE.wheel_speed_noise_rad_s)
+    )
     return EstimatorConfig(vehicle=core, sliding_speed_noise_m_s=noise * deviation)

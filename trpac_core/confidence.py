@@ -16,10 +16,12 @@ from typing import NamedTuple
 
 from .tyre import TyreAtSlip
 
-LEAST_ROAD, GREATEST_ROAD = 0.05, 1.1
+LEAST_ROAD, GREATEST_ROAD = 0.05, 1.2
 """Roads lie between these [-]."""
 SURELY = 2.0
 """Deviations by which a bound on theta is taken lower than it reads [-]."""
+FARTHEST = 6.0
+"""Deviations from the elastic line beyond which a tyre surely slides [-]."""
 LAG_RATE_1_S = 50.0
 """Rate of the filter on the distance between the tyre's theta and the estimate [1/s]."""
 
@@ -43,19 +45,19 @@ class ConfidenceModel:
     class_scatter : float
         Distance of a road from the value of the class that the camera gave it, wrong classes included [-].
     unknown : float
-        Standard deviation of a road of which nothing is known: anywhere between 0.1 and 1.1 [-].
+        Standard deviation of a road of which nothing is known: anywhere between 0.05 and 1.2 [-].
     """
 
     torque_noise_nm: float = 3.2
     tyre_share: float = 0.01
     car_share: float = 0.03
     road_change: float = 0.05
-    class_change_m: float = 20.0
+    class_change_m: float = 60.0
     class_scatter: float = 0.15
-    unknown: float = 0.29
+    unknown: float = 0.33
 
 
-MIDDLE_ROAD = 0.6
+MIDDLE_ROAD = 0.5 * (LEAST_ROAD + GREATEST_ROAD)
 """Middle of the roads that may be where nothing is known [-]."""
 
 
@@ -141,12 +143,14 @@ def advanced_variance(
     from_torque = torque_friction * torque_friction * gamma * step_s / (2.0 * friction * friction)
     share = math.sqrt(sure + noise_share * noise_share * averaged + from_torque)
     low, high = theta_at(fraction * (1.0 - share), elastic), theta_at(fraction * (1.0 + share), elastic)
-    beyond = fraction * (1.0 + share) - 1.0
-    if beyond > 0.0:
-        # So much of the error leaves a tyre that does not slide, on any road above.
-        high += max(0.0, GREATEST_ROAD - high) * min(beyond / share, 1.0)
     half, scale = 0.5 * (high - low), model.car_share * theta_tyre
     settled = half * half + scale * scale
+    # The same error may make a tyre that does not slide look like one that does: then any road above would do. By
+    # Bayes' rule with all roads alike likely; exp(-x^2 / 2) integrates to sqrt(2 pi) half over those that slide.
+    apart, above = (1.0 - fraction) / (fraction * share), GREATEST_ROAD - 2.0 * elastic
+    if above > 0.0 and apart < FARTHEST:
+        odds = math.exp(-0.5 * apart * apart) * above / (math.sqrt(2.0 * math.pi) * half)
+        settled += odds / (1.0 + odds) * bounded_variance(theta_tyre, 2.0 * elastic)
     variance += (1.0 - math.exp(-2.0 * gamma * step_s)) * (settled - variance)
     # Where the tyre goes on showing something else than the estimate, the estimate is off by that.
     lag += min(1.0, LAG_RATE_1_S * step_s) * (theta_tyre - theta_hat - lag)
@@ -160,6 +164,8 @@ def with_camera(model: ConfidenceModel, variance: float, theta_hat: float, theta
     """Mean square error of the estimate with what the camera says of the road beside what is known [-]."""
     if theta_img is None:
         return variance
-    scatter = model.class_scatter**2
+    scatter, distance = model.class_scatter**2, theta_img - theta_hat
     share = variance / (variance + scatter)
-    return share * scatter + (share * (theta_img - theta_hat)) ** 2
+    # Both may rest on the same: what is known of all roads. So together they are no surer than the better one.
+    alone = min(variance, scatter + distance * distance)
+    return max(share * scatter + (share * distance) ** 2, alone)

@@ -187,7 +187,7 @@ class TrpacEstimator:
         else:
             return state._replace(frame_failed=True) if failed else state
         preview = add_frame(
-            state.preview,
+            prune(state.preview, self._preview, state.position_m),
             self._preview,
             outcome,
             position_m=state.position_m,
@@ -268,7 +268,7 @@ class TrpacEstimator:
             True,
             state.frame_failed,
             state.ife,
-            prune(state.preview, self._preview, position_m) if state.preview.stamps else state.preview,
+            state.preview,
         )
         theta_seen, Q_v, age_s = self._seen(outcome)
         self._last = Estimate(
@@ -300,6 +300,7 @@ class TrpacEstimator:
             now = smoothed(before, sensors, rates.sensor_share)
             ratio = min(step_s / state.step_s, MOST_AHEAD) if state.step_s else 0.0
         omega, torque_nm, speed_m_s = now
+        before_omega, before_torque_nm, _ = before
         floor_m_s = config.floor_m_s
         slip = wheel_slip(omega, speed_m_s, radius_m, floor_m_s)
         read_slip = signed = slip.size * slip.direction
@@ -323,8 +324,8 @@ class TrpacEstimator:
         noise = rates.noise_m_s / max(sensors.vehicle_speed_m_s, floor_m_s)
         inputs = WheelInputs(
             omega,
-            ahead(omega, before.wheel_speed_rad_s, ratio),
-            ahead(torque_nm, before.wheel_torque_nm, ratio) - rolling_nm,
+            ahead(omega, before_omega, ratio),
+            ahead(torque_nm, before_torque_nm, ratio) - rolling_nm,
             slip,
             load_n,
             max(noise, math.sqrt(offset_variance)),
@@ -346,8 +347,10 @@ class TrpacEstimator:
         """Variance and lag of the fused estimate one step later."""
         config, way_m = self.config, inputs.way_m
         before, after = state.fusion.theta_img, fused.state.theta_img
-        if before is not None and after != before:
-            way_m += config.confidence.class_change_m
+        if before is not None and after is not None and after != before and fused.theta_tyre is None:
+            theta = fused.state.theta_hat
+            if abs(after - theta) > abs(before - theta):
+                way_m += config.confidence.class_change_m
         size = inputs.slip.size
         if size == 0.0 or step_s == 0.0 or not inputs.torque_known:
             return wandered(config.confidence, state.variance, fused.state.theta_hat, way_m), 0.0

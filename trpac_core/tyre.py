@@ -25,10 +25,10 @@ INITIAL_SLOPE = 1.27
 """G at slip 0: the curve starts with 1.27 C_x [-]."""
 NEWTON_STEPS = 50
 """Far above what the safeguarded Newton searches need (3 to 6): a bound, not a setting."""
-LEAST_STEP = 1e-10
-"""Where the search for theta ends [-]: its error is then the square of this."""
-LEAST_SLIP_STEP = 1e-6
-"""Where the search for the curve's maximum ends [-]: the maximum is flat, so its height is then right to 1e-10."""
+LEAST_STEP = 1e-6
+"""Newton's last step in the search for theta [-]: the error left is about its square."""
+LEAST_SLIP_STEP = 1e-3
+"""Newton's last step in the search for the curve's maximum [-]: that is flat, so its height is then right to 1e-9."""
 GREATEST_PEAK_SLIP = 0.95
 """Where the search for the curve's maximum ends [-]."""
 
