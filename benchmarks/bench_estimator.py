@@ -2,8 +2,8 @@
 
 .venv/bin/python -m benchmarks.bench_estimator --json out/step.json
 
-Classes come at 20 Hz, some of them wrong, so that DE and DIFE are apart and both are computed. The reference loop is a fixed piece of
-Python: where a busy machine slows it, it slows the step alike.
+Classes come at 20 Hz, some of them wrong, so that DE and DIFE are apart and both are computed. The reference loop is a
+fixed piece of Python: where a busy machine slows it, it slows the step alike.
 """
 
 import argparse

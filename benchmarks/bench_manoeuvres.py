@@ -2,7 +2,8 @@
 
 .venv/bin/python -m benchmarks.bench_manoeuvres
 
-A claim is wrong where the true adhesion is more than 2 TRPAC_std off, and confidently wrong where TRPAC_std is also below 0.1.
+A claim is wrong where the true adhesion is more than 2 TRPAC_std off, and confidently wrong where TRPAC_std is also
+below 0.1.
 """
 
 import json

@@ -1,7 +1,8 @@
 """Random drives in the paper's simulation condition: three stretches of 20 m, pulsed acceleration, a camera by classes.
 
-The order of the stretches and their adhesion are drawn, each from its class's real range; so are the sensors' noise and the camera's
-frames, some of them wrong with the flag up. The driver uses nine tenths of the road's grip or the motors' peak, whichever is less.
+The order of the stretches and their adhesion are drawn, each from its class's real range; so are the sensors' noise and
+the camera's frames, some of them wrong with the flag up. The driver uses nine tenths of the road's grip or the motors'
+peak, whichever is less.
 A car may differ from what the estimator is told of it.
 """
 

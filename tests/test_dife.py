@@ -11,7 +11,6 @@ from trpac_core import tyre
 from trpac_core.dife import (
     GREATEST_THETA,
     LEAST_THETA,
-    NEVER_SEEN_M,
     SEEN_HOLD_M,
     FusionState,
     Gains,

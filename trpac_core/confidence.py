@@ -1,11 +1,11 @@
 """How sure the estimate is: what the tyre, the force it carries, the camera and the way driven unseen say of its error.
 
-The variance P is that of the error of theta_hat, not of a best guess: where the estimate holds, what is known of the road may lie
-elsewhere, and the distance counts.
+The variance P is that of the error of theta_hat, not of a best guess: where the estimate holds, what is known of the
+road may lie elsewhere, and the distance counts.
 
-Force and slip on the sliding part of the curve are f = 1 - (1 - L)^2 of the elastic force, so L = 1 - sqrt(1 - f). A relative
-error d of force or elastic line moves f to f (1 +- d): close to L = 1 a small d spans many roads, and beyond it f says only
-that theta is no less than at f (1 - d). This is the information in theta; nothing about it is constant.
+Force and slip on the sliding part of the curve are f = 1 - (1 - L)^2 of the elastic force, so L = 1 - sqrt(1 - f). A
+relative error d of force or elastic line moves f to f (1 +- d): close to L = 1 a small d spans many roads, and beyond
+it f says only that theta is no less than at f (1 - d). This is the information in theta; nothing about it is constant.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Evidence(NamedTuple):
     noise_share: float
     """That of the slip through noise and through its change, in one step [-]."""
     torque_friction: float
-    """That of the used friction through the torque's noise, per sample [-]."""
+    """That of the used friction through the filtered torque's noise [-]."""
 
 
 def advanced_variance(
@@ -140,7 +140,7 @@ def advanced_variance(
             bound = bounded_variance(theta_hat, least)
             variance = bound if least > theta_hat else min(variance, bound)
         return variance, 0.0
-    from_torque = torque_friction * torque_friction * gamma * step_s / (2.0 * friction * friction)
+    from_torque = torque_friction * torque_friction * averaged / (friction * friction)
     share = math.sqrt(sure + noise_share * noise_share * averaged + from_torque)
     low, high = theta_at(fraction * (1.0 - share), elastic), theta_at(fraction * (1.0 + share), elastic)
     half, scale = 0.5 * (high - low), model.car_share * theta_tyre

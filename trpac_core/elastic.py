@@ -1,15 +1,15 @@
 """The elastic line of the tyre at hand: what gentle driving teaches of slip and stiffness.
 
-A rolling radius or a speed signal that is off by half a per cent moves slip by as much as the difference between two roads, and
-a stiffness that is off moves all that is read from it. Both show where a tyre surely does not slide: its slip is then
+A rolling radius or a speed signal that is off by half a per cent moves slip by as much as the difference between two
+roads, and a stiffness that is off moves all that is read from it. Both show where a tyre surely does not slide:
 
     lambda_read = b / v + r + (1 + c) F_hat / (1.27 C_x)
 
-with the bias b of the speed signals [m/s], the share r by which the radius or the speed's scale is off, and the share c
-by which the tyre is softer than thought. The three are estimated by a Kalman filter (their covariance
-is what the estimate's own standard deviation rests on); a torque that is off by a factor is taken up by c, one
-that is off by a constant by b and r, so that force and slip agree with each other on the elastic line. What is learned is
-used as far as it lies beyond two deviations, and all of it counts in the estimate's own deviation.
+with the bias b of the speed signals [m/s], the share r by which the radius or the speed's scale is off, and the share
+c by which the tyre is softer than told. A Kalman filter estimates the three; the estimate's own standard deviation
+rests on their covariance. A torque that is off by a factor is taken up by c, one that is off by a constant by b and
+r, so that force and slip agree with each other on the elastic line. What is learned is used as far as it lies beyond
+two deviations, and all of it counts in the estimate's own deviation.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from .tyre import INITIAL_SLOPE
 REJECTED = 3.0
 """Standard deviations beyond which a reading contradicts what is known [-]."""
 CORRELATED = 2.2
-"""Samples one filter constant apart are alike by 1/e: the variance of their mean is greater by (1 + 1/e) / (1 - 1/e) [-]."""
+"""Samples a filter constant apart are alike by 1/e: their mean's variance is (1 + 1/e) / (1 - 1/e) as large [-]."""
 SETTLING = 5.0
 """F_hat settles after slip does: so many times the slip's distance from its own course is a reading's error [-]."""
 CONTRADICTED = 2.0
-"""Deviations up to which the car is taken to be as told: a car that is as told is not spoilt by what noise teaches [-]."""
+"""Deviations up to which the car is taken to be as told: what noise teaches does not spoil a car that is [-]."""
 SOFTEST, STIFFEST = 1.0, -0.5
 """Bounds of c [-]: half and double the stiffness that is known."""
 
@@ -92,9 +92,9 @@ class ElasticLine(NamedTuple):
     rc: float
     cc: float
 
-    def offset(self, speed_m_s: float) -> float:
-        """What is taken off the slip that is read [-]."""
-        return beyond(self.b / speed_m_s + self.r, self.offset_variance(speed_m_s))
+    def offset(self, speed_m_s: float, variance: float) -> float:
+        """What is taken off the slip that is read, with its `offset_variance` [-]."""
+        return beyond(self.b / speed_m_s + self.r, variance)
 
     def compliance(self) -> float:
         """What the tyre is taken to be softer by [-]."""
@@ -107,9 +107,10 @@ class ElasticLine(NamedTuple):
     def slip_variance(self, slip: float, speed_m_s: float) -> float:
         """Mean square error of where the elastic line has a slip, with what was learned and not used in it [-]."""
         cross = 2.0 * slip * (self.bc / speed_m_s + self.rc)
-        variance = self.offset_variance(speed_m_s) + cross + slip * slip * self.cc
-        unused = self.b / speed_m_s + self.r - self.offset(speed_m_s) + slip * (self.c - self.compliance())
-        return max(0.0, variance) + unused * unused
+        offset_variance = self.offset_variance(speed_m_s)
+        used = self.offset(speed_m_s, offset_variance) + slip * self.compliance()
+        unused = self.b / speed_m_s + self.r + slip * self.c - used
+        return max(0.0, offset_variance + cross + slip * slip * self.cc) + unused * unused
 
     def drifted(self, model: ElasticModel, passed_s: float) -> ElasticLine:
         """The line after a time in which the speed signals may have drifted."""

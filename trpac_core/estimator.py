@@ -242,11 +242,12 @@ class TrpacEstimator:
         if theta_img is not None or fusion != dynamics:
             fused = fusion_step(fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s)
         theta = fused.state.theta_hat
-        variance, lag = self._variance(state, fused, inputs, look, wheel, step_s)
-        line, unlearned_s = state.line, state.unlearned_s + step_s
-        if unlearned_s >= config.sensor_filter_s:
-            line = self._learned(state, alone, inputs, read_slip, unlearned_s)
-            unlearned_s = 0.0
+        line, variance, lag, unasked_s = state.line, state.variance, state.lag, state.unasked_s + step_s
+        changed = fused.state.theta_img != fusion.theta_img
+        if changed or unasked_s >= config.sensor_filter_s:
+            variance, lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
+            line = self._learned(state, alone, inputs, read_slip, unasked_s)
+            unasked_s = 0.0
         position_m = state.position_m + inputs.way_m
         self._state = EstimatorState(
             fused.state,
@@ -255,7 +256,7 @@ class TrpacEstimator:
             line,
             variance,
             lag,
-            unlearned_s,
+            unasked_s,
             locked_s,
             state.time_s + step_s,
             position_m,
@@ -308,7 +309,7 @@ class TrpacEstimator:
         divisor_m_s = speed_m_s if speed_m_s > floor_m_s else floor_m_s
         if slip.direction or speed_m_s >= floor_m_s:
             offset_variance = line.offset_variance(divisor_m_s)
-            signed = read_slip - line.offset(divisor_m_s)
+            signed = read_slip - line.offset(divisor_m_s, offset_variance)
             slip = Slip(
                 min(abs(signed), GREATEST_SLIP), 1.0 if signed > 0.0 else -1.0 if signed < 0.0 else 0.0
             )
@@ -342,37 +343,38 @@ class TrpacEstimator:
         inputs: WheelInputs,
         look: Look,
         wheel: Wheel,
-        step_s: float,
+        passed_s: float,
     ) -> tuple[float, float]:
-        """Variance and lag of the fused estimate one step later."""
-        config, way_m = self.config, inputs.way_m
+        """Variance and lag of the fused estimate after a time."""
+        config, theta_hat = self.config, fused.state.theta_hat
+        way_m = state.speed_m_s * passed_s
         before, after = state.fusion.theta_img, fused.state.theta_img
-        if before is not None and after is not None and after != before and fused.theta_tyre is None:
-            theta = fused.state.theta_hat
-            if abs(after - theta) > abs(before - theta):
-                way_m += config.confidence.class_change_m
+        known = before is not None and after is not None and fused.theta_tyre is None
+        if known and abs(after - theta_hat) > abs(before - theta_hat):
+            # A class that is farther from the estimate than the one before: the road may be another.
+            way_m += config.confidence.class_change_m
         size = inputs.slip.size
-        if size == 0.0 or step_s == 0.0 or not inputs.torque_known:
-            return wandered(config.confidence, state.variance, fused.state.theta_hat, way_m), 0.0
-        speed_m_s = max(inputs.way_m / step_s, config.floor_m_s)
+        if size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
+            return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
+        speed_m_s = max(state.speed_m_s, config.floor_m_s)
         evidence = Evidence(
             fused.theta_tyre,
             fused.tyre_force_n * inputs.slip.direction / inputs.load_n,
             look.tyre,
             math.sqrt(state.line.slip_variance(size, speed_m_s)) / size,
             (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size,
-            config.confidence.torque_noise_nm / (wheel.radius_m * inputs.load_n),
+            self._rates.noise_gain * config.confidence.torque_noise_nm / (wheel.radius_m * inputs.load_n),
         )
         return advanced_variance(
             config.confidence,
             state.variance,
             state.lag,
-            fused.state.theta_hat,
+            theta_hat,
             evidence,
             self._averaged,
             config.gains.gamma,
             way_m,
-            step_s,
+            passed_s,
         )
 
     def _learned(

@@ -136,8 +136,8 @@ class EstimatorState(NamedTuple):
     variance: float
     lag: float = 0.0
     """Smoothed distance of the tyre's theta from the estimate [-]."""
-    unlearned_s: float = 0.0
-    """Time since the elastic line was last asked [s]."""
+    unasked_s: float = 0.0
+    """Time since elastic line and variance were last brought up to date: once per time constant of the filter [s]."""
     locked_s: float = math.inf
     """Time since the wheel was last locked [s]."""
     time_s: float = 0.0
@@ -194,6 +194,8 @@ class Rates(NamedTuple):
     """Of the sensor filter [-]."""
     acceleration_share: float
     """Of the filter that differentiates speed [-]."""
+    noise_gain: float
+    """What the sensor filter leaves of white noise's standard deviation [-]."""
     noise_m_s: float
     """Standard deviation of the filtered sliding speed [m/s]."""
 
@@ -203,5 +205,6 @@ class Rates(NamedTuple):
         sensor_share = filter_share(step_s, config.sensor_filter_s)
         # White noise per sample through a discrete first-order filter
         share = sensor_share or filter_share(before_s, config.sensor_filter_s)
-        noise_m_s = config.sliding_speed_noise_m_s * math.sqrt(share / (2.0 - share))
-        return cls(step_s, sensor_share, filter_share(step_s, config.acceleration_filter_s), noise_m_s)
+        gain = math.sqrt(share / (2.0 - share))
+        noise_m_s = config.sliding_speed_noise_m_s * gain
+        return cls(step_s, sensor_share, filter_share(step_s, config.acceleration_filter_s), gain, noise_m_s)
