@@ -185,3 +185,27 @@ def test_the_camera_rests_for_a_way_after_the_tyre_was_seen():
     resting = round(SEEN_HOLD_M / elastic.way_m)
     assert trace[: resting - 1] == [0.5] * (resting - 1)
     assert trace[-1] > 0.5
+
+
+def test_another_class_under_the_wheel_ends_the_rest():
+    """Another class is another road: what the tyre showed before no longer speaks for it."""
+    elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
+    state = stepped(settled(FusionState(0.5, 0.0, 0.0), elastic, WHEEL, GAINS), elastic, theta_img=0.2).state
+    assert stepped(state, elastic, theta_img=0.2).state.theta_hat == 0.5
+    assert stepped(state, elastic, theta_img=0.8).state.theta_hat > 0.5
+
+
+def test_a_locked_wheel_moves_neither_estimate_nor_force():
+    """Its torque is the commanded one, which the road need not give."""
+    locked = on_road(0.5, slip=0.999)._replace(
+        wheel_torque_nm=-900.0, slip=Slip(0.999, -1.0), torque_known=False, wheel_speed_rad_s=0.0
+    )
+    state = settled(FusionState(0.7, 0.0), locked, WHEEL, GAINS)
+    for _ in range(500):
+        step = stepped(state, locked, theta_img=0.2)
+        state = step.state
+    assert state.theta_hat == 0.7
+    assert not step.excited
+    assert step.tyre_force_n == pytest.approx(
+        tyre.force(0.7, 0.999, LOAD_N, WHEEL.longitudinal_stiffness_n, -1.0)
+    )

@@ -152,12 +152,11 @@ def advanced_variance(
         odds = math.exp(-0.5 * apart * apart) * above / (math.sqrt(2.0 * math.pi) * half)
         settled += odds / (1.0 + odds) * bounded_variance(theta_tyre, 2.0 * elastic)
     variance += (1.0 - math.exp(-2.0 * gamma * step_s)) * (settled - variance)
+    variance = min(variance, unknown_variance(model, theta_hat))
     # Where the tyre goes on showing something else than the estimate, the estimate is off by that.
     lag += min(1.0, LAG_RATE_1_S * step_s) * (theta_tyre - theta_hat - lag)
     off = abs(lag) - half / share * noise_share
-    if off > 0.0:
-        variance = max(variance, off * off)
-    return min(variance, unknown_variance(model, theta_hat)), lag
+    return (max(variance, off * off) if off > 0.0 else variance), lag
 
 
 def with_camera(model: ConfidenceModel, variance: float, theta_hat: float, theta_img: float | None) -> float:

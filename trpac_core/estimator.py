@@ -349,8 +349,12 @@ class TrpacEstimator:
         config, theta_hat = self.config, fused.state.theta_hat
         way_m = state.speed_m_s * passed_s
         before, after = state.fusion.theta_img, fused.state.theta_img
-        known = before is not None and after is not None and fused.theta_tyre is None
-        if known and abs(after - theta_hat) > abs(before - theta_hat):
+        if (
+            before is not None
+            and after is not None
+            and fused.theta_tyre is None
+            and abs(after - theta_hat) > abs(before - theta_hat)
+        ):
             # A class that is farther from the estimate than the one before: the road may be another.
             way_m += config.confidence.class_change_m
         size = inputs.slip.size
