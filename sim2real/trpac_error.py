@@ -26,6 +26,7 @@ from sim2real.noise import read_noise
 from sim2real.observer import Prediction, Simulation
 from sim2real.result import TrpacError
 from trpac_core.dife import WheelInputs, visible_theta
+from trpac_core.elastic import AS_TOLD
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.readings import Sensors, filter_share
 from trpac_core.slip import GREATEST_SLIP, Slip
@@ -235,7 +236,10 @@ def _sliding_speed_noise(model: Simulation, drive: Drive, prediction: Prediction
 
 
 def _run(inputs: Inputs, drive: Drive, sliding_speed_noise_m_s: float) -> Run:
-    config = EstimatorConfig(vehicle=inputs.vehicle, sliding_speed_noise_m_s=sliding_speed_noise_m_s)
+    # What a model is worth shows where the estimator does not mend it by itself.
+    config = EstimatorConfig(
+        vehicle=inputs.vehicle, elastic=AS_TOLD, sliding_speed_noise_m_s=sliding_speed_noise_m_s
+    )
     estimator, step_s, said = TrpacEstimator(config), drive.step_s, []
     for wheel_rad_s, torque_nm, speed_m_s, *accel in zip(
         *(values.tolist() for values in inputs.readings), strict=True

@@ -11,7 +11,6 @@ from trpac_core import tyre
 from trpac_core.dife import (
     GREATEST_THETA,
     LEAST_THETA,
-    NEVER_SEEN_M,
     SEEN_HOLD_M,
     FusionState,
     Gains,
@@ -20,6 +19,7 @@ from trpac_core.dife import (
     WheelInputs,
     fusion_step,
     least_theta,
+    look_at,
     settled,
     visible_theta,
 )
@@ -40,11 +40,16 @@ def on_road(theta, slip=0.03, deviation=0.0, change=0.0):
     return WheelInputs(omega, omega, force * WHEEL.radius_m, Slip(slip, 1.0), LOAD_N, deviation, change)
 
 
+def stepped(state, inputs, gains=GAINS, theta_img=None, step_s=STEP_S):
+    look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+    return fusion_step(state, inputs, look, WHEEL, gains, SCHEDULER, theta_img, step_s)
+
+
 def run(inputs, theta_hat, seconds, gains=GAINS, theta_img=None):
-    state = settled(theta_hat, NEVER_SEEN_M, inputs, WHEEL, gains)
+    state = settled(FusionState(theta_hat, 0.0), inputs, WHEEL, gains)
     trace = []
     for _ in range(round(seconds / STEP_S)):
-        step = fusion_step(state, inputs, WHEEL, gains, SCHEDULER, theta_img, STEP_S)
+        step = stepped(state, inputs, gains, theta_img)
         state = step.state
         trace.append(state.theta_hat)
     return np.array(trace), step
@@ -131,7 +136,7 @@ def test_whatever_comes_the_estimate_stays_in_its_domain(slip, direction, torque
     inputs = WheelInputs(40.0, 40.0, torque, Slip(slip, direction if slip else 0.0), LOAD_N, 1e-4, 0.0)
     state = FusionState(0.5, 0.0)
     for _ in range(5):
-        state = fusion_step(state, inputs, WHEEL, GAINS, SCHEDULER, theta_img, step_s).state
+        state = stepped(state, inputs, GAINS, theta_img, step_s).state
         assert LEAST_THETA <= state.theta_hat <= GREATEST_THETA
         assert np.isfinite(state.s)
 
@@ -139,11 +144,11 @@ def test_whatever_comes_the_estimate_stays_in_its_domain(slip, direction, torque
 def test_ten_short_steps_are_one_long_one():
     """Both equations are solved exactly over a step: with the target at rest the step size does not matter."""
     inputs = on_road(0.3)
-    start = settled(0.32, NEVER_SEEN_M, inputs, WHEEL, GAINS)
-    long = fusion_step(start, inputs, WHEEL, GAINS, SCHEDULER, None, 0.01).state.theta_hat
+    start = settled(FusionState(0.32, 0.0), inputs, WHEEL, GAINS)
+    long = stepped(start, inputs, step_s=0.01).state.theta_hat
     short = start
     for _ in range(10):
-        short = fusion_step(short, inputs, WHEEL, GAINS, SCHEDULER, None, 0.001).state
+        short = stepped(short, inputs).state
     # The target moves a little with F_hat meanwhile: a first-order remainder of (gamma + K) dt of the way made.
     assert short.theta_hat == pytest.approx(long, abs=2e-4)
 
@@ -170,13 +175,37 @@ def test_least_theta_never_exceeds_the_truth(theta, slip, deviation):
 def test_the_camera_rests_for_a_way_after_the_tyre_was_seen():
     """Elastic again after it slid: a wrong class must not undo what the tyre just showed, but may speak later on."""
     elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
-    state = settled(0.5, 0.0, elastic, WHEEL, GAINS)
+    state = settled(FusionState(0.5, 0.0, 0.0), elastic, WHEEL, GAINS)
     trace = []
     for _ in range(round(1.5 * SEEN_HOLD_M / elastic.way_m)):
-        step = fusion_step(state, elastic, WHEEL, GAINS, SCHEDULER, 0.8, STEP_S)
+        step = stepped(state, elastic, theta_img=0.8)
         state = step.state
         trace.append(state.theta_hat)
     assert step.sensitivity == 0.0
     resting = round(SEEN_HOLD_M / elastic.way_m)
     assert trace[: resting - 1] == [0.5] * (resting - 1)
     assert trace[-1] > 0.5
+
+
+def test_another_class_under_the_wheel_ends_the_rest():
+    """Another class is another road: what the tyre showed before no longer speaks for it."""
+    elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
+    state = stepped(settled(FusionState(0.5, 0.0, 0.0), elastic, WHEEL, GAINS), elastic, theta_img=0.2).state
+    assert stepped(state, elastic, theta_img=0.2).state.theta_hat == 0.5
+    assert stepped(state, elastic, theta_img=0.8).state.theta_hat > 0.5
+
+
+def test_a_locked_wheel_moves_neither_estimate_nor_force():
+    """Its torque is the commanded one, which the road need not give."""
+    locked = on_road(0.5, slip=0.999)._replace(
+        wheel_torque_nm=-900.0, slip=Slip(0.999, -1.0), torque_known=False, wheel_speed_rad_s=0.0
+    )
+    state = settled(FusionState(0.7, 0.0), locked, WHEEL, GAINS)
+    for _ in range(500):
+        step = stepped(state, locked, theta_img=0.2)
+        state = step.state
+    assert state.theta_hat == 0.7
+    assert not step.excited
+    assert step.tyre_force_n == pytest.approx(
+        tyre.force(0.7, 0.999, LOAD_N, WHEEL.longitudinal_stiffness_n, -1.0)
+    )

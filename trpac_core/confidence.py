@@ -1,12 +1,29 @@
-"""How sure the estimate is: variance gained where the tyre shows theta, lost with every metre where it does not."""
+"""How sure the estimate is: what the tyre, the force it carries, the camera and the way driven unseen say of its error.
+
+The variance P is that of the error of theta_hat, not of a best guess: where the estimate holds, what is known of the
+road may lie elsewhere, and the distance counts.
+
+Force and slip on the sliding part of the curve are f = 1 - (1 - L)^2 of the elastic force, so L = 1 - sqrt(1 - f). A
+relative error d of force or elastic line moves f to f (1 +- d): close to L = 1 a small d spans many roads, and beyond
+it f says only that theta is no less than at f (1 - d). This is the information in theta; nothing about it is constant.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from .dife import Wheel, WheelInputs
-from .tyre import friction_by_slip
+from .tyre import TyreAtSlip
+
+LEAST_ROAD, GREATEST_ROAD = 0.05, 1.2
+"""Roads lie between these [-]."""
+SURELY = 2.0
+"""Deviations by which a bound on theta is taken lower than it reads [-]."""
+FARTHEST = 6.0
+"""Deviations from the elastic line beyond which a tyre surely slides [-]."""
+LAG_RATE_1_S = 50.0
+"""Rate of the filter on the distance between the tyre's theta and the estimate [1/s]."""
 
 
 @dataclass(frozen=True)
@@ -18,50 +35,136 @@ class ConfidenceModel:
     torque_noise_nm : float
         Of the wheel torque per sample [N m].
     tyre_share : float
-        What the tyre model itself may be wrong by, as a share of used friction [-].
+        What the tyre's curve itself may be wrong by, as a share of used friction [-].
+    car_share : float
+        What load and torque may be wrong by: the share of theta that no driving can tell [-].
     road_change : float
-        How far friction may wander per root of a metre driven unseen [1/sqrt(m)].
+        How far friction wanders at first per root of a metre driven unseen [1/sqrt(m)].
+    class_change_m : float
+        Way that a change of the class under the wheel counts as: the road may be another [m].
+    class_scatter : float
+        Distance of a road from the value of the class that the camera gave it, wrong classes included [-].
     unknown : float
-        Standard deviation where nothing is known: of a road between 0.1 and 1.1 [-].
+        Standard deviation of a road of which nothing is known: anywhere between 0.05 and 1.2 [-].
     """
 
     torque_noise_nm: float = 3.2
     tyre_share: float = 0.01
+    car_share: float = 0.03
     road_change: float = 0.05
-    unknown: float = 0.29
+    class_change_m: float = 60.0
+    class_scatter: float = 0.15
+    unknown: float = 0.33
 
 
-def wandered(model: ConfidenceModel, variance: float, way_m: float) -> float:
-    """Variance after a way driven unseen [-]."""
-    return min(variance + model.road_change**2 * abs(way_m), model.unknown**2)
+MIDDLE_ROAD = 0.5 * (LEAST_ROAD + GREATEST_ROAD)
+"""Middle of the roads that may be where nothing is known [-]."""
+
+
+def unknown_variance(model: ConfidenceModel, theta_hat: float) -> float:
+    """Mean square error of an estimate that says nothing of the road [-]."""
+    return model.unknown**2 + (theta_hat - MIDDLE_ROAD) ** 2
+
+
+def wandered(model: ConfidenceModel, variance: float, theta_hat: float, way_m: float) -> float:
+    """Variance after a way driven unseen: the road may have changed to any other [-]."""
+    unknown = unknown_variance(model, theta_hat)
+    if variance >= unknown:
+        return variance
+    return unknown - (unknown - variance) * math.exp(-(model.road_change**2) * abs(way_m) / unknown)
+
+
+def theta_at(fraction: float, elastic: float) -> float:
+    """Theta from the force as a fraction of the elastic one, below 1; 2 X / F_z is the road that just slides."""
+    return 2.0 * elastic * (1.0 - math.sqrt(1.0 - fraction)) if fraction < 1.0 else 2.0 * elastic
+
+
+def bounded_variance(theta_hat: float, least: float) -> float:
+    """Mean square error where the road is known to be anywhere above `least` [-]."""
+    least = min(least, GREATEST_ROAD - 0.1)
+    above, below = GREATEST_ROAD - theta_hat, least - theta_hat
+    return (above**3 - below**3) / (3.0 * (GREATEST_ROAD - least))
+
+
+class Evidence(NamedTuple):
+    """What a step says of theta."""
+
+    theta_tyre: float | None
+    """theta(lambda, F_hat) where the tyre shows it [-]."""
+    friction: float
+    """Used friction in the direction of the slip [-]."""
+    tyre: TyreAtSlip
+    line_share: float
+    """Standard deviation of the elastic line as a share of the slip [-]."""
+    noise_share: float
+    """That of the slip through noise and through its change, in one step [-]."""
+    torque_friction: float
+    """That of the used friction through the filtered torque's noise [-]."""
 
 
 def advanced_variance(
     model: ConfidenceModel,
     variance: float,
+    lag: float,
     theta_hat: float,
-    sensitivity: float,
-    inputs: WheelInputs,
-    wheel: Wheel,
+    evidence: Evidence,
+    averaged: float,
     gamma: float,
     way_m: float,
     step_s: float,
-) -> float:
-    """Variance of the estimate one step later [-].
+) -> tuple[float, float]:
+    """Variance of the estimate, and the tyre's smoothed distance from it, one step later.
 
-    While the tyre shows theta (sensitivity d mu / d theta above 0) the estimator is a first-order filter of
-    rate gamma over theta(lambda, F_hat), so its variance goes to that of filtered white noise,
-    sigma^2 gamma dt / 2, plus the tyre model's own error. Otherwise it grows with the way driven.
+    Parameters
+    ----------
+    model, variance, lag, theta_hat
+        Constants; variance, distance and the estimate now [-].
+    evidence : Evidence
+        What the step says of theta.
+    averaged : float
+        What the estimator leaves of the variance of the slip's noise [-].
+    gamma, way_m, step_s : float
+        Rate of the estimator [1/s], way [m] and step [s].
     """
-    if step_s == 0.0:
+    variance = wandered(model, variance, theta_hat, way_m)
+    theta_tyre, friction, tyre, line_share, noise_share, torque_friction = evidence
+    if friction <= 0.0:
+        return variance, 0.0
+    elastic = tyre.elastic
+    fraction = friction / (elastic * tyre.g_0)
+    sure = line_share * line_share + model.tyre_share * model.tyre_share
+    if theta_tyre is None:
+        share = SURELY * math.sqrt(sure + noise_share * noise_share)
+        least = theta_at(fraction * (1.0 - share), elastic) if share < 1.0 else 0.0
+        if least > LEAST_ROAD:
+            bound = bounded_variance(theta_hat, least)
+            variance = bound if least > theta_hat else min(variance, bound)
+        return variance, 0.0
+    from_torque = torque_friction * torque_friction * averaged / (friction * friction)
+    share = math.sqrt(sure + noise_share * noise_share * averaged + from_torque)
+    low, high = theta_at(fraction * (1.0 - share), elastic), theta_at(fraction * (1.0 + share), elastic)
+    half, scale = 0.5 * (high - low), model.car_share * theta_tyre
+    settled = half * half + scale * scale
+    # The same error may make a tyre that does not slide look like one that does: then any road above would do. By
+    # Bayes' rule with all roads alike likely; exp(-x^2 / 2) integrates to sqrt(2 pi) half over those that slide.
+    apart, above = (1.0 - fraction) / (fraction * share), GREATEST_ROAD - 2.0 * elastic
+    if above > 0.0 and apart < FARTHEST:
+        odds = math.exp(-0.5 * apart * apart) * above / (math.sqrt(2.0 * math.pi) * half)
+        settled += odds / (1.0 + odds) * bounded_variance(theta_tyre, 2.0 * elastic)
+    variance += (1.0 - math.exp(-2.0 * gamma * step_s)) * (settled - variance)
+    variance = min(variance, unknown_variance(model, theta_hat))
+    # Where the tyre goes on showing something else than the estimate, the estimate is off by that.
+    lag += min(1.0, LAG_RATE_1_S * step_s) * (theta_tyre - theta_hat - lag)
+    off = abs(lag) - half / share * noise_share
+    return (max(variance, off * off) if off > 0.0 else variance), lag
+
+
+def with_camera(model: ConfidenceModel, variance: float, theta_hat: float, theta_img: float | None) -> float:
+    """Mean square error of the estimate with what the camera says of the road beside what is known [-]."""
+    if theta_img is None:
         return variance
-    grown = wandered(model, variance, way_m)
-    if sensitivity > 0.0:
-        slope = friction_by_slip(theta_hat, inputs.slip.size, inputs.load_n, wheel.longitudinal_stiffness_n)
-        from_slip = slope * inputs.slip_deviation
-        from_torque = model.torque_noise_nm / (wheel.radius_m * inputs.load_n)
-        sample = (from_slip**2 + from_torque**2) / sensitivity**2
-        settled = sample * gamma * step_s / 2.0 + (model.tyre_share / sensitivity) ** 2
-        share = 1.0 - math.exp(-2.0 * gamma * step_s)
-        grown += share * (settled - grown)
-    return min(grown, model.unknown**2)
+    scatter, distance = model.class_scatter**2, theta_img - theta_hat
+    share = variance / (variance + scatter)
+    # Both may rest on the same: what is known of all roads. So together they are no surer than the better one.
+    alone = min(variance, scatter + distance * distance)
+    return max(share * scatter + (share * distance) ** 2, alone)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from .excitation import FuzzyScheduler
 from .observer import advanced_state, observed_force, settled_state
 from .slip import GREATEST_SLIP, Slip
-from .tyre import correction, force, friction_by_theta, slip_ratio_force, theta_from_friction
+from .tyre import TyreAtSlip, force, slip_ratio_force, theta_from_friction, tyre_at_slip
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
@@ -47,9 +47,10 @@ class Gains:
 
     With `tyre_first` the camera hurries the estimate along but does not drag it away from what the tyre shows: where
     theta(lambda, F_hat) is seen, the visual term acts only in its direction and no farther than it; for 2 m after it
-    was seen the term rests; where it is not seen, theta_img counts as no less than force and slip allow. Eqs. (17)
-    and (18) as printed have no such guard: there a wrong class with its flag up pulls a settled estimate off by
-    K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for "dry" on a road of 0.5.
+    was seen the term rests, unless the class under the wheel changes meanwhile; where it is not seen, theta_img
+    counts as no less than force and slip allow. Eqs. (17) and (18) as printed have no such guard: there a wrong
+    class with its flag up pulls a settled estimate off by K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for
+    "dry" on a road of 0.5.
     """
 
     K: float = 63.0
@@ -69,12 +70,14 @@ class WheelInputs(NamedTuple):
     slip: Slip
     load_n: float
     slip_deviation: float
-    """Standard deviation of the slip through sensor noise [-]."""
+    """Standard deviation of the slip through sensor noise and a bias that is not known better [-]."""
     slip_change: float
     """Distance of the slip from its own, once more filtered, course [-]: force and slip of a tyre that is being
     loaded or unloaded pass the filter along the chord of its bent curve, and lie that far beside it."""
     way_m: float = 0.0
     """Way driven over the step to come [m]."""
+    torque_known: bool = True
+    """False at a locked wheel: its brake holds what the road gives, whatever was commanded."""
 
 
 class Wheel(NamedTuple):
@@ -85,12 +88,27 @@ class Wheel(NamedTuple):
     longitudinal_stiffness_n: float
 
 
+class Look(NamedTuple):
+    """What slip and load say before any force is known: the same for DE and DIFE."""
+
+    tyre: TyreAtSlip
+    slides_below: float
+    """Used friction below which the tyre surely slides; 0 where noise hides it [-]."""
+    threshold: float
+    """Excitation threshold without a picture [-]."""
+
+
 class FusionState(NamedTuple):
-    """Inner state: estimated adhesion [-], the observer's s [rad/s^2], way since the tyre last showed theta [m]."""
+    """Inner state of one estimator."""
 
     theta_hat: float
+    """Estimated adhesion [-]."""
     s: float
+    """The observer's s [rad/s^2]."""
     unseen_m: float = NEVER_SEEN_M
+    """Way since the tyre last showed theta [m]."""
+    theta_img: float | None = None
+    """Adhesion of the class that the camera last gave the road under the wheel [-]."""
 
 
 class FusionStep(NamedTuple):
@@ -99,8 +117,10 @@ class FusionStep(NamedTuple):
     state: FusionState
     tyre_force_n: float
     """Observed force F_hat [N]."""
+    theta_tyre: float | None
+    """theta(lambda, F_hat); None where the tyre does not show it or the estimate holds [-]."""
     sensitivity: float
-    """d mu / d theta at theta(lambda, F_hat) [-]; 0 where the tyre does not show theta or the estimate holds."""
+    """d mu / d theta there [-]; 0 where it is None."""
     threshold: float
     """Excitation threshold [-]."""
     excited: bool
@@ -108,51 +128,56 @@ class FusionStep(NamedTuple):
     """Visual gain, [-] in the form (17) and [1/s] in the form (18)."""
 
 
-def settled(
-    theta_hat: float, unseen_m: float, inputs: WheelInputs, wheel: Wheel, gains: Gains
-) -> FusionState:
-    """State whose observed force balances the wheel torque, to start from."""
-    model = force(
-        theta_hat,
-        inputs.slip.size,
-        inputs.load_n,
-        wheel.longitudinal_stiffness_n,
-        inputs.slip.direction,
-    )
+def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains) -> FusionState:
+    """The state with its observed force balancing the wheel torque, to start from."""
+    slip, load_n = inputs.slip, inputs.load_n
+    model = force(state.theta_hat, slip.size, load_n, wheel.longitudinal_stiffness_n, slip.direction)
     balanced = inputs.wheel_torque_nm / wheel.radius_m
     s = settled_state(model, balanced, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
-    return FusionState(theta_hat, s, unseen_m)
+    return state._replace(s=s)
 
 
-def visible_theta(
-    force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float
-) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it.
+def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: FuzzyScheduler) -> Look:
+    """What slip and load say of the tyre.
 
     On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
     end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
     So the force must also be below the elastic one of a slip that is `SIGNIFICANCE` deviations smaller.
     """
-    slip, load_n = inputs.slip, inputs.load_n
-    surely = slip.size - SIGNIFICANCE * (inputs.slip_deviation + inputs.slip_change)
-    if surely <= 0.0:
+    size, load_n, deviation = inputs.slip.size, inputs.load_n, inputs.slip_deviation
+    surely = size - SIGNIFICANCE * (deviation + inputs.slip_change)
+    below = 0.0
+    if surely > 0.0:
+        below = tyre_at_slip(surely, load_n, longitudinal_stiffness_n).elastic_friction()
+    threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
+    return Look(tyre_at_slip(size, load_n, longitudinal_stiffness_n), below, threshold)
+
+
+def _shown(friction: float, look: Look) -> tuple[float | None, float]:
+    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
+    if friction > look.slides_below or look.slides_below == 0.0:
         return None, 0.0
-    friction = force_n * slip.direction / load_n
-    elastic = slip_ratio_force(surely, longitudinal_stiffness_n) / load_n
-    if friction > elastic * correction(2.0 * elastic, surely):
-        return None, 0.0
-    theta = theta_from_friction(friction, slip.size, load_n, longitudinal_stiffness_n)
+    theta = look.tyre.theta(friction)
     if theta is None:
         return None, 0.0
-    sensitivity = friction_by_theta(theta, slip.size, load_n, longitudinal_stiffness_n)
+    sensitivity = look.tyre.friction_by_theta(theta)
     if sensitivity < LEAST_SENSITIVITY:
         return None, 0.0
     return min(theta, GREATEST_THETA), sensitivity
 
 
+def visible_theta(
+    force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float
+) -> tuple[float | None, float]:
+    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
+    look = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
+    return _shown(force_n * inputs.slip.direction / inputs.load_n, look)
+
+
 def fusion_step(
     state: FusionState,
     inputs: WheelInputs,
+    look: Look,
     wheel: Wheel,
     gains: Gains,
     scheduler: FuzzyScheduler,
@@ -168,41 +193,57 @@ def fusion_step(
     keeps running. The estimator's equation is linear in theta_hat over a step and is solved exactly, so that it is
     stable for any step size.
 
+    A locked wheel tells nothing of its force: the observer is then led by the tyre model and the estimate holds.
+
     Parameters
     ----------
-    state, inputs, wheel, gains, scheduler
-        State now, inputs at the start of the step and constants.
+    state, inputs, look, wheel, gains, scheduler
+        State now, inputs at the start of the step, what slip and load say, and constants.
     theta_img : float or None
         Adhesion of the class that the camera gives the road under the wheel; None where epsilon = 0 [-].
     step_s : float
         Step [s].
     """
-    slip, load_n, C_x = inputs.slip, inputs.load_n, wheel.longitudinal_stiffness_n
-    model_n = force(state.theta_hat, slip.size, load_n, C_x, slip.direction)
-    F_hat = observed_force(
-        model_n, state.s, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m
-    )
-    theta_tyre, sensitivity = visible_theta(F_hat, inputs, C_x)
-    threshold = scheduler.threshold(theta_img, load_n, C_x, inputs.slip_deviation)
-    excited = slip.size > threshold
-    if not excited and theta_tyre is not None:
-        excited = slip.size > scheduler.threshold(None, load_n, C_x, inputs.slip_deviation)
-    theta_next, K_v = state.theta_hat, 0.0
+    theta_hat, s, unseen_m, before_img = state
+    size, direction = inputs.slip
+    load_n, C_x = inputs.load_n, wheel.longitudinal_stiffness_n
+    if theta_img is not None:
+        if before_img is not None and theta_img != before_img:
+            unseen_m = NEVER_SEEN_M  # another class: what the tyre showed was shown by another road
+        before_img = theta_img
+    unseen_m = min(unseen_m + inputs.way_m, NEVER_SEEN_M)
+    threshold = look.threshold
+    if theta_img is not None:
+        threshold = scheduler.threshold(theta_img, load_n, C_x, inputs.slip_deviation)
+    model_n = direction * load_n * look.tyre.friction(theta_hat)
+    if not inputs.torque_known:
+        s = settled_state(
+            model_n, model_n, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m
+        )
+        held = FusionState(theta_hat, s, unseen_m, before_img)
+        return FusionStep(held, model_n, None, 0.0, threshold, False, 0.0)
+    F_hat = observed_force(model_n, s, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
+    theta_tyre, sensitivity = None, 0.0
+    excited = size > threshold
+    if excited or size > look.threshold:
+        theta_tyre, sensitivity = _shown(F_hat * direction / load_n, look)
+        excited = excited or theta_tyre is not None
+    theta_next, K_v, by_theta_n = theta_hat, 0.0, 0.0
     if excited:
         if theta_img is not None and gains.tyre_first:
-            theta_img = _compatible(theta_img, state, theta_tyre, F_hat, inputs, C_x)
+            theta_img = _compatible(theta_img, theta_hat, unseen_m, theta_tyre, F_hat, inputs, C_x)
         if theta_img is not None:
-            K_v = scheduler.K_v(abs(theta_img - state.theta_hat))
-        theta_next = _driven(state.theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
-    by_theta_n = 0.0
-    if theta_next != state.theta_hat and slip.size:
-        by_theta_n = slip.direction * load_n * friction_by_theta(state.theta_hat, slip.size, load_n, C_x)
-    rate = (theta_next - state.theta_hat) / step_s if step_s > 0.0 else 0.0
+            K_v = scheduler.K_v(abs(theta_img - theta_hat))
+        theta_next = _driven(theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
+        if theta_next != theta_hat:
+            by_theta_n = direction * load_n * look.tyre.friction_by_theta(theta_hat)
+        if theta_tyre is not None:
+            unseen_m = 0.0
     s = advanced_state(
-        state.s,
+        s,
         model_n,
         by_theta_n,
-        rate,
+        (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0,
         inputs.wheel_torque_nm,
         inputs.wheel_speed_ahead_rad_s,
         gains.K,
@@ -210,9 +251,8 @@ def fusion_step(
         wheel.radius_m,
         step_s,
     )
-    shown = sensitivity if excited else 0.0
-    unseen_m = 0.0 if shown else min(state.unseen_m + inputs.way_m, NEVER_SEEN_M)
-    return FusionStep(FusionState(theta_next, s, unseen_m), F_hat, shown, threshold, excited, K_v)
+    after = FusionState(theta_next, s, unseen_m, before_img)
+    return FusionStep(after, F_hat, theta_tyre, sensitivity, threshold, excited, K_v)
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
@@ -231,7 +271,8 @@ def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: f
 
 def _compatible(
     theta_img: float,
-    state: FusionState,
+    theta_hat: float,
+    unseen_m: float,
     theta_tyre: float | None,
     force_n: float,
     inputs: WheelInputs,
@@ -243,12 +284,12 @@ def _compatible(
     the tyre shows, and not less than it already carries.
     """
     if theta_tyre is not None:
-        by_tyre, by_camera = theta_tyre - state.theta_hat, theta_img - state.theta_hat
+        by_tyre, by_camera = theta_tyre - theta_hat, theta_img - theta_hat
         if by_tyre * by_camera < 0.0:
             return None
         # Of noisy samples half lie on the camera's side: without this bound their noise would be rectified.
         return theta_img if abs(by_camera) < abs(by_tyre) else theta_tyre
-    if state.unseen_m < SEEN_HOLD_M:
+    if unseen_m < SEEN_HOLD_M:
         return None
     return max(theta_img, least_theta(force_n, inputs, longitudinal_stiffness_n))
 

@@ -78,6 +78,21 @@ def implausible(sensors: Sensors, names: tuple[str, ...]) -> list[str]:
     ]
 
 
+def plain(step_s: float, sensors: Sensors, floor_m_s: float) -> bool:
+    """Whether a step's input is beyond doubt, at little cost; where it is not, `unusable` decides."""
+    load_n, acceleration = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
+    return (
+        0.0 <= step_s < math.inf
+        and -floor_m_s <= sensors.vehicle_speed_m_s <= PLAUSIBLE["vehicle_speed_m_s"]
+        and 0.0 <= sensors.wheel_speed_rad_s <= PLAUSIBLE["wheel_speed_rad_s"]
+        and abs(sensors.wheel_torque_nm) <= PLAUSIBLE["wheel_torque_nm"]
+        and abs(sensors.steering_angle_rad) <= PLAUSIBLE["steering_angle_rad"]
+        and (load_n is None or 0.0 < load_n <= PLAUSIBLE["vertical_load_n"])
+        and (acceleration is None or abs(acceleration) <= PLAUSIBLE["longitudinal_acceleration_m_s2"])
+        and (sensors.yaw_rate_rad_s is None or abs(sensors.yaw_rate_rad_s) <= PLAUSIBLE["yaw_rate_rad_s"])
+    )
+
+
 def unusable(step_s: float, sensors: Sensors, wheel_radius_m: float, floor_m_s: float) -> str | None:
     """One sentence on what makes a step's input unusable, None where it is good.
 

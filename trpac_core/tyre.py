@@ -19,9 +19,16 @@ References
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+INITIAL_SLOPE = 1.27
+"""G at slip 0: the curve starts with 1.27 C_x [-]."""
 NEWTON_STEPS = 50
 """Far above what the safeguarded Newton searches need (3 to 6): a bound, not a setting."""
+LEAST_STEP = 1e-6
+"""Newton's last step in the search for theta [-]: the error left is about its square."""
+LEAST_SLIP_STEP = 1e-3
+"""Newton's last step in the search for the curve's maximum [-]: that is flat, so its height is then right to 1e-9."""
 GREATEST_PEAK_SLIP = 0.95
 """Where the search for the curve's maximum ends [-]."""
 
@@ -34,6 +41,69 @@ def slip_ratio_force(slip: float, longitudinal_stiffness_n: float) -> float:
 def correction(theta: float, slip: float) -> float:
     """Correction factor G of the modified Dugoff tyre [-]."""
     return (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + 1.27
+
+
+class TyreAtSlip(NamedTuple):
+    """The tyre at one slip and load, a function of theta alone: the cubic of the module's text.
+
+    elastic is X / F_z, g_0 and g_1 make up G, and kappa is F_z / (4 X) [-].
+    """
+
+    elastic: float
+    g_0: float
+    g_1: float
+    kappa: float
+
+    def friction(self, theta: float) -> float:
+        """Used friction mu [-]."""
+        elastic, g_0, g_1, kappa = self
+        share = elastic if theta >= 2.0 * elastic else theta * (1.0 - kappa * theta)
+        return share * (g_0 + g_1 * theta)
+
+    def friction_by_theta(self, theta: float) -> float:
+        """Sensitivity d mu / d theta [-]: how clearly the tyre shows the road's friction."""
+        elastic, g_0, g_1, kappa = self
+        if theta >= 2.0 * elastic:
+            return elastic * g_1
+        return (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
+
+    def elastic_friction(self) -> float:
+        """Used friction at L = 1, the most that theta can be read from [-]."""
+        return self.elastic * (self.g_0 + 2.0 * self.g_1 * self.elastic)
+
+    def theta(self, friction: float) -> float | None:
+        """The one theta below L = 1 that gives this used friction; None where none does."""
+        elastic, g_0, g_1, kappa = self
+        if friction <= 0.0:
+            return 0.0 if friction == 0.0 else None
+        upper = 2.0 * elastic
+        if friction >= elastic * (g_0 + g_1 * upper):
+            return None
+        # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
+        theta = upper * (1.0 - math.sqrt(max(0.0, 1.0 - friction / (elastic * g_0))))
+        lower = 0.0
+        for _ in range(NEWTON_STEPS):
+            base, share = g_0 + g_1 * theta, theta * (1.0 - kappa * theta)
+            excess = share * base - friction
+            if excess > 0.0:
+                upper = theta
+            else:
+                lower = theta
+            slope = (1.0 - 2.0 * kappa * theta) * base + share * g_1
+            proposal = theta - excess / slope
+            if not lower <= proposal <= upper:
+                proposal = 0.5 * (lower + upper)
+            if abs(proposal - theta) < LEAST_STEP:
+                return proposal
+            theta = proposal
+        return theta
+
+
+def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> TyreAtSlip:
+    """The tyre at this unsigned slip [-], vertical load F_z [N] and longitudinal stiffness C_x [N]."""
+    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
+    kappa = 0.25 / elastic if elastic > 0.0 else math.inf
+    return TyreAtSlip(elastic, 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip), kappa)
 
 
 def used_friction(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
@@ -51,10 +121,7 @@ def used_friction(theta: float, slip: float, load_n: float, longitudinal_stiffne
     >>> round(used_friction(0.5, 0.0186, 2895.0, 50_000.0), 3)
     0.384
     """
-    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
-    if theta >= 2.0 * elastic:
-        return elastic * correction(theta, slip)
-    return theta * (1.0 - theta / (4.0 * elastic)) * correction(theta, slip)
+    return tyre_at_slip(slip, load_n, longitudinal_stiffness_n).friction(theta)
 
 
 def force(
@@ -66,12 +133,7 @@ def force(
 
 def friction_by_theta(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
     """Sensitivity d mu / d theta at constant slip [-]: how clearly the tyre shows the road's friction."""
-    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
-    correction_by_theta = 0.75 * slip * (1.0 - slip)
-    if theta >= 2.0 * elastic:
-        return elastic * correction_by_theta
-    share = theta / (4.0 * elastic)
-    return (1.0 - 2.0 * share) * correction(theta, slip) + theta * (1.0 - share) * correction_by_theta
+    return tyre_at_slip(slip, load_n, longitudinal_stiffness_n).friction_by_theta(theta)
 
 
 def friction_by_slip(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
@@ -104,30 +166,7 @@ def theta_from_friction(
     float or None
         Theta [-]; None where no theta gives it: at L >= 1 the force no longer depends on theta.
     """
-    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
-    if friction <= 0.0:
-        return 0.0 if friction == 0.0 else None
-    upper = 2.0 * elastic
-    if friction >= elastic * correction(upper, slip):
-        return None
-    # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
-    base = 1.27 + slip * (1.15 * slip - 1.63)
-    theta = upper * (1.0 - math.sqrt(max(0.0, 1.0 - friction / (elastic * base))))
-    lower = 0.0
-    for _ in range(NEWTON_STEPS):
-        excess = used_friction(theta, slip, load_n, longitudinal_stiffness_n) - friction
-        if excess > 0.0:
-            upper = theta
-        else:
-            lower = theta
-        slope = friction_by_theta(theta, slip, load_n, longitudinal_stiffness_n)
-        proposal = theta - excess / slope
-        if not lower <= proposal <= upper:
-            proposal = 0.5 * (lower + upper)
-        if abs(proposal - theta) < 1e-12:
-            return proposal
-        theta = proposal
-    return theta
+    return tyre_at_slip(slip, load_n, longitudinal_stiffness_n).theta(friction)
 
 
 def onset_slip(theta: float, load_n: float, longitudinal_stiffness_n: float, sensitivity: float) -> float:
@@ -167,7 +206,7 @@ def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> f
         proposal = slip - value / value_by_slip if value_by_slip != 0.0 else upper
         if not lower < proposal < upper:
             proposal = 0.5 * (lower + upper)
-        if abs(proposal - slip) < 1e-10:
+        if abs(proposal - slip) < LEAST_SLIP_STEP:
             return proposal
         slip = proposal
     return slip

@@ -1,0 +1,84 @@
+"""The variance's parts against what they are derived from."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from trpac_core.confidence import (
+    GREATEST_ROAD,
+    ConfidenceModel,
+    Evidence,
+    advanced_variance,
+    bounded_variance,
+    unknown_variance,
+    wandered,
+    with_camera,
+)
+from trpac_core.tyre import tyre_at_slip
+
+MODEL = ConfidenceModel()
+LOAD_N, C_X = 3000.0, 50_000.0
+
+
+def settled_std(theta, slip, line_share=0.0, noise_share=0.0):
+    """Standard deviation after 2 s of a tyre that shows theta."""
+    at = tyre_at_slip(slip, LOAD_N, C_X)
+    evidence = Evidence(theta, at.friction(theta), at, line_share, noise_share, 0.0)
+    variance, lag = unknown_variance(MODEL, theta), 0.0
+    for _ in range(200):
+        variance, lag = advanced_variance(MODEL, variance, lag, theta, evidence, 0.11, 12.5, 0.0, 0.01)
+    return variance**0.5
+
+
+@given(st.floats(0.1, 1.1), st.floats(0.1, 1.0))
+def test_a_road_above_a_bound_is_as_far_as_roads_drawn_there(theta_hat, least):
+    roads = np.linspace(least, GREATEST_ROAD, 20_001)
+    assert bounded_variance(theta_hat, least) == pytest.approx(np.mean((roads - theta_hat) ** 2), rel=1e-3)
+
+
+def test_the_tyre_tells_less_the_closer_it_is_to_not_sliding():
+    stds = [settled_std(0.5, slip, line_share=0.01) for slip in (0.06, 0.03, 0.0205, 0.0186)]
+    assert stds == sorted(stds)
+    assert stds[0] < 0.03
+    assert stds[-1] > 0.1
+
+
+def test_a_car_known_less_well_leaves_a_larger_deviation_however_long_it_is_excited():
+    stds = [settled_std(0.5, 0.03, line_share=share) for share in (0.0, 0.02, 0.05, 0.1)]
+    assert stds == sorted(stds)
+    assert stds[-1] > 3.0 * stds[0]
+
+
+def test_deviation_is_that_of_drawn_errors_of_the_elastic_line():
+    """Monte Carlo through the tyre's own inverse, far enough from L = 1 for all draws to slide."""
+    theta, slip, share = 0.3, 0.03, 0.05
+    at = tyre_at_slip(slip, LOAD_N, C_X)
+    draws = np.random.default_rng(1).normal(1.0, share, 4000)
+    found = np.array([at.theta(at.friction(theta) * draw) for draw in draws])
+    model = (settled_std(theta, slip, line_share=share) ** 2 - (MODEL.car_share * theta) ** 2) ** 0.5
+    assert model == pytest.approx(found.std(), rel=0.1)
+
+
+def test_knowledge_fades_with_the_way_up_to_nothing():
+    variances = [wandered(MODEL, 1e-4, 0.3, way) for way in (0.0, 1.0, 10.0, 1e4)]
+    assert variances == sorted(variances)
+    assert variances[1] - variances[0] == pytest.approx(MODEL.road_change**2, rel=0.05)
+    assert variances[-1] == pytest.approx(unknown_variance(MODEL, 0.3))
+
+
+def test_a_tyre_that_goes_on_showing_something_else_widens_at_once():
+    at = tyre_at_slip(0.05, LOAD_N, C_X)
+    evidence = Evidence(0.3, at.friction(0.3), at, 0.01, 0.01, 0.0)
+    variance, lag = 1e-4, 0.0
+    for _ in range(5):
+        variance, lag = advanced_variance(MODEL, variance, lag, 0.8, evidence, 0.11, 12.5, 0.0, 0.01)
+    assert variance**0.5 > 0.4
+
+
+def test_the_camera_narrows_where_it_agrees_and_widens_where_it_does_not():
+    unknown, sure = unknown_variance(MODEL, 0.8), 1e-4
+    assert with_camera(MODEL, unknown, 0.8, 0.8) < unknown
+    assert with_camera(MODEL, unknown, 0.8, 0.2) > unknown
+    assert with_camera(MODEL, sure, 0.3, 0.8) == pytest.approx(sure, rel=0.1)
+    assert with_camera(MODEL, unknown, 0.8, None) == unknown

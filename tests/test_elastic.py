@@ -1,0 +1,75 @@
+"""What gentle driving teaches of radius, speed signal and stiffness, on a wheel whose errors are known."""
+
+import numpy as np
+import pytest
+
+from trpac_core.elastic import AS_TOLD, ElasticModel, learned
+from trpac_core.tyre import INITIAL_SLOPE
+
+LOAD_N, C_X = 3400.0, 50_000.0
+MODEL = ElasticModel()
+RNG_SEED = 5
+
+
+def taught(model=MODEL, bias=0.0, ratio=0.0, compliance=0.0, gentle=0.05, seconds=4.0, noise=2e-4, speed=8.0):
+    """Coasting and gentle pulses in turn, read every 10 ms, at a speed that rises."""
+    rng, line = np.random.default_rng(RNG_SEED), model.start
+    rows = round(seconds / 0.01)
+    for row in range(rows):
+        force_n = gentle * LOAD_N if row // 30 % 2 else 0.0
+        v = speed * (0.7 + 0.6 * row / rows)
+        slip = (
+            bias / v
+            + ratio
+            + (1.0 + compliance) * force_n / (INITIAL_SLOPE * C_X)
+            + noise * rng.standard_normal()
+        )
+        line = learned(line.drifted(model, 0.01), model, slip, v, force_n, LOAD_N, C_X, noise, 0.0)
+    return line, v
+
+
+def test_a_car_that_is_as_told_is_left_as_it_is():
+    line, v = taught()
+    assert line.offset(v, line.offset_variance(v)) == 0.0
+    assert line.compliance() == 0.0
+    assert line.offset_variance(v) < 1e-8
+
+
+@pytest.mark.parametrize(("bias", "ratio"), [(0.03, 0.0), (0.0, 0.01), (0.0, -0.05), (0.0, 0.1)])
+def test_slip_that_a_coasting_wheel_reads_is_taken_off(bias, ratio):
+    line, v = taught(bias=bias, ratio=ratio)
+    assert line.offset(v, line.offset_variance(v)) == pytest.approx(bias / v + ratio, abs=3e-4)
+
+
+@pytest.mark.parametrize("compliance", [-0.1, 0.1, 0.2])
+def test_a_tyre_of_another_stiffness_is_told_within_its_deviation(compliance):
+    line, _ = taught(compliance=compliance)
+    assert line.c == pytest.approx(compliance, abs=3.0 * line.cc**0.5)
+    assert 0.0 < abs(line.compliance()) <= abs(line.c)
+    assert line.cc**0.5 < 0.5 * MODEL.compliance
+
+
+def test_a_tyre_that_may_slide_teaches_nothing():
+    line = MODEL.start
+    for used in (0.061, 0.3):
+        assert learned(line, MODEL, 0.03, 8.0, used * LOAD_N, LOAD_N, C_X, 1e-4, 0.0) is line
+
+
+def test_what_contradicts_all_that_is_known_counts_only_on_a_coasting_wheel():
+    line, _ = taught()
+    assert learned(line, MODEL, 0.02, 8.0, 0.05 * LOAD_N, LOAD_N, C_X, 1e-4, 0.0) is line
+    assert learned(line, MODEL, 0.02, 8.0, 0.0, LOAD_N, C_X, 1e-4, 0.0).offset_variance(
+        8.0
+    ) > line.offset_variance(8.0)
+
+
+def test_told_to_learn_nothing_it_learns_nothing():
+    line, v = taught(AS_TOLD, ratio=0.02, compliance=0.1)
+    assert line == AS_TOLD.start
+    assert line.offset(v, line.offset_variance(v)) == line.compliance() == 0.0
+
+
+def test_covariance_stays_one():
+    line, _ = taught(seconds=60.0)
+    matrix = np.array([[line.bb, line.br, line.bc], [line.br, line.rr, line.rc], [line.bc, line.rc, line.cc]])
+    assert np.linalg.eigvalsh(matrix).min() > -1e-12

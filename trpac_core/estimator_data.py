@@ -1,0 +1,210 @@
+"""What the estimator of one wheel is set to, what it says and what it remembers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+from .confidence import ConfidenceModel
+from .dife import FusionState, Gains
+from .elastic import ElasticLine, ElasticModel
+from .excitation import FuzzyScheduler
+from .readings import Readings, filter_share
+from .vehicle import Vehicle
+from .vision.classes import CLASS_THETA, Surface
+from .vision.ife import IfeConfig, IfeState
+from .vision.preview import PreviewConfig, PreviewState
+
+
+@dataclass(frozen=True)
+class RoadClass:
+    """A surface class that another classifier found, in place of a picture; confidence is its Q_v."""
+
+    surface: Surface
+    confidence: float
+
+
+@dataclass(frozen=True)
+class EstimatorConfig:
+    """Settings of one wheel's estimator.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What is known of the car.
+    front_axle : bool
+        Whether the wheel is a front wheel: its load and when it reaches the road seen ahead.
+    left_side : bool
+        Whether it is on the left: which wheel's track the camera follows.
+    vision : IfeConfig
+        Settings of the image estimator but for what the vehicle and the wheel already say, see `image_settings`.
+    gains, scheduler, preview, confidence
+        Settings of the parts.
+    elastic : ElasticModel
+        How well slip and stiffness are known before the car drives; `elastic.AS_TOLD` to learn nothing of them.
+    class_theta : tuple of 3 floats
+        Adhesion of dry, wet, snow and ice [-].
+    theta_initial : float
+        Estimate before anything is known: a dry road [-].
+    floor_m_s : float
+        Speed below which slip says nothing. At 1 m/s a speed error of 0.014 m/s is a slip of 0.014, as
+        large as the excitation threshold [m/s].
+    sensor_filter_s : float
+        Time constant of the filter on wheel speed, torque, vehicle speed and measured acceleration. The tyre's curve
+        is bent: noise that reached it unfiltered would lower its mean force, and theta_hat would rise to make up for
+        it. One filter for all keeps Eq. (12) true between the filtered signals [s].
+    sliding_speed_noise_m_s : float
+        Standard deviation of the sliding speed omega R - v per sample: that of the car's sensors [m/s].
+    acceleration_filter_s : float
+        Time constant for the acceleration that the load follows where it is differentiated from speed [s].
+    """
+
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    front_axle: bool = True
+    left_side: bool = True
+    vision: IfeConfig = field(default_factory=IfeConfig)
+    gains: Gains = field(default_factory=Gains)
+    scheduler: FuzzyScheduler = field(default_factory=FuzzyScheduler)
+    preview: PreviewConfig = field(default_factory=PreviewConfig)
+    confidence: ConfidenceModel = field(default_factory=ConfidenceModel)
+    elastic: ElasticModel = field(default_factory=ElasticModel)
+    class_theta: tuple[float, float, float] = (
+        CLASS_THETA[Surface.DRY],
+        CLASS_THETA[Surface.WET],
+        CLASS_THETA[Surface.SNOW_ICE],
+    )
+    theta_initial: float = 0.8
+    floor_m_s: float = 1.0
+    sensor_filter_s: float = 0.010
+    sliding_speed_noise_m_s: float = 0.0042
+    acceleration_filter_s: float = 0.05
+
+    @property
+    def image_settings(self) -> IfeConfig:
+        """Settings of the image estimator for this vehicle and wheel."""
+        return replace(
+            self.vision,
+            track_m=self.vehicle.track_m,
+            wheelbase_m=self.vehicle.wheelbase_m,
+            side="left" if self.left_side else "right",
+        )
+
+
+@dataclass(slots=True)  # frozen, its making would take 2 us of the step's 20
+class Estimate:
+    """What the estimator says at a step."""
+
+    TRPAC: float
+    """Fused estimate theta_hat (DIFE) [-]."""
+    flag: bool
+    """Epsilon: whether the camera's verdict on the road under the wheel is used."""
+    K_v: float
+    """Visual gain [-] or [1/s], after Eq. (17) or (18)."""
+    excitation_flag: bool
+    """Whether DIFE runs: slip is above the threshold, or the tyre visibly slides."""
+    excitation_threshold: float
+    """Slip above which DIFE runs in any case [-]."""
+    slip: float
+    """Longitudinal slip, unsigned, filtered and less what it reads on a coasting car [-]."""
+    tyre_force_n: float
+    """Observed longitudinal force F_hat [N]."""
+    TRPAC_image: float
+    """Adhesion of the class that the camera gave the road under the wheel, whatever its flag [-]."""
+    TRPAC_dynamics: float
+    """The same estimator without the camera (DE) [-]."""
+    TRPAC_peak: float
+    """Maximum of the tyre's curve at TRPAC: what a brake test measures [-]."""
+    image_confidence: float
+    """Q_v of the road under the wheel, 0 where there is no verdict [-]."""
+    frame_age_s: float
+    """Time since the picture of the road under the wheel was taken; -1 where there is none [s]."""
+    TRPAC_std: float
+    """Standard deviation of TRPAC [-]."""
+    problem: str | None = None
+    """One sentence where the input was unusable and the last good estimate is held."""
+
+
+class EstimatorState(NamedTuple):
+    """All that the estimator remembers."""
+
+    fusion: FusionState
+    dynamics: FusionState
+    readings: Readings
+    line: ElasticLine
+    variance: float
+    lag: float = 0.0
+    """Smoothed distance of the tyre's theta from the estimate [-]."""
+    unasked_s: float = 0.0
+    """Time since elastic line and variance were last brought up to date: once per time constant of the filter [s]."""
+    locked_s: float = math.inf
+    """Time since the wheel was last locked [s]."""
+    time_s: float = 0.0
+    position_m: float = 0.0
+    speed_m_s: float = 0.0
+    acceleration_m_s2: float = 0.0
+    smoothed_slip: float = 0.0
+    """Signed slip through the sensor filter once more."""
+    lagged_speed_m_s: float = 0.0
+    """Speed behind the filter that differentiates it."""
+    load_n: float = 0.0
+    """Vertical load, filtered where it is measured."""
+    step_s: float = 0.0
+    settled: bool = False
+    """Whether the force observers follow the wheel; not so at the start and after a gap in the input."""
+    frame_failed: bool = False
+    ife: IfeState = IfeState()
+    preview: PreviewState = PreviewState()
+
+    def to_json(self) -> dict[str, Any]:
+        """The state as JSON-able values, exact."""
+        values = self._asdict()
+        for name in ("fusion", "dynamics", "readings", "line"):
+            values[name] = list(values[name])
+        values["locked_s"] = None if math.isinf(self.locked_s) else self.locked_s
+        values["ife"], values["preview"] = self.ife.to_json(), self.preview.to_json()
+        return values
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> EstimatorState:
+        """The state that `to_json` wrote."""
+        values = dict(data)
+        for name, kind in _PARTS.items():
+            values[name] = kind(*values[name])
+        values["locked_s"] = math.inf if values["locked_s"] is None else values["locked_s"]
+        values["ife"] = IfeState.from_json(values["ife"])
+        values["preview"] = PreviewState.from_json(values["preview"])
+        return cls(**values)
+
+
+_PARTS: Mapping[str, Any] = {
+    "fusion": FusionState,
+    "dynamics": FusionState,
+    "readings": Readings,
+    "line": ElasticLine,
+}
+
+
+class Rates(NamedTuple):
+    """What follows from the step size alone."""
+
+    step_s: float
+    sensor_share: float
+    """Of the sensor filter [-]."""
+    acceleration_share: float
+    """Of the filter that differentiates speed [-]."""
+    noise_gain: float
+    """What the sensor filter leaves of white noise's standard deviation [-]."""
+    noise_m_s: float
+    """Standard deviation of the filtered sliding speed [m/s]."""
+
+    @classmethod
+    def at(cls, config: EstimatorConfig, step_s: float, before_s: float) -> Rates:
+        """Rates of a step; a step of 0 keeps the noise of the one before it."""
+        sensor_share = filter_share(step_s, config.sensor_filter_s)
+        # White noise per sample through a discrete first-order filter
+        share = sensor_share or filter_share(before_s, config.sensor_filter_s)
+        gain = math.sqrt(share / (2.0 - share))
+        noise_m_s = config.sliding_speed_noise_m_s * gain
+        return cls(step_s, sensor_share, filter_share(step_s, config.acceleration_filter_s), gain, noise_m_s)
