@@ -167,8 +167,11 @@ NOT_OFFERED = {
     "vision.remove_shadow",
     "vision.calibrate",
     "vision.weight_evidence",
+    "elastic.coasting",
+    "elastic.gentle",
+    "elastic.force_doubt_n",
 }
-"""What the estimator of one wheel does not use, and switches for ablation studies."""
+"""What the estimator of one wheel does not use, switches for ablation studies, and what learning the car rests on."""
 
 
 def leaves(owner: object, path: str = "") -> list[str]:
