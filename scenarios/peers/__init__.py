@@ -1,11 +1,14 @@
 """Friction estimators of the literature on the same inputs as ours, tuned, in one shape."""
 
+from collections.abc import Callable, Mapping
+
 from scenarios.peers.base import Peer, PeerEstimate, PeerSetup
 from scenarios.peers.kalman import EkfPeer, KalmanTuning, UkfPeer
 from scenarios.peers.slip_slope import SlipSlopePeer, SlipSlopeTuning
 from scenarios.peers.tuning import TUNING_FILE, Tuning, load_tuning
 
 __all__ = [
+    "PEERS",
     "PEER_NAMES",
     "TUNING_FILE",
     "EkfPeer",
@@ -18,18 +21,26 @@ __all__ = [
     "Tuning",
     "UkfPeer",
     "load_tuning",
+    "make_peer",
     "make_peers",
 ]
 
-PEER_NAMES = (SlipSlopePeer.name, EkfPeer.name, UkfPeer.name)
+PEERS: Mapping[str, Callable[[PeerSetup, Tuning], Peer]] = {
+    SlipSlopePeer.name: lambda setup, tuning: SlipSlopePeer(setup, tuning.slip_slope),
+    EkfPeer.name: lambda setup, tuning: EkfPeer(setup, tuning.ekf),
+    UkfPeer.name: lambda setup, tuning: UkfPeer(setup, tuning.ukf),
+}
+"""How each peer is made on one wheel, by its name."""
+PEER_NAMES = tuple(PEERS)
 """All peers by name, in the order of `make_peers`."""
+
+
+def make_peer(name: str, setup: PeerSetup, tuning: Tuning | None = None) -> Peer:
+    """The peer of a name on one wheel, with its tuning as delivered unless another is given."""
+    return PEERS[name](setup, tuning or load_tuning())
 
 
 def make_peers(setup: PeerSetup, tuning: Tuning | None = None) -> tuple[Peer, ...]:
     """All peers on one wheel, with their tuning as delivered unless another is given."""
     tuned = tuning or load_tuning()
-    return (
-        SlipSlopePeer(setup, tuned.slip_slope),
-        EkfPeer(setup, tuned.ekf),
-        UkfPeer(setup, tuned.ukf),
-    )
+    return tuple(make_peer(name, setup, tuned) for name in PEERS)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from trpac_core.confidence import ConfidenceModel
 from trpac_core.readings import GREATEST_ACCELERATION_M_S2, Sensors, filter_share, unusable
@@ -37,6 +37,7 @@ class PeerEstimate:
     excited: bool
 
 
+@runtime_checkable
 class Peer(Protocol):
     """An estimator of the literature, on one wheel."""
 

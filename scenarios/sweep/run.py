@@ -14,12 +14,13 @@ from fmu_src.units import UNITS
 from scenarios.files import WHEELS, Scenario
 from scenarios.looks import image_estimator
 from scenarios.metrics import score_run
+from scenarios.peers import PeerSetup
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.runner import segment_starts, under_the_wheel
 from scenarios.sweep.camera import RenderedFrames, class_verdicts
 from scenarios.sweep.draw import RunPlan
-from scenarios.sweep.trackers import OWN, Told, make_peer
+from scenarios.sweep.trackers import OWN, make_peer
 from scenarios.unit_client import parameters
 from trpac_core.dife import GREATEST_THETA, LEAST_SENSITIVITY, LEAST_THETA
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
@@ -133,10 +134,10 @@ def camera_of(plan: RunPlan, trajectory: PlantTrajectory) -> tuple[Frames, Ife |
     return class_verdicts(scenario, trajectory, camera, plan.camera_seed), None
 
 
-def told_of(plan: RunPlan, config: EstimatorConfig) -> Told:
+def told_of(plan: RunPlan, config: EstimatorConfig) -> PeerSetup:
     """What peers are told: what ours is told."""
     noise = plan.believed.noise
-    return Told(
+    return PeerSetup(
         vehicle=config.vehicle,
         front_axle=config.front_axle,
         wheel_speed_noise_rad_s=noise.wheel_speed_noise_rad_s,
