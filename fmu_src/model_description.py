@@ -19,6 +19,7 @@ UNITS: dict[str, dict[str, int] | None] = {
     "s": {"s": 1},
     "1/s": {"s": -1},
     "1/m0.5": None,
+    "m/s1.5": None,
     "kg": {"kg": 1},
     "kg.m2": {"kg": 1, "m": 2},
     "N": {"kg": 1, "m": 1, "s": -2},
