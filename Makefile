@@ -22,7 +22,7 @@ demo: $(READY)   ## build the unit, drive it over the paper's road, write out/de
 	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo
 
 test: $(READY) check  ## lint, types and the whole test suite
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 check: $(READY)  ## lint and types
 	$(BIN)/ruff check .
