@@ -22,7 +22,9 @@ from sim2real.replay.run import OURS, readings, replay
 from sim2real.replay.score import score
 from sim2real.replay.vehicle_level import vehicle_level
 from trpac_cli.main import app
+from trpac_core.car_friction import Friction, car_friction
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
+from trpac_core.four_wheels import FourWheelsConfig
 from trpac_core.vision.classes import Surface
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -306,18 +308,25 @@ class TestInputs:
 
 
 class TestVehicleLevel:
-    def test_a_sure_wheel_outweighs_the_others(self):
-        theta, std = vehicle_level(np.array([[0.3, 0.8, 0.8, 0.8]]), np.array([[0.01, 0.29, 0.29, 0.29]]))
-        assert theta[0] == pytest.approx(0.3, abs=0.01)
-        assert std[0] < 0.05
+    LOADS = np.array([[3500.0, 3500.0, 3000.0, 3000.0]])
+
+    def test_rows_follow_the_rule_of_the_car(self):
+        theta, std = np.array([[0.3, 0.8, 0.8, 0.8]]), np.array([[0.01, 0.29, 0.29, 0.29]])
+        found = vehicle_level(
+            np.repeat(theta, 2, axis=0), np.repeat(std, 2, axis=0), np.repeat(self.LOADS, 2, axis=0)
+        )
+        wheels = tuple(Friction(t, s) for t, s in zip(theta[0], std[0], strict=True))
+        rule = car_friction(wheels, tuple(self.LOADS[0]), FourWheelsConfig().axle_deviation)
+        assert [(t, s) for t, s in zip(*found, strict=True)] == [pytest.approx(rule)] * 2
 
     def test_wheels_that_agree_are_no_surer_together(self):
-        theta, std = vehicle_level(np.full((1, 4), 0.5), np.full((1, 4), 0.1))
-        assert (theta[0], std[0]) == pytest.approx((0.5, 0.1))
+        theta, std = vehicle_level(np.full((1, 4), 0.5), np.full((1, 4), 0.1), self.LOADS)
+        assert theta[0] == pytest.approx(0.5)
+        assert std[0] >= 0.09
 
-    def test_wheels_that_differ_widen_the_deviation(self):
-        _, std = vehicle_level(np.array([[0.2, 0.8, 0.2, 0.8]]), np.full((1, 4), 0.02))
-        assert std[0] == pytest.approx(0.3, abs=0.01)
+    def test_the_rear_axle_counts_with_its_slippery_side(self):
+        theta, _ = vehicle_level(np.array([[0.2, 0.8, 0.2, 0.8]]), np.full((1, 4), 0.01), self.LOADS)
+        assert theta[0] == pytest.approx((3500 * 0.2 + 3500 * 0.8 + 6000 * 0.2) / 13000, abs=1e-6)
 
 
 def test_a_score_counts_only_rows_that_have_a_reference():

@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.panel import Panel
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from trpac_cli.console import bars, refuse, require_folder
 
 if TYPE_CHECKING:
     from sim2real.demo import Case, Truth
     from sim2real.result import Diagnosis
 
-EXIT_INPUT = 2
-"""Unusable input: one line on standard error, and nothing written."""
-MOST_NAMED = 10
-"""Problems that the line names; the rest are counted."""
 MOST_CAUSES = 5
 """Causes that the summary shows."""
 COLOURS = {
@@ -34,8 +28,6 @@ COLOURS = {
     "unknown": "red",
     "no_gap": "green",
 }
-
-Told = Callable[[str, int, int], None]
 
 app = typer.Typer(
     help="The sim-to-real gap: where it lies, which effect causes it, how far it shrinks.",
@@ -87,9 +79,9 @@ def diagnose(
     from sim2real.report import rated, write_diagnosis
 
     command = "trpac gap diagnose"
-    _require_folder(command, out)
+    require_folder(command, out)
     try:
-        with _bars() as told:
+        with bars() as told:
             said = diagnose_files(
                 vehicle,
                 road,
@@ -104,7 +96,7 @@ def diagnose(
             written = write_diagnosis(rated(said), out)
             told("report", 1, 1)
     except (ScenarioError, OSError) as error:
-        _refuse(command, error)
+        refuse(command, error)
     console = Console()
     _summarise(console, said)
     console.print("  ".join(str(path) for path in written), soft_wrap=True, highlight=False)
@@ -135,12 +127,12 @@ def demo(
     from sim2real.report import rated, write_diagnosis
 
     command = "trpac gap demo"
-    _require_folder(command, out)
+    require_folder(command, out)
     console = Console(highlight=False)
     try:
         case = make_case(out, seed)
         _tell_case(console, case)
-        with _bars() as told:
+        with bars() as told:
             said = diagnose_files(
                 case.vehicle,
                 case.road,
@@ -155,7 +147,7 @@ def demo(
         _summarise(console, said)
         _tell_truth(console, case, open_seal(case), said)
     except (ScenarioError, OSError) as error:
-        _refuse(command, error)
+        refuse(command, error)
     console.print(f"The whole story, with pictures: {report}", soft_wrap=True)
 
 
@@ -267,37 +259,5 @@ def _cause_table(said: Diagnosis) -> Table:
     return table
 
 
-@contextmanager
-def _bars() -> Iterator[Told]:
-    """A progress bar per stage, and what to tell them."""
-    columns = (TextColumn("{task.description:>20}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns) as bars:
-        tasks: dict[str, TaskID] = {}
-
-        def told(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
-            bars.update(tasks[stage], completed=done, total=total)
-
-        yield told
-
-
 def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _require_folder(command: str, out: Path) -> None:
-    """Refuse before the work what would fail after it."""
-    there = next(p for p in (out, *out.absolute().parents) if p.exists())
-    if not there.is_dir():
-        _refuse(command, f"{there}: a file. Expected a folder to write into.")
-    if not os.access(there, os.W_OK | os.X_OK):
-        _refuse(command, f"{there}: no permission to write there. Expected a folder of your own.")
-
-
-def _refuse(command: str, problem: str | Exception) -> NoReturn:
-    """All problems in one line on standard error."""
-    lines = [line.strip() for line in str(problem).splitlines() if line.strip()]
-    more = [f"And {len(lines) - MOST_NAMED} more problems."] if len(lines) > MOST_NAMED else []
-    print(f"{command}: {' '.join([*lines[:MOST_NAMED], *more])}", file=sys.stderr)
-    raise typer.Exit(EXIT_INPUT)

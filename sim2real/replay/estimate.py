@@ -89,7 +89,7 @@ def estimate_files(
 
 def _outcome(done: Replay) -> dict[str, float | None]:
     """The car's estimate at the end, and how sure it was where the tyre was seen."""
-    theta, std, peak = done.traces[OURS].of_the_car()
+    theta, std, peak = done.traces[OURS].of_the_car
     seen = done.seen.any(axis=1) & done.inputs.moving
     return {
         "TRPAC_end": float(theta[-1]),

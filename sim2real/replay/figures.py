@@ -52,7 +52,7 @@ def _sheet(rows: int, height_in: float, ratios: tuple[float, ...]) -> Iterator[t
 def estimate(done: Replay) -> bytes:
     """The car's estimate with its band and reference, the flags, and what the drive was like."""
     time_s = done.inputs.time_s
-    theta, std, peak = done.traces[OURS].of_the_car()
+    theta, std, peak = done.traces[OURS].of_the_car
     share = peak / theta
     with _sheet(4, 6.6, (2.6, 0.5, 1.0, 1.0)) as (axes, buffer):
         top, flags, speed, torque = axes
@@ -68,7 +68,7 @@ def estimate(done: Replay) -> bytes:
         if done.camera.left or done.camera.right:
             top.plot(
                 time_s,
-                done.traces[DYNAMICS].of_the_car()[2],
+                done.traces[DYNAMICS].of_the_car[2],
                 color=BEFORE,
                 lw=1.0,
                 label="without camera (DE)",
@@ -173,9 +173,9 @@ def compared(done: Replay) -> bytes:
     with _sheet(1, 3.2, (1.0,)) as (axes, buffer):
         axis = axes[0]
         for name, colour in zip(others, PEER_COLOURS, strict=True):
-            axis.plot(time_s, done.traces[name].of_the_car()[2], color=colour, lw=0.9, label=name)
-        axis.plot(time_s, done.traces[DYNAMICS].of_the_car()[2], color=FLOOR, lw=1.0, label=DYNAMICS)
-        axis.plot(time_s, done.traces[OURS].of_the_car()[2], color=AFTER, lw=1.6, label=OURS)
+            axis.plot(time_s, done.traces[name].of_the_car[2], color=colour, lw=0.9, label=name)
+        axis.plot(time_s, done.traces[DYNAMICS].of_the_car[2], color=FLOOR, lw=1.0, label=DYNAMICS)
+        axis.plot(time_s, done.traces[OURS].of_the_car[2], color=AFTER, lw=1.6, label=OURS)
         if done.inputs.mu_reference is not None:
             axis.plot(
                 time_s, done.inputs.mu_reference, color=MEASURED, lw=1.2, ls=(0, (4, 3)), label="mu_reference"

@@ -29,7 +29,7 @@ WIDE_STD = 0.15
 def estimates_table(done: Replay) -> pd.DataFrame:
     """estimates.csv: the car's estimate, then TRPAC per wheel, then TRPAC_peak and the deviation per wheel."""
     ours = done.traces[OURS]
-    theta, std, peak = ours.of_the_car()
+    theta, std, peak = ours.of_the_car
     flags = done.flag.any(axis=1), ours.excited.any(axis=1)
     columns: dict[str, Any] = {
         "time_s": done.inputs.time_s,
@@ -44,7 +44,7 @@ def estimates_table(done: Replay) -> pd.DataFrame:
     }
     for name, trace in done.traces.items():
         if name not in (OURS, DYNAMICS):
-            columns[f"TRPAC_{name.replace('-', '_')}"] = trace.of_the_car()[0]
+            columns[f"TRPAC_{name.replace('-', '_')}"] = trace.of_the_car[0]
     return pd.DataFrame(columns)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,19 +42,23 @@ class Trace:
         TRPAC, its standard deviation (NaN where it has none) and TRPAC_peak of fl, fr, rl, rr [-].
     excited : array of bool, shape (n, 4)
         Its own excitation flag.
+    load_n : array, shape (n, 4)
+        Vertical loads [N].
     """
 
     theta: Array
     std: Array
     peak: Array
     excited: Mask
+    load_n: Array
 
+    @cached_property
     def of_the_car(self) -> tuple[Array, Array, Array]:
         """TRPAC, its deviation and TRPAC_peak for the car, shape (n,) each [-]."""
         known = np.isfinite(self.std).all()
         std = self.std if known else np.ones_like(self.theta)
-        theta, of_theta = vehicle_level(self.theta, std)
-        peak, _ = vehicle_level(self.peak, std)
+        theta, of_theta = vehicle_level(self.theta, std, self.load_n)
+        peak, _ = vehicle_level(self.peak, std, self.load_n)
         return theta, of_theta if known else np.full(len(theta), np.nan), peak
 
     @property
@@ -113,11 +118,11 @@ def replay(
 
     load_n = inputs.load_n()
     theta, alone, excited = of("TRPAC"), of("TRPAC_dynamics"), of("excitation_flag") > 0.0
-    ours = Trace(theta, of("TRPAC_std"), of("TRPAC_peak"), excited)
+    ours = Trace(theta, of("TRPAC_std"), of("TRPAC_peak"), excited, load_n)
     dynamics = ours
     if camera.left or camera.right:
         peak = _peaks(alone, load_n, inputs.vehicle.longitudinal_stiffness_n)
-        dynamics = Trace(alone, np.full_like(alone, np.nan), peak, excited)
+        dynamics = Trace(alone, np.full_like(alone, np.nan), peak, excited, load_n)
     traces = {OURS: ours, DYNAMICS: dynamics}
     if peers:
         traces |= _peer_traces(inputs, load_n, told)
@@ -174,7 +179,11 @@ def _peer_traces(inputs: Inputs, load_n: Array, told: Told) -> dict[str, Trace]:
     stiffness_n = inputs.vehicle.longitudinal_stiffness_n
     return {
         name: Trace(
-            of[:, :, 0].T, of[:, :, 1].T, _peaks(of[:, :, 0].T, load_n, stiffness_n), of[:, :, 2].T > 0.0
+            theta=of[:, :, 0].T,
+            std=of[:, :, 1].T,
+            peak=_peaks(of[:, :, 0].T, load_n, stiffness_n),
+            excited=of[:, :, 2].T > 0.0,
+            load_n=load_n,
         )
         for name, of in zip(PEER_NAMES, said, strict=True)
     }

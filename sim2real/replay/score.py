@@ -68,7 +68,7 @@ def errors(done: Replay) -> dict[str, Any] | None:
     moving = done.inputs.moving
     out: dict[str, Any] = {"reference": "mu_reference", "compared": "TRPAC_peak"}
     for name, trace in done.traces.items():
-        theta, std, peak = trace.of_the_car()
+        theta, std, peak = trace.of_the_car
         peak_std = std * peak / theta
         out[name] = {
             label: asdict(score(peak, peak_std, reference, rows, done.inputs.step_s))
