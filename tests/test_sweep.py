@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from distributed import LocalCluster
+from distributed import Client, LocalCluster
 from typer.testing import CliRunner
 
 from scenarios.errors import ScenarioError
 from scenarios.plant.pipeline import drive
+from scenarios.sweep import execute as execute_module
 from scenarios.sweep.camera import CERTAIN, class_verdicts, measured_process
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import execute, run_one
@@ -354,3 +355,11 @@ def test_rendered_pictures_go_through_the_image_estimator(tmp_path):
     judged = tracks.by_name["IFE"].TRPAC[front > 2.6]
     assert set(np.unique(judged)) <= {0.2, 0.6, 0.8}
     assert (judged == 0.2).mean() > 0.5
+
+
+def test_no_run_is_lost_between_those_handed_out_ahead_and_the_rest(monkeypatch, sweep_of):
+    monkeypatch.setattr(execute_module, "run_one", lambda sweep, key: key.index)
+    keys = run_keys(sweep_of(runs=3 * execute_module.AHEAD))
+    with Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as client:
+        done = [(key.index, future.result()) for key, future in execute_module._stream(client, None, keys)]
+    assert sorted(done) == [(i, i) for i in range(len(keys))]

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -149,7 +150,7 @@ def _stream(client: Client, sweep: Sweep, todo: list[RunKey]) -> Iterator[tuple[
         return future
 
     running: dict[Any, RunKey] = {}
-    first = [submit(key) for key, _ in zip(waiting, range(AHEAD * threads), strict=False)]
+    first = [submit(key) for key in islice(waiting, AHEAD * threads)]
     completed = as_completed(first)
     for future in completed:
         yield running.pop(future.key), future
