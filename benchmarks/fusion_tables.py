@@ -32,7 +32,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SWEEPS = ROOT / "scenarios" / "sweeps"
 PAGE, PICTURES = ROOT / "docs" / "fusion.md", ROOT / "docs" / "fusion"
 HISTORY = Path(__file__).with_name("history") / "fusion.jsonl"
-NAMES = ("paper_simulation", "road_test", "road_test_brakes", "degradation", "rendered")
+NAMES = ("paper_simulation", "peers", "road_test", "road_test_brakes", "degradation", "rendered")
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 DASH = "–"
 LEAST_RUNS = 5
@@ -258,6 +258,8 @@ def blocks(found: dict[str, dict[str, Any]]) -> Iterator[str]:
         yield "### The simulation condition\n\n" + accuracy(found["paper_simulation"])
         yield "DIFE after a change of road, by true friction:\n\n" + by_friction(found["paper_simulation"])
         yield "Where the tyre never showed its friction for 0.5 s:\n\n" + not_shown(found["paper_simulation"])
+    if "peers" in found:
+        yield "### Peers, on the first of these roads\n\n" + accuracy(found["peers"])
     yield "### Coverage of 2 TRPAC_std\n\n" + coverage_rows(found)
     if "degradation" in found:
         yield "### Degradation\n\n" + degradation(found["degradation"])

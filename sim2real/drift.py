@@ -54,13 +54,18 @@ def read_drift(drives: Sequence[Drive], noises: Sequence[Noise], residuals: Sequ
         left_less_right = (z[:, 0::2] - z[:, 1::2]) / np.sqrt(2.0)
         excess = _spread(block_sums(np.nan_to_num(left_less_right), length)) - 1.0
         squares.append(np.maximum(excess, 0.0) / length * np.mean(scale**2))
-    axles = np.mean(squares, axis=0)
-    return float(np.sqrt(min(axles.mean(), ALIKE * axles.min(), MOST_DRIFT**2)))
+    axles = [
+        np.mean(known) for of_axle in np.transpose(squares) if len(known := of_axle[np.isfinite(of_axle)])
+    ]
+    if not axles:
+        return 0.0
+    return float(np.sqrt(min(np.mean(axles), ALIKE * min(axles), MOST_DRIFT**2)))
 
 
 def _spread(sums: Array) -> Array:
-    """Robust variance of each column."""
-    return np.square(1.4826 * np.nanmedian(np.abs(np.where(sums == 0.0, np.nan, sums)), axis=0))
+    """Robust variance of each column; NaN where a wheel is not measured."""
+    known = [np.abs(column[column != 0.0]) for column in sums.T]
+    return np.array([(1.4826 * np.median(column)) ** 2 if len(column) else np.nan for column in known])
 
 
 def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: float, seed: int = 0) -> Noise:

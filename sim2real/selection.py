@@ -42,8 +42,8 @@ PAIR_MISFIT = 1.4
 """Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
 PAIR_SHARE = 0.02
 """As `EXPLAINED_SHARE`, for a pair [-]."""
-MOST_LEFT = 0.7
-"""An effect that a structural difference stands beside leaves alone at most this share of the misfit [-]."""
+MAJOR = 0.5
+"""An effect that a structural difference stands beside takes alone at least this share of what both take [-]."""
 RIVAL = 0.1
 """An entry with more than this share of the winner's probability is not told apart from it [-]."""
 SOFTNESS = 4.0
@@ -233,7 +233,8 @@ def _structured(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Ev
     beside = fitness(best, fit_to, holdout)
     alone = next(e for e in contest.singles if e.ids[0] == best.ids[0])
     needed = alone.loss - best.loss > FURTHER_GAIN * inflation(best, fit_to, holdout)
-    major = fitness(alone, fit_to, holdout).misfit <= MOST_LEFT * before.misfit
+    null = contest.null.loss
+    major = null - alone.loss >= MAJOR * (null - best.loss)
     if not (needed and major and explains(beside, before)):
         return None
     rivals = tuple(e for e in entries if e is not best and of[e.ids] > RIVAL * of[best.ids])

@@ -72,6 +72,13 @@ def test_what_both_sides_share_and_what_one_wheel_alone_has_is_no_drift(nominal)
     assert read_drift([nominal], [noise], [one]) < 0.15
 
 
+def test_a_car_whose_left_wheels_alone_are_measured_shows_no_drift(nominal):
+    noise = Noise(SIGMA, np.zeros(len(CHANNELS)), np.ones((len(nominal), len(CHANNELS))))
+    rows = SIGMA * np.random.default_rng(1).standard_normal((len(nominal), len(CHANNELS)))
+    rows[:, [3, 5]] = np.nan
+    assert read_drift([nominal], [noise], [rows]) == 0.0
+
+
 def test_what_is_allowed_is_what_a_right_model_leaves_of_a_drifting_log(nominal):
     seen = gather(MODEL, logs_of(nominal, SHARE, count=6))
     known = Noise(SIGMA, np.zeros(len(CHANNELS)), np.ones((len(nominal), len(CHANNELS))))
