@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 BLIND_SEED ?= 1
 
-.PHONY: help demo test check format lock clean blind
+.PHONY: help demo test check format lock clean blind bench
 
 help:            ## this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -41,6 +41,9 @@ lock: $(READY)   ## resolve the dependencies anew (needs uv on PATH)
 blind: $(READY)  ## the diagnosis on withheld cases, all thresholds (long; BLIND_SEED=n for other cases; third family of forms)
 	$(BIN)/python -m benchmarks.blind run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --forms third --jobs 2
 	$(BIN)/python -m benchmarks.blind score --out out/blind-$(BLIND_SEED)
+
+bench: $(READY)  ## step times of estimator and plant, added to benchmarks/history/speed.jsonl (on an idle machine)
+	$(BIN)/python -m benchmarks.speed
 
 clean:           ## remove what was built and measured
 	rm -rf out dist build

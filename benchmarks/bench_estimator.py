@@ -1,6 +1,6 @@
 """Time of one estimator step in Python, one wheel, classes in place of pictures, over a recorded drive.
 
-.venv/bin/python -m benchmarks.bench_estimator --json out/step.json
+.venv/bin/python -m benchmarks.bench_estimator
 
 Classes come at 20 Hz, some of them wrong, so that DE and DIFE are apart and both are computed. The reference loop is a
 fixed piece of Python: where a busy machine slows it, it slows the step alike.
@@ -9,7 +9,6 @@ fixed piece of Python: where a busy machine slows it, it slows the step alike.
 import argparse
 import json
 import time
-from pathlib import Path
 
 import numpy as np
 
@@ -59,14 +58,8 @@ def measure() -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path, help="write the figures there too")
-    options = parser.parse_args()
-    text = json.dumps(measure(), indent=2)
-    if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(text + "\n", encoding="utf-8")
-    print(text)
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    print(json.dumps(measure(), indent=2))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Time of a step of four wheels in Python, and of four single estimators beside it: JSON.
 
-``python -m benchmarks.bench_four_wheels [--out FILE.json]``. Both take turns, so that a busy machine slows both alike.
+``python -m benchmarks.bench_four_wheels``. Both take turns, so that a busy machine slows both alike.
 CPU time of this process, median over rounds [us].
 """
 
@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import statistics
 import time
 from collections.abc import Callable
-from pathlib import Path
+from typing import Any
 
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.four_wheels import WHEELS, CarSensors, FourWheels, FourWheelsConfig, SideClasses
@@ -74,10 +72,8 @@ def medians_us(works: dict[str, Callable[[], None]]) -> dict[str, float]:
     return {name: round(statistics.median(values), 1) for name, values in times.items()}
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, help="JSON file; standard output by default")
-    options = parser.parse_args()
+def measure() -> dict[str, Any]:
+    """Cost of a step in all situations, and over that of four single ones."""
     works = {}
     for label, every in (("class_20_hz", FRAME_STEPS), ("class_each_step", 1)):
         for name in SITUATIONS:
@@ -85,21 +81,18 @@ def main() -> None:
             works[f"{name}_{label}_four_single"] = four_single(name, every)
     cost = medians_us(works)
     cases = sorted({name.removesuffix("_four_wheels").removesuffix("_four_single") for name in cost})
-    result = {
+    return {
         "what": "CPU time of a step of four wheels; medians over rounds [us]",
         "cost_us": cost,
         "over_four_single_steps": {
             case: round(cost[f"{case}_four_wheels"] / cost[f"{case}_four_single"], 2) for case in cases
         },
-        "machine": {"cpus": os.cpu_count(), "processor": platform.machine(), "load_1min": os.getloadavg()[0]},
-        "python": platform.python_version(),
     }
-    text = json.dumps(result, indent=2)
-    if options.out:
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        options.out.write_text(text + "\n")
-    else:
-        print(text)
+
+
+def main() -> None:
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    print(json.dumps(measure(), indent=2))
 
 
 if __name__ == "__main__":

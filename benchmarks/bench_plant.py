@@ -6,6 +6,7 @@ python benchmarks/bench_plant.py
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,8 @@ def measure(scenario: Scenario, vehicle: VehicleFile) -> dict[str, float]:
     }
 
 
-def main() -> None:
+def measure_all() -> dict[str, Any]:
+    """The paper's scenario with and without effects."""
     scenario = load_scenario(SCENARIO)
     own = dict(scenario.vehicle.effects)
     sets = {
@@ -58,7 +60,11 @@ def main() -> None:
     rows = {
         name: measure(scenario, with_effects(scenario.vehicle, effects)) for name, effects in sets.items()
     }
-    print(json.dumps({"scenario": scenario.name, "step_s": scenario.step_s, "effects": rows}, indent=2))
+    return {"scenario": scenario.name, "step_s": scenario.step_s, "effects": rows}
+
+
+def main() -> None:
+    print(json.dumps(measure_all(), indent=2))
 
 
 if __name__ == "__main__":
