@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from trpac_core import tyre
@@ -241,6 +241,7 @@ def test_state_survives_json_bit_by_bit():
 
 
 @settings(max_examples=60)
+@example([(0.0, 0.0, 0.0, step_s, None) for step_s in (*(0.0,) * 10, 0.002, 0.002)])
 @given(
     st.lists(
         st.tuples(

@@ -37,6 +37,10 @@ LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
 MOST_AHEAD = 2.0
 """Most that a step may be longer than the one before for the readings' trend to be trusted over it [-]."""
+JUMP_M_S, RIM_JUMP_M_S = 1.5, 8.0
+"""How far a reading may be from its filter: a bus of 20 Hz at 15 m/s^2, and a wheel that a full brake locks [m/s]."""
+RIM_ACCELERATION_M_S2 = 750.0
+"""Steepest change of a rim's speed: 3000 N m on 1.2 kg m^2 at 0.3 m [m/s^2]."""
 LOCKED_M_S = 0.5
 """Below this rim speed the wheel of a driving car counts as locked: its brake then holds what the road gives, not the
 torque that was commanded [m/s]."""
@@ -143,12 +147,27 @@ class TrpacEstimator:
             return self._hold(step_s, sensors, frame, frame_failed, problem)
         if step_s != self._rates.step_s or step_s == 0.0:
             self._rates = Rates.at(self.config, step_s, self._state.step_s)
+        if self._state.settled and self._jumped(sensors, step_s):
+            self._state = self._state._replace(settled=False)
         acceleration, lagged, load_n = self._moved(sensors)
         state = self._state
         if frame is not None or frame_failed:
             judging = state._replace(acceleration_m_s2=acceleration)
             state = self._with_frame(judging, frame, frame_failed, sensors)
         return self._advance(state, sensors, step_s, acceleration, lagged, load_n)
+
+    def _jumped(self, sensors: Sensors, step_s: float) -> bool:
+        """Whether readings are where no car can have gone since: a host that began with zeros, a signal that came back.
+
+        The observers would take such a jump for a force that they forget only slowly.
+        """
+        omega, _, speed_m_s = self._state.readings
+        speed_m_s -= sensors.vehicle_speed_m_s
+        rim_m_s = (omega - sensors.wheel_speed_rad_s) * self._wheel.radius_m
+        return (
+            abs(speed_m_s) > JUMP_M_S + GREATEST_ACCELERATION_M_S2 * step_s
+            or abs(rim_m_s) > RIM_JUMP_M_S + RIM_ACCELERATION_M_S2 * step_s
+        )
 
     def _moved(self, sensors: Sensors) -> tuple[float, float, float]:
         """Acceleration, lagged speed and load as they are now; at the start, and after a gap, unfiltered."""
