@@ -13,14 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.drive import CHANNELS, WHEEL, Drive
+from sim2real.drive import BLOCK_S, CHANNELS, WHEEL, Drive
 from sim2real.noise import Noise
 from sim2real.observer import Simulation
 
 Array = NDArray[np.float64]
 
-BLOCK_S = 0.2
-"""Residuals are averaged over blocks of this length to see what noise would average out [s]."""
 DRIFT_S = 3.0
 """Correlation time that a drift is taken to have [s]."""
 MOST_DRIFT = 0.6
@@ -39,16 +37,11 @@ def block_sums(rows: Array, length: int) -> Array:
     return cut.sum(axis=1) / np.sqrt(used)
 
 
-def block_length(drive: Drive) -> int:
-    """Rows of a block."""
-    return max(round(BLOCK_S / drive.step_s), 1)
-
-
 def read_drift(drives: Sequence[Drive], noises: Sequence[Noise], residuals: Sequence[Array]) -> float:
     """Standard deviation of the drift, in those of the noise, from the differences of left and right wheels [-]."""
     squares = []
     for drive, noise, rest in zip(drives, noises, residuals, strict=True):
-        length = block_length(drive)
+        length = drive.rows_in(BLOCK_S)
         scale = np.sqrt((1.0 + noise.correlation[WHEEL]) / (1.0 - noise.correlation[WHEEL]))
         z = (noise.whitened(rest) * noise.widening)[:, WHEEL]
         left_less_right = (z[:, 0::2] - z[:, 1::2]) / np.sqrt(2.0)
@@ -73,7 +66,7 @@ def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: float, seed
     if drift <= 0.0:
         return replace(noise, slow=np.zeros(len(CHANNELS)))
     generator = np.random.default_rng(seed)
-    length, nominal = block_length(drive), model.predict(drive).channels
+    length, nominal = drive.rows_in(BLOCK_S), model.predict(drive).channels
     found = np.zeros(len(CHANNELS))
     for _ in range(DRAWS):
         off = drift * noise.sigma * _drawn(len(drive), drive.step_s, generator)

@@ -29,6 +29,8 @@ GROUPS = {
 """Signals as the verdict names them, and their channels."""
 UNITS = {"position": "m", "vehicle_speed": "m/s", "wheel_speed": "rad/s", "accel_x": "m/s^2"}
 
+BLOCK_S = 0.2
+"""Residuals are averaged over blocks of this length to see what noise would average out [s]."""
 ANALYSIS_RATE_HZ = 125.0
 """Rate that a faster log is averaged down to: fast enough for driveline oscillation [Hz]."""
 
@@ -70,6 +72,10 @@ class Drive:
     def step_s(self) -> float:
         """Grid step [s]."""
         return float(self.time_s[1] - self.time_s[0])
+
+    def rows_in(self, duration_s: float) -> int:
+        """Rows of a block of this length, at least one."""
+        return max(round(duration_s / self.step_s), 1)
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -83,7 +83,7 @@ def _block_squares(
     """Per block and signal: sums of squares before and after, and how many samples stand behind them."""
     rows_before, rows_after, rows_count = [], [], []
     for drive, noise, old, new in zip(evidence.drives, evidence.noises, before, after, strict=True):
-        length = max(round(BLOCK_S / drive.step_s), 1)
+        length = drive.rows_in(BLOCK_S)
         z_old, z_new = noise.scaled(old), noise.scaled(new)
         for at in range(0, len(drive), length):
             cut = slice(at, at + length)
@@ -120,7 +120,7 @@ def intervals(found: Fit, evidence: Evidence) -> list[tuple[float, float, float]
     meat = np.zeros_like(bread)
     for part, drive in zip(evidence.parts, evidence.drives, strict=True):
         channels = drive.measured.shape[1]
-        length = max(round(BLOCK_S / drive.step_s), 1) * channels
+        length = drive.rows_in(BLOCK_S) * channels
         for at in range(part.start, part.stop, length):
             cut = slice(at, min(at + length, part.stop))
             score = scaled[cut].T @ (weight[cut] * found.z[cut])

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.contest import Contest, Entry
-from sim2real.drift import block_length, block_sums
-from sim2real.drive import GROUPS
+from sim2real.drift import block_sums
+from sim2real.drive import BLOCK_S, GROUPS
 from sim2real.evidence import Evidence
 from sim2real.fitting import robust
 from sim2real.result import Verdict
@@ -76,7 +76,7 @@ def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Fitness:
     for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
         for part, drive, noise in zip(evidence.parts, evidence.drives, evidence.noises, strict=True):
             rows = z[part].reshape(-1, drive.measured.shape[1])
-            sums = block_sums(rows, block_length(drive)) / np.sqrt(1.0 + noise.slow)
+            sums = block_sums(rows, drive.rows_in(BLOCK_S)) / np.sqrt(1.0 + noise.slow)
             for name, channels in GROUPS.items():
                 squares[name].append(sums[:, channels][np.abs(sums[:, channels]) > 0.0] ** 2)
     signals = {
@@ -95,7 +95,7 @@ def inflation(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
         counts += int(np.count_nonzero(z))
         for part, drive in zip(evidence.parts, evidence.drives, strict=True):
             rows = np.clip(z[part].reshape(-1, drive.measured.shape[1]), -5.0, 5.0)
-            sums.append(block_sums(rows, max(round(LONG_BLOCK_S / drive.step_s), 1)).ravel())
+            sums.append(block_sums(rows, drive.rows_in(LONG_BLOCK_S)).ravel())
     size = max(losses / max(counts, 1), 1.0)
     every = np.concatenate(sums)
     memory = max(float(np.mean(every[every != 0.0] ** 2)) / size, 1.0) if np.any(every) else 1.0
@@ -135,7 +135,7 @@ def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
 def _drifting(*evidence: Evidence) -> float:
     """Share of the residuals' variance that is the sensors' drift [-]."""
     parts = [
-        noise.slow / block_length(drive)
+        noise.slow / drive.rows_in(BLOCK_S)
         for each in evidence
         for drive, noise in zip(each.drives, each.noises, strict=True)
     ]
@@ -235,10 +235,10 @@ def _structured(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Ev
     needed = alone.loss - best.loss > FURTHER_GAIN * inflation(best, fit_to, holdout)
     null = contest.null.loss
     major = null - alone.loss >= MAJOR * (null - best.loss)
-    if not (needed and major and explains(beside, before)):
+    among = sum(of[e.ids] for e in contest.structured)  # 0 where pairs fit better beyond measure
+    if not (among and needed and major and explains(beside, before)):
         return None
     rivals = tuple(e for e in entries if e is not best and of[e.ids] > RIVAL * of[best.ids])
-    among = sum(of[e.ids] for e in contest.structured)
     share = {e.ids[0]: 0.0 for e in contest.singles}
     share |= {e.ids[0]: of[e.ids] / among for e in contest.structured}
     verdict = Verdict.AMBIGUOUS if rivals else Verdict.IDENTIFIED

@@ -27,7 +27,7 @@ from sim2real.observer import Prediction, Simulation
 from sim2real.result import TrpacError
 from trpac_core.dife import WheelInputs, visible_theta
 from trpac_core.elastic import AS_TOLD
-from trpac_core.estimator import EstimatorConfig, TrpacEstimator
+from trpac_core.estimator import LOCKED_M_S, EstimatorConfig, TrpacEstimator
 from trpac_core.readings import Sensors, filter_share
 from trpac_core.slip import GREATEST_SLIP, Slip
 from trpac_core.tyre import used_friction
@@ -38,9 +38,6 @@ Mask = NDArray[np.bool_]
 
 SETTLING = 5.0
 """Time constants of the estimator that it is given after a change of the road; 0.7 % of a step are left then [-]."""
-LOCKED_M_S = 0.5
-"""Below this rim speed the wheel of a driving car counts as locked: its brake then holds what the road gives, not the
-torque that was commanded, so there is no torque to estimate from [m/s]."""
 
 PARAMETERS = {
     "mass_kg": "the mass",

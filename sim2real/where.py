@@ -85,7 +85,7 @@ def regimes(drive: Drive, seen: Prediction) -> NDArray[np.str_]:
 
 def blocks(drive: Drive, noise: Noise, seen: Prediction, residuals: Array) -> Blocks:
     """Averages of a model's residuals."""
-    length = max(round(BLOCK_S / drive.step_s), 1)
+    length = drive.rows_in(BLOCK_S)
     count = len(drive) // length
     z = noise.whitened(residuals)[: count * length].reshape(count, length, -1)
     used = np.isfinite(z).sum(axis=1)

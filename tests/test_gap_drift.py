@@ -9,8 +9,8 @@ from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured
 from scenarios.effects import EFFECTS
 from sim2real.contest import Entry
 from sim2real.diagnose import find
-from sim2real.drift import DRIFT_S, block_length, block_sums, read_drift, with_drift
-from sim2real.drive import CHANNELS, WHEEL
+from sim2real.drift import DRIFT_S, block_sums, read_drift, with_drift
+from sim2real.drive import BLOCK_S, CHANNELS, WHEEL
 from sim2real.evidence import Evidence, drift_of, gather
 from sim2real.noise import Noise
 from sim2real.result import Verdict
@@ -85,7 +85,7 @@ def test_what_is_allowed_is_what_a_right_model_leaves_of_a_drifting_log(nominal)
     allowed = 1.0 + with_drift(MODEL, nominal, known, SHARE).slow
     left = [known.whitened(r) for r in seen.residuals(MODEL)]
     found = np.mean(
-        [np.mean(block_sums(np.nan_to_num(z), block_length(nominal)) ** 2, axis=0) for z in left], 0
+        [np.mean(block_sums(np.nan_to_num(z), nominal.rows_in(BLOCK_S)) ** 2, axis=0) for z in left], 0
     )
     assert np.all(allowed > 1.2)
     np.testing.assert_allclose(

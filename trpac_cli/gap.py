@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -74,6 +73,8 @@ def diagnose(
 
     Exit codes: 0 with a diagnosis, 2 unusable input.
     """
+    from joblib import cpu_count
+
     from scenarios.errors import ScenarioError
     from sim2real.diagnose import diagnose_files
     from sim2real.report import rated, write_diagnosis
@@ -89,7 +90,7 @@ def diagnose(
                 holdout,
                 mapping=mapping,
                 seed=seed,
-                jobs=jobs or _processors(),
+                jobs=jobs or cpu_count(),
                 progress=told,
             )
             told("report", 0, 1)
@@ -121,6 +122,8 @@ def demo(
 
     Exit codes: 0 done, whether the diagnosis is right or not; 2 the folder cannot be used.
     """
+    from joblib import cpu_count
+
     from scenarios.errors import ScenarioError
     from sim2real.demo import make_case, open_seal
     from sim2real.diagnose import diagnose_files
@@ -139,7 +142,7 @@ def demo(
                 [str(path) for path in case.fit],
                 str(case.holdout),
                 seed=seed,
-                jobs=jobs or _processors(),
+                jobs=jobs or cpu_count(),
                 progress=told,
             )
             _, report = write_diagnosis(rated(said), out)
@@ -257,7 +260,3 @@ def _cause_table(said: Diagnosis) -> Table:
             f"{cause.shrink_percent.value:.0f} %",
         )
     return table
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

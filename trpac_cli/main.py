@@ -17,11 +17,9 @@ from rich.table import Table
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
 from trpac_cli import gap, vision
+from trpac_cli.console import EXIT_INPUT
 from trpac_cli.estimate import estimate
 from trpac_cli.sweep import sweep
-
-EXIT_INPUT = 2
-"""Unusable input: one message on standard error, and nothing written."""
 
 app = typer.Typer(
     help="Tyre-road adhesion from dynamics and camera: run scenarios, see how the gains come about.",

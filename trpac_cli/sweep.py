@@ -20,6 +20,7 @@ from rich.progress import (
 from rich.table import Table
 
 from scenarios.errors import ScenarioError
+from trpac_cli.console import EXIT_INPUT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
 EXIT_SOME_FAILED = 1
 """Done, but some runs failed; they are named on standard error."""
-EXIT_INPUT = 2
-"""Unusable input: one message on standard error, and nothing written."""
 MOST_NAMED = 5
 
 

@@ -13,14 +13,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from trpac_cli.console import EXIT_INPUT
+
 if TYPE_CHECKING:
     from scenarios.stills import Progress as Told
     from scenarios.vision_runs import Drive
 
 EXIT_SOME_UNREADABLE = 1
 """Done, but some of the pictures could not be used; they are named on standard error."""
-EXIT_INPUT = 2
-"""Unusable input: one message on standard error, and nothing written."""
 MOST_NAMED = 20
 """Unusable pictures that a message names; the rest are counted."""
 

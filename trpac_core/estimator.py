@@ -31,7 +31,15 @@ from .vision.ife import Ife
 from .vision.preview import Outcome, add_frame, covering, prune
 from .vision.trajectory import Motion
 
-__all__ = ["Estimate", "EstimatorConfig", "EstimatorState", "RoadClass", "Sensors", "TrpacEstimator"]
+__all__ = [
+    "LOCKED_M_S",
+    "Estimate",
+    "EstimatorConfig",
+    "EstimatorState",
+    "RoadClass",
+    "Sensors",
+    "TrpacEstimator",
+]
 
 LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""

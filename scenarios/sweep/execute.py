@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import Any
 
 import dask
 from distributed import Client, Future, LocalCluster, as_completed
+from joblib import cpu_count
 
 from scenarios.errors import ScenarioError
 from scenarios.sweep.draw import RunKey, plan_run, run_keys
@@ -95,7 +95,7 @@ def execute(
         return parts, []
     failures: list[Failure] = []
     finished = len(keys) - len(todo)
-    with connected(scheduler, min(jobs or core_count(), len(todo))) as client:
+    with connected(scheduler, min(jobs or cpu_count(), len(todo))) as client:
         for key, future in _stream(client, sweep, todo):
             if future.status == "finished":
                 result = future.result()
@@ -106,11 +106,6 @@ def execute(
             finished += 1
             progress(finished, len(keys))
     return parts, failures
-
-
-def core_count() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

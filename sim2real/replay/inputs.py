@@ -12,8 +12,7 @@ from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive, make_drive
 from sim2real.logs import Log, LogError, resample
 from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
-from sim2real.trpac_error import LOCKED_M_S
-from trpac_core.estimator import EstimatorConfig
+from trpac_core.estimator import LOCKED_M_S, EstimatorConfig
 from trpac_core.vehicle import Vehicle
 
 Array = NDArray[np.float64]
