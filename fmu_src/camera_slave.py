@@ -13,8 +13,9 @@ from pythonfmu.enums import Fmi2Status
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
 
-from .frames import BusClass, FrameState, next_frame
+from .frames import BusClass, FrameState, in_memory, next_frame
 from .guarded_slave import GuardedSlave
+from .settings import BUFFERS_ENABLED
 
 SEGMENTER_FILE = "segmenter.onnx"
 CLASSIFIER_FILE = "surface.onnx"
@@ -88,8 +89,12 @@ class CameraSlave(GuardedSlave):
     def step(self, step_s: float) -> None:
         """Hand sensors and a new frame to the estimator, and publish its estimate."""
         sensors = self.sensors()
-        self._frame, frame, problem = next_frame(self._frame, self.values, self.bus)
-        self.clear_volatile()
+        if not self.values[BUFFERS_ENABLED] and in_memory(self.values):
+            self._tell_buffers_off()
+        try:
+            self._frame, frame, problem = next_frame(self._frame, self.values, self.bus)
+        finally:
+            self.clear_volatile()
         try:
             estimate = self._estimator.step(step_s, sensors, frame, frame_failed=self._frame.failed)
         except (ImageError, ModelError) as error:
@@ -101,6 +106,13 @@ class CameraSlave(GuardedSlave):
             self.report("frame", Fmi2Status.warning, f"{self.modelName}: {problem}")
         for kind, text in self.problems(estimate):
             self.report(f"sensors {kind}", Fmi2Status.warning, f"{self.modelName}: {text}")
+
+    def _tell_buffers_off(self) -> None:
+        text = (
+            f"the inputs image.* point to a picture in memory, which is not read: the parameter {BUFFERS_ENABLED} is "
+            "false. Set it to true before the initialisation ends, or give pictures by image_path."
+        )
+        self.report("buffers off", Fmi2Status.warning, f"{self.modelName}: {text}")
 
     def optional(self, name: str) -> float | None:
         """An input that counts as connected from its first value other than 0; None before."""
