@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
 import os
 import shutil
@@ -15,6 +16,7 @@ CACHE_FOLDER = "trpac-fmu"
 """Folder of kept code within the user's cache."""
 
 _KEPT: list[dict[str, Any]] = []
+_ENDING_IN_ORDER: set[str] = set()
 
 
 def keep(namespace: dict[str, Any]) -> None:
@@ -24,6 +26,33 @@ def keep(namespace: dict[str, Any]) -> None:
     this the namespace is freed under the module, and a later instance fails or crashes.
     """
     _KEPT.append(namespace)
+
+
+def end_in_order(resources: str) -> None:
+    """Let the wrapper's state end before the wrapper does; once per unpacked unit, and on Linux only.
+
+    At the process's end the C library first destroys the wrapper's shared pointer to its state, and then calls the
+    wrapper's `finalizePythonInterpreter`, which assigns to the destroyed pointer: it counts down in freed memory, and
+    the heap is corrupt ("corrupted double-linked list"). Exit handlers run last in, first out: one that calls the
+    same function and is registered now, after the pointer's, runs before it, and leaves an empty pointer behind.
+
+    Parameters
+    ----------
+    resources : str
+        The resources folder of the unpacked unit, beside which the wrapper lies.
+    """
+    if resources in _ENDING_IN_ORDER or not sys.platform.startswith("linux"):
+        return
+    _ENDING_IN_ORDER.add(resources)
+    for library in (Path(resources).parent / "binaries" / "linux64").glob("*.so"):
+        try:
+            # Only where the host has loaded it from here, and it must then stay as long as its exit handler.
+            wrapper = ctypes.CDLL(str(library), os.RTLD_NOW | os.RTLD_NOLOAD | os.RTLD_NODELETE)
+            at_exit = ctypes.CDLL(None).__cxa_atexit
+            at_exit.argtypes = (ctypes.c_void_p,) * 3
+            at_exit(ctypes.cast(wrapper.finalizePythonInterpreter, ctypes.c_void_p), None, None)
+        except (OSError, AttributeError):
+            continue  # another host, wrapper or C library: the process then ends as it did
 
 
 class MissingPackagesError(ImportError):
@@ -63,6 +92,7 @@ def require_packages(unit: str, modules: Mapping[str, str]) -> None:
             f"{sys.executable or 'python3'} -m pip install {' '.join(packages)}"
         )
         print(message, file=sys.stderr)
+        end_in_order(sys.path[0])  # where the wrapper has put its resources
         raise MissingPackagesError(message.replace("%", "%%"))
 
 
