@@ -13,6 +13,7 @@ from pythonfmu.enums import Fmi2Status
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
 
+from .contents import require_as_built
 from .frames import BusClass, FrameState, in_memory, next_frame
 from .guarded_slave import GuardedSlave
 from .settings import BUFFERS_ENABLED
@@ -67,13 +68,14 @@ class CameraSlave(GuardedSlave):
         """Unusable readings: what distinguishes one from another in the log, and a sentence."""
 
     def prepare(self) -> None:
-        """Load the networks, once per process; raises ModelError.
+        """Load the networks, once per process; raises ContentError where they are not those of the build, ModelError.
 
         In the unit this module's name holds the hash of all that the unit carries, networks included:
         those of another unit cannot be meant.
         """
         if CameraSlave._networks is None:
             folder = Path(str(self.resources))
+            require_as_built(folder, (SEGMENTER_FILE, CLASSIFIER_FILE))
             CameraSlave._networks = (
                 Segmenter(folder / SEGMENTER_FILE),
                 SurfaceClassifier(folder / CLASSIFIER_FILE),

@@ -16,6 +16,7 @@ from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
 from scenarios.plant.parameters import Wheels
 from scenarios.plant.pipeline import PlantState, advance, initial_state
 
+from .contents import require_as_built
 from .guarded_slave import GuardedSlave
 from .interface_plant import MOST_TORQUE_NM, REFERENCE_PLANT, SIDES, WHEELS
 from .parameters import check_parameters
@@ -46,6 +47,10 @@ class ReferencePlant(GuardedSlave):
     """Four wheel torques in, the car's true motion and the road under and ahead of it out."""
 
     variables: ClassVar[tuple[Variable, ...]] = REFERENCE_PLANT
+
+    def prepare(self) -> None:
+        """Raise ContentError where the road that the unit brings is not that of the build."""
+        require_as_built(Path(str(self.resources)), (ROAD_FILE,))
 
     def initialise(self) -> None:
         """Apply the parameters and compile the plant; ValueError where they cannot be applied."""
