@@ -13,8 +13,6 @@ EXIT_USAGE, EXIT_BUILD, EXIT_INVALID, EXIT_RUN = 2, 3, 4, 5
 
 SMOKE_STEPS = 100
 SMOKE_STEP_S = 0.001
-ROLLING = {"wheel_speed": 34.5, "vehicle_speed": 10.0, "wheel_torque": 20.0}
-"""Signals of a rolling car, for the inputs of these names and of each wheel."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -80,6 +78,7 @@ def smoke_run(path: Path) -> float:
     from fmpy.fmi2 import FMU2Slave
 
     from fmu_src.packaging import unpack_unit
+    from fmu_src.trial import ROLLING
 
     description = read_model_description(str(path))
     folder = unpack_unit(path)

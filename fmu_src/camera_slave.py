@@ -13,8 +13,10 @@ from pythonfmu.enums import Fmi2Status
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
 
-from .frames import BusClass, FrameState, next_frame
+from .contents import require_as_built
+from .frames import BusClass, FrameState, in_memory, next_frame
 from .guarded_slave import GuardedSlave
+from .settings import BUFFERS_ENABLED
 
 SEGMENTER_FILE = "segmenter.onnx"
 CLASSIFIER_FILE = "surface.onnx"
@@ -66,13 +68,14 @@ class CameraSlave(GuardedSlave):
         """Unusable readings: what distinguishes one from another in the log, and a sentence."""
 
     def prepare(self) -> None:
-        """Load the networks, once per process; raises ModelError.
+        """Load the networks, once per process; raises ContentError where they are not those of the build, ModelError.
 
         In the unit this module's name holds the hash of all that the unit carries, networks included:
         those of another unit cannot be meant.
         """
         if CameraSlave._networks is None:
             folder = Path(str(self.resources))
+            require_as_built(folder, (SEGMENTER_FILE, CLASSIFIER_FILE))
             CameraSlave._networks = (
                 Segmenter(folder / SEGMENTER_FILE),
                 SurfaceClassifier(folder / CLASSIFIER_FILE),
@@ -88,8 +91,12 @@ class CameraSlave(GuardedSlave):
     def step(self, step_s: float) -> None:
         """Hand sensors and a new frame to the estimator, and publish its estimate."""
         sensors = self.sensors()
-        self._frame, frame, problem = next_frame(self._frame, self.values, self.bus)
-        self.clear_volatile()
+        if not self.values[BUFFERS_ENABLED] and in_memory(self.values):
+            self._tell_buffers_off()
+        try:
+            self._frame, frame, problem = next_frame(self._frame, self.values, self.bus)
+        finally:
+            self.clear_volatile()
         try:
             estimate = self._estimator.step(step_s, sensors, frame, frame_failed=self._frame.failed)
         except (ImageError, ModelError) as error:
@@ -101,6 +108,13 @@ class CameraSlave(GuardedSlave):
             self.report("frame", Fmi2Status.warning, f"{self.modelName}: {problem}")
         for kind, text in self.problems(estimate):
             self.report(f"sensors {kind}", Fmi2Status.warning, f"{self.modelName}: {text}")
+
+    def _tell_buffers_off(self) -> None:
+        text = (
+            f"the inputs image.* point to a picture in memory, which is not read: the parameter {BUFFERS_ENABLED} is "
+            "false. Set it to true before the initialisation ends, or give pictures by image_path."
+        )
+        self.report("buffers off", Fmi2Status.warning, f"{self.modelName}: {text}")
 
     def optional(self, name: str) -> float | None:
         """An input that counts as connected from its first value other than 0; None before."""

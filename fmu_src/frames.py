@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from trpac_core.estimator import RoadClass
 from trpac_core.four_wheels import SideClasses
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.images import MOST_PIXELS, ImageError, decode_image, raw_bgr_image
+from trpac_core.vision.images import MOST_PIXELS, ImageError, check_size, decode_image, raw_bgr_image
 
+from .settings import BUFFERS_ENABLED
 from .signals import NO_ROAD_CLASS
 
 Frame = NDArray[np.uint8] | RoadClass | SideClasses
@@ -37,6 +38,8 @@ BUS = "<road_class>"
 """Source of a frame whose class came by bus."""
 BUFFER = "<buffer>"
 """Source of a frame that came as a picture in memory."""
+IN_MEMORY = "picture in memory"
+"""What messages call it."""
 SURFACES = {surface.value: surface for surface in Surface}
 MOST_BYTES = 3 * MOST_PIXELS
 """Larger buffers are refused unread [bytes]."""
@@ -83,9 +86,14 @@ def _source(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> str:
     for place in bus:
         if values[place.surface] != NO_ROAD_CLASS:
             return BUS
-    if values["image.size"] != 0 and (values["image.base.lo"] != 0 or values["image.base.hi"] != 0):
+    if values[BUFFERS_ENABLED] and in_memory(values):
         return BUFFER
     return str(values["image_path"])
+
+
+def in_memory(values: Mapping[str, Any]) -> bool:
+    """Whether the inputs point to a picture in memory: neither address nor size is 0."""
+    return values["image.size"] != 0 and (values["image.base.lo"] != 0 or values["image.base.hi"] != 0)
 
 
 def _read(source: str, values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> Frame | None:
@@ -97,19 +105,25 @@ def _read(source: str, values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> 
 
 
 def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
-    """The picture at an address, copied; the address is two signed halves of 32 bits."""
+    """The picture at an address, copied; the address is two signed halves of 32 bits.
+
+    All that the numbers alone can tell is checked before the first byte is read; whether the address is readable they
+    cannot tell.
+    """
     address = (values["image.base.lo"] & 0xFFFFFFFF) | (values["image.base.hi"] & 0xFFFFFFFF) << 32
     size, width, height = values["image.size"], values["image_width"], values["image_height"]
     raw = width != 0 or height != 0
     if not 0 < size <= MOST_BYTES:
         raise ImageError(f"image.size is {size} bytes; expected 1 to {MOST_BYTES}.")
-    if raw and size != 3 * width * height:
-        raise ImageError(
-            f"image.size is {size} bytes; expected {3 * width * height} for {width} x {height} pixels of raw BGR. "
-            "For a JPEG or PNG picture leave image_width and image_height at 0."
-        )
+    if raw:
+        check_size(width, height, f"{IN_MEMORY} of image_width x image_height")
+        if size != 3 * width * height:
+            raise ImageError(
+                f"image.size is {size} bytes; expected {3 * width * height} for {width} x {height} pixels of raw "
+                "BGR. For a JPEG or PNG picture leave image_width and image_height at 0."
+            )
     data = ctypes.string_at(address, size)
-    return raw_bgr_image(data, width, height) if raw else decode_image(data, "picture in memory")
+    return raw_bgr_image(data, width, height) if raw else decode_image(data, IN_MEMORY)
 
 
 def _by_bus(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> RoadClass | SideClasses | None:

@@ -18,6 +18,7 @@ from typing import Any, ClassVar
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
+from .host import end_in_order
 from .variables import Kind, Variable
 
 Value = float | int | bool | str
@@ -93,7 +94,10 @@ class GuardedSlave(Fmi2Slave):
             kind: {vr: v.name for vr, v in enumerate(self.variables) if v.kind is kind} for kind in Kind
         }
         self._inputs = frozenset(v.name for v in self.variables if v.causality == "input")
-        self._settable = self._inputs | {v.name for v in self.variables if v.causality == "parameter"}
+        self._inputs_and_parameters = self._inputs | {
+            v.name for v in self.variables if v.causality == "parameter"
+        }
+        self._settable = self._inputs_and_parameters
         self._reported: set[str] = set()
         self._ready = False
         try:
@@ -108,6 +112,9 @@ class GuardedSlave(Fmi2Slave):
             self.report("prepare", Fmi2Status.error, text)
         else:
             type(self)._prepared = True
+        finally:
+            # After all libraries are loaded, so that in a host without Python the interpreter ends before they do.
+            end_in_order(str(self.resources))
 
     # What a slave adds
 
@@ -245,6 +252,7 @@ class GuardedSlave(Fmi2Slave):
             "schema": STATE_SCHEMA,
             "unit": __name__,
             "ready": self._ready,
+            "initialised": self._settable is self._inputs,
             "values": self.values | self._forgotten,
             "inner": self.inner_state() if self._ready else None,
         }
@@ -266,7 +274,7 @@ class GuardedSlave(Fmi2Slave):
             return
         if content["ready"]:
             self.restore_inner_state(content["values"], content["inner"])
-            self._settable = self._inputs
+        self._settable = self._inputs if content["initialised"] else self._inputs_and_parameters
         self.values = content["values"]
         self._ready = content["ready"]
 

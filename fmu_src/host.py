@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
 import os
 import shutil
@@ -14,7 +15,11 @@ from typing import Any
 CACHE_FOLDER = "trpac-fmu"
 """Folder of kept code within the user's cache."""
 
+LEAST_PYTHON = (3, 11)
+"""Older ones do not read the unit's code."""
+
 _KEPT: list[dict[str, Any]] = []
+_ENDING_IN_ORDER: set[str] = set()
 
 
 def keep(namespace: dict[str, Any]) -> None:
@@ -26,12 +31,47 @@ def keep(namespace: dict[str, Any]) -> None:
     _KEPT.append(namespace)
 
 
-class MissingPackagesError(ImportError):
-    """The host's Python lacks packages of the unit; the text says which, where and how to install them."""
+def end_in_order(resources: str) -> None:
+    """Let the wrapper's state end before the wrapper does; once per unpacked unit, and on Linux only.
+
+    At the process's end the C library first destroys the wrapper's shared pointer to its state, and then calls the
+    wrapper's `finalizePythonInterpreter`, which assigns to the destroyed pointer: it counts down in freed memory, and
+    the heap is corrupt ("corrupted double-linked list"). Exit handlers run last in, first out: one that calls the
+    same function and is registered now, after the pointer's, runs before it, and leaves an empty pointer behind.
+
+    Parameters
+    ----------
+    resources : str
+        The resources folder of the unpacked unit, beside which the wrapper lies.
+    """
+    if resources in _ENDING_IN_ORDER or not sys.platform.startswith("linux"):
+        return
+    _ENDING_IN_ORDER.add(resources)
+    for library in (Path(resources).parent / "binaries" / "linux64").glob("*.so"):
+        try:
+            # Only where the host has loaded it from here, and it must then stay as long as its exit handler.
+            wrapper = ctypes.CDLL(str(library), os.RTLD_NOW | os.RTLD_NOLOAD | os.RTLD_NODELETE)
+            at_exit = ctypes.CDLL(None).__cxa_atexit
+            at_exit.argtypes = (ctypes.c_void_p,) * 3
+            at_exit(ctypes.cast(wrapper.finalizePythonInterpreter, ctypes.c_void_p), None, None)
+        except (OSError, AttributeError):
+            continue  # another host, wrapper or C library: the process then ends as it did
+
+
+class HostError(ImportError):
+    """The host's Python cannot run the unit; the text says why, which Python it is and what to do."""
+
+
+def interpreter() -> str:
+    """The Python that runs this, as a command: within another program `sys.executable` may be that program."""
+    if Path(sys.executable).name.lower().startswith("python"):
+        return sys.executable
+    found = (Path(sys.prefix) / place for place in ("bin/python3", "python.exe"))
+    return next((str(path) for path in found if path.is_file()), f"python{LEAST_PYTHON[0]}.{LEAST_PYTHON[1]}")
 
 
 def require_packages(unit: str, modules: Mapping[str, str]) -> None:
-    """Import what the unit needs, or say everything that is missing in one error.
+    """Import what the unit needs, or say all that is wrong with this Python in one error.
 
     A per cent sign is doubled: the wrapper hands the text to a printf-like logger.
 
@@ -44,10 +84,16 @@ def require_packages(unit: str, modules: Mapping[str, str]) -> None:
 
     Raises
     ------
-    MissingPackagesError
-        Names each package, the interpreter and the command that installs them. The same sentence goes to
-        standard error, because hosts show no log of a unit that could not be instantiated.
+    HostError
+        Where Python is too old, or packages are missing: names each package, the interpreter and the command that
+        installs them. The same sentence goes to standard error, because hosts show no log of a unit that could not
+        be instantiated.
     """
+    if sys.version_info < LEAST_PYTHON:
+        _refuse(
+            f"{unit} needs Python {LEAST_PYTHON[0]}.{LEAST_PYTHON[1]} or newer, and {_this_python()} runs it. Start "
+            "the host with another Python: see 'What the host needs' in the unit's documentation."
+        )
     problems, packages = [], []
     for module, package in modules.items():
         try:
@@ -56,14 +102,21 @@ def require_packages(unit: str, modules: Mapping[str, str]) -> None:
             problems.append(f"{package} ({error})")
             packages.append(package)
     if problems:
-        message = (
-            f"{unit} needs Python packages that {sys.executable or 'the embedded interpreter'} "
-            f"(Python {sys.version_info.major}.{sys.version_info.minor}, prefix {sys.prefix}) cannot import: "
-            f"{'; '.join(problems)}. Install them with: "
-            f"{sys.executable or 'python3'} -m pip install {' '.join(packages)}"
+        _refuse(
+            f"{unit} needs Python packages that {_this_python()} cannot import: {'; '.join(problems)}. "
+            f"Install them with: {interpreter()} -m pip install {' '.join(packages)}"
         )
-        print(message, file=sys.stderr)
-        raise MissingPackagesError(message.replace("%", "%%"))
+
+
+def _this_python() -> str:
+    version = ".".join(map(str, sys.version_info[:3]))
+    return f"{interpreter()} (Python {version}, prefix {sys.prefix})"
+
+
+def _refuse(message: str) -> None:
+    print(message, file=sys.stderr)
+    end_in_order(sys.path[0])  # where the wrapper has put its resources
+    raise HostError(message.replace("%", "%%"))
 
 
 def import_kept(package: str) -> None:

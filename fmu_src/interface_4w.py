@@ -101,6 +101,10 @@ TRPAC_ESTIMATOR_4W = (
     *(made for variable in OUTPUTS for made in _at_each_wheel(variable)),
     *_OF_THE_CAR,
     _AXLE_DEVIATION,
-    *(replace(v, source=f"wheel.{v.source}") for v in PARAMETERS if v.name not in WHICH_WHEEL),
+    *(
+        replace(v, source=f"wheel.{v.source}" if v.source else "")
+        for v in PARAMETERS
+        if v.name not in WHICH_WHEEL
+    ),
 )
 """Variables of the unit `TrpacEstimator4W`."""

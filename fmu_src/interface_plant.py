@@ -6,6 +6,9 @@ from .variables import Kind, Variable
 
 WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 SIDES = ("left", "right")
+ROAD = ((0.0, 0.9, 0), (20.0, 0.3, 2), (40.0, 0.5, 1), (60.0, 0.9, 0), (80.0, 0.3, 2))
+"""Start [m], theta and surface of each segment that the parameters can describe; by default the first three count, the
+road of Figure 16 of Tian et al. 2022."""
 MOST_TORQUE_NM = 20_000.0
 """No road car's wheel is given more; beyond it the input is a fault or in another unit [N m]."""
 
@@ -56,8 +59,46 @@ def _parameter(
     )
 
 
+def _whole(name: str, description: str, start: int, minimum: int, maximum: int) -> Variable:
+    return Variable(
+        name,
+        Kind.INTEGER,
+        "parameter",
+        "fixed",
+        description,
+        start=start,
+        minimum=minimum,
+        maximum=maximum,
+    )
+
+
 def _path(name: str, description: str) -> Variable:
     return Variable(name, Kind.STRING, "parameter", "fixed", description, start="")
+
+
+def _road_segment(number: int, start_m: float, theta: float, surface: int) -> tuple[Variable, ...]:
+    name = f"road.segment_{number}"
+    return (
+        _parameter(
+            f"{name}.start", "m", f"Segment {number}: where it starts; it holds to the next one's", start_m
+        ),
+        *(
+            _parameter(
+                f"{name}.theta_{side}", "1", f"Segment {number}: theta of the {side} side", theta, 0.02, 1.5
+            )
+            for side in SIDES
+        ),
+        *(
+            _whole(
+                f"{name}.class_{side}",
+                f"Segment {number}: {side} side is 0 dry, 1 wet, 2 snow or ice",
+                surface,
+                0,
+                2,
+            )
+            for side in SIDES
+        ),
+    )
 
 
 _OUTPUTS = (
@@ -105,7 +146,7 @@ _OUTPUTS = (
 
 _PARAMETERS = (
     _path("vehicle_path", "vehicle.yaml of the car; empty: the parameters vehicle.* and tyre.* say it"),
-    _path("road_path", "road.yaml; empty: the paper's 0.9 / 0.3 / 0.5, 20 m each"),
+    _path("road_path", "road.yaml; empty: the parameters road.* say it, which start as the paper's road"),
     _parameter("vehicle.mass", "kg", "Mass of the car", 1343.8, 1.0, source="mass_kg"),
     _parameter("vehicle.wheelbase", "m", "Wheelbase", 2.305, 0.1, source="wheelbase_m"),
     _parameter("vehicle.track", "m", "Track width", 1.356, 0.1, source="track_m"),
@@ -138,6 +179,12 @@ _PARAMETERS = (
     _parameter("initial.position", "m", "Road coordinate of the front axle at the start", 0.0),
     _parameter("preview.P_0", "m", "Way ahead of the front axle at which road_class looks", 2.5, 0.0),
     _parameter("camera.confidence", "1", "What road_class_confidence says", 0.95, 0.0, 1.0),
+    _whole("road.segments", "How many segments the road has", 3, 1, len(ROAD)),
+    *(
+        variable
+        for number, segment in enumerate(ROAD, start=1)
+        for variable in _road_segment(number, *segment)
+    ),
 )
 
 REFERENCE_PLANT = (

@@ -40,7 +40,8 @@ CAPABILITIES = {
 
 OSMP_NAMESPACE = "http://xsd.pmsf.net/OSISensorModelPackaging"
 OSMP_VERSION = "1.6.0"
-IMAGE_TYPE = "image/*"
+IMAGE_TYPE = "application/octet-stream"
+"""JPEG, PNG or raw pixels; the convention asks for a valid MIME type, which image/* with its wildcard is not."""
 
 LOG_CATEGORIES = {
     "logStatusWarning": "An input that could not be used; the last good estimate is held.",

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import pythonfmu
 
+from .contents import CONTENTS_FILE, Contents, sha256_of
 from .model_description import UnitInfo, model_description
 from .variables import Variable
 
-SLAVE_FILES = ("__init__.py", "guarded_slave.py", "host.py", "variables.py")
+SLAVE_FILES = ("__init__.py", "contents.py", "guarded_slave.py", "host.py", "variables.py")
 """Files of this package that every unit carries; what a unit needs besides comes on top."""
 
 PYTHONFMU_FILES = (
@@ -87,6 +88,9 @@ def build_unit(slave: Slave, target: Path) -> Path:
     content[f"resources/{slave.info.name}_{digest}.py"] = _entry(slave, digest)
     content["resources/slavemodule.txt"] = f"{slave.info.name}_{digest}".encode()
     content["modelDescription.xml"] = model_description(slave.info, slave.variables, digest)
+    files = {path: sha256_of(data) for path, data in content.items()}
+    record = Contents(slave.info.name, slave.info.version, digest, dict(slave.packages), files)
+    content[f"resources/{CONTENTS_FILE}"] = record.to_bytes()
     target.parent.mkdir(parents=True, exist_ok=True)
     # Stored, not compressed: compressed bytes differ between versions of zlib.
     with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as archive:
@@ -130,7 +134,7 @@ def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
 
 def sha256(path: Path) -> str:
     """SHA-256 of a file, as hexadecimal text."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return sha256_of(path.read_bytes())
 
 
 def _module_files(place: str, path: Path) -> dict[str, bytes]:

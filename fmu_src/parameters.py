@@ -21,7 +21,7 @@ def configuration(variables: Sequence[Variable], values: Mapping[str, Any], defa
         Lists every parameter that is not finite or out of its range; or what the configuration refuses.
     """
     check_parameters(variables, values)
-    settings = {v.source: values[v.name] for v in variables if v.causality == "parameter"}
+    settings = {v.source: values[v.name] for v in variables if v.source}
     configured: Config = with_fields(default, settings)
     return configured
 

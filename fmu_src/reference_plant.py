@@ -5,23 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pythonfmu.enums import Fmi2Status
 
 from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
 from scenarios.plant.parameters import Wheels
 from scenarios.plant.pipeline import PlantState, advance, initial_state
+from trpac_core.vision.classes import Surface
 
 from .guarded_slave import GuardedSlave
 from .interface_plant import MOST_TORQUE_NM, REFERENCE_PLANT, SIDES, WHEELS
 from .parameters import check_parameters
 from .variables import Variable
 
-ROAD_FILE = "paper_simulation.yaml"
+File = TypeVar("File", bound=BaseModel)
+
 LONGEST_STEP_S = 10.0
 """Longer steps are refused: the plant's own sub-steps would keep the host waiting for minutes [s]."""
 
@@ -84,7 +85,7 @@ class ReferencePlant(GuardedSlave):
     def _setting(self, values: Mapping[str, Any]) -> Setting:
         check_parameters(self.variables, values)
         vehicle = load_vehicle(values["vehicle_path"]) if values["vehicle_path"] else _vehicle(values)
-        road = load_road(values["road_path"] or Path(str(self.resources)) / ROAD_FILE)
+        road = load_road(values["road_path"]) if values["road_path"] else _road(values)
         to_front_m = vehicle.wheelbase_m - vehicle.cog_to_rear_axle_m
         return Setting(vehicle, road, to_front_m, values["preview.P_0"])
 
@@ -151,10 +152,32 @@ def _vehicle(values: Mapping[str, Any]) -> VehicleFile:
         section, _, field = variable.source.rpartition(".")
         if field:
             (content[section] if section else content)[field] = values[variable.name]
+    return _described(VehicleFile, "car", content)
+
+
+def _road(values: Mapping[str, Any]) -> RoadFile:
+    """The road that the parameters road.* describe; raises ValueError."""
+    segments = []
+    for number in range(1, values["road.segments"] + 1):
+        of_it = f"road.segment_{number}"
+        left, right = (Surface(values[f"{of_it}.class_{side}"]).label for side in SIDES)
+        segments.append(
+            {
+                "start_m": values[f"{of_it}.start"],
+                "mu_left": values[f"{of_it}.theta_left"],
+                "mu_right": values[f"{of_it}.theta_right"],
+                "surface": left,
+                "surface_right": None if right == left else right,
+            }
+        )
+    return _described(RoadFile, "road", {"schema": 1, "segments": segments})
+
+
+def _described(kind: type[File], what: str, content: dict[str, Any]) -> File:
     try:
-        return VehicleFile.model_validate(content)
+        return kind.model_validate(content)
     except ValidationError as error:
         problems = "; ".join(
             f"{'.'.join(map(str, one['loc']))} {one['msg']}".strip() for one in error.errors()
         )
-        raise ValueError(f"The parameters describe no car: {problems}") from error
+        raise ValueError(f"The parameters describe no {what}: {problems}") from error

@@ -14,6 +14,9 @@ from trpac_core.vision.classes import Surface
 from .fields import field_value
 from .variables import Kind, Variable
 
+BUFFERS_ENABLED = "image.buffers_enabled"
+"""Parameter of the unit itself, not of the estimator."""
+
 _DEFAULTS = EstimatorConfig()
 
 
@@ -353,4 +356,21 @@ _IMAGE_PARAMETERS = (
     _parameter("image.seed", "", "vision.seed", "Seed of the drawing of patches", 0),
 )
 
-PARAMETERS = _VEHICLE_PARAMETERS + _ESTIMATOR_PARAMETERS + _CAMERA_PARAMETERS + _IMAGE_PARAMETERS
+_UNIT_PARAMETERS = (
+    Variable(
+        BUFFERS_ENABLED,
+        Kind.BOOLEAN,
+        "parameter",
+        "fixed",
+        "Pictures in memory are read; false: the inputs image.* are never followed, so that no wrong address can crash",
+        start=True,
+    ),
+)
+
+PARAMETERS = (
+    *_VEHICLE_PARAMETERS,
+    *_ESTIMATOR_PARAMETERS,
+    *_CAMERA_PARAMETERS,
+    *_IMAGE_PARAMETERS,
+    *_UNIT_PARAMETERS,
+)

@@ -35,6 +35,10 @@ def _output(
     )
 
 
+WRONG_ADDRESS = (
+    "The unit cannot catch a wrong address: it crashes the host (image.buffers_enabled turns this off)"
+)
+
 INPUTS = (
     _input("wheel_speed", "rad/s", "Rotational speed of the wheel, positive forwards", nominal=100.0),
     _input("wheel_torque", "N.m", "Torque on the wheel, brakes included; positive drives", nominal=300.0),
@@ -61,7 +65,7 @@ INPUTS = (
             Kind.INTEGER,
             "input",
             "discrete",
-            f"{meaning} of the newest picture in memory, set for one step; 0 is none",
+            f"{meaning} of the newest picture in memory, set for one step; 0 is none. {WRONG_ADDRESS}",
             start=0,
             binary="image",
         )

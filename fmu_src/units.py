@@ -8,6 +8,7 @@ from pathlib import Path
 from .interface import TRPAC_ESTIMATOR
 from .interface_4w import TRPAC_ESTIMATOR_4W
 from .interface_plant import REFERENCE_PLANT
+from .interface_pulses import TORQUE_PULSES
 from .model_description import UnitInfo
 from .packaging import Slave
 
@@ -88,8 +89,16 @@ UNITS = {
             **{place: ROOT / place for place in PLANT_MODULES},
         },
         packages=PLANT_PACKAGES,
-        resources=(ROOT / "scenarios" / "roads" / "paper_simulation.yaml",),
+        resources=(),
         compiled="scenarios",
+    ),
+    "TorquePulses": Slave(
+        _info("TorquePulses", "Driving and braking torque by the clock, for systems without a driver"),
+        files=("fields.py", "parameters.py", "interface_pulses.py", "torque_pulses.py"),
+        variables=TORQUE_PULSES,
+        modules={},
+        packages={},
+        resources=(),
     ),
 }
 """Units by the name that `build_fmu.py --slave` takes."""

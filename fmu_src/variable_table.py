@@ -13,6 +13,7 @@ TARGETS = {
     "TrpacEstimator": DOCS / "fmu_variables.md",
     "TrpacEstimator4W": DOCS / "fmu_variables_4w.md",
     "ReferencePlant": DOCS / "fmu_variables_plant.md",
+    "TorquePulses": DOCS / "fmu_variables_pulses.md",
 }
 
 

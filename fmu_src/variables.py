@@ -30,6 +30,6 @@ class Variable:
     maximum: float | None = None
     nominal: float | None = None
     source: str = ""
-    """Of a parameter: the field of the estimator's configuration, as a dotted path."""
+    """Of a parameter: the field of the estimator's configuration, as a dotted path; empty: the unit's own."""
     binary: str = ""
     """Of a part of a binary variable: the binary variable's name; this one's is that and the part."""

@@ -24,9 +24,9 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """End with the tests' verdict: the interpreter's shutdown with the wrapper loaded sometimes corrupts the heap.
+    """End with the tests' verdict: pythonfmu's plain slaves, which some tests run, corrupt the heap at the end.
 
-    See "Limits" in docs/fmu.md.
+    See the findings in docs/fmu.md; processes with the units alone end in order.
     """
     if EXIT_STATUS in config.stash:
         sys.stdout.flush()

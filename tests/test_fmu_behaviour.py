@@ -449,6 +449,34 @@ def _hand_over(unit: Unit, other: Unit) -> None:
     unit.slave.freeFMUstate(state)
 
 
+def test_a_state_from_before_the_initialisation_unlocks_the_parameters(open_unit: Open) -> None:
+    expected = open_unit(vehicle__mass=1900.0)
+    unit = open_unit(initialise=False, vehicle__mass=1300.0)
+    state = unit.slave.getFMUstate()
+    unit.initialise()
+    flag_up(unit)
+    unit.slave.setFMUstate(state)
+    unit.set({"vehicle.mass": 1900.0})
+    unit.initialise()
+    assert unit.log == []
+    assert unit.get("vehicle.mass") == 1900.0
+    for one in (unit, expected):
+        flag_up(one)
+    assert unit.outputs() == expected.outputs()
+    unit.set({"vehicle.mass": 1.0})
+    assert [line.status for line in unit.log] == [ERROR], "and the initialisation locks them again"
+
+
+def test_a_state_from_after_the_initialisation_locks_the_parameters(open_unit: Open) -> None:
+    run = open_unit(vehicle__mass=1900.0)
+    fresh = open_unit(initialise=False)
+    saved = run.slave.serializeFMUstate(run.slave.getFMUstate())
+    fresh.slave.setFMUstate(fresh.slave.deSerializeFMUstate(saved))
+    fresh.set({"vehicle.mass": 1.0})
+    assert fresh.get("vehicle.mass") == 1900.0
+    assert [line.status for line in fresh.log] == [ERROR]
+
+
 @pytest.mark.parametrize(
     "spoil",
     [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import sysconfig
@@ -59,14 +60,9 @@ def plain_unit(folder: Path, body: str, **options: bool) -> Path:
 
 
 def in_new_process(code: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run code that may crash, with the tests' helpers importable.
-
-    It ends without the interpreter's shutdown, which with the wrapper loaded sometimes corrupts the heap (see "Limits"
-    in docs/fmu.md): what is tested is that the host lives through the calls.
-    """
-    header = f"import os, sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
-    footer = "\nsys.stdout.flush(); sys.stderr.flush(); os._exit(0)\n"
-    command = [sys.executable, "-c", header + textwrap.dedent(code) + footer, *map(str, arguments)]
+    """Run code that may crash, with the tests' helpers importable; the process ends as any other does."""
+    header = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+    command = [sys.executable, "-c", header + textwrap.dedent(code), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
 
 
@@ -453,3 +449,79 @@ def test_damaged_network_file_leaves_one_clear_message(unit_file: Path, tmp_path
     assert done.returncode == 0, done.stderr
     assert "surface.onnx" in done.stderr
     assert done.stdout.strip().endswith("Failed to instantiate model")
+
+
+# 10. The end of the process
+
+
+@pytest.fixture(scope="module")
+def reuse(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The library in tests/c_reuse.c, compiled."""
+    compiler = shutil.which("cc")
+    if compiler is None or not sys.platform.startswith("linux"):
+        pytest.skip("needs a C compiler on Linux")
+    library = tmp_path_factory.mktemp("reuse") / "reuse.so"
+    source = Path(__file__).parent / "c_reuse.c"
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
+    return library
+
+
+def end_of_a_process(reuse: Path, *folders: Path, free: bool = True) -> subprocess.CompletedProcess[str]:
+    """Instantiate, step and maybe free each of the units; what is freed while the process ends is used again."""
+    return in_new_process(
+        f"""
+        import ctypes
+        from pathlib import Path
+        from fmu_unit import Unit
+        ctypes.CDLL(sys.argv[1]).watch()
+        for folder in sys.argv[2:]:
+            try:
+                unit = Unit(Path(folder))
+            except Exception as error:
+                print(error)
+                continue
+            unit.initialise()
+            unit.step()
+            if {free}:
+                unit.free()
+        print("ran")
+        """,
+        reuse,
+        *folders,
+    )
+
+
+def test_10_finding_the_wrapper_counts_in_freed_memory_when_the_process_ends(
+    reuse: Path, unit_file: Path, tmp_path: Path
+) -> None:
+    folder = unpack_unit(unit_file, tmp_path / "unpacked")
+    (host,) = (folder / "resources").glob("fmu_src_*/host.py")
+    host.write_text(f"{host.read_text()}\ndef end_in_order(resources): pass\n")
+    done = end_of_a_process(reuse, folder)
+    assert (done.returncode, done.stdout.strip()) == (-signal.SIGSEGV, "ran"), done.stderr
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_10_cure_the_process_ends_in_order(
+    reuse: Path, unit_folder: Path, unit_folder_4w: Path, free: bool
+) -> None:
+    done = end_of_a_process(reuse, unit_folder, unit_folder_4w, unit_folder, free=free)
+    assert (done.returncode, done.stdout.strip()) == (0, "ran"), done.stderr
+
+
+def test_10_cure_holds_after_an_instantiation_that_failed(
+    reuse: Path, unit_file: Path, tmp_path: Path
+) -> None:
+    folder = unpack_unit(unit_file, tmp_path / "unpacked")
+    (folder / "resources" / "surface.onnx").write_bytes(b"not a network")
+    done = end_of_a_process(reuse, folder)
+    assert "Failed to instantiate model" in done.stdout
+    assert done.returncode == 0, done.stderr
+
+
+def test_10_cure_holds_in_a_host_without_python(c_host: Path, unit_folder: Path) -> None:
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    # Freed memory goes straight to the heap's lists, where a count in it that is lowered may be found out.
+    environment = {"LD_PRELOAD": shared_libpython(), "GLIBC_TUNABLES": "glibc.malloc.tcache_count=0"}
+    done = run_in_c(c_host, unit_folder, "", PATH=path, **environment)
+    assert done.returncode == 0, done.stderr

@@ -14,8 +14,8 @@ from fmpy.validation import validate_fmu
 from fmu_unit import STEP_S, Unit
 
 from fmu_src.interface_plant import REFERENCE_PLANT
-from fmu_src.packaging import build_unit, sha256
-from fmu_src.reference_plant import _vehicle
+from fmu_src.packaging import build_unit, sha256, unpack_unit
+from fmu_src.reference_plant import _road, _vehicle
 from fmu_src.units import UNITS
 from scenarios.files import load_road, load_vehicle
 from scenarios.plant.pipeline import PlantState, advance, initial_state, make_setup
@@ -52,6 +52,32 @@ def test_its_car_is_the_scenarios_car() -> None:
     assert make_setup(_vehicle(starts), road).parameters == make_setup(load_vehicle(VEHICLE), road).parameters
 
 
+def test_its_road_is_the_papers_road() -> None:
+    starts = {v.name: v.start for v in REFERENCE_PLANT}
+    assert _road(starts) == load_road(ROAD)
+
+
+@pytest.mark.e2e
+def test_parameters_say_the_road_to_tools_without_strings(open_plant: Open, tmp_path: Path) -> None:
+    parameters = {
+        "road.segments": 2,
+        "road.segment_1.theta_left": 0.3,
+        "road.segment_1.theta_right": 0.8,
+        "road.segment_1.class_left": 2,
+        "road.segment_2.start": 5.0,
+        "road.segment_2.class_left": 1,
+        "road.segment_2.class_right": 1,
+    }
+    by_name = {name.replace(".", "__"): value for name, value in parameters.items()}
+    unit = open_plant(initial__position=1.0, **by_name)
+    assert [unit.get(f"theta.{wheel}") for wheel in WHEELS] == [0.3, 0.8, 0.3, 0.8]
+    assert [unit.get(f"road_class.{side}") for side in ("left", "right")] == [2, 0]
+    ahead = open_plant(initial__position=2.6, **by_name)
+    assert [ahead.get(f"road_class.{side}") for side in ("left", "right")] == [1, 1]
+    backwards = open_plant(**{**by_name, "road__segment_2__start": -1.0})
+    assert "expected ascending starts" in backwards.log[0].text
+
+
 @pytest.mark.e2e
 def test_unit_and_plant_agree_bit_by_bit(open_plant: Open) -> None:
     unit = open_plant(initial__vehicle_speed=5.0)
@@ -70,6 +96,51 @@ def test_unit_and_plant_agree_bit_by_bit(open_plant: Open) -> None:
         assert unit.get(f"tyre_force.{wheel}") == state.wheels.force_n[i]
         assert unit.get(f"theta.{wheel}") == state.wheels.theta[i] == 0.3
     assert unit.log == []
+
+
+@pytest.fixture(scope="module")
+def pulses_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    archive = build_unit(UNITS["TorquePulses"], tmp_path_factory.mktemp("unit") / "TorquePulses.fmu")
+    assert validate_fmu(str(archive)) == []
+    return unpack_unit(archive, tmp_path_factory.mktemp("unpacked"))
+
+
+@pytest.mark.e2e
+def test_torque_pulses_are_trapezia_in_turn_and_their_state_is_exact(pulses_folder: Path) -> None:
+    unit = Unit(pulses_folder)
+    unit.set({"drive.torque": 100.0, "drive.duration": 0.2, "drive.rear_share": 0.5, "brake.torque": 300.0})
+    unit.set({"brake.duration": 0.3, "pulse.pause": 0.1, "pulse.ramp": 0.05})
+    unit.initialise()
+    expected = {
+        0.1: 0.0,
+        0.125: 50.0,
+        0.2: 100.0,
+        0.275: 50.0,
+        0.35: 0.0,
+        0.425: -150.0,
+        0.55: -300.0,
+        0.8: 0.0,
+    }
+    seen, state = {}, None
+    for index in range(1, 1501):
+        unit.step()
+        seen[round(index * STEP_S, 3)] = (unit.get("wheel_torque.fl"), unit.get("wheel_torque.rr"))
+        if index == 700:
+            state = unit.slave.getFMUstate()
+    for time_s, torque in expected.items():
+        rear = 0.5 * torque if torque > 0.0 else torque
+        assert seen[time_s] == pytest.approx((torque, rear), abs=1e-6)
+        assert seen[round(time_s + 0.7, 3)] == pytest.approx((torque, rear), abs=1e-6), "the period is 0.7 s"
+    unit.slave.setFMUstate(state)
+    again = []
+    for _ in range(701, 1501):
+        unit.step()
+        again.append((unit.get("wheel_torque.fl"), unit.get("wheel_torque.rr")))
+    assert again == [seen[round(index * STEP_S, 3)] for index in range(701, 1501)]
+    unit.step(step_s=math.nan)
+    assert (unit.get("wheel_torque.fl"), unit.get("wheel_torque.rr")) == again[-1]
+    assert [line.status for line in unit.log] == [WARNING]
+    unit.free()
 
 
 @pytest.mark.e2e

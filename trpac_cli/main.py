@@ -16,6 +16,7 @@ from rich.table import Table
 
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
+from trpac_cli import fmu as fmu_commands
 from trpac_cli import gap, vision
 from trpac_cli.console import EXIT_INPUT
 from trpac_cli.estimate import estimate
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 app.add_typer(vision.app, name="vision")
 app.add_typer(gap.app, name="gap")
+app.add_typer(fmu_commands.app, name="fmu")
 app.command()(estimate)
 app.command()(sweep)
 

@@ -66,7 +66,7 @@ def decode_image(
         raise ImageError(
             f"{name}: neither JPEG nor PNG (starts with {data[:8].hex(' ')}). Convert the picture."
         )
-    _check_size(width, height, name)
+    check_size(width, height, name)
     how = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), how)
@@ -81,7 +81,7 @@ def raw_bgr_image(
     data: bytes | bytearray | memoryview, width_px: int, height_px: int, name: str = "image buffer"
 ) -> NDArray[np.uint8]:
     """A buffer of 8-bit BGR as a picture of shape (height, width, 3), not copied; raises ImageError."""
-    _check_size(width_px, height_px, name)
+    check_size(width_px, height_px, name)
     expected = width_px * height_px * 3
     if len(data) != expected:
         raise ImageError(
@@ -99,7 +99,8 @@ def _read(path: Path) -> bytes:
         raise ImageError(f"{path}: cannot be read ({error}). Expected a JPEG or PNG picture.") from error
 
 
-def _check_size(width: int, height: int, name: str) -> None:
+def check_size(width: int, height: int, name: str) -> None:
+    """Raise ImageError if a picture of this size [px] is refused, whatever it shows."""
     if min(width, height) < LEAST_SIDE_PX or width * height > MOST_PIXELS:
         raise ImageError(
             f"{name}: {width} x {height} pixels; expected at least {LEAST_SIDE_PX} on each side and at most "

@@ -1,0 +1,110 @@
+"""What a unit's archive held when it was built, and what differs from it now."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+CONTENTS_FILE = "contents.json"
+"""The record, among the unit's resources; it lists every file of the archive but itself."""
+SCHEMA = 1
+SHOWN_DIGITS = 12
+
+
+class ContentError(ValueError):
+    """A file of the unit is not the one that was built; the text names it and what to do."""
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What was built.
+
+    Parameters
+    ----------
+    unit, version, build : str
+        Name of the unit, version of the project, hash of the whole content.
+    packages : mapping
+        Modules that the host's Python must have, and the packages that bring them.
+    files : mapping
+        SHA-256 by path in the archive.
+    """
+
+    unit: str
+    version: str
+    build: str
+    packages: Mapping[str, str]
+    files: Mapping[str, str]
+
+    def to_bytes(self) -> bytes:
+        """The record as a JSON text; the same contents give the same bytes."""
+        return json.dumps({"schema": SCHEMA, **asdict(self)}, indent=1, sort_keys=True).encode() + b"\n"
+
+
+def read_contents(data: bytes) -> Contents:
+    """The record that `to_bytes` wrote; raises ContentError."""
+    try:
+        content = json.loads(data)
+        schema = content.pop("schema")
+        contents = Contents(**content)
+        pairs = [*contents.packages.items(), *contents.files.items()]
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ContentError(f"{CONTENTS_FILE}: damaged ({error}). Build or copy the unit again.") from error
+    if schema != SCHEMA or not all(isinstance(text, str) for pair in pairs for text in pair):
+        raise ContentError(f"{CONTENTS_FILE}: not of schema {SCHEMA}. Build the unit again.")
+    return contents
+
+
+def sha256_of(data: bytes) -> str:
+    """SHA-256 as hexadecimal text."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def deviations(contents: Contents, names: Iterable[str], read: Callable[[str], bytes]) -> list[str]:
+    """One sentence for each of the named files that is missing or is not the one that was built.
+
+    Parameters
+    ----------
+    contents : Contents
+        The record.
+    names : iterable of str
+        Paths in the archive.
+    read : callable
+        Gives the bytes at such a path now; OSError or KeyError where there are none.
+    """
+    problems = []
+    for name in names:
+        try:
+            found = sha256_of(read(name))
+        except (OSError, KeyError):
+            problems.append(f"{name} is missing")
+            continue
+        built = contents.files.get(name)
+        if built is None:
+            problems.append(f"{name} is not of this build")
+        elif found != built:
+            problems.append(
+                f"{name} is damaged or has been exchanged: SHA-256 {found[:SHOWN_DIGITS]}..., "
+                f"built was {built[:SHOWN_DIGITS]}..."
+            )
+    return problems
+
+
+def require_as_built(resources: Path, names: Iterable[str]) -> None:
+    """Raise one ContentError that names all of these resources that are not what was built into the unit."""
+    try:
+        contents = read_contents((resources / CONTENTS_FILE).read_bytes())
+    except OSError as error:
+        raise ContentError(
+            f"{resources / CONTENTS_FILE}: cannot be read ({error}). Copy the unit again."
+        ) from error
+    problems = deviations(
+        contents, [f"resources/{name}" for name in names], lambda name: (resources.parent / name).read_bytes()
+    )
+    if problems:
+        raise ContentError(
+            f"{'; '.join(problems)} (in {resources.parent}). Copy the unit again, or build one with the files that are "
+            "meant."
+        )

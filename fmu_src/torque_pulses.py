@@ -1,0 +1,60 @@
+"""The unit `TorquePulses`: a driver that pushes and brakes by the clock."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+from pythonfmu.enums import Fmi2Status
+
+from .guarded_slave import GuardedSlave
+from .interface_pulses import TORQUE_PULSES, WHEELS
+from .parameters import check_parameters
+from .variables import Variable
+
+
+class TorquePulses(GuardedSlave):
+    """Pause, driving pulse, pause, braking pulse, and again; each pulse is a trapezium."""
+
+    variables: ClassVar[tuple[Variable, ...]] = TORQUE_PULSES
+
+    def initialise(self) -> None:
+        """Apply the parameters; ValueError where they cannot be applied."""
+        check_parameters(self.variables, self.values)
+        self._time_s = 0.0
+        self._publish()
+
+    def step(self, step_s: float) -> None:
+        """Let time pass; a step below 0 or not finite moves nothing."""
+        if math.isfinite(step_s) and step_s >= 0.0:
+            self._time_s += step_s
+            self._publish()
+        else:
+            text = f"step size is {step_s} s, expected 0 or more. No time has passed."
+            self.report("step", Fmi2Status.warning, f"{self.modelName}: {text}")
+
+    def _publish(self) -> None:
+        values = self.values
+        pause_s, drive_s, brake_s = (
+            values[name] for name in ("pulse.pause", "drive.duration", "brake.duration")
+        )
+        period_s = 2.0 * pause_s + drive_s + brake_s
+        since_s = self._time_s % period_s if period_s > 0.0 else 0.0
+        driving = values["drive.torque"] * self._height(since_s - pause_s, drive_s)
+        braking = values["brake.torque"] * self._height(since_s - 2.0 * pause_s - drive_s, brake_s)
+        for wheel in WHEELS:
+            share = values["drive.front_share" if wheel.startswith("f") else "drive.rear_share"]
+            values[f"wheel_torque.{wheel}"] = share * driving - braking
+
+    def _height(self, since_s: float, duration_s: float) -> float:
+        """Height of a pulse of 1 so long after its start [-]."""
+        ramp_s = self.values["pulse.ramp"]
+        return max(0.0, min(1.0, since_s / ramp_s, (duration_s - since_s) / ramp_s))
+
+    def inner_state(self) -> float:
+        """The time since the start [s]."""
+        return self._time_s
+
+    def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
+        """Take back what `inner_state` gave; the outputs are among the values."""
+        self._time_s = float(state)

@@ -1,0 +1,154 @@
+"""A unit tried out in a process of its own: `python trial.py FOLDER [STEPS]`; needs the standard library alone.
+
+It loads the wrapper as a host does, instantiates, steps with rolling wheels and prints one line of JSON. Whatever kills
+it kills no one else.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import math
+import sys
+import time
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+ROLLING = {"wheel_speed": 34.5, "vehicle_speed": 10.0, "wheel_torque": 20.0}
+"""Signals of a rolling car, for the inputs of these names and of each wheel."""
+STEPS, STEP_S = 20, 0.001
+PLATFORMS = {"linux": ("linux64", ".so"), "win32": ("win64", ".dll")}
+CO_SIMULATION = 1
+OK = 0
+
+_POINTER, _TEXT = ctypes.c_void_p, ctypes.c_char_p
+_LOGGER = ctypes.CFUNCTYPE(None, _POINTER, _TEXT, ctypes.c_int, _TEXT, _TEXT)
+_ALLOCATE = ctypes.CFUNCTYPE(_POINTER, ctypes.c_size_t, ctypes.c_size_t)
+_FREE = ctypes.CFUNCTYPE(None, _POINTER)
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = (
+        ("logger", _LOGGER),
+        ("allocate", _ALLOCATE),
+        ("free", _FREE),
+        ("step_finished", _POINTER),
+        ("environment", _POINTER),
+    )
+
+
+def library(folder: Path, name: str) -> Path:
+    """The wrapper of a unit for this platform; raises FileNotFoundError."""
+    place, suffix = PLATFORMS.get(sys.platform, (sys.platform, ".so"))
+    path = folder / "binaries" / place / f"{name}{suffix}"
+    if not path.is_file():
+        raise FileNotFoundError(f"the unit holds no library for this platform ({place})")
+    return path
+
+
+class Instance:
+    """One instance of the unit, driven as the FMI 2.0 standard has it; `log` holds what it said."""
+
+    def __init__(self, folder: Path) -> None:
+        root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+        simulation = root.find("CoSimulation")
+        if simulation is None:
+            raise ValueError("modelDescription.xml: no CoSimulation element")
+        self.scalars = [(s.attrib, s[0].tag) for s in root.iter("ScalarVariable")]
+        self.log: list[str] = []
+        self._dll = ctypes.CDLL(str(library(folder, simulation.attrib["modelIdentifier"])))
+        self._callbacks = _Callbacks(_LOGGER(self._told), _ALLOCATE(0), _FREE(0), None, None)
+        instantiate = self._dll.fmi2Instantiate
+        instantiate.restype = _POINTER
+        resources = (folder.resolve() / "resources").as_uri().encode()
+        self._component = _POINTER(
+            instantiate(
+                b"trial",
+                CO_SIMULATION,
+                root.attrib["guid"].encode(),
+                resources,
+                ctypes.byref(self._callbacks),
+                0,
+                1,
+            )
+        )
+        if not self._component:
+            raise RuntimeError("fmi2Instantiate gave no instance")
+
+    def _told(self, _: int, __: bytes, ___: int, ____: bytes, message: bytes) -> None:
+        self.log.append(message.decode("utf-8", "replace").replace("%%", "%"))
+
+    def call(self, name: str, *arguments: Any) -> None:
+        """An FMI function on this instance; raises RuntimeError where its status is not fmi2OK."""
+        status = getattr(self._dll, name)(self._component, *arguments)
+        if status != OK:
+            raise RuntimeError(f"{name} returned status {status}")
+
+    def set_real(self, reference: int, value: float) -> None:
+        """Set one Real variable."""
+        self.call(
+            "fmi2SetReal",
+            ctypes.byref(ctypes.c_uint(reference)),
+            ctypes.c_size_t(1),
+            ctypes.byref(ctypes.c_double(value)),
+        )
+
+    def get_real(self, reference: int) -> float:
+        """Read one Real variable."""
+        value = ctypes.c_double()
+        self.call(
+            "fmi2GetReal",
+            ctypes.byref(ctypes.c_uint(reference)),
+            ctypes.c_size_t(1),
+            ctypes.byref(value),
+        )
+        return value.value
+
+    def initialise(self) -> None:
+        """From instantiation to the first step."""
+        no, zero = ctypes.c_int(0), ctypes.c_double(0.0)
+        self.call("fmi2SetupExperiment", no, zero, zero, no, zero)
+        self.call("fmi2EnterInitializationMode")
+        self.call("fmi2ExitInitializationMode")
+
+    def step(self, index: int) -> None:
+        """One communication step."""
+        self.call("fmi2DoStep", ctypes.c_double(index * STEP_S), ctypes.c_double(STEP_S), ctypes.c_int(1))
+
+    def free(self) -> None:
+        """End the instance."""
+        self.call("fmi2Terminate")
+        self._dll.fmi2FreeInstance(self._component)
+
+
+def run(folder: Path, steps: int) -> dict[str, Any]:
+    """Instantiate, step and free; what happened, JSON-able."""
+    instance = None
+    try:
+        instance = Instance(folder)
+        instance.initialise()
+        reals = [
+            (a["name"], a["causality"], int(a["valueReference"])) for a, t in instance.scalars if t == "Real"
+        ]
+        for name, causality, reference in reals:
+            if causality == "input" and name.split(".")[0] in ROLLING:
+                instance.set_real(reference, ROLLING[name.split(".")[0]])
+        started = time.perf_counter()
+        for index in range(steps):
+            instance.step(index)
+        elapsed = time.perf_counter() - started
+        outputs = {
+            name: instance.get_real(reference)
+            for name, causality, reference in reals
+            if causality == "output"
+        }
+        instance.free()
+    except (OSError, ValueError, RuntimeError, KeyError, AttributeError, ElementTree.ParseError) as error:
+        return {"ran": False, "error": str(error), "log": instance.log if instance else []}
+    strange = sorted(name for name, value in outputs.items() if not math.isfinite(value))
+    return {"ran": True, "step_us": elapsed / steps * 1e6, "not_finite": strange, "log": instance.log}
+
+
+if __name__ == "__main__":
+    print(json.dumps(run(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else STEPS)))
