@@ -1,0 +1,460 @@
+"""The cycle: read the bus, step the unit, send; each at its time, whatever happens."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import can
+
+from trpac_core.vision.classes import Surface
+from trpac_core.vision.preview import Outcome
+from trpac_hil.camera import FAILED, HEAD
+from trpac_hil.codec import Codec
+from trpac_hil.deadlines import SPIN_NS, Clock, Deadlines, WallWatch, wait_until
+from trpac_hil.events import Events
+from trpac_hil.inputs import Inputs
+from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
+from trpac_hil.records import AGED, LOGGED
+from trpac_hil.shared import Numbers, Ring
+from trpac_hil.unit import NO_CLASS, Estimates, Wiring
+
+HEALTH_EVERY_NS = 100_000_000
+CHECK_EVERY_NS = 100_000_000
+"""How often bus state, wall clock and helpers are looked at [ns]."""
+LONG_NS = 5_000_000
+"""Overruns beyond this are counted on their own [ns]."""
+REQUIRED_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion")
+STARTING, RUNNING, HELD_INPUT, HELD_BUS, HELD_UNIT, ENDED = 0, 1, 2, 3, 4, 7
+"""Values of the signal Status."""
+SURFACES = {float(surface.value): surface for surface in Surface}
+NAN = math.nan
+
+
+class Bus(Protocol):
+    """What the loop needs of the bus; see `trpac_hil.bus.Link`."""
+
+    losses: int
+
+    @property
+    def up(self) -> bool: ...  # noqa: D102
+
+    def receive(self) -> list[can.Message]: ...  # noqa: D102
+
+    def send(self, frame_id: int, extended: bool, data: bytes) -> bool: ...  # noqa: D102
+
+    def check(self) -> None: ...  # noqa: D102
+
+
+class SteppedUnit(Protocol):
+    """What the loop needs of the unit; see `trpac_hil.unit.Unit`."""
+
+    wiring: Wiring
+
+    @property
+    def last(self) -> Estimates: ...  # noqa: D102
+
+    def references(self, variables: Sequence[str]) -> list[int]: ...  # noqa: D102
+
+    def give_class(self, classes: Sequence[tuple[int, float]], number: int) -> None: ...  # noqa: D102
+
+    def step(  # noqa: D102
+        self, time_s: float, step_s: float, references: Sequence[int], values: Sequence[float]
+    ) -> Estimates | None: ...
+
+
+@dataclass
+class Counts:
+    """What the loop counts itself.
+
+    `overruns` are cycles that ended after their deadline and cycles left out; `long_overruns` those of them by more
+    than 5 ms; `worst_ns` is the greatest time by which a deadline was missed.
+    """
+
+    cycles: int = 0
+    late_ends: int = 0
+    left_out: int = 0
+    long_overruns: int = 0
+    worst_ns: int = 0
+    discarded: int = 0
+    held: int = 0
+    clock_jumps: int = 0
+    lost: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def overruns(self) -> int:
+        """Deadlines that were not met."""
+        return self.late_ends + self.left_out
+
+
+@dataclass
+class Camera:
+    """The loop's end of the camera: pictures' results by shared memory, or by bus where `results` is None."""
+
+    placing: Placing
+    stale_ns: int
+    results: Ring | None = None
+    motion: Numbers | None = None
+    left_out: int = 0
+    """Pictures that the camera's process was too slow for."""
+    work_ms: list[float] = field(default_factory=list)
+    """How long it worked on each picture."""
+
+
+class Loop:
+    """One run.
+
+    Parameters
+    ----------
+    clock, deadlines : Clock, Deadlines
+        Time, and when each cycle is due.
+    bus, unit, codec, inputs : Bus, SteppedUnit, Codec, Inputs
+        What is read, stepped and sent.
+    camera : Camera
+        Results of pictures.
+    ring : Ring
+        Where each cycle's row goes.
+    events : Events
+        Told what happens.
+    check : callable
+        Looks after the helpers, ten times a second.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        deadlines: Deadlines,
+        bus: Bus,
+        unit: SteppedUnit,
+        codec: Codec,
+        inputs: Inputs,
+        camera: Camera,
+        ring: Ring,
+        events: Events,
+        check: Callable[[], None] = lambda: None,
+        spin_ns: int = SPIN_NS,
+    ) -> None:
+        self.counts, self.odometer = Counts(), Odometer()
+        self._clock, self._deadlines, self._spin_ns = clock, deadlines, spin_ns
+        self._bus, self._unit, self._codec, self._inputs = bus, unit, codec, inputs
+        self._camera, self._ring, self._events, self._check = camera, ring, events, check
+        self._wall = WallWatch(clock)
+        self._polled_ns = clock.now_ns()
+        self._unit_time_s, self._unit_slot = 0.0, -1
+        self._sent = dict.fromkeys(("Estimate", "EstimateWheels", "Health"), 0)
+        self._required = dict(unit.wiring.required)
+        self._wired = dict(self._required)
+        self._references = unit.references(tuple(self._wired))
+        self._fresh: dict[str, bool] = {}
+        self._told: tuple[Outcome | None, ...] = (None,) * len(unit.wiring.sides)
+        self._classes = [(NO_CLASS, 0.0)] * len(unit.wiring.sides)
+        self._number = 0
+        self._result_number = NAN
+        self._next_check_ns = self._next_health_ns = 0
+
+    def run(self, stop: Callable[[], bool], slots: int | None = None) -> Counts:
+        """Cycle until told to stop, or for a number of slots."""
+        deadlines, clock, done = self._deadlines, self._clock, -1
+        while not stop() and (slots is None or done + 1 < slots):
+            now_ns = wait_until(clock, deadlines.due_ns(done + 1), self._spin_ns)
+            slot = deadlines.next_slot(done, now_ns)
+            self._leave_out(done + 1, slot - done - 1, now_ns)
+            self._cycle(slot, slot - done - 1, now_ns)
+            done = slot
+        self._send_estimate(self._unit.last.held(), ENDED)
+        return self.counts
+
+    def _leave_out(self, first: int, number: int, now_ns: int) -> None:
+        """Count cycles that were left out: each missed its deadline."""
+        if number <= 0:
+            return
+        counts, period_ns = self.counts, self._deadlines.period_ns
+        counts.left_out += number
+        missed_ns = self._deadlines.missed_by_ns(first, now_ns)
+        counts.worst_ns = max(counts.worst_ns, missed_ns)
+        # Of the slots in a row that were left out each missed its own deadline by a period less than the one before.
+        counts.long_overruns += max(0, min(number, -(-(missed_ns - LONG_NS) // period_ns)))
+
+    def _cycle(self, slot: int, left_out: int, began_ns: int) -> None:
+        passed_s = (left_out + 1) * self._deadlines.period_ns * 1e-9
+        fresh = self._receive(began_ns)
+        values = self._snapshot(began_ns)
+        self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
+        self._share_motion(values)
+        self._place(fresh, values, began_ns)
+        readings = self._readings(values)
+        unit_began_ns = self._clock.now_ns()
+        step_s = (slot - self._unit_slot) * self._deadlines.period_ns * 1e-9
+        estimates = self._unit.step(self._unit_time_s, step_s, self._references, readings)
+        unit_ended_ns = self._clock.now_ns()
+        status = self._judge(estimates, readings)
+        if estimates is None:
+            estimates, step_s = self._unit.last, 0.0
+        else:
+            self._unit_slot, self._unit_time_s = slot, self._unit_time_s + step_s
+        if status != RUNNING:
+            estimates = estimates.held()
+        self._send_estimate(estimates, status)
+        self._look_after(began_ns)
+        ended_ns = self._clock.now_ns()
+        missed_ns = max(0, self._deadlines.missed_by_ns(slot, ended_ns))
+        self._count(missed_ns, status)
+        timing = (
+            began_ns - self._deadlines.due_ns(slot),
+            ended_ns - began_ns,
+            unit_ended_ns - unit_began_ns,
+            missed_ns,
+        )
+        self._record(slot, step_s, values, estimates, status, timing, left_out, began_ns)
+
+    def _receive(self, now_ns: int) -> set[str]:
+        """Take in what came; it came after the last look at the earliest."""
+        earliest_ns, self._polled_ns = self._polled_ns, now_ns
+        take = self._inputs.take
+        return {
+            name
+            for m in self._bus.receive()
+            if (name := take(m.arbitration_id, m.is_extended_id, bytes(m.data), earliest_ns))
+        }
+
+    def _snapshot(self, now_ns: int) -> dict[str, float]:
+        """All signals as they count now, NaN where lost; a message that stopped coming is said."""
+        value = self._inputs.value
+        values = {signal: value(signal, now_ns) for signal in LOGGED.values()}
+        for name in REQUIRED_MESSAGES:
+            age_ns = self._inputs.age_ns(name, now_ns)
+            limit_ns = next(iter(self._inputs.heard[name].coded.stale_ns.values()), age_ns)
+            here = 0 <= age_ns <= limit_ns
+            if self._fresh.get(name, False) and not here:
+                self.counts.lost[name] = self.counts.lost.get(name, 0) + 1
+                self._events.say(
+                    f"lost {name}",
+                    f"{name}: none for more than {limit_ns * 1e-6:g} ms. TRPAC is held with flag 0 until it is back.",
+                )
+            elif here and not self._fresh.get(name, True):
+                self._events.say(f"back {name}", f"{name} is back.")
+            if here or name in self._fresh:
+                self._fresh[name] = here
+        return values
+
+    def _share_motion(self, values: dict[str, float]) -> None:
+        motion = self._camera.motion
+        if motion is None:
+            return
+        accel, steering = values["AccelX"], values["SteeringAngle"]
+        motion.set(
+            (
+                self.odometer.speed_m_s,
+                accel if accel == accel else 0.0,
+                steering if steering == steering and abs(steering) < 1.5 else 0.0,
+                values["YawRate"],
+            )
+        )
+
+    def _place(self, fresh: set[str], values: dict[str, float], now_ns: int) -> None:
+        """Take results in, and tell the unit what is known of the road that the front wheel has reached."""
+        camera = self._camera
+        placing = camera.placing
+        for result in self._results(fresh, now_ns):
+            placing.take(result, self.odometer, camera.stale_ns)
+        newest = placing.newest
+        if newest is not None and now_ns - newest.arrived_ns > camera.stale_ns:
+            placing.newest = None
+            placing.forget()
+            self.counts.lost["camera"] = self.counts.lost.get("camera", 0) + 1
+            self._events.say(
+                "lost camera",
+                f"No result of a picture for {camera.stale_ns * 1e-6:g} ms: on without the camera.",
+            )
+        position_m = self.odometer.position_m
+        known = tuple(placing.known(side, position_m) for side in range(len(self._told)))
+        if known == self._told:
+            return
+        self._classes = [
+            (before[0], 0.0) if outcome is None else (int(outcome.surface), outcome.Q_v)
+            for outcome, before in zip(known, self._classes, strict=True)
+        ]
+        self._told, self._number = known, self._number + 1
+        self._unit.give_class(self._classes, self._number)
+
+    def _results(self, fresh: set[str], now_ns: int) -> list[CameraResult]:
+        ring = self._camera.results
+        if ring is None:
+            return [self._result_by_bus(now_ns)] if "RoadClass" in fresh and self._new_by_bus() else []
+        if not ring.waiting:
+            return []
+        rows = ring.read()
+        self._camera.left_out = int(rows[-1, 3]) if len(rows) else self._camera.left_out
+        self._camera.work_ms.extend(rows[:, 4].tolist())
+        return [
+            CameraResult(
+                int(row[0]),
+                int(row[1]),
+                now_ns,
+                tuple(
+                    None if row[at] == FAILED else Verdict(SURFACES[row[at]], float(row[at + 1]))
+                    for at in range(HEAD, len(row), 2)
+                ),
+            )
+            for row in rows
+        ]
+
+    def _new_by_bus(self) -> bool:
+        number = self._inputs.heard["RoadClass"].values["RoadClass_Number"]
+        new, self._result_number = number != self._result_number, number
+        return new
+
+    def _result_by_bus(self, now_ns: int) -> CameraResult:
+        """The result that another device sent; taken `RoadClass_Age` before it was sent."""
+        values = self._inputs.heard["RoadClass"].values
+        age_ms = values["RoadClass_Age"]
+        if age_ms != age_ms:
+            age_ms = 0.0
+            self._events.say(
+                "class without age",
+                "RoadClass_Age is not available: results count as if their pictures were taken when they came.",
+            )
+        verdicts = []
+        for side in self._unit.wiring.side_names:
+            surface = SURFACES.get(values[f"RoadClass_{side.capitalize()}"])
+            Q_v = values[f"RoadClassConfidence_{side.capitalize()}"]
+            verdicts.append(Verdict(surface, Q_v) if surface is not None and 0.0 <= Q_v <= 1.0 else None)
+        captured_ns = now_ns - round(age_ms * 1e6)
+        return CameraResult(int(values["RoadClass_Number"]), captured_ns, now_ns, tuple(verdicts))
+
+    def _readings(self, values: dict[str, float]) -> list[float]:
+        """Inputs of the unit; an optional signal counts from the first time it comes, and is missed from then on."""
+        for variable, signal in self._unit.wiring.optional.items():
+            if variable not in self._wired and values[signal] == values[signal]:
+                self._wired[variable] = signal
+                self._references = self._unit.references(tuple(self._wired))
+        return [values[signal] for signal in self._wired.values()]
+
+    def _judge(self, estimates: Estimates | None, readings: Sequence[float]) -> int:
+        """What the signal Status says of this cycle."""
+        if not self._bus.up:
+            return HELD_BUS
+        if estimates is None:
+            self.counts.discarded += 1
+            self._events.say(
+                "discarded",
+                "The unit discarded a step: the last estimate is held with flag 0, and the loop goes on.",
+            )
+            return HELD_UNIT
+        if self._missing(readings):
+            started = len(self._fresh) == len(REQUIRED_MESSAGES)
+            return HELD_INPUT if started else STARTING
+        return RUNNING
+
+    def _missing(self, readings: Sequence[float]) -> bool:
+        """Whether signals are lost without which no wheel can be estimated; one wheel's own hold that wheel alone."""
+        lost = [name for name, reading in zip(self._wired, readings, strict=True) if reading != reading]
+        if not lost:
+            return False
+        own = {name.rpartition(".")[2] for name in lost if "." in name}
+        return any("." not in name for name in lost) or len(own) == len(self._unit.wiring.wheels)
+
+    def _send_estimate(self, estimates: Estimates, status: int) -> None:
+        self._send(
+            "Estimate",
+            {
+                "TRPAC": estimates.TRPAC,
+                "TRPAC_std": estimates.TRPAC_std,
+                "K_v": estimates.K_v,
+                "Flag": float(estimates.flag),
+                "Excitation": float(estimates.excitation),
+                "Status": float(status),
+                "TRPAC_dynamics": estimates.TRPAC_dynamics,
+            },
+        )
+        if estimates.wheels:
+            names = [w.upper() for w in self._unit.wiring.wheels]
+            thetas = {f"TRPAC_{w}": t for w, t in zip(names, estimates.wheels, strict=True)}
+            flags = {f"Flag_{w}": float(f) for w, f in zip(names, estimates.wheel_flags, strict=True)}
+            self._send("EstimateWheels", thetas | flags)
+
+    def _send(self, name: str, values: dict[str, float]) -> None:
+        coded = self._codec[name]
+        data = coded.encode(values, self._sent[name])
+        self._sent[name] += 1
+        self._bus.send(coded.message.frame_id, coded.message.is_extended_frame, data)
+
+    def _look_after(self, now_ns: int) -> None:
+        """What needs no look in every cycle."""
+        if now_ns >= self._next_check_ns:
+            self._next_check_ns = now_ns + CHECK_EVERY_NS
+            self._bus.check()
+            self._check()
+            jump_ns = self._wall.jump_ns()
+            if jump_ns:
+                self.counts.clock_jumps += 1
+                self._events.say(
+                    "clock jump",
+                    f"The wall clock was set by {jump_ns * 1e-9:+.3f} s. The loop runs by another clock and goes on.",
+                )
+        if now_ns >= self._next_health_ns:
+            self._next_health_ns = now_ns + HEALTH_EVERY_NS
+            newest = self._camera.placing.newest
+            ages_ns = [self._inputs.age_ns(name, now_ns) for name in REQUIRED_MESSAGES]
+            self._send(
+                "Health",
+                {
+                    "Overruns": float(self.counts.overruns),
+                    "WorstOverrun": self.counts.worst_ns * 1e-6,
+                    "InputAge": max(ages_ns) * 1e-6 if min(ages_ns) >= 0 else math.inf,
+                    "PictureAge": (now_ns - newest.captured_ns) * 1e-6 if newest else math.inf,
+                    "BusLosses": float(self._bus.losses),
+                },
+            )
+
+    def _count(self, missed_ns: int, status: int) -> None:
+        counts = self.counts
+        counts.cycles += 1
+        counts.held += status in (HELD_INPUT, HELD_BUS, HELD_UNIT)
+        if missed_ns:
+            counts.late_ends += 1
+            counts.long_overruns += missed_ns > LONG_NS
+            counts.worst_ns = max(counts.worst_ns, missed_ns)
+
+    def _record(
+        self,
+        slot: int,
+        step_s: float,
+        values: dict[str, float],
+        estimates: Estimates,
+        status: int,
+        timing_ns: tuple[int, int, int, int],
+        left_out: int,
+        now_ns: int,
+    ) -> None:
+        """The cycle's row, in the order of `trpac_hil.records.columns`."""
+        age_ns, newest = self._inputs.age_ns, self._camera.placing.newest
+        under = [now_ns * 1e-6 - outcome.captured_s * 1e3 for outcome in self._told if outcome is not None]
+        self._ring.write(
+            [
+                slot * self._deadlines.period_ns * 1e-9,
+                step_s,
+                self.odometer.position_m,
+                *(values[signal] for signal in LOGGED.values()),
+                self._number,
+                *(surface for surface, _ in self._classes),
+                *(Q_v for _, Q_v in self._classes),
+                estimates.TRPAC,
+                estimates.TRPAC_std,
+                estimates.K_v,
+                estimates.flag,
+                estimates.excitation,
+                estimates.TRPAC_dynamics,
+                *estimates.wheels,
+                *estimates.wheel_flags,
+                status,
+                *(part * 1e-3 for part in timing_ns),
+                left_out,
+                self.counts.overruns,
+                *(age * 1e-6 if (age := age_ns(name, now_ns)) >= 0 else NAN for name in AGED),
+                NAN if newest is None else (now_ns - newest.captured_ns) * 1e-6,
+                max(under) if under else NAN,
+            ]
+        )
