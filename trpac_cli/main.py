@@ -19,6 +19,7 @@ from scenarios.files import Scenario
 from trpac_cli import gap, vision
 from trpac_cli.console import EXIT_INPUT
 from trpac_cli.estimate import estimate
+from trpac_cli.hil import hil, hil_plant
 from trpac_cli.sweep import sweep
 
 app = typer.Typer(
@@ -31,6 +32,8 @@ app.add_typer(vision.app, name="vision")
 app.add_typer(gap.app, name="gap")
 app.command()(estimate)
 app.command()(sweep)
+app.command()(hil)
+app.command("hil-plant")(hil_plant)
 
 
 @app.callback()

@@ -68,7 +68,7 @@ class Partner:
 
     def __init__(self, job: PartnerJob, link: Any, clock: Clock) -> None:
         scenario = load_scenario(job.scenario)
-        self.drive = EndlessDrive(scenario)
+        self.drive = EndlessDrive(scenario, 1.0 / job.rate_hz)
         self.left_out = 0
         self._job, self._link, self._clock = job, link, clock
         self._codec: Codec = load_codec(job.dbc)
@@ -76,8 +76,6 @@ class Partner:
         self._sent: dict[str, int] = {}
         self._pictures: deque[_Picture] = deque()
         self._next_slow_ns = 0
-        # The first step compiles, or loads what was compiled.
-        self.drive.advance(1.0 / job.rate_hz)
 
     def run(self, start_ns: int, stop: Callable[[], bool], slots: int | None = None) -> None:
         """Drive in real time until told to stop, or for a number of slots."""
@@ -88,7 +86,7 @@ class Partner:
             now_ns = wait_until(self._clock, deadlines.due_ns(done + 1), 0)
             slot = deadlines.next_slot(done, now_ns)
             self.left_out += slot - done - 1
-            self.drive.advance((slot - done) / self._job.rate_hz)
+            self.drive.advance(slot - done)
             done = slot
             self._link.receive()
             self._send_fast()
@@ -107,9 +105,9 @@ class Partner:
 
     def _send_fast(self) -> None:
         noise: SensorNoise = self._noise
-        random = self._random.standard_normal(10)
-        state = self.drive.state
-        speeds, torques = state.wheel_speed_rad_s, self.drive.torque_nm
+        random = self._random.standard_normal(10).tolist()
+        now = self.drive.now
+        speeds, torques = now.wheel_speed_rad_s, now.wheel_torque_nm
         self._send(
             "WheelSpeeds",
             {
@@ -127,13 +125,13 @@ class Partner:
         self._send(
             "VehicleMotion",
             {
-                "VehicleSpeed": state.speed_m_s + noise.vehicle_speed_noise_m_s * random[8],
-                "AccelX": state.accel_x_m_s2 + noise.accel_x_noise_m_s2 * random[9],
+                "VehicleSpeed": now.speed_m_s + noise.vehicle_speed_noise_m_s * random[8],
+                "AccelX": now.accel_x_m_s2 + noise.accel_x_noise_m_s2 * random[9],
             },
         )
 
     def _send_slow(self) -> None:
-        theta = self.drive.state.wheels.theta
+        theta = self.drive.now.theta
         self._send("PlantTruth", {f"Theta_{w.upper()}": theta[i] for i, w in enumerate(WHEELS)})
 
     def _send_pictures(self, now_ns: int) -> None:

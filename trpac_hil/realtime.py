@@ -46,9 +46,9 @@ def raise_priority() -> str:
     """Ask for real-time priority; returns what came of it."""
     if not hasattr(os, "sched_setscheduler"):
         return "real-time priority: this system has none that can be asked for here"
-    policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
     try:
-        os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
+        # Threads that start later inherit it, as they must: one that is held up with the interpreter holds the loop up.
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except PermissionError:
         return (
             "real-time priority: refused; allow it with a line '@GROUP - rtprio 50' in /etc/security/limits.conf "

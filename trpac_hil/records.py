@@ -48,12 +48,12 @@ def columns(wiring: Wiring) -> tuple[Column, ...]:
     wheels = WHEELS if len(wiring.wheels) > 1 else ()
     return (
         Column(TIME, "s", "start of the cycle's slot"),
-        Column("step_s", "s", "step of the unit", "f4"),
+        Column("step_s", "s", "step of the unit; 0 where it discarded the step"),
         Column("position_m", "m", "way driven, integrated from the vehicle speed"),
         *(Column(name, _unit(name), f"signal {signal}; NaN: lost") for name, signal in LOGGED.items()),
         Column("frame_id", "", "number of what the unit was told of the road", "i4"),
         *(Column(f"image_class{s}", "", f"0 dry, 1 wet, 2 snow_ice, -1 none{t}", "i1") for s, t in sides),
-        *(Column(f"image_confidence{s}", "1", f"Q_v{t}", "f4") for s, t in sides),
+        *(Column(f"image_confidence{s}", "1", f"Q_v{t}") for s, t in sides),
         Column("TRPAC", "1", "fused estimate, as sent"),
         Column("TRPAC_std", "1", "its standard deviation"),
         Column("K_v", "1", "visual gain"),

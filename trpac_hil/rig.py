@@ -225,7 +225,8 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
         camera.results = Ring(result_columns(len(unit.wiring.sides)), RESULTS_KEPT)
         camera.motion = Numbers(4)
         rig.add("camera", watch, _camera_job(settings, unit), camera.motion, camera.results, ...)
-    thread = _plant(settings, rig, events, stopper, stack)
+    over = threading.Event()
+    thread = _plant(settings, rig, events, over, stack)
     rig.wait_until_ready()
     system = _system(settings)
     link = Link(settings.bus.open, events.say)
@@ -253,6 +254,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
         if thread is not None:
             thread(start_ns)
         counts = loop.run(stopper, slots)
+        over.set()
         ended = "asked to stop" if stopper.asked else "time was up"
         said = rig.end(recorder)
     summary = summarise(settings, unit, counts, events, inputs, link, camera, said, system, ended)
@@ -323,7 +325,7 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
 
 
 def _plant(
-    settings: HilSettings, rig: Rig, events: Events, stopper: Stopper, stack: ExitStack
+    settings: HilSettings, rig: Rig, events: Events, over: threading.Event, stack: ExitStack
 ) -> Callable[[int], None] | None:
     """The plant: a thread where the bus is within this process, else a process of its own."""
     job = settings.plant
@@ -333,7 +335,6 @@ def _plant(
         rig.add("plant", play, job, ...)
         return None
     partner = open_partner(job, lambda kind, text: events.say(f"plant: {kind}", f"Plant: {text}"))
-    over = threading.Event()
 
     def start(start_ns: int) -> None:
         thread = threading.Thread(target=partner.run, args=(start_ns, over.is_set), name="plant", daemon=True)

@@ -101,6 +101,8 @@ _OF_THE_CAR = {
     "steering_angle": "SteeringAngle",
 }
 
+WHICH_WHEEL = ("wheel.front", "wheel.left")
+"""Parameters that the unit of four wheels does not have."""
 WIRINGS = ("TrpacEstimator", "TrpacEstimator4W")
 
 
@@ -148,12 +150,27 @@ class Unit:
         except Exception as error:  # fmpy raises a bare Exception here
             raise HilError(f"{self.archive}: cannot be instantiated ({error}).") from error
         self._slave = slave
-        known = {key: value for key, value in settings.items() if key in self._references}
+        known = self._typed(settings)
         self._initialise(known)
         self._warm_up()
         slave.reset()
         self._initialise(known)
         self._last = self._read()
+
+    def _typed(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Settings as their variables' types; raises HilError for a name that the unit does not have."""
+        kinds = {"Integer": int, "Boolean": bool, "Real": float}
+        usable = {name for name, (_, kind) in self._references.items() if kind in kinds}
+        unknown = sorted(set(settings) - usable - set(WHICH_WHEEL))
+        if unknown:
+            raise HilError(
+                f"{self.archive}: has no parameter {', '.join(unknown)}; see docs/fmu_variables.md."
+            )
+        return {
+            name: kinds[self._references[name][1]](value)
+            for name, value in settings.items()
+            if name in self._references
+        }
 
     def _initialise(self, settings: Mapping[str, Any]) -> None:
         slave = self._instance
@@ -211,7 +228,8 @@ class Unit:
         reals = self._instance.getReal(self._reals)
         flags = [bool(flag) for flag in self._instance.getBoolean(self._flags)]
         if len(self.wiring.wheels) == 1:
-            return Estimates(*reals[:3], flags[0], flags[1], reals[3], (), ())
+            TRPAC, std, K_v, alone = reals
+            return Estimates(TRPAC, std, K_v, flags[0], flags[1], alone, (), ())
         trpac, gains, alone = reals[2:6], reals[6:10], reals[10:14]
         return Estimates(
             reals[0],
