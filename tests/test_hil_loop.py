@@ -127,6 +127,13 @@ def test_a_sleep_that_overshoots_is_an_overrun_of_the_slots_that_it_slept_throug
     assert counts.worst_ns == int(2.2 * MS)
 
 
+def test_slots_that_pass_at_the_very_end_are_counted_and_none_beyond_it() -> None:
+    bench = Bench()
+    bench.clock.overshoot_ns = {9: 50 * MS}
+    counts = bench.run(10)
+    assert (counts.cycles, counts.left_out) == (8, 2)
+
+
 def test_lost_messages_hold_the_estimate_with_flag_0_until_they_are_back() -> None:
     bench = Bench()
     bench.bus.messages = lambda cycle: {} if 20 <= cycle < 120 else driving()

@@ -101,6 +101,12 @@ class Link:
             self._lose(f"{type(error).__name__}: {error}")
         return messages
 
+    def drain(self, longest_s: float = 1.0) -> None:
+        """Throw away what has waited: nobody knows how old it is."""
+        end_s = time.monotonic() + longest_s
+        while time.monotonic() < end_s and self.receive():
+            continue
+
     def send(self, frame_id: int, extended: bool, data: bytes) -> bool:
         """Hand a message over; False where that failed."""
         if self._bus is None:

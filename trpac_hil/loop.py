@@ -160,6 +160,9 @@ class Loop:
         while not stop() and (slots is None or done + 1 < slots):
             now_ns = wait_until(clock, deadlines.due_ns(done + 1), self._spin_ns)
             slot = deadlines.next_slot(done, now_ns)
+            if slots is not None and slot >= slots:
+                self._leave_out(done + 1, slots - done - 1, now_ns)
+                break
             self._leave_out(done + 1, slot - done - 1, now_ns)
             self._cycle(slot, slot - done - 1, now_ns)
             done = slot

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -15,7 +16,7 @@ from typing import Any
 from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios.camera.files import load_camera
-from scenarios.files import load_vehicle
+from scenarios.files import load_scenario, load_vehicle
 from scenarios.unit_client import car_parameters
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.ife import IfeConfig
@@ -201,40 +202,42 @@ def run_hil(settings: HilSettings, stopper: Stopper | None = None) -> dict[str, 
     """
     stopper = stopper or Stopper()
     with ExitStack() as stack:
-        settings.out.mkdir(parents=True, exist_ok=True)
         return _run(settings, stopper, stack)
 
 
 def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str, Any]:
     codec = load_codec(settings.dbc)
-    placing = _preview(settings)
+    preview = _preview(settings)
     unit = stack.enter_context(Unit(_archive(settings, stack), _parameters(settings), settings.wheel))
+    sides = len(unit.wiring.sides)
     clock, rig = SystemClock(), Rig()
-    stack.callback(rig.end)
-    ring = Ring(len(columns(unit.wiring)), ROWS_KEPT)
-    words = CONTEXT.SimpleQueue()
     start_ns = clock.now_ns()
+    words = CONTEXT.SimpleQueue()
     events = Events(
         lambda time_s, text: words.put((time_s, text)), lambda: (clock.now_ns() - start_ns) * 1e-9
     )
+    seen = None if settings.frames is None else _camera_job(settings, unit)
+    link = Link(settings.bus.open, events.say)
+    stack.callback(link.close)
+    # What can be refused has been refused: only now the processes, which take seconds.
+    stack.callback(rig.end)
+    settings.out.mkdir(parents=True, exist_ok=True)
+    ring = Ring(len(columns(unit.wiring)), ROWS_KEPT)
     recorder = rig.add("recorder", record, _recorder_job(settings, unit), ring, ..., words)
-    interval_s = 1.0 / settings.fps
     stale_ns = codec[CLASS_MESSAGE].stale_ns.get(CLASS_SIGNAL, 1_000_000_000)
-    camera = Camera(Placing(placing, interval_s, IfeConfig.flag_threshold, len(unit.wiring.sides)), stale_ns)
-    if settings.frames is not None:
-        camera.results = Ring(result_columns(len(unit.wiring.sides)), RESULTS_KEPT)
-        camera.motion = Numbers(4)
-        rig.add("camera", watch, _camera_job(settings, unit), camera.motion, camera.results, ...)
+    camera = Camera(Placing(preview, 1.0 / settings.fps, IfeConfig.flag_threshold, sides), stale_ns)
+    if seen is not None:
+        camera.results, camera.motion = Ring(result_columns(sides), RESULTS_KEPT), Numbers(4)
+        rig.add("camera", watch, seen, camera.motion, camera.results, ...)
     over = threading.Event()
     thread = _plant(settings, rig, events, over, stack)
     rig.wait_until_ready()
     system = _system(settings)
-    link = Link(settings.bus.open, events.say)
-    stack.callback(link.close)
     inputs = Inputs(codec, INPUT_MESSAGES, events.say, settings.counters)
     period_ns = round(1e9 / settings.rate_hz)
     slots = None if settings.duration_s is None else max(1, round(settings.duration_s * settings.rate_hz))
     with undisturbed(), stopper.by_signal():
+        link.drain()
         start_ns = clock.now_ns() + RUN_UP_NS
         deadlines = Deadlines(start_ns, period_ns)
         loop = Loop(
@@ -266,8 +269,6 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
 def _archive(settings: HilSettings, stack: ExitStack) -> Path:
     if settings.fmu is not None:
         return settings.fmu
-    import tempfile
-
     scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="trpac_")))
     return build_unit(UNITS["TrpacEstimator"], scratch / "TrpacEstimator.fmu")
 
@@ -276,8 +277,6 @@ def _vehicle(settings: HilSettings) -> Vehicle:
     if settings.vehicle is not None:
         return load_vehicle(settings.vehicle).to_core()
     if settings.plant is not None:
-        from scenarios.files import load_scenario
-
         return load_scenario(settings.plant.scenario).vehicle.to_core()
     return Vehicle()
 
@@ -337,7 +336,10 @@ def _plant(
     partner = open_partner(job, lambda kind, text: events.say(f"plant: {kind}", f"Plant: {text}"))
 
     def start(start_ns: int) -> None:
-        thread = threading.Thread(target=partner.run, args=(start_ns, over.is_set), name="plant", daemon=True)
+        # Half a period apart the two do not ask for the interpreter at the same time.
+        half_ns = round(0.5e9 / job.rate_hz)
+        arguments = (start_ns + half_ns, over.is_set)
+        thread = threading.Thread(target=partner.run, args=arguments, name="plant", daemon=True)
         thread.start()
         stack.callback(thread.join, 2.0)
         stack.callback(over.set)
