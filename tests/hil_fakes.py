@@ -38,19 +38,17 @@ class FakeBus:
     def __init__(self, codec: Codec, messages: Callable[[int], dict[str, dict[str, float]]]) -> None:
         self.codec, self.messages = codec, messages
         self.up, self.losses = True, 0
-        self.polls = 0
+        self.polls = -1  # the first look is thrown away, before the first cycle
         self.counts: dict[str, int] = {}
         self.sent: list[tuple[str, dict[str, float], int]] = []
 
     def receive(self) -> list[can.Message]:
         made = []
-        for name, values in self.messages(self.polls).items():
+        for name, values in (self.messages(self.polls) if self.polls >= 0 else {}).items():
             self.counts[name] = self.counts.get(name, 0) + 1
             coded = self.codec[name]
             data = coded.encode(values, self.counts[name])
-            made.append(
-                can.Message(arbitration_id=coded.message.frame_id, is_extended_id=False, data=data)
-            )
+            made.append(can.Message(arbitration_id=coded.message.frame_id, is_extended_id=False, data=data))
         self.polls += 1
         return made
 

@@ -22,13 +22,13 @@ from trpac_hil.loop import (
     HELD_UNIT,
     RUNNING,
     STARTING,
-    Camera,
     Counts,
     Loop,
 )
 from trpac_hil.placing import Placing
 from trpac_hil.records import columns
 from trpac_hil.shared import Ring
+from trpac_hil.sight import Sight
 from trpac_hil.unit import Wiring
 
 CODEC = load_codec()
@@ -58,6 +58,7 @@ class Bench:
         self.bus = FakeBus(CODEC, lambda cycle: driving())
         self.ring = Ring(len(columns(self.unit.wiring)), 5000)
         self.placing = Placing(PreviewConfig(), 0.05, 0.5, len(self.unit.wiring.sides))
+        self.sight = Sight(self.placing, 1000 * MS, self.unit.wiring.side_names)
         self.events = Events(lambda time_s, text: self.told.append(text), lambda: 0.0)
         self.inputs = Inputs(CODEC, INPUT_MESSAGES, self.events.say)
 
@@ -70,7 +71,7 @@ class Bench:
             self.unit,
             CODEC,
             self.inputs,
-            Camera(self.placing, 1000 * MS),
+            self.sight,
             self.ring,
             self.events,
             spin_ns=self.spin_ns,
@@ -245,8 +246,8 @@ def test_a_class_by_bus_reaches_the_unit_when_the_wheel_reaches_what_the_camera_
 def test_a_camera_that_falls_silent_is_lost_and_one_that_sees_nothing_is_believed() -> None:
     bench = Bench()
     bench.bus.messages = lambda cycle: driving(1.0) | (road(0.0, cycle) if cycle == 100 else {})
-    counts = bench.run(1500)
-    assert counts.lost == {"camera": 1}
+    bench.run(1500)
+    assert bench.sight.losses == 1
     assert bench.table["age_picture_ms"][-1] != bench.table["age_picture_ms"][-1]
     blind = Bench()
     blind.bus.messages = lambda cycle: (
@@ -258,7 +259,9 @@ def test_a_camera_that_falls_silent_is_lost_and_one_that_sees_nothing_is_believe
     assert classes == [(int(Surface.WET), 0.0)]
 
 
-def test_of_four_wheels_one_without_its_signals_holds_alone_and_each_has_its_own_estimate_on_the_bus() -> None:
+def test_of_four_wheels_one_without_its_signals_holds_alone_and_each_has_its_own_estimate_on_the_bus() -> (
+    None
+):
     bench = Bench(unit=FakeUnit(Wiring.of_four()))
     whole = driving()
     lame = driving()

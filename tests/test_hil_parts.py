@@ -333,9 +333,13 @@ def test_error_frames_are_counted_and_a_flood_is_read_in_parts() -> None:
 
 
 def test_a_bus_that_is_not_there_at_the_start_is_one_sentence() -> None:
-    with pytest.raises(HilError, match="cannot be opened.*--interface"):
+    with pytest.raises(HilError, match=r"cannot be opened.*--interface"):
         Link(BusSettings("no_such_interface", "x").open, unsaid)
-    assert bus_options(["bitrate=500000", "fd=true", "name=x"]) == {"bitrate": 500000, "fd": True, "name": "x"}
+    assert bus_options(["bitrate=500000", "fd=true", "name=x"]) == {
+        "bitrate": 500000,
+        "fd": True,
+        "name": "x",
+    }
     with pytest.raises(HilError, match="expected NAME=VALUE"):
         bus_options(["bitrate"])
 

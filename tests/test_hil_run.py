@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -26,7 +27,7 @@ from trpac_hil.codec import load_codec
 from trpac_hil.errors import HilError
 from trpac_hil.partner import PartnerJob
 from trpac_hil.placing import UNIT_PREVIEW
-from trpac_hil.rig import HilSettings, run_hil
+from trpac_hil.rig import HilSettings, Rig, run_hil
 
 pytestmark = pytest.mark.e2e
 
@@ -151,7 +152,16 @@ def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(unit_file: Pa
 
 def test_ctrl_c_ends_cleanly_with_the_log_written(unit_file: Path, tmp_path: Path) -> None:
     code = "from trpac_cli.main import app; app()"
-    command = ["hil", "--with-plant", "--fmu", str(unit_file), "--rate-hz", "100", "--out", str(tmp_path / "out")]
+    command = [
+        "hil",
+        "--with-plant",
+        "--fmu",
+        str(unit_file),
+        "--rate-hz",
+        "100",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     process = subprocess.Popen(
         [sys.executable, "-c", code, *command, "--quiet"],
         stdout=subprocess.PIPE,
@@ -206,6 +216,34 @@ def test_what_cannot_be_used_is_refused_in_one_line(
     assert not list(tmp_path.glob("out/*"))
 
 
+def test_killed_helpers_are_said_and_the_loop_goes_on(
+    unit_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = Rig.start
+
+    def kill() -> None:
+        for process in multiprocessing.active_children():
+            if process.name.startswith("trpac-hil"):
+                process.kill()
+
+    def begin_and_kill(rig: Rig, start_ns: int) -> None:
+        begin(rig, start_ns)
+        threading.Timer(1.0, kill).start()
+
+    monkeypatch.setattr(Rig, "start", begin_and_kill)
+    frames = pictures(tmp_path / "frames")
+    bus = BusSettings("virtual", "test-killed")
+    settings = HilSettings(
+        tmp_path / "out", unit_file, bus, rate_hz=100.0, duration_s=3.0, frames=frames, camera=CAMERA
+    )
+    summary = run_hil(settings)
+    assert summary["ended"] == "time was up"
+    assert summary["cycles"] + summary["overruns"]["left_out"] == 300
+    assert {event["kind"] for event in summary["events"]} >= {"dead camera", "dead recorder"}
+    assert summary["log"]["problem"] == "the recorder's process died"
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["summary.json"]
+
+
 def test_the_unit_of_four_wheels_runs_on_the_same_bus(tmp_path: Path) -> None:
     from fmu_src.packaging import build_unit
     from fmu_src.units import UNITS
@@ -213,9 +251,7 @@ def test_the_unit_of_four_wheels_runs_on_the_same_bus(tmp_path: Path) -> None:
     archive = build_unit(UNITS["TrpacEstimator4W"], tmp_path / "TrpacEstimator4W.fmu")
     bus = BusSettings("virtual", "test-four")
     job = PartnerJob(bus=bus, rate_hz=100.0, camera_delay_s=0.03)
-    summary = run_hil(
-        HilSettings(tmp_path / "out", archive, bus, rate_hz=100.0, duration_s=1.5, plant=job)
-    )
+    summary = run_hil(HilSettings(tmp_path / "out", archive, bus, rate_hz=100.0, duration_s=1.5, plant=job))
     log = columns(tmp_path / "out" / "log.mf4")
     assert summary["unit"] == "TrpacEstimator4W"
     assert (log["status"] == 1).sum() > 10

@@ -4,7 +4,7 @@
 trpac.dbc, codec.py     the messages, and their values by signal name
 bus.py                  a CAN bus of any python-can interface that may be lost and come back
 inputs.py               the newest value of each signal, and how old it is
-placing.py              which result of the camera is for the road under the wheel now
+placing.py, sight.py    which result of the camera is for the road under the wheel now
 unit.py                 the unit through fmpy
 deadlines.py            when each cycle is due
 loop.py                 the cycle: bus, unit, bus

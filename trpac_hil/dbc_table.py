@@ -13,7 +13,8 @@ _HEAD = """# Messages of `trpac hil`
 
 Written by `python -m trpac_hil.dbc_table` from `trpac_hil/trpac.dbc`; do not edit. How they are used: [hil.md](hil.md).
 
-Classic CAN, 11-bit identifiers, 8 bytes, Intel byte order. "Stale after" is the age beyond which the rig takes a signal for lost.
+Classic CAN, 11-bit identifiers, 8 bytes, Intel byte order. "Stale after" is the age beyond which
+the rig takes a signal for lost.
 """
 
 
@@ -37,7 +38,8 @@ def _row(signal: Signal) -> str:
     attributes = signal.dbc.attributes if signal.dbc else {}
     stale = f"{attributes[STALE_AFTER].value} ms" if STALE_AFTER in attributes else ""
     named = ", ".join(
-        f"{raw}: {str(name).replace(NOT_AVAILABLE, 'not available')}" for raw, name in (signal.choices or {}).items()
+        f"{raw}: {str(name).replace(NOT_AVAILABLE, 'not available')}"
+        for raw, name in (signal.choices or {}).items()
     )
     sign = "i" if signal.is_signed else "u"
     meaning = f"{signal.comment} ({named})" if named else f"{signal.comment}"

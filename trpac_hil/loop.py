@@ -9,17 +9,15 @@ from typing import Protocol
 
 import can
 
-from trpac_core.vision.classes import Surface
-from trpac_core.vision.preview import Outcome
-from trpac_hil.camera import FAILED, HEAD
 from trpac_hil.codec import Codec
 from trpac_hil.deadlines import SPIN_NS, Clock, Deadlines, WallWatch, wait_until
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
-from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
+from trpac_hil.placing import Odometer
 from trpac_hil.records import AGED, LOGGED
-from trpac_hil.shared import Numbers, Ring
-from trpac_hil.unit import NO_CLASS, Estimates, Wiring
+from trpac_hil.shared import Ring
+from trpac_hil.sight import Sight
+from trpac_hil.unit import Estimates, Wiring
 
 HEALTH_EVERY_NS = 100_000_000
 CHECK_EVERY_NS = 100_000_000
@@ -29,7 +27,6 @@ LONG_NS = 5_000_000
 REQUIRED_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion")
 STARTING, RUNNING, HELD_INPUT, HELD_BUS, HELD_UNIT, ENDED = 0, 1, 2, 3, 4, 7
 """Values of the signal Status."""
-SURFACES = {float(surface.value): surface for surface in Surface}
 NAN = math.nan
 
 
@@ -89,20 +86,6 @@ class Counts:
         return self.late_ends + self.left_out
 
 
-@dataclass
-class Camera:
-    """The loop's end of the camera: pictures' results by shared memory, or by bus where `results` is None."""
-
-    placing: Placing
-    stale_ns: int
-    results: Ring | None = None
-    motion: Numbers | None = None
-    left_out: int = 0
-    """Pictures that the camera's process was too slow for."""
-    work_ms: list[float] = field(default_factory=list)
-    """How long it worked on each picture."""
-
-
 class Loop:
     """One run.
 
@@ -112,7 +95,7 @@ class Loop:
         Time, and when each cycle is due.
     bus, unit, codec, inputs : Bus, SteppedUnit, Codec, Inputs
         What is read, stepped and sent.
-    camera : Camera
+    sight : Sight
         Results of pictures.
     ring : Ring
         Where each cycle's row goes.
@@ -130,7 +113,7 @@ class Loop:
         unit: SteppedUnit,
         codec: Codec,
         inputs: Inputs,
-        camera: Camera,
+        sight: Sight,
         ring: Ring,
         events: Events,
         check: Callable[[], None] = lambda: None,
@@ -139,7 +122,7 @@ class Loop:
         self.counts, self.odometer = Counts(), Odometer()
         self._clock, self._deadlines, self._spin_ns = clock, deadlines, spin_ns
         self._bus, self._unit, self._codec, self._inputs = bus, unit, codec, inputs
-        self._camera, self._ring, self._events, self._check = camera, ring, events, check
+        self._sight, self._ring, self._events, self._check = sight, ring, events, check
         self._wall = WallWatch(clock)
         self._polled_ns = clock.now_ns()
         self._unit_time_s, self._unit_slot = 0.0, -1
@@ -148,15 +131,13 @@ class Loop:
         self._wired = dict(self._required)
         self._references = unit.references(tuple(self._wired))
         self._fresh: dict[str, bool] = {}
-        self._told: tuple[Outcome | None, ...] = (None,) * len(unit.wiring.sides)
-        self._classes = [(NO_CLASS, 0.0)] * len(unit.wiring.sides)
-        self._number = 0
-        self._result_number = NAN
         self._next_check_ns = self._next_health_ns = 0
 
     def run(self, stop: Callable[[], bool], slots: int | None = None) -> Counts:
         """Cycle until told to stop, or for a number of slots."""
         deadlines, clock, done = self._deadlines, self._clock, -1
+        self._polled_ns = wait_until(clock, deadlines.due_ns(-1), self._spin_ns)
+        self._bus.receive()  # what has come by now may be of any age
         while not stop() and (slots is None or done + 1 < slots):
             now_ns = wait_until(clock, deadlines.due_ns(done + 1), self._spin_ns)
             slot = deadlines.next_slot(done, now_ns)
@@ -185,8 +166,11 @@ class Loop:
         fresh = self._receive(began_ns)
         values = self._snapshot(began_ns)
         self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
-        self._share_motion(values)
-        self._place(fresh, values, began_ns)
+        sight = self._sight
+        sight.share_motion(self.odometer.speed_m_s, values)
+        heard = self._inputs.heard["RoadClass"]
+        if sight.news(heard, "RoadClass" in fresh, self.odometer, began_ns, self._events.say):
+            self._unit.give_class(sight.classes, sight.number)
         readings = self._readings(values)
         unit_began_ns = self._clock.now_ns()
         step_s = (slot - self._unit_slot) * self._deadlines.period_ns * 1e-9
@@ -241,91 +225,6 @@ class Loop:
             if here or name in self._fresh:
                 self._fresh[name] = here
         return values
-
-    def _share_motion(self, values: dict[str, float]) -> None:
-        motion = self._camera.motion
-        if motion is None:
-            return
-        accel, steering = values["AccelX"], values["SteeringAngle"]
-        motion.set(
-            (
-                self.odometer.speed_m_s,
-                accel if accel == accel else 0.0,
-                steering if steering == steering and abs(steering) < 1.5 else 0.0,
-                values["YawRate"],
-            )
-        )
-
-    def _place(self, fresh: set[str], values: dict[str, float], now_ns: int) -> None:
-        """Take results in, and tell the unit what is known of the road that the front wheel has reached."""
-        camera = self._camera
-        placing = camera.placing
-        for result in self._results(fresh, now_ns):
-            placing.take(result, self.odometer, camera.stale_ns)
-        newest = placing.newest
-        if newest is not None and now_ns - newest.arrived_ns > camera.stale_ns:
-            placing.newest = None
-            placing.forget()
-            self.counts.lost["camera"] = self.counts.lost.get("camera", 0) + 1
-            self._events.say(
-                "lost camera",
-                f"No result of a picture for {camera.stale_ns * 1e-6:g} ms: on without the camera.",
-            )
-        position_m = self.odometer.position_m
-        known = tuple(placing.known(side, position_m) for side in range(len(self._told)))
-        if known == self._told:
-            return
-        self._classes = [
-            (before[0], 0.0) if outcome is None else (int(outcome.surface), outcome.Q_v)
-            for outcome, before in zip(known, self._classes, strict=True)
-        ]
-        self._told, self._number = known, self._number + 1
-        self._unit.give_class(self._classes, self._number)
-
-    def _results(self, fresh: set[str], now_ns: int) -> list[CameraResult]:
-        ring = self._camera.results
-        if ring is None:
-            return [self._result_by_bus(now_ns)] if "RoadClass" in fresh and self._new_by_bus() else []
-        if not ring.waiting:
-            return []
-        rows = ring.read()
-        self._camera.left_out = int(rows[-1, 3]) if len(rows) else self._camera.left_out
-        self._camera.work_ms.extend(rows[:, 4].tolist())
-        return [
-            CameraResult(
-                int(row[0]),
-                int(row[1]),
-                now_ns,
-                tuple(
-                    None if row[at] == FAILED else Verdict(SURFACES[row[at]], float(row[at + 1]))
-                    for at in range(HEAD, len(row), 2)
-                ),
-            )
-            for row in rows
-        ]
-
-    def _new_by_bus(self) -> bool:
-        number = self._inputs.heard["RoadClass"].values["RoadClass_Number"]
-        new, self._result_number = number != self._result_number, number
-        return new
-
-    def _result_by_bus(self, now_ns: int) -> CameraResult:
-        """The result that another device sent; taken `RoadClass_Age` before it was sent."""
-        values = self._inputs.heard["RoadClass"].values
-        age_ms = values["RoadClass_Age"]
-        if age_ms != age_ms:
-            age_ms = 0.0
-            self._events.say(
-                "class without age",
-                "RoadClass_Age is not available: results count as if their pictures were taken when they came.",
-            )
-        verdicts = []
-        for side in self._unit.wiring.side_names:
-            surface = SURFACES.get(values[f"RoadClass_{side.capitalize()}"])
-            Q_v = values[f"RoadClassConfidence_{side.capitalize()}"]
-            verdicts.append(Verdict(surface, Q_v) if surface is not None and 0.0 <= Q_v <= 1.0 else None)
-        captured_ns = now_ns - round(age_ms * 1e6)
-        return CameraResult(int(values["RoadClass_Number"]), captured_ns, now_ns, tuple(verdicts))
 
     def _readings(self, values: dict[str, float]) -> list[float]:
         """Inputs of the unit; an optional signal counts from the first time it comes, and is missed from then on."""
@@ -399,7 +298,7 @@ class Loop:
                 )
         if now_ns >= self._next_health_ns:
             self._next_health_ns = now_ns + HEALTH_EVERY_NS
-            newest = self._camera.placing.newest
+            picture_ms = self._sight.picture_age_ms(now_ns)
             ages_ns = [self._inputs.age_ns(name, now_ns) for name in REQUIRED_MESSAGES]
             self._send(
                 "Health",
@@ -407,7 +306,7 @@ class Loop:
                     "Overruns": float(self.counts.overruns),
                     "WorstOverrun": self.counts.worst_ns * 1e-6,
                     "InputAge": max(ages_ns) * 1e-6 if min(ages_ns) >= 0 else math.inf,
-                    "PictureAge": (now_ns - newest.captured_ns) * 1e-6 if newest else math.inf,
+                    "PictureAge": math.inf if math.isnan(picture_ms) else picture_ms,
                     "BusLosses": float(self._bus.losses),
                 },
             )
@@ -433,17 +332,16 @@ class Loop:
         now_ns: int,
     ) -> None:
         """The cycle's row, in the order of `trpac_hil.records.columns`."""
-        age_ns, newest = self._inputs.age_ns, self._camera.placing.newest
-        under = [now_ns * 1e-6 - outcome.captured_s * 1e3 for outcome in self._told if outcome is not None]
+        age_ns, sight = self._inputs.age_ns, self._sight
         self._ring.write(
             [
                 slot * self._deadlines.period_ns * 1e-9,
                 step_s,
                 self.odometer.position_m,
                 *(values[signal] for signal in LOGGED.values()),
-                self._number,
-                *(surface for surface, _ in self._classes),
-                *(Q_v for _, Q_v in self._classes),
+                sight.number,
+                *(surface for surface, _ in sight.classes),
+                *(Q_v for _, Q_v in sight.classes),
                 estimates.TRPAC,
                 estimates.TRPAC_std,
                 estimates.K_v,
@@ -457,7 +355,7 @@ class Loop:
                 left_out,
                 self.counts.overruns,
                 *(age * 1e-6 if (age := age_ns(name, now_ns)) >= 0 else NAN for name in AGED),
-                NAN if newest is None else (now_ns - newest.captured_ns) * 1e-6,
-                max(under) if under else NAN,
+                sight.picture_age_ms(now_ns),
+                sight.age_under_wheel_ms(now_ns),
             ]
         )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from trpac_hil.records import Column
 
+SCRATCH_PREFIX = ".hil_"
 MASTER = ("time_s", 1)
 """Name of the master channel, and MDF's number for one that is time."""
 
@@ -27,7 +28,7 @@ class MdfLog:
         from asammdf import MDF  # takes a second to import, which only the recorder has to pay
 
         self.path, self._columns = path, columns
-        self._scratch = Path(tempfile.mkdtemp(dir=path.parent, prefix=".hil_"))
+        self._scratch = Path(tempfile.mkdtemp(dir=path.parent, prefix=SCRATCH_PREFIX))
         self._mdf: Any = MDF(version="4.10", temporary_folder=str(self._scratch))
         self._mdf.header.comment = comment
         self._begun = False

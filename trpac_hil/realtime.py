@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 SWITCH_INTERVAL_S = 2e-4
 """How long another thread of this process may hold the interpreter while the loop waits for it [s]."""
@@ -40,6 +41,15 @@ def _set_timer_slack() -> None:
     # Linux may let a sleep of an ordinary thread overshoot by 50 us to save power.
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(_TIMER_SLACK_NS), 0, 0, 0)
+
+
+def memory_mb() -> float | None:
+    """Resident memory of this process; None where the system does not tell it as Linux does [MB]."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        return None
+    return pages * os.sysconf("SC_PAGE_SIZE") * 1e-6
 
 
 def raise_priority() -> str:

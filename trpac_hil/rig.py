@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
 import tempfile
@@ -29,13 +30,15 @@ from trpac_hil.errors import HilError
 from trpac_hil.events import Events
 from trpac_hil.helper import CONTEXT, Control
 from trpac_hil.inputs import Inputs
-from trpac_hil.loop import Camera, Loop
+from trpac_hil.loop import Loop
+from trpac_hil.mdf import SCRATCH_PREFIX
 from trpac_hil.partner import PartnerJob, open_partner, play
 from trpac_hil.placing import UNIT_PREVIEW, Placing
-from trpac_hil.realtime import pin, raise_priority, undisturbed
+from trpac_hil.realtime import memory_mb, pin, raise_priority, undisturbed
 from trpac_hil.recorder import LOG_FAILED, ROWS_KEPT, RecorderJob, record
 from trpac_hil.records import columns
 from trpac_hil.shared import Numbers, Ring
+from trpac_hil.sight import Sight
 from trpac_hil.summary import summarise, write_summary
 from trpac_hil.unit import Unit
 
@@ -225,10 +228,12 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
     ring = Ring(len(columns(unit.wiring)), ROWS_KEPT)
     recorder = rig.add("recorder", record, _recorder_job(settings, unit), ring, ..., words)
     stale_ns = codec[CLASS_MESSAGE].stale_ns.get(CLASS_SIGNAL, 1_000_000_000)
-    camera = Camera(Placing(preview, 1.0 / settings.fps, IfeConfig.flag_threshold, sides), stale_ns)
+    placing = Placing(preview, 1.0 / settings.fps, IfeConfig.flag_threshold, sides)
+    sight = Sight(placing, stale_ns, unit.wiring.side_names)
     if seen is not None:
-        camera.results, camera.motion = Ring(result_columns(sides), RESULTS_KEPT), Numbers(4)
-        rig.add("camera", watch, seen, camera.motion, camera.results, ...)
+        results, motion = Ring(result_columns(sides), RESULTS_KEPT), Numbers(4)
+        sight = Sight(placing, stale_ns, unit.wiring.side_names, results, motion)
+        rig.add("camera", watch, seen, motion, results, ...)
     over = threading.Event()
     thread = _plant(settings, rig, events, over, stack)
     rig.wait_until_ready()
@@ -247,7 +252,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
             unit,
             codec,
             inputs,
-            camera,
+            sight,
             ring,
             events,
             lambda: rig.check(events),
@@ -256,11 +261,16 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
         rig.start(start_ns)
         if thread is not None:
             thread(start_ns)
+        before_mb = memory_mb()
         counts = loop.run(stopper, slots)
         over.set()
+        after_mb = memory_mb()
         ended = "asked to stop" if stopper.asked else "time was up"
         said = rig.end(recorder)
-    summary = summarise(settings, unit, counts, events, inputs, link, camera, said, system, ended)
+    summary = summarise(settings, unit, counts, events, inputs, link, sight, said, system, ended)
+    if before_mb is not None and after_mb is not None:
+        # The garbage collector is off: what grows here would grow for ever.
+        summary["system"]["memory_mb"] = {"before": round(before_mb, 1), "after": round(after_mb, 1)}
     summary["log"] = _log_outcome(settings, said)
     write_summary(summary, settings.out / SUMMARY)
     return summary
@@ -361,6 +371,9 @@ def _system(settings: HilSettings) -> dict[str, Any]:
 def _log_outcome(settings: HilSettings, said: Mapping[str, Any]) -> dict[str, Any]:
     if not settings.log:
         return {"file": None, "rows": 0, "rows_lost": 0, "problem": None}
+    if "done" not in said:
+        for left in settings.out.glob(f"{SCRATCH_PREFIX}*"):
+            shutil.rmtree(left, ignore_errors=True)
     done = said.get("done", {"log_rows": 0, "rows_lost": 0})
     problem = said.get(LOG_FAILED) or (None if "done" in said else "the recorder's process died")
     return {

@@ -14,7 +14,8 @@ from fmu_src.packaging import sha256
 from trpac_hil.bus import Link
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
-from trpac_hil.loop import Camera, Counts
+from trpac_hil.loop import Counts
+from trpac_hil.sight import Sight
 from trpac_hil.unit import Unit
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def summarise(
     events: Events,
     inputs: Inputs,
     link: Link,
-    camera: Camera,
+    sight: Sight,
     said: Mapping[str, Any],
     system: Mapping[str, Any],
     ended: str,
@@ -55,9 +56,9 @@ def summarise(
         "held_cycles": counts.held,
         "discarded_steps": counts.discarded,
         "clock_jumps": counts.clock_jumps,
-        "signals_lost": counts.lost,
+        "signals_lost": counts.lost | ({"camera": sight.losses} if sight.losses else {}),
         "bus": _bus(settings, inputs, link),
-        "camera": _camera(settings, camera),
+        "camera": _camera(settings, sight),
         "events": events.summary(),
         "system": dict(system),
         "versions": {package: version(package) for package in PACKAGES},
@@ -80,8 +81,8 @@ def _bus(settings: HilSettings, inputs: Inputs, link: Link) -> dict[str, Any]:
     }
 
 
-def _camera(settings: HilSettings, camera: Camera) -> dict[str, Any]:
-    counts, work_ms = camera.placing.counts, camera.work_ms
+def _camera(settings: HilSettings, sight: Sight) -> dict[str, Any]:
+    counts, work_ms = sight.placing.counts, sight.work_ms
     source = "bus" if settings.frames is None else f"pictures at {settings.fps:g} 1/s"
     return {
         "source": source,
@@ -90,7 +91,7 @@ def _camera(settings: HilSettings, camera: Camera) -> dict[str, Any]:
         "late": counts.late,
         "in_vain": counts.in_vain,
         "unplaced": counts.unplaced,
-        "left_out": camera.left_out,
+        "left_out": sight.left_out,
         "work_ms": {
             "median": round(float(np.median(work_ms)), 2),
             "p99": round(float(np.percentile(work_ms, 99.0)), 2),
