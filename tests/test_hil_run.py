@@ -130,7 +130,7 @@ def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(unit_file: Pa
     assert summary["cycles"] + summary["overruns"]["left_out"] == 800
     assert summary["discarded_steps"] == 0
     assert summary["camera"]["failed"] > 0
-    assert log["vehicle_speed_m_s"][-1] > 0.0
+    assert np.nanmax(log["vehicle_speed_m_s"]) > 4.0
     assert log["frame_id"].max() > 1, "pictures reached the unit"
 
     parameters = car_parameters(_vehicle(settings), "fl") | UNIT_PREVIEW
