@@ -98,6 +98,9 @@ def test_each_cycle_steps_the_unit_by_a_period_and_sends_what_it_says() -> None:
     assert bench.sent("Flag") == [1.0] * 50 + [0.0]
     assert [count for name, _, count in bench.bus.sent if name == "Estimate"] == list(range(51))
     assert bench.table["lateness_us"].max() == 0.0
+    assert bench.table["age_WheelSpeeds_ms"] == pytest.approx([1.0] * 50), (
+        "an age counts from the look before"
+    )
 
 
 def test_a_cycle_that_takes_too_long_is_counted_and_the_slots_that_passed_are_left_out() -> None:
