@@ -15,6 +15,7 @@ from fmu_src.packaging import unpack_unit
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario
 from scenarios.pictures import frame_steps
+from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
 
 OUTPUTS = (
@@ -37,18 +38,7 @@ INPUTS = ("wheel_speed", "wheel_torque", "vehicle_speed", "longitudinal_accelera
 def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
     """What the unit is told of the scenario's car, camera and sensors, by the unit's variable names."""
     car, noise = scenario.vehicle.to_core(), scenario.sensors
-    values: dict[str, float | int | bool] = {
-        "wheel.front": scenario.wheel.startswith("f"),
-        "wheel.left": scenario.wheel.endswith("l"),
-        "vehicle.mass": car.mass_kg,
-        "vehicle.wheelbase": car.wheelbase_m,
-        "vehicle.track": car.track_m,
-        "vehicle.cog_height": car.cog_height_m,
-        "vehicle.cog_to_rear_axle": car.cog_to_rear_axle_m,
-        "vehicle.wheel_radius": car.wheel_radius_m,
-        "vehicle.wheel_inertia": car.wheel_inertia_kg_m2,
-        "tyre.rolling_resistance": car.rolling_resistance,
-        "tyre.longitudinal_stiffness": car.longitudinal_stiffness_n,
+    values: dict[str, float | int | bool] = car_parameters(car, scenario.wheel) | {
         "confidence.torque_noise": noise.wheel_torque_noise_nm,
         "estimator.sliding_speed_noise": float(
             np.hypot(noise.vehicle_speed_noise_m_s, car.wheel_radius_m * noise.wheel_speed_noise_rad_s)
@@ -58,6 +48,23 @@ def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
         values |= _camera_parameters(load_camera(scenario.camera_path))
         values["camera.fps"] = 1.0 / (frame_steps(scenario) * scenario.step_s)
     return values
+
+
+def car_parameters(car: Vehicle, wheel: str) -> dict[str, float | int | bool]:
+    """What the unit of one wheel is told of a car, by the unit's variable names; four wheels take all but the place."""
+    return {
+        "wheel.front": wheel.startswith("f"),
+        "wheel.left": wheel.endswith("l"),
+        "vehicle.mass": car.mass_kg,
+        "vehicle.wheelbase": car.wheelbase_m,
+        "vehicle.track": car.track_m,
+        "vehicle.cog_height": car.cog_height_m,
+        "vehicle.cog_to_rear_axle": car.cog_to_rear_axle_m,
+        "vehicle.wheel_radius": car.wheel_radius_m,
+        "vehicle.wheel_inertia": car.wheel_inertia_kg_m2,
+        "tyre.rolling_resistance": car.rolling_resistance,
+        "tyre.longitudinal_stiffness": car.longitudinal_stiffness_n,
+    }
 
 
 def _camera_parameters(camera: Camera) -> dict[str, float | int | bool]:

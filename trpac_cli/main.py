@@ -20,6 +20,7 @@ from trpac_cli import fmu as fmu_commands
 from trpac_cli import gap, vision
 from trpac_cli.console import EXIT_INPUT
 from trpac_cli.estimate import estimate
+from trpac_cli.hil import hil, hil_plant
 from trpac_cli.sweep import sweep
 
 app = typer.Typer(
@@ -33,6 +34,8 @@ app.add_typer(gap.app, name="gap")
 app.add_typer(fmu_commands.app, name="fmu")
 app.command()(estimate)
 app.command()(sweep)
+app.command()(hil)
+app.command("hil-plant")(hil_plant)
 
 
 @app.callback()

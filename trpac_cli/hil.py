@@ -1,0 +1,254 @@
+"""The commands `trpac hil` and `trpac hil-plant`: the unit on a CAN bus in wall-clock time, and a car to go with it."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from trpac_cli.console import refuse, require_folder
+
+if TYPE_CHECKING:
+    from trpac_hil.bus import BusSettings
+    from trpac_hil.partner import PartnerJob
+
+COMMAND, PLANT_COMMAND = "trpac hil", "trpac hil-plant"
+EXIT_NO_LOG = 4
+"""The loop ran, but its log could not be written."""
+MULTICAST = "239.74.163.2"
+"""Channel of udp_multicast where none is given: python-can's own group for IPv4."""
+CHANNELS = {"virtual": "trpac", "udp_multicast": MULTICAST, "socketcan": "can0"}
+
+Interface = Annotated[
+    str, typer.Option(help="Any interface of python-can: virtual, udp_multicast, socketcan, pcan, vector ...")
+]
+Channel = Annotated[
+    str | None, typer.Option(help="Its channel, such as can0; virtual and UDP have a default.")
+]
+Options = Annotated[
+    list[str] | None,
+    typer.Option("--bus-option", help="NAME=VALUE for the interface, such as bitrate=1000000; repeatable."),
+]
+Dbc = Annotated[
+    Path | None,
+    typer.Option(help="DBC file with the shipped one's names, but ids, layout and scales of yours."),
+]
+Rate = Annotated[float, typer.Option(min=100.0, max=1000.0, help="Cycles per second.")]
+Duration = Annotated[float | None, typer.Option(min=0.01, help="Ends by itself after this time [s].")]
+ScenarioOption = Annotated[
+    Path | None, typer.Option(help="Car, road and sensor noise of the plant; the paper's by default.")
+]
+
+
+def hil(
+    out: Annotated[Path, typer.Option(help="Folder for log.mf4 and summary.json.")],
+    fmu: Annotated[
+        Path | None, typer.Option(help="TrpacEstimator.fmu or TrpacEstimator4W.fmu; without it one is built.")
+    ] = None,
+    interface: Interface = "virtual",
+    channel: Channel = None,
+    bus_option: Options = None,
+    dbc: Dbc = None,
+    rate_hz: Rate = 1000.0,
+    duration_s: Duration = None,
+    wheel: Annotated[str, typer.Option(help="Wheel of a unit of one wheel: fl, fr, rl or rr.")] = "fl",
+    vehicle: Annotated[
+        Path | None, typer.Option(help="The car: vehicle.yaml; by default the paper's.")
+    ] = None,
+    parameter: Annotated[
+        list[str] | None, typer.Option(help="NAME=VALUE of the unit, such as estimator.gamma=10; repeatable.")
+    ] = None,
+    frames: Annotated[
+        Path | None, typer.Option(help="Folder of pictures to play; without it classes come by bus.")
+    ] = None,
+    camera: Annotated[Path | None, typer.Option(help="camera.yaml of the pictures.")] = None,
+    fps: Annotated[float, typer.Option(min=0.1, max=200.0, help="Pictures per second.")] = 20.0,
+    with_plant: Annotated[
+        bool, typer.Option("--with-plant", help="Also play the car on the same bus: no hardware needed.")
+    ] = False,
+    scenario: ScenarioOption = None,
+    no_log: Annotated[bool, typer.Option("--no-log", help="Write no log.mf4.")] = False,
+    no_counters: Annotated[
+        bool, typer.Option("--no-counters", help="The senders do not count their messages.")
+    ] = False,
+    realtime: Annotated[bool, typer.Option("--realtime", help="Ask for real-time priority.")] = False,
+    core: Annotated[
+        int | None, typer.Option(min=0, help="Core for the loop; the helpers keep off it.")
+    ] = None,
+    camera_threads: Annotated[int, typer.Option(min=1, max=16, help="Threads of each network.")] = 1,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No table while it runs, events only.")] = False,
+) -> None:
+    """Step the unit in real time against a CAN bus; end with Ctrl-C.
+
+    Wheel speeds, torques, vehicle speed and the road's class come in, TRPAC,
+    flag and K_v go out, as trpac_hil/trpac.dbc says (docs/hil_dbc.md).
+
+    Example without hardware: trpac hil --with-plant --duration-s 30 --out out/hil
+
+    Example on a bus: trpac hil --fmu dist/TrpacEstimator.fmu --interface socketcan
+    --channel can0 --frames frames --camera camera.yaml --out out/hil
+
+    Exit codes: 0 done or ended by Ctrl-C, 2 unusable input or no bus, 4 ran, but the log could not be written.
+    """
+    _require_packages(COMMAND)
+    from scenarios.errors import ScenarioError
+    from trpac_hil.codec import DBC_FILE
+    from trpac_hil.deadlines import SPIN_NS
+    from trpac_hil.rig import HilSettings, run_hil
+    from trpac_hil.unit import WHEELS
+
+    require_folder(COMMAND, out)
+    if wheel not in WHEELS:
+        refuse(COMMAND, f"--wheel {wheel}: expected {', '.join(WHEELS)}.")
+    try:
+        bus = _bus(interface, channel, bus_option)
+        settings = HilSettings(
+            out=out,
+            fmu=fmu,
+            bus=bus,
+            dbc=dbc or DBC_FILE,
+            rate_hz=rate_hz,
+            duration_s=duration_s,
+            wheel=wheel,
+            vehicle=vehicle,
+            camera=camera,
+            frames=frames,
+            fps=fps,
+            parameters=_parameters(parameter),
+            plant=_plant_job(bus, dbc, scenario, rate_hz, core, frames is None) if with_plant else None,
+            log=not no_log,
+            counters=not no_counters,
+            live=sys.stderr.isatty() and not quiet,
+            realtime=realtime,
+            core=core,
+            camera_threads=camera_threads,
+            spin_ns=SPIN_NS,
+        )
+        summary = run_hil(settings)
+    except (ScenarioError, OSError) as error:
+        refuse(COMMAND, error)
+    _show(summary, out)
+    if summary["log"]["problem"]:
+        print(f"{COMMAND}: no log: {summary['log']['problem']}", file=sys.stderr)
+        raise typer.Exit(EXIT_NO_LOG)
+
+
+def hil_plant(
+    interface: Interface = "udp_multicast",
+    channel: Channel = None,
+    bus_option: Options = None,
+    dbc: Dbc = None,
+    rate_hz: Rate = 1000.0,
+    duration_s: Duration = None,
+    scenario: ScenarioOption = None,
+    camera_fps: Annotated[
+        float, typer.Option(min=0.0, max=200.0, help="Results per second of a camera on the bus; 0: none.")
+    ] = 20.0,
+    camera_delay_s: Annotated[
+        float, typer.Option(min=0.0, max=2.0, help="From a picture to its result on the bus [s].")
+    ] = 0.06,
+) -> None:
+    """Play the reference plant on a CAN bus in real time, as the car for trpac hil; end with Ctrl-C.
+
+    It drives up and down between 4 and 14 m/s over the scenario's road, again
+    and again.
+
+    Example, in two terminals: trpac hil-plant, and
+    trpac hil --interface udp_multicast --out out/hil
+
+    Exit codes: 0 done or ended by Ctrl-C, 2 unusable input or no bus.
+    """
+    _require_packages(PLANT_COMMAND)
+    from scenarios.errors import ScenarioError
+    from trpac_hil.deadlines import SystemClock
+    from trpac_hil.partner import open_partner
+    from trpac_hil.rig import RUN_UP_NS, Stopper
+
+    try:
+        job = _plant_job(_bus(interface, channel, bus_option), dbc, scenario, rate_hz, None, True)
+        job = replace(job, camera_fps=camera_fps, camera_delay_s=camera_delay_s)
+        partner = open_partner(job, lambda kind, text: print(f"{PLANT_COMMAND}: {text}", file=sys.stderr))
+    except (ScenarioError, OSError) as error:
+        refuse(PLANT_COMMAND, error)
+    stopper = Stopper()
+    print(f"{PLANT_COMMAND}: driving on {job.bus.interface} {job.bus.channel}; Ctrl-C ends.", file=sys.stderr)
+    with stopper.by_signal():
+        slots = None if duration_s is None else round(duration_s * rate_hz)
+        partner.run(SystemClock().now_ns() + RUN_UP_NS, stopper, slots)
+    partner.close()
+    print(f"{PLANT_COMMAND}: {partner.left_out} cycles were left out for being late.", file=sys.stderr)
+
+
+def _require_packages(command: str) -> None:
+    """One line for who lacks the extra."""
+    import importlib.util
+
+    wanted = {"can": "python-can", "cantools": "cantools", "asammdf": "asammdf", "fmpy": "fmpy"}
+    missing = [package for module, package in wanted.items() if importlib.util.find_spec(module) is None]
+    if missing:
+        refuse(
+            command, f"lacks {', '.join(missing)}. Run: {sys.executable} -m pip install {' '.join(missing)}"
+        )
+
+
+def _bus(interface: str, channel: str | None, options: list[str] | None) -> BusSettings:
+    from trpac_hil.bus import BusSettings, bus_options
+    from trpac_hil.errors import HilError
+
+    chosen = channel or CHANNELS.get(interface)
+    if chosen is None:
+        raise HilError(f"--channel: missing; interface {interface} has no default here.")
+    return BusSettings(interface, chosen, bus_options(options or ()))
+
+
+def _parameters(pairs: list[str] | None) -> dict[str, float]:
+    from trpac_hil.errors import HilError
+
+    values = {}
+    for pair in pairs or ():
+        name, _, text = pair.partition("=")
+        try:
+            values[name] = float(text)
+        except ValueError:
+            raise HilError(f"--parameter {pair}: expected NAME=NUMBER, such as estimator.gamma=10.") from None
+    return values
+
+
+def _plant_job(
+    bus: BusSettings, dbc: Path | None, scenario: Path | None, rate_hz: float, core: int | None, sees: bool
+) -> PartnerJob:
+    from trpac_hil.codec import DBC_FILE
+    from trpac_hil.partner import PLAIN_SCENARIO, PartnerJob
+
+    return PartnerJob(
+        scenario or PLAIN_SCENARIO, bus, dbc or DBC_FILE, rate_hz, camera_fps=20.0 if sees else 0.0, core=core
+    )
+
+
+def _show(summary: dict[str, Any], out: Path) -> None:
+    """The outcome on the terminal."""
+    console, overruns = Console(), summary["overruns"]
+    worst = f", the worst by {overruns['worst_ms']:.2f} ms" if overruns["count"] else ""
+    console.print(
+        f"{summary['cycles']} cycles at {summary['rate_hz']:g} Hz, {overruns['count']} deadlines missed{worst}; "
+        f"{overruns['beyond_5_ms']} by more than 5 ms. Held for {summary['held_cycles']} cycles."
+    )
+    if summary["timing"]:
+        table = Table()
+        for heading in ("", "median", "p99", "max"):
+            table.add_column(heading, justify="right" if heading else "left")
+        for name, figures in summary["timing"].items():
+            if figures:
+                table.add_row(name, *(f"{figures[key]:g}" for key in ("median", "p99", "max")))
+        console.print(table)
+    for text in (summary["system"].get("priority"), summary["system"].get("core")):
+        if text:
+            console.print(escape(text))
+    log = f"{out / summary['log']['file']}  " if summary["log"]["file"] else ""
+    console.print(f"{log}{out / 'summary.json'}", soft_wrap=True, highlight=False)

@@ -1,0 +1,17 @@
+"""Hardware in the loop: the estimator's unit in wall-clock time on a CAN bus.
+
+======================  ==================================================================================
+trpac.dbc, codec.py     the messages, and their values by signal name
+bus.py                  a CAN bus of any python-can interface that may be lost and come back
+inputs.py               the newest value of each signal, and how old it is
+placing.py, sight.py    which result of the camera is for the road under the wheel now
+unit.py                 the unit through fmpy
+deadlines.py            when each cycle is due
+loop.py                 the cycle: bus, unit, bus
+camera.py               pictures, in a process of their own
+recorder.py, mdf.py     log, figures and terminal, in a process of their own
+shared.py               memory that these processes share
+driver.py, partner.py   the reference plant as the car on the bus
+rig.py                  all of it put together
+======================  ==================================================================================
+"""

@@ -1,0 +1,182 @@
+"""A CAN bus of any python-can interface that may be lost, and is opened anew beside the loop."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import can
+
+from trpac_hil.errors import HilError
+from trpac_hil.inputs import Say
+
+RETRY_S = 0.5
+"""Pause between attempts to open a lost bus anew [s]."""
+MOST_AT_ONCE = 512
+"""Messages that one cycle reads at most; what is left waits for the next one."""
+BUS_ERRORS = (can.CanError, OSError)
+"""What interfaces raise when a bus fails."""
+
+
+@dataclass(frozen=True)
+class BusSettings:
+    """How to open the bus: python-can's interface and channel, and whatever else that interface takes."""
+
+    interface: str = "virtual"
+    channel: str = "trpac"
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def open(self) -> can.BusABC:
+        """Open the bus; raises what the interface raises.
+
+        No filters are set: where python-can filters itself, a look without waiting ends at the first message that is
+        filtered out, and leaves those behind it for later.
+        """
+        return can.Bus(channel=self.channel, interface=self.interface, **self.options)
+
+
+def bus_options(pairs: Sequence[str]) -> dict[str, Any]:
+    """Options as on the command line, NAME=VALUE each; raises HilError."""
+    options: dict[str, Any] = {}
+    for pair in pairs:
+        name, sign, text = pair.partition("=")
+        if not sign or not name:
+            raise HilError(f"--bus-option {pair}: expected NAME=VALUE, such as bitrate=1000000.")
+        words: dict[str, Any] = {"true": True, "false": False}
+        options[name] = words.get(text.lower(), can.util.cast_from_string(text))
+    return options
+
+
+class Link:
+    """The loop's end of the bus. No call of it waits, and none raises.
+
+    Parameters
+    ----------
+    open_bus : callable
+        Opens the bus, or raises one of `BUS_ERRORS`.
+    say : callable
+        Told when the bus is lost and when it is back.
+    """
+
+    def __init__(self, open_bus: Callable[[], can.BusABC], say: Say, retry_s: float = RETRY_S) -> None:
+        """Open the bus; raises HilError where it cannot be opened at the start."""
+        self._open, self._say, self._retry_s = open_bus, say, retry_s
+        self.losses = self.unsent = self.error_frames = self.backlogs = 0
+        self._found: can.BusABC | None = None
+        self._closing = threading.Event()
+        self._seeker: threading.Thread | None = None
+        try:
+            self._bus: can.BusABC | None = open_bus()
+        except (*BUS_ERRORS, ValueError, TypeError, ImportError, NotImplementedError) as error:
+            raise HilError(
+                f"The bus cannot be opened: {type(error).__name__}: {error}. Check --interface, --channel and "
+                "--bus-option; docs/hil.md has examples."
+            ) from error
+
+    @property
+    def up(self) -> bool:
+        """Whether there is a bus."""
+        return self._bus is not None
+
+    def receive(self) -> list[can.Message]:
+        """All messages that have come, at most `MOST_AT_ONCE`; none while the bus is lost."""
+        bus = self._bus or self._back()
+        messages: list[can.Message] = []
+        if bus is None:
+            return messages
+        try:
+            while len(messages) < MOST_AT_ONCE:
+                message = bus.recv(0.0)
+                if message is None:
+                    return messages
+                if message.is_error_frame:
+                    self.error_frames += 1
+                elif not message.is_remote_frame:
+                    messages.append(message)
+            self.backlogs += 1
+        except BUS_ERRORS as error:
+            self._lose(f"{type(error).__name__}: {error}")
+        return messages
+
+    def drain(self, longest_s: float = 1.0) -> None:
+        """Throw away what has waited: nobody knows how old it is."""
+        end_s = time.monotonic() + longest_s
+        while time.monotonic() < end_s and self.receive():
+            continue
+
+    def send(self, frame_id: int, extended: bool, data: bytes) -> bool:
+        """Hand a message over; False where that failed."""
+        if self._bus is None:
+            return False
+        message = can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data)
+        try:
+            self._bus.send(message)
+        except can.CanOperationError as error:
+            # A full transmit buffer is no lost bus: nobody acknowledges, or too much is sent.
+            self.unsent += 1
+            self._say("unsent", f"A message could not be sent: {error}")
+            return False
+        except BUS_ERRORS as error:
+            self.unsent += 1
+            self._lose(f"{type(error).__name__}: {error}")
+            return False
+        return True
+
+    def check(self) -> None:
+        """Ask the controller for its state, where the interface can tell; a bus that is off is lost."""
+        if self._bus is None:
+            return
+        try:
+            if self._bus.state is can.BusState.ERROR:
+                self._lose("the controller is bus-off")
+        except NotImplementedError:
+            return
+        except BUS_ERRORS as error:
+            self._lose(f"{type(error).__name__}: {error}")
+
+    def _lose(self, why: str) -> None:
+        self.losses += 1
+        self._say(
+            "bus lost", f"The bus was lost ({why}). TRPAC is held with flag 0; trying to open it again."
+        )
+        lost, self._bus = self._bus, None
+        # Closing and opening may take long: neither is the loop's business.
+        self._seeker = threading.Thread(target=self._seek, args=(lost,), name="bus", daemon=True)
+        self._seeker.start()
+
+    def _seek(self, lost: can.BusABC | None) -> None:
+        if lost is not None:
+            _shut(lost)
+        while not self._closing.wait(self._retry_s):
+            try:
+                self._found = self._open()
+            except BUS_ERRORS:
+                continue
+            return
+
+    def _back(self) -> can.BusABC | None:
+        if self._found is not None:
+            self._bus, self._found = self._found, None
+            self._say("bus back", "The bus is back.")
+        return self._bus
+
+    def close(self) -> None:
+        """Shut the bus; the last messages get a moment to leave."""
+        self._closing.set()
+        if self._seeker is not None:
+            self._seeker.join(2.0)
+        for bus in (self._bus, self._found):
+            if bus is not None:
+                time.sleep(0.02)
+                _shut(bus)
+        self._bus = self._found = None
+
+
+def _shut(bus: can.BusABC) -> None:
+    try:
+        bus.shutdown()
+    except BUS_ERRORS:
+        return

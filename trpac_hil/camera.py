@@ -1,0 +1,169 @@
+"""Pictures, worked on in a process of their own: a folder of frames played at a rate, class and confidence out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from trpac_core.vision.camera import Camera
+from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.images import ImageError, decode_image
+from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
+from trpac_core.vision.results import FrameResult
+from trpac_core.vision.sides import SidesIfe, SidesState
+from trpac_core.vision.trajectory import Motion
+from trpac_hil.deadlines import Deadlines, SystemClock
+from trpac_hil.helper import Control, helper
+from trpac_hil.shared import Numbers, Ring
+
+MODELS = Path(__file__).parent.parent / "models"
+FAILED = -1.0
+"""In the place of a class: the picture could not be used."""
+HEAD = 5
+"""Numbers of a result before the verdicts: picture, time taken, time ready [ns], pictures left out, work [ms]."""
+RESULTS_KEPT = 64
+LONGEST_SLEEP_NS = 50_000_000
+
+
+def result_columns(sides: int) -> int:
+    """Numbers of a result: the head, and class and confidence of each side."""
+    return HEAD + 2 * sides
+
+
+class Source(Protocol):
+    """Where pictures come from."""
+
+    def picture(self, number: int) -> NDArray[np.uint8]:
+        """The picture of that number, counted from 0; raises ImageError."""
+        ...
+
+
+@dataclass(frozen=True)
+class Folder:
+    """Pictures of a folder, over and over again."""
+
+    files: tuple[Path, ...]
+
+    def picture(self, number: int) -> NDArray[np.uint8]:
+        """The picture of that number; raises ImageError."""
+        return decode_image(self.files[number % len(self.files)])
+
+
+@dataclass(frozen=True)
+class CameraJob:
+    """What the camera's process needs to know.
+
+    Attributes
+    ----------
+    source : Source
+        Pictures.
+    camera : Camera
+        Lens and mounting.
+    fps : float
+        Pictures per second.
+    sides : tuple of str
+        Tracks that are asked for: 'left', 'right', or both in this order.
+    track_m, wheelbase_m : float
+        Of the car [m].
+    threads : int
+        Of each network; 1 leaves the loop its core.
+    core : int or None
+        The loop's core, to keep off.
+    """
+
+    source: Source
+    camera: Camera
+    fps: float
+    sides: tuple[str, ...] = ("left",)
+    track_m: float = 1.356
+    wheelbase_m: float = 2.305
+    threads: int = 1
+    core: int | None = None
+
+
+@dataclass
+class Eyes:
+    """The image estimator of one side or of both, with its memory."""
+
+    job: CameraJob
+    state: Any = field(init=False)
+    _ife: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Load the networks; raises ModelError."""
+        job = self.job
+        networks = (
+            Segmenter(MODELS / "segmenter.onnx", job.threads),
+            SurfaceClassifier(MODELS / "surface.onnx", job.threads),
+        )
+        config = IfeConfig(camera=job.camera, track_m=job.track_m, wheelbase_m=job.wheelbase_m)
+        if len(job.sides) == 2:
+            self._ife, self.state = SidesIfe(config, *networks), SidesState()
+        else:
+            side: Any = job.sides[0]
+            self._ife, self.state = Ife(replace(config, side=side), *networks), IfeState()
+
+    def look(self, image: NDArray[np.uint8], motion: Motion) -> Sequence[FrameResult]:
+        """Verdicts of a picture; raises ImageError or ModelError, and then nothing is remembered."""
+        self.state, *results = self._ife.process(self.state, image, motion)
+        return results
+
+
+def motion_of(numbers: Sequence[float]) -> Motion:
+    """Motion from what the loop shares: speed, acceleration, steering angle, yaw rate (NaN: none)."""
+    speed, acceleration, steering, yaw = numbers
+    return Motion(speed, acceleration, steering, None if math.isnan(yaw) else yaw)
+
+
+def watch(job: CameraJob, motion: Numbers, results: Ring, control: Control) -> None:
+    """Body of the process: take each picture when it is due, and share what it shows; ends with the loop."""
+    with helper(job.core):
+        cv2.setNumThreads(1)
+        try:
+            eyes = Eyes(job)
+            first = job.source.picture(0)
+            eyes.look(first, Motion(10.0))
+        except (ModelError, ImageError) as error:
+            control.refuse(str(error))
+            return
+        eyes.state = type(eyes.state)()
+        control.ready()
+        if control.wait_for_start():
+            _play(job, eyes, motion, results, control)
+
+
+def _play(job: CameraJob, eyes: Eyes, motion: Numbers, results: Ring, control: Control) -> None:
+    clock = SystemClock()
+    deadlines = Deadlines(control.start_ns, round(1e9 / job.fps))
+    done, left_out = -1, 0
+    while not control.stopped:
+        due_ns = deadlines.due_ns(done + 1)
+        now_ns = clock.now_ns()
+        if now_ns < due_ns:
+            clock.sleep_ns(min(due_ns - now_ns, LONGEST_SLEEP_NS))
+            continue
+        # Too slow for the rate: the newest picture counts, those in between are left out.
+        number = deadlines.next_slot(done, now_ns)
+        left_out += number - done - 1
+        done = number
+        verdicts = _verdicts(job, eyes, number, motion, control)
+        ready_ns = clock.now_ns()
+        work_ms = (ready_ns - now_ns) * 1e-6
+        results.write([number, deadlines.due_ns(number), ready_ns, left_out, work_ms, *verdicts])
+
+
+def _verdicts(job: CameraJob, eyes: Eyes, number: int, motion: Numbers, control: Control) -> list[float]:
+    moving = motion_of(motion.get())
+    try:
+        seen = eyes.look(job.source.picture(number), moving)
+    except (ImageError, ModelError) as error:
+        control.tell("picture", f"A picture could not be used: {error}")
+        return [FAILED, 0.0] * len(job.sides)
+    return [number for result in seen for number in (float(result.surface), result.Q_v)]

@@ -1,0 +1,54 @@
+"""Writes the page of the bus's messages from the DBC file: `python -m trpac_hil.dbc_table`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cantools.database.can import Message, Signal
+
+from trpac_hil.codec import NOT_AVAILABLE, STALE_AFTER, load_codec
+
+TARGET = Path(__file__).parent.parent / "docs" / "hil_dbc.md"
+_HEAD = """# Messages of `trpac hil`
+
+Written by `python -m trpac_hil.dbc_table` from `trpac_hil/trpac.dbc`; do not edit. How they are used: [hil.md](hil.md).
+
+Classic CAN, 11-bit identifiers, 8 bytes, Intel byte order. "Stale after" is the age beyond which
+the rig takes a signal for lost.
+"""
+
+
+def document() -> str:
+    """All messages as a Markdown document."""
+    messages = [coded.message for coded in load_codec().messages.values()]
+    return _HEAD + "".join(_section(message) for message in messages)
+
+
+def _section(message: Message) -> str:
+    rows = "\n".join(_row(signal) for signal in message.signals)
+    heading = f"## {message.name}, 0x{message.frame_id:X}, sent by {' '.join(message.senders)}"
+    return (
+        f"\n{heading}\n\n{message.comment}. Cycle time {message.cycle_time} ms.\n\n"
+        "| signal | bits | unit | scale | range | stale after | meaning |\n|---|---|---|---|---|---|---|\n"
+        f"{rows}\n"
+    )
+
+
+def _row(signal: Signal) -> str:
+    attributes = signal.dbc.attributes if signal.dbc else {}
+    stale = f"{attributes[STALE_AFTER].value} ms" if STALE_AFTER in attributes else ""
+    named = ", ".join(
+        f"{raw}: {str(name).replace(NOT_AVAILABLE, 'not available')}"
+        for raw, name in (signal.choices or {}).items()
+    )
+    sign = "i" if signal.is_signed else "u"
+    meaning = f"{signal.comment} ({named})" if named else f"{signal.comment}"
+    return (
+        f"| `{signal.name}` | {signal.start}, {sign}{signal.length} | {signal.unit or ''} | {signal.scale:g} | "
+        f"{signal.minimum:g} ... {signal.maximum:g} | {stale} | {meaning} |"
+    )
+
+
+if __name__ == "__main__":
+    TARGET.write_text(document(), encoding="utf-8")
+    print(TARGET)

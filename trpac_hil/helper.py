@@ -1,0 +1,116 @@
+"""Processes beside the loop: how they start, hear that they are to stop, and say what is wrong."""
+
+from __future__ import annotations
+
+import multiprocessing
+import queue
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import parent_process
+from multiprocessing.queues import SimpleQueue
+from typing import Any
+
+from trpac_hil.errors import HilError
+from trpac_hil.realtime import leave, lower_priority
+from trpac_hil.shared import Numbers
+
+CONTEXT = multiprocessing.get_context("spawn")
+"""A forked child would inherit the unit's Python state and the loop's threads."""
+START_TIMEOUT_S = 120.0
+"""Loading takes seconds; numba may compile for half a minute [s]."""
+PARENT_EVERY_S = 1.0
+_START, _STOP = 0, 1
+
+
+class Control:
+    """What the loop and one process beside it tell each other."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._numbers = Numbers(2)
+        self._said: SimpleQueue[tuple[str, Any]] = CONTEXT.SimpleQueue()
+        self._parent_seen_s = 0.0
+
+    # The loop's side
+
+    def wait_until_ready(self, process: Any) -> None:
+        """Wait until the process can begin; raises HilError where it cannot."""
+        end_s = time.monotonic() + START_TIMEOUT_S
+        while time.monotonic() < end_s:
+            if not self._said.empty():
+                kind, text = self._said.get()
+                if kind == "ready":
+                    return
+                raise HilError(str(text))
+            if not process.is_alive():
+                break
+            time.sleep(0.02)
+        raise HilError(f"The process of the {self.name} did not start; its own words are above.")
+
+    def start(self, start_ns: int) -> None:
+        """Say when slot 0 begins."""
+        self._numbers.set([float(start_ns), 0.0])
+
+    def stop(self) -> None:
+        """Say that it is over."""
+        self._numbers.set([self._numbers.get()[_START] or 1.0, 1.0])
+
+    def heard(self) -> list[tuple[str, Any]]:
+        """What the process has said since: kind and text."""
+        said = []
+        try:
+            while not self._said.empty():
+                said.append(self._said.get())
+        except (EOFError, OSError, queue.Empty):
+            return said
+        return said
+
+    # The process's side
+
+    def ready(self) -> None:
+        """Say that the clock may start."""
+        self._said.put(("ready", ""))
+
+    def refuse(self, text: str) -> None:
+        """Say why the process cannot begin."""
+        self._said.put(("refused", text))
+
+    def tell(self, kind: str, content: Any) -> None:
+        """Say something to the loop's side."""
+        self._said.put((kind, content))
+
+    def wait_for_start(self) -> bool:
+        """Wait for the start; False if it was called off."""
+        while not self._numbers.get()[_START]:
+            if self.stopped:
+                return False
+            time.sleep(0.005)
+        return not self.stopped
+
+    @property
+    def start_ns(self) -> int:
+        """When slot 0 begins [ns]."""
+        return int(self._numbers.get()[_START])
+
+    @property
+    def stopped(self) -> bool:
+        """Whether it is over, or the loop's process is gone."""
+        if self._numbers.get()[_STOP]:
+            return True
+        now_s = time.monotonic()
+        if now_s - self._parent_seen_s > PARENT_EVERY_S:
+            self._parent_seen_s = now_s
+            parent = parent_process()
+            return parent is not None and not parent.is_alive()
+        return False
+
+
+@contextmanager
+def helper(core: int | None) -> Iterator[None]:
+    """The rules of a process beside the loop: Ctrl-C is the loop's to hear, and the loop goes first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    lower_priority()
+    leave(core)
+    yield

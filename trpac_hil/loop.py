@@ -1,0 +1,361 @@
+"""The cycle: read the bus, step the unit, send; each at its time, whatever happens."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import can
+
+from trpac_hil.codec import Codec
+from trpac_hil.deadlines import SPIN_NS, Clock, Deadlines, WallWatch, wait_until
+from trpac_hil.events import Events
+from trpac_hil.inputs import Inputs
+from trpac_hil.placing import Odometer
+from trpac_hil.records import AGED, LOGGED
+from trpac_hil.shared import Ring
+from trpac_hil.sight import Sight
+from trpac_hil.unit import Estimates, Wiring
+
+HEALTH_EVERY_NS = 100_000_000
+CHECK_EVERY_NS = 100_000_000
+"""How often bus state, wall clock and helpers are looked at [ns]."""
+LONG_NS = 5_000_000
+"""Overruns beyond this are counted on their own [ns]."""
+REQUIRED_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion")
+STARTING, RUNNING, HELD_INPUT, HELD_BUS, HELD_UNIT, ENDED = 0, 1, 2, 3, 4, 7
+"""Values of the signal Status."""
+NAN = math.nan
+
+
+class Bus(Protocol):
+    """What the loop needs of the bus; see `trpac_hil.bus.Link`."""
+
+    losses: int
+
+    @property
+    def up(self) -> bool: ...  # noqa: D102
+
+    def receive(self) -> list[can.Message]: ...  # noqa: D102
+
+    def send(self, frame_id: int, extended: bool, data: bytes) -> bool: ...  # noqa: D102
+
+    def check(self) -> None: ...  # noqa: D102
+
+
+class SteppedUnit(Protocol):
+    """What the loop needs of the unit; see `trpac_hil.unit.Unit`."""
+
+    wiring: Wiring
+
+    @property
+    def last(self) -> Estimates: ...  # noqa: D102
+
+    def references(self, variables: Sequence[str]) -> list[int]: ...  # noqa: D102
+
+    def give_class(self, classes: Sequence[tuple[int, float]], number: int) -> None: ...  # noqa: D102
+
+    def step(  # noqa: D102
+        self, time_s: float, step_s: float, references: Sequence[int], values: Sequence[float]
+    ) -> Estimates | None: ...
+
+
+@dataclass
+class Counts:
+    """What the loop counts itself.
+
+    `overruns` are cycles that ended after their deadline and cycles left out; `long_overruns` those of them by more
+    than 5 ms; `worst_ns` is the greatest time by which a deadline was missed.
+    """
+
+    cycles: int = 0
+    late_ends: int = 0
+    left_out: int = 0
+    long_overruns: int = 0
+    worst_ns: int = 0
+    discarded: int = 0
+    held: int = 0
+    clock_jumps: int = 0
+    lost: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def overruns(self) -> int:
+        """Deadlines that were not met."""
+        return self.late_ends + self.left_out
+
+
+class Loop:
+    """One run.
+
+    Parameters
+    ----------
+    clock, deadlines : Clock, Deadlines
+        Time, and when each cycle is due.
+    bus, unit, codec, inputs : Bus, SteppedUnit, Codec, Inputs
+        What is read, stepped and sent.
+    sight : Sight
+        Results of pictures.
+    ring : Ring
+        Where each cycle's row goes.
+    events : Events
+        Told what happens.
+    check : callable
+        Looks after the helpers, ten times a second.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        deadlines: Deadlines,
+        bus: Bus,
+        unit: SteppedUnit,
+        codec: Codec,
+        inputs: Inputs,
+        sight: Sight,
+        ring: Ring,
+        events: Events,
+        check: Callable[[], None] = lambda: None,
+        spin_ns: int = SPIN_NS,
+    ) -> None:
+        self.counts, self.odometer = Counts(), Odometer()
+        self._clock, self._deadlines, self._spin_ns = clock, deadlines, spin_ns
+        self._bus, self._unit, self._codec, self._inputs = bus, unit, codec, inputs
+        self._sight, self._ring, self._events, self._check = sight, ring, events, check
+        self._wall = WallWatch(clock)
+        self._polled_ns = clock.now_ns()
+        self._unit_time_s, self._unit_slot = 0.0, -1
+        self._sent = dict.fromkeys(("Estimate", "EstimateWheels", "Health"), 0)
+        self._required = dict(unit.wiring.required)
+        self._wired = dict(self._required)
+        self._references = unit.references(tuple(self._wired))
+        self._fresh: dict[str, bool] = {}
+        self._next_check_ns = self._next_health_ns = 0
+
+    def run(self, stop: Callable[[], bool], slots: int | None = None) -> Counts:
+        """Cycle until told to stop, or for a number of slots."""
+        deadlines, clock, done = self._deadlines, self._clock, -1
+        self._polled_ns = wait_until(clock, deadlines.due_ns(-1), self._spin_ns)
+        self._bus.receive()  # what has come by now may be of any age
+        while not stop() and (slots is None or done + 1 < slots):
+            now_ns = wait_until(clock, deadlines.due_ns(done + 1), self._spin_ns)
+            slot = deadlines.next_slot(done, now_ns)
+            if slots is not None and slot >= slots:
+                self._leave_out(done + 1, slots - done - 1, now_ns)
+                break
+            self._leave_out(done + 1, slot - done - 1, now_ns)
+            self._cycle(slot, slot - done - 1, now_ns)
+            done = slot
+        self._send_estimate(self._unit.last.held(), ENDED)
+        return self.counts
+
+    def _leave_out(self, first: int, number: int, now_ns: int) -> None:
+        """Count cycles that were left out: each missed its deadline."""
+        if number <= 0:
+            return
+        counts, period_ns = self.counts, self._deadlines.period_ns
+        counts.left_out += number
+        missed_ns = self._deadlines.missed_by_ns(first, now_ns)
+        counts.worst_ns = max(counts.worst_ns, missed_ns)
+        # Of the slots in a row that were left out each missed its own deadline by a period less than the one before.
+        counts.long_overruns += max(0, min(number, -(-(missed_ns - LONG_NS) // period_ns)))
+
+    def _cycle(self, slot: int, left_out: int, began_ns: int) -> None:
+        passed_s = (left_out + 1) * self._deadlines.period_ns * 1e-9
+        fresh = self._receive(began_ns)
+        values = self._snapshot(began_ns)
+        self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
+        sight = self._sight
+        sight.share_motion(self.odometer.speed_m_s, values)
+        heard = self._inputs.heard["RoadClass"]
+        if sight.news(heard, "RoadClass" in fresh, self.odometer, began_ns, self._events.say):
+            self._unit.give_class(sight.classes, sight.number)
+        readings = self._readings(values)
+        unit_began_ns = self._clock.now_ns()
+        step_s = (slot - self._unit_slot) * self._deadlines.period_ns * 1e-9
+        estimates = self._unit.step(self._unit_time_s, step_s, self._references, readings)
+        unit_ended_ns = self._clock.now_ns()
+        status = self._judge(estimates, readings)
+        if estimates is None:
+            estimates, step_s = self._unit.last, 0.0
+        else:
+            self._unit_slot, self._unit_time_s = slot, self._unit_time_s + step_s
+        if status != RUNNING:
+            estimates = estimates.held()
+        self._send_estimate(estimates, status)
+        self._look_after(began_ns)
+        ended_ns = self._clock.now_ns()
+        missed_ns = max(0, self._deadlines.missed_by_ns(slot, ended_ns))
+        self._count(missed_ns, status)
+        timing = (
+            began_ns - self._deadlines.due_ns(slot),
+            ended_ns - began_ns,
+            unit_ended_ns - unit_began_ns,
+            missed_ns,
+        )
+        self._record(slot, step_s, values, estimates, status, timing, left_out, began_ns)
+
+    def _receive(self, now_ns: int) -> set[str]:
+        """Take in what came; it came after the last look at the earliest."""
+        earliest_ns, self._polled_ns = self._polled_ns, now_ns
+        take = self._inputs.take
+        return {
+            name
+            for m in self._bus.receive()
+            if (name := take(m.arbitration_id, m.is_extended_id, bytes(m.data), earliest_ns))
+        }
+
+    def _snapshot(self, now_ns: int) -> dict[str, float]:
+        """All signals as they count now, NaN where lost; a message that stopped coming is said."""
+        value = self._inputs.value
+        values = {signal: value(signal, now_ns) for signal in LOGGED.values()}
+        for name in REQUIRED_MESSAGES:
+            age_ns = self._inputs.age_ns(name, now_ns)
+            limit_ns = next(iter(self._inputs.heard[name].coded.stale_ns.values()), age_ns)
+            here = 0 <= age_ns <= limit_ns
+            if self._fresh.get(name, False) and not here:
+                self.counts.lost[name] = self.counts.lost.get(name, 0) + 1
+                self._events.say(
+                    f"lost {name}",
+                    f"{name}: none for more than {limit_ns * 1e-6:g} ms. TRPAC is held with flag 0 until it is back.",
+                )
+            elif here and not self._fresh.get(name, True):
+                self._events.say(f"back {name}", f"{name} is back.")
+            if here or name in self._fresh:
+                self._fresh[name] = here
+        return values
+
+    def _readings(self, values: dict[str, float]) -> list[float]:
+        """Inputs of the unit; an optional signal counts from the first time it comes, and is missed from then on."""
+        for variable, signal in self._unit.wiring.optional.items():
+            if variable not in self._wired and values[signal] == values[signal]:
+                self._wired[variable] = signal
+                self._references = self._unit.references(tuple(self._wired))
+        return [values[signal] for signal in self._wired.values()]
+
+    def _judge(self, estimates: Estimates | None, readings: Sequence[float]) -> int:
+        """What the signal Status says of this cycle."""
+        if not self._bus.up:
+            return HELD_BUS
+        if estimates is None:
+            self.counts.discarded += 1
+            self._events.say(
+                "discarded",
+                "The unit discarded a step: the last estimate is held with flag 0, and the loop goes on.",
+            )
+            return HELD_UNIT
+        if self._missing(readings):
+            started = len(self._fresh) == len(REQUIRED_MESSAGES)
+            return HELD_INPUT if started else STARTING
+        return RUNNING
+
+    def _missing(self, readings: Sequence[float]) -> bool:
+        """Whether signals are lost without which no wheel can be estimated; one wheel's own hold that wheel alone."""
+        lost = [name for name, reading in zip(self._wired, readings, strict=True) if reading != reading]
+        if not lost:
+            return False
+        own = {name.rpartition(".")[2] for name in lost if "." in name}
+        return any("." not in name for name in lost) or len(own) == len(self._unit.wiring.wheels)
+
+    def _send_estimate(self, estimates: Estimates, status: int) -> None:
+        self._send(
+            "Estimate",
+            {
+                "TRPAC": estimates.TRPAC,
+                "TRPAC_std": estimates.TRPAC_std,
+                "K_v": estimates.K_v,
+                "Flag": float(estimates.flag),
+                "Excitation": float(estimates.excitation),
+                "Status": float(status),
+                "TRPAC_dynamics": estimates.TRPAC_dynamics,
+            },
+        )
+        if estimates.wheels:
+            names = [w.upper() for w in self._unit.wiring.wheels]
+            thetas = {f"TRPAC_{w}": t for w, t in zip(names, estimates.wheels, strict=True)}
+            flags = {f"Flag_{w}": float(f) for w, f in zip(names, estimates.wheel_flags, strict=True)}
+            self._send("EstimateWheels", thetas | flags)
+
+    def _send(self, name: str, values: dict[str, float]) -> None:
+        coded = self._codec[name]
+        data = coded.encode(values, self._sent[name])
+        self._sent[name] += 1
+        self._bus.send(coded.message.frame_id, coded.message.is_extended_frame, data)
+
+    def _look_after(self, now_ns: int) -> None:
+        """What needs no look in every cycle."""
+        if now_ns >= self._next_check_ns:
+            self._next_check_ns = now_ns + CHECK_EVERY_NS
+            self._bus.check()
+            self._check()
+            jump_ns = self._wall.jump_ns()
+            if jump_ns:
+                self.counts.clock_jumps += 1
+                self._events.say(
+                    "clock jump",
+                    f"The wall clock was set by {jump_ns * 1e-9:+.3f} s. The loop runs by another clock and goes on.",
+                )
+        if now_ns >= self._next_health_ns:
+            self._next_health_ns = now_ns + HEALTH_EVERY_NS
+            picture_ms = self._sight.picture_age_ms(now_ns)
+            ages_ns = [self._inputs.age_ns(name, now_ns) for name in REQUIRED_MESSAGES]
+            self._send(
+                "Health",
+                {
+                    "Overruns": float(self.counts.overruns),
+                    "WorstOverrun": self.counts.worst_ns * 1e-6,
+                    "InputAge": max(ages_ns) * 1e-6 if min(ages_ns) >= 0 else math.inf,
+                    "PictureAge": math.inf if math.isnan(picture_ms) else picture_ms,
+                    "BusLosses": float(self._bus.losses),
+                },
+            )
+
+    def _count(self, missed_ns: int, status: int) -> None:
+        counts = self.counts
+        counts.cycles += 1
+        counts.held += status in (HELD_INPUT, HELD_BUS, HELD_UNIT)
+        if missed_ns:
+            counts.late_ends += 1
+            counts.long_overruns += missed_ns > LONG_NS
+            counts.worst_ns = max(counts.worst_ns, missed_ns)
+
+    def _record(
+        self,
+        slot: int,
+        step_s: float,
+        values: dict[str, float],
+        estimates: Estimates,
+        status: int,
+        timing_ns: tuple[int, int, int, int],
+        left_out: int,
+        now_ns: int,
+    ) -> None:
+        """The cycle's row, in the order of `trpac_hil.records.columns`."""
+        age_ns, sight = self._inputs.age_ns, self._sight
+        self._ring.write(
+            [
+                slot * self._deadlines.period_ns * 1e-9,
+                step_s,
+                self.odometer.position_m,
+                *(values[signal] for signal in LOGGED.values()),
+                sight.number,
+                *(surface for surface, _ in sight.classes),
+                *(Q_v for _, Q_v in sight.classes),
+                estimates.TRPAC,
+                estimates.TRPAC_std,
+                estimates.K_v,
+                estimates.flag,
+                estimates.excitation,
+                estimates.TRPAC_dynamics,
+                *estimates.wheels,
+                *estimates.wheel_flags,
+                status,
+                *(part * 1e-3 for part in timing_ns),
+                left_out,
+                self.counts.overruns,
+                *(age * 1e-6 if (age := age_ns(name, now_ns)) >= 0 else NAN for name in AGED),
+                sight.picture_age_ms(now_ns),
+                sight.age_under_wheel_ms(now_ns),
+            ]
+        )

@@ -1,0 +1,163 @@
+"""The recorder: a process beside the loop that keeps the log, the figures and the terminal."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trpac_hil.helper import Control, helper
+from trpac_hil.mdf import MdfLog
+from trpac_hil.records import AGED, Column
+from trpac_hil.shared import Ring
+from trpac_hil.spread import Spread
+
+EVERY_S = 0.25
+"""How often rows are fetched and the terminal is drawn [s]."""
+ROWS_KEPT = 30_000
+"""Rows that wait for a recorder that is held up: 30 s at 1 kHz."""
+SPREADS = {
+    "jitter_us": "lateness_us",
+    "cycle_us": "work_us",
+    "unit_step_us": "unit_us",
+    **{f"age_{m}_ms": f"age_{m}_ms" for m in AGED},
+    "age_picture_ms": "age_picture_ms",
+    "age_under_wheel_ms": "age_under_wheel_ms",
+}
+"""Figures of summary.json, and the column of each."""
+LOG_FAILED = "log failed"
+
+
+@dataclass(frozen=True)
+class RecorderJob:
+    """What the recorder needs to know.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        Of the rows.
+    log : Path or None
+        The MDF4 file; None for none.
+    comment : str
+        What the log says of itself.
+    live : bool
+        Whether to draw the figures on the terminal while the loop runs.
+    title : str
+        Of that table.
+    core : int or None
+        The loop's core, to keep off.
+    """
+
+    columns: tuple[Column, ...]
+    log: Path | None
+    comment: str
+    live: bool
+    title: str
+    core: int | None = None
+
+
+class Figures:
+    """Spreads of timing and ages over all rows, and the newest row."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        self._at = {column.name: place for place, column in enumerate(columns)}
+        self.spreads = {name: Spread() for name in SPREADS}
+        self.newest: NDArray[np.float64] | None = None
+        self.rows = 0
+
+    def add(self, rows: NDArray[np.float64]) -> None:
+        """Count rows, shape (n, columns)."""
+        if not len(rows):
+            return
+        for name, column in SPREADS.items():
+            self.spreads[name].add(rows[:, self._at[column]])
+        self.newest, self.rows = rows[-1].copy(), self.rows + len(rows)
+
+    def now(self, column: str) -> float:
+        """Newest value of a column, NaN before the first row or where there is no such column."""
+        if self.newest is None or column not in self._at:
+            return float("nan")
+        return float(self.newest[self._at[column]])
+
+    def summary(self) -> dict[str, dict[str, float] | None]:
+        """Median, p99 and maximum of each."""
+        return {name: spread.summary() for name, spread in self.spreads.items()}
+
+
+def record(job: RecorderJob, ring: Ring, control: Control, words: Any) -> None:
+    """Body of the process: drain the ring until the loop ends, then finish the log and hand the figures back."""
+    with helper(job.core):
+        figures, log = Figures(job.columns), _open(job, control)
+        control.ready()
+        with _screen(job) as screen:
+            if control.wait_for_start():
+                over = False
+                while not over:
+                    over = control.stopped
+                    rows = ring.read()
+                    figures.add(rows)
+                    log = _kept(log, rows, control)
+                    screen.show(figures, _words(words))
+                    if not over:
+                        time.sleep(EVERY_S)
+            screen.show(figures, _words(words))
+        written = _finished(log, control)
+        control.tell("done", {"figures": figures.summary(), "log_rows": written, "rows_lost": ring.lost})
+
+
+def _words(words: Any) -> list[tuple[float, str]]:
+    said = []
+    while not words.empty():
+        said.append(words.get())
+    return said
+
+
+def _open(job: RecorderJob, control: Control) -> MdfLog | None:
+    if job.log is None:
+        return None
+    try:
+        return MdfLog(job.log, job.columns, job.comment)
+    except OSError as error:
+        control.refuse(f"{job.log}: the log cannot be written ({error}).")
+        raise SystemExit(1) from error
+
+
+def _kept(log: MdfLog | None, rows: NDArray[np.float64], control: Control) -> MdfLog | None:
+    """Rows into the log; a log that fails is given up, the loop goes on."""
+    if log is None:
+        return None
+    try:
+        log.add(rows)
+    except OSError as error:
+        log.drop()
+        control.tell(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
+        print(f"trpac hil: {log.path}: the log cannot be written ({error}).", file=sys.stderr)
+        return None
+    return log
+
+
+def _finished(log: MdfLog | None, control: Control) -> int:
+    """Put the log in its place; returns its rows."""
+    if log is None:
+        return 0
+    if not log.rows:
+        log.drop()
+        return 0
+    try:
+        log.finish()
+    except OSError as error:
+        control.tell(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
+        return 0
+    return log.rows
+
+
+def _screen(job: RecorderJob) -> Any:
+    from trpac_hil.screen import Lines, Screen  # rich takes a moment, and tests need it not
+
+    return Screen(job.title) if job.live else Lines()

@@ -1,0 +1,384 @@
+"""The rig: unit, bus, camera, recorder and plant, put together for one run."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fmu_src.packaging import build_unit
+from fmu_src.units import UNITS
+from scenarios.camera.files import load_camera
+from scenarios.files import load_scenario, load_vehicle
+from scenarios.unit_client import car_parameters
+from trpac_core.vehicle import Vehicle
+from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.preview import PreviewConfig
+from trpac_hil.bus import BusSettings, Link
+from trpac_hil.camera import RESULTS_KEPT, CameraJob, Folder, result_columns, watch
+from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, load_codec
+from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock
+from trpac_hil.errors import HilError
+from trpac_hil.events import Events
+from trpac_hil.helper import CONTEXT, Control
+from trpac_hil.inputs import Inputs
+from trpac_hil.loop import Loop
+from trpac_hil.mdf import SCRATCH_PREFIX
+from trpac_hil.partner import PartnerJob, open_partner, play
+from trpac_hil.placing import UNIT_PREVIEW, Placing
+from trpac_hil.realtime import memory_mb, pin, raise_priority, undisturbed
+from trpac_hil.recorder import LOG_FAILED, ROWS_KEPT, RecorderJob, record
+from trpac_hil.records import columns
+from trpac_hil.shared import Numbers, Ring
+from trpac_hil.sight import Sight
+from trpac_hil.summary import summarise, write_summary
+from trpac_hil.unit import Unit
+
+LOG, SUMMARY = "log.mf4", "summary.json"
+RUN_UP_NS = 200_000_000
+"""From the word to start until slot 0, for all processes to hear it [ns]."""
+PICTURE_ENDINGS = (".jpg", ".jpeg", ".png")
+CLASS_MESSAGE, CLASS_SIGNAL = "RoadClass", "RoadClass_Number"
+
+
+@dataclass(frozen=True)
+class HilSettings:
+    """What a run is told.
+
+    Attributes
+    ----------
+    out : Path
+        Folder for log.mf4 and summary.json.
+    fmu : Path or None
+        The unit; None builds TrpacEstimator from the sources.
+    bus : BusSettings
+        The bus.
+    dbc : Path
+        Its messages.
+    rate_hz : float
+        Cycles per second, 100 to 1000.
+    duration_s : float or None
+        None runs until asked to stop [s].
+    wheel : str
+        Which wheel a unit of one wheel is for.
+    vehicle, camera : Path or None
+        vehicle.yaml; camera.yaml of the pictures.
+    frames : Path or None
+        Folder of pictures; None takes classes from the bus.
+    fps : float
+        Pictures per second.
+    parameters : mapping
+        Parameters of the unit by variable name.
+    plant : PartnerJob or None
+        The plant to play on the same bus.
+    log, counters, live, realtime : bool
+        Whether to log; to hold messages to their counters; to draw on the terminal; to ask for real-time priority.
+    core : int or None
+        Core of the loop.
+    camera_threads : int
+        Threads of each network.
+    spin_ns : int
+        How long before a due time the sleep ends [ns].
+    """
+
+    out: Path
+    fmu: Path | None = None
+    bus: BusSettings = field(default_factory=BusSettings)
+    dbc: Path = DBC_FILE
+    rate_hz: float = 1000.0
+    duration_s: float | None = None
+    wheel: str = "fl"
+    vehicle: Path | None = None
+    camera: Path | None = None
+    frames: Path | None = None
+    fps: float = 20.0
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    plant: PartnerJob | None = None
+    log: bool = True
+    counters: bool = True
+    live: bool = False
+    realtime: bool = False
+    core: int | None = None
+    camera_threads: int = 1
+    spin_ns: int = SPIN_NS
+
+
+class Stopper:
+    """Set by Ctrl-C, SIGTERM or whoever holds it."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __call__(self) -> bool:
+        """Whether to stop."""
+        return self.asked
+
+    def ask(self, *_: object) -> None:
+        """Stop at the end of the cycle."""
+        self.asked = True
+
+    @contextmanager
+    def by_signal(self) -> Iterator[None]:
+        """Ctrl-C and SIGTERM end the loop, not the program; from another thread than the main one they cannot."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = {number: signal.signal(number, self.ask) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+class Rig:
+    """Helpers of a run: processes that start before the loop and end after it."""
+
+    def __init__(self) -> None:
+        self._helpers: list[tuple[Control, Any]] = []
+        self.dead: list[str] = []
+
+    def add(self, name: str, body: Callable[..., None], *arguments: Any) -> Control:
+        """Start a process; the control is its body's last argument but what follows `...`."""
+        control = Control(name)
+        places = [control if argument is ... else argument for argument in arguments]
+        process = CONTEXT.Process(target=body, args=tuple(places), name=f"trpac-hil-{name}")
+        process.start()
+        self._helpers.append((control, process))
+        return control
+
+    def wait_until_ready(self) -> None:
+        """Wait for all of them; raises HilError."""
+        for control, process in self._helpers:
+            control.wait_until_ready(process)
+
+    def start(self, start_ns: int) -> None:
+        """Tell all of them when slot 0 begins."""
+        for control, _ in self._helpers:
+            control.start(start_ns)
+
+    def check(self, events: Events) -> None:
+        """Pass on what they say; a process that has died is said and left behind."""
+        for control, process in self._helpers:
+            for kind, text in control.heard() if control.name != "recorder" else ():
+                events.say(kind, text)
+            if control.name not in self.dead and not process.is_alive():
+                self.dead.append(control.name)
+                events.say(
+                    f"dead {control.name}", f"The process of the {control.name} has died. On without it."
+                )
+
+    def end(self, control: Control | None = None) -> dict[str, Any]:
+        """Stop all, wait for them, and return what one of them said last, by kind."""
+        for each, _ in self._helpers:
+            each.stop()
+        said: dict[str, Any] = {}
+        for each, process in self._helpers:
+            while True:
+                heard = each.heard()
+                if each is control:
+                    said |= dict(heard)
+                process.join(0.1)
+                if not process.is_alive():
+                    if each is control:
+                        said |= dict(each.heard())
+                    break
+        self._helpers.clear()
+        return said
+
+
+def run_hil(settings: HilSettings, stopper: Stopper | None = None) -> dict[str, Any]:
+    """Run the loop to its end; writes log.mf4 and summary.json and returns what the latter holds.
+
+    Raises
+    ------
+    HilError, ScenarioError
+        Before the loop begins, where something cannot be used; the folder then holds nothing new.
+    """
+    stopper = stopper or Stopper()
+    with ExitStack() as stack:
+        return _run(settings, stopper, stack)
+
+
+def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str, Any]:
+    codec = load_codec(settings.dbc)
+    preview = _preview(settings)
+    unit = stack.enter_context(Unit(_archive(settings, stack), _parameters(settings), settings.wheel))
+    sides = len(unit.wiring.sides)
+    clock, rig = SystemClock(), Rig()
+    start_ns = clock.now_ns()
+    words = CONTEXT.SimpleQueue()
+    events = Events(
+        lambda time_s, text: words.put((time_s, text)), lambda: (clock.now_ns() - start_ns) * 1e-9
+    )
+    seen = None if settings.frames is None else _camera_job(settings, unit)
+    link = Link(settings.bus.open, events.say)
+    stack.callback(link.close)
+    # What can be refused has been refused: only now the processes, which take seconds.
+    stack.callback(rig.end)
+    settings.out.mkdir(parents=True, exist_ok=True)
+    ring = Ring(len(columns(unit.wiring)), ROWS_KEPT)
+    recorder = rig.add("recorder", record, _recorder_job(settings, unit), ring, ..., words)
+    stale_ns = codec[CLASS_MESSAGE].stale_ns.get(CLASS_SIGNAL, 1_000_000_000)
+    placing = Placing(preview, 1.0 / settings.fps, IfeConfig.flag_threshold, sides)
+    sight = Sight(placing, stale_ns, unit.wiring.side_names)
+    if seen is not None:
+        results, motion = Ring(result_columns(sides), RESULTS_KEPT), Numbers(4)
+        sight = Sight(placing, stale_ns, unit.wiring.side_names, results, motion)
+        rig.add("camera", watch, seen, motion, results, ...)
+    over = threading.Event()
+    thread = _plant(settings, rig, events, over, stack)
+    rig.wait_until_ready()
+    system = _system(settings)
+    inputs = Inputs(codec, INPUT_MESSAGES, events.say, settings.counters)
+    period_ns = round(1e9 / settings.rate_hz)
+    slots = None if settings.duration_s is None else max(1, round(settings.duration_s * settings.rate_hz))
+    with undisturbed(), stopper.by_signal():
+        link.drain()
+        start_ns = clock.now_ns() + RUN_UP_NS
+        deadlines = Deadlines(start_ns, period_ns)
+        loop = Loop(
+            clock,
+            deadlines,
+            link,
+            unit,
+            codec,
+            inputs,
+            sight,
+            ring,
+            events,
+            lambda: rig.check(events),
+            settings.spin_ns,
+        )
+        rig.start(start_ns)
+        if thread is not None:
+            thread(start_ns)
+        before_mb = memory_mb()
+        counts = loop.run(stopper, slots)
+        over.set()
+        after_mb = memory_mb()
+        ended = "asked to stop" if stopper.asked else "time was up"
+        said = rig.end(recorder)
+    summary = summarise(settings, unit, counts, events, inputs, link, sight, said, system, ended)
+    if before_mb is not None and after_mb is not None:
+        # The garbage collector is off: what grows here would grow for ever.
+        summary["system"]["memory_mb"] = {"before": round(before_mb, 1), "after": round(after_mb, 1)}
+    summary["log"] = _log_outcome(settings, said)
+    write_summary(summary, settings.out / SUMMARY)
+    return summary
+
+
+def _archive(settings: HilSettings, stack: ExitStack) -> Path:
+    if settings.fmu is not None:
+        return settings.fmu
+    scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="trpac_")))
+    return build_unit(UNITS["TrpacEstimator"], scratch / "TrpacEstimator.fmu")
+
+
+def _vehicle(settings: HilSettings) -> Vehicle:
+    if settings.vehicle is not None:
+        return load_vehicle(settings.vehicle).to_core()
+    if settings.plant is not None:
+        return load_scenario(settings.plant.scenario).vehicle.to_core()
+    return Vehicle()
+
+
+def _parameters(settings: HilSettings) -> dict[str, Any]:
+    """The unit's parameters; results are placed by the rig, so the unit's own preview is switched off."""
+    return car_parameters(_vehicle(settings), settings.wheel) | dict(settings.parameters) | UNIT_PREVIEW
+
+
+def _preview(settings: HilSettings) -> PreviewConfig:
+    """What the rig places results by; raises HilError."""
+    names = {"preview.P_0": "P_0_m", "preview.hold": "hold_m", "preview.resolution": "resolution_m"}
+    chosen = {names[key]: float(value) for key, value in settings.parameters.items() if key in names}
+    try:
+        return PreviewConfig(**chosen)
+    except ValueError as error:
+        raise HilError(str(error)) from error
+
+
+def _recorder_job(settings: HilSettings, unit: Unit) -> RecorderJob:
+    title = f"{unit.name} at {settings.rate_hz:g} Hz on {settings.bus.interface} {settings.bus.channel}"
+    log = settings.out / LOG if settings.log else None
+    return RecorderJob(columns(unit.wiring), log, f"trpac hil, {title}", settings.live, title, settings.core)
+
+
+def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
+    if settings.camera is None or settings.frames is None:
+        raise HilError("Pictures need a camera file: --camera, such as scenarios/cameras/paper.yaml.")
+    if not settings.frames.is_dir():
+        raise HilError(f"{settings.frames}: no such folder. Expected a folder of JPEG or PNG pictures.")
+    files = tuple(sorted(p for p in settings.frames.iterdir() if p.suffix.lower() in PICTURE_ENDINGS))
+    if not files:
+        raise HilError(f"{settings.frames}: no pictures in this folder. Expected JPEG or PNG files.")
+    car = _vehicle(settings)
+    return CameraJob(
+        Folder(files),
+        load_camera(settings.camera),
+        settings.fps,
+        unit.wiring.side_names,
+        car.track_m,
+        car.wheelbase_m,
+        settings.camera_threads,
+        settings.core,
+    )
+
+
+def _plant(
+    settings: HilSettings, rig: Rig, events: Events, over: threading.Event, stack: ExitStack
+) -> Callable[[int], None] | None:
+    """The plant: a thread where the bus is within this process, else a process of its own."""
+    job = settings.plant
+    if job is None:
+        return None
+    if settings.bus.interface != "virtual":
+        rig.add("plant", play, job, ...)
+        return None
+    partner = open_partner(job, lambda kind, text: events.say(f"plant: {kind}", f"Plant: {text}"))
+
+    def start(start_ns: int) -> None:
+        # Half a period apart the two do not ask for the interpreter at the same time.
+        half_ns = round(0.5e9 / job.rate_hz)
+        arguments = (start_ns + half_ns, over.is_set)
+        thread = threading.Thread(target=partner.run, args=arguments, name="plant", daemon=True)
+        thread.start()
+        stack.callback(thread.join, 2.0)
+        stack.callback(over.set)
+
+    stack.callback(partner.close)
+    return start
+
+
+def _system(settings: HilSettings) -> dict[str, Any]:
+    """Priority and core of the loop, as far as the system grants them."""
+    granted: dict[str, Any] = {"cpus": os.cpu_count(), "platform": sys.platform}
+    if settings.core is not None:
+        granted["core"] = pin(settings.core)
+    if settings.realtime:
+        granted["priority"] = raise_priority()
+    return granted
+
+
+def _log_outcome(settings: HilSettings, said: Mapping[str, Any]) -> dict[str, Any]:
+    if not settings.log:
+        return {"file": None, "rows": 0, "rows_lost": 0, "problem": None}
+    if "done" not in said:
+        for left in settings.out.glob(f"{SCRATCH_PREFIX}*"):
+            shutil.rmtree(left, ignore_errors=True)
+    done = said.get("done", {"log_rows": 0, "rows_lost": 0})
+    problem = said.get(LOG_FAILED) or (None if "done" in said else "the recorder's process died")
+    return {
+        "file": LOG if done["log_rows"] else None,
+        "rows": done["log_rows"],
+        "rows_lost": done["rows_lost"],
+        "problem": problem,
+    }

@@ -1,0 +1,109 @@
+"""summary.json: what a run counted and measured."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fmu_src.packaging import sha256
+from trpac_hil.bus import Link
+from trpac_hil.events import Events
+from trpac_hil.inputs import Inputs
+from trpac_hil.loop import Counts
+from trpac_hil.sight import Sight
+from trpac_hil.unit import Unit
+
+if TYPE_CHECKING:
+    from trpac_hil.rig import HilSettings
+
+PACKAGES = ("trpac-fmu", "fmpy", "python-can", "cantools", "asammdf", "numpy", "onnxruntime")
+
+
+def summarise(
+    settings: HilSettings,
+    unit: Unit,
+    counts: Counts,
+    events: Events,
+    inputs: Inputs,
+    link: Link,
+    sight: Sight,
+    said: Mapping[str, Any],
+    system: Mapping[str, Any],
+    ended: str,
+) -> dict[str, Any]:
+    """What summary.json holds; docs/hil.md has its fields."""
+    done = said.get("done")
+    return {
+        "unit": unit.name,
+        "unit_sha256": sha256(unit.archive),
+        "wheel": settings.wheel if len(unit.wiring.wheels) == 1 else "all",
+        "rate_hz": settings.rate_hz,
+        "ended": ended,
+        "cycles": counts.cycles,
+        "overruns": {
+            "count": counts.overruns,
+            "ended_late": counts.late_ends,
+            "left_out": counts.left_out,
+            "beyond_5_ms": counts.long_overruns,
+            "worst_ms": round(counts.worst_ns * 1e-6, 4),
+        },
+        "timing": done["figures"] if done else None,
+        "held_cycles": counts.held,
+        "discarded_steps": counts.discarded,
+        "clock_jumps": counts.clock_jumps,
+        "signals_lost": counts.lost | ({"camera": sight.losses} if sight.losses else {}),
+        "bus": _bus(settings, inputs, link),
+        "camera": _camera(settings, sight),
+        "events": events.summary(),
+        "system": dict(system),
+        "versions": {package: version(package) for package in PACKAGES},
+    }
+
+
+def _bus(settings: HilSettings, inputs: Inputs, link: Link) -> dict[str, Any]:
+    return {
+        "interface": settings.bus.interface,
+        "channel": settings.bus.channel,
+        "dbc": settings.dbc.name,
+        "losses": link.losses,
+        "unsent": link.unsent,
+        "error_frames": link.error_frames,
+        "backlogs": link.backlogs,
+        "messages": {
+            name: {"received": h.received, "lost": h.lost, "frozen": h.frozen, "broken": h.broken}
+            for name, h in inputs.heard.items()
+        },
+    }
+
+
+def _camera(settings: HilSettings, sight: Sight) -> dict[str, Any]:
+    counts, work_ms = sight.placing.counts, sight.work_ms
+    source = "bus" if settings.frames is None else f"pictures at {settings.fps:g} 1/s"
+    return {
+        "source": source,
+        "results": counts.results,
+        "failed": counts.failed,
+        "late": counts.late,
+        "in_vain": counts.in_vain,
+        "unplaced": counts.unplaced,
+        "left_out": sight.left_out,
+        "work_ms": {
+            "median": round(float(np.median(work_ms)), 2),
+            "p99": round(float(np.percentile(work_ms, 99.0)), 2),
+            "max": round(max(work_ms), 2),
+        }
+        if work_ms
+        else None,
+    }
+
+
+def write_summary(summary: Mapping[str, Any], path: Path) -> None:
+    """Write the summary under another name, then give it its own."""
+    scratch = path.with_name(f".{path.name}.part")
+    scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    scratch.replace(path)

@@ -1,0 +1,266 @@
+"""The estimator's unit through fmpy, its variables wired to the bus's signals."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import ParseError
+
+from fmpy import read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+
+from fmu_src.packaging import unpack_unit
+from trpac_hil.errors import HilError
+
+WHEELS = ("fl", "fr", "rl", "rr")
+NO_CLASS = -1
+WARM_UP_STEPS = 300
+"""Steps before the clock starts: the first ones load code and are slow."""
+WARM_UP_INPUTS = {"wheel_speed": 52.0, "wheel_torque": 150.0, "vehicle_speed": 15.0}
+
+
+class Estimates(NamedTuple):
+    """What the loop sends: those of the car, or of the one wheel; then theta_hat and flag of each wheel, if any."""
+
+    TRPAC: float
+    TRPAC_std: float
+    K_v: float
+    flag: bool
+    excitation: bool
+    TRPAC_dynamics: float
+    wheels: tuple[float, ...]
+    wheel_flags: tuple[bool, ...]
+
+    def held(self) -> Estimates:
+        """The same estimate, with nothing that says that it is live."""
+        return self._replace(
+            flag=False, excitation=False, K_v=0.0, wheel_flags=(False,) * len(self.wheel_flags)
+        )
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """Which signals of the bus go to which variables.
+
+    Attributes
+    ----------
+    wheels : tuple of str
+        Wheels that the unit estimates.
+    required, optional : mapping
+        Signal by variable; optional ones are set from the first time they come.
+    sides : tuple of pairs
+        Variables of class and confidence, for each side that the unit asks for.
+    side_names : tuple of str
+        'left', 'right'.
+    """
+
+    wheels: tuple[str, ...]
+    required: Mapping[str, str]
+    optional: Mapping[str, str]
+    sides: tuple[tuple[str, str], ...]
+    side_names: tuple[str, ...]
+
+    @classmethod
+    def of_one(cls, wheel: str) -> Wiring:
+        """The unit of one wheel, wired to that wheel's signals."""
+        place = wheel.upper()
+        required = {
+            "wheel_speed": f"WheelSpeed_{place}",
+            "wheel_torque": f"WheelTorque_{place}",
+            "vehicle_speed": "VehicleSpeed",
+        }
+        optional = {"vertical_load": f"VerticalLoad_{place}", **_OF_THE_CAR}
+        side = "left" if wheel.endswith("l") else "right"
+        return cls((wheel,), required, optional, (("road_class", "road_class_confidence"),), (side,))
+
+    @classmethod
+    def of_four(cls) -> Wiring:
+        """The unit of four wheels."""
+        required = {f"wheel_speed.{w}": f"WheelSpeed_{w.upper()}" for w in WHEELS}
+        required |= {f"wheel_torque.{w}": f"WheelTorque_{w.upper()}" for w in WHEELS}
+        optional = {f"vertical_load.{w}": f"VerticalLoad_{w.upper()}" for w in WHEELS}
+        names = ("left", "right")
+        sides = tuple((f"road_class.{s}", f"road_class_confidence.{s}") for s in names)
+        return cls(
+            WHEELS,
+            {**required, "vehicle_speed": "VehicleSpeed"},
+            {**optional, **_OF_THE_CAR, "lateral_acceleration": "AccelY"},
+            sides,
+            names,
+        )
+
+
+_OF_THE_CAR = {
+    "longitudinal_acceleration": "AccelX",
+    "yaw_rate": "YawRate",
+    "steering_angle": "SteeringAngle",
+}
+
+WHICH_WHEEL = ("wheel.front", "wheel.left")
+"""Parameters that the unit of four wheels does not have."""
+WIRINGS = ("TrpacEstimator", "TrpacEstimator4W")
+
+
+class Unit:
+    """One instance of TrpacEstimator or TrpacEstimator4W; a context that frees it and removes its files."""
+
+    def __init__(self, archive: Path, settings: Mapping[str, Any], wheel: str) -> None:
+        """Unpack, instantiate, warm up, initialise; raises HilError where the file or a setting cannot be used."""
+        if not zipfile.is_zipfile(archive):
+            raise HilError(f"{archive}: no unit there. Build one: .venv/bin/python build_fmu.py")
+        self.archive = archive
+        self._folder = unpack_unit(archive)
+        self._slave: FMU2Slave | None = None
+        try:
+            self._open(settings, wheel)
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(self, settings: Mapping[str, Any], wheel: str) -> None:
+        try:
+            description = read_model_description(str(self._folder))
+            name = description.coSimulation.modelIdentifier
+        except (OSError, ValueError, AttributeError, ParseError) as error:
+            raise HilError(f"{self.archive}: not a co-simulation unit ({error}).") from error
+        if name not in WIRINGS:
+            raise HilError(f"{self.archive}: is {name}; expected {' or '.join(WIRINGS)}.")
+        self.name = name
+        self.wiring = Wiring.of_four() if name.endswith("4W") else Wiring.of_one(wheel)
+        self._references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
+        outputs = _outputs(self.wiring)
+        self._reals = [self._references[n][0] for n in outputs[0]]
+        self._flags = [self._references[n][0] for n in outputs[1]]
+        self._frame_id = self._references["frame_id"][0]
+        self._classes = [self._references[c][0] for c, _ in self.wiring.sides]
+        self._confidences = [self._references[c][0] for _, c in self.wiring.sides]
+        slave = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=str(self._folder),
+            modelIdentifier=name,
+            instanceName="hil",
+        )
+        try:
+            slave.instantiate(loggingOn=False)
+        except Exception as error:  # fmpy raises a bare Exception here
+            raise HilError(f"{self.archive}: cannot be instantiated ({error}).") from error
+        self._slave = slave
+        known = self._typed(settings)
+        self._initialise(known)
+        self._warm_up()
+        slave.reset()
+        self._initialise(known)
+        self._last = self._read()
+
+    def _typed(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Settings as their variables' types; raises HilError for a name that the unit does not have."""
+        kinds = {"Integer": int, "Boolean": bool, "Real": float}
+        usable = {name for name, (_, kind) in self._references.items() if kind in kinds}
+        unknown = sorted(set(settings) - usable - set(WHICH_WHEEL))
+        if unknown:
+            raise HilError(
+                f"{self.archive}: has no parameter {', '.join(unknown)}; see docs/fmu_variables.md."
+            )
+        return {
+            name: kinds[self._references[name][1]](value)
+            for name, value in settings.items()
+            if name in self._references
+        }
+
+    def _initialise(self, settings: Mapping[str, Any]) -> None:
+        slave = self._instance
+        slave.setupExperiment(startTime=0.0)
+        for name, value in settings.items():
+            reference, kind = self._references[name]
+            getattr(slave, f"set{kind}")([reference], [value])
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+
+    def _warm_up(self) -> None:
+        """Steps whose results are thrown away; a unit that discards them cannot be used with these settings."""
+        values = [WARM_UP_INPUTS[name.partition(".")[0]] for name in self.wiring.required]
+        references = self.references(tuple(self.wiring.required))
+        for number in range(WARM_UP_STEPS):
+            self.give_class([(0, 0.9)] * len(self.wiring.sides), number + 1)
+            if not self.step(1e-3 * number, 1e-3, references, values):
+                raise HilError(f"{self.archive}: refuses the settings; its own words are above.")
+
+    @property
+    def _instance(self) -> FMU2Slave:
+        if self._slave is None:
+            raise HilError(f"{self.archive}: is closed.")
+        return self._slave
+
+    def references(self, variables: Sequence[str]) -> list[int]:
+        """Value references of variables."""
+        return [self._references[name][0] for name in variables]
+
+    def give_class(self, classes: Sequence[tuple[int, float]], number: int) -> None:
+        """Set class and confidence of each side, as the result of that number."""
+        slave = self._instance
+        slave.setInteger([*self._classes, self._frame_id], [*(surface for surface, _ in classes), number])
+        slave.setReal(self._confidences, [confidence for _, confidence in classes])
+
+    def step(
+        self, time_s: float, step_s: float, references: Sequence[int], values: Sequence[float]
+    ) -> Estimates | None:
+        """Set inputs and step; None where the unit discards the step."""
+        slave = self._instance
+        try:
+            slave.setReal(references, values)
+            slave.doStep(time_s, step_s)
+            self._last = self._read()
+        except FMICallException:
+            return None
+        return self._last
+
+    @property
+    def last(self) -> Estimates:
+        """The estimates of the last step that was not discarded."""
+        return self._last
+
+    def _read(self) -> Estimates:
+        reals = self._instance.getReal(self._reals)
+        flags = [bool(flag) for flag in self._instance.getBoolean(self._flags)]
+        if len(self.wiring.wheels) == 1:
+            TRPAC, std, K_v, alone = reals
+            return Estimates(TRPAC, std, K_v, flags[0], flags[1], alone, (), ())
+        trpac, gains, alone = reals[2:6], reals[6:10], reals[10:14]
+        return Estimates(
+            reals[0],
+            reals[1],
+            max(gains),
+            any(flags[:4]),
+            any(flags[4:]),
+            min(alone),
+            tuple(trpac),
+            tuple(flags[:4]),
+        )
+
+    def close(self) -> None:
+        """Free the instance and remove its files."""
+        if self._slave is not None:
+            slave, self._slave = self._slave, None
+            slave.terminate()
+            slave.freeInstance()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def __enter__(self) -> Unit:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _outputs(wiring: Wiring) -> tuple[list[str], list[str]]:
+    """Real and Boolean outputs in the order in which `Unit` reads them."""
+    if len(wiring.wheels) == 1:
+        return ["TRPAC", "TRPAC_std", "K_v", "TRPAC_dynamics"], ["flag", "excitation_flag"]
+    reals = [f"{name}.{w}" for name in ("TRPAC", "K_v", "TRPAC_dynamics") for w in WHEELS]
+    flags = [f"{name}.{w}" for name in ("flag", "excitation_flag") for w in WHEELS]
+    return ["TRPAC.vehicle", "TRPAC_std.vehicle", *reals], flags
