@@ -41,6 +41,9 @@ ROAD_BOXES: dict[str, tuple[Box, ...]] = {
 Set by looking at the pictures (burnt-in text, bonnets, verges), never by a network's score.
 """
 
+WIDE_BOXES: dict[str, Box] = {"condition_web": (0.08, 0.55, 0.92, 0.96)}
+"""Where road and its close surroundings fill stills nearly from side to side, for the widest looks."""
+
 EXTREME_LIMITS: tuple[Box, ...] = (
     (120 / 640, 200 / 360, 290 / 640, 315 / 360),
     (380 / 640, 200 / 360, 560 / 640, 315 / 360),
