@@ -20,7 +20,7 @@ from .export import export_surface, sha256_of
 from .nets import SurfaceNet
 from .outliers import outlier_patches
 from .patches import PatchSet, joined, judged_patches, share_group, training_patches
-from .teacher import TeacherFeatures, teacher_features
+from .teacher import TeacherError, TeacherFeatures, teacher_features
 from .train_surface import (
     Report,
     Taught,
@@ -114,11 +114,13 @@ def gather(
         "train": outlier_patches(rng, seen, patches.patches[kept], OUTLIERS["train"]),
         "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, OUTLIERS["val"]),
     }
-    return Material(patches.where(kept), teacher and teacher.where(kept), outliers)
+    return Material(patches.where(kept), None if teacher is None else teacher.where(kept), outliers)
 
 
 def _ask_teacher(given: argparse.Namespace, patches: PatchSet, steps: Steps) -> TeacherFeatures:
     """The teacher's features, kept beside the rendered worlds where there is a folder for those."""
+    if not given.teacher.is_file():
+        raise TeacherError(f"{given.teacher}: not found; leave --teacher out to train without one")
     digest = hashlib.sha256(patches.patches.tobytes() + given.teacher.read_bytes()).hexdigest()[:12]
     file = given.worlds / f"teacher-{digest}.npz" if given.worlds else None
     if file and file.is_file():

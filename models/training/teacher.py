@@ -114,8 +114,6 @@ def _load(model: Path):  # type: ignore[no-untyped-def]
     """The interpreter, its input's index, and scale and zero point of each layer that is handed on."""
     from ai_edge_litert.interpreter import Interpreter  # type: ignore[import-untyped]
 
-    if not model.is_file():
-        raise TeacherError(f"{model}: not found; leave --teacher out to train without one")
     interpreter = Interpreter(str(model), num_threads=1, experimental_preserve_all_tensors=True)
     interpreter.allocate_tensors()
     details = {detail["index"]: detail for detail in interpreter.get_tensor_details()}
