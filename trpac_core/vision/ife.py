@@ -74,6 +74,9 @@ class IfeConfig:
         Q_v above which the flag is set [-].
     seed : int
         Of the drawing of patches.
+    groups_looked_at : int
+        How many groups from the near one on. The verdict is the near group's, so 1 gives the same verdicts in less
+        time, bit by bit; the others are for those who look at the road further ahead.
     use_trajectory, remove_shadow, calibrate, weight_evidence : bool
         Each False leaves that part of the method out, to measure what it is worth: the whole drivable strip
         ahead in place of the ellipses; shadow kept; T = 1; equal evidence weights in Eq. (8).
@@ -95,6 +98,7 @@ class IfeConfig:
     weight_law: WeightLaw = field(default_factory=WeightLaw)
     flag_threshold: float = 0.5
     seed: int = 0
+    groups_looked_at: int = len(GROUP_NAMES)
     use_trajectory: bool = True
     remove_shadow: bool = True
     calibrate: bool = True
@@ -124,6 +128,7 @@ class IfeConfig:
             > 0.0,
             "sigma must lie in [0, 1]": 0.0 <= self.weight_law.sigma <= 1.0,
             "seed must not be negative": self.seed >= 0,
+            "groups_looked_at must be 1, 2 or 3": 1 <= self.groups_looked_at <= len(GROUP_NAMES),
         }
         problems = [text for text, good in checks.items() if not good]
         if problems:
@@ -216,7 +221,8 @@ class Ife:
         camera = fit_camera(self.config.camera, image)
         masks = self._segmenter.segment(image) if masks is None else masks
         usable = usable_road(masks, self.config.remove_shadow)
-        regions = self.look(state, image, motion, camera, masks, usable)
+        looked_at = self.config.groups_looked_at
+        regions = self.look(state, image, motion, camera, masks, usable, looked_at)
         evidence = self.classify(regions)
         state, result = self.judge(state, regions, evidence)
         if with_view:
@@ -283,7 +289,7 @@ class Ife:
                 motion,
                 wheelbase_m=config.wheelbase_m,
                 lateral_m=sign * config.track_m / 2.0,
-                horizon_m=max(high for _, high in config.ranges_m),
+                horizon_m=max(high for _, high in config.ranges_m[: config.groups_looked_at]),
                 step_m=config.step_m,
                 k1=config.k1,
                 k2=config.k2,
