@@ -23,7 +23,13 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeConfig, IfeState
 from trpac_core.vision.images import ImageError, decode_image
-from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier, calibrated_probabilities
+from trpac_core.vision.networks import (
+    PatchVerdicts,
+    RoadMasks,
+    Segmenter,
+    SurfaceClassifier,
+    calibrated_probabilities,
+)
 from trpac_core.vision.regions import roi_box
 from trpac_core.vision.trajectory import Motion
 
@@ -79,8 +85,8 @@ class ByColour:
 
     temperature = 2.0
 
-    def logits(self, patches):
-        return patches.astype(np.float64).mean(axis=(1, 2)) / 100.0
+    def verdicts(self, patches):
+        return PatchVerdicts(patches.astype(np.float64).mean(axis=(1, 2)) / 100.0, np.ones(len(patches)))
 
 
 class Certain:
@@ -88,8 +94,8 @@ class Certain:
 
     temperature = 1.5
 
-    def logits(self, patches):
-        return np.tile([2.0, 0.5, -1.0], (len(patches), 1))
+    def verdicts(self, patches):
+        return PatchVerdicts(np.tile([2.0, 0.5, -1.0], (len(patches), 1)), np.ones(len(patches)))
 
 
 def noisy(colour, height, width):

@@ -6,16 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from scipy.optimize import minimize, minimize_scalar
-from torch import Tensor
+from scipy.optimize import minimize_scalar
 
 from scenarios.camera.disturbances import PAPER, disturb
 
 from .data import Image
-from .nets import SurfaceNet, sharpness
-from .train_surface import verdicts_of
 
 BINS = 15
 """Bins of confidence in ECE, MCE and the reliability diagram."""
@@ -70,25 +66,6 @@ def learn_temperature(logits: NDArray[np.float64], labels: NDArray[np.int64]) ->
         lambda inverse: cross_entropy(logits, labels, 1.0 / inverse), bounds=bounds, method="bounded"
     )
     return float(1.0 / found.x)
-
-
-def learn_softening(net: SurfaceNet, patches: Image, labels: NDArray[np.int64]) -> Tensor:
-    """Slope and centre of the softening by sharpness, shape (2,), by the validation cross-entropy.
-
-    Logits are divided by exp(slope * (centre - sharpness)) where a patch is less sharp than the centre, the median of
-    the given ones: temperature scaling whose T depends on the picture (parameterised as in Tomani et al. 2022).
-    """
-    net.softening.data = torch.zeros(2)
-    logits = verdicts_of(net, patches)[0]
-    sharp = sharpness(torch.from_numpy(patches)).double().numpy()
-    centre = float(np.median(sharp))
-    blur = np.maximum(centre - sharp, 0.0)[:, None]
-
-    def entropy(values: NDArray[np.float64]) -> float:
-        return cross_entropy(logits * np.exp(-values[0] * blur), labels, float(np.exp(values[1])))
-
-    found = minimize(entropy, (0.0, 0.5), method="Nelder-Mead")
-    return torch.tensor([max(float(found.x[0]), 0.0), centre], dtype=torch.float32)
 
 
 def reliability(

@@ -149,9 +149,9 @@ def surface_card(
         "No teacher was used."
         if facts.teacher is None
         else "In a first stage, without labels, linear maps of the middle maps and of the embedding had to match what\n"
-        "blocks 4 to 12 of MobileNetV2 1.0 / 224 (ImageNet weights, Apache-2.0) see: mean and deviation of each channel, "
-        "and\n4 x 6 cells of blocks 9 and 12. They kept half their weight in the second stage, which learns the classes. "
-        "Neither\nthat network nor the linear maps are in the file."
+        "blocks 4 to 12 of MobileNetV2 1.0 / 224 (ImageNet weights, Apache-2.0) see: mean and deviation of each\n"
+        "channel, and 4 x 6 cells of blocks 9 and 12. They kept half their weight in the second stage, which learns\n"
+        "the classes. Neither that network nor the linear maps are in the file."
     )
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
     return f"""\
@@ -173,8 +173,9 @@ feed one linear layer.
 {train_patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
 Patches are 3:2 to 3:1 wide before they are squeezed to the input, from 48 pixels to nearly the whole width of the road.
 They are mirrored, shifted, zoomed by up to 12 % and seen with the resolution, gain, gamma and white balance of other
-cameras (within {100 * CAMERA_SPREAD:.0f} %). {left_out}Classes are drawn equally often and sources within a class by fixed shares, so
-that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the weights.
+cameras (within {100 * CAMERA_SPREAD:.0f} %). {left_out}Classes are drawn equally often and sources within a class by
+fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
+weights.
 {teacher}
 {time_text(facts, train_s)}
 {versions_text(facts)}
@@ -200,8 +201,10 @@ the number of pictures of the class. Every rendered view is one picture.
 
 ## Calibration
 
-Within the graph the logits are divided by exp({slope:.3f} (s0 - s)) where a patch's sharpness s (log of mean grey step over
-grey deviation) is below s0 = {centre:.3f}, both learned like T: an unsharp patch is less sure. T = {temperature:.3f} minimises the cross-entropy of the validation patches, undisturbed and disturbed (motion blur on
+Within the graph the logits are divided by exp({slope:.3f} (s0 - s)) where a patch's sharpness s (log of mean grey
+step over grey deviation) is below s0 = {centre:.3f}: an unsharp patch is less sure. The slope is learned like T.
+
+T = {temperature:.3f} minimises the cross-entropy of the validation patches, undisturbed and disturbed (motion blur on
 all, brightness and contrast on 70 %, abnormal exposure and shadow on 30 % each), from {entropies[0]:.3f} to
 {entropies[1]:.3f} nat. The class never changes. {len(reliabilities)} sets, 15 bins; MCE is the worst bin however few
 patches it holds. The diagram `reliability.png` is the validation set's, undisturbed and disturbed together.

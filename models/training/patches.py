@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trpac_core.vision.regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX, cut_patch
 
 from .augment import camera_look
-from .data import WIDE_BOXES, Image, Picture, pixel_box
+from .data import Image, Picture, family_of, pixel_box
 
 ASPECTS = (1.5, 3.0)
 """Width over height of a training patch on the road, squeezed to 3:2 in the end: narrow and wide looks [-]."""
@@ -26,14 +26,14 @@ WIDE_LEAST = 0.6
 
 PATCHES_PER_PICTURE = {
     "condition_web": 20,
-    "drivable_camvid/0006R0": 2,
-    "drivable_camvid/0016E5": 2,
-    "drivable_lums": 1,
-    "dry_udacity": 12,
-    "seq_dry_yolop/input1": 6,
-    "seq_dry_extreme/Critical_Driving1": 10,
-    "seq_wet_extreme/rain": 10,
-    "seq_snow_extreme/snow1": 10,
+    "drivable_camvid/0006R0": 4,
+    "drivable_camvid/0016E5": 4,
+    "drivable_lums": 2,
+    "dry_udacity": 20,
+    "seq_dry_yolop/input1": 8,
+    "seq_dry_extreme/Critical_Driving1": 20,
+    "seq_wet_extreme/rain": 20,
+    "seq_snow_extreme/snow1": 20,
 }
 """Training patches cut from each picture of a source; others give OTHER_SOURCES."""
 OTHER_SOURCES = 2
@@ -53,8 +53,8 @@ Each class is drawn equally often, and its shares are normalised over the source
 cameras being dry does not make "dash camera" mean "dry": wet and snowy dash frames, real and rendered, weigh as much.
 """
 
-LEAST_ROAD = 0.95
-"""Least share of road in a patch cut by a mask [-]."""
+LEAST_ROADS = (0.95, 0.7)
+"""Least share of road in a patch cut by a mask, of one half and the other: some with kerbs and vehicles [-]."""
 
 CAMERA_SPREAD = 0.25
 """Gain, gamma and white balance of other undisturbed cameras, as a share [-]."""
@@ -104,12 +104,6 @@ def joined(sets: Sequence[PatchSet]) -> PatchSet:
     )
 
 
-def share_group(source: str) -> str:
-    """The entry of SOURCE_SHARES that a source falls under."""
-    folder = source.split("/")[0]
-    return "seq_extreme" if folder.endswith("_extreme") else folder
-
-
 def unsquashed(picture: Picture, image: Image, stretch: float) -> Image:
     """A web still at its likely former aspect; other pictures as they are."""
     if picture.source != "condition_web":
@@ -130,7 +124,7 @@ def random_patches(rng: np.random.Generator, picture: Picture, count: int) -> li
     image = unsquashed(picture, picture.image(), rng.uniform(*WEB_STRETCH))
     if picture.mask is not None:
         return _patches_in_mask(rng, image, picture.road_mask(), count, ASPECTS)
-    wide = WIDE_BOXES.get(picture.source)
+    wide = picture.wide_box
     patches = []
     for _ in range(count):
         if wide is not None and rng.random() < WIDE_SHARE:
@@ -165,17 +159,17 @@ def _patches_in_mask(
         if x0 < 0 or y0 < 0 or x1 > image.shape[1] or y1 > image.shape[0]:
             continue
         inside = counts[y1, x1] - counts[y0, x1] - counts[y1, x0] + counts[y0, x0]
-        if inside >= LEAST_ROAD * (x1 - x0) * (y1 - y0):
+        if inside >= LEAST_ROADS[len(patches) % 2] * (x1 - x0) * (y1 - y0):
             patches.append(reduced(image, (x0, y0, x1, y1)))
     return patches
 
 
 def fixed_patches(picture: Picture) -> list[Image]:
-    """The patches on which a picture is judged: each road box whole, the wide one too, and four smaller ones in each."""
+    """The patches on which a picture is judged: each road box whole, the wide one too, and four parts of each."""
     image = unsquashed(picture, picture.image(), float(np.mean(WEB_STRETCH)))
     if picture.mask is not None:
         return _patches_in_mask(np.random.default_rng(0), image, picture.road_mask(), 4, (JUDGED_ASPECT,) * 2)
-    wide = WIDE_BOXES.get(picture.source)
+    wide = picture.wide_box
     patches = [] if wide is None else [reduced(image, pixel_box(wide, image))]
     for box in picture.boxes:
         x0, y0, x1, y1 = pixel_box(box, image)
@@ -224,7 +218,7 @@ def judged_patches(pictures: Iterable[Picture]) -> PatchSet:
 
 def draw_weights(patches: PatchSet) -> NDArray[np.float64]:
     """Probability of each patch to be drawn: classes equal, sources within a class by SOURCE_SHARES."""
-    groups = np.array([share_group(str(source)) for source in patches.sources])
+    groups = np.array([family_of(str(source)) for source in patches.sources])
     weights = np.zeros(len(patches))
     for label in np.unique(patches.labels):
         of_class = patches.labels == label

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 from . import calibrate, cards, scores
-from .data import Image, Picture, of_split
+from .data import Image, Picture, family_of, of_split
 from .export import export_surface, sha256_of
 from .nets import SurfaceNet
 from .outliers import outlier_patches
-from .patches import PatchSet, joined, judged_patches, share_group, training_patches
+from .patches import PatchSet, joined, judged_patches, training_patches
 from .teacher import TeacherError, TeacherFeatures, teacher_features
 from .train_surface import (
     Report,
@@ -27,6 +27,7 @@ from .train_surface import (
     learn_classes,
     learn_features,
     learn_reading,
+    learn_softening,
     new_student,
     verdicts_of,
 )
@@ -107,9 +108,9 @@ def gather(
     every = of_split(pictures, "train")
     patches = joined([training_patches(every, CUTTING_SEED), rendered["train"]])
     teacher = _ask_teacher(given, patches, steps) if given.teacher else None
-    kept = np.array([share_group(str(source)) not in given.without for source in patches.sources])
+    kept = np.array([family_of(str(source)) not in given.without for source in patches.sources])
     rng = np.random.default_rng(CUTTING_SEED)
-    seen = [picture for picture in every if share_group(picture.source) not in given.without]
+    seen = [picture for picture in every if picture.family not in given.without]
     outliers = {
         "train": outlier_patches(rng, seen, patches.patches[kept], OUTLIERS["train"]),
         "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, OUTLIERS["val"]),
@@ -179,7 +180,7 @@ def judge(net: SurfaceNet, judged: dict[str, PatchSet], outliers: Image, seed: i
     validation = joined([_thinned(seed, part) for name, part in judged.items() if " val" in name])
     noised = calibrate.noised(validation.patches, seed)
     labels = np.tile(validation.labels, 2)
-    net.softening.data = calibrate.learn_softening(net, np.concatenate([validation.patches, noised]), labels)
+    net.softening.data = learn_softening(net, np.concatenate([validation.patches, noised]), labels)
     plain = {"undisturbed": verdicts_of(net, validation.patches)[0], "disturbed": verdicts_of(net, noised)[0]}
     both = np.concatenate(list(plain.values()))
     temperature = calibrate.learn_temperature(both, labels)

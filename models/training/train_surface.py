@@ -9,11 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 from torch import Tensor, nn
 from torch.nn import functional
 
+from .calibrate import cross_entropy
 from .data import Image
-from .nets import SurfaceNet
+from .nets import SurfaceNet, sharpness
 from .patches import PatchSet, augmented, draw_weights
 from .teacher import MAP_CELLS, TeacherFeatures
 
@@ -171,6 +173,25 @@ def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, seed: in
         loss.backward()
         optimiser.step()
     net.eval()
+
+
+def learn_softening(net: SurfaceNet, patches: Image, labels: NDArray[np.int64]) -> Tensor:
+    """Slope and centre of the softening by sharpness, shape (2,), by the validation cross-entropy.
+
+    Logits are divided by exp(slope * (centre - sharpness)) where a patch is less sharp than the centre, the median of
+    the given ones: temperature scaling whose T depends on the picture (parameterised as in Tomani et al. 2022).
+    """
+    net.softening.data = torch.zeros(2)
+    logits = verdicts_of(net, patches)[0]
+    sharp = sharpness(torch.from_numpy(patches)).double().numpy()
+    centre = float(np.median(sharp))
+    blur = np.maximum(centre - sharp, 0.0)[:, None]
+
+    def entropy(values: NDArray[np.float64]) -> float:
+        return cross_entropy(logits * np.exp(-values[0] * blur), labels, float(np.exp(values[1])))
+
+    found = minimize(entropy, (0.0, 0.5), method="Nelder-Mead")
+    return torch.tensor([max(float(found.x[0]), 0.0), centre], dtype=torch.float32)
 
 
 def _running_average(average: Tensor, current: Tensor, steps: Tensor | int) -> Tensor:

@@ -37,6 +37,9 @@ LEAST_CONTRAST = 1.0
 """Standard deviation of a patch's grey levels below which it shows no road but a covered, blinded or dark camera. The
 lowest of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
 
+LEAST_READABLE = 0.5
+"""Probability of readable road below which a patch is left out [-]."""
+
 SIDES = {"left": (1.0,), "right": (-1.0,), "both": (1.0, -1.0)}
 """Front wheels whose tracks are looked at, as the sign of their lateral position."""
 
@@ -155,25 +158,39 @@ class IfeState:
 
 @dataclass(frozen=True)
 class Region:
-    """One group before the classifier: its corners, and the patches drawn from them."""
+    """One group on its way: its corners, the patches drawn from them, and what those that can be read show."""
 
     corners: Corners
     centres_px: NDArray[np.float64]
     widths_px: NDArray[np.float64]
     ellipses: tuple[Ellipses, ...]
+    drawn: int
     patches: tuple[NDArray[np.uint8], ...] = ()
+    probabilities: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, len(Surface))))
 
     def seen_in(self, image: NDArray[np.uint8]) -> Region:
         """The region with the patches cut, those without contrast left out."""
-        cut = [
+        cut = tuple(
             cut_patch(image, centre, width)
             for centre, width in zip(self.centres_px, self.widths_px, strict=True)
-        ]
-        kept = [i for i, patch in enumerate(cut) if cv2.meanStdDev(patch)[1].max() >= LEAST_CONTRAST]
-        patches = tuple(cut[i] for i in kept)
-        return replace(
-            self, centres_px=self.centres_px[kept], widths_px=self.widths_px[kept], patches=patches
         )
+        contrast = np.array([cv2.meanStdDev(patch)[1].max() for patch in cut])
+        return replace(self, patches=cut).keeping(contrast >= LEAST_CONTRAST)
+
+    def keeping(self, kept: NDArray[np.bool_]) -> Region:
+        """The region with some of its patches."""
+        return replace(
+            self,
+            centres_px=self.centres_px[kept],
+            widths_px=self.widths_px[kept],
+            patches=tuple(patch for patch, keep in zip(self.patches, kept, strict=True) if keep),
+        )
+
+    @property
+    def p_util(self) -> float:
+        """Share of the road looked at that is of use [-]: corners that are usable, times patches that can be read."""
+        read = len(self.probabilities) / self.drawn if self.drawn else 1.0
+        return self.corners.p_util * read
 
 
 class Ife:
@@ -223,10 +240,10 @@ class Ife:
         usable = usable_road(masks, self.config.remove_shadow)
         looked_at = self.config.groups_looked_at
         regions = self.look(state, image, motion, camera, masks, usable, looked_at)
-        evidence = self.classify(regions)
-        state, result = self.judge(state, regions, evidence)
+        regions = self.classify(regions)
+        state, result = self.judge(state, regions)
         if with_view:
-            result = replace(result, view=_view(camera, masks, usable, regions, evidence))
+            result = replace(result, view=_view(camera, masks, usable, regions))
         return state, result
 
     def look(
@@ -246,14 +263,9 @@ class Ife:
             for index in range(groups)
         ]
 
-    def judge(
-        self, state: IfeState, regions: list[Region], evidence: list[NDArray[np.float64]]
-    ) -> tuple[IfeState, FrameResult]:
-        """The state after a frame and its verdict, from the regions and their patches' probabilities."""
-        verdicts = [
-            self._fuse(index, state.evidence[index], region.corners, probabilities)
-            for index, (region, probabilities) in enumerate(zip(regions, evidence, strict=True))
-        ]
+    def judge(self, state: IfeState, regions: list[Region]) -> tuple[IfeState, FrameResult]:
+        """The state after a frame and its verdict, from the classified regions."""
+        verdicts = [self._fuse(index, state.evidence[index], region) for index, region in enumerate(regions)]
         after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
         result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)
         return IfeState(after, state.frame_count + 1), result
@@ -280,7 +292,7 @@ class Ife:
         key = (config.seed, frame, index, list(SIDES).index(config.side))
         drawn = sample(corners, config.b[index], key)
         widths = roi_widths_px(camera, corners.ground_m[drawn], config.roi_width_m)
-        return Region(corners, corners.pixel[drawn], widths, ellipses)
+        return Region(corners, corners.pixel[drawn], widths, ellipses, len(drawn))
 
     def _tracks(self, motion: Motion) -> list[Ellipses]:
         config = self.config
@@ -298,21 +310,26 @@ class Ife:
             for sign in SIDES[config.side]
         ]
 
-    def classify(self, regions: list[Region]) -> list[NDArray[np.float64]]:
-        """Calibrated probabilities of the patches of each group, all in one run of the network."""
+    def classify(self, regions: list[Region]) -> list[Region]:
+        """The regions with what their readable patches show, all in one run of the network; others are left out."""
         patches = [patch for region in regions for patch in region.patches]
         if not patches:
-            return [np.empty((0, len(Surface)))] * len(regions)
+            return regions
         temperature = self._classifier.temperature if self.config.calibrate else 1.0
-        probabilities = calibrated_probabilities(self._classifier.logits(np.stack(patches)), temperature)
-        ends = np.cumsum([len(region.widths_px) for region in regions])
-        return np.split(probabilities, ends[:-1])
+        verdicts = self._classifier.verdicts(np.stack(patches))
+        probabilities = calibrated_probabilities(verdicts.logits, temperature)
+        readable = verdicts.readable >= LEAST_READABLE
+        ends = np.cumsum([len(region.patches) for region in regions])[:-1]
+        return [
+            replace(region.keeping(kept), probabilities=own[kept])
+            for region, kept, own in zip(
+                regions, np.split(readable, ends), np.split(probabilities, ends), strict=True
+            )
+        ]
 
-    def _fuse(
-        self, index: int, before: EvidenceState, corners: Corners, probabilities: NDArray[np.float64]
-    ) -> tuple[EvidenceState, GroupResult]:
+    def _fuse(self, index: int, before: EvidenceState, region: Region) -> tuple[EvidenceState, GroupResult]:
         """Evidence weights and verdict of one group, Eqs. (7) to (10)."""
-        config = self.config
+        config, corners, probabilities = self.config, region.corners, region.probabilities
         n_roi = len(probabilities)
         if n_roi > 1:
             after = update_weights(before, probabilities.argmax(axis=1), config.weight_law)
@@ -321,7 +338,7 @@ class Ife:
         else:
             after, fused = before, np.array(before.weights)
         surface = Surface(int(fused.argmax()))
-        Q_v = visual_confidence(corners.p_util, float(fused[surface]))
+        Q_v = visual_confidence(region.p_util, float(fused[surface]))
         dry, wet, snow_ice = fused.tolist()
         return after, GroupResult(
             name=GROUP_NAMES[index],
@@ -329,7 +346,7 @@ class Ife:
             surface=surface,
             probabilities=(dry, wet, snow_ice),
             P_fusion=float(fused[surface]),
-            p_util=corners.p_util,
+            p_util=region.p_util,
             Q_v=Q_v,
             flag=n_roi > 1 and Q_v > config.flag_threshold,
             n_roi=n_roi,
@@ -370,10 +387,9 @@ def _view(
     masks: RoadMasks,
     usable: NDArray[np.bool_],
     regions: list[Region],
-    evidence: list[NDArray[np.float64]],
 ) -> FrameView:
     groups = []
-    for region, probabilities in zip(regions, evidence, strict=True):
+    for region in regions:
         outlines = [ellipses.outlines_m() for ellipses in region.ellipses]
         stacked = np.concatenate(outlines) if outlines else np.empty((0, 32, 2))
         boxes = [
@@ -384,7 +400,7 @@ def _view(
             GroupView(
                 camera.ground_to_image(stacked.reshape(-1, 2)).reshape(stacked.shape),
                 np.array(boxes, dtype=np.int64).reshape(-1, 4),
-                probabilities,
+                region.probabilities,
             )
         )
     return FrameView(masks, usable, tuple(groups))
