@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from trpac_core.vision.regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX, cut_patch
+from trpac_core.vision.regions import cut_box, cut_patch
 
 from .augment import camera_look
 from .data import Image, Picture, family_of, pixel_box
@@ -115,8 +115,7 @@ def unsquashed(picture: Picture, image: Image, stretch: float) -> Image:
 def reduced(image: Image, box: tuple[float, float, float, float]) -> Image:
     """A box of a picture (left, top, right, bottom in pixels) as a patch of the network's size."""
     left, top, right, bottom = (round(edge) for edge in box)
-    size = (PATCH_WIDTH_PX, PATCH_HEIGHT_PX)
-    return np.asarray(cv2.resize(image[top:bottom, left:right], size, interpolation=cv2.INTER_AREA), np.uint8)
+    return cut_box(image, (left, top, right, bottom))
 
 
 def random_patches(rng: np.random.Generator, picture: Picture, count: int) -> list[Image]:
