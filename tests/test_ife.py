@@ -393,3 +393,24 @@ def test_a_camera_that_sees_nothing_keeps_the_flag_down(grey):
     assert result.near.n_roi == 0
     assert not result.flag
     assert result.surface is WET  # what history says
+
+
+def test_the_near_group_alone_gives_the_same_verdicts_bit_by_bit():
+    """The trained networks, over frames whose history matters: what the units leave out is not missed."""
+    networks = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
+    camera = CAMERA.scaled(0.5)
+    renderer = Renderer(camera, [SurfaceSegment(0.0, WET), SurfaceSegment(8.0, DRY)], SceneLook(seed=3))
+    whole = Ife(IfeConfig(camera=camera), *networks)
+    near = Ife(IfeConfig(camera=camera, groups_looked_at=1), *networks)
+    states = IfeState(), IfeState()
+    for place_m in (0.0, 3.0, 6.0):
+        image, motion = renderer.frame(place_m).image, Motion(12.0, 0.5, 0.01)
+        (left, seen), (right, alone) = (
+            ife.process(state, image, motion) for ife, state in zip((whole, near), states, strict=True)
+        )
+        states = left, right
+        assert len(alone.groups) == 1
+        assert alone.near == seen.near
+        assert right.evidence[0] == left.evidence[0]
+    with pytest.raises(ValueError, match="groups_looked_at must be 1, 2 or 3"):
+        IfeConfig(groups_looked_at=0)

@@ -163,7 +163,7 @@ def _kept(sequence: Sequence, folder: Path, scenario: str, out: Path, load) -> p
     key = hashlib.sha256("\n".join(asked).encode()).hexdigest()[:16]
     file = out / "verdicts" / f"{key}.csv"
     if file.is_file():
-        return pd.read_csv(file, keep_default_na=False, na_values=["nan"])
+        return pd.read_csv(file, dtype={"sequence": str}, keep_default_na=False, na_values=["nan"])
     table = judged(sequence, load(), scenario)
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_suffix(".part")
