@@ -258,7 +258,7 @@ class Blind(Certain):
 
 def test_what_cannot_be_read_does_not_count_and_alone_is_refused():
     image = noisy((60, 60, 60), 320, 512)
-    image[:, 300:] = noisy((200, 200, 200), 320, 212)
+    image[:, 260:] = noisy((200, 200, 200), 320, 252)
     everywhere = masks(np.ones((160, 256), bool))
     assert picture_probabilities(image, everywhere, Blind(0)).argmax() == Surface.DRY
     assert picture_probabilities(image, everywhere, Blind(150)).argmax() == Surface.SNOW_ICE
