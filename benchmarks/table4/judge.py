@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from scenarios.camera.disturbances import NONE, PAPER, Disturbance, disturb
 from trpac_core.vision.ife import Ife, IfeConfig, IfeState, fit_camera, usable_road
-from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier
+from trpac_core.vision.networks import PatchVerdicts, RoadMasks, Segmenter, SurfaceClassifier
 from trpac_core.vision.voting import Voting, VotingConfig
 
 from .sequences import Image, Sequence, majority
@@ -39,16 +39,16 @@ class Kept:
 
     def __post_init__(self) -> None:
         self._patches = np.empty((0, 0, 0, 0), np.uint8)
-        self._logits = np.empty((0, 0))
+        self._verdicts = PatchVerdicts(np.empty((0, 3)), np.empty(0))
 
     @property
     def temperature(self) -> float:
         return self.classifier.temperature
 
-    def logits(self, patches: NDArray[np.uint8]) -> NDArray[np.float64]:
+    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
         if not np.array_equal(patches, self._patches):
-            self._patches, self._logits = patches, self.classifier.logits(patches)
-        return self._logits
+            self._patches, self._verdicts = patches, self.classifier.verdicts(patches)
+        return self._verdicts
 
 
 @dataclass(frozen=True)
