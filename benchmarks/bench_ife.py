@@ -81,7 +81,7 @@ def main() -> None:
     watch = Stopwatch()
     estimator = Ife(IfeConfig(side=options.side), segmenter, classifier)
     segmenter.segment = watch.wrap("resize_and_segment", segmenter.segment)  # type: ignore[method-assign]
-    classifier.logits = watch.wrap("classify", classifier.logits)  # type: ignore[method-assign]
+    classifier.verdicts = watch.wrap("classify", classifier.verdicts)  # type: ignore[method-assign]
     for stage, names in STAGES.items():
         for name in names:
             setattr(ife_module, name, watch.wrap(stage, getattr(ife_module, name)))
