@@ -161,6 +161,8 @@ def _variant(table: pd.DataFrame, scenario: str, variant: str) -> tuple[object, 
 
 def paired(own: pd.DataFrame, whole: pd.DataFrame, draws: int = 2000) -> str:
     """Difference of n_w on the same frames with its 95 % interval, bootstrap over blocks."""
+    if own.empty:
+        return "-"
     wrong = (own["found"] != own["truth"]).to_numpy(float) - (whole["found"] != whole["truth"]).to_numpy(
         float
     )
