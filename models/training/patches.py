@@ -42,7 +42,7 @@ SOURCE_SHARES = {
     "rendered": 3.0,
     "condition_web": 3.0,
     "seq_extreme": 1.5,
-    "drivable_camvid": 1.0,
+    "drivable_camvid": 1.5,
     "drivable_lums": 0.4,
     "seq_dry_yolop": 0.3,
     "dry_udacity": 0.4,
@@ -56,7 +56,7 @@ cameras being dry does not make "dash camera" mean "dry": wet and snowy dash fra
 LEAST_ROADS = (0.95, 0.7)
 """Least share of road in a patch cut by a mask, of one half and the other: some with kerbs and vehicles [-]."""
 
-CAMERA_SPREAD = 0.25
+CAMERA_SPREAD = 0.4
 """Gain, gamma and white balance of other undisturbed cameras, as a share [-]."""
 
 COARSE_SHARE, COARSE_SCALES = 0.25, (0.45, 1.0)
@@ -122,7 +122,7 @@ def random_patches(rng: np.random.Generator, picture: Picture, count: int) -> li
     """Patches at random places, scales and aspects on the road of one picture, each inside its box or mask."""
     image = unsquashed(picture, picture.image(), rng.uniform(*WEB_STRETCH))
     if picture.mask is not None:
-        return _patches_in_mask(rng, image, picture.road_mask(), count, ASPECTS)
+        return _patches_in_mask(rng, image, picture.road_mask(), count, ASPECTS, LEAST_ROADS)
     wide = picture.wide_box
     patches = []
     for _ in range(count):
@@ -141,7 +141,12 @@ def random_patches(rng: np.random.Generator, picture: Picture, count: int) -> li
 
 
 def _patches_in_mask(
-    rng: np.random.Generator, image: Image, mask: Image, count: int, aspects: tuple[float, float]
+    rng: np.random.Generator,
+    image: Image,
+    mask: Image,
+    count: int,
+    aspects: tuple[float, float],
+    least_roads: tuple[float, float],
 ) -> list[Image]:
     road = mask == 1
     counts = cv2.integral(road.astype(np.uint8))
@@ -158,7 +163,7 @@ def _patches_in_mask(
         if x0 < 0 or y0 < 0 or x1 > image.shape[1] or y1 > image.shape[0]:
             continue
         inside = counts[y1, x1] - counts[y0, x1] - counts[y1, x0] + counts[y0, x0]
-        if inside >= LEAST_ROADS[len(patches) % 2] * (x1 - x0) * (y1 - y0):
+        if inside >= least_roads[len(patches) % 2] * (x1 - x0) * (y1 - y0):
             patches.append(reduced(image, (x0, y0, x1, y1)))
     return patches
 
@@ -167,7 +172,8 @@ def fixed_patches(picture: Picture) -> list[Image]:
     """The patches on which a picture is judged: each road box whole, the wide one too, and four parts of each."""
     image = unsquashed(picture, picture.image(), float(np.mean(WEB_STRETCH)))
     if picture.mask is not None:
-        return _patches_in_mask(np.random.default_rng(0), image, picture.road_mask(), 4, (JUDGED_ASPECT,) * 2)
+        rng = np.random.default_rng(0)
+        return _patches_in_mask(rng, image, picture.road_mask(), 4, (JUDGED_ASPECT,) * 2, LEAST_ROADS[:1] * 2)
     wide = picture.wide_box
     patches = [] if wide is None else [reduced(image, pixel_box(wide, image))]
     for box in picture.boxes:
