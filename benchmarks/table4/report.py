@@ -231,7 +231,8 @@ def _times(times: dict[str, Any] | None) -> str:
 def _how(measured: Measured) -> str:
     drives = measured.table.loc[measured.table["part"] == "", "sequence"].nunique()
     said = [
-        f"{drives} rendered drives. Processor time: {measured.render_cpu_min:.1f} min to draw the drives, {measured.judge_cpu_min:.1f} min "
+        f"{drives} rendered drives. Processor time: "
+        f"{measured.render_cpu_min:.1f} min to draw the drives, {measured.judge_cpu_min:.1f} min "
         "in this run to judge (verdicts kept from a run before cost nothing).",
         "Networks: "
         + "; ".join(
@@ -300,9 +301,10 @@ def draw(measured: Measured, path: Path) -> None:
             axis.bar(at, values, 0.38, color=colour, label=method)
             axis.errorbar(at, values, np.maximum(reach, 0.0), fmt="none", ecolor="#222222", capsize=3, lw=1)
             axis.axhline(PAPER[scenario, method], color=colour, ls="--", lw=1.2)
-            axis.text(len(found) - 0.5, PAPER[scenario, method], f"paper,\n{method}", va="center", fontsize=8)
+            axis.text(len(found) - 0.5, PAPER[scenario, method], f"paper,\n{method}", va="bottom", fontsize=8)
+        axis.set_xticks(range(len(named)), [name.replace(" ", "\n", 1) for name in named], fontsize=8)
         axis.set_title(scenario)
-        axis.set_xlim(-0.6, len(named) + 0.1)
+        axis.set_xlim(-0.6, len(named) + 0.2)
         axis.grid(axis="y", alpha=0.3)
     figure.axes[0].set_ylabel("n_w: wrong frames per 100")
     figure.axes[0].legend(loc="upper left", fontsize=8)
