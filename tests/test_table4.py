@@ -159,6 +159,8 @@ def test_frames_that_are_wrong_together_make_the_interval_wide():
 def test_wilson_and_what_never_went_wrong():
     low, high = wilson(0.0, 10)
     assert (low, high) == (0.0, pytest.approx(0.2775, abs=1e-4))  # z^2 / (n + z^2)
+    one_block = share(np.array([True, False]), np.zeros(2, np.int64))
+    assert one_block.high - one_block.low > 80.0, "a single block says next to nothing"
     none_wrong = share(np.zeros(100, np.bool_), np.repeat(np.arange(10), 10))
     assert (none_wrong.value, none_wrong.high) == (0.0, pytest.approx(27.75, abs=0.01))
     assert str(share(np.empty(0, np.bool_), np.empty(0, np.int64))) == "-"
@@ -192,8 +194,7 @@ def test_the_command_judges_keeps_and_says_what_it_leaves_out(tmp_path, monkeypa
 
     command.main(asked)
     told = capsys.readouterr()
-    assert "LEFT OUT: yolop: no networks in 'without_yolop'" in told.err
-    assert "| (b) rendered drives over class changes | " not in told.err
+    assert "LEFT OUT of the tables: yolop: no networks in 'without_yolop'" in told.err
     line = json.loads((tmp_path / "out" / "scores.json").read_text())
     assert set(line["sets"]) == {"(b) rendered"}
     assert line["sets"]["(b) rendered"]["normal"]["n_w"]["IFE"]["frames"] == 4
@@ -224,5 +225,5 @@ def test_kept_verdicts_are_read_as_they_were_written(tmp_path, monkeypatch, netw
     measured = Measured(
         again.assign(networks="full", consecutive=True), (), False, None, 0.0, 0.0, {"full": {"a": "b"}}
     )
-    assert "| normal | IFE | 1.5 | " in tables(measured)
+    assert "| w/ interference | IFE | 12.8 | " in tables(measured)
     assert json.loads(json.dumps(history_line(measured)))["networks"] == {"full": {"a": "b"}}

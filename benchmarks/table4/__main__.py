@@ -79,7 +79,8 @@ def main(arguments: Row[str] | None = None) -> None:
     if options.page:
         write_page(measured)
     for reason in sorted(missing):
-        print(f"LEFT OUT: {reason}", file=sys.stderr)
+        how = "NOT LEFT OUT of training" if options.not_left_out else "LEFT OUT of the tables"
+        print(f"{how}: {reason}", file=sys.stderr)
 
 
 def _options(arguments: Row[str] | None) -> argparse.Namespace:

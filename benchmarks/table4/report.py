@@ -88,7 +88,20 @@ def tables(measured: Measured) -> str:
         ("Frame time", _times(measured.time)),
         ("How it was measured", _how(measured)),
     ]
-    return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
+    found = (f"## {title}\n\n{text}" for title, text in parts if text)
+    return "\n\n".join([*_warning(measured), *found]) + "\n"
+
+
+def _warning(measured: Measured) -> list[str]:
+    """What the reader must know before the first figure."""
+    if not measured.missing:
+        return []
+    mark = (
+        "NOT LEFT OUT: the networks that judge these sources were trained on them: their rows say nothing of new roads"
+        if measured.not_left_out
+        else "No rows, for want of networks that never saw the source"
+    )
+    return [f"**{mark}**: {'; '.join(measured.missing)}."]
 
 
 def _in(table: pd.DataFrame, scenario: str, method: str) -> pd.DataFrame:
@@ -216,8 +229,10 @@ def _times(times: dict[str, Any] | None) -> str:
 
 
 def _how(measured: Measured) -> str:
+    drives = measured.table.loc[measured.table["part"] == "", "sequence"].nunique()
     said = [
-        f"Processor time: {measured.render_cpu_min:.1f} min to draw the drives, {measured.judge_cpu_min:.1f} min "
+        f"{drives} rendered drives. Processor time: "
+        f"{measured.render_cpu_min:.1f} min to draw the drives, {measured.judge_cpu_min:.1f} min "
         "in this run to judge (verdicts kept from a run before cost nothing).",
         "Networks: "
         + "; ".join(
@@ -226,13 +241,6 @@ def _how(measured: Measured) -> str:
         )
         + ".",
     ]
-    if measured.missing:
-        mark = (
-            "NOT LEFT OUT, judged by the networks of `full`, which were trained on these sources"
-            if measured.not_left_out
-            else "Left out of the tables"
-        )
-        said.append(f"**{mark}**: {'; '.join(measured.missing)}.")
     return "\n\n".join(said)
 
 
@@ -293,17 +301,13 @@ def draw(measured: Measured, path: Path) -> None:
             axis.bar(at, values, 0.38, color=colour, label=method)
             axis.errorbar(at, values, np.maximum(reach, 0.0), fmt="none", ecolor="#222222", capsize=3, lw=1)
             axis.axhline(PAPER[scenario, method], color=colour, ls="--", lw=1.2)
-            axis.text(
-                len(found) - 0.45,
-                PAPER[scenario, method],
-                f"paper, {method}",
-                va="bottom",
-                ha="right",
-                fontsize=8,
-            )
+            axis.text(len(found) - 0.5, PAPER[scenario, method], f"paper,\n{method}", va="bottom", fontsize=8)
         axis.set_xticks(range(len(named)), [name.replace(" ", "\n", 1) for name in named], fontsize=8)
         axis.set_title(scenario)
+        axis.set_xlim(-0.6, len(named) + 0.2)
         axis.grid(axis="y", alpha=0.3)
     figure.axes[0].set_ylabel("n_w: wrong frames per 100")
     figure.axes[0].legend(loc="upper left", fontsize=8)
+    if measured.missing and measured.not_left_out:
+        figure.suptitle("Provisional: the networks were trained on the sources of (a)", fontsize=10)
     figure.savefig(path, dpi=110, metadata={"Software": None})

@@ -15,6 +15,7 @@ from .judge import NO_ROAD, VARIANTS, VOTING
 
 BLOCK = 20
 """Frames of a real drive that count as one observation: 2 s at 10 frames per second."""
+LEAST_BLOCKS = 5
 DRAWS = 2000
 Z = 1.96
 METHODS = (VOTING, *VARIANTS)
@@ -47,15 +48,15 @@ def blocks_of(table: pd.DataFrame) -> NDArray[np.int64]:
 def share(hit: NDArray[np.bool_], block: NDArray[np.int64], seed: int = 0) -> Share:
     """Share of hits [%] with a bootstrap over blocks.
 
-    Where every frame is a hit, or none, all draws are alike and the bootstrap says nothing: there the interval is
-    Wilson's with each block as one observation, which is wide on purpose.
+    Where every frame is a hit, or none, or blocks are few, draws are alike and the bootstrap says nothing: there the
+    interval is Wilson's with each block as one observation, which is wide on purpose.
     """
     if not len(hit):
         return Share(float("nan"), float("nan"), float("nan"), 0, 0)
     _, inverse = np.unique(block, return_inverse=True)
     hits, sizes = np.bincount(inverse, hit), np.bincount(inverse)
     value, n = float(hit.mean()), len(sizes)
-    if value in (0.0, 1.0):
+    if value in (0.0, 1.0) or n < LEAST_BLOCKS:
         low, high = wilson(value, n)
     else:
         drawn = np.random.default_rng(seed).integers(0, n, (DRAWS, n))
