@@ -75,6 +75,9 @@ class IfeConfig:
         Parameters of the evidence weights.
     flag_threshold : float
         Q_v above which the flag is set [-].
+    least_mass : float
+        Largest mass m_0 of Eq. (8), before the combination, from which the flag may be set [-]. Patches of one frame
+        share light, camera and road: combined as if independent, nearly any of them gives a P_fusion near 1.
     seed : int
         Of the drawing of patches.
     groups_looked_at : int
@@ -100,6 +103,7 @@ class IfeConfig:
     strip_half_width_m: float = 4.0
     weight_law: WeightLaw = field(default_factory=WeightLaw)
     flag_threshold: float = 0.5
+    least_mass: float = 0.6
     seed: int = 0
     groups_looked_at: int = len(GROUP_NAMES)
     use_trajectory: bool = True
@@ -130,6 +134,7 @@ class IfeConfig:
             )
             > 0.0,
             "sigma must lie in [0, 1]": 0.0 <= self.weight_law.sigma <= 1.0,
+            "least_mass must lie in [0, 1]": 0.0 <= self.least_mass <= 1.0,
             "seed must not be negative": self.seed >= 0,
             "groups_looked_at must be 1, 2 or 3": 1 <= self.groups_looked_at <= len(GROUP_NAMES),
         }
@@ -334,8 +339,10 @@ class Ife:
         if n_roi > 1:
             after = update_weights(before, probabilities.argmax(axis=1), config.weight_law)
             weights = after.weights if config.weight_evidence else EvidenceState().weights
-            fused = combine(basic_probability(probabilities, weights), n_roi)
+            mass = basic_probability(probabilities, weights)
+            fused = combine(mass, n_roi)
         else:
+            mass = np.zeros(len(Surface))
             after, fused = before, np.array(before.weights)
         surface = Surface(int(fused.argmax()))
         Q_v = visual_confidence(region.p_util, float(fused[surface]))
@@ -348,7 +355,8 @@ class Ife:
             P_fusion=float(fused[surface]),
             p_util=region.p_util,
             Q_v=Q_v,
-            flag=n_roi > 1 and Q_v > config.flag_threshold,
+            m_0=float(mass.max()),
+            flag=Q_v > config.flag_threshold and mass.max() >= config.least_mass and n_roi > 1,
             n_roi=n_roi,
             n_ell=corners.n_ell,
             n_rs=corners.n_rs,
