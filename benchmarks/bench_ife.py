@@ -1,6 +1,6 @@
 """Time of each stage of the image-based fusion estimator on a rendered 1920 x 1200 frame; prints JSON.
 
-python benchmarks/bench_ife.py [--models FOLDER] [--frames N] [--threads N] [--side left|right|both]
+python benchmarks/bench_ife.py [--models FOLDER] [--frames N] [--threads N] [--side left|right|both] [--groups 1|2|3]
 """
 
 import argparse
@@ -70,6 +70,9 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=100)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--side", choices=["left", "right", "both"], default="both")
+    parser.add_argument(
+        "--groups", type=int, choices=[1, 2, 3], default=1, help="the units look at the near one"
+    )
     options = parser.parse_args()
 
     segmenter = Segmenter(options.models / "segmenter.onnx", options.threads)
@@ -79,9 +82,9 @@ def main() -> None:
     jpeg = cv2.imencode(".jpg", pictures[0])[1].tobytes()
 
     watch = Stopwatch()
-    estimator = Ife(IfeConfig(side=options.side), segmenter, classifier)
+    estimator = Ife(IfeConfig(side=options.side, groups_looked_at=options.groups), segmenter, classifier)
     segmenter.segment = watch.wrap("resize_and_segment", segmenter.segment)  # type: ignore[method-assign]
-    classifier.logits = watch.wrap("classify", classifier.logits)  # type: ignore[method-assign]
+    classifier.verdicts = watch.wrap("classify", classifier.verdicts)  # type: ignore[method-assign]
     for stage, names in STAGES.items():
         for name in names:
             setattr(ife_module, name, watch.wrap(stage, getattr(ife_module, name)))
@@ -100,6 +103,7 @@ def main() -> None:
             {
                 "picture_px": [1920, 1200],
                 "side": options.side,
+                "groups": options.groups,
                 "frames": options.frames,
                 "threads": options.threads,
                 "cpus": os.cpu_count(),

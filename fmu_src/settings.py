@@ -319,6 +319,14 @@ _IMAGE_PARAMETERS = (
     _parameter(
         "image.flag_threshold", "1", "vision.flag_threshold", "Q_v above which the flag is set", 0.0, 1.0
     ),
+    _parameter(
+        "image.least_mass",
+        "1",
+        "vision.least_mass",
+        "Least mass m_0 of the class for the flag to be set",
+        0.0,
+        1.0,
+    ),
     *(
         _parameter(
             f"image.{group}_{end}",

@@ -22,6 +22,8 @@ from trpac_core.vision.trajectory import Motion
 MODELS = Path(__file__).resolve().parents[1] / "models"
 CLASS_BGR = {Surface.DRY: (60, 160, 240), Surface.WET: (230, 140, 40), Surface.SNOW_ICE: (220, 80, 200)}
 ROAD_BGR, SHADOW_BGR = (90, 200, 90), (200, 90, 90)
+FLAG_DOWN_BGR = (60, 60, 230)
+NEAR_LINE_PX, FAR_LINE_PX = 5, 2
 TINT = 0.22
 TILE_PX = 640
 COLUMNS = 3
@@ -44,6 +46,9 @@ def image_estimator(scenario: Scenario) -> Ife:
 def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArray[np.uint8]:
     """The picture with usable road and shadow tinted, ellipses, patches by their class, and the verdict.
 
+    The near group, whose verdict it is, is drawn in thick lines; a bar in the class's colour stands beside the
+    verdict, and a red line stands below it where the flag is down.
+
     Raises ValueError where the result was made without its view.
     """
     if result.view is None:
@@ -53,7 +58,7 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
     for mask, colour in ((result.view.masks.drivable, ROAD_BGR), (result.view.masks.shadow, SHADOW_BGR)):
         inside = cv2.resize(mask, size, interpolation=cv2.INTER_LINEAR) > 0.5
         shown[inside] = ((1.0 - TINT) * shown[inside] + TINT * np.array(colour)).astype(np.uint8)
-    for group in result.view.groups:
+    for number, group in enumerate(result.view.groups):
         for outline in group.outlines_px[::2]:
             if np.isfinite(outline).all():
                 cv2.polylines(
@@ -61,9 +66,16 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
                 )
         for box, probabilities in zip(group.boxes_px, group.probabilities, strict=True):
             colour = CLASS_BGR[Surface(int(np.argmax(probabilities)))]
-            cv2.rectangle(shown, (int(box[0]), int(box[1])), (int(box[2]), int(box[3])), colour, 3)
-    verdict = f"{result.surface.label}  Q_v {result.Q_v:.2f}  flag {int(result.flag)}"
+            corners = (int(box[0]), int(box[1])), (int(box[2]), int(box[3]))
+            cv2.rectangle(shown, *corners, colour, NEAR_LINE_PX if number == 0 else FAR_LINE_PX)
+    verdict = (
+        f"{result.surface.label}  Q_v {result.Q_v:.2f} (p_util {result.p_util:.2f}, P {result.P_fusion:.2f})"
+        f"  flag {int(result.flag)}"
+    )
     cv2.rectangle(shown, (0, 0), (shown.shape[1], 150), (40, 40, 40), cv2.FILLED)
+    cv2.rectangle(shown, (0, 0), (14, 150), CLASS_BGR[result.surface], cv2.FILLED)
+    if not result.flag:
+        cv2.rectangle(shown, (0, 138), (shown.shape[1], 150), FLAG_DOWN_BGR, cv2.FILLED)
     for row, text in enumerate((caption, verdict)):
         place = (24, 60 + 64 * row)
         cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 4, cv2.LINE_AA)

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from scenarios.looks import MODELS
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import LEAST_CONTRAST, usable_road
+from trpac_core.vision.ife import LEAST_CONTRAST, LEAST_READABLE, usable_road
 from trpac_core.vision.images import ImageError, decode_image
 from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier, calibrated_probabilities
-from trpac_core.vision.regions import LEAST_ROI_WIDTH_PX, ROI_ASPECT, cut_patch, roi_box
+from trpac_core.vision.regions import cut_box
 
 CLASSIFY_COLUMNS = ("file", "class", "confidence", "p_dry", "p_wet", "p_snow_ice")
 PICTURE_ENDINGS = frozenset((".jpg", ".jpeg", ".png", ".bmp", ".gif", ".heic", ".tif", ".tiff", ".webp"))
@@ -26,14 +26,14 @@ PICTURE_ENDINGS = frozenset((".jpg", ".jpeg", ".png", ".bmp", ".gif", ".heic", "
 
 LOWER_CENTRE = (0.20, 0.60, 0.80, 0.95)
 """Where road is in the picture of a camera of which nothing is known: left, top, right, bottom [of its size]."""
-PATCH_SCALES = (1.0, 0.55, 0.3)
-"""Patch widths, of the largest that the lower centre holds [-]."""
-MOST_PER_AXIS = 6
-"""Patches of one width side by side, or one above the other."""
-LEAST_USABLE = 0.8
-"""Share of a patch that must be road out of the shadow [-]."""
-LEAST_PATCHES = 4
-"""With fewer patches on usable road, all of the lower centre's are taken."""
+WIDE = (0.08, 0.55, 0.92, 0.96)
+"""The same with the road's sides: water shows in what a wide field reflects."""
+PART = 0.6
+"""Size of the overlapping parts of the lower centre that are looked at besides, of its width and height [-]."""
+LEAST_USABLE = 0.7
+"""Share of a look that must be road out of the shadow [-]."""
+LEAST_LOOKS = 2
+"""With fewer looks at usable road, all are taken."""
 _LEAST_PROBABILITY = 1e-12
 
 Progress = Callable[[int, int], None]
@@ -114,25 +114,28 @@ def picture_probabilities(
     The mean log probability of its patches, normalised: patches of one picture share light, camera and road, so they
     are not the independent bodies of evidence that Dempster's rule would multiply to near-certainty.
 
-    Raises ImageError where the lower centre shows nothing at all: a covered, blinded or dark camera.
+    Raises ImageError where the lower centre shows nothing at all, or nothing that could be read: a covered, blinded or
+    dark camera, a picture without road.
     """
-    height, width = image.shape[:2]
-    boxes = _patch_places(width, height)
+    boxes = _looks(image.shape[1], image.shape[0])
     usable = usable_road(masks, remove_shadow=True)
-    share = np.array(
-        [_usable_share(usable, roi_box(width, height, at[:2], at[2]), width, height) for at in boxes]
-    )
-    on_road = boxes[share >= LEAST_USABLE]
-    for places in (on_road, boxes):
-        cut = [cut_patch(image, place[:2], place[2]) for place in places]
-        patches = [patch for patch in cut if patch.std(axis=(0, 1)).max() >= LEAST_CONTRAST]
-        if len(patches) >= LEAST_PATCHES:
-            break
+    share = np.array([_usable_share(usable, box, image.shape[1], image.shape[0]) for box in boxes])
+    if (share >= LEAST_USABLE).sum() >= LEAST_LOOKS:
+        boxes = [box for box, on_road in zip(boxes, share >= LEAST_USABLE, strict=True) if on_road]
+    patches = [cut_box(image, box) for box in boxes]
+    patches = [patch for patch in patches if patch.std(axis=(0, 1)).max() >= LEAST_CONTRAST]
     if not patches:
         raise ImageError(
             f"{name}: one even colour where the road should be. Is the lens covered, or the picture dark?"
         )
-    probabilities = calibrated_probabilities(classifier.logits(np.stack(patches)), classifier.temperature)
+    verdicts = classifier.verdicts(np.stack(patches))
+    readable = verdicts.readable >= LEAST_READABLE
+    if not readable.any():
+        raise ImageError(
+            f"{name}: no road that could be read where it should be, the lower centre. Is it a picture of a road, in "
+            "focus and lit?"
+        )
+    probabilities = calibrated_probabilities(verdicts.logits[readable], classifier.temperature)
     logs = np.log(np.maximum(probabilities, _LEAST_PROBABILITY)).mean(axis=0)
     raised = np.exp(logs - logs.max())
     return raised / raised.sum()
@@ -148,25 +151,13 @@ def _upright(file: Path) -> NDArray[np.uint8]:
     return image if turned is None else turned.astype(np.uint8, copy=False)
 
 
-def _patch_places(width_px: int, height_px: int) -> NDArray[np.float64]:
-    """Patches that cover the lower centre in three sizes: column, row and width of each, shape (n, 3) [px]."""
-    left, top, right, bottom = np.array(LOWER_CENTRE) * [width_px, height_px, width_px, height_px]
-    largest = min(right - left, ROI_ASPECT * (bottom - top))
-    places = []
-    for scale in PATCH_SCALES:
-        width = scale * largest
-        if scale == PATCH_SCALES[0] or width >= LEAST_ROI_WIDTH_PX:
-            columns = _spread(left, right, width)
-            places += [(x, y, width) for x in columns for y in _spread(top, bottom, width / ROI_ASPECT)]
-    return np.array(places)
-
-
-def _spread(low: float, high: float, length: float) -> NDArray[np.float64]:
-    """Centres of pieces of a length that overlap by two fifths and fill the stretch from low to high."""
-    count = min(MOST_PER_AXIS, 1 + round((high - low - length) / (0.6 * length)))
-    if count == 1:
-        return np.array([(low + high) / 2.0])
-    return np.linspace(low + length / 2.0, high - length / 2.0, count)
+def _looks(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:
+    """The wide look, the lower centre and its four parts: left, top, right, bottom of each [px]."""
+    left, top, right, bottom = LOWER_CENTRE
+    columns, rows = PART * (right - left), PART * (bottom - top)
+    parts = [(x, y, x + columns, y + rows) for x in (left, right - columns) for y in (top, bottom - rows)]
+    size = np.array([width_px, height_px, width_px, height_px])
+    return [tuple(int(edge) for edge in np.round(box * size)) for box in (WIDE, LOWER_CENTRE, *parts)]  # type: ignore[misc]
 
 
 def _usable_share(

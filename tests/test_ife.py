@@ -20,7 +20,7 @@ from trpac_core.vision.classes import Surface
 from trpac_core.vision.evidence import EvidenceState, WeightLaw
 from trpac_core.vision.ife import Ife, IfeConfig, IfeState
 from trpac_core.vision.images import ImageError
-from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier
+from trpac_core.vision.networks import PatchVerdicts, RoadMasks, Segmenter, SurfaceClassifier
 from trpac_core.vision.trajectory import Motion
 from trpac_core.vision.voting import Voting, VotingConfig
 
@@ -51,10 +51,14 @@ class Middle:
         self.temperature, self.certainty = temperature, certainty
         self.patches = np.empty((0, 64, 96, 3), np.uint8)
 
-    def logits(self, patches):
+    def verdicts(self, patches):
         self.patches = patches
         grey = patches[:, 30:34, 46:50].mean(axis=(1, 2, 3))
-        return self.certainty * np.eye(3)[np.abs(grey[:, None] - PAINT).argmin(axis=1)]
+        logits = self.certainty * np.eye(3)[np.abs(grey[:, None] - PAINT).argmin(axis=1)]
+        return PatchVerdicts(logits, self.readable(grey))
+
+    def readable(self, grey):
+        return np.ones(len(grey))
 
 
 @lru_cache
@@ -172,6 +176,29 @@ def test_without_usable_road_history_answers_and_the_flag_is_down():
     assert (result.flag, result.Q_v, result.near.n_roi) == (False, 0.0, 0)
     assert after.evidence == state.evidence
     assert after.frame_count == 8
+
+
+class HalfBlind(Middle):
+    """Reads the left half of its patches only."""
+
+    def __init__(self, share):
+        super().__init__()
+        self.share = share
+
+    def readable(self, grey):
+        return (np.arange(len(grey)) < self.share * len(grey)).astype(float)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.25, 0.0])
+def test_patches_that_cannot_be_read_are_left_out_and_lower_p_util(share):
+    result = run(
+        paint(lambda x, y: np.zeros(len(x))),
+        classifier=HalfBlind(share),
+        config=IfeConfig(groups_looked_at=1),
+    )[1]
+    assert result.near.n_roi == round(4 * share)
+    assert result.near.p_util == pytest.approx(share, abs=0.02)
+    assert result.flag == (share == 1.0)
 
 
 def test_one_usable_corner_is_no_evidence_however_sure_history_is():
@@ -366,3 +393,24 @@ def test_a_camera_that_sees_nothing_keeps_the_flag_down(grey):
     assert result.near.n_roi == 0
     assert not result.flag
     assert result.surface is WET  # what history says
+
+
+def test_the_near_group_alone_gives_the_same_verdicts_bit_by_bit():
+    """The trained networks, over frames whose history matters: what the units leave out is not missed."""
+    networks = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
+    camera = CAMERA.scaled(0.5)
+    renderer = Renderer(camera, [SurfaceSegment(0.0, WET), SurfaceSegment(8.0, DRY)], SceneLook(seed=3))
+    whole = Ife(IfeConfig(camera=camera), *networks)
+    near = Ife(IfeConfig(camera=camera, groups_looked_at=1), *networks)
+    states = IfeState(), IfeState()
+    for place_m in (0.0, 3.0, 6.0):
+        image, motion = renderer.frame(place_m).image, Motion(12.0, 0.5, 0.01)
+        (left, seen), (right, alone) = (
+            ife.process(state, image, motion) for ife, state in zip((whole, near), states, strict=True)
+        )
+        states = left, right
+        assert len(alone.groups) == 1
+        assert alone.near == seen.near
+        assert right.evidence[0] == left.evidence[0]
+    with pytest.raises(ValueError, match="groups_looked_at must be 1, 2 or 3"):
+        IfeConfig(groups_looked_at=0)

@@ -48,6 +48,10 @@ def logits_of(network, images):
     return network.run(["logits"], {"patches": np.ascontiguousarray(images)})[0].astype(np.float64)
 
 
+def readings_of(network, images):
+    return network.run(["readable"], {"patches": np.ascontiguousarray(images)})[0].astype(np.float64)
+
+
 def temperature_of(network):
     return float(network.get_modelmeta().custom_metadata_map["temperature"])
 
@@ -83,8 +87,8 @@ def test_surface_contract(surface):
     (batch,) = surface.get_inputs()
     assert (batch.name, batch.type, batch.shape[1:]) == ("patches", "tensor(uint8)", [64, 96, 3])
     assert not isinstance(batch.shape[0], int)
-    (output,) = surface.get_outputs()
-    assert (output.name, output.type, output.shape[1]) == ("logits", "tensor(float)", 3)
+    outputs = {output.name: (output.type, output.shape[1:]) for output in surface.get_outputs()}
+    assert outputs == {"logits": ("tensor(float)", [3]), "readable": ("tensor(float)", [])}
     properties = surface.get_modelmeta().custom_metadata_map
     assert properties["classes"] == "dry,wet,snow_ice"
     assert 0.05 < temperature_of(surface) < 20.0
@@ -92,6 +96,22 @@ def test_surface_contract(surface):
         logits = logits_of(surface, random_patches(count))
         assert logits.shape == (count, 3)
         assert np.isfinite(logits).all()
+        readable = readings_of(surface, random_patches(count))
+        assert readable.shape == (count,)
+        assert ((readable >= 0.0) & (readable <= 1.0)).all()
+
+
+def test_readable_road_is_told_from_what_is_none(surface, held_out):
+    """Rendered roads that no training has seen, and noise, an even grey and a grid, none of them as in the training."""
+    rng = np.random.default_rng(1)
+    checks = (np.indices((64, 96)).sum(axis=0) // 8 % 2 * 120 + 60).astype(np.uint8)
+    odd = [
+        rng.normal(128, 60, (64, 96, 3)).clip(0, 255).astype(np.uint8),
+        np.full((64, 96, 3), 128, np.uint8),
+        np.repeat(checks[..., None], 3, axis=2),
+    ]
+    assert np.mean(readings_of(surface, held_out[1].patches) > 0.5) > 0.97
+    assert (readings_of(surface, np.stack(odd)) < 0.5).all()
 
 
 def test_a_patch_is_judged_alone(surface):

@@ -10,8 +10,10 @@ from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
 def test_classifier_takes_any_number_of_patches_in_one_run(tmp_path):
     classifier = SurfaceClassifier(write_classifier(tmp_path / "surface.onnx"))
     patches = np.random.default_rng(0).integers(0, 256, (7, 64, 96, 3), dtype=np.uint8)
-    assert classifier.logits(patches) == pytest.approx(patches.mean(axis=(1, 2)), rel=1e-5)
-    assert classifier.logits(patches[:1]).shape == (1, 3)
+    assert classifier.verdicts(patches).logits == pytest.approx(patches.mean(axis=(1, 2)), rel=1e-5)
+    assert classifier.verdicts(patches[:1]).logits.shape == (1, 3)
+    grey = patches.mean(axis=(1, 2, 3))
+    assert classifier.verdicts(patches).readable == pytest.approx(1.0 / (1.0 + np.exp(-grey)), rel=1e-5)
     assert classifier.temperature == 2.5
 
 

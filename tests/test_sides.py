@@ -24,9 +24,9 @@ class Counting(Middle):
 
     runs = 0
 
-    def logits(self, patches):
+    def verdicts(self, patches):
         self.runs += 1
-        return super().logits(patches)
+        return super().verdicts(patches)
 
 
 def test_each_side_gets_its_own_surface_from_one_segmentation_and_one_run():

@@ -12,7 +12,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.training import augment, calibrate, data, patches, rendered, scores, segmenter_data
+from models.training import (
+    augment,
+    calibrate,
+    data,
+    outliers,
+    patches,
+    rendered,
+    scores,
+    segmenter_data,
+    teacher,
+)
 from models.training.__main__ import main
 
 ROOT = Path(__file__).parents[1]
@@ -87,8 +97,11 @@ def test_splits_are_the_manifests(made_up):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_patches_stay_on_the_road(made_up, seed):
+def test_patches_stay_on_the_road(made_up, seed, monkeypatch):
     """The road is grey and all else white: a white edge wider than one pixel is a box that is off."""
+    monkeypatch.setattr(patches, "WIDE_SHARE", 0.0)
+    monkeypatch.setattr(patches, "LEAST_ROADS", (0.97, 0.97))
+    monkeypatch.setattr(data, "WIDE_BOXES", {})
     for picture in data.read_manifest(made_up):
         cut = patches.random_patches(np.random.default_rng(seed), picture, 12)
         cut += patches.fixed_patches(picture)
@@ -96,6 +109,55 @@ def test_patches_stay_on_the_road(made_up, seed):
         for patch in cut:
             assert patch.shape == (64, 96, 3)
             assert np.mean(patch > GREY + 40) <= 0.06
+
+
+def test_wide_looks_span_most_of_the_wide_box_and_no_more(made_up, monkeypatch):
+    monkeypatch.setattr(patches, "WIDE_SHARE", 1.0)
+    still = next(p for p in data.read_manifest(made_up) if p.source == "condition_web")
+    x, y = np.meshgrid(np.linspace(0, 255, 200), np.linspace(0, 255, 200))
+    cv2.imwrite(str(still.path), np.dstack([x, y, 0 * x]).astype(np.uint8))
+    left, top, right, bottom = data.WIDE_BOXES["condition_web"]
+    for patch in patches.random_patches(np.random.default_rng(0), still, 20):
+        columns, rows = patch[..., 0] / 255.0, patch[..., 1] / 255.0
+        assert columns.min() >= left - 0.02
+        assert columns.max() <= right + 0.02
+        assert rows.min() >= top - 0.02
+        assert rows.max() <= bottom + 0.02
+        assert np.ptp(columns) >= 0.9 * patches.WIDE_LEAST * (right - left)
+        assert np.ptp(rows) >= 0.9 * patches.WIDE_LEAST * (bottom - top)
+
+
+def test_left_out_sources_are_absent_from_patches_and_outliers(made_up, monkeypatch):
+    pytest.importorskip("torch")
+    import argparse
+
+    from models.training import surface_run
+
+    monkeypatch.setattr(surface_run, "OUTLIERS", {"train": 12, "val": 4})
+    rendered_part = patches.patch_set([([np.full((64, 96, 3), GREY, np.uint8)], 0, "rendered")])
+    given = argparse.Namespace(teacher=None, without=("seq_extreme",), worlds=None)
+    material = surface_run.gather(
+        given, data.read_manifest(made_up), {"train": rendered_part, "val": rendered_part}, None
+    )
+    assert set(material.patches.sources) == {"condition_web", "drivable_camvid/train", "rendered"}
+    assert material.outliers["train"].shape == (12, 64, 96, 3)
+
+
+def test_outliers_repeat_by_seed_and_differ_from_one_another(made_up):
+    pictures = data.of_split(data.read_manifest(made_up), "train")
+    road = np.random.default_rng(0).integers(0, 80, (2, 64, 96, 3), np.uint8)
+    first = outliers.outlier_patches(np.random.default_rng(3), pictures, road, 24)
+    np.testing.assert_array_equal(
+        first, outliers.outlier_patches(np.random.default_rng(3), pictures, road, 24)
+    )
+    assert len({patch.tobytes() for patch in first[::2]}) == 12
+
+
+def test_areas_of_the_teachers_cells_are_shared_out_whole():
+    weights = teacher._area_weights(14, 4)
+    assert weights.shape == (4, 14)
+    assert weights.sum(axis=1) == pytest.approx(np.ones(4))
+    assert weights.sum(axis=0) == pytest.approx(np.full(14, 4 / 14))
 
 
 def test_overlaid_clips_are_used_inside_their_limits_only():

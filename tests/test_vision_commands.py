@@ -23,8 +23,13 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeConfig, IfeState
 from trpac_core.vision.images import ImageError, decode_image
-from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier, calibrated_probabilities
-from trpac_core.vision.regions import roi_box
+from trpac_core.vision.networks import (
+    PatchVerdicts,
+    RoadMasks,
+    Segmenter,
+    SurfaceClassifier,
+    calibrated_probabilities,
+)
 from trpac_core.vision.trajectory import Motion
 
 SMALL = Camera().scaled(0.25)
@@ -79,8 +84,8 @@ class ByColour:
 
     temperature = 2.0
 
-    def logits(self, patches):
-        return patches.astype(np.float64).mean(axis=(1, 2)) / 100.0
+    def verdicts(self, patches):
+        return PatchVerdicts(patches.astype(np.float64).mean(axis=(1, 2)) / 100.0, np.ones(len(patches)))
 
 
 class Certain:
@@ -88,8 +93,8 @@ class Certain:
 
     temperature = 1.5
 
-    def logits(self, patches):
-        return np.tile([2.0, 0.5, -1.0], (len(patches), 1))
+    def verdicts(self, patches):
+        return PatchVerdicts(np.tile([2.0, 0.5, -1.0], (len(patches), 1)), np.ones(len(patches)))
 
 
 def noisy(colour, height, width):
@@ -228,15 +233,37 @@ def test_one_even_colour_is_refused():
 
 
 @given(st.integers(64, 8000), st.integers(64, 8000))
-def test_patches_lie_in_pictures_of_any_shape(width, height):
-    places = stills._patch_places(width, height)
-    assert 1 <= len(places) <= 3 * stills.MOST_PER_AXIS**2
-    for column, row, patch_px in places:
-        left, top, right, bottom = roi_box(width, height, (column, row), patch_px)
+def test_looks_lie_in_pictures_of_any_shape(width, height):
+    looks = stills._looks(width, height)
+    assert len(looks) == 6
+    for left, top, right, bottom in looks:
         assert 0 <= left < right <= width
-        assert 0 <= top < bottom <= height
-        assert 0.2 * width <= column <= 0.8 * width
-        assert 0.6 * height <= row <= 0.95 * height
+        assert height // 2 <= top < bottom <= height
+    assert looks[0][0] <= 0.1 * width
+    assert looks[0][2] >= 0.9 * width
+
+
+class Blind(Certain):
+    """Reads patches whose mean grey is above a limit."""
+
+    def __init__(self, limit):
+        self.limit = limit
+
+    def verdicts(self, patches):
+        grey = patches.mean(axis=(1, 2, 3))
+        return PatchVerdicts(
+            np.where(grey[:, None] > 150, [0.0, 0.0, 3.0], [3.0, 0.0, 0.0]), (grey > self.limit) * 1.0
+        )
+
+
+def test_what_cannot_be_read_does_not_count_and_alone_is_refused():
+    image = noisy((60, 60, 60), 320, 512)
+    image[:, 260:] = noisy((200, 200, 200), 320, 252)
+    everywhere = masks(np.ones((160, 256), bool))
+    assert picture_probabilities(image, everywhere, Blind(0)).argmax() == Surface.DRY
+    assert picture_probabilities(image, everywhere, Blind(150)).argmax() == Surface.SNOW_ICE
+    with pytest.raises(ImageError, match=r"wall\.png: no road that could be read"):
+        picture_probabilities(image, everywhere, Blind(255), "wall.png")
 
 
 # --- run ---

@@ -49,13 +49,18 @@ def _write(path: Path, nodes: list[bytes], inputs: list[bytes], outputs: list[by
 
 
 def write_classifier(path: Path, *, height: int = 64, metadata: dict | None = None) -> Path:
-    """Logits are the mean blue, green and red of each patch."""
+    """Logits are the mean blue, green and red of each patch; any patch is readable, the more so the brighter it is."""
     calibration = {"temperature": "2.5", "classes": "dry,wet,snow_ice"} if metadata is None else metadata
     return _write(
         path,
-        [_cast("patches"), _mean("logits", [1, 2])],
+        [
+            _cast("patches"),
+            _mean("logits", [1, 2]),
+            _mean("grey", [1, 2, 3]),
+            _node("Sigmoid", "grey", "readable"),
+        ],
         [_tensor("patches", UINT8, ["n", height, 96, 3])],
-        [_tensor("logits", FLOAT, ["n", 3])],
+        [_tensor("logits", FLOAT, ["n", 3]), _tensor("readable", FLOAT, ["n"])],
         calibration,
     )
 

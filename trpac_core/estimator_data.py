@@ -83,9 +83,10 @@ class EstimatorConfig:
 
     @property
     def image_settings(self) -> IfeConfig:
-        """Settings of the image estimator for this vehicle and wheel."""
+        """Settings of the image estimator for this vehicle and wheel: only the near group's verdict reaches it."""
         return replace(
             self.vision,
+            groups_looked_at=1,
             track_m=self.vehicle.track_m,
             wheelbase_m=self.vehicle.wheelbase_m,
             side="left" if self.left_side else "right",

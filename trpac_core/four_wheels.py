@@ -217,8 +217,7 @@ class FourWheels:
 
     def _as_class(self, result: FrameResult) -> RoadClass:
         """A verdict in the form that a wheel takes: its flag is up where the confidence is above the threshold."""
-        threshold = self.config.wheel.vision.flag_threshold
-        return RoadClass(result.surface, result.Q_v if result.flag else min(result.Q_v, threshold))
+        return RoadClass(result.surface, result.told_by_bus(self.config.wheel.vision.flag_threshold))
 
     @staticmethod
     def _motion_known(sensors: CarSensors) -> bool:

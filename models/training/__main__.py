@@ -9,6 +9,7 @@ from pathlib import Path
 
 from .data import DataFolderError
 
+LEFT_OUT = ("drivable_camvid", "drivable_lums", "seq_dry_yolop", "seq_extreme")
 NEEDED = ("torch", "onnx", "onnxscript", "albumentations", "rich", "matplotlib")
 
 
@@ -35,12 +36,25 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--worlds",
         type=Path,
-        help="folder that keeps the rendered pictures; delete it when the renderer changes",
+        help="folder that keeps the rendered pictures and the teacher's features; delete it when the renderer changes",
     )
     parser.add_argument(
         "--teacher",
         type=Path,
         help="MobileNetV2 as 8-bit .tflite that guides the surface classifier's features",
+    )
+    parser.add_argument(
+        "--trunk",
+        type=Path,
+        help="file that keeps the net after its first stage (the teacher's features); read if it is there",
+    )
+    parser.add_argument(
+        "--without",
+        nargs="*",
+        default=(),
+        metavar="SOURCE",
+        choices=LEFT_OUT,
+        help=f"sources left out of the surface classifier's training, to be judged on them: {', '.join(LEFT_OUT)}",
     )
     given = parser.parse_args(arguments)
     needed = NEEDED + (("ai_edge_litert",) if given.teacher else ())

@@ -8,14 +8,17 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from trpac_core.vision.classes import Surface
 
-from .calibrate import Reliability
 from .data import Picture
 from .patches import CAMERA_SPREAD
 from .scores import ClassScore, wilson_interval
 from .train_segmenter import SegmentationScore
+
+if TYPE_CHECKING:
+    from .surface_run import Outcome
 
 CLASSES = [surface.label for surface in Surface]
 PACKAGES = ("torch", "onnx", "onnxruntime", "numpy", "opencv-python-headless", "albumentations")
@@ -41,6 +44,7 @@ class RunFacts:
     render_s: float
     threads: int
     teacher: str | None = None
+    without: tuple[str, ...] = ()
     versions: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -112,19 +116,17 @@ def class_table(scores: dict[str, ClassScore]) -> str:
 
 
 def surface_card(
-    facts: RunFacts,
-    *,
-    sha256: str,
-    parameters: int,
-    train_s: float,
-    train_patches: int,
-    temperature: float,
-    reliabilities: dict[str, tuple[Reliability, Reliability]],
-    entropies: tuple[float, float],
-    picture_scores: dict[str, ClassScore],
-    patch_scores: dict[str, ClassScore],
+    facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: float, train_patches: int
 ) -> str:
     """Card of surface.onnx."""
+    temperature, reliabilities, entropies = outcome.temperature, outcome.reliabilities, outcome.entropies
+    picture_scores, patch_scores = outcome.picture_scores, outcome.patch_scores
+    parameters = sum(parameter.numel() for parameter in outcome.net.parameters())
+    slope, centre = outcome.net.softening.tolist()
+    readings = table(
+        ["patches", "share taken for readable road"],
+        [[name, f"{share:.3f}"] for name, share in outcome.readings.items()],
+    )
     calibration = table(
         [
             "patches",
@@ -146,10 +148,14 @@ def surface_card(
     teacher = (
         "No teacher was used."
         if facts.teacher is None
-        else "During training a linear map of the embedding also had to match block 12 of MobileNetV2 1.0 / 224\n"
-        "(ImageNet weights, Apache-2.0), mean and deviation of each channel; neither that network nor the map is in "
-        "the file."
+        else "In a first stage, without labels, linear maps of the middle maps and of the embedding had to match what\n"
+        "blocks 4 to 12 of MobileNetV2 1.0 / 224 (ImageNet weights, Apache-2.0) see: mean and deviation of each\n"
+        "channel, and 4 x 6 cells of blocks 9 and 12. They kept half their weight in the second stage, which learns\n"
+        "the classes. Neither that network nor the linear maps are in the file. The first layers learn in the first\n"
+        "stage alone. A first stage that was read from a file is not in the time below: it took 26 min on one busy\n"
+        "processor."
     )
+    left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
     return f"""\
 # surface.onnx
 
@@ -161,17 +167,24 @@ feed one linear layer.
 
 - Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).
+- Output `readable`: float32 (N,), probability that a patch shows road that can be read at all.
 - Metadata: `temperature` = {temperature:.6f}, `classes` = dry,wet,snow_ice.
 
 ## Training
 
 {train_patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
-Patches are mirrored, shifted, zoomed by up to 12 % and seen with the gain, gamma and white balance of other cameras
-(within {100 * CAMERA_SPREAD:.0f} %). Classes are drawn equally often and sources within a class by fixed shares, so
-that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the weights.
+Patches are 3:2 to 3:1 wide before they are squeezed to the input, from 48 pixels to nearly the whole width of the road.
+They are mirrored, shifted, zoomed by up to 12 % and seen with the resolution, gain, gamma and white balance of other
+cameras (within {100 * CAMERA_SPREAD:.0f} %). {left_out}Classes are drawn equally often and sources within a class by
+fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
+weights.
 {teacher}
 {time_text(facts, train_s)}
 {versions_text(facts)}
+
+`readable` is a head of its own, taught last, which leaves the rest as it is: road of all sources, undisturbed and
+disturbed, against sky, trees and houses of the upper part of the pictures, noise, clouds, stripes, and roads that are
+too dark, too bright or far out of focus to be read.
 
 ## Scores on pictures
 
@@ -184,7 +197,14 @@ the number of pictures of the class. Every rendered view is one picture.
 
 {class_table(patch_scores)}
 
+## Readable road
+
+{readings}
+
 ## Calibration
+
+Within the graph the logits are divided by exp({slope:.3f} (s0 - s)) where a patch's sharpness s (log of mean grey
+step over grey deviation) is below s0 = {centre:.3f}: an unsharp patch is less sure. The slope is learned like T.
 
 T = {temperature:.3f} minimises the cross-entropy of the validation patches, undisturbed and disturbed (motion blur on
 all, brightness and contrast on 70 %, abnormal exposure and shadow on 30 % each), from {entropies[0]:.3f} to
@@ -201,8 +221,7 @@ patches it holds. The diagram `reliability.png` is the validation set's, undistu
   same road seconds later. Rendered scores say how well the network knows the renderer, no more.
 - Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
 - Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
-- T is one number for all pictures, between what undisturbed and what disturbed ones would want: where it corrects the
-  confidence on disturbed patches, undisturbed ones come out less sure than they could be.
+- Sharpness and T know blur; a wrong exposure or a shadow is not softened by itself.
 
 ## Data
 

@@ -41,6 +41,14 @@ ROAD_BOXES: dict[str, tuple[Box, ...]] = {
 Set by looking at the pictures (burnt-in text, bonnets, verges), never by a network's score.
 """
 
+WIDE_BOXES: dict[str, Box] = {
+    "condition_web": (0.08, 0.55, 0.92, 0.96),
+    "seq_extreme": (120 / 640, 200 / 360, 560 / 640, 315 / 360),
+    "seq_dry_yolop": (0.12, 0.72, 0.88, 0.98),
+    "dry_udacity": (0.15, 0.66, 0.88, 0.95),
+}
+"""Road and its close surroundings (verges, kerbs, vehicles, drawn paths), nearly from side to side."""
+
 EXTREME_LIMITS: tuple[Box, ...] = (
     (120 / 640, 200 / 360, 290 / 640, 315 / 360),
     (380 / 640, 200 / 360, 560 / 640, 315 / 360),
@@ -87,12 +95,19 @@ class Picture:
         return np.asarray(mask, dtype=np.uint8)
 
     @property
+    def family(self) -> str:
+        """See `family_of`."""
+        return family_of(self.source)
+
+    @property
+    def wide_box(self) -> Box | None:
+        """The wide look at a picture of this source, if there is one."""
+        return WIDE_BOXES.get(self.family)
+
+    @property
     def boxes(self) -> tuple[Box, ...]:
         """Road boxes of a picture without a mask, as fractions of its width and height."""
-        folder = self.source.split("/")[0]
-        if folder.startswith("seq_") and folder.endswith("_extreme"):
-            folder = "seq_extreme"
-        boxes = ROAD_BOXES.get(self.source, ROAD_BOXES.get(folder))
+        boxes = ROAD_BOXES.get(self.source, ROAD_BOXES.get(self.family))
         if boxes is None:
             known = ", ".join(sorted(ROAD_BOXES))
             raise DataFolderError(
@@ -106,6 +121,12 @@ def source_of(file: str) -> str:
     """Camera or clip of a file of the manifest: its folder; all web stills are one source."""
     folder = file.rpartition("/")[0]
     return "condition_web" if folder.startswith("condition_web/") else folder
+
+
+def family_of(source: str) -> str:
+    """Folder of a source; the three clips of one car are one family."""
+    folder = source.split("/")[0]
+    return "seq_extreme" if folder.startswith("seq_") and folder.endswith("_extreme") else folder
 
 
 def read_manifest(folder: Path) -> list[Picture]:

@@ -35,9 +35,12 @@ def export_segmenter(net: Segmenter, path: Path) -> None:
 
 
 def export_surface(net: SurfaceNet, temperature: float, path: Path) -> None:
-    """Write surface.onnx: `patches` uint8 (N, 64, 96, 3) BGR to `logits` (N, 3); T is in the metadata."""
+    """Write surface.onnx: `patches` uint8 (N, 64, 96, 3) BGR to `logits` (N, 3) and `readable` (N,).
+
+    T is in the metadata.
+    """
     example = torch.zeros((2, 64, 96, 3), dtype=torch.uint8)
-    _export(net, example, path, "patches", ["logits"], {"patches": {0: "n"}})
+    _export(net, example, path, "patches", ["logits", "readable"], {"patches": {0: "n"}})
     classes = ",".join(surface.label for surface in Surface)
     _annotate(path, {"temperature": f"{temperature:.6f}", "classes": classes})
 

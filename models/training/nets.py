@@ -153,12 +153,16 @@ def pooled(maps: Tensor) -> Tensor:
 class SurfaceNet(nn.Module):
     """ShuffleNet with three groups for 64 x 96 patches; middle and last maps feed the classifier.
 
-    Texture and gloss live in the middle maps, hence their mean and deviation beside the last stage's.
+    Texture and gloss live in the middle maps, hence their mean and deviation beside the last stage's. Beside the
+    classes it says whether a patch shows readable road at all, and it softens the logits of unsharp patches; neither
+    changes the class.
     """
 
     GROUPS = 3
-    STAGES = ((96, 4), (192, 5), (288, 2))
-    EMBEDDING = 2 * (192 + 288)
+    STAGES = ((96, 3), (240, 6), (384, 2))
+    EMBEDDING = 2 * (240 + 384)
+    READING = 32
+    """Width of the head that tells readable road."""
 
     def __init__(self, classes: int = 3, dropout: float = 0.3):
         super().__init__()
@@ -173,13 +177,54 @@ class SurfaceNet(nn.Module):
         self.stages = nn.ModuleList(stages)
         self.dropout = nn.Dropout(dropout)
         self.classifier = nn.Linear(self.EMBEDDING, classes)
+        self.reading_norm = nn.BatchNorm1d(self.EMBEDDING)
+        self.reading = nn.Sequential(
+            nn.Linear(self.EMBEDDING, self.READING), nn.ReLU(), nn.Linear(self.READING, 1)
+        )
+        self.softening = nn.Parameter(torch.tensor([0.0, 0.0]), requires_grad=False)
+
+    @property
+    def first_layers(self) -> tuple[nn.Module, ...]:
+        """The layers that see edges and grain, at the finest maps."""
+        return self.stem, self.stages[0]
+
+    def maps(self, patches: Tensor) -> tuple[Tensor, Tensor]:
+        """Middle (n, 240, 8, 12) and last (n, 384, 4, 6) maps of uint8 patches (n, 64, 96, 3)."""
+        middle = self.stages[1](self.stages[0](self.stem(normalise(patches))))
+        return middle, self.stages[2](middle)
 
     def embed(self, patches: Tensor) -> Tensor:
         """Pooled features of uint8 patches (n, 64, 96, 3), shape (n, EMBEDDING)."""
-        x = self.stages[0](self.stem(normalise(patches)))
-        middle = self.stages[1](x)
-        return torch.cat((pooled(middle), pooled(self.stages[2](middle))), dim=1)
+        return self.pool(*self.maps(patches))
 
-    def forward(self, patches: Tensor) -> Tensor:
-        """Logits (n, classes) of uint8 patches (n, 64, 96, 3)."""
-        return self.classifier(self.dropout(self.embed(patches)))
+    @staticmethod
+    def pool(middle: Tensor, last: Tensor) -> Tensor:
+        """Mean and deviation of both maps, shape (n, EMBEDDING)."""
+        return torch.cat((pooled(middle), pooled(last)), dim=1)
+
+    def readable(self, embedding: Tensor) -> Tensor:
+        """Logit that a patch shows readable road, shape (n,)."""
+        return self.reading(self.reading_norm(embedding))[:, 0]
+
+    def soft_logits(self, patches: Tensor, embedding: Tensor) -> Tensor:
+        """Logits (n, classes), smaller the less sharp a patch is: `softening` holds slope and centre."""
+        slope, centre = self.softening
+        blur = functional.relu(centre - sharpness(patches))
+        return self.classifier(embedding) * torch.exp(-slope * blur)[:, None]
+
+    def forward(self, patches: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (n, classes), and the probability of readable road (n,), of uint8 patches (n, 64, 96, 3)."""
+        embedding = self.embed(patches)
+        return self.soft_logits(patches, embedding), torch.sigmoid(self.readable(embedding))
+
+
+def sharpness(patches: Tensor) -> Tensor:
+    """Logarithm of the mean grey step between neighbouring pixels over the grey spread, shape (n,) [-].
+
+    A gain or an offset of the exposure leaves it alone; blur lowers it.
+    """
+    grey = patches.float().mean(dim=3)
+    steps = (grey[:, :, 1:] - grey[:, :, :-1]).abs().mean(dim=(1, 2))
+    steps = steps + (grey[:, 1:, :] - grey[:, :-1, :]).abs().mean(dim=(1, 2))
+    centred = grey - grey.mean(dim=(1, 2), keepdim=True)
+    return torch.log((steps + 0.1) / (torch.sqrt(centred.square().mean(dim=(1, 2))) + 0.5))

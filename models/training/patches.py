@@ -9,26 +9,31 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from trpac_core.vision.regions import cut_patch
+from trpac_core.vision.regions import cut_box, cut_patch
 
 from .augment import camera_look
-from .data import Image, Picture, pixel_box
+from .data import Image, Picture, family_of, pixel_box
 
-ASPECT = 1.5
-"""Width over height of a patch [-]."""
+ASPECTS = (1.5, 3.0)
+"""Width over height of a training patch on the road, squeezed to 3:2 in the end: narrow and wide looks [-]."""
+JUDGED_ASPECT = 1.5
 
 MIN_WIDTH_PX = 48.0
+WIDE_SHARE = 0.4
+"""Share of the patches that span nearly all of a still's wide road box: water shows over a wide field."""
+WIDE_LEAST = 0.6
+"""Least share of the wide box's width and height in such a patch [-]."""
 
 PATCHES_PER_PICTURE = {
-    "condition_web": 8,
-    "drivable_camvid/0006R0": 2,
-    "drivable_camvid/0016E5": 2,
-    "drivable_lums": 1,
-    "dry_udacity": 12,
-    "seq_dry_yolop/input1": 3,
-    "seq_dry_extreme/Critical_Driving1": 10,
-    "seq_wet_extreme/rain": 10,
-    "seq_snow_extreme/snow1": 10,
+    "condition_web": 20,
+    "drivable_camvid/0006R0": 4,
+    "drivable_camvid/0016E5": 4,
+    "drivable_lums": 2,
+    "dry_udacity": 20,
+    "seq_dry_yolop/input1": 8,
+    "seq_dry_extreme/Critical_Driving1": 20,
+    "seq_wet_extreme/rain": 20,
+    "seq_snow_extreme/snow1": 20,
 }
 """Training patches cut from each picture of a source; others give OTHER_SOURCES."""
 OTHER_SOURCES = 2
@@ -37,7 +42,7 @@ SOURCE_SHARES = {
     "rendered": 3.0,
     "condition_web": 3.0,
     "seq_extreme": 1.5,
-    "drivable_camvid": 1.0,
+    "drivable_camvid": 1.5,
     "drivable_lums": 0.4,
     "seq_dry_yolop": 0.3,
     "dry_udacity": 0.4,
@@ -48,8 +53,14 @@ Each class is drawn equally often, and its shares are normalised over the source
 cameras being dry does not make "dash camera" mean "dry": wet and snowy dash frames, real and rendered, weigh as much.
 """
 
-CAMERA_SPREAD = 0.25
+LEAST_ROADS = (0.95, 0.7)
+"""Least share of road in a patch cut by a mask, of one half and the other: some with kerbs and vehicles [-]."""
+
+CAMERA_SPREAD = 0.4
 """Gain, gamma and white balance of other undisturbed cameras, as a share [-]."""
+
+COARSE_SHARE, COARSE_SCALES = 0.25, (0.45, 1.0)
+"""Share of the training looks that come from a coarser camera, and its resolution [-]."""
 
 WEB_STRETCH = (1.2, 1.5)
 """Width over height that the squared web stills had before, roughly [-]."""
@@ -93,12 +104,6 @@ def joined(sets: Sequence[PatchSet]) -> PatchSet:
     )
 
 
-def share_group(source: str) -> str:
-    """The entry of SOURCE_SHARES that a source falls under."""
-    folder = source.split("/")[0]
-    return "seq_extreme" if folder.endswith("_extreme") else folder
-
-
 def unsquashed(picture: Picture, image: Image, stretch: float) -> Image:
     """A web still at its likely former aspect; other pictures as they are."""
     if picture.source != "condition_web":
@@ -107,23 +112,42 @@ def unsquashed(picture: Picture, image: Image, stretch: float) -> Image:
     return np.asarray(cv2.resize(image, (round(stretch * width), height)), np.uint8)
 
 
+def reduced(image: Image, box: tuple[float, float, float, float]) -> Image:
+    """A box of a picture (left, top, right, bottom in pixels) as a patch of the network's size."""
+    left, top, right, bottom = (round(edge) for edge in box)
+    return cut_box(image, (left, top, right, bottom))
+
+
 def random_patches(rng: np.random.Generator, picture: Picture, count: int) -> list[Image]:
-    """Patches at random places and scales on the road of one picture, each wholly inside its box or mask."""
+    """Patches at random places, scales and aspects on the road of one picture, each inside its box or mask."""
     image = unsquashed(picture, picture.image(), rng.uniform(*WEB_STRETCH))
     if picture.mask is not None:
-        return _patches_in_mask(rng, image, picture.road_mask(), count)
+        return _patches_in_mask(rng, image, picture.road_mask(), count, ASPECTS, LEAST_ROADS)
+    wide = picture.wide_box
     patches = []
     for _ in range(count):
-        x0, y0, x1, y1 = pixel_box(picture.boxes[rng.integers(len(picture.boxes))], image)
-        largest = min(x1 - x0, ASPECT * (y1 - y0))
-        width = np.exp(rng.uniform(np.log(min(MIN_WIDTH_PX, largest)), np.log(largest)))
-        half_w, half_h = width / 2, width / ASPECT / 2
-        centre = (rng.uniform(x0 + half_w, x1 - half_w), rng.uniform(y0 + half_h, y1 - half_h))
-        patches.append(cut_patch(image, centre, width))
+        if wide is not None and rng.random() < WIDE_SHARE:
+            x0, y0, x1, y1 = pixel_box(wide, image)
+            columns, rows = rng.uniform(WIDE_LEAST, 1.0, 2) * (x1 - x0, y1 - y0)
+        else:
+            x0, y0, x1, y1 = pixel_box(picture.boxes[rng.integers(len(picture.boxes))], image)
+            aspect = rng.uniform(*ASPECTS)
+            largest = min(x1 - x0, aspect * (y1 - y0))
+            columns = np.exp(rng.uniform(np.log(min(MIN_WIDTH_PX, largest)), np.log(largest)))
+            rows = columns / aspect
+        left, top = rng.uniform(x0, x1 - columns), rng.uniform(y0, y1 - rows)
+        patches.append(reduced(image, (left, top, left + columns, top + rows)))
     return patches
 
 
-def _patches_in_mask(rng: np.random.Generator, image: Image, mask: Image, count: int) -> list[Image]:
+def _patches_in_mask(
+    rng: np.random.Generator,
+    image: Image,
+    mask: Image,
+    count: int,
+    aspects: tuple[float, float],
+    least_roads: tuple[float, float],
+) -> list[Image]:
     road = mask == 1
     counts = cv2.integral(road.astype(np.uint8))
     rows, columns = np.nonzero(road)
@@ -132,30 +156,32 @@ def _patches_in_mask(rng: np.random.Generator, image: Image, mask: Image, count:
         if len(patches) == count or not len(rows):
             break
         index = rng.integers(len(rows))
-        width = np.exp(rng.uniform(np.log(MIN_WIDTH_PX), np.log(0.4 * image.shape[1])))
-        x0, y0 = int(columns[index] - width / 2), int(rows[index] - width / ASPECT / 2)
-        x1, y1 = int(x0 + width), int(y0 + width / ASPECT)
+        width = np.exp(rng.uniform(np.log(MIN_WIDTH_PX), np.log(0.6 * image.shape[1])))
+        height = width / rng.uniform(*aspects)
+        x0, y0 = int(columns[index] - width / 2), int(rows[index] - height / 2)
+        x1, y1 = int(x0 + width), int(y0 + height)
         if x0 < 0 or y0 < 0 or x1 > image.shape[1] or y1 > image.shape[0]:
             continue
         inside = counts[y1, x1] - counts[y0, x1] - counts[y1, x0] + counts[y0, x0]
-        if inside >= 0.97 * (x1 - x0) * (y1 - y0):
-            patches.append(cut_patch(image, ((x0 + x1) / 2, (y0 + y1) / 2), x1 - x0))
+        if inside >= least_roads[len(patches) % 2] * (x1 - x0) * (y1 - y0):
+            patches.append(reduced(image, (x0, y0, x1, y1)))
     return patches
 
 
 def fixed_patches(picture: Picture) -> list[Image]:
-    """The patches on which a picture is judged: the largest in each road box and four smaller ones in it."""
+    """The patches on which a picture is judged: each road box whole, the wide one too, and four parts of each."""
     image = unsquashed(picture, picture.image(), float(np.mean(WEB_STRETCH)))
     if picture.mask is not None:
-        return _patches_in_mask(np.random.default_rng(0), image, picture.road_mask(), 4)
-    patches = []
+        rng = np.random.default_rng(0)
+        return _patches_in_mask(rng, image, picture.road_mask(), 4, (JUDGED_ASPECT,) * 2, LEAST_ROADS[:1] * 2)
+    wide = picture.wide_box
+    patches = [] if wide is None else [reduced(image, pixel_box(wide, image))]
     for box in picture.boxes:
         x0, y0, x1, y1 = pixel_box(box, image)
-        largest = min(x1 - x0, ASPECT * (y1 - y0))
-        patches.append(cut_patch(image, ((x0 + x1) / 2, (y0 + y1) / 2), largest))
-        width = 0.55 * largest
+        patches.append(reduced(image, (x0, y0, x1, y1)))
+        width = 0.55 * min(x1 - x0, JUDGED_ASPECT * (y1 - y0))
         for column in (x0 + width / 2, x1 - width / 2):
-            for row in (y0 + width / ASPECT / 2, y1 - width / ASPECT / 2):
+            for row in (y0 + width / JUDGED_ASPECT / 2, y1 - width / JUDGED_ASPECT / 2):
                 patches.append(cut_patch(image, (column, row), width))
     return patches
 
@@ -197,7 +223,7 @@ def judged_patches(pictures: Iterable[Picture]) -> PatchSet:
 
 def draw_weights(patches: PatchSet) -> NDArray[np.float64]:
     """Probability of each patch to be drawn: classes equal, sources within a class by SOURCE_SHARES."""
-    groups = np.array([share_group(str(source)) for source in patches.sources])
+    groups = np.array([family_of(str(source)) for source in patches.sources])
     weights = np.zeros(len(patches))
     for label in np.unique(patches.labels):
         of_class = patches.labels == label
@@ -208,17 +234,23 @@ def draw_weights(patches: PatchSet) -> NDArray[np.float64]:
     return weights / weights.sum()
 
 
-def augmented(rng: np.random.Generator, patch: Image) -> Image:
-    """A patch mirrored, shifted a little and seen by another undisturbed camera."""
+def augmented(rng: np.random.Generator, patch: Image, mirror: bool) -> Image:
+    """A patch shifted a little, mirrored or not, and seen by another undisturbed camera."""
     height, width = patch.shape[:2]
-    shift_x, shift_y = rng.integers(-10, 11), rng.integers(-6, 7)
+    shift_x, shift_y = rng.integers(-8, 9), rng.integers(-5, 6)
     zoom = np.exp(rng.uniform(-0.12, 0.12))
-    flip = -1.0 if rng.random() < 0.5 else 1.0
+    flip = -1.0 if mirror else 1.0
     move = np.array(
         [
-            [flip * zoom, 0.0, width / 2 - flip * zoom * width / 2 + shift_x],
-            [0.0, zoom, height / 2 - zoom * height / 2 + shift_y],
+            [flip * zoom, 0.0, (1.0 - flip * zoom) * (width - 1) / 2 + shift_x],
+            [0.0, zoom, (1.0 - zoom) * (height - 1) / 2 + shift_y],
         ]
     )
     moved = cv2.warpAffine(patch, move, (width, height), borderMode=cv2.BORDER_REFLECT_101)
+    if rng.random() < COARSE_SHARE:
+        factor = rng.uniform(*COARSE_SCALES)
+        small = cv2.resize(
+            moved, (round(factor * width), round(factor * height)), interpolation=cv2.INTER_AREA
+        )
+        moved = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
     return camera_look(rng, np.asarray(moved, np.uint8), spread=CAMERA_SPREAD)

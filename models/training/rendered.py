@@ -13,10 +13,10 @@ from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import RenderedFrame, SceneLook, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.regions import cut_patch, roi_box, roi_width_px
+from trpac_core.vision.regions import roi_width_px
 
 from .data import IGNORE, Image
-from .patches import PatchSet, patch_set
+from .patches import ASPECTS, PatchSet, patch_set, reduced
 from .segmenter_data import SIZE, Sample
 
 SEED_RANGES = {
@@ -36,7 +36,7 @@ FULL_SCALE, REDUCED_SCALE = 1.0, 0.5
 """Scales of the rendered pictures: every fourth world at the camera's own resolution, the others at half."""
 
 NEAREST_M, FARTHEST_M = 2.5, 15.0
-ROI_WIDTHS_M = (0.7, 3.0)
+ROI_WIDTHS_M = (0.7, 4.5)
 PURE_SHARE = 0.97
 """Least share of a patch that is lit road of one surface [-]; the classifier learns undisturbed looks only."""
 
@@ -121,7 +121,7 @@ def view_patches(view: View, count: int) -> list[tuple[Image, int]]:
     rng = np.random.default_rng(view.patch_seed)
     frame, camera = view.frame, view.camera
     cut: list[tuple[Image, int]] = []
-    for _ in range(8 * count):
+    for _ in range(16 * count):
         if len(cut) == count:
             break
         point = np.array([rng.uniform(NEAREST_M, FARTHEST_M), rng.uniform(-2.5, 2.5)])
@@ -131,12 +131,16 @@ def view_patches(view: View, count: int) -> list[tuple[Image, int]]:
         in_picture = (pixel >= 0).all() and pixel[0] < camera.width_px and pixel[1] < camera.height_px
         if not in_picture or width > 0.9 * camera.width_px:
             continue
-        left, top, right, bottom = roi_box(camera.width_px, camera.height_px, pixel, width)
+        height = width / rng.uniform(*ASPECTS)
+        left, top = round(pixel[0] - width / 2), round(pixel[1] - height / 2)
+        right, bottom = round(left + width), round(top + height)
+        if left < 0 or top < 0 or right > camera.width_px or bottom > camera.height_px:
+            continue
         window = np.s_[top:bottom, left:right]
         label = int(frame.surface[int(pixel[1]), int(pixel[0])])
         pure = (frame.surface[window] == label) & ~frame.shadow[window]
         if label >= 0 and pure.mean() >= PURE_SHARE:
-            cut.append((cut_patch(frame.image, pixel, width), label))
+            cut.append((reduced(frame.image, (left, top, right, bottom)), label))
     return cut
 
 

@@ -2,25 +2,69 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 INPUT_PX = 224
-LAYER_SHAPE = (1, 14, 14, 96)
-"""Shape of the layer that is handed on: MobileNetV2's block 12 (texture and gloss, not yet objects)."""
+GLOSS_LAYERS = {
+    128: (28, 32),
+    132: (28, 32),
+    140: (14, 64),
+    144: (14, 64),
+    148: (14, 64),
+    155: (14, 96),
+    159: (14, 96),
+}
+"""Tensors of MobileNetV2's blocks 4 to 12 with their side and channels: texture and gloss, not yet objects. The mean
+and deviation of each channel are handed on."""
 
-LAYER_INDEX = 159
+MAP_LAYERS = (148, 159)
+"""Tensors (blocks 9 and 12) whose maps are handed on as well, reduced to MAP_CELLS."""
+
+MAP_CELLS = (4, 6)
+"""Rows and columns of the handed-on maps."""
 
 
 class TeacherError(ValueError):
     """The teacher file cannot be used."""
 
 
-def teacher_features(model: Path, patches: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Standardised mean and deviation of the teacher's middle maps for each patch, shape (n, 192).
+@dataclass(frozen=True)
+class TeacherFeatures:
+    """What the teacher sees in patches, standardised, aligned along the first axis.
+
+    Attributes
+    ----------
+    pooled : float16, shape (n, 896)
+        Mean and deviation of each channel of GLOSS_LAYERS.
+    maps : float16, shape (n, 160, 4, 6)
+        Maps of MAP_LAYERS.
+    """
+
+    POOLED: ClassVar[int] = 2 * sum(channels for _, channels in GLOSS_LAYERS.values())
+    MAPS: ClassVar[int] = sum(GLOSS_LAYERS[index][1] for index in MAP_LAYERS)
+
+    pooled: NDArray[np.float16]
+    maps: NDArray[np.float16]
+
+    def __len__(self) -> int:
+        return len(self.pooled)
+
+    def where(self, chosen: NDArray[np.bool_]) -> TeacherFeatures:
+        """The chosen patches' features alone."""
+        return TeacherFeatures(self.pooled[chosen], self.maps[chosen])
+
+
+def teacher_features(
+    model: Path, patches: NDArray[np.uint8], report: Callable[[int], None] = lambda done: None
+) -> TeacherFeatures:
+    """The teacher's features of each patch.
 
     Parameters
     ----------
@@ -28,26 +72,55 @@ def teacher_features(model: Path, patches: NDArray[np.uint8]) -> NDArray[np.floa
         MobileNetV2 1.0 / 224 as a TensorFlow Lite file with 8-bit weights (uint8 RGB input).
     patches : uint8, shape (n, height, width, 3)
         BGR patches.
+    report : callable
+        Called with the number of patches done.
     """
-    from ai_edge_litert.interpreter import Interpreter  # type: ignore[import-untyped]
-
-    if not model.is_file():
-        raise TeacherError(f"{model}: not found; leave --teacher out to train without one")
-    interpreter = Interpreter(str(model), num_threads=2, experimental_preserve_all_tensors=True)
-    interpreter.allocate_tensors()
-    source = interpreter.get_input_details()[0]
-    layer = {detail["index"]: detail for detail in interpreter.get_tensor_details()}.get(LAYER_INDEX)
-    if layer is None or tuple(layer["shape"]) != LAYER_SHAPE:
-        raise TeacherError(
-            f"{model}: tensor {LAYER_INDEX} is not of shape {LAYER_SHAPE}; expected MobileNetV2 1.0 / 224"
-        )
-    scale, zero = layer["quantization"]
-    features = np.empty((len(patches), 2 * LAYER_SHAPE[-1]), np.float32)
+    interpreter, source, scales = _load(model)
+    rows, columns = (_area_weights(GLOSS_LAYERS[MAP_LAYERS[0]][0], cells) for cells in MAP_CELLS)
+    pooled, maps = [], []
     for row, patch in enumerate(patches):
         large = cv2.resize(patch, (INPUT_PX, INPUT_PX), interpolation=cv2.INTER_LINEAR)
-        interpreter.set_tensor(source["index"], large[None, :, :, ::-1])
+        interpreter.set_tensor(source, large[None, :, :, ::-1])
         interpreter.invoke()
-        maps = (interpreter.get_tensor(LAYER_INDEX)[0].astype(np.float32) - zero) * scale
-        features[row] = np.concatenate((maps.mean(axis=(0, 1)), maps.std(axis=(0, 1))))
-    deviation = features.std(axis=0)
-    return (features - features.mean(axis=0)) / np.maximum(deviation, 1e-3)
+        found = {
+            index: (interpreter.get_tensor(index)[0].astype(np.float32) - zero) * scale
+            for index, (scale, zero) in scales.items()
+        }
+        pooled.append(
+            np.concatenate(
+                [part for layer in found.values() for part in (layer.mean((0, 1)), layer.std((0, 1)))]
+            )
+        )
+        cells = [np.einsum("ij,jkc,lk->cil", rows, found[index], columns) for index in MAP_LAYERS]
+        maps.append(np.concatenate(cells).astype(np.float16))
+        report(row + 1)
+    return TeacherFeatures(
+        _standard(np.stack(pooled), (0,)), _standard(np.stack(maps).astype(np.float32), (0, 2, 3))
+    )
+
+
+def _area_weights(side: int, cells: int) -> NDArray[np.float32]:
+    """Share of each of `side` pixels in each of fewer cells, shape (cells, side)."""
+    unit = np.eye(side, dtype=np.float32)
+    return np.asarray(cv2.resize(unit, (side, cells), interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _standard(features: NDArray[np.float32], axes: tuple[int, ...]) -> NDArray[np.float16]:
+    centred = features - features.mean(axis=axes, keepdims=True)
+    return (centred / np.maximum(centred.std(axis=axes, keepdims=True), 1e-3)).astype(np.float16)
+
+
+def _load(model: Path):  # type: ignore[no-untyped-def]
+    """The interpreter, its input's index, and scale and zero point of each layer that is handed on."""
+    from ai_edge_litert.interpreter import Interpreter  # type: ignore[import-untyped]
+
+    interpreter = Interpreter(str(model), num_threads=1, experimental_preserve_all_tensors=True)
+    interpreter.allocate_tensors()
+    details = {detail["index"]: detail for detail in interpreter.get_tensor_details()}
+    for index, (side, channels) in GLOSS_LAYERS.items():
+        if index not in details or tuple(details[index]["shape"]) != (1, side, side, channels):
+            raise TeacherError(
+                f"{model}: tensor {index} is not of shape {(1, side, side, channels)}; expected MobileNetV2 1.0 / 224"
+            )
+    scales = {index: details[index]["quantization"] for index in GLOSS_LAYERS}
+    return interpreter, interpreter.get_input_details()[0]["index"], scales

@@ -1,17 +1,23 @@
-"""Training of the surface classifier on undisturbed patches."""
+"""Training of the surface classifier on undisturbed patches, in two stages, and of its reading head."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .nets import SurfaceNet
+from .calibrate import cross_entropy
+from .data import Image
+from .nets import SurfaceNet, sharpness
 from .patches import PatchSet, augmented, draw_weights
+from .teacher import MAP_CELLS, TeacherFeatures
 
 BATCH = 96
 LEARNING_RATE = 3e-3
@@ -19,54 +25,186 @@ WEIGHT_DECAY = 2e-2
 AVERAGING = 0.995
 """Decay of the running average of the weights; the average is what ships."""
 
-HINT_WEIGHT = 0.5
-"""Weight of the teacher's features beside the cross-entropy, if there is a teacher."""
+MAP_WEIGHT, POOLED_WEIGHT = 1.0, 1.0
+"""Weights of the teacher's maps and pooled features in the first stage."""
+HINT_SHARE = 0.5
+"""Share of both beside the cross-entropy in the second stage."""
+READING_STEPS, READING_RATE = 600, 2e-3
+
+Report = Callable[[int, float], None]
 
 
-def train_surface(
+class Taught(NamedTuple):
+    """A net with the linear maps by which its features are held against the teacher's; only the net ships."""
+
+    net: SurfaceNet
+    maps: nn.Conv2d
+    pooled: nn.Linear
+
+    def parameters(self) -> list[nn.Parameter]:
+        """All that is trained."""
+        return [parameter for part in self for parameter in part.parameters() if parameter.requires_grad]
+
+    def train(self) -> nn.ModuleList:
+        """All modules, in training; layers that stay as they are keep their statistics as well."""
+        modules = nn.ModuleList(self).train()
+        for layer in self.net.first_layers:
+            layer.train(any(parameter.requires_grad for parameter in layer.parameters()))
+        return modules
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Drawn patches with mirror flags, and what is known of them."""
+
+    patches: Tensor
+    labels: Tensor
+    pooled: Tensor
+    maps: Tensor
+
+
+def new_student(seed: int) -> Taught:
+    """An untrained net with its maps to the teacher's features."""
+    torch.manual_seed(seed)
+    net = SurfaceNet()
+    middle = net.STAGES[1][0]
+    return Taught(
+        net, nn.Conv2d(middle, TeacherFeatures.MAPS, 1), nn.Linear(net.EMBEDDING, TeacherFeatures.POOLED)
+    )
+
+
+def learn_features(
+    student: Taught, patches: PatchSet, teacher: TeacherFeatures, *, steps: int, seed: int, report: Report
+) -> Taught:
+    """First stage: the net learns to see what the teacher sees; no label is used."""
+    shares = np.full(len(patches), 1.0 / len(patches))
+    return _train(student, patches, teacher, shares, steps, seed, report, hint=1.0, classes=0.0)
+
+
+def learn_classes(
+    student: Taught,
     patches: PatchSet,
+    teacher: TeacherFeatures | None,
     *,
     steps: int,
     seed: int,
-    report: Callable[[int, float], None],
-    teacher: NDArray[np.float32] | None = None,
-) -> SurfaceNet:
-    """Train for a number of steps under one learning-rate cycle; `report` gets the step and the loss.
+    report: Report,
+) -> Taught:
+    """Second stage: the classes.
 
-    `teacher`, shape (n, features), holds standardised features of each patch from a larger network: a linear map of
-    the embedding learns to match them and is then thrown away.
+    Where there is a teacher its features are kept in view, and the first layers stay as the first stage left them: a
+    thousand pictures of real roads are few, and half of the time is saved.
     """
-    torch.manual_seed(seed)
-    rng = np.random.default_rng(seed)
-    net = SurfaceNet()
-    hint = nn.Linear(SurfaceNet.EMBEDDING, 1 if teacher is None else teacher.shape[1])
-    average = torch.optim.swa_utils.AveragedModel(net, avg_fn=_running_average, use_buffers=True)
-    parameters = [*net.parameters(), *hint.parameters()]
-    optimiser = torch.optim.AdamW(parameters, lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, LEARNING_RATE, total_steps=steps, pct_start=0.15
+    hint = 0.0 if teacher is None else HINT_SHARE
+    for layer in student.net.first_layers:
+        layer.requires_grad_(teacher is None)
+    return _train(
+        student, patches, teacher, draw_weights(patches), steps, seed, report, hint=hint, classes=1.0
     )
-    weights = draw_weights(patches)
-    net.train()
+
+
+def _train(
+    student: Taught,
+    patches: PatchSet,
+    teacher: TeacherFeatures | None,
+    shares: NDArray[np.float64],
+    steps: int,
+    seed: int,
+    report: Report,
+    *,
+    hint: float,
+    classes: float,
+) -> Taught:
+    """One learning-rate cycle; the running average of the weights comes back."""
+    rng = np.random.default_rng(seed)
+    torch.manual_seed(seed)
+    modules = student.train()
+    average = torch.optim.swa_utils.AveragedModel(modules, avg_fn=_running_average, use_buffers=True)
+    rate = LEARNING_RATE if hint == 1.0 or teacher is None else LEARNING_RATE / 2
+    optimiser = torch.optim.AdamW(student.parameters(), lr=rate, weight_decay=WEIGHT_DECAY)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, total_steps=steps, pct_start=0.15)
     for step in range(steps):
-        chosen = rng.choice(len(patches), size=BATCH, p=weights)
-        batch = torch.from_numpy(np.stack([augmented(rng, patches.patches[index]) for index in chosen]))
-        embedding = net.embed(batch)
-        logits = net.classifier(net.dropout(embedding))
-        loss = functional.cross_entropy(logits, torch.from_numpy(patches.labels[chosen]))
-        if teacher is not None:
-            target = torch.from_numpy(teacher[chosen])
-            loss = loss + HINT_WEIGHT * functional.mse_loss(hint(embedding), target)
+        batch = _draw(rng, patches, teacher, shares)
+        loss = _loss(student, batch, hint if teacher is not None else 0.0, classes)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
-        torch.nn.utils.clip_grad_norm_(parameters, 5.0)
+        torch.nn.utils.clip_grad_norm_(student.parameters(), 5.0)
         optimiser.step()
         schedule.step()
-        average.update_parameters(net)
+        average.update_parameters(modules)
         report(step + 1, float(loss.detach()))
-    trained = average.module.eval()
-    assert isinstance(trained, SurfaceNet)
-    return trained
+    net, maps, pooled = average.module.eval()
+    return Taught(net, maps, pooled)
+
+
+def _draw(
+    rng: np.random.Generator, patches: PatchSet, teacher: TeacherFeatures | None, shares: NDArray[np.float64]
+) -> Batch:
+    chosen = rng.choice(len(patches), size=BATCH, p=shares)
+    mirrored = rng.random(BATCH) < 0.5
+    views = [
+        augmented(rng, patches.patches[index], mirror) for index, mirror in zip(chosen, mirrored, strict=True)
+    ]
+    if teacher is None:
+        pooled = maps = torch.empty(0)
+    else:
+        pooled = torch.from_numpy(teacher.pooled[chosen].astype(np.float32))
+        maps = torch.from_numpy(teacher.maps[chosen].astype(np.float32))
+        maps = torch.where(torch.from_numpy(mirrored)[:, None, None, None], maps.flip(3), maps)
+    return Batch(torch.from_numpy(np.stack(views)), torch.from_numpy(patches.labels[chosen]), pooled, maps)
+
+
+def _loss(student: Taught, batch: Batch, hint: float, classes: float) -> Tensor:
+    middle, last = student.net.maps(batch.patches)
+    embedding = student.net.pool(middle, last)
+    loss = torch.zeros(())
+    if classes:
+        logits = student.net.classifier(student.net.dropout(embedding))
+        loss = loss + classes * functional.cross_entropy(logits, batch.labels)
+    if hint:
+        seen = functional.adaptive_avg_pool2d(student.maps(middle), MAP_CELLS)
+        loss = loss + hint * MAP_WEIGHT * functional.mse_loss(seen, batch.maps)
+        loss = loss + hint * POOLED_WEIGHT * functional.mse_loss(student.pooled(embedding), batch.pooled)
+    return loss
+
+
+def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, seed: int) -> None:
+    """Teach the reading head to tell readable road from all else; the rest of the net stays as it is.
+
+    `readable` and `outliers` are patches (n, 64, 96, 3); disturbed road counts as readable.
+    """
+    torch.manual_seed(seed)
+    features = torch.cat([embeddings(net, readable), embeddings(net, outliers)])
+    labels = torch.cat([torch.ones(len(readable)), torch.zeros(len(outliers))])
+    weights = torch.where(labels > 0, 0.5 / len(readable), 0.5 / len(outliers))
+    head = nn.ModuleList([net.reading_norm, net.reading]).train()
+    optimiser = torch.optim.AdamW(head.parameters(), lr=READING_RATE, weight_decay=WEIGHT_DECAY)
+    for _ in range(READING_STEPS):
+        chosen = torch.multinomial(weights, 512, replacement=True)
+        loss = functional.binary_cross_entropy_with_logits(net.readable(features[chosen]), labels[chosen])
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        optimiser.step()
+    net.eval()
+
+
+def learn_softening(net: SurfaceNet, patches: Image, labels: NDArray[np.int64]) -> Tensor:
+    """Slope and centre of the softening by sharpness, shape (2,), by the validation cross-entropy.
+
+    Logits are divided by exp(slope * (centre - sharpness)) where a patch is less sharp than the centre, the median of
+    the given ones: temperature scaling whose T depends on the picture (parameterised as in Tomani et al. 2022).
+    """
+    net.softening.data = torch.zeros(2)
+    logits = verdicts_of(net, patches)[0]
+    sharp = sharpness(torch.from_numpy(patches)).double().numpy()
+    centre = float(np.median(sharp))
+    blur = np.maximum(centre - sharp, 0.0)[:, None]
+
+    def entropy(values: NDArray[np.float64]) -> float:
+        return cross_entropy(logits * np.exp(-values[0] * blur), labels, float(np.exp(values[1])))
+
+    found = minimize(entropy, (0.0, 0.5), method="Nelder-Mead")
+    return torch.tensor([max(float(found.x[0]), 0.0), centre], dtype=torch.float32)
 
 
 def _running_average(average: Tensor, current: Tensor, steps: Tensor | int) -> Tensor:
@@ -76,10 +214,23 @@ def _running_average(average: Tensor, current: Tensor, steps: Tensor | int) -> T
 
 
 @torch.no_grad()
-def logits_of(net: SurfaceNet, patches: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Logits of patches (n, 64, 96, 3), shape (n, 3)."""
-    batches = [
-        net(torch.from_numpy(np.ascontiguousarray(patches[start : start + 256])))
-        for start in range(0, len(patches), 256)
-    ]
-    return torch.cat(batches).double().numpy() if batches else np.empty((0, 3))
+def embeddings(net: SurfaceNet, patches: NDArray[np.uint8]) -> Tensor:
+    """Pooled features of patches (n, 64, 96, 3), shape (n, EMBEDDING)."""
+    net.eval()
+    batches = [net.embed(batch) for batch in _batches(patches)]
+    return torch.cat(batches) if batches else torch.empty((0, net.EMBEDDING))
+
+
+@torch.no_grad()
+def verdicts_of(
+    net: SurfaceNet, patches: NDArray[np.uint8]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Logits (n, 3), and probability of readable road (n,), of patches (n, 64, 96, 3)."""
+    net.eval()
+    logits, readings = zip(*[net(batch) for batch in _batches(patches)], strict=True)
+    return torch.cat(logits).double().numpy(), torch.cat(readings).double().numpy()
+
+
+def _batches(patches: NDArray[np.uint8]) -> list[Tensor]:
+    starts = range(0, len(patches), 256)
+    return [torch.from_numpy(np.ascontiguousarray(patches[start : start + 256])) for start in starts]

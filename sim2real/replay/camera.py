@@ -145,7 +145,7 @@ def _from_pictures(log: Log, inputs: Inputs, camera: Camera, models: Path, told:
             masks = segmenter.segment(image)
             for i, ife in enumerate(estimators):
                 states[i], seen = ife.process(states[i], image, _motion(inputs, row), masks=masks)
-                frames[i][row] = RoadClass(seen.surface, seen.Q_v)
+                frames[i][row] = RoadClass(seen.surface, seen.told_by_bus(ife.config.flag_threshold))
         except ImageError as error:
             unreadable.append(str(error))
             frames[0][row] = frames[1][row] = None

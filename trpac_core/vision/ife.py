@@ -37,6 +37,9 @@ LEAST_CONTRAST = 1.0
 """Standard deviation of a patch's grey levels below which it shows no road but a covered, blinded or dark camera. The
 lowest of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
 
+LEAST_READABLE = 0.5
+"""Probability of readable road below which a patch is left out [-]."""
+
 SIDES = {"left": (1.0,), "right": (-1.0,), "both": (1.0, -1.0)}
 """Front wheels whose tracks are looked at, as the sign of their lateral position."""
 
@@ -72,8 +75,14 @@ class IfeConfig:
         Parameters of the evidence weights.
     flag_threshold : float
         Q_v above which the flag is set [-].
+    least_mass : float
+        Largest mass m_0 of Eq. (8), before the combination, from which the flag may be set [-]. Patches of one frame
+        share light, camera and road: combined as if independent, nearly any of them gives a P_fusion near 1.
     seed : int
         Of the drawing of patches.
+    groups_looked_at : int
+        How many groups from the near one on. The verdict is the near group's, so 1 gives the same verdicts in less
+        time, bit by bit; the others are for those who look at the road further ahead.
     use_trajectory, remove_shadow, calibrate, weight_evidence : bool
         Each False leaves that part of the method out, to measure what it is worth: the whole drivable strip
         ahead in place of the ellipses; shadow kept; T = 1; equal evidence weights in Eq. (8).
@@ -94,7 +103,9 @@ class IfeConfig:
     strip_half_width_m: float = 4.0
     weight_law: WeightLaw = field(default_factory=WeightLaw)
     flag_threshold: float = 0.5
+    least_mass: float = 0.6
     seed: int = 0
+    groups_looked_at: int = len(GROUP_NAMES)
     use_trajectory: bool = True
     remove_shadow: bool = True
     calibrate: bool = True
@@ -123,7 +134,9 @@ class IfeConfig:
             )
             > 0.0,
             "sigma must lie in [0, 1]": 0.0 <= self.weight_law.sigma <= 1.0,
+            "least_mass must lie in [0, 1]": 0.0 <= self.least_mass <= 1.0,
             "seed must not be negative": self.seed >= 0,
+            "groups_looked_at must be 1, 2 or 3": 1 <= self.groups_looked_at <= len(GROUP_NAMES),
         }
         problems = [text for text, good in checks.items() if not good]
         if problems:
@@ -150,25 +163,39 @@ class IfeState:
 
 @dataclass(frozen=True)
 class Region:
-    """One group before the classifier: its corners, and the patches drawn from them."""
+    """One group on its way: its corners, the patches drawn from them, and what those that can be read show."""
 
     corners: Corners
     centres_px: NDArray[np.float64]
     widths_px: NDArray[np.float64]
     ellipses: tuple[Ellipses, ...]
+    drawn: int
     patches: tuple[NDArray[np.uint8], ...] = ()
+    probabilities: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, len(Surface))))
 
     def seen_in(self, image: NDArray[np.uint8]) -> Region:
         """The region with the patches cut, those without contrast left out."""
-        cut = [
+        cut = tuple(
             cut_patch(image, centre, width)
             for centre, width in zip(self.centres_px, self.widths_px, strict=True)
-        ]
-        kept = [i for i, patch in enumerate(cut) if cv2.meanStdDev(patch)[1].max() >= LEAST_CONTRAST]
-        patches = tuple(cut[i] for i in kept)
-        return replace(
-            self, centres_px=self.centres_px[kept], widths_px=self.widths_px[kept], patches=patches
         )
+        contrast = np.array([cv2.meanStdDev(patch)[1].max() for patch in cut])
+        return replace(self, patches=cut).keeping(contrast >= LEAST_CONTRAST)
+
+    def keeping(self, kept: NDArray[np.bool_]) -> Region:
+        """The region with some of its patches."""
+        return replace(
+            self,
+            centres_px=self.centres_px[kept],
+            widths_px=self.widths_px[kept],
+            patches=tuple(patch for patch, keep in zip(self.patches, kept, strict=True) if keep),
+        )
+
+    @property
+    def p_util(self) -> float:
+        """Share of the road looked at that is of use [-]: corners that are usable, times patches that can be read."""
+        read = len(self.probabilities) / self.drawn if self.drawn else 1.0
+        return self.corners.p_util * read
 
 
 class Ife:
@@ -216,11 +243,12 @@ class Ife:
         camera = fit_camera(self.config.camera, image)
         masks = self._segmenter.segment(image) if masks is None else masks
         usable = usable_road(masks, self.config.remove_shadow)
-        regions = self.look(state, image, motion, camera, masks, usable)
-        evidence = self.classify(regions)
-        state, result = self.judge(state, regions, evidence)
+        looked_at = self.config.groups_looked_at
+        regions = self.look(state, image, motion, camera, masks, usable, looked_at)
+        regions = self.classify(regions)
+        state, result = self.judge(state, regions)
         if with_view:
-            result = replace(result, view=_view(camera, masks, usable, regions, evidence))
+            result = replace(result, view=_view(camera, masks, usable, regions))
         return state, result
 
     def look(
@@ -240,14 +268,9 @@ class Ife:
             for index in range(groups)
         ]
 
-    def judge(
-        self, state: IfeState, regions: list[Region], evidence: list[NDArray[np.float64]]
-    ) -> tuple[IfeState, FrameResult]:
-        """The state after a frame and its verdict, from the regions and their patches' probabilities."""
-        verdicts = [
-            self._fuse(index, state.evidence[index], region.corners, probabilities)
-            for index, (region, probabilities) in enumerate(zip(regions, evidence, strict=True))
-        ]
+    def judge(self, state: IfeState, regions: list[Region]) -> tuple[IfeState, FrameResult]:
+        """The state after a frame and its verdict, from the classified regions."""
+        verdicts = [self._fuse(index, state.evidence[index], region) for index, region in enumerate(regions)]
         after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
         result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)
         return IfeState(after, state.frame_count + 1), result
@@ -274,7 +297,7 @@ class Ife:
         key = (config.seed, frame, index, list(SIDES).index(config.side))
         drawn = sample(corners, config.b[index], key)
         widths = roi_widths_px(camera, corners.ground_m[drawn], config.roi_width_m)
-        return Region(corners, corners.pixel[drawn], widths, ellipses)
+        return Region(corners, corners.pixel[drawn], widths, ellipses, len(drawn))
 
     def _tracks(self, motion: Motion) -> list[Ellipses]:
         config = self.config
@@ -283,7 +306,7 @@ class Ife:
                 motion,
                 wheelbase_m=config.wheelbase_m,
                 lateral_m=sign * config.track_m / 2.0,
-                horizon_m=max(high for _, high in config.ranges_m),
+                horizon_m=max(high for _, high in config.ranges_m[: config.groups_looked_at]),
                 step_m=config.step_m,
                 k1=config.k1,
                 k2=config.k2,
@@ -292,30 +315,37 @@ class Ife:
             for sign in SIDES[config.side]
         ]
 
-    def classify(self, regions: list[Region]) -> list[NDArray[np.float64]]:
-        """Calibrated probabilities of the patches of each group, all in one run of the network."""
+    def classify(self, regions: list[Region]) -> list[Region]:
+        """The regions with what their readable patches show, all in one run of the network; others are left out."""
         patches = [patch for region in regions for patch in region.patches]
         if not patches:
-            return [np.empty((0, len(Surface)))] * len(regions)
+            return regions
         temperature = self._classifier.temperature if self.config.calibrate else 1.0
-        probabilities = calibrated_probabilities(self._classifier.logits(np.stack(patches)), temperature)
-        ends = np.cumsum([len(region.widths_px) for region in regions])
-        return np.split(probabilities, ends[:-1])
+        verdicts = self._classifier.verdicts(np.stack(patches))
+        probabilities = calibrated_probabilities(verdicts.logits, temperature)
+        readable = verdicts.readable >= LEAST_READABLE
+        ends = np.cumsum([len(region.patches) for region in regions])[:-1]
+        return [
+            replace(region.keeping(kept), probabilities=own[kept])
+            for region, kept, own in zip(
+                regions, np.split(readable, ends), np.split(probabilities, ends), strict=True
+            )
+        ]
 
-    def _fuse(
-        self, index: int, before: EvidenceState, corners: Corners, probabilities: NDArray[np.float64]
-    ) -> tuple[EvidenceState, GroupResult]:
+    def _fuse(self, index: int, before: EvidenceState, region: Region) -> tuple[EvidenceState, GroupResult]:
         """Evidence weights and verdict of one group, Eqs. (7) to (10)."""
-        config = self.config
+        config, corners, probabilities = self.config, region.corners, region.probabilities
         n_roi = len(probabilities)
         if n_roi > 1:
             after = update_weights(before, probabilities.argmax(axis=1), config.weight_law)
             weights = after.weights if config.weight_evidence else EvidenceState().weights
-            fused = combine(basic_probability(probabilities, weights), n_roi)
+            mass = basic_probability(probabilities, weights)
+            fused = combine(mass, n_roi)
         else:
+            mass = np.zeros(len(Surface))
             after, fused = before, np.array(before.weights)
         surface = Surface(int(fused.argmax()))
-        Q_v = visual_confidence(corners.p_util, float(fused[surface]))
+        Q_v = visual_confidence(region.p_util, float(fused[surface]))
         dry, wet, snow_ice = fused.tolist()
         return after, GroupResult(
             name=GROUP_NAMES[index],
@@ -323,9 +353,10 @@ class Ife:
             surface=surface,
             probabilities=(dry, wet, snow_ice),
             P_fusion=float(fused[surface]),
-            p_util=corners.p_util,
+            p_util=region.p_util,
             Q_v=Q_v,
-            flag=n_roi > 1 and Q_v > config.flag_threshold,
+            m_0=float(mass.max()),
+            flag=Q_v > config.flag_threshold and mass.max() >= config.least_mass and n_roi > 1,
             n_roi=n_roi,
             n_ell=corners.n_ell,
             n_rs=corners.n_rs,
@@ -364,10 +395,9 @@ def _view(
     masks: RoadMasks,
     usable: NDArray[np.bool_],
     regions: list[Region],
-    evidence: list[NDArray[np.float64]],
 ) -> FrameView:
     groups = []
-    for region, probabilities in zip(regions, evidence, strict=True):
+    for region in regions:
         outlines = [ellipses.outlines_m() for ellipses in region.ellipses]
         stacked = np.concatenate(outlines) if outlines else np.empty((0, 32, 2))
         boxes = [
@@ -378,7 +408,7 @@ def _view(
             GroupView(
                 camera.ground_to_image(stacked.reshape(-1, 2)).reshape(stacked.shape),
                 np.array(boxes, dtype=np.int64).reshape(-1, 4),
-                probabilities,
+                region.probabilities,
             )
         )
     return FrameView(masks, usable, tuple(groups))

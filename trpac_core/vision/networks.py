@@ -42,6 +42,22 @@ class RoadMasks:
     shadow: NDArray[np.float32]
 
 
+@dataclass(frozen=True)
+class PatchVerdicts:
+    """What the surface network says of n patches.
+
+    Attributes
+    ----------
+    logits : float64, shape (n, 3)
+        Of dry, wet, snow and ice.
+    readable : float64, shape (n,)
+        Probability that the patch shows road that can be read at all [-].
+    """
+
+    logits: NDArray[np.float64]
+    readable: NDArray[np.float64]
+
+
 class RoadSegmenter(Protocol):
     """Finds drivable road and shadow in a picture."""
 
@@ -58,8 +74,8 @@ class PatchClassifier(Protocol):
         """T of the temperature scaling [-]."""
         ...
 
-    def logits(self, patches: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Logits of BGR patches (n, 64, 96, 3), shape (n, 3)."""
+    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
+        """What BGR patches (n, 64, 96, 3) show."""
         ...
 
 
@@ -95,7 +111,7 @@ class SurfaceClassifier:
         self._session = _load(path, threads)
         self._path = path
         _check_input(self._session, path, "patches", [None, PATCH_HEIGHT_PX, PATCH_WIDTH_PX, 3])
-        _check_outputs(self._session, path, ("logits",))
+        _check_outputs(self._session, path, ("logits", "readable"))
         self._temperature = _read_temperature(self._session, path)
 
     @property
@@ -103,15 +119,20 @@ class SurfaceClassifier:
         """T of the temperature scaling [-]."""
         return self._temperature
 
-    def logits(self, patches: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Logits of BGR patches (n, 64, 96, 3) in one run, shape (n, 3); raises ModelError if not finite."""
-        (logits,) = self._session.run(["logits"], {"patches": patches})
+    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
+        """Verdicts on BGR patches (n, 64, 96, 3) in one run; raises ModelError if they are not finite."""
+        logits, readable = self._session.run(["logits", "readable"], {"patches": patches})
         if logits.shape != (len(patches), len(Surface)) or not np.isfinite(logits).all():
             raise ModelError(
                 f"{self._path}: expected finite logits of shape {(len(patches), len(Surface))}, got shape "
                 f"{logits.shape}. Export or train the network again."
             )
-        return logits.astype(np.float64)
+        if readable.shape != (len(patches),) or not ((readable >= 0.0) & (readable <= 1.0)).all():
+            raise ModelError(
+                f"{self._path}: expected 'readable' of shape {(len(patches),)} within [0, 1], got shape "
+                f"{readable.shape}. Export or train the network again."
+            )
+        return PatchVerdicts(logits.astype(np.float64), readable.astype(np.float64))
 
 
 def _load(path: str | Path, threads: int) -> ort.InferenceSession:

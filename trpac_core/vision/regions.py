@@ -215,7 +215,12 @@ def cut_patch(
     array of uint8, shape (64, 96, 3)
         The region of aspect 3:2, shifted to lie inside the picture, reduced by area averaging.
     """
-    left, top, right, bottom = roi_box(image.shape[1], image.shape[0], centre_px, width_px)
+    return cut_box(image, roi_box(image.shape[1], image.shape[0], centre_px, width_px))
+
+
+def cut_box(image: NDArray[np.uint8], box: tuple[int, int, int, int]) -> NDArray[np.uint8]:
+    """A box of a picture (left, top, right, bottom in pixels) at the surface network's size, by area averaging."""
+    left, top, right, bottom = box
     size = (PATCH_WIDTH_PX, PATCH_HEIGHT_PX)
     return cv2.resize(image[top:bottom, left:right], size, interpolation=cv2.INTER_AREA).astype(
         np.uint8, copy=False

@@ -15,8 +15,9 @@ from .networks import RoadMasks
 class GroupResult:
     """Verdict of one group of ellipses.
 
-    `probabilities` are P_fusion of dry, wet, snow and ice. With `n_roi` of 0 or 1 they are the evidence
-    weights, the surface is that of the largest weight, and the flag is not set.
+    `probabilities` are P_fusion of dry, wet, snow and ice, `m_0` is the largest mass of Eq. (8) before the
+    combination. With `n_roi` of 0 or 1 they are the evidence weights, `m_0` is 0, the surface is that of the largest
+    weight, and the flag is not set.
     """
 
     name: str
@@ -26,6 +27,7 @@ class GroupResult:
     P_fusion: float
     p_util: float
     Q_v: float
+    m_0: float
     flag: bool
     n_roi: int
     n_ell: int
@@ -102,3 +104,7 @@ class FrameResult:
     def flag(self) -> bool:
         """Whether the visual information is to be trusted."""
         return self.near.flag
+
+    def told_by_bus(self, flag_threshold: float) -> float:
+        """Q_v for a receiver that sets its flag by Q_v alone: no more than its threshold where the flag is down [-]."""
+        return self.Q_v if self.flag else min(self.Q_v, flag_threshold)

@@ -72,7 +72,8 @@ class Voting:
         drawn = generator.choice(len(pixels), min(self.config.n_roi, len(pixels)), replace=False)
         widths = roi_widths_px(camera, ground_m[drawn], self.config.roi_width_m)
         patches = [cut_patch(image, pixel, width) for pixel, width in zip(pixels[drawn], widths, strict=True)]
-        votes = np.bincount(self._classifier.logits(np.stack(patches)).argmax(axis=1), minlength=len(Surface))
+        classes = self._classifier.verdicts(np.stack(patches)).logits.argmax(axis=1)
+        votes = np.bincount(classes, minlength=len(Surface))
         return VotingResult(Surface(int(votes.argmax())), float(votes.max() / votes.sum()), int(votes.sum()))
 
     def _drivable_cells(

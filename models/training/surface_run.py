@@ -1,0 +1,238 @@
+"""One training of the surface classifier: patches, teacher, both stages, calibration, reading head, card."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import time
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from rich.progress import Progress
+
+from . import calibrate, cards, scores
+from .data import Image, Picture, family_of, of_split
+from .export import export_surface, sha256_of
+from .nets import SurfaceNet
+from .outliers import outlier_patches
+from .patches import PatchSet, joined, judged_patches, training_patches
+from .teacher import TeacherError, TeacherFeatures, teacher_features
+from .train_surface import (
+    Report,
+    Taught,
+    learn_classes,
+    learn_features,
+    learn_reading,
+    learn_softening,
+    new_student,
+    verdicts_of,
+)
+
+TRUNK_STEPS, CLASS_STEPS = 1500, 800
+TRUNK_SOURCES = ("condition_web", "dry_udacity", "rendered")
+"""Sources of the first stage: none on which a leave-one-out score is taken, so that one trunk serves all of those."""
+
+CUTTING_SEED = 1
+OUTLIERS = {"train": 4000, "val": 800}
+CALIBRATION_PER_SOURCE = 240
+"""Most validation patches that one source gives to the calibration, lest one drive decide T."""
+
+Steps = Callable[[str, int], AbstractContextManager[Report]]
+
+
+@dataclass(frozen=True)
+class Material:
+    """What the classifier learns from."""
+
+    patches: PatchSet
+    teacher: TeacherFeatures | None
+    outliers: dict[str, Image]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A trained and calibrated classifier with its scores on the judged sets."""
+
+    net: SurfaceNet
+    temperature: float
+    reliabilities: dict[str, tuple[calibrate.Reliability, calibrate.Reliability]]
+    entropies: tuple[float, float]
+    picture_scores: dict[str, scores.ClassScore]
+    patch_scores: dict[str, scores.ClassScore]
+    readings: dict[str, float]
+
+
+def train_and_ship(
+    given: argparse.Namespace,
+    facts: cards.RunFacts,
+    rendered: dict[str, PatchSet],
+    progress: Progress,
+    steps: Steps,
+) -> None:
+    """Train as the command line asks, write surface.onnx, its card and the reliability diagram."""
+    start = time.monotonic()
+    material = gather(given, facts.pictures, rendered, steps)
+    trunk = _trunk(given, material, steps)
+    count = max(2, round(given.effort * CLASS_STEPS))
+    with steps("training the surface classifier", count) as report:
+        taught = learn_classes(
+            trunk, material.patches, material.teacher, steps=count, seed=given.seed, report=report
+        )
+    net = taught.net
+    learn_reading(net, _all_looks(material.patches, given.seed), material.outliers["train"], seed=given.seed)
+    train_s = time.monotonic() - start
+    outcome = judge(net, _judged_sets(facts.pictures, rendered), material.outliers["val"], given.seed)
+    path = given.out / "surface.onnx"
+    export_surface(net, outcome.temperature, path)
+    calibrate.draw_reliability(
+        *outcome.reliabilities["validation, both"], outcome.temperature, given.out / "reliability.png"
+    )
+    text = cards.surface_card(
+        facts, outcome, sha256=sha256_of(path), train_s=train_s, train_patches=len(material.patches)
+    )
+    cards.write_card(path.with_suffix(".md"), text)
+    progress.console.print(cards.class_table(outcome.picture_scores), markup=False)
+
+
+def gather(
+    given: argparse.Namespace, pictures: Sequence[Picture], rendered: dict[str, PatchSet], steps: Steps
+) -> Material:
+    """Training patches with the teacher's features, and outliers; sources that the command line leaves out are absent.
+
+    What is cut does not depend on the seed of the training, so that the teacher need be asked once only.
+    """
+    every = of_split(pictures, "train")
+    patches = joined([training_patches(every, CUTTING_SEED), rendered["train"]])
+    teacher = _ask_teacher(given, patches, steps) if given.teacher else None
+    kept = np.array([family_of(str(source)) not in given.without for source in patches.sources])
+    rng = np.random.default_rng(CUTTING_SEED)
+    seen = [picture for picture in every if picture.family not in given.without]
+    outliers = {
+        "train": outlier_patches(rng, seen, patches.patches[kept], OUTLIERS["train"]),
+        "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, OUTLIERS["val"]),
+    }
+    return Material(patches.where(kept), None if teacher is None else teacher.where(kept), outliers)
+
+
+def _ask_teacher(given: argparse.Namespace, patches: PatchSet, steps: Steps) -> TeacherFeatures:
+    """The teacher's features, kept beside the rendered worlds where there is a folder for those."""
+    if not given.teacher.is_file():
+        raise TeacherError(f"{given.teacher}: not found; leave --teacher out to train without one")
+    digest = hashlib.sha256(patches.patches.tobytes() + given.teacher.read_bytes()).hexdigest()[:12]
+    file = given.worlds / f"teacher-{digest}.npz" if given.worlds else None
+    if file and file.is_file():
+        with np.load(file) as kept:
+            return TeacherFeatures(kept["pooled"], kept["maps"])
+    with steps("asking the teacher", len(patches)) as report:
+        features = teacher_features(given.teacher, patches.patches, lambda done: report(done, np.nan))
+    if file:
+        part = file.with_suffix(".part.npz")
+        np.savez(part, pooled=features.pooled, maps=features.maps)
+        part.replace(file)
+    return features
+
+
+def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taught:
+    """The first stage's net: read from its file where there is one, else trained (and kept)."""
+    student = new_student(given.seed)
+    if material.teacher is None:
+        return student
+    if given.trunk and given.trunk.is_file():
+        torch.nn.ModuleList(student).load_state_dict(torch.load(given.trunk, weights_only=True))
+        return student
+    chosen = np.isin(material.patches.sources, TRUNK_SOURCES)
+    count = max(2, round(given.effort * TRUNK_STEPS))
+    with steps("learning the teacher's features", count) as report:
+        trunk = learn_features(
+            student,
+            material.patches.where(chosen),
+            material.teacher.where(chosen),
+            steps=count,
+            seed=given.seed,
+            report=report,
+        )
+    if given.trunk:
+        part = given.trunk.with_suffix(".part")
+        torch.save(torch.nn.ModuleList(trunk).state_dict(), part)
+        part.replace(given.trunk)
+    return trunk
+
+
+def _all_looks(patches: PatchSet, seed: int) -> Image:
+    """Readable road, undisturbed and disturbed, of all sources alike: for the reading head alone."""
+    rng = np.random.default_rng(seed)
+    keep = np.concatenate(
+        [
+            rng.permutation(np.flatnonzero(patches.sources == source))[:1500]
+            for source in np.unique(patches.sources)
+        ]
+    )
+    clear = patches.patches[keep]
+    return np.concatenate([clear, calibrate.noised(clear[::2], seed)])
+
+
+def judge(net: SurfaceNet, judged: dict[str, PatchSet], outliers: Image, seed: int) -> Outcome:
+    """Calibration on the validation sets, then scores of all sets."""
+    validation = joined([_thinned(seed, part) for name, part in judged.items() if " val" in name])
+    noised = calibrate.noised(validation.patches, seed)
+    labels = np.tile(validation.labels, 2)
+    net.softening.data = learn_softening(net, np.concatenate([validation.patches, noised]), labels)
+    plain = {"undisturbed": verdicts_of(net, validation.patches)[0], "disturbed": verdicts_of(net, noised)[0]}
+    both = np.concatenate(list(plain.values()))
+    temperature = calibrate.learn_temperature(both, labels)
+
+    def pair(values: NDArray[np.float64], true: NDArray[np.int64]) -> tuple:
+        return calibrate.reliability(values, true), calibrate.reliability(values, true, temperature)
+
+    reliabilities = {"validation, both": pair(both, labels)}
+    reliabilities |= {
+        f"validation, {name}": pair(values, validation.labels) for name, values in plain.items()
+    }
+    logits = {name: verdicts_of(net, part.patches)[0] for name, part in judged.items()}
+    readings = {"readable road kept: validation": _share_read(net, validation.patches)}
+    readings["readable road kept: validation, disturbed"] = _share_read(net, noised)
+    for name, part in judged.items():
+        if " test" in name:
+            reliabilities[name] = pair(logits[name], part.labels)
+            disturbed = calibrate.noised(part.patches, seed)
+            reliabilities[f"{name}, disturbed"] = pair(verdicts_of(net, disturbed)[0], part.labels)
+            readings[f"readable road kept: {name}"] = _share_read(net, part.patches)
+    readings["no readable road, let through: validation"] = _share_read(net, outliers)
+    return Outcome(
+        net,
+        temperature,
+        reliabilities,
+        (calibrate.cross_entropy(both, labels), calibrate.cross_entropy(both, labels, temperature)),
+        {name: scores.by_picture(logits[name], part, temperature) for name, part in judged.items()},
+        {name: scores.by_patch(logits[name], part) for name, part in judged.items()},
+        readings,
+    )
+
+
+def _share_read(net: SurfaceNet, patches: Image) -> float:
+    return float((verdicts_of(net, patches)[1] > 0.5).mean())
+
+
+def _judged_sets(pictures: Sequence[Picture], rendered: dict[str, PatchSet]) -> dict[str, PatchSet]:
+    """Validation and test sets by name; test pictures of other cameras apart from the stills."""
+    validation, test = of_split(pictures, "val"), of_split(pictures, "test")
+    sets = {
+        f"real val: {source}": [p for p in validation if p.source == source]
+        for source in sorted({picture.source for picture in validation})
+    }
+    sets["real test: stills, same search"] = [p for p in test if p.source == "condition_web"]
+    sets["real test: other cameras"] = [p for p in test if p.source.startswith("other_cameras/")]
+    known = {id(picture) for group in sets.values() for picture in group}
+    sets["real test: other"] = [p for p in test if id(p) not in known]
+    judged = {name: judged_patches(group) for name, group in sets.items() if group}
+    return {**judged, "rendered val": rendered["val"], "rendered test": rendered["test"]}
+
+
+def _thinned(seed: int, patches: PatchSet) -> PatchSet:
+    keep = np.zeros(len(patches), np.bool_)
+    keep[np.random.default_rng(seed).permutation(len(patches))[:CALIBRATION_PER_SOURCE]] = True
+    return patches.where(keep)
