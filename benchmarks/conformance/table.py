@@ -12,6 +12,7 @@ from .matrix import Place
 from .operations import OPERATIONS
 from .outcome import Cell, Outcome
 
+NOT_RUN = "not run"
 DOCUMENT = Path(__file__).parents[2] / "docs" / "conformance.md"
 HEAD = """# Which client can do what with the units
 
@@ -21,9 +22,9 @@ called without FMI, gives the same outputs bit for bit. `-` is not offered by th
 `FAILED` what it says; the numbers stand for the reasons below.
 
 Two clients round what they pass on. libcosim hands over step sizes that are differences of times: compared to 1e-12,
-without `TRPAC_std`, which is renewed block of time by block of time, one step earlier or later there. The program `ecos`
-writes six digits. fmpy's own remoting serves units for another platform only (Windows units
-under wine), so "fmpy, own process" is fmpy behind a pipe. The C program is ours, on the FMI headers that fmpy ships.
+without `TRPAC_std`, which is renewed block of time by block of time, one step earlier or later there. The program
+`ecos` writes six digits. fmpy's own remoting serves units for another platform only (Windows units under wine), so
+"fmpy, own process" is fmpy behind a pipe. The C program is ours, on the FMI headers that fmpy ships.
 """
 
 
@@ -39,7 +40,7 @@ def rows(cells: Mapping[Place, Cell], unit: str) -> list[str]:
 
 def _cell(cell: Cell | None) -> str:
     if cell is None:
-        return "not run"
+        return NOT_RUN
     return cell.outcome.value if cell.outcome is Outcome.OK else f"{cell.outcome.value} [{cell.reason}]"
 
 
@@ -63,10 +64,11 @@ def _numbered(row: str, reasons: dict[str, int]) -> str:
     )
 
 
-def outcomes(text: str) -> dict[Place, Outcome]:
-    """The cells that a document holds, without their reasons."""
+def read_cells(text: str) -> dict[Place, Cell]:
+    """The cells that a document holds."""
+    reasons = dict(re.findall(r"^(\d+)\. (.*)$", text, re.MULTILINE))
     operations = {title: name for name, title in OPERATIONS.items()}
-    found: dict[Place, Outcome] = {}
+    found: dict[Place, Cell] = {}
     for section in text.split("\n## ")[1:]:
         unit, *lines = section.splitlines()
         if unit not in CASES:
@@ -75,5 +77,8 @@ def outcomes(text: str) -> dict[Place, Outcome]:
             title, *cells = [part.strip() for part in line.strip("|").split("|")]
             if title in operations:
                 for client, cell in zip(CLIENTS, cells, strict=True):
-                    found[Place(client, unit, operations[title])] = Outcome(cell.split(" ")[0])
+                    if cell != NOT_RUN:
+                        outcome, _, number = cell.partition(" ")
+                        place = Place(client, unit, operations[title])
+                        found[place] = Cell(Outcome(outcome), reasons.get(number, ""))
     return found
