@@ -36,7 +36,7 @@ format: $(READY) ## rewrite the sources in the house format
 lock: $(READY)   ## resolve the dependencies anew (needs uv on PATH)
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
 	  --no-emit-index-url --no-emit-find-links \
-	  --extra fmu --extra scenarios --extra design --extra gap --extra sweep --extra dev pyproject.toml -o requirements/dev.txt
+	  --extra fmu --extra scenarios --extra design --extra gap --extra sweep --extra conformance --extra dev pyproject.toml -o requirements/dev.txt
 
 blind: $(READY)  ## the diagnosis on withheld cases, all thresholds (long; BLIND_SEED=n for other cases; third family of forms)
 	$(BIN)/python -m benchmarks.blind run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --forms third --jobs 2

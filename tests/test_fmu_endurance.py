@@ -132,13 +132,18 @@ def test_a_full_disk_leaves_no_half_unit() -> None:
     assert (done["exit_code"], done["lines_of_error"], done["left"]) == (3, 1, [])
 
 
+def _fail_half_way(out: Path) -> None:
+    with written_whole(out) as made:
+        (made / "log.csv").write_text("second, cut sho")
+        (made / "no such folder" / "figure.png").write_text("fails as a full disk does")
+
+
 def test_a_result_appears_whole_or_not_at_all(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with written_whole(out) as made:
         (made / "log.csv").write_text("first")
-    with pytest.raises(OSError, match="no such folder"), written_whole(out) as made:
-        (made / "log.csv").write_text("second, cut sho")
-        (made / "no such folder" / "figure.png").write_text("fails as a full disk does")
+    with pytest.raises(OSError, match="no such folder"):
+        _fail_half_way(out)
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
     assert (out / "log.csv").read_text() == "first"
 

@@ -21,8 +21,8 @@ from .vectors import fuzzed
 
 HISTORY = Path(__file__).parents[1] / "history" / "fuzz.jsonl"
 UNIT_NAMES, KIND_NAMES = tuple(CASES), tuple(KINDS)
-LONGEST_S = 120.0
-"""Without a word for this long the child hangs; a start on a busy machine compiles for half a minute [s]."""
+LONGEST_S, LONGEST_START_S = 120.0, 600.0
+"""Without a word for this long the child hangs; its first word may wait for numba's compilation [s]."""
 SHOWN = 20
 """Findings of a kind that the result quotes."""
 
@@ -69,7 +69,7 @@ def _one_child(name: str, seed: int, start: int, stop: int, folder: Path, findin
         assert process.stdout is not None
         waiting = selectors.DefaultSelector()
         waiting.register(process.stdout, selectors.EVENT_READ)
-        while waiting.select(LONGEST_S):
+        while waiting.select(LONGEST_START_S if at <= start else LONGEST_S):
             line = process.stdout.readline()
             if not line:
                 break
