@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,13 +71,17 @@ def _child(
     command = [sys.executable, "-m", f"{__package__}.cell", client, unit]
     command += [str(bench.archives[unit]), str(bench.folders[unit]), *pictures, *operations]
     with tempfile.TemporaryFile("w+") as said:
+        # A session of its own, so that what a crashed client leaves running can be ended with it.
+        child = subprocess.Popen(
+            command, stdout=said, stderr=subprocess.DEVNULL, cwd=ROOT, start_new_session=True
+        )
         try:
-            done = subprocess.run(
-                command, stdout=said, stderr=subprocess.DEVNULL, cwd=ROOT, timeout=LONGEST_S, check=False
-            )
-            end = f"the process ended with exit code {done.returncode}"
+            end = f"the process ended with exit code {child.wait(LONGEST_S)}"
         except subprocess.TimeoutExpired:
             end = f"the process did not end within {LONGEST_S:g} s"
+        with suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGKILL)
+        child.wait()
         said.seek(0)
         lines = [json.loads(line) for line in said]
     cells = {line["ends"]: Cell(Outcome[line["outcome"]], line["reason"]) for line in lines if "ends" in line}
