@@ -30,6 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         from fmu_src.packaging import BuildError, build_unit, sha256
         from fmu_src.units import UNITS
+        from scenarios.whole_files import written_whole
     except ImportError as error:
         print(
             f"build_fmu.py: {error}. Run it with the project's interpreter: .venv/bin/python build_fmu.py",
@@ -44,7 +45,9 @@ def main(arguments: list[str] | None = None) -> int:
         return EXIT_USAGE
     started = time.perf_counter()
     try:
-        path = build_unit(UNITS[options.slave], options.out / f"{options.slave}.fmu")
+        with written_whole(options.out) as made:
+            built = build_unit(UNITS[options.slave], made / f"{options.slave}.fmu")
+        path = options.out / built.name
     except (BuildError, OSError) as error:
         print(f"build_fmu.py: {error}", file=sys.stderr)
         return EXIT_BUILD

@@ -7,9 +7,11 @@ once, for every slave; see docs/fmu.md.
 
 from __future__ import annotations
 
+import ctypes
 import json
 import sys
 import threading
+import zlib
 from _thread import interrupt_main
 from collections.abc import Callable
 from functools import wraps
@@ -60,8 +62,38 @@ def guarded(fallback: Callable[..., Any]) -> Callable[[Callable[..., Any]], Call
     return decorate
 
 
+def settled(callback: Callable[..., Any]) -> Callable[..., Any]:
+    """Drop an error that C code has left pending: raising another one replaces it, and catching that ends it."""
+
+    @wraps(callback)
+    def run(self: GuardedSlave, *arguments: Any) -> Any:
+        try:
+            raise LookupError  # noqa: TRY301 - raised to be caught, see above
+        except (LookupError, SystemError):  # the second where the pending error spoils the first
+            pass
+        return callback(self, *arguments)
+
+    return run
+
+
 def _nothing(*_: Any) -> None:
     return None
+
+
+def holes(items: list[Any]) -> list[int]:
+    """Places of a list that hold no object at all, as only C code can leave them; Python would crash on reading one.
+
+    A list object holds, after three words, the address of its items (CPython 3.11, Include/cpython/listobject.h).
+    """
+    if not items:
+        return []
+    word = ctypes.sizeof(ctypes.c_void_p)
+    address = ctypes.c_void_p.from_address(id(items) + 3 * word).value
+    if address is None:
+        return []
+    return [
+        place for place, item in enumerate((ctypes.c_void_p * len(items)).from_address(address)) if not item
+    ]
 
 
 class InstantiationError(RuntimeError):
@@ -218,10 +250,26 @@ class GuardedSlave(Fmi2Slave):
         """Set Boolean variables by value reference."""
         self._set(Kind.BOOLEAN, vrs, values)
 
+    def __init_subclass__(cls) -> None:
+        # A text that is not UTF-8 leaves Python's error pending while the wrapper looks this callback up: only what
+        # lies in the instance's own class is then found.
+        cls.set_string = cls.set_string  # type: ignore[method-assign]
+
+    @settled
     @guarded(_nothing)
     def set_string(self, vrs: list[int], values: list[str | None]) -> None:
-        """Set String variables by value reference; a null pointer is the empty text."""
-        self._set(Kind.STRING, vrs, [value or "" for value in values])
+        """Set String variables by value reference; a null pointer is the empty text, as is one that is not UTF-8."""
+        # The wrapper leaves a hole in the list where a text is not UTF-8.
+        unreadable = holes(values)
+        if unreadable:
+            self.report(
+                "set String encoding",
+                Fmi2Status.error,
+                f"{self.modelName}: the texts for value references {[vrs[place] for place in unreadable]} are "
+                "not UTF-8, as FMI 2.0 has them, and were taken as empty.",
+            )
+        texts = ["" if place in unreadable else values[place] or "" for place in range(len(values))]
+        self._set(Kind.STRING, vrs, texts)
 
     @guarded(lambda vrs: [0.0] * len(vrs))
     def get_real(self, vrs: list[int]) -> list[float]:
@@ -256,7 +304,8 @@ class GuardedSlave(Fmi2Slave):
             "values": self.values | self._forgotten,
             "inner": self.inner_state() if self._ready else None,
         }
-        return json.dumps(state).encode()
+        text = json.dumps(state)
+        return f'{text[:-1]}, "crc32": {zlib.crc32(text.encode())}}}'.encode()
 
     @guarded(_nothing)
     def _set_fmu_state(self, state: bytes) -> None:
@@ -268,6 +317,9 @@ class GuardedSlave(Fmi2Slave):
             return
         if origin != (STATE_SCHEMA, __name__):
             self._refuse_state(f"it was saved by another build of the unit ({content['unit']})")
+            return
+        if content.pop("crc32", None) != zlib.crc32(json.dumps(content).encode()):
+            self._refuse_state("it is damaged")
             return
         if content["values"].keys() != self.values.keys():
             self._refuse_state("its variables are not those of this unit")

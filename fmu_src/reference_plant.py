@@ -53,7 +53,9 @@ class ReferencePlant(GuardedSlave):
         setting = self._setting(self.values)
         start_m = self.values["initial.position"] - setting.to_front_m
         state = initial_state(setting.vehicle, setting.road, self.values["initial.vehicle_speed"], start_m)
-        advance(state, (0.0,) * 4, 1e-3)  # compiles, so that no step of the host's has to wait for it
+        moved = advance(state, (0.0,) * 4, 1e-3)  # compiles, so that no step of the host's has to wait for it
+        if not (_finite(state) and _finite(moved)):
+            raise ValueError("The parameters describe a car whose loads or motion are no finite numbers.")
         self._set_up, self._state, self._torque = setting, state, (0.0,) * 4
         self._publish()
 
@@ -76,8 +78,12 @@ class ReferencePlant(GuardedSlave):
                 "step", f"step size is {step_s} s, expected 0 to {LONGEST_STEP_S:g} s. No time has passed."
             )
         elif step_s > 0.0:
-            self._state = advance(replace(self._state, wheel_torque_nm=self._torque), self._torque, step_s)
-            self._publish()
+            moved = advance(replace(self._state, wheel_torque_nm=self._torque), self._torque, step_s)
+            if _finite(moved):
+                self._state = moved
+                self._publish()
+            else:
+                self._warn("motion", "the motion is no finite number any more. The car stays where it was.")
 
     def _warn(self, kind: str, text: str) -> None:
         self.report(kind, Fmi2Status.warning, f"{self.modelName}: {text}")
@@ -133,6 +139,12 @@ class ReferencePlant(GuardedSlave):
             Wheels(*map(np.array, state["wheels"])),
         )
         self._set_up, self._torque = setting, tuple(state["torque"])
+
+
+def _finite(state: PlantState) -> bool:
+    """Whether motion, loads and forces are numbers."""
+    parts = (state.y, *state.wheels)
+    return math.isfinite(state.accel_x_m_s2) and all(bool(np.isfinite(part).all()) for part in parts)
 
 
 def _vehicle(values: Mapping[str, Any]) -> VehicleFile:

@@ -23,6 +23,7 @@ from scenarios.files import (
 )
 from scenarios.plant import simulate
 from scenarios.plant.sensors import make_log, write_log
+from scenarios.whole_files import written_whole
 
 VEHICLE = Path(__file__).parents[1] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml"
 
@@ -102,20 +103,20 @@ def make_case(folder: Path, seed: int) -> Case:
     vehicle = load_vehicle(VEHICLE)
     real = with_effect(vehicle, truth)
     road = draw_road(rng)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "vehicle.yaml").write_bytes(VEHICLE.read_bytes())
-    (folder / "road.yaml").write_text(yaml.safe_dump(road.model_dump(by_alias=True), sort_keys=False))
-    for number, name in enumerate(LOGS):
-        speed_m_s = float(rng.uniform(8.0, 14.0))
-        fine_s = STEP_S / FINE
-        time_s = np.linspace(0.0, DURATION_S, round(DURATION_S / fine_s), endpoint=False)
-        torque_nm = draw_manoeuvre(rng, vehicle, speed_m_s).torque(time_s)
-        trajectory = simulate(real, road, torque_nm, fine_s, initial_speed_m_s=speed_m_s)
-        # the friction reference would give a hidden friction effect away, and few cars have one
-        log = make_log(trajectory, real, NOISE, seed=1000 * seed + number).drop(columns="mu_reference")
-        write_log(log.iloc[::FINE], folder / name)
-    text = json.dumps({"effect": truth.effect, "parameters": truth.parameters}, indent=1) + "\n"
-    (folder / "truth.json").write_text(text, encoding="utf-8")
+    with written_whole(folder) as made:
+        (made / "vehicle.yaml").write_bytes(VEHICLE.read_bytes())
+        (made / "road.yaml").write_text(yaml.safe_dump(road.model_dump(by_alias=True), sort_keys=False))
+        for number, name in enumerate(LOGS):
+            speed_m_s = float(rng.uniform(8.0, 14.0))
+            fine_s = STEP_S / FINE
+            time_s = np.linspace(0.0, DURATION_S, round(DURATION_S / fine_s), endpoint=False)
+            torque_nm = draw_manoeuvre(rng, vehicle, speed_m_s).torque(time_s)
+            trajectory = simulate(real, road, torque_nm, fine_s, initial_speed_m_s=speed_m_s)
+            # the friction reference would give a hidden friction effect away, and few cars have one
+            log = make_log(trajectory, real, NOISE, seed=1000 * seed + number).drop(columns="mu_reference")
+            write_log(log.iloc[::FINE], made / name)
+        text = json.dumps({"effect": truth.effect, "parameters": truth.parameters}, indent=1) + "\n"
+        (made / "truth.json").write_text(text, encoding="utf-8")
     return Case(
         folder / "vehicle.yaml",
         folder / "road.yaml",

@@ -199,8 +199,9 @@ def test_5_cure_a_fault_within_a_callback_is_logged_and_the_unit_goes_on(
 ) -> None:
     unit = open_unit()
     base = sys.modules[f"fmu_src_{unit.description.guid}.guarded_slave"]
+    slave = sys.modules[f"fmu_src_{unit.description.guid}.trpac_estimator"].TrpacEstimator
     monkeypatch.setattr(
-        base.GuardedSlave, callback, base.guarded(_fallbacks()[callback])(_broken(callback)), raising=True
+        slave, callback, base.guarded(_fallbacks()[callback])(_broken(callback)), raising=True
     )
     act(unit)
     act(unit)

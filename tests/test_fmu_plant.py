@@ -251,3 +251,11 @@ def test_compiled_code_is_kept_beside_a_copy_that_outlives_the_unpacked_unit(
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert Path(done.stdout.strip()).is_relative_to(tmp_path / "trpac-fmu")
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize("mass_kg", [1e308, 1e307])
+def test_a_car_whose_numbers_are_no_numbers_is_refused(open_plant: Open, mass_kg: float) -> None:
+    unit = open_plant(vehicle__mass=mass_kg)
+    assert [line.status for line in unit.log] == [ERROR]
+    assert all(math.isfinite(value) for value in unit.outputs().values())

@@ -62,7 +62,7 @@ def run(
 
     Example: trpac run scenarios/paper_simulation.yaml --out out/paper
 
-    Exit codes: 0 done, 2 unusable input.
+    Exit codes: 0 done, 2 unusable input or no place to write, and then nothing is written.
     """
     from scenarios.files import load_scenario
 
@@ -71,7 +71,7 @@ def run(
         chosen = _varied(load_scenario(scenario), seed, stiffness_n)
         with tempfile.TemporaryDirectory(prefix="trpac_") as scratch:
             _run(chosen, fmu, out, Path(scratch))
-    except ScenarioError as error:
+    except (ScenarioError, OSError) as error:
         print(f"trpac run: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_INPUT) from error
 
@@ -102,6 +102,7 @@ def _run(scenario: Scenario, fmu: Path | None, out: Path, scratch: Path) -> None
     from scenarios.looks import draw_looks
     from scenarios.report import write_report
     from scenarios.runner import run_scenario, write_run
+    from scenarios.whole_files import written_whole
 
     console = Console()
     unit = fmu or build_unit(UNITS["TrpacEstimator"], scratch / "TrpacEstimator.fmu")
@@ -121,9 +122,10 @@ def _run(scenario: Scenario, fmu: Path | None, out: Path, scratch: Path) -> None
             draw_looks(finished, looks, lambda done, total: show("drawing the report", done, total))
     report = scratch / "report.html"
     write_report(finished, figure, looks if looks.is_file() else None, report)
-    write_run(finished, out)
-    for path in (figure, report):
-        (out / path.name).write_bytes(path.read_bytes())
+    with written_whole(out) as made:
+        write_run(finished, made)
+        for path in (figure, report):
+            (made / path.name).write_bytes(path.read_bytes())
     console.print(_score_table(finished.summary))
     console.print(f"Report: {out / 'report.html'}   figure: {out / 'figure17.png'}")
 

@@ -44,6 +44,12 @@ SIDES = {"left": (1.0,), "right": (-1.0,), "both": (1.0, -1.0)}
 """Front wheels whose tracks are looked at, as the sign of their lateral position."""
 
 
+MOST_WAY_M, MOST_WIDTH_M, MOST_PATCHES = 200.0, 40.0, 500
+LEAST_GRID_M, LEAST_STEP_M = 0.005, 0.01
+MOST_DEVIATION_M, MOST_GROWTH_M_S = 2.0, 0.01
+"""Beyond these a frame would cost minutes or all memory, and nothing would be gained [m], [m/s]."""
+
+
 @dataclass(frozen=True)
 class IfeConfig:
     """Settings of the estimator; the defaults are Table 3 and section 3 of the paper where it states them.
@@ -133,6 +139,16 @@ class IfeConfig:
                 self.strip_half_width_m,
             )
             > 0.0,
+            f"ranges must end within {MOST_WAY_M:g} m, which no camera sees the surface beyond": all(
+                high <= MOST_WAY_M for _, high in self.ranges_m
+            ),
+            f"b must be at most {MOST_PATCHES} in each group": max(self.b) <= MOST_PATCHES,
+            f"a must be at least {LEAST_GRID_M:g} m and the step {LEAST_STEP_M:g} m": self.a_m >= LEAST_GRID_M
+            and self.step_m >= LEAST_STEP_M,
+            f"start deviation must be at most {MOST_DEVIATION_M:g} m and k2 {MOST_GROWTH_M_S:g} m/s, patch and strip "
+            f"{MOST_WIDTH_M:g} m wide": self.start_deviation_m <= MOST_DEVIATION_M
+            and self.k2 <= MOST_GROWTH_M_S
+            and max(self.roi_width_m, 2.0 * self.strip_half_width_m) <= MOST_WIDTH_M,
             "sigma must lie in [0, 1]": 0.0 <= self.weight_law.sigma <= 1.0,
             "least_mass must lie in [0, 1]": 0.0 <= self.least_mass <= 1.0,
             "seed must not be negative": self.seed >= 0,

@@ -26,6 +26,7 @@ _LOAD_ERRORS = (
     ort_errors.NoSuchFile,
     ort_errors.NotImplemented,
     ort_errors.RuntimeException,
+    UnicodeDecodeError,  # the runtime's own error text, where it quotes damaged names
 )
 _CLASS_LIST = ",".join(surface.label for surface in Surface)
 

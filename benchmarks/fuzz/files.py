@@ -1,0 +1,273 @@
+"""Every kind of file that the project reads: a good one, how it is read, which errors are clear ones, what is right."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+import warnings
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from fmu_src.units import MODELS, ROOT
+
+from .mutations import BINARY, TEXT, Rng
+
+LONGEST_ERROR = 20_000
+"""A longer error is no clear one [characters]."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of file.
+
+    Parameters
+    ----------
+    make : callable
+        Writes a good file into a folder and returns its path.
+    read : callable
+        Reads a file; its value is compared with that of the good file where `exact` is set.
+    errors : callable
+        The classes of clear errors, imported when asked for.
+    text : bool
+        Whether it is damaged as text, too.
+    exact : bool
+        Whether the format protects its content, so that what can be read must be right.
+    """
+
+    make: Callable[[Path], Path]
+    read: Callable[[Path], Any]
+    errors: Callable[[], tuple[type[Exception], ...]]
+    text: bool = False
+    exact: bool = False
+
+
+def damaged(kind: Kind, good: bytes, rng: Rng) -> bytes:
+    """The file's bytes after one damage, or two."""
+    ways = TEXT if kind.text else BINARY
+    for _ in range(int(rng.integers(1, 3))):
+        if good:
+            good = ways[int(rng.integers(len(ways)))](good, rng)
+    return good
+
+
+def judge(kind: Kind, path: Path, right: Any) -> str | None:
+    """What is wrong with how a damaged file is read; None where it is refused clearly, or read."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = kind.read(path)
+    except kind.errors() as error:
+        text = str(error)
+        if not text.strip() or len(text) > LONGEST_ERROR:
+            return f"an error of {len(text)} characters"
+        return None
+    except Exception as error:  # noqa: BLE001 - whatever else comes is the finding
+        return f"{type(error).__name__}: {str(error)[:300]}"
+    if kind.exact and not _same(found, right):
+        return "read, with another content"
+    return None
+
+
+def _same(found: Any, right: Any) -> bool:
+    if isinstance(right, np.ndarray):
+        return found.shape == right.shape and bool(np.array_equal(found, right))
+    return bool(found == right)
+
+
+# Pictures
+
+
+def _picture(suffix: str) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        rng = np.random.default_rng(3)
+        image = np.full((120, 192, 3), 190, np.uint8)
+        image[50:] = rng.integers(60, 140, (70, 192, 1), dtype=np.uint8)
+        cv2.imwrite(str(folder / f"good{suffix}"), image)
+        return folder / f"good{suffix}"
+
+    return make
+
+
+def _decode(path: Path) -> Any:
+    from trpac_core.vision.images import decode_image
+
+    return decode_image(path)
+
+
+def _picture_errors() -> tuple[type[Exception], ...]:
+    from trpac_core.vision.images import ImageError
+
+    return (ImageError,)
+
+
+# Configuration
+
+
+def _shipped(*parts: str) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        return Path(shutil.copy(ROOT.joinpath(*parts), folder / parts[-1]))
+
+    return make
+
+
+def _scenario(folder: Path) -> Path:
+    """A scenario among the files that it names."""
+    for name in ("roads", "vehicles", "manoeuvres", "cameras"):
+        shutil.copytree(ROOT / "scenarios" / name, folder / name, dirs_exist_ok=True)
+    return Path(shutil.copy(ROOT / "scenarios" / "paper_simulation.yaml", folder / "scenario.yaml"))
+
+
+def _load(name: str, module: str = "scenarios.files") -> Callable[[Path], Any]:
+    def read(path: Path) -> Any:
+        __import__(module)
+        return getattr(sys.modules[module], name)(path)
+
+    return read
+
+
+def _scenario_errors() -> tuple[type[Exception], ...]:
+    from scenarios.errors import ScenarioError
+
+    return (ScenarioError,)
+
+
+# Logs
+
+
+def _log(suffix: str) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        import pandas as pd
+
+        from sim2real.logs.write import write_log
+
+        rng, n = np.random.default_rng(1), 250
+        time_s = np.arange(n) * 0.01
+        columns = {"time_s": time_s}
+        for wheel in ("fl", "fr", "rl", "rr"):
+            columns[f"wheel_torque_{wheel}_nm"] = 400.0 * np.cos(2.0 * time_s) + rng.normal(size=n)
+            columns[f"wheel_speed_{wheel}_rad_s"] = 52.0 + rng.normal(size=n)
+        columns["vehicle_speed_m_s"] = 15.0 + 0.02 * rng.normal(size=n)
+        columns["accel_x_m_s2"] = 4.0 * np.cos(2.0 * time_s)
+        columns["position_m"] = 15.0 * time_s
+        write_log(pd.DataFrame(columns), folder / f"good{suffix}")
+        return folder / f"good{suffix}"
+
+    return make
+
+
+def _read_log(path: Path) -> Any:
+    from sim2real.logs import read_log
+
+    return read_log(path).to_frame().to_numpy(dtype=float)
+
+
+# Networks, units, states
+
+
+def _network(name: str) -> Callable[[Path], Path]:
+    return lambda folder: Path(shutil.copy(MODELS / name, folder / name))
+
+
+def _segment(path: Path) -> Any:
+    """Loaded and used. ONNX protects nothing: that the numbers are right is for the unit's hash to say."""
+    from trpac_core.vision.networks import Segmenter
+
+    return Segmenter(path, 1).segment(np.full((160, 256, 3), 90, np.uint8)).drivable
+
+
+def _classify(path: Path) -> Any:
+    from trpac_core.vision.networks import SurfaceClassifier
+
+    return SurfaceClassifier(path, 1).logits(np.full((1, 64, 96, 3), 90, np.uint8))
+
+
+def _network_errors() -> tuple[type[Exception], ...]:
+    from trpac_core.vision.networks import ModelError
+
+    return (ModelError,)
+
+
+def _unit(folder: Path) -> Path:
+    from fmu_src.packaging import build_unit
+    from fmu_src.units import UNITS
+
+    return build_unit(UNITS["ReferencePlant"], folder / "good.fmu")
+
+
+def _read_unit(path: Path) -> Any:
+    """Unpacked as our tools do it; the files' content counts."""
+    from fmu_src.packaging import unpack_unit
+
+    folder = Path(tempfile.mkdtemp(prefix="trpac-fuzz-unit-"))
+    try:
+        unpack_unit(path, folder)
+        return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    finally:
+        shutil.rmtree(folder)
+
+
+KINDS = {
+    "picture_jpeg": Kind(_picture(".jpg"), _decode, _picture_errors),
+    "picture_png": Kind(_picture(".png"), _decode, _picture_errors, exact=True),
+    "camera_yaml": Kind(
+        _shipped("scenarios", "cameras", "paper.yaml"),
+        _load("load_camera", "scenarios.camera.files"),
+        _scenario_errors,
+        text=True,
+    ),
+    "vehicle_yaml": Kind(
+        _shipped("scenarios", "vehicles", "four_in_wheel_motor_ev.yaml"),
+        _load("load_vehicle"),
+        _scenario_errors,
+        text=True,
+    ),
+    "road_yaml": Kind(
+        _shipped("scenarios", "roads", "paper_simulation.yaml"),
+        _load("load_road"),
+        _scenario_errors,
+        text=True,
+    ),
+    "scenario_yaml": Kind(_scenario, _load("load_scenario"), _scenario_errors, text=True),
+    "mapping_yaml": Kind(
+        _shipped("sim2real", "mappings", sorted(os.listdir(ROOT / "sim2real" / "mappings"))[0]),
+        _load("load_mapping", "sim2real.logs.mapping"),
+        _scenario_errors,
+        text=True,
+    ),
+    "log_csv": Kind(_log(".csv"), _read_log, _scenario_errors, text=True),
+    "log_parquet": Kind(_log(".parquet"), _read_log, _scenario_errors, exact=True),
+    "log_mf4": Kind(_log(".mf4"), _read_log, _scenario_errors),
+    "segmenter_onnx": Kind(_network("segmenter.onnx"), _segment, _network_errors),
+    "surface_onnx": Kind(_network("surface.onnx"), _classify, _network_errors),
+    "unit_fmu": Kind(_unit, _read_unit, lambda: (ValueError, zipfile.BadZipFile, OSError), exact=True),
+}
+"""By short name. A serialised state is no file of ours, but the host's: see `vectors`."""
+
+
+@contextmanager
+def workplace(kind: Kind) -> Iterator[tuple[Path, bytes, Any]]:
+    """Where damaged files lie, the good one's bytes, and what it reads as."""
+    with tempfile.TemporaryDirectory(prefix="trpac-fuzz-") as name:
+        good = kind.make(Path(name))
+        yield good, good.read_bytes(), kind.read(good)
+
+
+def damaged_files(name: str, seed: int, numbers: range) -> Iterator[tuple[int, str | None]]:
+    """Number and finding of each damaged file; the file of a number depends on the seed alone."""
+    kind = KINDS[name]
+    with workplace(kind) as (path, good, right):
+        for number in numbers:
+            yield number, None
+            path.write_bytes(damaged(kind, good, np.random.default_rng([seed, number])))
+            finding = judge(kind, path, right)
+            if finding:
+                yield number, finding

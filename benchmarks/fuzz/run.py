@@ -1,0 +1,89 @@
+"""Children with a time limit: a crash or a hang is a finding, and the rest goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.conformance.cases import CASES
+from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.units import ROOT, UNITS
+
+from .files import KINDS, damaged_files
+from .vectors import fuzzed
+
+HISTORY = Path(__file__).parents[1] / "history" / "fuzz.jsonl"
+UNIT_NAMES, KIND_NAMES = tuple(CASES), tuple(KINDS)
+LONGEST_S, LONGEST_START_S = 120.0, 600.0
+"""Without a word for this long the child hangs; its first word may wait for numba's compilation [s]."""
+SHOWN = 20
+"""Findings of a kind that the result quotes."""
+
+
+def child(name: str, seed: int, numbers: range, folder: Path) -> None:
+    """The damaged files or acts of these numbers; one line of JSON before each, and one for each finding."""
+    answers = os.fdopen(os.dup(1), "w")
+    # What libraries and units say belongs to nobody here.
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+    with tempfile.TemporaryDirectory(prefix="trpac-fuzz-work-") as work:
+        files = name in KINDS
+        found = damaged_files(name, seed, numbers) if files else fuzzed(folder, Path(work), seed, numbers)
+        for number, finding in found:
+            print(json.dumps([number, finding]), file=answers, flush=True)
+
+
+def run_kind(name: str, seed: int, count: int) -> dict[str, Any]:
+    """All files or acts of a kind: how many, in what time, and the findings."""
+    started = time.perf_counter()
+    findings: list[str] = []
+    with tempfile.TemporaryDirectory(prefix="trpac-fuzz-unit-") as place:
+        folder = Path(place) / name
+        if name in UNITS:
+            unpack_unit(build_unit(UNITS[name], Path(place) / f"{name}.fmu"), folder)
+        start = 0
+        while start < count:
+            start = _one_child(name, seed, start, count, folder, findings)
+    return {
+        "count": count,
+        "seconds": round(time.perf_counter() - started, 1),
+        "findings": len(findings),
+        "shown": findings[:SHOWN],
+    }
+
+
+def _one_child(name: str, seed: int, start: int, stop: int, folder: Path, findings: list[str]) -> int:
+    """Runs a child to its end, a crash or a hang; returns the number that comes next."""
+    command = [sys.executable, "-m", __package__ or "benchmarks.fuzz", "--child", name]
+    command += [str(seed), str(start), str(stop), str(folder)]
+    at = -1
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        assert process.stdout is not None
+        waiting = selectors.DefaultSelector()
+        waiting.register(process.stdout, selectors.EVENT_READ)
+        while waiting.select(LONGEST_START_S if at <= start else LONGEST_S):
+            line = process.stdout.readline()
+            if not line:
+                break
+            at, finding = json.loads(line)
+            if finding:
+                findings.append(f"{at}: {finding}")
+        else:
+            process.kill()
+            at = max(at, start)
+            findings.append(f"{at}: hangs for {LONGEST_S:g} s")
+            return at + 1
+        if process.wait() and at < 0:
+            raise RuntimeError(f"{name}: the child ended with exit code {process.returncode} before it began")
+        if process.returncode:
+            findings.append(f"{at}: the process ended with exit code {process.returncode}")
+            return at + 1
+    return stop

@@ -1,0 +1,60 @@
+"""The committed matrix of clients is the one that a run gives."""
+
+from __future__ import annotations
+
+import ctypes.util
+from importlib.util import find_spec
+
+import pytest
+
+from benchmarks.conformance.cases import CASES
+from benchmarks.conformance.clients import CLIENTS
+from benchmarks.conformance.matrix import Bench, Place, prepare, run_cells
+from benchmarks.conformance.operations import OPERATIONS
+from benchmarks.conformance.outcome import Cell, Outcome
+from benchmarks.conformance.table import DOCUMENT, document, read_cells
+
+UNIT = "TrpacEstimator"
+SHORT = {
+    "fmpy": tuple(OPERATIONS),
+    "fmpy_apart": ("load", "serialised"),
+    "c": ("load", "steps", "state", "missing"),
+    "libcosimpy": ("steps", "two", "reset", "logging"),
+    "ecospy": ("steps", "reset", "state", "nan"),
+    "proxyfmu": ("steps",),
+    "ecos": ("steps", "real"),
+}
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    return prepare(tmp_path_factory.mktemp("conformance"), [UNIT])
+
+
+def test_the_document_has_every_client_unit_and_operation() -> None:
+    found = read_cells(DOCUMENT.read_text(encoding="utf-8"))
+    assert set(found) == {Place(c, u, o) for c in CLIENTS for u in CASES for o in OPERATIONS}
+
+
+def test_a_document_is_read_as_it_was_written() -> None:
+    kinds = (
+        Cell(Outcome.OK),
+        Cell(Outcome.NOT_OFFERED, "a reason: of (some) kind"),
+        Cell(Outcome.FAILED, "12."),
+    )
+    cells = {Place(c, u, o): kinds[len(c + u + o) % 3] for c in CLIENTS for u in CASES for o in OPERATIONS}
+    read = read_cells(document(cells, {"Python": "3.11"}))
+    assert read == cells
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize("client", SHORT)
+def test_a_short_run_gives_the_documents_cells(bench: Bench, client: str) -> None:
+    package = CLIENTS[client].package
+    if find_spec(package) is None:
+        pytest.skip(f"needs {package}: pip install -e .[conformance]")
+    if package == "ecospy" and ctypes.util.find_library("tbb") is None:
+        pytest.skip("ecospy needs the system library libtbb.so.12 (Debian: apt-get install libtbb12)")
+    cells = run_cells(bench, client, UNIT, SHORT[client])
+    committed = read_cells(DOCUMENT.read_text(encoding="utf-8"))
+    assert {p: (c.outcome, c.reason) for p, c in cells.items() if c.outcome is not committed[p].outcome} == {}
