@@ -61,3 +61,13 @@ def test_state_survives_json():
     after, *_ = sides.process(SidesState(), split_road(), STRAIGHT)
     assert SidesState.from_json(after.to_json()) == after
     assert after != SidesState()
+
+
+@pytest.mark.parametrize(("certainty", "flag"), [(3.0, True), (0.4, False)])
+def test_a_receiver_that_knows_q_v_alone_sets_the_same_flag(certainty, flag):
+    """Patches that hardly prefer a class: Q_v is above its threshold after the combination, the flag is down."""
+    sides = SidesIfe(IfeConfig(camera=CAMERA), Masks(), Middle(certainty=certainty))
+    _, left, _ = sides.process(SidesState(), split_road(), STRAIGHT)
+    assert left.Q_v > 0.5
+    assert left.flag is flag
+    assert (left.told_by_bus(0.5) > 0.5) is flag

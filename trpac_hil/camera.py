@@ -94,6 +94,7 @@ class Eyes:
 
     job: CameraJob
     state: Any = field(init=False)
+    flag_threshold: float = field(init=False)
     _ife: Any = field(init=False)
 
     def __post_init__(self) -> None:
@@ -103,7 +104,10 @@ class Eyes:
             Segmenter(MODELS / "segmenter.onnx", job.threads),
             SurfaceClassifier(MODELS / "surface.onnx", job.threads),
         )
-        config = IfeConfig(camera=job.camera, track_m=job.track_m, wheelbase_m=job.wheelbase_m)
+        config = IfeConfig(
+            camera=job.camera, track_m=job.track_m, wheelbase_m=job.wheelbase_m, groups_looked_at=1
+        )
+        self.flag_threshold = config.flag_threshold
         if len(job.sides) == 2:
             self._ife, self.state = SidesIfe(config, *networks), SidesState()
         else:
@@ -166,4 +170,8 @@ def _verdicts(job: CameraJob, eyes: Eyes, number: int, motion: Numbers, control:
     except (ImageError, ModelError) as error:
         control.tell("picture", f"A picture could not be used: {error}")
         return [FAILED, 0.0] * len(job.sides)
-    return [number for result in seen for number in (float(result.surface), result.Q_v)]
+    return [
+        number
+        for result in seen
+        for number in (float(result.surface), result.told_by_bus(eyes.flag_threshold))
+    ]

@@ -356,9 +356,9 @@ class Ife:
             after = update_weights(before, probabilities.argmax(axis=1), config.weight_law)
             weights = after.weights if config.weight_evidence else EvidenceState().weights
             mass = basic_probability(probabilities, weights)
-            fused = combine(mass, n_roi)
+            m_0, fused = float(mass.max()), combine(mass, n_roi)
         else:
-            mass = np.zeros(len(Surface))
+            m_0 = 0.0
             after, fused = before, np.array(before.weights)
         surface = Surface(int(fused.argmax()))
         Q_v = visual_confidence(region.p_util, float(fused[surface]))
@@ -371,8 +371,8 @@ class Ife:
             P_fusion=float(fused[surface]),
             p_util=region.p_util,
             Q_v=Q_v,
-            m_0=float(mass.max()),
-            flag=Q_v > config.flag_threshold and mass.max() >= config.least_mass and n_roi > 1,
+            m_0=m_0,
+            flag=Q_v > config.flag_threshold and m_0 >= config.least_mass and n_roi > 1,
             n_roi=n_roi,
             n_ell=corners.n_ell,
             n_rs=corners.n_rs,
