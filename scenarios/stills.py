@@ -32,6 +32,8 @@ PART = 0.6
 """Size of the overlapping parts of the lower centre that are looked at besides, of its width and height [-]."""
 LEAST_USABLE = 0.7
 """Share of a look that must be road out of the shadow [-]."""
+LEAST_ROAD = 0.05
+"""Probability of readable road that at least one look must have: the lowest of validation stills was 0.08 [-]."""
 LEAST_LOOKS = 2
 """With fewer looks at usable road, all are taken."""
 _LEAST_PROBABILITY = 1e-12
@@ -118,24 +120,27 @@ def picture_probabilities(
     dark camera, a picture without road.
     """
     boxes = _looks(image.shape[1], image.shape[0])
-    usable = usable_road(masks, remove_shadow=True)
-    share = np.array([_usable_share(usable, box, image.shape[1], image.shape[0]) for box in boxes])
-    if (share >= LEAST_USABLE).sum() >= LEAST_LOOKS:
-        boxes = [box for box, on_road in zip(boxes, share >= LEAST_USABLE, strict=True) if on_road]
-    patches = [cut_box(image, box) for box in boxes]
-    patches = [patch for patch in patches if patch.std(axis=(0, 1)).max() >= LEAST_CONTRAST]
-    if not patches:
+    patches = np.stack([cut_box(image, box) for box in boxes])
+    contrast = patches.std(axis=(1, 2)).max(axis=1) >= LEAST_CONTRAST
+    if not contrast.any():
         raise ImageError(
             f"{name}: one even colour where the road should be. Is the lens covered, or the picture dark?"
         )
-    verdicts = classifier.verdicts(np.stack(patches))
-    readable = verdicts.readable >= LEAST_READABLE
-    if not readable.any():
+    verdicts = classifier.verdicts(patches)
+    if verdicts.readable[contrast].max() < LEAST_ROAD:
         raise ImageError(
             f"{name}: no road that could be read where it should be, the lower centre. Is it a picture of a road, in "
             "focus and lit?"
         )
-    probabilities = calibrated_probabilities(verdicts.logits[readable], classifier.temperature)
+    usable = usable_road(masks, remove_shadow=True)
+    share = np.array([_usable_share(usable, box, image.shape[1], image.shape[0]) for box in boxes])
+    readable = contrast & (verdicts.readable >= LEAST_READABLE)
+    on_road = readable & (share >= LEAST_USABLE)
+    best = next(
+        (looks for looks, least in ((on_road, LEAST_LOOKS), (readable, 1)) if looks.sum() >= least), contrast
+    )
+    logits = verdicts.logits[best]
+    probabilities = calibrated_probabilities(logits, classifier.temperature)
     logs = np.log(np.maximum(probabilities, _LEAST_PROBABILITY)).mean(axis=0)
     raised = np.exp(logs - logs.max())
     return raised / raised.sum()
