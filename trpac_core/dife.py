@@ -25,6 +25,7 @@ SEEN_HOLD_M = 2.0
 """Way after which what the tyre showed no longer speaks for the road under it: the depth of the near group [m]."""
 NEVER_SEEN_M = 1e6
 """Way since the tyre showed theta where it never did [m]."""
+_new = tuple.__new__
 LEAST_SENSITIVITY = 0.1
 """Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
 nothing to invert [-]."""
@@ -144,26 +145,26 @@ def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: Fuz
     end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
     So the force must also be below the elastic one of a slip that is `SIGNIFICANCE` deviations smaller.
     """
-    size, load_n, deviation = inputs.slip.size, inputs.load_n, inputs.slip_deviation
-    surely = size - SIGNIFICANCE * (deviation + inputs.slip_change)
+    _, _, _, (size, _), load_n, deviation, change, _, _ = inputs
+    surely = size - SIGNIFICANCE * (deviation + change)
     below = 0.0
     if surely > 0.0:
         below = tyre_at_slip(surely, load_n, longitudinal_stiffness_n).elastic_friction()
     threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
-    return Look(tyre_at_slip(size, load_n, longitudinal_stiffness_n), below, threshold)
+    return _new(Look, (tyre_at_slip(size, load_n, longitudinal_stiffness_n), below, threshold))
 
 
-def _shown(friction: float, look: Look) -> tuple[float | None, float]:
+def _shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float | None, float]:
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
-    if friction > look.slides_below or look.slides_below == 0.0:
+    if friction > slides_below or slides_below == 0.0:
         return None, 0.0
-    theta = look.tyre.theta(friction)
+    theta = tyre.theta(friction)
     if theta is None:
         return None, 0.0
-    sensitivity = look.tyre.friction_by_theta(theta)
+    sensitivity = tyre.friction_by_theta(theta)
     if sensitivity < LEAST_SENSITIVITY:
         return None, 0.0
-    return min(theta, GREATEST_THETA), sensitivity
+    return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity
 
 
 def visible_theta(
@@ -171,7 +172,7 @@ def visible_theta(
 ) -> tuple[float | None, float]:
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
     look = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
-    return _shown(force_n * inputs.slip.direction / inputs.load_n, look)
+    return _shown(force_n * inputs.slip.direction / inputs.load_n, look.tyre, look.slides_below)
 
 
 def fusion_step(
@@ -205,28 +206,29 @@ def fusion_step(
         Step [s].
     """
     theta_hat, s, unseen_m, before_img = state
-    size, direction = inputs.slip
-    load_n, C_x = inputs.load_n, wheel.longitudinal_stiffness_n
+    omega, omega_ahead, torque_nm, (size, direction), load_n, deviation, _, way_m, torque_known = inputs
+    tyre, slides_below, threshold = look
+    inertia, radius_m, C_x = wheel
+    K, driven_n = gains.K, direction * load_n
+    may_show = size > threshold
     if theta_img is not None:
         if before_img is not None and theta_img != before_img:
             unseen_m = NEVER_SEEN_M  # another class: what the tyre showed was shown by another road
         before_img = theta_img
-    unseen_m = min(unseen_m + inputs.way_m, NEVER_SEEN_M)
-    threshold = look.threshold
-    if theta_img is not None:
-        threshold = scheduler.threshold(theta_img, load_n, C_x, inputs.slip_deviation)
-    model_n = direction * load_n * look.tyre.friction(theta_hat)
-    if not inputs.torque_known:
-        s = settled_state(
-            model_n, model_n, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m
-        )
+        threshold = scheduler.threshold(theta_img, load_n, C_x, deviation)
+    unseen_m += way_m
+    if unseen_m > NEVER_SEEN_M:
+        unseen_m = NEVER_SEEN_M
+    model_n = driven_n * tyre.friction(theta_hat)
+    if not torque_known:
+        s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
         held = FusionState(theta_hat, s, unseen_m, before_img)
         return FusionStep(held, model_n, None, 0.0, threshold, False, 0.0)
-    F_hat = observed_force(model_n, s, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
+    F_hat = observed_force(model_n, s, omega, K, inertia, radius_m)
     theta_tyre, sensitivity = None, 0.0
     excited = size > threshold
-    if excited or size > look.threshold:
-        theta_tyre, sensitivity = _shown(F_hat * direction / load_n, look)
+    if excited or may_show:
+        theta_tyre, sensitivity = _shown(F_hat * direction / load_n, tyre, slides_below)
         excited = excited or theta_tyre is not None
     theta_next, K_v, by_theta_n = theta_hat, 0.0, 0.0
     if excited:
@@ -236,7 +238,7 @@ def fusion_step(
             K_v = scheduler.K_v(abs(theta_img - theta_hat))
         theta_next = _driven(theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
         if theta_next != theta_hat:
-            by_theta_n = direction * load_n * look.tyre.friction_by_theta(theta_hat)
+            by_theta_n = driven_n * tyre.friction_by_theta(theta_hat)
         if theta_tyre is not None:
             unseen_m = 0.0
     s = advanced_state(
@@ -244,15 +246,15 @@ def fusion_step(
         model_n,
         by_theta_n,
         (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0,
-        inputs.wheel_torque_nm,
-        inputs.wheel_speed_ahead_rad_s,
-        gains.K,
-        wheel.inertia_kg_m2,
-        wheel.radius_m,
+        torque_nm,
+        omega_ahead,
+        K,
+        inertia,
+        radius_m,
         step_s,
     )
-    after = FusionState(theta_next, s, unseen_m, before_img)
-    return FusionStep(after, F_hat, theta_tyre, sensitivity, threshold, excited, K_v)
+    after = _new(FusionState, (theta_next, s, unseen_m, before_img))
+    return _new(FusionStep, (after, F_hat, theta_tyre, sensitivity, threshold, excited, K_v))
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
@@ -315,4 +317,6 @@ def _driven(
     )
     target = pull / rate
     moved = target + (theta_hat - target) * math.exp(-rate * step_s)
-    return min(max(moved, LEAST_THETA), GREATEST_THETA)
+    if moved < LEAST_THETA:
+        return LEAST_THETA
+    return moved if moved < GREATEST_THETA else GREATEST_THETA

@@ -94,7 +94,7 @@ class ElasticLine(NamedTuple):
 
     def offset(self, speed_m_s: float, variance: float) -> float:
         """What is taken off the slip that is read, with its `offset_variance` [-]."""
-        return beyond(self.b / speed_m_s + self.r, variance)
+        return beyond(self[0] / speed_m_s + self[1], variance)
 
     def compliance(self) -> float:
         """What the tyre is taken to be softer by [-]."""
@@ -102,7 +102,9 @@ class ElasticLine(NamedTuple):
 
     def offset_variance(self, speed_m_s: float) -> float:
         """Variance of what the slip reads too much [-]."""
-        return max(0.0, (self.bb / speed_m_s + 2.0 * self.br) / speed_m_s + self.rr)
+        _, _, _, bb, br, _, rr, _, _ = self
+        variance = (bb / speed_m_s + 2.0 * br) / speed_m_s + rr
+        return variance if variance > 0.0 else 0.0
 
     def slip_variance(self, slip: float, speed_m_s: float) -> float:
         """Mean square error of where the elastic line has a slip, with what was learned and not used in it [-]."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 from .confidence import ConfidenceModel
 from .dife import FusionState, Gains
@@ -126,8 +126,9 @@ class Estimate:
     """One sentence where the input was unusable and the last good estimate is held."""
 
 
-class EstimatorState(NamedTuple):
-    """All that the estimator remembers."""
+@dataclass(slots=True)
+class EstimatorState:
+    """All that the estimator remembers; brought up to date in place, once all of a step is worked out."""
 
     fusion: FusionState
     dynamics: FusionState
@@ -159,7 +160,7 @@ class EstimatorState(NamedTuple):
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
-        values = self._asdict()
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
         for name in ("fusion", "dynamics", "readings", "line"):
             values[name] = list(values[name])
         values["locked_s"] = None if math.isinf(self.locked_s) else self.locked_s
@@ -186,7 +187,8 @@ _PARTS: Mapping[str, Any] = {
 }
 
 
-class Rates(NamedTuple):
+@dataclass(slots=True)
+class Rates:
     """What follows from the step size alone."""
 
     step_s: float

@@ -7,14 +7,16 @@ per output set, the table therefore falls apart into two interpolations, which i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from .tyre import onset_slip
+from .tyre import onset_elastic
 
 THRESHOLD_LIMIT = 0.06
 """Upper end of the threshold's domain [-] (section 4.2)."""
 K_V_LIMIT = 3.0
 """Upper end of K_v's domain [-] (section 4.2)."""
+MOST_CLASSES = 8
+"""Classes whose onset is kept, and none: a bound on memory, not a setting [-]."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ class FuzzyScheduler:
     class_scatter: float = 0.1
     onset_sensitivity: float = 0.1
     noise_factor: float = 3.0
+    _onsets: dict[float | None, float] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def threshold(
         self, theta_img: float | None, load_n: float, longitudinal_stiffness_n: float, slip_deviation: float
@@ -85,6 +88,17 @@ class FuzzyScheduler:
         slip_deviation : float
             Standard deviation of the slip through sensor noise [-].
         """
+        elastic = self._onsets.get(theta_img)
+        if elastic is None:
+            elastic = self._onset(theta_img)
+        ratio = elastic * load_n / longitudinal_stiffness_n
+        slip, noise = ratio / (1.0 + ratio), self.noise_factor * slip_deviation
+        if slip < noise:
+            slip = noise
+        return slip if slip < THRESHOLD_LIMIT else THRESHOLD_LIMIT
+
+    def _onset(self, theta_img: float | None) -> float:
+        """Elastic friction at which a road of that class begins to show [-]; classes are few, so it is kept."""
         sets = self.theta_sets
         visible = (
             sets.small - self.class_scatter,
@@ -92,8 +106,10 @@ class FuzzyScheduler:
             sets.big - self.class_scatter,
         )
         theta = visible[0] if theta_img is None else sets.blend(theta_img, visible)
-        slip = onset_slip(theta, load_n, longitudinal_stiffness_n, self.onset_sensitivity)
-        return min(max(slip, self.noise_factor * slip_deviation), THRESHOLD_LIMIT)
+        elastic = onset_elastic(theta, self.onset_sensitivity)
+        if len(self._onsets) < MOST_CLASSES:
+            self._onsets[theta_img] = elastic
+        return elastic
 
     def K_v(self, difference: float) -> float:
         """Visual gain for a difference abs(theta_img - theta_hat) [-]."""
