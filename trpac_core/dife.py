@@ -11,7 +11,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from .excitation import FuzzyScheduler
-from .observer import advanced_state, observed_force, settled_state
+from .observer import advanced_state, settled_state
 from .slip import GREATEST_SLIP, Slip
 from .tyre import TyreAtSlip, force, slip_ratio_force, theta_from_friction, tyre_at_slip
 
@@ -219,12 +219,14 @@ def fusion_step(
     unseen_m += way_m
     if unseen_m > NEVER_SEEN_M:
         unseen_m = NEVER_SEEN_M
-    model_n = driven_n * tyre.friction(theta_hat)
+    elastic, g_0, g_1, kappa = tyre
+    share = elastic if theta_hat >= 2.0 * elastic else theta_hat * (1.0 - kappa * theta_hat)
+    model_n = driven_n * (share * (g_0 + g_1 * theta_hat))
     if not torque_known:
         s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
         held = FusionState(theta_hat, s, unseen_m, before_img)
         return FusionStep(held, model_n, None, 0.0, threshold, False, 0.0)
-    F_hat = observed_force(model_n, s, omega, K, inertia, radius_m)
+    F_hat = model_n - inertia / radius_m * (s + K * omega)  # Eq. (14), see `observed_force`
     theta_tyre, sensitivity = None, 0.0
     excited = size > threshold
     if excited or may_show:

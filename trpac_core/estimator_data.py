@@ -155,8 +155,8 @@ class EstimatorState:
     settled: bool = False
     """Whether the force observers follow the wheel; not so at the start and after a gap in the input."""
     frame_failed: bool = False
-    ife: IfeState = IfeState()
-    preview: PreviewState = PreviewState()
+    ife: IfeState = field(default_factory=IfeState)
+    preview: PreviewState = field(default_factory=PreviewState)
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""

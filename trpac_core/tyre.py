@@ -235,4 +235,6 @@ def peak_friction(theta: float, load_n: float, longitudinal_stiffness_n: float) 
     if theta <= 0.0:
         return 0.0
     slip = peak_slip(theta, load_n, longitudinal_stiffness_n)
-    return used_friction(theta, slip, load_n, longitudinal_stiffness_n)
+    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
+    base = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * (1.0 - slip) * theta
+    return (elastic if theta >= 2.0 * elastic else theta * (1.0 - 0.25 / elastic * theta)) * base
