@@ -163,8 +163,9 @@ def with_camera(model: ConfidenceModel, variance: float, theta_hat: float, theta
     """Mean square error of the estimate with what the camera says of the road beside what is known [-]."""
     if theta_img is None:
         return variance
-    scatter, distance = model.class_scatter**2, theta_img - theta_hat
+    scatter, distance = model.class_scatter * model.class_scatter, theta_img - theta_hat
     share = variance / (variance + scatter)
+    together, by_camera = share * scatter + share * distance * (share * distance), scatter + distance * distance
     # Both may rest on the same: what is known of all roads. So together they are no surer than the better one.
-    alone = min(variance, scatter + distance * distance)
-    return max(share * scatter + (share * distance) ** 2, alone)
+    alone = variance if variance < by_camera else by_camera
+    return together if together > alone else alone

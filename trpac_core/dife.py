@@ -161,7 +161,8 @@ def _shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[floa
     theta = tyre.theta(friction)
     if theta is None:
         return None, 0.0
-    sensitivity = tyre.friction_by_theta(theta)
+    _, g_0, g_1, kappa = tyre
+    sensitivity = (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
     if sensitivity < LEAST_SENSITIVITY:
         return None, 0.0
     return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity

@@ -231,9 +231,10 @@ class TrpacEstimator:
         if theta_img is not None or fusion != dynamics:
             fused = fusion_step(fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s)
         after, force_n, _, _, threshold, excited, K_v = fused
-        theta = after[0]
+        theta, _, _, class_after = after
+        _, _, _, class_before = fusion
         unasked_s = state.unasked_s + step_s
-        if unasked_s >= config.sensor_filter_s or after.theta_img != fusion.theta_img:
+        if unasked_s >= config.sensor_filter_s or class_after != class_before:
             variance, lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
             state.line = self._learned(state, alone, inputs, read_slip, unasked_s)
             state.variance, state.lag = variance, lag
@@ -306,9 +307,8 @@ class TrpacEstimator:
         deviation = 0.0
         if direction or speed_m_s >= floor_m_s:
             divisor_m_s = speed_m_s if speed_m_s > floor_m_s else floor_m_s
-            offset_variance = state.line.offset_variance(divisor_m_s)
-            signed = read_slip - state.line.offset(divisor_m_s, offset_variance)
-            deviation = math.sqrt(offset_variance)
+            offset, deviation = state.line.offset(divisor_m_s)
+            signed = read_slip - offset
             size, direction = (signed, 1.0) if signed > 0.0 else (-signed, -1.0 if signed < 0.0 else 0.0)
             if size > GREATEST_SLIP:
                 size = GREATEST_SLIP

@@ -113,4 +113,6 @@ class FuzzyScheduler:
 
     def K_v(self, difference: float) -> float:
         """Visual gain for a difference abs(theta_img - theta_hat) [-]."""
+        if difference <= self.difference_sets.small:
+            return self.K_v_values[0]
         return self.difference_sets.blend(difference, self.K_v_values)
