@@ -66,6 +66,17 @@ def unknown_variance(model: ConfidenceModel, theta_hat: float) -> float:
     return model.unknown**2 + (theta_hat - MIDDLE_ROAD) ** 2
 
 
+def camera_share(model: ConfidenceModel, variance: float, theta_hat: float) -> float:
+    """Share of its distance from the estimate that a class may claim [-].
+
+    The Kalman gain P / (P + R), with the variance P of the estimate and R of a road about its class's value; as a
+    share of what it is where nothing is known, so that Table 2 stands as it is there.
+    """
+    unknown, scatter = unknown_variance(model, theta_hat), model.class_scatter * model.class_scatter
+    share = variance * (unknown + scatter) / (unknown * (variance + scatter))
+    return share if share < 1.0 else 1.0
+
+
 def wandered(model: ConfidenceModel, variance: float, theta_hat: float, way_m: float) -> float:
     """Variance after a way driven unseen: the road may have changed to any other [-]."""
     unknown = unknown_variance(model, theta_hat)
@@ -165,7 +176,10 @@ def with_camera(model: ConfidenceModel, variance: float, theta_hat: float, theta
         return variance
     scatter, distance = model.class_scatter * model.class_scatter, theta_img - theta_hat
     share = variance / (variance + scatter)
-    together, by_camera = share * scatter + share * distance * (share * distance), scatter + distance * distance
+    together, by_camera = (
+        share * scatter + share * distance * (share * distance),
+        scatter + distance * distance,
+    )
     # Both may rest on the same: what is known of all roads. So together they are no surer than the better one.
     alone = variance if variance < by_camera else by_camera
     return together if together > alone else alone

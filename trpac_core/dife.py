@@ -23,6 +23,8 @@ SIGNIFICANCE = 1.5
 """How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
 SEEN_HOLD_M = 2.0
 """Way after which what the tyre showed no longer speaks for the road under it: the depth of the near group [m]."""
+OTHER_CLASS_M = 2.0
+"""Way for which another class must stand to be another road: one picture's verdict reaches no farther [m]."""
 NEVER_SEEN_M = 1e6
 """Way since the tyre showed theta where it never did [m]."""
 _new = tuple.__new__
@@ -47,11 +49,14 @@ class Gains:
     K [1/s] is the force observer's bandwidth, gamma [1/s] the estimator's.
 
     With `tyre_first` the camera hurries the estimate along but does not drag it away from what the tyre shows: where
-    theta(lambda, F_hat) is seen, the visual term acts only in its direction and no farther than it; for 2 m after it
-    was seen the term rests, unless the class under the wheel changes meanwhile; where it is not seen, theta_img
-    counts as no less than force and slip allow. Eqs. (17) and (18) as printed have no such guard: there a wrong
-    class with its flag up pulls a settled estimate off by K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for
-    "dry" on a road of 0.5.
+    theta(lambda, F_hat) is seen, the visual term acts only in its direction and no farther than it. After it was seen
+    the term rests for 2 m at least, and until the camera has said for 2 m that the road is of another class: a class
+    has one value wherever it is, so the one under which the tyre was seen says nothing new. From the first sight
+    on, a class that has not yet stood for 2 m says nothing by itself.
+    Where the tyre is not seen, theta_img counts as no less than force and slip allow, and K_v follows the share of
+    the difference that the estimate's own variance leaves to the class. Eqs. (17) and (18) as printed have no such
+    guard: there a wrong class with its flag up pulls a settled estimate off by
+    K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for "dry" on a road of 0.5.
     """
 
     K: float = 63.0
@@ -110,6 +115,12 @@ class FusionState(NamedTuple):
     """Way since the tyre last showed theta [m]."""
     theta_img: float | None = None
     """Adhesion of the class that the camera last gave the road under the wheel [-]."""
+    road_img: float | None = None
+    """That of the class that has stood, from the tyre's first showing theta on [-]."""
+    other_m: float = 0.0
+    """Way for which one other class than that has been given [m]."""
+    rests: bool = False
+    """Whether the tyre has shown theta since that class stands: the camera then has nothing to add."""
 
 
 class FusionStep(NamedTuple):
@@ -185,6 +196,7 @@ def fusion_step(
     scheduler: FuzzyScheduler,
     theta_img: float | None,
     step_s: float,
+    camera_share: float = 1.0,
 ) -> FusionStep:
     """One step of observer and estimator.
 
@@ -205,16 +217,24 @@ def fusion_step(
         Adhesion of the class that the camera gives the road under the wheel; None where epsilon = 0 [-].
     step_s : float
         Step [s].
+    camera_share : float
+        What of its distance from the estimate a class may claim where the tyre is not seen: less than 1 where the
+        estimate is surer than one that knows nothing, see `confidence.camera_share` [-].
     """
-    theta_hat, s, unseen_m, before_img = state
+    theta_hat, s, unseen_m, before_img, road_img, other_m, rests = state
     omega, omega_ahead, torque_nm, (size, direction), load_n, deviation, _, way_m, torque_known = inputs
     tyre, slides_below, threshold = look
     inertia, radius_m, C_x = wheel
     K, driven_n = gains.K, direction * load_n
     may_show = size > threshold
     if theta_img is not None:
-        if before_img is not None and theta_img != before_img:
-            unseen_m = NEVER_SEEN_M  # another class: what the tyre showed was shown by another road
+        if theta_img == road_img:
+            other_m = 0.0
+        elif road_img is not None:
+            other_m = other_m + way_m if theta_img == before_img else way_m
+            if other_m >= OTHER_CLASS_M:
+                # Another class that stands: what the tyre showed was another road.
+                road_img, other_m, rests = theta_img, 0.0, False
         before_img = theta_img
         threshold = scheduler.threshold(theta_img, load_n, C_x, deviation)
     unseen_m += way_m
@@ -225,7 +245,7 @@ def fusion_step(
     model_n = driven_n * (share * (g_0 + g_1 * theta_hat))
     if not torque_known:
         s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
-        held = FusionState(theta_hat, s, unseen_m, before_img)
+        held = FusionState(theta_hat, s, unseen_m, before_img, road_img, other_m, rests)
         return FusionStep(held, model_n, None, 0.0, threshold, False, 0.0)
     F_hat = model_n - inertia / radius_m * (s + K * omega)  # Eq. (14), see `observed_force`
     theta_tyre, sensitivity = None, 0.0
@@ -236,14 +256,18 @@ def fusion_step(
     theta_next, K_v, by_theta_n = theta_hat, 0.0, 0.0
     if excited:
         if theta_img is not None and gains.tyre_first:
-            theta_img = _compatible(theta_img, theta_hat, unseen_m, theta_tyre, F_hat, inputs, C_x)
+            silent = rests or unseen_m < SEEN_HOLD_M or other_m > 0.0
+            theta_img = _compatible(theta_img, theta_hat, silent, theta_tyre, F_hat, inputs, C_x)
         if theta_img is not None:
-            K_v = scheduler.K_v(abs(theta_img - theta_hat))
+            share = camera_share if theta_tyre is None and gains.tyre_first else 1.0
+            K_v = scheduler.K_v(share * abs(theta_img - theta_hat))
         theta_next = _driven(theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
         if theta_next != theta_hat:
             by_theta_n = driven_n * tyre.friction_by_theta(theta_hat)
         if theta_tyre is not None:
             unseen_m = 0.0
+            road_img = before_img if road_img is None else road_img
+            rests = road_img is not None
     s = advanced_state(
         s,
         model_n,
@@ -256,7 +280,7 @@ def fusion_step(
         radius_m,
         step_s,
     )
-    after = _new(FusionState, (theta_next, s, unseen_m, before_img))
+    after = _new(FusionState, (theta_next, s, unseen_m, before_img, road_img, other_m, rests))
     return _new(FusionStep, (after, F_hat, theta_tyre, sensitivity, threshold, excited, K_v))
 
 
@@ -277,7 +301,7 @@ def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: f
 def _compatible(
     theta_img: float,
     theta_hat: float,
-    unseen_m: float,
+    silent: bool,
     theta_tyre: float | None,
     force_n: float,
     inputs: WheelInputs,
@@ -285,8 +309,8 @@ def _compatible(
 ) -> float | None:
     """What the camera may still say beside the tyre.
 
-    None where the tyre is seen to pull the estimate the other way, or was seen just before; no farther off than what
-    the tyre shows, and not less than it already carries.
+    None where the tyre is seen to pull the estimate the other way, or where it is not seen and the camera rests after
+    it was; no farther off than what the tyre shows, and not less than it already carries.
     """
     if theta_tyre is not None:
         by_tyre, by_camera = theta_tyre - theta_hat, theta_img - theta_hat
@@ -294,7 +318,7 @@ def _compatible(
             return None
         # Of noisy samples half lie on the camera's side: without this bound their noise would be rectified.
         return theta_img if abs(by_camera) < abs(by_tyre) else theta_tyre
-    if unseen_m < SEEN_HOLD_M:
+    if silent:
         return None
     return max(theta_img, least_theta(force_n, inputs, longitudinal_stiffness_n))
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera_side import RoadUnderWheel, take_frame
-from .confidence import Evidence, advanced_variance, unknown_variance, wandered, with_camera
+from .confidence import Evidence, advanced_variance, camera_share, unknown_variance, wandered, with_camera
 from .dife import FusionState, FusionStep, Look, Wheel, WheelInputs, fusion_step, look_at, settled
 from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
@@ -229,10 +229,10 @@ class TrpacEstimator:
         alone = fusion_step(dynamics, inputs, look, wheel, gains, scheduler, None, step_s)
         fused = alone
         if theta_img is not None or fusion != dynamics:
-            fused = fusion_step(fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s)
+            share = camera_share(config.confidence, state.variance, fusion[0]) if flag else 1.0
+            fused = fusion_step(fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, share)
         after, force_n, _, _, threshold, excited, K_v = fused
-        theta, _, _, class_after = after
-        _, _, _, class_before = fusion
+        theta, class_after, class_before = after[0], after[3], fusion[3]
         unasked_s = state.unasked_s + step_s
         if unasked_s >= config.sensor_filter_s or class_after != class_before:
             variance, lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
