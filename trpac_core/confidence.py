@@ -111,6 +111,16 @@ class Evidence(NamedTuple):
     """That of the slip through noise and through its change, in one step [-]."""
     torque_friction: float
     """That of the used friction through the filtered torque's noise [-]."""
+    following: float = 0.0
+    """How surely the tyre's theta follows its slip, from 0 to 1, see `mismatch` [-]."""
+
+    def reading_noise(self) -> float:
+        """Relative standard deviation of the tyre's theta through noise, in one step [-]."""
+        fraction = self.friction / (self.tyre.elastic * self.tyre.g_0)
+        share = math.hypot(self.noise_share, self.torque_friction / self.friction)
+        low = theta_at(fraction * (1.0 - share), self.tyre.elastic)
+        high = theta_at(fraction * (1.0 + share), self.tyre.elastic)
+        return 0.5 * (high - low) / theta_at(fraction, self.tyre.elastic)
 
 
 def advanced_variance(
@@ -138,7 +148,7 @@ def advanced_variance(
         Rate of the estimator [1/s], way [m] and step [s].
     """
     variance = wandered(model, variance, theta_hat, way_m)
-    theta_tyre, friction, tyre, line_share, noise_share, torque_friction = evidence
+    theta_tyre, friction, tyre, line_share, noise_share, torque_friction, following = evidence
     if friction <= 0.0:
         return variance, 0.0
     elastic = tyre.elastic
@@ -162,6 +172,9 @@ def advanced_variance(
     if above > 0.0 and apart < FARTHEST:
         odds = math.exp(-0.5 * apart * apart) * above / (math.sqrt(2.0 * math.pi) * half)
         settled += odds / (1.0 + odds) * bounded_variance(theta_tyre, 2.0 * elastic)
+    # A theta that follows the slip is no road's: then any road above would do.
+    if following > 0.0:
+        settled += following * following * (bounded_variance(theta_tyre, theta_tyre) - settled)
     variance += (1.0 - math.exp(-2.0 * gamma * step_s)) * (settled - variance)
     variance = min(variance, unknown_variance(model, theta_hat))
     # Where the tyre goes on showing something else than the estimate, the estimate is off by that.

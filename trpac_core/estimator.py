@@ -15,6 +15,7 @@ from .confidence import Evidence, advanced_variance, camera_share, unknown_varia
 from .dife import FusionState, FusionStep, Look, Wheel, WheelInputs, fusion_step, look_at, settled
 from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
+from .mismatch import followed
 from .readings import (
     GREATEST_ACCELERATION_M_S2,
     MOTION,
@@ -366,6 +367,11 @@ class TrpacEstimator:
             (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size,
             self._rates.noise_gain * config.confidence.torque_noise_nm / (wheel.radius_m * inputs.load_n),
         )
+        theta_tyre = fused.theta_tyre
+        if theta_tyre is not None and evidence.friction > 0.0:
+            noise = evidence.reading_noise()
+            state.following = followed(state.following, look.tyre.elastic, theta_tyre, noise)
+            evidence = evidence._replace(following=state.following.share())
         return advanced_variance(
             config.confidence,
             state.variance,

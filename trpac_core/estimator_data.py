@@ -11,6 +11,7 @@ from .confidence import ConfidenceModel
 from .dife import FusionState, Gains
 from .elastic import ElasticLine, ElasticModel
 from .excitation import FuzzyScheduler
+from .mismatch import Following
 from .readings import Readings, filter_share
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface
@@ -135,6 +136,8 @@ class EstimatorState:
     readings: Readings
     line: ElasticLine
     variance: float
+    following: Following = field(default_factory=Following)
+    """How the tyre's theta follows its slip."""
     lag: float = 0.0
     """Smoothed distance of the tyre's theta from the estimate [-]."""
     unasked_s: float = 0.0
@@ -161,7 +164,7 @@ class EstimatorState:
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
         values = {item.name: getattr(self, item.name) for item in fields(self)}
-        for name in ("fusion", "dynamics", "readings", "line"):
+        for name in _PARTS:
             values[name] = list(values[name])
         values["locked_s"] = None if math.isinf(self.locked_s) else self.locked_s
         values["ife"], values["preview"] = self.ife.to_json(), self.preview.to_json()
@@ -184,6 +187,7 @@ _PARTS: Mapping[str, Any] = {
     "dynamics": FusionState,
     "readings": Readings,
     "line": ElasticLine,
+    "following": Following,
 }
 
 
