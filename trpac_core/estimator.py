@@ -25,9 +25,9 @@ from .readings import (
     plain,
     unusable,
 )
-from .slip import GREATEST_SLIP, Slip, wheel_slip
 from .tyre import peak_friction
 from .vision.ife import Ife
+from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
 
 __all__ = [
     "LOCKED_M_S",
@@ -41,21 +41,6 @@ __all__ = [
 
 LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
-MOST_AHEAD = 2.0
-"""Most that a step may be longer than the one before for the readings' trend to be trusted over it [-]."""
-JUMP_M_S, RIM_JUMP_M_S = 1.5, 8.0
-"""How far a reading may be from its filter: a bus of 20 Hz at 15 m/s^2, and a wheel that a full brake locks [m/s]."""
-RIM_ACCELERATION_M_S2 = 750.0
-"""Steepest change of a rim's speed: 3000 N m on 1.2 kg m^2 at 0.3 m [m/s^2]."""
-LOCKED_M_S = 0.5
-"""Below this rim speed the wheel of a driving car counts as locked: its brake then holds what the road gives, not the
-torque that was commanded [m/s]."""
-RELEASED = 5.0
-"""Time constants of the sensor filter until it has forgotten a locked wheel's torque to 1 % [-]."""
-
-
-_new = tuple.__new__
-"""Makes a named tuple of a tuple in a third of the time that its own constructor takes."""
 
 
 class TrpacEstimator:
@@ -162,24 +147,12 @@ class TrpacEstimator:
         state = self._state
         if step_s != rates.step_s or step_s == 0.0:
             self._rates = Rates.at(config, step_s, state.step_s)
-        if state.settled and self._jumped(sensors, step_s):
+        if state.settled and jumped(state.readings, sensors, self._radius_m, step_s):
             state.settled = False
         acceleration, lagged, load_n = self._moved(sensors)
         if frame is not None or frame_failed:
             take_frame(state, config, self._preview, self._ife, frame, sensors, acceleration)
         return self._advance(sensors, step_s, acceleration, lagged, load_n)
-
-    def _jumped(self, sensors: Sensors, step_s: float) -> bool:
-        """Whether readings are where no car can have gone since: a host that began with zeros, a signal that came back.
-
-        The observers would take such a jump for a force that they forget only slowly.
-        """
-        omega, _, speed_m_s = self._state.readings
-        speed_m_s -= sensors.vehicle_speed_m_s
-        rim_m_s = (omega - sensors.wheel_speed_rad_s) * self._radius_m
-        most_m_s = JUMP_M_S + GREATEST_ACCELERATION_M_S2 * step_s
-        most_rim_m_s = RIM_JUMP_M_S + RIM_ACCELERATION_M_S2 * step_s
-        return not (-most_m_s <= speed_m_s <= most_m_s and -most_rim_m_s <= rim_m_s <= most_rim_m_s)
 
     def _moved(self, sensors: Sensors) -> tuple[float, float, float]:
         """Acceleration, lagged speed and load as they are now; at the start, and after a gap, unfiltered."""
@@ -215,7 +188,9 @@ class TrpacEstimator:
         config, state = self.config, self._state
         scheduler, gains, wheel = config.scheduler, config.gains, self._softened(state.line)
         C_x = wheel[2]
-        readings, inputs, read_slip, smoothed_slip, locked_s = self._inputs(sensors, step_s, load_n)
+        readings, inputs, read_slip, smoothed_slip, locked_s = wheel_inputs(
+            config, self._rates, state, sensors, self._radius_m, step_s, load_n
+        )
         fusion, dynamics = state.fusion, state.dynamics
         if not state.settled:
             fusion = settled(fusion, inputs, wheel, gains)
@@ -272,67 +247,6 @@ class TrpacEstimator:
             inertia, radius_m, told_n = self._wheel
             self._softened_by = line, Wheel(inertia, radius_m, told_n / (1.0 + line.compliance()))
         return self._softened_by[1]
-
-    def _inputs(
-        self, sensors: Sensors, step_s: float, load_n: float
-    ) -> tuple[Readings, WheelInputs, float, float, float]:
-        """Filtered readings, what both estimators are given of them, slip as read, smoothed slip, time since locked."""
-        config, state, rates, radius_m = self.config, self._state, self._rates, self._radius_m
-        omega, torque_nm, speed_m_s = (
-            sensors.wheel_speed_rad_s,
-            sensors.wheel_torque_nm,
-            sensors.vehicle_speed_m_s,
-        )
-        floor_m_s, way_m, share = config.floor_m_s, speed_m_s * step_s, 1.0
-        locked_s, noise = state.locked_s + step_s, rates.noise_m_s
-        if speed_m_s > floor_m_s:
-            noise /= speed_m_s
-            if omega * radius_m < LOCKED_M_S:
-                locked_s = 0.0
-        else:
-            noise /= floor_m_s
-        omega_ahead, torque_ahead_nm = omega, torque_nm
-        if state.settled:
-            share = rates.sensor_share
-            before_omega, before_nm, before_m_s = state.readings
-            omega = before_omega + share * (omega - before_omega)
-            torque_nm = before_nm + share * (torque_nm - before_nm)
-            speed_m_s = before_m_s + share * (speed_m_s - before_m_s)
-            # The mean over the step to come of signals that go on as they came.
-            ratio = step_s / state.step_s if state.step_s else 0.0
-            half = 0.5 * (ratio if ratio < MOST_AHEAD else MOST_AHEAD)
-            omega_ahead = omega + half * (omega - before_omega)
-            torque_ahead_nm = torque_nm + half * (torque_nm - before_nm)
-        size, direction = wheel_slip(omega, speed_m_s, radius_m, floor_m_s)
-        read_slip = signed = size * direction
-        deviation = 0.0
-        if direction or speed_m_s >= floor_m_s:
-            divisor_m_s = speed_m_s if speed_m_s > floor_m_s else floor_m_s
-            offset, deviation = state.line.offset(divisor_m_s)
-            signed = read_slip - offset
-            size, direction = (signed, 1.0) if signed > 0.0 else (-signed, -1.0 if signed < 0.0 else 0.0)
-            if size > GREATEST_SLIP:
-                size = GREATEST_SLIP
-        smoothed_slip = signed
-        if state.settled:
-            smoothed_slip = state.smoothed_slip + share * (signed - state.smoothed_slip)
-        if omega * radius_m >= floor_m_s:
-            torque_ahead_nm -= config.vehicle.rolling_resistance * load_n * radius_m
-        inputs = _new(
-            WheelInputs,
-            (
-                omega,
-                omega_ahead,
-                torque_ahead_nm,
-                _new(Slip, (size, direction)),
-                load_n,
-                noise if noise > deviation else deviation,
-                abs(signed - smoothed_slip),
-                way_m,
-                locked_s > RELEASED * config.sensor_filter_s,
-            ),
-        )
-        return _new(Readings, (omega, torque_nm, speed_m_s)), inputs, read_slip, smoothed_slip, locked_s
 
     def _variance(
         self,

@@ -6,8 +6,8 @@ theta(lambda, F_hat) follows the slip ratio X = C_x lambda / (1 - lambda):
 
     ln theta(lambda, F_hat) = const + e ln X,    e = 0: it slides as told;   e = 1: all of it is elastic
 
-A Kalman filter follows the slope e about the running mean of both. With e what it is, the reading is wrong by as much of
-the way to the roads above as e says: at e = 1 it tells no more than that the road carries what the tyre carries.
+A Kalman filter follows the slope e about the running mean of both. The reading then is off by the share e of the way
+to the roads above it: at e = 1 it tells no more than that the road carries what the tyre carries.
 """
 
 from __future__ import annotations
