@@ -8,6 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from trpac_core import tyre
+from trpac_core.confidence import ConfidenceModel
 from trpac_core.dife import (
     GREATEST_THETA,
     LEAST_THETA,
@@ -210,13 +211,14 @@ def test_a_class_that_flickers_or_stays_does_not_end_the_rest():
 
 
 def test_a_sure_estimate_leaves_less_of_the_difference_to_the_class():
-    """Not seen, and 0.3 from the class: with less than half of it K_v is in its dead zone."""
+    """Not seen, and 0.3 from the class: half of that or less is within K_v's dead zone."""
     elastic = on_road(0.9, slip=0.0235, deviation=1e-4)
     state = settled(FusionState(0.5, 0.0), elastic, WHEEL, GAINS)
     look = look_at(elastic, WHEEL.longitudinal_stiffness_n, SCHEDULER)
     given = (state, elastic, look, WHEEL, GAINS, SCHEDULER, 0.8, STEP_S)
-    assert fusion_step(*given, camera_share=0.45).K_v == 0.0
-    assert fusion_step(*given).K_v > 0.0
+    K_v = [fusion_step(*given, ConfidenceModel(), std * std).K_v for std in (0.05, 0.2, 0.35)]
+    assert K_v[0] == 0.0
+    assert 0.0 < K_v[1] < K_v[2] == pytest.approx(fusion_step(*given).K_v)
 
 
 def test_a_locked_wheel_moves_neither_estimate_nor_force():

@@ -114,13 +114,14 @@ class Evidence(NamedTuple):
     following: float = 0.0
     """How surely the tyre's theta follows its slip, from 0 to 1, see `mismatch` [-]."""
 
-    def reading_noise(self) -> float:
-        """Relative standard deviation of the tyre's theta through noise, in one step [-]."""
-        fraction = self.friction / (self.tyre.elastic * self.tyre.g_0)
-        share = math.hypot(self.noise_share, self.torque_friction / self.friction)
-        low = theta_at(fraction * (1.0 - share), self.tyre.elastic)
-        high = theta_at(fraction * (1.0 + share), self.tyre.elastic)
-        return 0.5 * (high - low) / theta_at(fraction, self.tyre.elastic)
+
+def reading_noise(friction: float, tyre: TyreAtSlip, noise_share: float, torque_friction: float) -> float:
+    """Relative standard deviation of the tyre's theta through noise in one step; parameters as in `Evidence` [-]."""
+    elastic, g_0, _, _ = tyre
+    fraction = friction / (elastic * g_0)
+    share = math.hypot(noise_share, torque_friction / friction)
+    low, high = theta_at(fraction * (1.0 - share), elastic), theta_at(fraction * (1.0 + share), elastic)
+    return 0.5 * (high - low) / theta_at(fraction, elastic)
 
 
 def advanced_variance(

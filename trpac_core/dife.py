@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
 from .observer import advanced_state, settled_state
 from .slip import GREATEST_SLIP, Slip
@@ -196,7 +197,8 @@ def fusion_step(
     scheduler: FuzzyScheduler,
     theta_img: float | None,
     step_s: float,
-    camera_share: float = 1.0,
+    confidence: ConfidenceModel | None = None,
+    variance: float = 0.0,
 ) -> FusionStep:
     """One step of observer and estimator.
 
@@ -217,9 +219,9 @@ def fusion_step(
         Adhesion of the class that the camera gives the road under the wheel; None where epsilon = 0 [-].
     step_s : float
         Step [s].
-    camera_share : float
-        What of its distance from the estimate a class may claim where the tyre is not seen: less than 1 where the
-        estimate is surer than one that knows nothing, see `confidence.camera_share` [-].
+    confidence, variance : ConfidenceModel, float
+        That of the estimate: where the tyre is not seen, a class may claim `confidence.camera_share` of its distance
+        from the estimate; without a model all of it.
     """
     theta_hat, s, unseen_m, before_img, road_img, other_m, rests = state
     omega, omega_ahead, torque_nm, (size, direction), load_n, deviation, _, way_m, torque_known = inputs
@@ -259,8 +261,10 @@ def fusion_step(
             silent = rests or unseen_m < SEEN_HOLD_M or other_m > 0.0
             theta_img = _compatible(theta_img, theta_hat, silent, theta_tyre, F_hat, inputs, C_x)
         if theta_img is not None:
-            share = camera_share if theta_tyre is None and gains.tyre_first else 1.0
-            K_v = scheduler.K_v(share * abs(theta_img - theta_hat))
+            difference = abs(theta_img - theta_hat)
+            if theta_tyre is None and confidence is not None and gains.tyre_first:
+                difference *= camera_share(confidence, variance, theta_hat)
+            K_v = scheduler.K_v(difference)
         theta_next = _driven(theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
         if theta_next != theta_hat:
             by_theta_n = driven_n * tyre.friction_by_theta(theta_hat)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera_side import RoadUnderWheel, take_frame
-from .confidence import Evidence, advanced_variance, camera_share, unknown_variance, wandered, with_camera
+from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
 from .dife import FusionState, FusionStep, Look, Wheel, WheelInputs, fusion_step, look_at, settled
 from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
@@ -205,8 +205,8 @@ class TrpacEstimator:
         alone = fusion_step(dynamics, inputs, look, wheel, gains, scheduler, None, step_s)
         fused = alone
         if theta_img is not None or fusion != dynamics:
-            share = camera_share(config.confidence, state.variance, fusion[0]) if flag else 1.0
-            fused = fusion_step(fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, share)
+            sure = config.confidence, state.variance
+            fused = fusion_step(fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, *sure)
         after, force_n, _, _, threshold, excited, K_v = fused
         theta, class_after, class_before = after[0], after[3], fusion[3]
         unasked_s = state.unasked_s + step_s
@@ -273,19 +273,18 @@ class TrpacEstimator:
         if size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
             return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
-        evidence = Evidence(
-            fused.theta_tyre,
-            fused.tyre_force_n * inputs.slip.direction / inputs.load_n,
-            look.tyre,
-            math.sqrt(state.line.slip_variance(size, speed_m_s)) / size,
-            (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size,
-            self._rates.noise_gain * config.confidence.torque_noise_nm / (wheel.radius_m * inputs.load_n),
-        )
-        theta_tyre = fused.theta_tyre
-        if theta_tyre is not None and evidence.friction > 0.0:
-            noise = evidence.reading_noise()
+        theta_tyre, friction = fused.theta_tyre, fused.tyre_force_n * inputs.slip.direction / inputs.load_n
+        noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
+        torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
+        torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0
+        if theta_tyre is not None and friction > 0.0:
+            noise = reading_noise(friction, look.tyre, noise_share, torque_friction)
             state.following = followed(state.following, look.tyre.elastic, theta_tyre, noise)
-            evidence = evidence._replace(following=state.following.share())
+            following = state.following.share()
+        line_share = math.sqrt(state.line.slip_variance(size, speed_m_s)) / size
+        evidence = Evidence(
+            theta_tyre, friction, look.tyre, line_share, noise_share, torque_friction, following
+        )
         return advanced_variance(
             config.confidence,
             state.variance,
