@@ -14,7 +14,7 @@ from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
 from .observer import advanced_state, settled_state
 from .slip import GREATEST_SLIP, Slip
-from .tyre import TyreAtSlip, force, slip_ratio_force, theta_from_friction, tyre_at_slip
+from .tyre import TyreAtSlip, elastic_friction, force, slip_ratio_force, theta_from_friction, tyre_at_slip
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
@@ -161,7 +161,7 @@ def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: Fuz
     surely = size - SIGNIFICANCE * (deviation + change)
     below = 0.0
     if surely > 0.0:
-        below = tyre_at_slip(surely, load_n, longitudinal_stiffness_n).elastic_friction()
+        below = elastic_friction(surely, load_n, longitudinal_stiffness_n)
     threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
     return _new(Look, (tyre_at_slip(size, load_n, longitudinal_stiffness_n), below, threshold))
 

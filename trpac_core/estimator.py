@@ -205,8 +205,10 @@ class TrpacEstimator:
         alone = fusion_step(dynamics, inputs, look, wheel, gains, scheduler, None, step_s)
         fused = alone
         if theta_img is not None or fusion != dynamics:
-            sure = config.confidence, state.variance
-            fused = fusion_step(fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, *sure)
+            model, known = config.confidence, state.variance
+            fused = fusion_step(
+                fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, model, known
+            )
         after, force_n, _, _, threshold, excited, K_v = fused
         theta, class_after, class_before = after[0], after[3], fusion[3]
         unasked_s = state.unasked_s + step_s

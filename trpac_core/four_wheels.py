@@ -186,7 +186,7 @@ class FourWheels:
             loads_n,
             self.config.axle_deviation,
         )
-        return CarEstimate(wheels, theta, deviation, problems)
+        return _new(CarEstimate, (wheels, theta, deviation, problems))
 
     def _told(self, sensors: CarSensors, problems: list[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
         """Problems by whom they concern; one that all wheels share is the car's."""

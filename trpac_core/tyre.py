@@ -71,10 +71,6 @@ class TyreAtSlip(NamedTuple):
             return elastic * g_1
         return (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
 
-    def elastic_friction(self) -> float:
-        """Used friction at L = 1, the most that theta can be read from [-]."""
-        return self.elastic * (self.g_0 + 2.0 * self.g_1 * self.elastic)
-
     def theta(self, friction: float) -> float | None:
         """The one theta below L = 1 that gives this used friction; None where none does."""
         elastic, g_0, g_1, kappa = self
@@ -110,6 +106,13 @@ def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) ->
     kappa = 0.25 / elastic if elastic > 0.0 else math.inf
     g_0, g_1 = 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip)
     return _new(TyreAtSlip, (elastic, g_0, g_1, kappa))
+
+
+def elastic_friction(slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+    """Used friction at L = 1, the most at this slip that theta can be read from [-]."""
+    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
+    g_0, g_1 = 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip)
+    return elastic * (g_0 + 2.0 * g_1 * elastic)
 
 
 def used_friction(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
