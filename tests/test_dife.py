@@ -216,7 +216,7 @@ def test_a_sure_estimate_leaves_less_of_the_difference_to_the_class():
     state = settled(FusionState(0.5, 0.0), elastic, WHEEL, GAINS)
     look = look_at(elastic, WHEEL.longitudinal_stiffness_n, SCHEDULER)
     given = (state, elastic, look, WHEEL, GAINS, SCHEDULER, 0.8, STEP_S)
-    K_v = [fusion_step(*given, ConfidenceModel(), std * std).K_v for std in (0.05, 0.2, 0.35)]
+    K_v = [fusion_step(*given, ConfidenceModel(), std * std).K_v for std in (0.05, 0.2, 0.5)]
     assert K_v[0] == 0.0
     assert 0.0 < K_v[1] < K_v[2] == pytest.approx(fusion_step(*given).K_v)
 
