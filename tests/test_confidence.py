@@ -11,6 +11,7 @@ from trpac_core.confidence import (
     Evidence,
     advanced_variance,
     bounded_variance,
+    camera_share,
     unknown_variance,
     wandered,
     with_camera,
@@ -35,6 +36,15 @@ def settled_std(theta, slip, line_share=0.0, noise_share=0.0):
 def test_a_road_above_a_bound_is_as_far_as_roads_drawn_there(theta_hat, least):
     roads = np.linspace(least, GREATEST_ROAD, 20_001)
     assert bounded_variance(theta_hat, least) == pytest.approx(np.mean((roads - theta_hat) ** 2), rel=1e-3)
+
+
+def test_a_class_may_claim_the_less_the_surer_the_estimate_is():
+    """All of the difference where nothing is known, next to nothing where the estimate is as good as the tyre's."""
+    stds = (0.02, 0.1, 0.2, unknown_variance(MODEL, 0.5) ** 0.5)
+    shares = [camera_share(MODEL, std * std, 0.5) for std in stds]
+    assert shares == sorted(shares)
+    assert shares[0] < 0.03
+    assert shares[-1] == pytest.approx(1.0)
 
 
 def test_the_tyre_tells_less_the_closer_it_is_to_not_sliding():

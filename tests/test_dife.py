@@ -8,9 +8,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from trpac_core import tyre
+from trpac_core.confidence import ConfidenceModel
 from trpac_core.dife import (
     GREATEST_THETA,
     LEAST_THETA,
+    OTHER_CLASS_M,
     SEEN_HOLD_M,
     FusionState,
     Gains,
@@ -187,12 +189,36 @@ def test_the_camera_rests_for_a_way_after_the_tyre_was_seen():
     assert trace[-1] > 0.5
 
 
-def test_another_class_under_the_wheel_ends_the_rest():
-    """Another class is another road: what the tyre showed before no longer speaks for it."""
+def after_snow(theta_img, metres, flicker_every_m=None):
+    """The estimate, seen as 0.5 under the class snow, after a way on which it is not seen and a class is given."""
     elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
-    state = stepped(settled(FusionState(0.5, 0.0, 0.0), elastic, WHEEL, GAINS), elastic, theta_img=0.2).state
-    assert stepped(state, elastic, theta_img=0.2).state.theta_hat == 0.5
-    assert stepped(state, elastic, theta_img=0.8).state.theta_hat > 0.5
+    state = settled(FusionState(0.5, 0.0, 0.0, 0.2, 0.2, 0.0, True), elastic, WHEEL, GAINS)
+    for k in range(round(metres / elastic.way_m)):
+        back = flicker_every_m is not None and k % round(flicker_every_m / elastic.way_m) == 0
+        state = stepped(state, elastic, theta_img=0.2 if back else theta_img).state
+    return state.theta_hat
+
+
+def test_another_class_that_stands_ends_the_rest():
+    """Another class is another road: what the tyre showed before no longer speaks for it."""
+    assert after_snow(0.8, OTHER_CLASS_M - 0.05) == 0.5
+    assert after_snow(0.8, OTHER_CLASS_M + 0.3) > 0.5
+
+
+def test_a_class_that_flickers_or_stays_does_not_end_the_rest():
+    assert after_snow(0.8, 20.0, flicker_every_m=OTHER_CLASS_M - 0.1) == 0.5
+    assert after_snow(0.2, 100.0) == 0.5
+
+
+def test_a_sure_estimate_leaves_less_of_the_difference_to_the_class():
+    """Not seen, and 0.3 from the class: half of that or less is within K_v's dead zone."""
+    elastic = on_road(0.9, slip=0.0235, deviation=1e-4)
+    state = settled(FusionState(0.5, 0.0), elastic, WHEEL, GAINS)
+    look = look_at(elastic, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+    given = (state, elastic, look, WHEEL, GAINS, SCHEDULER, 0.8, STEP_S)
+    K_v = [fusion_step(*given, ConfidenceModel(), std * std).K_v for std in (0.05, 0.2, 0.5)]
+    assert K_v[0] == 0.0
+    assert 0.0 < K_v[1] < K_v[2] == pytest.approx(fusion_step(*given).K_v)
 
 
 def test_a_locked_wheel_moves_neither_estimate_nor_force():

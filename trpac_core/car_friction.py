@@ -46,8 +46,12 @@ def surer(own: Friction, partner: Friction, axle_deviation: float) -> Friction:
 
     `axle_deviation` is the standard deviation of the road's change over a wheelbase [-].
     """
-    lent = math.hypot(partner.deviation, axle_deviation)
-    return own if own.deviation <= lent else Friction(partner.theta, lent)
+    _, deviation = own
+    theta, partner_deviation = partner
+    if deviation <= partner_deviation:
+        return own
+    lent = math.hypot(partner_deviation, axle_deviation)
+    return own if deviation <= lent else Friction(theta, lent)
 
 
 def lower(first: Friction, second: Friction) -> Friction:
@@ -58,20 +62,21 @@ def lower(first: Friction, second: Friction) -> Friction:
     >>> lower(Friction(0.3, 0.02), Friction(0.8, 0.1)).deviation
     0.02
     """
-    low, high = (first, second) if first.theta <= second.theta else (second, first)
-    spread = math.hypot(low.deviation, high.deviation)
+    low, high = (first, second) if first[0] <= second[0] else (second, first)
+    (low_theta, low_deviation), (high_theta, high_deviation) = low, high
+    spread = math.hypot(low_deviation, high_deviation)
     if spread == 0.0:
         return low
-    gap = high.theta - low.theta
+    gap = high_theta - low_theta
     ratio = gap / spread
     right_order = 0.5 * (1.0 + math.erf(ratio / _ROOT_2))
     density = math.exp(-0.5 * ratio * ratio) / _ROOT_2_PI
     square = (
-        low.deviation**2 * right_order
-        + (gap * gap + high.deviation**2) * (1.0 - right_order)
+        low_deviation * low_deviation * right_order
+        + (gap * gap + high_deviation * high_deviation) * (1.0 - right_order)
         - gap * spread * density
     )
-    return Friction(low.theta, math.sqrt(max(square, 0.0)))
+    return Friction(low_theta, math.sqrt(square) if square > 0.0 else 0.0)
 
 
 def car_friction(
@@ -97,10 +102,11 @@ def car_friction(
     0.362
     """
     fl, fr, rl, rr = wheels
-    front_left, front_right = surer(fl, rl, axle_deviation), surer(fr, rr, axle_deviation)
-    rear = lower(surer(rl, fl, axle_deviation), surer(rr, fr, axle_deviation))
+    left_theta, left_deviation = surer(fl, rl, axle_deviation)
+    right_theta, right_deviation = surer(fr, rr, axle_deviation)
+    rear_theta, rear_deviation = lower(surer(rl, fl, axle_deviation), surer(rr, fr, axle_deviation))
     left_n, right_n, rear_n = load_n[0], load_n[1], load_n[2] + load_n[3]
     total_n = left_n + right_n + rear_n
-    theta = left_n * front_left.theta + right_n * front_right.theta + rear_n * rear.theta
-    deviation = left_n * front_left.deviation + right_n * front_right.deviation + rear_n * rear.deviation
+    theta = left_n * left_theta + right_n * right_theta + rear_n * rear_theta
+    deviation = left_n * left_deviation + right_n * right_deviation + rear_n * rear_deviation
     return Friction(theta / total_n, deviation / total_n)

@@ -66,6 +66,17 @@ def unknown_variance(model: ConfidenceModel, theta_hat: float) -> float:
     return model.unknown**2 + (theta_hat - MIDDLE_ROAD) ** 2
 
 
+def camera_share(model: ConfidenceModel, variance: float, theta_hat: float) -> float:
+    """Share of its distance from the estimate that a class may claim [-].
+
+    The Kalman gain P / (P + R), with the variance P of the estimate and R of a road about its class's value; as a
+    share of what it is where nothing is known, so that Table 2 stands as it is there.
+    """
+    unknown, scatter = unknown_variance(model, theta_hat), model.class_scatter * model.class_scatter
+    share = variance * (unknown + scatter) / (unknown * (variance + scatter))
+    return share if share < 1.0 else 1.0
+
+
 def wandered(model: ConfidenceModel, variance: float, theta_hat: float, way_m: float) -> float:
     """Variance after a way driven unseen: the road may have changed to any other [-]."""
     unknown = unknown_variance(model, theta_hat)
@@ -100,6 +111,17 @@ class Evidence(NamedTuple):
     """That of the slip through noise and through its change, in one step [-]."""
     torque_friction: float
     """That of the used friction through the filtered torque's noise [-]."""
+    following: float = 0.0
+    """How surely the tyre's theta follows its slip, from 0 to 1, see `mismatch` [-]."""
+
+
+def reading_noise(friction: float, tyre: TyreAtSlip, noise_share: float, torque_friction: float) -> float:
+    """Relative standard deviation of the tyre's theta through noise in one step; parameters as in `Evidence` [-]."""
+    elastic, g_0, _, _ = tyre
+    fraction = friction / (elastic * g_0)
+    share = math.hypot(noise_share, torque_friction / friction)
+    low, high = theta_at(fraction * (1.0 - share), elastic), theta_at(fraction * (1.0 + share), elastic)
+    return 0.5 * (high - low) / theta_at(fraction, elastic)
 
 
 def advanced_variance(
@@ -127,7 +149,7 @@ def advanced_variance(
         Rate of the estimator [1/s], way [m] and step [s].
     """
     variance = wandered(model, variance, theta_hat, way_m)
-    theta_tyre, friction, tyre, line_share, noise_share, torque_friction = evidence
+    theta_tyre, friction, tyre, line_share, noise_share, torque_friction, following = evidence
     if friction <= 0.0:
         return variance, 0.0
     elastic = tyre.elastic
@@ -151,6 +173,9 @@ def advanced_variance(
     if above > 0.0 and apart < FARTHEST:
         odds = math.exp(-0.5 * apart * apart) * above / (math.sqrt(2.0 * math.pi) * half)
         settled += odds / (1.0 + odds) * bounded_variance(theta_tyre, 2.0 * elastic)
+    # A theta that follows the slip is no road's: then any road above would do.
+    if following > 0.0:
+        settled += following * following * (bounded_variance(theta_tyre, theta_tyre) - settled)
     variance += (1.0 - math.exp(-2.0 * gamma * step_s)) * (settled - variance)
     variance = min(variance, unknown_variance(model, theta_hat))
     # Where the tyre goes on showing something else than the estimate, the estimate is off by that.
@@ -163,8 +188,12 @@ def with_camera(model: ConfidenceModel, variance: float, theta_hat: float, theta
     """Mean square error of the estimate with what the camera says of the road beside what is known [-]."""
     if theta_img is None:
         return variance
-    scatter, distance = model.class_scatter**2, theta_img - theta_hat
+    scatter, distance = model.class_scatter * model.class_scatter, theta_img - theta_hat
     share = variance / (variance + scatter)
+    together, by_camera = (
+        share * scatter + share * distance * (share * distance),
+        scatter + distance * distance,
+    )
     # Both may rest on the same: what is known of all roads. So together they are no surer than the better one.
-    alone = min(variance, scatter + distance * distance)
-    return max(share * scatter + (share * distance) ** 2, alone)
+    alone = variance if variance < by_camera else by_camera
+    return together if together > alone else alone

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
-from .observer import advanced_state, observed_force, settled_state
+from .observer import advanced_state, settled_state
 from .slip import GREATEST_SLIP, Slip
-from .tyre import TyreAtSlip, force, slip_ratio_force, theta_from_friction, tyre_at_slip
+from .tyre import TyreAtSlip, elastic_friction, force, slip_ratio_force, theta_from_friction, tyre_at_slip
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
@@ -23,8 +24,11 @@ SIGNIFICANCE = 1.5
 """How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
 SEEN_HOLD_M = 2.0
 """Way after which what the tyre showed no longer speaks for the road under it: the depth of the near group [m]."""
+OTHER_CLASS_M = 2.0
+"""Way for which another class must stand to be another road: one picture's verdict reaches no farther [m]."""
 NEVER_SEEN_M = 1e6
 """Way since the tyre showed theta where it never did [m]."""
+_new = tuple.__new__
 LEAST_SENSITIVITY = 0.1
 """Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
 nothing to invert [-]."""
@@ -46,11 +50,14 @@ class Gains:
     K [1/s] is the force observer's bandwidth, gamma [1/s] the estimator's.
 
     With `tyre_first` the camera hurries the estimate along but does not drag it away from what the tyre shows: where
-    theta(lambda, F_hat) is seen, the visual term acts only in its direction and no farther than it; for 2 m after it
-    was seen the term rests, unless the class under the wheel changes meanwhile; where it is not seen, theta_img
-    counts as no less than force and slip allow. Eqs. (17) and (18) as printed have no such guard: there a wrong
-    class with its flag up pulls a settled estimate off by K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for
-    "dry" on a road of 0.5.
+    theta(lambda, F_hat) is seen, the visual term acts only in its direction and no farther than it. After it was seen
+    the term rests for 2 m at least, and until the camera has said for 2 m that the road is of another class: a class
+    has one value wherever it is, so the one under which the tyre was seen says nothing new. From the first sight
+    on, a class that has not yet stood for 2 m says nothing by itself.
+    Where the tyre is not seen, theta_img counts as no less than force and slip allow, and K_v follows the share of
+    the difference that the estimate's own variance leaves to the class. Eqs. (17) and (18) as printed have no such
+    guard: there a wrong class with its flag up pulls a settled estimate off by
+    K_v (theta_img - theta_hat) / (gamma + K_v), 0.02 for "dry" on a road of 0.5.
     """
 
     K: float = 63.0
@@ -109,6 +116,12 @@ class FusionState(NamedTuple):
     """Way since the tyre last showed theta [m]."""
     theta_img: float | None = None
     """Adhesion of the class that the camera last gave the road under the wheel [-]."""
+    road_img: float | None = None
+    """That of the class that has stood, from the tyre's first showing theta on [-]."""
+    other_m: float = 0.0
+    """Way for which one other class than that has been given [m]."""
+    rests: bool = False
+    """Whether the tyre has shown theta since that class stands: the camera then has nothing to add."""
 
 
 class FusionStep(NamedTuple):
@@ -144,26 +157,27 @@ def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: Fuz
     end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
     So the force must also be below the elastic one of a slip that is `SIGNIFICANCE` deviations smaller.
     """
-    size, load_n, deviation = inputs.slip.size, inputs.load_n, inputs.slip_deviation
-    surely = size - SIGNIFICANCE * (deviation + inputs.slip_change)
+    _, _, _, (size, _), load_n, deviation, change, _, _ = inputs
+    surely = size - SIGNIFICANCE * (deviation + change)
     below = 0.0
     if surely > 0.0:
-        below = tyre_at_slip(surely, load_n, longitudinal_stiffness_n).elastic_friction()
+        below = elastic_friction(surely, load_n, longitudinal_stiffness_n)
     threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
-    return Look(tyre_at_slip(size, load_n, longitudinal_stiffness_n), below, threshold)
+    return _new(Look, (tyre_at_slip(size, load_n, longitudinal_stiffness_n), below, threshold))
 
 
-def _shown(friction: float, look: Look) -> tuple[float | None, float]:
+def _shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float | None, float]:
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
-    if friction > look.slides_below or look.slides_below == 0.0:
+    if friction > slides_below or slides_below == 0.0:
         return None, 0.0
-    theta = look.tyre.theta(friction)
+    theta = tyre.theta(friction)
     if theta is None:
         return None, 0.0
-    sensitivity = look.tyre.friction_by_theta(theta)
+    _, g_0, g_1, kappa = tyre
+    sensitivity = (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
     if sensitivity < LEAST_SENSITIVITY:
         return None, 0.0
-    return min(theta, GREATEST_THETA), sensitivity
+    return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity
 
 
 def visible_theta(
@@ -171,7 +185,7 @@ def visible_theta(
 ) -> tuple[float | None, float]:
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
     look = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
-    return _shown(force_n * inputs.slip.direction / inputs.load_n, look)
+    return _shown(force_n * inputs.slip.direction / inputs.load_n, look.tyre, look.slides_below)
 
 
 def fusion_step(
@@ -183,6 +197,8 @@ def fusion_step(
     scheduler: FuzzyScheduler,
     theta_img: float | None,
     step_s: float,
+    confidence: ConfidenceModel | None = None,
+    variance: float = 0.0,
 ) -> FusionStep:
     """One step of observer and estimator.
 
@@ -203,56 +219,73 @@ def fusion_step(
         Adhesion of the class that the camera gives the road under the wheel; None where epsilon = 0 [-].
     step_s : float
         Step [s].
+    confidence, variance : ConfidenceModel, float
+        That of the estimate: where the tyre is not seen, a class may claim `confidence.camera_share` of its distance
+        from the estimate; without a model all of it.
     """
-    theta_hat, s, unseen_m, before_img = state
-    size, direction = inputs.slip
-    load_n, C_x = inputs.load_n, wheel.longitudinal_stiffness_n
+    theta_hat, s, unseen_m, before_img, road_img, other_m, rests = state
+    omega, omega_ahead, torque_nm, (size, direction), load_n, deviation, _, way_m, torque_known = inputs
+    tyre, slides_below, threshold = look
+    inertia, radius_m, C_x = wheel
+    K, driven_n = gains.K, direction * load_n
+    may_show = size > threshold
     if theta_img is not None:
-        if before_img is not None and theta_img != before_img:
-            unseen_m = NEVER_SEEN_M  # another class: what the tyre showed was shown by another road
+        if theta_img == road_img:
+            other_m = 0.0
+        elif road_img is not None:
+            other_m = other_m + way_m if theta_img == before_img else way_m
+            if other_m >= OTHER_CLASS_M:
+                # Another class that stands: what the tyre showed was another road.
+                road_img, other_m, rests = theta_img, 0.0, False
         before_img = theta_img
-    unseen_m = min(unseen_m + inputs.way_m, NEVER_SEEN_M)
-    threshold = look.threshold
-    if theta_img is not None:
-        threshold = scheduler.threshold(theta_img, load_n, C_x, inputs.slip_deviation)
-    model_n = direction * load_n * look.tyre.friction(theta_hat)
-    if not inputs.torque_known:
-        s = settled_state(
-            model_n, model_n, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m
-        )
-        held = FusionState(theta_hat, s, unseen_m, before_img)
+        threshold = scheduler.threshold(theta_img, load_n, C_x, deviation)
+    unseen_m += way_m
+    if unseen_m > NEVER_SEEN_M:
+        unseen_m = NEVER_SEEN_M
+    elastic, g_0, g_1, kappa = tyre
+    share = elastic if theta_hat >= 2.0 * elastic else theta_hat * (1.0 - kappa * theta_hat)
+    model_n = driven_n * (share * (g_0 + g_1 * theta_hat))
+    if not torque_known:
+        s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
+        held = FusionState(theta_hat, s, unseen_m, before_img, road_img, other_m, rests)
         return FusionStep(held, model_n, None, 0.0, threshold, False, 0.0)
-    F_hat = observed_force(model_n, s, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
+    F_hat = model_n - inertia / radius_m * (s + K * omega)  # Eq. (14), see `observed_force`
     theta_tyre, sensitivity = None, 0.0
     excited = size > threshold
-    if excited or size > look.threshold:
-        theta_tyre, sensitivity = _shown(F_hat * direction / load_n, look)
+    if excited or may_show:
+        theta_tyre, sensitivity = _shown(F_hat * direction / load_n, tyre, slides_below)
         excited = excited or theta_tyre is not None
     theta_next, K_v, by_theta_n = theta_hat, 0.0, 0.0
     if excited:
         if theta_img is not None and gains.tyre_first:
-            theta_img = _compatible(theta_img, theta_hat, unseen_m, theta_tyre, F_hat, inputs, C_x)
+            silent = rests or unseen_m < SEEN_HOLD_M or other_m > 0.0
+            theta_img = _compatible(theta_img, theta_hat, silent, theta_tyre, F_hat, inputs, C_x)
         if theta_img is not None:
-            K_v = scheduler.K_v(abs(theta_img - theta_hat))
+            difference = abs(theta_img - theta_hat)
+            if theta_tyre is None and confidence is not None and gains.tyre_first:
+                difference *= camera_share(confidence, variance, theta_hat)
+            K_v = scheduler.K_v(difference)
         theta_next = _driven(theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
         if theta_next != theta_hat:
-            by_theta_n = direction * load_n * look.tyre.friction_by_theta(theta_hat)
+            by_theta_n = driven_n * tyre.friction_by_theta(theta_hat)
         if theta_tyre is not None:
             unseen_m = 0.0
+            road_img = before_img if road_img is None else road_img
+            rests = road_img is not None
     s = advanced_state(
         s,
         model_n,
         by_theta_n,
         (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0,
-        inputs.wheel_torque_nm,
-        inputs.wheel_speed_ahead_rad_s,
-        gains.K,
-        wheel.inertia_kg_m2,
-        wheel.radius_m,
+        torque_nm,
+        omega_ahead,
+        K,
+        inertia,
+        radius_m,
         step_s,
     )
-    after = FusionState(theta_next, s, unseen_m, before_img)
-    return FusionStep(after, F_hat, theta_tyre, sensitivity, threshold, excited, K_v)
+    after = _new(FusionState, (theta_next, s, unseen_m, before_img, road_img, other_m, rests))
+    return _new(FusionStep, (after, F_hat, theta_tyre, sensitivity, threshold, excited, K_v))
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
@@ -272,7 +305,7 @@ def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: f
 def _compatible(
     theta_img: float,
     theta_hat: float,
-    unseen_m: float,
+    silent: bool,
     theta_tyre: float | None,
     force_n: float,
     inputs: WheelInputs,
@@ -280,8 +313,8 @@ def _compatible(
 ) -> float | None:
     """What the camera may still say beside the tyre.
 
-    None where the tyre is seen to pull the estimate the other way, or was seen just before; no farther off than what
-    the tyre shows, and not less than it already carries.
+    None where the tyre is seen to pull the estimate the other way, or where it is not seen and the camera rests after
+    it was; no farther off than what the tyre shows, and not less than it already carries.
     """
     if theta_tyre is not None:
         by_tyre, by_camera = theta_tyre - theta_hat, theta_img - theta_hat
@@ -289,7 +322,7 @@ def _compatible(
             return None
         # Of noisy samples half lie on the camera's side: without this bound their noise would be rectified.
         return theta_img if abs(by_camera) < abs(by_tyre) else theta_tyre
-    if unseen_m < SEEN_HOLD_M:
+    if silent:
         return None
     return max(theta_img, least_theta(force_n, inputs, longitudinal_stiffness_n))
 
@@ -315,4 +348,6 @@ def _driven(
     )
     target = pull / rate
     moved = target + (theta_hat - target) * math.exp(-rate * step_s)
-    return min(max(moved, LEAST_THETA), GREATEST_THETA)
+    if moved < LEAST_THETA:
+        return LEAST_THETA
+    return moved if moved < GREATEST_THETA else GREATEST_THETA

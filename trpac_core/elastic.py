@@ -92,9 +92,13 @@ class ElasticLine(NamedTuple):
     rc: float
     cc: float
 
-    def offset(self, speed_m_s: float, variance: float) -> float:
-        """What is taken off the slip that is read, with its `offset_variance` [-]."""
-        return beyond(self.b / speed_m_s + self.r, variance)
+    def offset(self, speed_m_s: float) -> tuple[float, float]:
+        """What is taken off the slip that is read, and the standard deviation of what it reads too much [-]."""
+        b, r, _, bb, br, _, rr, _, _ = self
+        variance = (bb / speed_m_s + 2.0 * br) / speed_m_s + rr
+        deviation = math.sqrt(variance) if variance > 0.0 else 0.0
+        value, least = b / speed_m_s + r, CONTRADICTED * deviation
+        return (value - least if value > least else value + least if value < -least else 0.0), deviation
 
     def compliance(self) -> float:
         """What the tyre is taken to be softer by [-]."""
@@ -102,13 +106,15 @@ class ElasticLine(NamedTuple):
 
     def offset_variance(self, speed_m_s: float) -> float:
         """Variance of what the slip reads too much [-]."""
-        return max(0.0, (self.bb / speed_m_s + 2.0 * self.br) / speed_m_s + self.rr)
+        _, _, _, bb, br, _, rr, _, _ = self
+        variance = (bb / speed_m_s + 2.0 * br) / speed_m_s + rr
+        return variance if variance > 0.0 else 0.0
 
     def slip_variance(self, slip: float, speed_m_s: float) -> float:
         """Mean square error of where the elastic line has a slip, with what was learned and not used in it [-]."""
         cross = 2.0 * slip * (self.bc / speed_m_s + self.rc)
         offset_variance = self.offset_variance(speed_m_s)
-        used = self.offset(speed_m_s, offset_variance) + slip * self.compliance()
+        used = self.offset(speed_m_s)[0] + slip * self.compliance()
         unused = self.b / speed_m_s + self.r + slip * self.c - used
         return max(0.0, offset_variance + cross + slip * slip * self.cc) + unused * unused
 

@@ -10,26 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .confidence import Evidence, advanced_variance, unknown_variance, wandered, with_camera
+from .camera_side import RoadUnderWheel, take_frame
+from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
 from .dife import FusionState, FusionStep, Look, Wheel, WheelInputs, fusion_step, look_at, settled
-from .elastic import learned
+from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
+from .mismatch import followed
 from .readings import (
     GREATEST_ACCELERATION_M_S2,
     MOTION,
     Readings,
     Sensors,
-    ahead,
     implausible,
     plain,
-    smoothed,
     unusable,
 )
-from .slip import GREATEST_SLIP, Slip, wheel_slip
 from .tyre import peak_friction
 from .vision.ife import Ife
-from .vision.preview import Outcome, add_frame, covering, prune
-from .vision.trajectory import Motion
+from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
 
 __all__ = [
     "LOCKED_M_S",
@@ -43,17 +41,6 @@ __all__ = [
 
 LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
-MOST_AHEAD = 2.0
-"""Most that a step may be longer than the one before for the readings' trend to be trusted over it [-]."""
-JUMP_M_S, RIM_JUMP_M_S = 1.5, 8.0
-"""How far a reading may be from its filter: a bus of 20 Hz at 15 m/s^2, and a wheel that a full brake locks [m/s]."""
-RIM_ACCELERATION_M_S2 = 750.0
-"""Steepest change of a rim's speed: 3000 N m on 1.2 kg m^2 at 0.3 m [m/s^2]."""
-LOCKED_M_S = 0.5
-"""Below this rim speed the wheel of a driving car counts as locked: its brake then holds what the road gives, not the
-torque that was commanded [m/s]."""
-RELEASED = 5.0
-"""Time constants of the sensor filter until it has forgotten a locked wheel's torque to 1 % [-]."""
 
 
 class TrpacEstimator:
@@ -84,6 +71,9 @@ class TrpacEstimator:
         smoothing = config.gains.gamma * config.sensor_filter_s
         self._averaged = smoothing / (1.0 + smoothing)
         self._rates = Rates.at(config, 0.0, 0.0)
+        self._radius_m, self._least_load_n = car.wheel_radius_m, LEAST_LOAD * self._static_load_n
+        self._road = RoadUnderWheel(self._preview)
+        self._softened_by: tuple[ElasticLine | None, Wheel] = (None, self._wheel)
         self.reset()
 
     def reset(self) -> None:
@@ -145,41 +135,28 @@ class TrpacEstimator:
         ImageError
             If the picture does not fit the camera; nothing has changed then.
         """
+        config, rates = self.config, self._rates
         problem = None
-        if not plain(step_s, sensors, self.config.floor_m_s):
-            problem = unusable(step_s, sensors, self._wheel.radius_m, self.config.floor_m_s)
-        if isinstance(frame, RoadClass) and not 0.0 <= frame.confidence <= 1.0:
+        if not plain(step_s, sensors, config.floor_m_s):
+            problem = unusable(step_s, sensors, self._wheel.radius_m, config.floor_m_s)
+        if frame is not None and isinstance(frame, RoadClass) and not 0.0 <= frame.confidence <= 1.0:
             problem = problem or f"Class confidence is {frame.confidence}; expected a number between 0 and 1."
             frame, frame_failed = None, True
         if problem is not None:
             return self._hold(step_s, sensors, frame, frame_failed, problem)
-        if step_s != self._rates.step_s or step_s == 0.0:
-            self._rates = Rates.at(self.config, step_s, self._state.step_s)
-        if self._state.settled and self._jumped(sensors, step_s):
-            self._state = self._state._replace(settled=False)
-        acceleration, lagged, load_n = self._moved(sensors)
         state = self._state
+        if step_s != rates.step_s or step_s == 0.0:
+            self._rates = Rates.at(config, step_s, state.step_s)
+        if state.settled and jumped(state.readings, sensors, self._radius_m, step_s):
+            state.settled = False
+        acceleration, lagged, load_n = self._moved(sensors)
         if frame is not None or frame_failed:
-            judging = state._replace(acceleration_m_s2=acceleration)
-            state = self._with_frame(judging, frame, frame_failed, sensors)
-        return self._advance(state, sensors, step_s, acceleration, lagged, load_n)
-
-    def _jumped(self, sensors: Sensors, step_s: float) -> bool:
-        """Whether readings are where no car can have gone since: a host that began with zeros, a signal that came back.
-
-        The observers would take such a jump for a force that they forget only slowly.
-        """
-        omega, _, speed_m_s = self._state.readings
-        speed_m_s -= sensors.vehicle_speed_m_s
-        rim_m_s = (omega - sensors.wheel_speed_rad_s) * self._wheel.radius_m
-        return (
-            abs(speed_m_s) > JUMP_M_S + GREATEST_ACCELERATION_M_S2 * step_s
-            or abs(rim_m_s) > RIM_JUMP_M_S + RIM_ACCELERATION_M_S2 * step_s
-        )
+            take_frame(state, config, self._preview, self._ife, frame, sensors, acceleration)
+        return self._advance(sensors, step_s, acceleration, lagged, load_n)
 
     def _moved(self, sensors: Sensors) -> tuple[float, float, float]:
         """Acceleration, lagged speed and load as they are now; at the start, and after a gap, unfiltered."""
-        config, state, rates = self.config, self._state, self._rates
+        state, rates = self._state, self._rates
         measured, lagged = sensors.longitudinal_acceleration_m_s2, state.lagged_speed_m_s
         if not state.settled:
             acceleration, lagged = measured or 0.0, sensors.vehicle_speed_m_s
@@ -188,7 +165,7 @@ class TrpacEstimator:
         else:
             # A signal that changes more rarely than the unit steps must not be cut at its jumps: so the speed is
             # differentiated by its distance from its own filter, and only that is bounded.
-            slope = (sensors.vehicle_speed_m_s - lagged) / config.acceleration_filter_s
+            slope = (sensors.vehicle_speed_m_s - lagged) / self.config.acceleration_filter_s
             acceleration = min(max(slope, -GREATEST_ACCELERATION_M_S2), GREATEST_ACCELERATION_M_S2)
             lagged += rates.acceleration_share * (sensors.vehicle_speed_m_s - lagged)
         load_n = sensors.vertical_load_n
@@ -196,54 +173,11 @@ class TrpacEstimator:
             load_n = self._static_load_n + self._load_by_acceleration * acceleration
         elif state.settled:
             load_n = state.load_n + rates.sensor_share * (load_n - state.load_n)
-        return acceleration, lagged, max(load_n, LEAST_LOAD * self._static_load_n)
-
-    def _with_frame(
-        self,
-        state: EstimatorState,
-        frame: NDArray[np.uint8] | RoadClass | None,
-        failed: bool,
-        sensors: Sensors,
-    ) -> EstimatorState:
-        """The state with a new frame's verdict stamped onto the road ahead; a failed one's is that it knows nothing."""
-        if frame is not None:
-            state, outcome = self._judged(state, frame, sensors)
-        elif failed and state.preview.stamps:
-            surface = state.preview.stamps[-1].outcome.surface
-            outcome = Outcome(surface, Q_v=0.0, flag=False, captured_s=state.time_s)
-        else:
-            return state._replace(frame_failed=True) if failed else state
-        preview = add_frame(
-            prune(state.preview, self._preview, state.position_m),
-            self._preview,
-            outcome,
-            position_m=state.position_m,
-            speed_m_s=sensors.vehicle_speed_m_s,
-            frame_interval_s=1.0 / self.config.vision.camera.fps,
-        )
-        return state._replace(preview=preview, frame_failed=frame is None)
-
-    def _judged(
-        self, state: EstimatorState, frame: NDArray[np.uint8] | RoadClass, sensors: Sensors
-    ) -> tuple[EstimatorState, Outcome]:
-        """Classify a picture, or take a class as it comes."""
-        if isinstance(frame, RoadClass):
-            flag = frame.confidence > self.config.vision.flag_threshold
-            return state, Outcome(frame.surface, frame.confidence, flag, state.time_s)
-        if self._ife is None:
-            raise TypeError("A picture came, but the estimator was made without an image estimator.")
-        motion = Motion(
-            sensors.vehicle_speed_m_s,
-            state.acceleration_m_s2,
-            sensors.steering_angle_rad,
-            sensors.yaw_rate_rad_s,
-        )
-        memory, result = self._ife.process(state.ife, frame, motion)
-        return state._replace(ife=memory), Outcome(result.surface, result.Q_v, result.flag, state.time_s)
+        least_n = self._least_load_n
+        return acceleration, lagged, load_n if load_n > least_n else least_n
 
     def _advance(
         self,
-        state: EstimatorState,
         sensors: Sensors,
         step_s: float,
         acceleration_m_s2: float,
@@ -251,117 +185,70 @@ class TrpacEstimator:
         load_n: float,
     ) -> Estimate:
         """Run both estimators over the step with the road that lies under the wheel at its start."""
-        config, known = self.config, self._wheel
-        scheduler, gains = config.scheduler, config.gains
-        readings, inputs, read_slip, smoothed_slip, locked_s = self._inputs(state, sensors, step_s, load_n)
-        C_x = known.longitudinal_stiffness_n / (1.0 + state.line.compliance())
-        wheel = Wheel(known.inertia_kg_m2, known.radius_m, C_x)
+        config, state = self.config, self._state
+        scheduler, gains, wheel = config.scheduler, config.gains, self._softened(state.line)
+        C_x = wheel[2]
+        readings, inputs, read_slip, smoothed_slip, locked_s = wheel_inputs(
+            config, self._rates, state, sensors, self._radius_m, step_s, load_n
+        )
         fusion, dynamics = state.fusion, state.dynamics
         if not state.settled:
             fusion = settled(fusion, inputs, wheel, gains)
             dynamics = settled(dynamics, inputs, wheel, gains)
-        outcome = covering(state.preview, self._preview, state.position_m - self._setback_m)
-        flag = outcome is not None and outcome.flag and not state.frame_failed
-        theta_img = config.class_theta[outcome.surface] if outcome is not None and flag else None
+        outcome = self._road.at(state.preview, state.position_m - self._setback_m)
+        flag, theta_img, theta_seen, Q_v, age_s = False, None, self._last.TRPAC_image, 0.0, -1.0
+        if outcome is not None:
+            flag = outcome.flag and not state.frame_failed
+            theta_seen, Q_v = config.class_theta[outcome.surface], outcome.Q_v
+            theta_img = theta_seen if flag else None
         look = look_at(inputs, C_x, scheduler)
         alone = fusion_step(dynamics, inputs, look, wheel, gains, scheduler, None, step_s)
         fused = alone
         if theta_img is not None or fusion != dynamics:
-            fused = fusion_step(fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s)
-        theta = fused.state.theta_hat
-        line, variance, lag, unasked_s = state.line, state.variance, state.lag, state.unasked_s + step_s
-        changed = fused.state.theta_img != fusion.theta_img
-        if changed or unasked_s >= config.sensor_filter_s:
+            model, known = config.confidence, state.variance
+            fused = fusion_step(
+                fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, model, known
+            )
+        after, force_n, _, _, threshold, excited, K_v = fused
+        theta, class_after, class_before = after[0], after[3], fusion[3]
+        unasked_s = state.unasked_s + step_s
+        if unasked_s >= config.sensor_filter_s or class_after != class_before:
             variance, lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
-            line = self._learned(state, alone, inputs, read_slip, unasked_s)
+            state.line = self._learned(state, alone, inputs, read_slip, unasked_s)
+            state.variance, state.lag = variance, lag
             unasked_s = 0.0
-        position_m = state.position_m + inputs.way_m
-        self._state = EstimatorState(
-            fused.state,
-            alone.state,
-            readings,
-            line,
-            variance,
-            lag,
-            unasked_s,
-            locked_s,
-            state.time_s + step_s,
-            position_m,
-            sensors.vehicle_speed_m_s,
-            acceleration_m_s2,
-            smoothed_slip,
-            lagged_speed_m_s,
-            load_n,
-            step_s or state.step_s,
-            True,
-            state.frame_failed,
-            state.ife,
-            state.preview,
-        )
-        theta_seen, Q_v, age_s = self._seen(outcome)
+        state.fusion, state.dynamics, state.readings = after, alone[0], readings
+        state.unasked_s, state.locked_s, state.smoothed_slip = unasked_s, locked_s, smoothed_slip
+        state.time_s += step_s
+        state.position_m += inputs[7]
+        state.speed_m_s, state.lagged_speed_m_s = sensors.vehicle_speed_m_s, lagged_speed_m_s
+        state.acceleration_m_s2, state.load_n = acceleration_m_s2, load_n
+        state.step_s, state.settled = step_s or state.step_s, True
+        if outcome is not None:
+            age_s = state.time_s - outcome.captured_s
         self._last = Estimate(
             theta,
             flag,
-            fused.K_v,
-            fused.excited,
-            fused.threshold,
-            inputs.slip.size,
-            fused.tyre_force_n,
+            K_v,
+            excited,
+            threshold,
+            inputs[3][0],
+            force_n,
             theta_seen,
-            alone.state.theta_hat,
+            alone[0][0],
             peak_friction(theta, load_n, C_x),
             Q_v,
             age_s,
-            math.sqrt(with_camera(config.confidence, variance, theta, theta_img)),
+            math.sqrt(with_camera(config.confidence, state.variance, theta, theta_img)),
         )
         return self._last
 
-    def _inputs(
-        self, state: EstimatorState, sensors: Sensors, step_s: float, load_n: float
-    ) -> tuple[Readings, WheelInputs, float, float, float]:
-        """Filtered readings, what both estimators are given of them, slip as read, smoothed slip, time since locked."""
-        config, rates, radius_m = self.config, self._rates, self._wheel.radius_m
-        now = Readings(sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s)
-        before, ratio = now, 0.0
-        if state.settled:
-            before = state.readings
-            now = smoothed(before, sensors, rates.sensor_share)
-            ratio = min(step_s / state.step_s, MOST_AHEAD) if state.step_s else 0.0
-        omega, torque_nm, speed_m_s = now
-        before_omega, before_torque_nm, _ = before
-        floor_m_s = config.floor_m_s
-        slip = wheel_slip(omega, speed_m_s, radius_m, floor_m_s)
-        read_slip = signed = slip.size * slip.direction
-        offset_variance, line = 0.0, state.line
-        divisor_m_s = speed_m_s if speed_m_s > floor_m_s else floor_m_s
-        if slip.direction or speed_m_s >= floor_m_s:
-            offset_variance = line.offset_variance(divisor_m_s)
-            signed = read_slip - line.offset(divisor_m_s, offset_variance)
-            slip = Slip(
-                min(abs(signed), GREATEST_SLIP), 1.0 if signed > 0.0 else -1.0 if signed < 0.0 else 0.0
-            )
-        smoothed_slip = signed
-        if state.settled:
-            smoothed_slip = state.smoothed_slip + rates.sensor_share * (signed - state.smoothed_slip)
-        rolling_nm = 0.0
-        if omega * radius_m >= floor_m_s:
-            rolling_nm = config.vehicle.rolling_resistance * load_n * radius_m
-        locked_s = state.locked_s + step_s
-        if sensors.wheel_speed_rad_s * radius_m < LOCKED_M_S and sensors.vehicle_speed_m_s > floor_m_s:
-            locked_s = 0.0
-        noise = rates.noise_m_s / max(sensors.vehicle_speed_m_s, floor_m_s)
-        inputs = WheelInputs(
-            omega,
-            ahead(omega, before_omega, ratio),
-            ahead(torque_nm, before_torque_nm, ratio) - rolling_nm,
-            slip,
-            load_n,
-            max(noise, math.sqrt(offset_variance)),
-            abs(signed - smoothed_slip),
-            sensors.vehicle_speed_m_s * step_s,
-            locked_s > RELEASED * config.sensor_filter_s,
-        )
-        return now, inputs, read_slip, smoothed_slip, locked_s
+    def _softened(self, line: ElasticLine) -> Wheel:
+        """The wheel with the stiffness that was learnt; worked out anew only where the line has changed."""
+        if line is not self._softened_by[0]:
+            inertia, radius_m, told_n = self._wheel
+            self._softened_by = line, Wheel(inertia, radius_m, told_n / (1.0 + line.compliance()))
+        return self._softened_by[1]
 
     def _variance(
         self,
@@ -388,13 +275,17 @@ class TrpacEstimator:
         if size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
             return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
+        theta_tyre, friction = fused.theta_tyre, fused.tyre_force_n * inputs.slip.direction / inputs.load_n
+        noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
+        torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
+        torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0
+        if theta_tyre is not None and friction > 0.0:
+            noise = reading_noise(friction, look.tyre, noise_share, torque_friction)
+            state.following = followed(state.following, look.tyre.elastic, theta_tyre, noise)
+            following = state.following.share()
+        line_share = math.sqrt(state.line.slip_variance(size, speed_m_s)) / size
         evidence = Evidence(
-            fused.theta_tyre,
-            fused.tyre_force_n * inputs.slip.direction / inputs.load_n,
-            look.tyre,
-            math.sqrt(state.line.slip_variance(size, speed_m_s)) / size,
-            (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size,
-            self._rates.noise_gain * config.confidence.torque_noise_nm / (wheel.radius_m * inputs.load_n),
+            theta_tyre, friction, look.tyre, line_share, noise_share, torque_friction, following
         )
         return advanced_variance(
             config.confidence,
@@ -433,13 +324,6 @@ class TrpacEstimator:
             inputs.slip_change,
         )
 
-    def _seen(self, outcome: Outcome | None) -> tuple[float, float, float]:
-        """Adhesion, confidence and age of what the camera side shows of the road under the wheel."""
-        if outcome is None:
-            return self._last.TRPAC_image, 0.0, -1.0
-        theta = self.config.class_theta[outcome.surface]
-        return theta, outcome.Q_v, self._state.time_s - outcome.captured_s
-
     def _hold(
         self,
         step_s: float,
@@ -454,22 +338,22 @@ class TrpacEstimator:
         """
         state = self._state
         passed_s = step_s if math.isfinite(step_s) and step_s > 0.0 else 0.0
-        speed_m_s = state.speed_m_s
         if not implausible(sensors, MOTION):
-            speed_m_s = sensors.vehicle_speed_m_s
-            state = self._with_frame(state, frame, frame_failed, sensors)
-        way_m = speed_m_s * passed_s
+            if frame is not None or frame_failed:
+                acceleration = state.acceleration_m_s2
+                take_frame(state, self.config, self._preview, self._ife, frame, sensors, acceleration)
+            state.speed_m_s = sensors.vehicle_speed_m_s
+        way_m = state.speed_m_s * passed_s
+        state.time_s += passed_s
+        state.position_m += way_m
         theta = state.fusion.theta_hat
-        self._state = state._replace(
-            time_s=state.time_s + passed_s,
-            position_m=state.position_m + way_m,
-            speed_m_s=speed_m_s,
-            variance=wandered(self.config.confidence, state.variance, theta, way_m),
-            lag=0.0,
-            settled=False,
-        )
-        outcome = covering(self._state.preview, self._preview, self._state.position_m - self._setback_m)
-        theta_seen, Q_v, age_s = self._seen(outcome)
+        state.variance = wandered(self.config.confidence, state.variance, theta, way_m)
+        state.lag, state.settled = 0.0, False
+        outcome = self._road.at(state.preview, state.position_m - self._setback_m)
+        theta_seen, Q_v, age_s = self._last.TRPAC_image, 0.0, -1.0
+        if outcome is not None:
+            theta_seen, Q_v = self.config.class_theta[outcome.surface], outcome.Q_v
+            age_s = state.time_s - outcome.captured_s
         self._last = replace(
             self._last,
             flag=False,
@@ -478,7 +362,7 @@ class TrpacEstimator:
             TRPAC_image=theta_seen,
             image_confidence=Q_v,
             frame_age_s=age_s,
-            TRPAC_std=math.sqrt(self._state.variance),
+            TRPAC_std=math.sqrt(state.variance),
             problem=problem,
         )
         return self._last

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 from .confidence import ConfidenceModel
 from .dife import FusionState, Gains
 from .elastic import ElasticLine, ElasticModel
 from .excitation import FuzzyScheduler
+from .mismatch import Following
 from .readings import Readings, filter_share
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface
@@ -127,14 +128,17 @@ class Estimate:
     """One sentence where the input was unusable and the last good estimate is held."""
 
 
-class EstimatorState(NamedTuple):
-    """All that the estimator remembers."""
+@dataclass(slots=True)
+class EstimatorState:
+    """All that the estimator remembers; brought up to date in place, once all of a step is worked out."""
 
     fusion: FusionState
     dynamics: FusionState
     readings: Readings
     line: ElasticLine
     variance: float
+    following: Following = field(default_factory=Following)
+    """How the tyre's theta follows its slip."""
     lag: float = 0.0
     """Smoothed distance of the tyre's theta from the estimate [-]."""
     unasked_s: float = 0.0
@@ -155,13 +159,13 @@ class EstimatorState(NamedTuple):
     settled: bool = False
     """Whether the force observers follow the wheel; not so at the start and after a gap in the input."""
     frame_failed: bool = False
-    ife: IfeState = IfeState()
-    preview: PreviewState = PreviewState()
+    ife: IfeState = field(default_factory=IfeState)
+    preview: PreviewState = field(default_factory=PreviewState)
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
-        values = self._asdict()
-        for name in ("fusion", "dynamics", "readings", "line"):
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        for name in _PARTS:
             values[name] = list(values[name])
         values["locked_s"] = None if math.isinf(self.locked_s) else self.locked_s
         values["ife"], values["preview"] = self.ife.to_json(), self.preview.to_json()
@@ -184,10 +188,12 @@ _PARTS: Mapping[str, Any] = {
     "dynamics": FusionState,
     "readings": Readings,
     "line": ElasticLine,
+    "following": Following,
 }
 
 
-class Rates(NamedTuple):
+@dataclass(slots=True)
+class Rates:
     """What follows from the step size alone."""
 
     step_s: float

@@ -8,13 +8,16 @@ per output set, the table therefore falls apart into two interpolations, which i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
-from .tyre import onset_slip
+from .tyre import onset_elastic
 
 THRESHOLD_LIMIT = 0.06
 """Upper end of the threshold's domain [-] (section 4.2)."""
 K_V_LIMIT = 3.0
 """Upper end of K_v's domain [-] (section 4.2)."""
+MOST_CLASSES = 8
+"""Classes whose onset is kept, and none: a bound on memory, not a setting [-]."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,22 @@ class FuzzyScheduler:
         slip_deviation : float
             Standard deviation of the slip through sensor noise [-].
         """
+        elastic = self._onsets.get(theta_img)
+        if elastic is None:
+            elastic = self._onset(theta_img)
+        ratio = elastic * load_n / longitudinal_stiffness_n
+        slip, noise = ratio / (1.0 + ratio), self.noise_factor * slip_deviation
+        if slip < noise:
+            slip = noise
+        return slip if slip < THRESHOLD_LIMIT else THRESHOLD_LIMIT
+
+    @cached_property
+    def _onsets(self) -> dict[float | None, float]:
+        """Onsets that are worked out already, by class."""
+        return {}
+
+    def _onset(self, theta_img: float | None) -> float:
+        """Elastic friction at which a road of that class begins to show [-]; classes are few, so it is kept."""
         sets = self.theta_sets
         visible = (
             sets.small - self.class_scatter,
@@ -92,9 +111,13 @@ class FuzzyScheduler:
             sets.big - self.class_scatter,
         )
         theta = visible[0] if theta_img is None else sets.blend(theta_img, visible)
-        slip = onset_slip(theta, load_n, longitudinal_stiffness_n, self.onset_sensitivity)
-        return min(max(slip, self.noise_factor * slip_deviation), THRESHOLD_LIMIT)
+        elastic = onset_elastic(theta, self.onset_sensitivity)
+        if len(self._onsets) < MOST_CLASSES:
+            self._onsets[theta_img] = elastic
+        return elastic
 
     def K_v(self, difference: float) -> float:
         """Visual gain for a difference abs(theta_img - theta_hat) [-]."""
+        if difference <= self.difference_sets.small:
+            return self.K_v_values[0]
         return self.difference_sets.blend(difference, self.K_v_values)

@@ -33,6 +33,7 @@ Four = tuple[float, float, float, float]
 OptionalFour = tuple[float | None, float | None, float | None, float | None]
 
 
+_new = tuple.__new__
 _UNKNOWN: OptionalFour = (None, None, None, None)
 
 
@@ -114,7 +115,7 @@ class FourWheels:
         self.config = config
         self._ife = ife
         self._wheels = tuple(TrpacEstimator(config.of_wheel(name)) for name in WHEELS)
-        car = config.wheel.vehicle
+        self._car = car = config.wheel.vehicle
         self._half_track_m, self._wheelbase_m = car.track_m / 2.0, car.wheelbase_m
         front_n, rear_n = car.wheel_load(True), car.wheel_load(False)
         self._static_n = (front_n, front_n, rear_n, rear_n)
@@ -154,36 +155,38 @@ class FourWheels:
         ImageError
             If the picture does not fit the camera; nothing has changed then.
         """
-        left, right = self._verdicts(sensors, frame)
-        speeds_m_s = self._local_speeds(sensors)
+        left, right = (None, None) if frame is None else self._verdicts(sensors, frame)
+        omega, torque, speed, _, steering, accel, _, yaw = sensors
+        speeds_m_s = (speed, speed, speed, speed)
+        if steering or yaw:
+            speeds_m_s = self._local_speeds(sensors)
         loads_n, given_n = self._loads(sensors)
-        omega, torque = sensors.wheel_speed_rad_s, sensors.wheel_torque_nm
-        steering, yaw = sensors.steering_angle_rad, sensors.yaw_rate_rad_s
-        accel = sensors.longitudinal_acceleration_m_s2
-        sides = (left, right, left, right)
         problems = []
-        for i, wheel in enumerate(self._wheels):
-            one = Sensors(omega[i], torque[i], speeds_m_s[i], given_n[i], steering, accel, yaw)
-            estimate = wheel.step(step_s, one, sides[i], frame_failed=frame_failed)
+        for name, wheel, side, wheel_omega, wheel_torque, wheel_m_s, wheel_n in zip(
+            WHEELS, self._wheels, (left, right, left, right), omega, torque, speeds_m_s, given_n, strict=True
+        ):
+            one = Sensors(wheel_omega, wheel_torque, wheel_m_s, wheel_n, steering, accel, yaw)
+            estimate = wheel.step(step_s, one, side, frame_failed=frame_failed)
             if estimate.problem is not None:
-                problems.append((WHEELS[i], estimate.problem))
+                problems.append((name, estimate.problem))
         self._last = self._together(loads_n, self._told(sensors, problems) if problems else ())
         return self._last
 
     def _together(self, loads_n: Four, problems: tuple[tuple[str, str], ...]) -> CarEstimate:
         """The wheels' estimates and the car's."""
-        fl, fr, rl, rr = (wheel.last for wheel in self._wheels)
+        front_left, front_right, rear_left, rear_right = self._wheels
+        wheels = fl, fr, rl, rr = front_left.last, front_right.last, rear_left.last, rear_right.last
         theta, deviation = car_friction(
             (
-                Friction(fl.TRPAC, fl.TRPAC_std),
-                Friction(fr.TRPAC, fr.TRPAC_std),
-                Friction(rl.TRPAC, rl.TRPAC_std),
-                Friction(rr.TRPAC, rr.TRPAC_std),
+                _new(Friction, (fl.TRPAC, fl.TRPAC_std)),
+                _new(Friction, (fr.TRPAC, fr.TRPAC_std)),
+                _new(Friction, (rl.TRPAC, rl.TRPAC_std)),
+                _new(Friction, (rr.TRPAC, rr.TRPAC_std)),
             ),
             loads_n,
             self.config.axle_deviation,
         )
-        return CarEstimate((fl, fr, rl, rr), theta, deviation, problems)
+        return _new(CarEstimate, (wheels, theta, deviation, problems))
 
     def _told(self, sensors: CarSensors, problems: list[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
         """Problems by whom they concern; one that all wheels share is the car's."""
@@ -232,12 +235,8 @@ class FourWheels:
 
         Where steering or yaw rate are no good readings the car's speed stands for all: each wheel will say so itself.
         """
-        speed, steering, yaw = (
-            sensors.vehicle_speed_m_s,
-            sensors.steering_angle_rad,
-            sensors.yaw_rate_rad_s,
-        )
-        if not (steering or yaw) or not self._motion_known(sensors):
+        _, _, speed, _, steering, _, _, yaw = sensors
+        if not self._motion_known(sensors):
             return (speed, speed, speed, speed)
         if yaw is None:
             yaw = speed * math.tan(steering) / self._wheelbase_m
@@ -251,16 +250,15 @@ class FourWheels:
 
         A wheel works the load out itself, from the filtered acceleration, unless a sensor or a lateral transfer tells.
         """
-        given, loads = sensors.vertical_load_n, self._static_n
-        accel, lateral = sensors.longitudinal_acceleration_m_s2, sensors.lateral_acceleration_m_s2
+        loads = self._static_n
+        _, _, _, given, _, accel, lateral, _ = sensors
         if accel is not None and abs(accel) <= _STEEPEST:
-            car = self.config.wheel.vehicle
-            front_n, rear_n = car.wheel_load(True, accel), car.wheel_load(False, accel)
+            front_n, rear_n = self._car.wheel_load(True, accel), self._car.wheel_load(False, accel)
             loads = (front_n, front_n, rear_n, rear_n)
             if lateral is not None:
                 loads = self._leaning(front_n, rear_n, lateral)
                 given = _first_known(given, loads)
-        if given == _UNKNOWN:
+        if given is _UNKNOWN or given == _UNKNOWN:
             return loads, given
         total = _first_known(given, loads)
         return (total if all(load > 0.0 and math.isfinite(load) for load in total) else self._static_n), given

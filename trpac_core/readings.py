@@ -24,7 +24,7 @@ GREATEST_ACCELERATION_M_S2 = 15.0
 """No road car's tyres give more: a steeper change of speed is a jump of the signal [m/s^2]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # frozen, its making would take 1 us, four times a step
 class Sensors:
     """What the car measures now. What is None is not connected and is replaced as the estimator documents.
 
@@ -54,21 +54,6 @@ def filter_share(step_s: float, time_constant_s: float) -> float:
     return 1.0 - math.exp(-step_s / time_constant_s)
 
 
-def smoothed(before: Readings, sensors: Sensors, share: float) -> Readings:
-    """Readings through the first-order filter."""
-    omega, torque, speed = before
-    return Readings(
-        omega + share * (sensors.wheel_speed_rad_s - omega),
-        torque + share * (sensors.wheel_torque_nm - torque),
-        speed + share * (sensors.vehicle_speed_m_s - speed),
-    )
-
-
-def ahead(now: float, before: float, ratio: float) -> float:
-    """Mean over the step to come of a signal that goes on as it came; `ratio` of this step to the one before."""
-    return now + 0.5 * ratio * (now - before)
-
-
 def implausible(sensors: Sensors, names: tuple[str, ...]) -> list[str]:
     """Which of these readings are not finite or beyond what a road car gives, each with what was expected."""
     return [
@@ -78,18 +63,22 @@ def implausible(sensors: Sensors, names: tuple[str, ...]) -> list[str]:
     ]
 
 
+_OMEGA, _TORQUE, _SPEED, _LOAD, _STEERING, _ACCELERATION, _YAW = PLAUSIBLE.values()
+
+
 def plain(step_s: float, sensors: Sensors, floor_m_s: float) -> bool:
     """Whether a step's input is beyond doubt, at little cost; where it is not, `unusable` decides."""
     load_n, acceleration = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
+    yaw_rate = sensors.yaw_rate_rad_s
     return (
         0.0 <= step_s < math.inf
-        and -floor_m_s <= sensors.vehicle_speed_m_s <= PLAUSIBLE["vehicle_speed_m_s"]
-        and 0.0 <= sensors.wheel_speed_rad_s <= PLAUSIBLE["wheel_speed_rad_s"]
-        and abs(sensors.wheel_torque_nm) <= PLAUSIBLE["wheel_torque_nm"]
-        and abs(sensors.steering_angle_rad) <= PLAUSIBLE["steering_angle_rad"]
-        and (load_n is None or 0.0 < load_n <= PLAUSIBLE["vertical_load_n"])
-        and (acceleration is None or abs(acceleration) <= PLAUSIBLE["longitudinal_acceleration_m_s2"])
-        and (sensors.yaw_rate_rad_s is None or abs(sensors.yaw_rate_rad_s) <= PLAUSIBLE["yaw_rate_rad_s"])
+        and -floor_m_s <= sensors.vehicle_speed_m_s <= _SPEED
+        and 0.0 <= sensors.wheel_speed_rad_s <= _OMEGA
+        and -_TORQUE <= sensors.wheel_torque_nm <= _TORQUE
+        and -_STEERING <= sensors.steering_angle_rad <= _STEERING
+        and (load_n is None or 0.0 < load_n <= _LOAD)
+        and (acceleration is None or -_ACCELERATION <= acceleration <= _ACCELERATION)
+        and (yaw_rate is None or -_YAW <= yaw_rate <= _YAW)
     )
 
 

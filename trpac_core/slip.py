@@ -8,6 +8,9 @@ GREATEST_SLIP = 0.999
 """A locked or spinning wheel is kept this far from slip 1, where the tyre's slip ratio has its pole [-]."""
 
 
+_new = tuple.__new__
+
+
 class Slip(NamedTuple):
     """Size and direction of a wheel's slip."""
 
@@ -42,10 +45,14 @@ def wheel_slip(
     Slip(size=0.034482758620689655, direction=1.0)
     """
     circumferential = wheel_speed_rad_s * wheel_radius_m
-    faster = max(circumferential, vehicle_speed_m_s)
+    sliding = circumferential - vehicle_speed_m_s
+    if sliding > 0.0:
+        size, direction, faster = sliding, 1.0, circumferential
+    elif sliding < 0.0:
+        size, direction, faster = -sliding, -1.0, vehicle_speed_m_s
+    else:
+        return Slip(0.0, 0.0)
     if faster < floor_m_s:
         return Slip(0.0, 0.0)
-    sliding = circumferential - vehicle_speed_m_s
-    if sliding == 0.0:
-        return Slip(0.0, 0.0)
-    return Slip(min(abs(sliding) / faster, GREATEST_SLIP), 1.0 if sliding > 0.0 else -1.0)
+    size /= faster
+    return _new(Slip, (size if size < GREATEST_SLIP else GREATEST_SLIP, direction))

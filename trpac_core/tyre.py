@@ -33,6 +33,10 @@ GREATEST_PEAK_SLIP = 0.95
 """Where the search for the curve's maximum ends [-]."""
 
 
+_new = tuple.__new__
+"""Makes a named tuple of a tuple: a third of the time that its own constructor takes."""
+
+
 def slip_ratio_force(slip: float, longitudinal_stiffness_n: float) -> float:
     """X = C_x lambda / (1 - lambda), the force of a tyre that never slides. [N]."""
     return longitudinal_stiffness_n * slip / (1.0 - slip)
@@ -67,10 +71,6 @@ class TyreAtSlip(NamedTuple):
             return elastic * g_1
         return (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
 
-    def elastic_friction(self) -> float:
-        """Used friction at L = 1, the most that theta can be read from [-]."""
-        return self.elastic * (self.g_0 + 2.0 * self.g_1 * self.elastic)
-
     def theta(self, friction: float) -> float | None:
         """The one theta below L = 1 that gives this used friction; None where none does."""
         elastic, g_0, g_1, kappa = self
@@ -80,7 +80,8 @@ class TyreAtSlip(NamedTuple):
         if friction >= elastic * (g_0 + g_1 * upper):
             return None
         # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
-        theta = upper * (1.0 - math.sqrt(max(0.0, 1.0 - friction / (elastic * g_0))))
+        left = 1.0 - friction / (elastic * g_0)
+        theta = upper * (1.0 - math.sqrt(left)) if left > 0.0 else upper
         lower = 0.0
         for _ in range(NEWTON_STEPS):
             base, share = g_0 + g_1 * theta, theta * (1.0 - kappa * theta)
@@ -93,7 +94,7 @@ class TyreAtSlip(NamedTuple):
             proposal = theta - excess / slope
             if not lower <= proposal <= upper:
                 proposal = 0.5 * (lower + upper)
-            if abs(proposal - theta) < LEAST_STEP:
+            if -LEAST_STEP < proposal - theta < LEAST_STEP:
                 return proposal
             theta = proposal
         return theta
@@ -101,9 +102,17 @@ class TyreAtSlip(NamedTuple):
 
 def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> TyreAtSlip:
     """The tyre at this unsigned slip [-], vertical load F_z [N] and longitudinal stiffness C_x [N]."""
-    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
+    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
     kappa = 0.25 / elastic if elastic > 0.0 else math.inf
-    return TyreAtSlip(elastic, 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip), kappa)
+    g_0, g_1 = 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip)
+    return _new(TyreAtSlip, (elastic, g_0, g_1, kappa))
+
+
+def elastic_friction(slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+    """Used friction at L = 1, the most at this slip that theta can be read from [-]."""
+    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
+    g_0, g_1 = 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip)
+    return elastic * (g_0 + 2.0 * g_1 * elastic)
 
 
 def used_friction(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
@@ -169,13 +178,17 @@ def theta_from_friction(
     return tyre_at_slip(slip, load_n, longitudinal_stiffness_n).theta(friction)
 
 
-def onset_slip(theta: float, load_n: float, longitudinal_stiffness_n: float, sensitivity: float) -> float:
-    """Slip at which d mu / d theta reaches a sensitivity: from here on the tyre shows theta.
+def onset_elastic(theta: float, sensitivity: float) -> float:
+    """X / F_z at which d mu / d theta reaches a sensitivity: from here on the tyre shows theta [-].
 
     G's dependence on theta (0.75 theta lambda, about 1 %) is left out, and G is taken at small slip, 1.27.
     """
-    elastic = theta / (2.0 * (1.0 - sensitivity / 1.27))
-    ratio = elastic * load_n / longitudinal_stiffness_n
+    return theta / (2.0 * (1.0 - sensitivity / 1.27))
+
+
+def onset_slip(theta: float, load_n: float, longitudinal_stiffness_n: float, sensitivity: float) -> float:
+    """Slip at which d mu / d theta reaches a sensitivity, see `onset_elastic` [-]."""
+    ratio = onset_elastic(theta, sensitivity) * load_n / longitudinal_stiffness_n
     return ratio / (1.0 + ratio)
 
 
@@ -187,7 +200,9 @@ def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> f
     quarter = theta * load_n / (4.0 * longitudinal_stiffness_n)
     square, linear = 1.15 - 0.75 * theta, 1.63 - 0.75 * theta
     lower, upper = 1e-6, GREATEST_PEAK_SLIP
-    slip = min(0.5, math.sqrt(1.27 * quarter / linear))
+    slip = math.sqrt(1.27 * quarter / linear)
+    if slip > 0.5:
+        slip = 0.5
     for _ in range(NEWTON_STEPS):
         # lambda^2 times the slope of (1 - quarter (1 - lambda) / lambda) G(lambda)
         g = (square * slip - linear) * slip + 1.27
@@ -206,7 +221,7 @@ def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> f
         proposal = slip - value / value_by_slip if value_by_slip != 0.0 else upper
         if not lower < proposal < upper:
             proposal = 0.5 * (lower + upper)
-        if abs(proposal - slip) < LEAST_SLIP_STEP:
+        if -LEAST_SLIP_STEP < proposal - slip < LEAST_SLIP_STEP:
             return proposal
         slip = proposal
     return slip
@@ -223,4 +238,6 @@ def peak_friction(theta: float, load_n: float, longitudinal_stiffness_n: float) 
     if theta <= 0.0:
         return 0.0
     slip = peak_slip(theta, load_n, longitudinal_stiffness_n)
-    return used_friction(theta, slip, load_n, longitudinal_stiffness_n)
+    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
+    base = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * (1.0 - slip) * theta
+    return (elastic if theta >= 2.0 * elastic else theta * (1.0 - 0.25 / elastic * theta)) * base

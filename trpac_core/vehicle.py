@@ -39,6 +39,6 @@ class Vehicle:
 
     def wheel_load(self, front: bool, longitudinal_acceleration_m_s2: float = 0.0) -> float:
         """Vertical load of one wheel under quasi-static longitudinal load transfer. [N]."""
-        lever_m = self.cog_to_rear_axle_m if front else self.cog_to_front_axle_m
+        lever_m = self.cog_to_rear_axle_m if front else self.wheelbase_m - self.cog_to_rear_axle_m
         transfer = longitudinal_acceleration_m_s2 * self.cog_height_m * (-1.0 if front else 1.0)
         return self.mass_kg * (GRAVITY_M_S2 * lever_m + transfer) / (2.0 * self.wheelbase_m)
