@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from fmu_unit import DRIVING, STEP_S, Unit
+from road_picture import road_picture
 
 from trpac_core.estimator import EstimatorConfig, RoadClass
 from trpac_core.estimator import TrpacEstimator as Estimator
@@ -39,11 +40,8 @@ WARNING, ERROR = 1, 3
 @pytest.fixture
 def picture(tmp_path: Path) -> Path:
     """A grey road below a bright sky, of the default camera's size."""
-    image = np.full((1200, 1920, 3), 190, np.uint8)
-    noise = np.random.default_rng(1).integers(80, 130, (700, 1920, 1), dtype=np.uint8)
-    image[500:] = noise
     path = tmp_path / "frame.png"
-    cv2.imwrite(str(path), image)
+    cv2.imwrite(str(path), road_picture(1920, 1200))
     return path
 
 

@@ -156,6 +156,7 @@ DERIVED = {
     "vision.track_m",
     "vision.wheelbase_m",
     "vision.side",
+    "vision.groups_looked_at",
     "preview.behind_m",
 }
 """Settings that follow from others."""

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 import pytest
 from fmu_unit import DRIVING, Unit
+from road_picture import road_picture
 
 from trpac_core.vision.images import decode_image
 
@@ -31,11 +32,8 @@ DRIVING_4W = {"vehicle_speed": DRIVING["vehicle_speed"]} | {
 
 
 def scene(seed: int = 1, grey: bool = False) -> np.ndarray:
-    """A noisy road below a bright sky, half the default camera's size, 8-bit BGR."""
-    rng = np.random.default_rng(seed)
-    image = np.full((600, 960, 3), 190, np.uint8)
-    image[250:] = rng.integers(60 + 20 * seed, 130, (350, 960, 1 if grey else 3), dtype=np.uint8)
-    return image
+    """A road below a bright sky, half the default camera's size, 8-bit BGR."""
+    return road_picture(960, 600, seed=seed, colour=not grey)
 
 
 def encoded(suffix: str, image: np.ndarray) -> bytes:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import atexit
 import math
+import shutil
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
+from fmu_src.contents import CONTENTS_FILE, Contents, sha256_of
 from fmu_src.guarded_slave import GuardedSlave
 from fmu_src.units import MODELS, ROOT
 
@@ -120,14 +125,34 @@ CASES = {
 
 
 def write_pictures(folder: Path) -> tuple[Path, Path]:
-    """Two pictures of a road below a bright sky, of the default camera's shape."""
+    """Two pictures of a road below a bright sky, of the default camera's shape: fine grain and coarse, as of snow."""
     paths = folder / "first.png", folder / "second.png"
     for seed, path in enumerate(paths):
         image = np.full((600, 960, 3), 190, np.uint8)
-        noise = np.random.default_rng(seed).integers(60, 140 + 60 * seed, (350, 960, 1), dtype=np.uint8)
-        image[250:] = noise
+        grain = np.random.default_rng(seed).normal(0.0, 1.0, (350, 960))
+        coarse = cv2.GaussianBlur(grain, (0, 0), 0.8 + 5.2 * seed)
+        image[250:] = np.clip(105.0 + 8.0 * coarse / coarse.std(), 0, 255)[..., None]
         cv2.imwrite(str(path), image)
     return paths
+
+
+@cache
+def _networks() -> Path:
+    """A folder like a built unit's resources: the networks, and the record of their hashes."""
+    from fmu_src.camera_slave import CLASSIFIER_FILE, SEGMENTER_FILE
+
+    unpacked = Path(tempfile.mkdtemp(prefix="trpac-direct-"))
+    atexit.register(shutil.rmtree, unpacked, ignore_errors=True)
+    resources = unpacked / "resources"
+    resources.mkdir()
+    files = {}
+    for name in (SEGMENTER_FILE, CLASSIFIER_FILE):
+        data = (MODELS / name).read_bytes()
+        (resources / name).write_bytes(data)
+        files[f"resources/{name}"] = sha256_of(data)
+    record = Contents(unit="direct", version="", build="", packages={}, files=files)
+    (resources / CONTENTS_FILE).write_bytes(record.to_bytes())
+    return resources
 
 
 def _slave(case: Case) -> GuardedSlave:
@@ -136,7 +161,7 @@ def _slave(case: Case) -> GuardedSlave:
     from fmu_src.trpac_estimator_4w import TrpacEstimator4W
 
     classes = {c.__name__: c for c in (TrpacEstimator, TrpacEstimator4W, ReferencePlant)}
-    resources = MODELS if case.takes_pictures else ROOT / "scenarios" / "roads"
+    resources = _networks() if case.takes_pictures else ROOT / "scenarios" / "roads"
     return classes[case.unit](instance_name="direct", resources=str(resources), visible=False)
 
 

@@ -187,7 +187,7 @@ def _segment(path: Path) -> Any:
 def _classify(path: Path) -> Any:
     from trpac_core.vision.networks import SurfaceClassifier
 
-    return SurfaceClassifier(path, 1).logits(np.full((1, 64, 96, 3), 90, np.uint8))
+    return SurfaceClassifier(path, 1).verdicts(np.full((1, 64, 96, 3), 90, np.uint8)).logits
 
 
 def _network_errors() -> tuple[type[Exception], ...]:

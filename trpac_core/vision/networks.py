@@ -17,6 +17,8 @@ from .regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
 
 MASK_WIDTH_PX = 256
 MASK_HEIGHT_PX = 160
+_ROUNDING = 1e-5
+"""By how much the runtime's sigmoid may leave [0, 1]."""
 
 _LOAD_ERRORS = (
     ort_errors.Fail,
@@ -128,12 +130,12 @@ class SurfaceClassifier:
                 f"{self._path}: expected finite logits of shape {(len(patches), len(Surface))}, got shape "
                 f"{logits.shape}. Export or train the network again."
             )
-        if readable.shape != (len(patches),) or not ((readable >= 0.0) & (readable <= 1.0)).all():
+        if readable.shape != (len(patches),) or not (np.abs(readable - 0.5) <= 0.5 + _ROUNDING).all():
             raise ModelError(
                 f"{self._path}: expected 'readable' of shape {(len(patches),)} within [0, 1], got shape "
                 f"{readable.shape}. Export or train the network again."
             )
-        return PatchVerdicts(logits.astype(np.float64), readable.astype(np.float64))
+        return PatchVerdicts(logits.astype(np.float64), readable.astype(np.float64).clip(0.0, 1.0))
 
 
 def _load(path: str | Path, threads: int) -> ort.InferenceSession:
