@@ -254,8 +254,11 @@ def test_compiled_code_is_kept_beside_a_copy_that_outlives_the_unpacked_unit(
 
 
 @pytest.mark.e2e
-@pytest.mark.parametrize("mass_kg", [1e308, 1e307])
-def test_a_car_whose_numbers_are_no_numbers_is_refused(open_plant: Open, mass_kg: float) -> None:
+@pytest.mark.parametrize(("mass_kg", "told"), [(1e308, [ERROR]), (1e307, [])])
+def test_a_car_whose_numbers_are_no_numbers_is_refused(
+    open_plant: Open, mass_kg: float, told: list[int]
+) -> None:
+    """Loads of the one overflow, those of the other just do not."""
     unit = open_plant(vehicle__mass=mass_kg)
-    assert [line.status for line in unit.log] == [ERROR]
+    assert [line.status for line in unit.log] == told
     assert all(math.isfinite(value) for value in unit.outputs().values())
