@@ -38,6 +38,12 @@ settings.register_profile("project", deadline=None)  # a busy machine is no faul
 settings.load_profile("project")
 
 
+@pytest.fixture(autouse=True)
+def same_folder(request: pytest.FixtureRequest) -> None:
+    """Each test begins where pytest was called: libraries of co-simulation clients change the process's folder."""
+    os.chdir(request.config.invocation_params.dir)
+
+
 @pytest.fixture(scope="session")
 def trpac_data() -> Path:
     """Folder of real pictures and logs."""

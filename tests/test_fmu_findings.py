@@ -268,6 +268,7 @@ def test_ctrl_c_within_a_step_reaches_the_host_and_the_unit_survives(unit_folder
         import signal, threading, time
         from pathlib import Path
         from fmu_unit import DRIVING, Unit
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs begin with it ignored
         unit = Unit(Path(sys.argv[1])); unit.initialise()
         module = sys.modules[f"fmu_src_{unit.description.guid}.trpac_estimator"]
         def interrupted(self, step_s):

@@ -87,7 +87,8 @@ def wandered(model: ConfidenceModel, variance: float, theta_hat: float, way_m: f
 
 def theta_at(fraction: float, elastic: float) -> float:
     """Theta from the force as a fraction of the elastic one, below 1; 2 X / F_z is the road that just slides."""
-    return 2.0 * elastic * (1.0 - math.sqrt(1.0 - fraction)) if fraction < 1.0 else 2.0 * elastic
+    # 1 - sqrt(1 - f) in the form that keeps its digits where hardly any force is used.
+    return 2.0 * elastic * (fraction / (1.0 + math.sqrt(1.0 - fraction)) if fraction < 1.0 else 1.0)
 
 
 def bounded_variance(theta_hat: float, least: float) -> float:

@@ -41,6 +41,8 @@ __all__ = [
 
 LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
+_LEAST_FRICTION = 1e-6
+"""Used friction below which a reading says nothing of the tyre's curve, whatever the noise is said to be [-]."""
 
 
 class TrpacEstimator:
@@ -279,7 +281,7 @@ class TrpacEstimator:
         noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
         torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
         torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0
-        if theta_tyre is not None and friction > 0.0:
+        if theta_tyre is not None and friction > max(torque_friction, _LEAST_FRICTION):
             noise = reading_noise(friction, look.tyre, noise_share, torque_friction)
             state.following = followed(state.following, look.tyre.elastic, theta_tyre, noise)
             following = state.following.share()
