@@ -15,6 +15,7 @@ from fmpy import read_model_description
 from .capture import said_by_libraries
 from .cases import STEP_S, STEPS, Case, Direct, Values, differences, not_finite
 from .outcome import NotOfferedError, expect
+from .typed import TypedValues
 
 TYPES = {"Real": "real", "Integer": "integer", "Boolean": "boolean", "String": "string"}
 TIMES = 1e-12
@@ -80,7 +81,7 @@ class Execution:
         expect(self.execution.step(count), "the step failed")
 
 
-class Cosim:
+class Cosim(TypedValues):
     """Runs the operations of libcosimpy on one unit."""
 
     def __init__(self, case: Case, archive: Path, pictures: tuple[Path, Path]) -> None:
@@ -98,9 +99,7 @@ class Cosim:
     def _load(self) -> None:
         Execution(self._archive)
 
-    def _set_and_get(self, values: Values, kind: str) -> None:
-        if not values:
-            raise NotOfferedError(f"the unit has no {kind} that can be set")
+    def _set_and_get(self, values: Values) -> None:
         execution = Execution(self._archive)
         # Parameters can be set until the initialisation, inputs at any time; both are read after a step.
         inputs = {n: v for n, v in values.items() if execution.variables[n].causality == "input"}
@@ -110,18 +109,6 @@ class Cosim:
         expect(
             [f"{n} reads {execution.get(n)!r}" for n, value in values.items() if execution.get(n) != value]
         )
-
-    def _real(self) -> None:
-        self._set_and_get(self._case.drive, "Real")
-
-    def _integer(self) -> None:
-        self._set_and_get(self._case.integers, "Integer")
-
-    def _boolean(self) -> None:
-        self._set_and_get(self._case.booleans, "Boolean")
-
-    def _text(self) -> None:
-        self._set_and_get(self._case.texts, "String")
 
     def _initialise(self) -> None:
         name, value = self._case.parameter

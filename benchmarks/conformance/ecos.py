@@ -19,6 +19,7 @@ from fmpy import read_model_description
 from .cases import STEP_S, STEPS, Case, Direct, Values, differences, not_finite
 from .outcome import NotOfferedError, expect
 from .transports import with_python
+from .typed import TypedValues
 
 TYPES = {"Real": "real", "Integer": "integer", "Boolean": "bool", "String": "string"}
 NO_LOG = "instantiates with logging off"
@@ -101,7 +102,7 @@ class Simulation:
         self.simulation.free()
 
 
-class Ecos:
+class Ecos(TypedValues):
     """Runs the operations of ecospy on one unit, in this process or behind proxyfmu."""
 
     def __init__(self, case: Case, archive: Path, pictures: tuple[Path, Path], apart: bool = False) -> None:
@@ -127,9 +128,7 @@ class Ecos:
     def _load(self) -> None:
         Simulation(self._archive, 1, self._apart).simulation.free()
 
-    def _set_and_get(self, values: Values, kind: str) -> None:
-        if not values:
-            raise NotOfferedError(f"the unit has no {kind} that can be set")
+    def _set_and_get(self, values: Values) -> None:
         causality = {v.name: v.causality for v in read_model_description(str(self._archive)).modelVariables}
         inputs = {n: v for n, v in values.items() if causality[n] == "input"}
         simulation = self._open(start={n: v for n, v in values.items() if n not in inputs})
@@ -137,18 +136,6 @@ class Ecos:
         simulation.simulation.step(1)
         expect([f"{n} reads {simulation.get(n)!r}" for n, v in values.items() if simulation.get(n) != v])
         simulation.end()
-
-    def _real(self) -> None:
-        self._set_and_get(self._case.drive, "Real")
-
-    def _integer(self) -> None:
-        self._set_and_get(self._case.integers, "Integer")
-
-    def _boolean(self) -> None:
-        self._set_and_get(self._case.booleans, "Boolean")
-
-    def _text(self) -> None:
-        self._set_and_get(self._case.texts, "String")
 
     def _initialise(self) -> None:
         name, value = self._case.parameter

@@ -10,8 +10,9 @@ from typing import Any
 from fmpy import read_model_description
 
 from .cases import STEP_S, STEPS, Case, Direct, Values, differences, not_finite
-from .outcome import NotOfferedError, expect
+from .outcome import expect
 from .transports import Answer, Transport
+from .typed import TypedValues
 
 OK, WARNING, DISCARD = 0, 1, 2
 FEW = 20
@@ -97,7 +98,7 @@ class Unit:
         return [name for name in names if self.get(name)]
 
 
-class Host:
+class Host(TypedValues):
     """Runs the operations of one client on one unit."""
 
     def __init__(
@@ -136,24 +137,10 @@ class Host:
         with self._unit(initialise=False):
             pass
 
-    def _set_and_get(self, values: Mapping[str, Any], kind: str) -> None:
-        if not values:
-            raise NotOfferedError(f"the unit has no {kind} that can be set")
+    def _set_and_get(self, values: Mapping[str, Any]) -> None:
         with self._unit(initialise=False) as unit:
             unit.set(values)
             expect([f"{n} reads {unit.get(n)!r}" for n, value in values.items() if unit.get(n) != value])
-
-    def _real(self) -> None:
-        self._set_and_get(self._case.drive, "Real")
-
-    def _integer(self) -> None:
-        self._set_and_get(self._case.integers, "Integer")
-
-    def _boolean(self) -> None:
-        self._set_and_get(self._case.booleans, "Boolean")
-
-    def _text(self) -> None:
-        self._set_and_get(self._case.texts, "String")
 
     def _initialise(self) -> None:
         name, value = self._case.parameter

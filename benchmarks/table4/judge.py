@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -147,19 +147,3 @@ def within(masks: RoadMasks, sequence: Sequence) -> RoadMasks:
             True
         )
     return RoadMasks(np.where(allowed, masks.drivable, np.float32(0.0)), masks.shadow)
-
-
-def judge_all(
-    sequences: Iterable[Sequence],
-    networks: Callable[[Sequence], Networks | None],
-    scenarios: Iterable[str],
-    told: Callable[[str], None],
-) -> pd.DataFrame:
-    """Tables of all sequences for which there are networks, in one."""
-    tables = []
-    for sequence in sequences:
-        found = networks(sequence)
-        if found is not None and sequence.frames:
-            tables += [judged(sequence, found, scenario) for scenario in scenarios]
-            told(sequence.name)
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(COLUMNS))
