@@ -15,13 +15,13 @@ from sim2real.replay.inputs import ANY_ROAD, Inputs
 from trpac_core.estimator import EstimatorConfig, RoadClass
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import IfeConfig
 from trpac_core.vision.images import ImageError, decode_image
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.preview import PreviewConfig
+from trpac_core.vision.sides import SidesIfe, SidesState
 from trpac_core.vision.trajectory import Motion
 
-SIDES = ("left", "right")
 MOST_TOLD = 3
 """Unreadable pictures that a warning names; the rest are counted."""
 
@@ -121,31 +121,21 @@ def _from_columns(log: Log, inputs: Inputs, vehicle: VehicleFile) -> CameraSide:
 
 
 def _from_pictures(log: Log, inputs: Inputs, camera: Camera, models: Path, told: Told) -> CameraSide:
-    """The pictures, each classified along the left and the right wheels' track with one segmentation."""
+    """The pictures, each classified along the left and the right wheels' track."""
     segmenter = Segmenter(models / "segmenter.onnx")
     classifier = SurfaceClassifier(models / "surface.onnx")
     preview = PreviewConfig()
-    estimators = [
-        Ife(
-            EstimatorConfig(
-                inputs.vehicle, left_side=side == "left", vision=IfeConfig(camera=camera)
-            ).image_settings,
-            segmenter,
-            classifier,
-        )
-        for side in SIDES
-    ]
-    states = [IfeState(), IfeState()]
+    settings = EstimatorConfig(inputs.vehicle, vision=IfeConfig(camera=camera)).image_settings
+    eyes, state = SidesIfe(settings, segmenter, classifier), SidesState()
     frames: tuple[Frames, Frames] = ({}, {})
     unreadable: list[str] = []
     rows, names = _new_pictures(log, inputs)
     for done, (row, name) in enumerate(zip(rows, names, strict=True)):
         try:
             image = decode_image(log.image_folder / name)
-            masks = segmenter.segment(image)
-            for i, ife in enumerate(estimators):
-                states[i], seen = ife.process(states[i], image, _motion(inputs, row), masks=masks)
-                frames[i][row] = RoadClass(seen.surface, seen.told_by_bus(ife.config.flag_threshold))
+            state, *verdicts = eyes.process(state, image, _motion(inputs, row))
+            for side, seen in zip(frames, verdicts, strict=True):
+                side[row] = RoadClass(seen.surface, seen.told_by_bus(settings.flag_threshold))
         except ImageError as error:
             unreadable.append(str(error))
             frames[0][row] = frames[1][row] = None
