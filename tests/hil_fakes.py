@@ -19,6 +19,7 @@ class FakeClock:
         self.time_ns = 1_000 * MS
         self.wall_offset_ns = 5_000_000 * MS
         self.overshoot_ns: dict[int, int] = {}
+        self.worked_ns = 0
         self.sleeps = 0
 
     def now_ns(self) -> int:
@@ -26,6 +27,9 @@ class FakeClock:
 
     def wall_ns(self) -> int:
         return self.time_ns + self.wall_offset_ns
+
+    def cpu_ns(self) -> int:
+        return self.worked_ns
 
     def sleep_ns(self, duration_ns: int) -> None:
         self.sleeps += 1

@@ -123,6 +123,20 @@ def test_a_cycle_that_takes_too_long_is_counted_and_the_slots_that_passed_are_le
     assert bench.table["lateness_us"][11] == pytest.approx(500.0)
 
 
+def test_of_cycles_that_take_too_long_those_count_as_overworked_whose_thread_worked_all_the_time() -> None:
+    bench = Bench()
+
+    def slow(number: int) -> None:
+        if number in (10, 30):
+            bench.clock.time_ns += 3 * MS
+            bench.clock.worked_ns += 2 * MS if number == 30 else 0
+
+    bench.unit.during_step = slow
+    counts = bench.run(60)
+    assert (counts.late_ends, counts.overworked) == (2, 1)
+    assert bench.table["cpu_us"].max() == pytest.approx(2000.0)
+
+
 def test_a_sleep_that_overshoots_is_an_overrun_of_the_slots_that_it_slept_through() -> None:
     bench = Bench()
     bench.clock.overshoot_ns = {6: int(3.2 * MS)}

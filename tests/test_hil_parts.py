@@ -21,9 +21,11 @@ from trpac_hil.dbc_table import TARGET, document
 from trpac_hil.deadlines import Deadlines, WallWatch, wait_until
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
+from trpac_hil.ferry import Ferry, Wire, ferry_ring
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
 from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
+from trpac_hil.realtime import loop_core
 from trpac_hil.records import columns
 from trpac_hil.shared import Ring
 from trpac_hil.spread import Spread
@@ -342,6 +344,48 @@ def test_a_bus_that_is_not_there_at_the_start_is_one_sentence() -> None:
     }
     with pytest.raises(HilError, match="expected NAME=VALUE"):
         bus_options(["bitrate"])
+
+
+# A process beside the loop, and what the system grants
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 2**29 - 1), st.booleans(), st.binary(max_size=8)),
+        max_size=30,
+        unique_by=lambda m: m[0],
+    )
+)
+def test_what_goes_into_the_wire_comes_out_of_the_bus_in_order(
+    messages: list[tuple[int, bool, bytes]],
+) -> None:
+    sent = [
+        (frame_id if extended else frame_id % 2**11, extended, data) for frame_id, extended, data in messages
+    ]
+    settings, ring = BusSettings("virtual", "test-ferry"), ferry_ring()
+    wire, link, listener = Wire(ring), Link(settings.open, unsaid), settings.open()
+    for message in sent:
+        assert wire.send(*message)
+    assert wire.receive() == []
+    Ferry(ring, link, FakeClock()).take_over()
+    heard = []
+    while (message := listener.recv(0.0)) is not None:
+        heard.append((message.arbitration_id, message.is_extended_id, bytes(message.data)))
+    listener.shutdown()
+    link.close()
+    assert heard == sent
+
+
+def test_with_real_time_priority_the_loop_has_the_last_core_where_the_rest_has_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cores = {0, 2, 3}
+    monkeypatch.setattr("os.sched_getaffinity", lambda process: cores, raising=False)
+    assert loop_core(None, realtime=True) == 3
+    assert loop_core(0, realtime=True) == 0
+    assert loop_core(None, realtime=False) is None
+    cores = {1}
+    assert loop_core(None, realtime=True) is None
 
 
 # Figures and files

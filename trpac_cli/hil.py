@@ -79,7 +79,8 @@ def hil(
     ] = False,
     realtime: Annotated[bool, typer.Option("--realtime", help="Ask for real-time priority.")] = False,
     core: Annotated[
-        int | None, typer.Option(min=0, help="Core for the loop; the helpers keep off it.")
+        int | None,
+        typer.Option(min=0, help="Core for the loop alone; with --realtime the last one by default."),
     ] = None,
     camera_threads: Annotated[int, typer.Option(min=1, max=16, help="Threads of each network.")] = 1,
     quiet: Annotated[bool, typer.Option("--quiet", help="No table while it runs, events only.")] = False,
@@ -121,7 +122,7 @@ def hil(
             frames=frames,
             fps=fps,
             parameters=_parameters(parameter),
-            plant=_plant_job(bus, dbc, scenario, rate_hz, core, frames is None) if with_plant else None,
+            plant=_plant_job(bus, dbc, scenario, rate_hz, frames is None) if with_plant else None,
             log=not no_log,
             counters=not no_counters,
             live=sys.stderr.isatty() and not quiet,
@@ -171,7 +172,7 @@ def hil_plant(
     from trpac_hil.rig import RUN_UP_NS, Stopper
 
     try:
-        job = _plant_job(_bus(interface, channel, bus_option), dbc, scenario, rate_hz, None, True)
+        job = _plant_job(_bus(interface, channel, bus_option), dbc, scenario, rate_hz, True)
         job = replace(job, camera_fps=camera_fps, camera_delay_s=camera_delay_s)
         partner = open_partner(job, lambda kind, text: print(f"{PLANT_COMMAND}: {text}", file=sys.stderr))
     except (ScenarioError, OSError) as error:
@@ -221,13 +222,13 @@ def _parameters(pairs: list[str] | None) -> dict[str, float]:
 
 
 def _plant_job(
-    bus: BusSettings, dbc: Path | None, scenario: Path | None, rate_hz: float, core: int | None, sees: bool
+    bus: BusSettings, dbc: Path | None, scenario: Path | None, rate_hz: float, sees: bool
 ) -> PartnerJob:
     from trpac_hil.codec import DBC_FILE
     from trpac_hil.partner import PLAIN_SCENARIO, PartnerJob
 
     return PartnerJob(
-        scenario or PLAIN_SCENARIO, bus, dbc or DBC_FILE, rate_hz, camera_fps=20.0 if sees else 0.0, core=core
+        scenario or PLAIN_SCENARIO, bus, dbc or DBC_FILE, rate_hz, camera_fps=20.0 if sees else 0.0
     )
 
 

@@ -21,6 +21,10 @@ class Clock(Protocol):
         """The clock on the wall, which somebody may set [ns]."""
         ...
 
+    def cpu_ns(self) -> int:
+        """Processor time that the calling thread has had [ns]."""
+        ...
+
     def sleep_ns(self, duration_ns: int) -> None:
         """Give the processor away for about this time [ns]."""
         ...
@@ -36,6 +40,10 @@ class SystemClock:
     def wall_ns(self) -> int:
         """The system's time of day [ns]."""
         return time.time_ns()
+
+    def cpu_ns(self) -> int:
+        """Of this thread alone; on Windows in steps of 16 ms [ns]."""
+        return time.thread_time_ns()
 
     def sleep_ns(self, duration_ns: int) -> None:
         """Sleep; on Linux until an absolute time (clock_nanosleep)."""

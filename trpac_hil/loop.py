@@ -67,7 +67,8 @@ class Counts:
     """What the loop counts itself.
 
     `overruns` are cycles that ended after their deadline and cycles left out; `long_overruns` those of them by more
-    than 5 ms; `worst_ns` is the greatest time by which a deadline was missed.
+    than 5 ms; `worst_ns` is the greatest time by which a deadline was missed. `overworked` are cycles whose own
+    processor time was longer than a period: all other overruns are time that the loop spent waiting for the processor.
     """
 
     cycles: int = 0
@@ -75,6 +76,7 @@ class Counts:
     left_out: int = 0
     long_overruns: int = 0
     worst_ns: int = 0
+    overworked: int = 0
     discarded: int = 0
     held: int = 0
     clock_jumps: int = 0
@@ -163,6 +165,7 @@ class Loop:
 
     def _cycle(self, slot: int, left_out: int, began_ns: int) -> None:
         passed_s = (left_out + 1) * self._deadlines.period_ns * 1e-9
+        cpu_began_ns = self._clock.cpu_ns()
         fresh = self._receive(began_ns)
         values = self._snapshot(began_ns)
         self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
@@ -185,12 +188,13 @@ class Loop:
             estimates = estimates.held()
         self._send_estimate(estimates, status)
         self._look_after(began_ns)
-        ended_ns = self._clock.now_ns()
+        ended_ns, cpu_ns = self._clock.now_ns(), self._clock.cpu_ns() - cpu_began_ns
         missed_ns = max(0, self._deadlines.missed_by_ns(slot, ended_ns))
-        self._count(missed_ns, status)
+        self._count(missed_ns, cpu_ns, status)
         timing = (
             began_ns - self._deadlines.due_ns(slot),
             ended_ns - began_ns,
+            cpu_ns,
             unit_ended_ns - unit_began_ns,
             missed_ns,
         )
@@ -311,8 +315,9 @@ class Loop:
                 },
             )
 
-    def _count(self, missed_ns: int, status: int) -> None:
+    def _count(self, missed_ns: int, cpu_ns: int, status: int) -> None:
         counts = self.counts
+        counts.overworked += cpu_ns > self._deadlines.period_ns
         counts.cycles += 1
         counts.held += status in (HELD_INPUT, HELD_BUS, HELD_UNIT)
         if missed_ns:
@@ -327,7 +332,7 @@ class Loop:
         values: dict[str, float],
         estimates: Estimates,
         status: int,
-        timing_ns: tuple[int, int, int, int],
+        timing_ns: tuple[int, int, int, int, int],
         left_out: int,
         now_ns: int,
     ) -> None:

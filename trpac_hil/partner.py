@@ -16,7 +16,10 @@ from trpac_hil.bus import BUS_ERRORS, BusSettings, Link
 from trpac_hil.codec import DBC_FILE, Codec, load_codec
 from trpac_hil.deadlines import Clock, Deadlines, SystemClock, wait_until
 from trpac_hil.driver import EndlessDrive
+from trpac_hil.ferry import Wire
 from trpac_hil.helper import Control, helper
+from trpac_hil.realtime import raise_priority
+from trpac_hil.shared import Ring
 from trpac_hil.unit import WHEELS
 
 PLAIN_SCENARIO = Path(__file__).parent.parent / "scenarios" / "paper_simulation.yaml"
@@ -45,6 +48,8 @@ class PartnerJob:
         Results per second of a camera on the bus, 0 for none, and how late they are sent [1/s], [s].
     core : int or None
         The loop's core, to keep off.
+    realtime : bool
+        Whether to ask for real-time priority, as a car on another machine would not give way to the camera either.
     """
 
     scenario: Path = PLAIN_SCENARIO
@@ -54,6 +59,7 @@ class PartnerJob:
     camera_fps: float = 20.0
     camera_delay_s: float = 0.06
     core: int | None = None
+    realtime: bool = False
 
 
 @dataclass(frozen=True)
@@ -158,19 +164,21 @@ class Partner:
         self._link.send(message.frame_id, message.is_extended_frame, coded.encode(values, count))
 
 
-def open_partner(job: PartnerJob, say: Callable[[str, str], None], clock: Clock | None = None) -> Partner:
-    """The plant with its end of the bus; raises ScenarioError and HilError."""
-    return Partner(job, Link(job.bus.open, say), clock or SystemClock())
+def open_partner(job: PartnerJob, say: Callable[[str, str], None], wire: Ring | None = None) -> Partner:
+    """The plant with its end of the bus, or of a wire to it; raises ScenarioError and HilError."""
+    return Partner(job, Link(job.bus.open, say) if wire is None else Wire(wire), SystemClock())
 
 
-def play(job: PartnerJob, control: Control) -> None:
-    """Body of a process that drives beside the loop, and ends with it."""
+def play(job: PartnerJob, wire: Ring | None, control: Control) -> None:
+    """Body of a process that drives beside the loop, and ends with it; without a wire it opens the bus itself."""
     with helper(job.core):
         try:
-            partner = open_partner(job, control.tell)
+            partner = open_partner(job, control.tell, wire)
         except (ScenarioError, *BUS_ERRORS) as error:
             control.refuse(str(error))
             return
+        if job.realtime:
+            raise_priority()
         control.ready()
         if control.wait_for_start():
             partner.run(control.start_ns, lambda: control.stopped)

@@ -75,6 +75,18 @@ def lower_priority() -> None:
         os.nice(HELPER_NICENESS)
 
 
+def loop_core(told: int | None, realtime: bool) -> int | None:
+    """The loop's core: as told; with real-time priority else the last one, where the rest has another.
+
+    Linux takes the processor from real-time threads for up to 50 ms in a second where ordinary work waits on their core
+    (sched_rt_runtime_us, since 6.12 the fair server), so the loop must not share its core with any.
+    """
+    if told is not None or not realtime or not hasattr(os, "sched_getaffinity"):
+        return told
+    cores = os.sched_getaffinity(0)
+    return max(cores) if len(cores) > 1 else None
+
+
 def pin(core: int) -> str:
     """Run this process on one core alone; returns what came of it."""
     if not hasattr(os, "sched_setaffinity"):

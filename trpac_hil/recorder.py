@@ -25,6 +25,7 @@ ROWS_KEPT = 30_000
 SPREADS = {
     "jitter_us": "lateness_us",
     "cycle_us": "work_us",
+    "cycle_cpu_us": "cpu_us",
     "unit_step_us": "unit_us",
     **{f"age_{m}_ms": f"age_{m}_ms" for m in AGED},
     "age_picture_ms": "age_picture_ms",

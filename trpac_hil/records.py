@@ -65,6 +65,7 @@ def columns(wiring: Wiring) -> tuple[Column, ...]:
         Column("status", "", "0 starting, 1 running, 2 held: input, 3 held: bus, 4 held: unit", "u1"),
         Column("lateness_us", "us", "begin of the cycle after its due time", "f4"),
         Column("work_us", "us", "from the cycle's begin until all is sent", "f4"),
+        Column("cpu_us", "us", "processor time of the loop's thread in that", "f4"),
         Column("unit_us", "us", "setting, stepping and reading the unit", "f4"),
         Column("missed_us", "us", "end of the cycle after its deadline; 0 where kept", "f4"),
         Column("left_out", "", "cycles left out before this one", "u4"),

@@ -10,7 +10,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +28,14 @@ from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, load_codec
 from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
+from trpac_hil.ferry import Ferry, ferry_ring
 from trpac_hil.helper import CONTEXT, Control
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Loop
 from trpac_hil.mdf import SCRATCH_PREFIX
-from trpac_hil.partner import PartnerJob, open_partner, play
+from trpac_hil.partner import PartnerJob, play
 from trpac_hil.placing import UNIT_PREVIEW, Placing
-from trpac_hil.realtime import memory_mb, pin, raise_priority, undisturbed
+from trpac_hil.realtime import loop_core, memory_mb, pin, raise_priority, undisturbed
 from trpac_hil.recorder import LOG_FAILED, ROWS_KEPT, RecorderJob, record
 from trpac_hil.records import columns
 from trpac_hil.shared import Numbers, Ring
@@ -82,7 +83,7 @@ class HilSettings:
     log, counters, live, realtime : bool
         Whether to log; to hold messages to their counters; to draw on the terminal; to ask for real-time priority.
     core : int or None
-        Core of the loop.
+        Core of the loop; with real-time priority the last one by default.
     camera_threads : int
         Threads of each network.
     spin_ns : int
@@ -209,6 +210,7 @@ def run_hil(settings: HilSettings, stopper: Stopper | None = None) -> dict[str, 
 
 
 def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str, Any]:
+    settings = replace(settings, core=loop_core(settings.core, settings.realtime))
     codec = load_codec(settings.dbc)
     preview = _preview(settings)
     unit = stack.enter_context(Unit(_archive(settings, stack), _parameters(settings), settings.wheel))
@@ -336,25 +338,29 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
 def _plant(
     settings: HilSettings, rig: Rig, events: Events, over: threading.Event, stack: ExitStack
 ) -> Callable[[int], None] | None:
-    """The plant: a thread where the bus is within this process, else a process of its own."""
+    """The plant, in a process of its own; to a bus within this process a thread here hands on what it sends."""
     job = settings.plant
     if job is None:
         return None
+    job = replace(job, core=settings.core, realtime=settings.realtime)
     if settings.bus.interface != "virtual":
-        rig.add("plant", play, job, ...)
+        rig.add("plant", play, job, None, ...)
         return None
-    partner = open_partner(job, lambda kind, text: events.say(f"plant: {kind}", f"Plant: {text}"))
+    wire = ferry_ring()
+    rig.add("plant", play, job, wire, ...)
+    link = Link(job.bus.open, lambda kind, text: events.say(f"plant: {kind}", f"Plant: {text}"))
+    stack.callback(link.close)
+    ferry = Ferry(wire, link, SystemClock())
 
     def start(start_ns: int) -> None:
         # Half a period apart the two do not ask for the interpreter at the same time.
-        half_ns = round(0.5e9 / job.rate_hz)
-        arguments = (start_ns + half_ns, over.is_set)
-        thread = threading.Thread(target=partner.run, args=arguments, name="plant", daemon=True)
+        period_ns = round(1e9 / job.rate_hz)
+        arguments = (start_ns + period_ns // 2, period_ns, over.is_set)
+        thread = threading.Thread(target=ferry.run, args=arguments, name="ferry", daemon=True)
         thread.start()
         stack.callback(thread.join, 2.0)
         stack.callback(over.set)
 
-    stack.callback(partner.close)
     return start
 
 

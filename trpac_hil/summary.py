@@ -50,6 +50,7 @@ def summarise(
             "ended_late": counts.late_ends,
             "left_out": counts.left_out,
             "beyond_5_ms": counts.long_overruns,
+            "overworked": counts.overworked,
             "worst_ms": round(counts.worst_ns * 1e-6, 4),
         },
         "timing": done["figures"] if done else None,
