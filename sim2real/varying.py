@@ -20,6 +20,7 @@ from sim2real.drive import Drive
 from sim2real.evidence import Evidence, rest_of
 from sim2real.fitting import loss, robust_weight
 from sim2real.observer import Towards
+from sim2real.selection import explains, fitness
 from sim2real.unknown import fit_terms
 
 Array = NDArray[np.float64]
@@ -43,11 +44,17 @@ OVER = ("time", "position")
 def add_varied(
     contest: Contest, fit_to: Evidence, holdout: Evidence, jobs: int = 1, progress: Progress = silent
 ) -> Contest:
-    """The contest with its best single effects free to vary, and what they leave beside a term over the motion."""
+    """The contest with its best single effects free to vary, and what they leave beside a term over the motion.
+
+    As it is where none of them explains the gap even so.
+    """
     null = contest.null.loss
     tried = [e for e in contest.singles[:TRIED] if null - e.loss >= MOSTLY * null]
     work = [partial(vary, e, fit_to, holdout, over) for e in tried for over in OVER]
     found = run_all(work, jobs, progress, "varying effects")
+    before = fitness(contest.null, fit_to, holdout)
+    if not any(explains(fitness(v.entry, fit_to, holdout), before) for v in found):
+        return contest
     drives, noises = (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
     terms = [
         fit_terms(e.fitted.candidate.model(e.fitted.x), drives, noises, jobs, shared=True)[0] for e in tried
