@@ -62,7 +62,11 @@ class VehicleFile(_FileModel):
     @model_validator(mode="after")
     def _check(self) -> VehicleFile:
         core = self.to_core()
-        problems = [text for key, values in self.effects.items() for text in problems_of(key, values, core)]
+        problems = [
+            text
+            for key, values in self.effects.items()
+            for text in problems_of(key, values, core, self.forms.get(key, ""))
+        ]
         problems += [text for key, form in self.forms.items() for text in self._problems_of_form(key, form)]
         if self.cog_to_rear_axle_m >= self.wheelbase_m:
             problems.append(

@@ -29,6 +29,10 @@ COUNTER = "wheel_speed_quantisation"
 """Judged by the mark that it leaves, see `sim2real.lattice`, not by residuals."""
 FINALISTS = 6
 """Effects that are fitted to all fit logs with full care, after a first round on one log."""
+PRICE = 0.003
+"""Share of the loss that a form of an effect has to take off for each parameter that it has more [-]."""
+NEAR = 0.2
+"""Share of the way from an effect's absence to its nearest start that a fit begins at, too [-]."""
 FIRST_ROUND_STEPS = 4
 """Steps of the first round's fits."""
 
@@ -87,6 +91,36 @@ class Entry:
 
 
 @dataclass(frozen=True)
+class Varied:
+    """An entry whose parameters vary, see `sim2real.varying`.
+
+    Attributes
+    ----------
+    entry : Entry
+        With the constant's fit and the residuals that the varying effect leaves.
+    over : str
+        What they vary over, "time" or "position".
+    spread : array, shape (k,)
+        Standard deviation of each parameter along the drives, in its unit.
+    price : float
+        What the prior asks for the variation, in units of the loss.
+    seconds : float
+        Length of all drives [s].
+    """
+
+    entry: Entry
+    over: str
+    spread: Array
+    price: float
+    seconds: float
+
+    @property
+    def cost(self) -> float:
+        """Loss and price."""
+        return self.entry.loss + self.price
+
+
+@dataclass(frozen=True)
 class Contest:
     """All entries, best first within each kind.
 
@@ -100,6 +134,12 @@ class Contest:
         What a second effect beside the best single one promises to leave of the fit logs [loss], best first.
     structured : tuple of Entry
         Single effects with a structural one beside them, see `sim2real.structure`.
+    varied : tuple of Varied
+        Single effects that are not the same everywhere, see `sim2real.varying`.
+    motion : float
+        Least loss that one of these effects leaves as a constant beside a free term over the car's motion.
+    lone : float
+        Least loss that a free term at one wheel alone leaves, without any effect, see `sim2real.suspect`.
     """
 
     null: Entry
@@ -107,6 +147,9 @@ class Contest:
     pairs: tuple[Entry, ...] = ()
     partners: tuple[tuple[float, str], ...] = ()
     structured: tuple[Entry, ...] = ()
+    varied: tuple[Varied, ...] = ()
+    motion: float = float("inf")
+    lone: float = float("inf")
 
 
 def hold_contest(
@@ -134,7 +177,9 @@ def hold_contest(
         for found in first
     ]
     best: dict[tuple[str, ...], Entry] = {}
-    for entry in sorted(run_all(work, jobs, progress, "effects"), key=lambda e: e.loss):
+    for entry in sorted(
+        run_all(work, jobs, progress, "effects"), key=lambda e: e.loss * (1.0 + PRICE * e.size)
+    ):
         best.setdefault(entry.ids, entry)
     return Contest(null, tuple(entry for entry in best.values() if is_proper(entry)))
 
@@ -152,21 +197,45 @@ def first_round(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> list[Fit]:
-    """Every form of every effect that acts on the car's motion or its sensors, fitted roughly to one log."""
+    """Every form of every effect that acts on the car's motion or its sensors, fitted roughly to one log.
+
+    A form with more parameters than the effect's first one starts from where that ended.
+    """
+    one_log = fit_to.longest()
+
+    def fits(wanted: Sequence[tuple[Candidate, Array]], stage: str) -> list[Fit]:
+        work = [partial(fit, candidate, one_log, starts, FIRST_ROUND_STEPS) for candidate, starts in wanted]
+        return run_all(work, jobs, progress, stage)
+
     candidates = [
         Candidate(model, (key,), (form,))
         for key, kinds in FORMS.items()
         if key not in {*exclude, COUNTER} and kinds[0].stage != "perception" and not kinds[0].structural
         for form in range(len(kinds))
     ]
-    one_log = fit_to.longest()
-    found = run_all(
-        [partial(fit, candidate, one_log, None, FIRST_ROUND_STEPS) for candidate in candidates],
-        jobs,
-        progress,
-        "effects, first round",
-    )
-    return sorted(found, key=lambda fit: fit.loss)
+    plain = [c for c in candidates if len(c.parameters) == len(FORMS[c.ids[0]][0].parameters())]
+    found = fits([(c, _near_and_far(c)) for c in plain], "effects, first round")
+    of = {f.candidate.ids: f for f in found if f.candidate.forms == (0,)}
+    more = [(c, _beyond(c, of[c.ids].x)) for c in candidates if c not in plain]
+    return sorted([*found, *fits(more, "forms, first round")], key=lambda fit: fit.loss)
+
+
+def _near_and_far(candidate: Candidate) -> Array:
+    """A candidate's coarse grid and, of a single parameter, points nearer to its absence: small gaps need them."""
+    far = candidate.starts
+    if far.shape[1] > 1:
+        return far
+    offsets = far[:, 0] - candidate.neutral[0]
+    sides = [side for side in (offsets[offsets > 0.0], offsets[offsets < 0.0]) if len(side)]
+    near = [candidate.neutral[0] + NEAR * side[np.argmin(np.abs(side))] for side in sides]
+    return np.concatenate([np.reshape(near, (-1, 1)), far])
+
+
+def _beyond(candidate: Candidate, x: Array) -> Array:
+    """Where a form with further parameters starts: the effect as it is without them, and with each value of theirs."""
+    rest = candidate.neutral[len(x) :]
+    values = np.unique(np.array([rest, *candidate.starts[:, len(x) :]]), axis=0)
+    return np.array([np.concatenate([x, value]) for value in values])
 
 
 def enter(candidate: Candidate, fit_to: Evidence, holdout: Evidence, start: Array, steps: int) -> Entry:

@@ -28,7 +28,9 @@ from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, is_noise, needs_pairs
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.structure import add_structure
+from sim2real.suspect import lone_wheel
 from sim2real.trpac_error import trpac_error
+from sim2real.varying import add_varied
 
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
 
@@ -153,7 +155,12 @@ def find(
         if needs_pairs(contest, fit_to, held):
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)
             contest = add_structure(contest, base, fit_to, held, exclude, jobs, progress)
-    return Findings(base, fit_to, held, contest, decide(contest, fit_to, held), lattice)
+            contest = replace(contest, lone=lone_wheel(base, fit_to, held, jobs))
+    decision = decide(contest, fit_to, held)
+    if decision.verdict is Verdict.UNKNOWN:
+        contest = add_varied(contest, fit_to, held, jobs, progress)
+        decision = decide(contest, fit_to, held)
+    return Findings(base, fit_to, held, contest, decision, lattice)
 
 
 def counter_gap(findings: Findings) -> tuple[Measure, Measure]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from sim2real.drive import BLOCK_S, CHANNELS, WHEEL, Drive
 from sim2real.noise import Noise
@@ -19,9 +20,11 @@ from sim2real.observer import Simulation
 
 Array = NDArray[np.float64]
 
-DRIFT_S = 3.0
-"""Correlation time that a drift is taken to have [s]."""
-MOST_DRIFT = 0.6
+DRIFT_S = (0.3, 1.0, 3.0)
+"""Correlation times that a drift is made up of: a flicker has all of them, a wandering zero the longest [s]."""
+LENGTHS_S = (0.2, 0.6, 2.0)
+"""Blocks whose means tell them apart [s]."""
+MOST_DRIFT = 1.0
 """Greatest drift that is allowed for, in standard deviations of the noise on the grid of the diagnosis [-]."""
 ALIKE = 2.0
 """Up to how much more variance than in the calmer axle is drift: a fault of one wheel shows in one axle [-]."""
@@ -37,39 +40,59 @@ def block_sums(rows: Array, length: int) -> Array:
     return cut.sum(axis=1) / np.sqrt(used)
 
 
-def read_drift(drives: Sequence[Drive], noises: Sequence[Noise], residuals: Sequence[Array]) -> float:
-    """Standard deviation of the drift, in those of the noise, from the differences of left and right wheels [-]."""
-    squares = []
-    for drive, noise, rest in zip(drives, noises, residuals, strict=True):
-        length = drive.rows_in(BLOCK_S)
-        scale = np.sqrt((1.0 + noise.correlation[WHEEL]) / (1.0 - noise.correlation[WHEEL]))
-        z = (noise.whitened(rest) * noise.widening)[:, WHEEL]
-        left_less_right = (z[:, 0::2] - z[:, 1::2]) / np.sqrt(2.0)
-        excess = _spread(block_sums(np.nan_to_num(left_less_right), length)) - 1.0
-        squares.append(np.maximum(excess, 0.0) / length * np.mean(scale**2))
-    axles = [
-        np.mean(known) for of_axle in np.transpose(squares) if len(known := of_axle[np.isfinite(of_axle)])
-    ]
-    if not axles:
-        return 0.0
-    return float(np.sqrt(min(np.mean(axles), ALIKE * min(axles), MOST_DRIFT**2)))
+def read_drift(drives: Sequence[Drive], noises: Sequence[Noise], residuals: Sequence[Array]) -> Array:
+    """Standard deviations of the drift's parts, one per correlation time of `DRIFT_S`, in those of the noise [-].
+
+    From the differences of left and right wheels: the variance of their blocks' means over several lengths is a sum of
+    what each part makes of it.
+    """
+    excess = []
+    for seconds in LENGTHS_S:
+        sums = []
+        for drive, noise, rest in zip(drives, noises, residuals, strict=True):
+            scale = np.sqrt((1.0 + noise.correlation[WHEEL]) / (1.0 - noise.correlation[WHEEL]))
+            z = (noise.whitened(rest) * noise.widening)[:, WHEEL] * np.mean(scale)
+            left_less_right = (z[:, 0::2] - z[:, 1::2]) / np.sqrt(2.0)
+            found = block_sums(np.nan_to_num(left_less_right), drive.rows_in(seconds))
+            sums.append(np.where(found == 0.0, np.nan, found))
+            white = np.mean(scale) ** 2
+        axles = _spread(np.concatenate(sums)) - white
+        known = np.maximum(axles[np.isfinite(axles)], 0.0)
+        if not len(known):
+            return np.zeros(len(DRIFT_S))
+        excess.append(min(float(np.mean(known)), ALIKE * float(known.min())))
+    rows = np.array([drives[0].rows_in(seconds) for seconds in LENGTHS_S])
+    makes = np.array([[_of_blocks(n, drives[0].step_s / tau) for tau in DRIFT_S] for n in rows])
+    weight = 1.0 / rows  # longer blocks are fewer, and hold more
+    squares, _ = nnls(makes * weight[:, None], np.array(excess) * weight)
+    return np.asarray(np.sqrt(squares * min(1.0, MOST_DRIFT**2 / max(float(squares.sum()), 1e-12))))
+
+
+def _of_blocks(rows: int, rate: float) -> float:
+    """Variance of `block_sums` of first-order noise of unit variance that forgets at a rate per row."""
+    lags = np.arange(1, rows)
+    return float(1.0 + 2.0 * np.sum((1.0 - lags / rows) * np.exp(-rate * lags)))
 
 
 def _spread(sums: Array) -> Array:
     """Robust variance of each column; NaN where a wheel is not measured."""
-    known = [np.abs(column[column != 0.0]) for column in sums.T]
+    known = [np.abs(column[np.isfinite(column)]) for column in sums.T]
     return np.array([(1.4826 * np.median(column)) ** 2 if len(column) else np.nan for column in known])
 
 
-def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: float, seed: int = 0) -> Noise:
+def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: Array, seed: int = 0) -> Noise:
     """The noise with what drifting sensors add to the blocks' means that a right model leaves, by drawn drifts."""
-    if drift <= 0.0:
+    if not np.any(drift > 0.0):
         return replace(noise, slow=np.zeros(len(CHANNELS)))
     generator = np.random.default_rng(seed)
     length, nominal = drive.rows_in(BLOCK_S), model.predict(drive).channels
     found = np.zeros(len(CHANNELS))
     for _ in range(DRAWS):
-        off = drift * noise.sigma * _drawn(len(drive), drive.step_s, generator)
+        parts = [
+            s * _drawn(len(drive), drive.step_s / tau, generator)
+            for s, tau in zip(drift, DRIFT_S, strict=True)
+        ]
+        off = noise.sigma * np.sum(parts, axis=0)
         moved = model.predict(replace(drive, measured=drive.measured + off)).channels
         rest = np.where(np.isfinite(drive.measured), off - (moved - nominal), np.nan)
         sums = block_sums(np.nan_to_num(noise.whitened(rest)), length)
@@ -77,7 +100,7 @@ def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: float, seed
     return replace(noise, slow=found)
 
 
-def _drawn(n: int, step_s: float, generator: np.random.Generator) -> Array:
-    """First-order coloured noise of unit variance, shape (n, 7)."""
-    slow = Noise(np.ones(len(CHANNELS)), np.full(len(CHANNELS), np.exp(-step_s / DRIFT_S)), np.ones((n, 1)))
+def _drawn(n: int, rate: float, generator: np.random.Generator) -> Array:
+    """First-order coloured noise of unit variance that forgets at a rate per row, shape (n, 7)."""
+    slow = Noise(np.ones(len(CHANNELS)), np.full(len(CHANNELS), np.exp(-rate)), np.ones((n, 1)))
     return slow.draw(n, generator)

@@ -46,8 +46,8 @@ class Evidence:
         noises = [n.sharper(m) for n, m in zip(self.noises, gather(model, self.drives).noises, strict=True)]
         return replace(self, noises=tuple(noises))
 
-    def drifting(self, model: Simulation, drift: float) -> Evidence:
-        """The same drives with sensors that drift by a share of their noise."""
+    def drifting(self, model: Simulation, drift: Array) -> Evidence:
+        """The same drives with sensors that drift by shares of their noise."""
         pairs = zip(self.drives, self.noises, strict=True)
         return replace(self, noises=tuple(with_drift(model, d, n, drift) for d, n in pairs))
 
@@ -82,8 +82,8 @@ def gather(model: Simulation, drives: Sequence[Drive]) -> Evidence:
     return Evidence(tuple(drives), tuple(read_noise(d, residuals(model, d), doubt(model, d)) for d in drives))
 
 
-def drift_of(model: Simulation, *evidence: Evidence) -> float:
-    """The sensors' drift over all drives [standard deviations of the noise]."""
+def drift_of(model: Simulation, *evidence: Evidence) -> Array:
+    """The sensors' drift over all drives, see `read_drift` [standard deviations of the noise]."""
     drives = [d for e in evidence for d in e.drives]
     noises = [n for e in evidence for n in e.noises]
     return read_drift(drives, noises, [residuals(model, d) for d in drives])

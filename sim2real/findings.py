@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, Effect
 from sim2real import where
-from sim2real.contest import Contest, Entry, Progress
+from sim2real.contest import Contest, Entry, Progress, Varied
 from sim2real.drive import CHANNELS
 from sim2real.evidence import Evidence
 from sim2real.fitting import Fit, loss
@@ -27,11 +27,13 @@ from sim2real.result import (
     Place,
     Structure,
     Trace,
+    Variation,
     Verdict,
 )
 from sim2real.selection import Decision, fitness
 from sim2real.suspect import lone_sensor
 from sim2real.unknown import Term, characterise, fit_terms
+from sim2real.varying import KNOT_S
 
 Array = NDArray[np.float64]
 
@@ -80,6 +82,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     whole = added.with_effects(*found.structure())
     gap = Gap(measure(held, before), measure(held, after), noise_floor(whole, held, seed))
     structure = _structure(found, held, whole)
+    variation = _variation(decision)
     causes = _causes(found, held, before, seed)
     terms: list[Term] = []
     unexplained = None
@@ -105,6 +108,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
             for part in (
                 _sentence(decision, gap, causes, unexplained.sentence if unexplained else ""),
                 _beside(structure),
+                _uneven(variation),
             )
             if part
         ),
@@ -114,6 +118,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         causes=causes,
         ambiguous_with=_ambiguous(decision),
         structure=structure,
+        variation=variation,
         cannot_rule_out=tuple(c.effect for c in causes if not c.excited),
         next_manoeuvre=_next(found, progress),
         unexplained=unexplained,
@@ -154,6 +159,8 @@ def _cause(
     alone = _joint(found, entry)
     values = {name: value for (effect, name), value in together.items() if effect == key}
     values = values or {name: value for (_, name), value in alone.items()}
+    if found.decision.varied and entry is found.decision.winner:
+        values = _as_means(values, found.decision.varied, best)
     excited = _excited(next(iter(alone.values())), float(best.candidate.scale[0]))
     fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
@@ -199,6 +206,35 @@ def at_bound(found: Fit) -> list[str]:
         (high - found.x < near) & (found.candidate.neutral < high - near)
     )
     return [p.name for (_, p), is_off in zip(found.candidate.parameters, off, strict=True) if is_off]
+
+
+STRETCH_S = 4.0 * KNOT_S
+"""Time after which a varying value has forgotten itself [s]."""
+
+
+def _as_means(values: dict[str, Interval], varied: Varied, found: Fit) -> dict[str, Interval]:
+    """Intervals of what varies along the logs, as of means of finitely many stretches."""
+    low, high = found.candidate.bounds
+    out = {}
+    for (name, value), spread, least, most in zip(values.items(), varied.spread, low, high, strict=True):
+        half = np.hypot(
+            0.5 * (value.high - value.low), 1.96 * spread / np.sqrt(max(varied.seconds / STRETCH_S, 1.0))
+        )
+        out[name] = replace(
+            value, low=float(max(value.value - half, least)), high=float(min(value.value + half, most))
+        )
+    return out
+
+
+def _variation(decision: Decision) -> Variation | None:
+    """How the cause varies, where it does."""
+    varied = decision.varied
+    if varied is None:
+        return None
+    names = [p.name for _, p in varied.entry.fitted.candidate.parameters]
+    return Variation(
+        varied.entry.ids[0], varied.over, dict(zip(names, map(float, varied.spread), strict=True))
+    )
 
 
 def _joint(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
@@ -314,6 +350,15 @@ def _beside(structure: Structure | None) -> str:
         f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}), "
         f"which leaves {structure.gap_after:.1f}: a difference of the models, not a fault."
     )
+
+
+def _uneven(variation: Variation | None) -> str:
+    """How the cause varies, in a sentence."""
+    if variation is None:
+        return ""
+    values = ", ".join(f"{name} by {spread:.2g}" for name, spread in variation.spread.items())
+    along = "time" if variation.over == "time" else "the road"
+    return f"It is not the same everywhere: along {along} it varies ({values}, standard deviation)."
 
 
 def _number(value: Interval) -> str:

@@ -8,7 +8,7 @@ shows as a residual of itself times the memory.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +51,34 @@ class Push:
     accel_m_s2: Array
     felt: bool
     offset: Array
+
+
+@dataclass(frozen=True)
+class Towards:
+    """Models that a model varies towards, along one drive: they differ from it in the values of its effects.
+
+    Attributes
+    ----------
+    models : tuple of Simulation
+        m of them.
+    shares : array, shape (n, m)
+        How far it is towards each, row by row: 0 itself, 1 the other, beyond as well [-].
+    """
+
+    models: tuple[Simulation, ...]
+    shares: Array
+
+    def mixed(self, columns: Sequence[dict[str, Array]]) -> dict[str, Array]:
+        """Columns of the model itself and of the others, as they are between them."""
+        own, *others = columns
+        if not others:
+            return own
+        mixed = {}
+        for name, values in own.items():
+            shares = self.shares.reshape(len(values), -1, *(1,) * (values.ndim - 1))
+            steps = np.stack([other[name] - values for other in others], axis=1)
+            mixed[name] = values + np.sum(shares * steps, axis=1)
+        return mixed
 
 
 @dataclass(frozen=True)
@@ -108,38 +136,54 @@ class Simulation:
             parameters, table = effect.dynamics(parameters), effect.road(table)
         return DynamicsParameters(*map(float, parameters)), table
 
-    def predict(self, drive: Drive, push: Push | None = None) -> Prediction:
+    def predict(self, drive: Drive, push: Push | None = None, towards: Towards | None = None) -> Prediction:
         """Follow a drive."""
-        parameters, table = self.setup(drive.road)
-        torque, seen = drive.torque_nm, drive.measured - push.offset if push else drive.measured
-        columns = {name: seen[:, i] for i, name in enumerate(CHANNELS)}
-        for effect in reversed(self.effects):
-            columns = effect.correct(drive.time_s, columns)
-        for effect in self.effects:
-            torque = effect.actuate(drive.time_s, torque)
+        blend = towards or Towards((), np.zeros((len(drive), 0)))
+        models = (self, *blend.models)
+        setups = [model.setup(drive.road) for model in models]
+        seen = drive.measured - push.offset if push else drive.measured
+        measured = {name: seen[:, i] for i, name in enumerate(CHANNELS)}
+        columns = blend.mixed([model.corrected(drive.time_s, measured) for model in models])
+        torque = blend.mixed([{"": model.actuated(drive.time_s, drive.torque_nm)} for model in models])[""]
         states, accel, slip, force_n, load_n, theta = dynamics.follow(
-            start(columns, drive.step_s, parameters),
+            start(columns, drive.step_s, setups[0][0]),
             np.ascontiguousarray(torque + push.torque_nm if push else torque),
             push.accel_m_s2 if push else np.zeros(len(drive)),
             np.column_stack([columns[name] for name in CHANNELS[:6]]),
             MEMORY_S,
             drive.step_s,
-            parameters,
-            table,
+            np.array([parameters for parameters, _ in setups]),
+            setups[0][1].start_m,
+            np.array([table.theta for _, table in setups]),
+            blend.shares,
         )
         if push and push.felt:
             accel = accel + push.accel_m_s2
-        channels = self._sense(drive.time_s, states, accel)
+        said = blend.mixed([model.sensed(drive.time_s, states, accel) for model in models])
+        channels = np.column_stack([said[name] for name in CHANNELS])
         if push:
             channels = channels + push.offset
         return Prediction(channels, states, slip, force_n, load_n, theta)
 
-    def _sense(self, time_s: Array, states: Array, accel: Array) -> Array:
+    def actuated(self, time_s: Array, torque_nm: Array) -> Array:
+        """What the actuators make of a commanded torque, shape (n, 4) [N m]."""
+        for effect in self.effects:
+            torque_nm = effect.actuate(time_s, torque_nm)
+        return torque_nm
+
+    def corrected(self, time_s: Array, columns: dict[str, Array]) -> dict[str, Array]:
+        """What ideal sensors would have read in place of these."""
+        for effect in reversed(self.effects):
+            columns = effect.correct(time_s, columns)
+        return columns
+
+    def sensed(self, time_s: Array, states: Array, accel: Array) -> dict[str, Array]:
+        """What the sensors read of these states, shape (n, 6), and this acceleration."""
         columns = {name: states[:, i] for i, name in enumerate(CHANNELS[:6])}
         columns[CHANNELS[ACCEL]] = accel
         for effect in self.effects:
             columns = effect.sense(time_s, columns)
-        return np.column_stack([columns[name] for name in CHANNELS])
+        return columns
 
 
 def _foretold(effect: Effect) -> Effect:

@@ -145,6 +145,25 @@ class Structure:
 
 
 @dataclass(frozen=True)
+class Variation:
+    """A cause that is not the same everywhere: its parameters are means.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    over : str
+        What it varies over, "time" or "position".
+    spread : dict
+        Parameter name to the standard deviation along the logs, in the parameter's unit.
+    """
+
+    effect: str
+    over: str
+    spread: dict[str, float]
+
+
+@dataclass(frozen=True)
 class NextManoeuvre:
     """What to drive next, and which pair of effects it would tell apart.
 
@@ -246,6 +265,7 @@ class Diagnosis:
     causes: tuple[Cause, ...]
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
     structure: Structure | None = None
+    variation: Variation | None = None
     cannot_rule_out: tuple[str, ...] = ()
     next_manoeuvre: NextManoeuvre | None = None
     unexplained: Unexplained | None = None
@@ -274,6 +294,7 @@ class Diagnosis:
             "causes": [_cause(cause) for cause in self.causes],
             "ambiguous_with": [list(group) for group in self.ambiguous_with],
             "structure": None if self.structure is None else asdict(self.structure),
+            "variation": None if self.variation is None else asdict(self.variation),
             "cannot_rule_out": list(self.cannot_rule_out),
             "next_manoeuvre": _profile(self.next_manoeuvre),
             "unexplained": _term(self.unexplained),

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.contest import Contest, Entry
+from sim2real.contest import Contest, Entry, Varied
 from sim2real.drift import block_sums
 from sim2real.drive import BLOCK_S, GROUPS
 from sim2real.evidence import Evidence
@@ -50,6 +50,10 @@ SOFTNESS = 4.0
 """Tempering of the quasi-likelihood: evidence counts for less than noise alone would say [-]."""
 FORM = 3e-4
 """Share of what the best entry explains that no entry is held to: the library's forms are not nature's [-]."""
+MOTION_SHARE = 0.95
+"""A term of a few values over the car's motion that takes this share of what a varying effect does is the cause [-]."""
+LONE_BELIEF = 0.3
+"""Probability that an effect of the whole car is the cause though a term at one wheel explains more [-]."""
 FLOOR_MISFIT = 1.5
 """Above this misfit an entry is worth a second effect's try [-]."""
 
@@ -169,6 +173,8 @@ class Decision:
         Of each single effect; what is left to 1 is "none of these".
     before, after : Fitness
         Of the null and of the best entry.
+    varied : Varied or None
+        How the winner's parameters vary, where they do.
     """
 
     verdict: Verdict
@@ -177,10 +183,22 @@ class Decision:
     probability: dict[str, float]
     before: Fitness
     after: Fitness
+    varied: Varied | None = None
 
 
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
-    """Verdict of a contest."""
+    """Verdict of a contest; what one wheel alone explains better is no effect of the whole car."""
+    said = _decide(contest, fit_to, holdout)
+    if said.verdict in (Verdict.NO_GAP, Verdict.UNKNOWN):
+        return said
+    margin = FURTHER_GAIN * inflation(said.winner, fit_to, holdout)
+    if contest.lone > said.winner.loss - margin:
+        return said
+    probability = _scaled(said.probability, LONE_BELIEF)
+    return replace(said, verdict=Verdict.UNKNOWN, rivals=(), probability=probability)
+
+
+def _decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     before = fitness(contest.null, fit_to, holdout)
     singles = list(contest.singles)
     weight = probabilities(contest, singles, fit_to, holdout)
@@ -202,6 +220,9 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     if structured:
         return structured
     if not explains(after, before):
+        varied = _varying(contest, before, fit_to, holdout)
+        if varied:
+            return varied
         return Decision(Verdict.UNKNOWN, best, (), _scaled(share, _belief(after, before)), before, after)
     rivals = [e for e in singles if e is not best and share[e.ids[0]] > RIVAL * share[best.ids[0]]]
     belief = _belief(after, before)
@@ -244,6 +265,34 @@ def _structured(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Ev
     verdict = Verdict.AMBIGUOUS if rivals else Verdict.IDENTIFIED
     belief = _belief(beside, before) * FURTHER_BELIEF
     return Decision(verdict, best, rivals, _scaled(share, belief), before, beside)
+
+
+def _varying(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Evidence) -> Decision | None:
+    """The verdict on an effect that is not the same everywhere; None where that does not explain the gap either.
+
+    A term over the car's motion that does as well beside a constant says that it is another effect.
+    """
+    able = [v for v in contest.varied if explains(fitness(v.entry, fit_to, holdout), before)]
+    if not able:
+        return None
+    best = able[0]
+    winner = next(e for e in contest.singles if e.ids == best.entry.ids)
+    if winner.loss - contest.motion > MOTION_SHARE * (winner.loss - best.entry.loss):
+        return None
+    tempered = SOFTNESS * inflation(best.entry, fit_to, holdout) + FORM * (
+        contest.null.loss - best.entry.loss
+    )
+    weight: dict[str, float] = {e.ids[0]: 0.0 for e in contest.singles}
+    for v in contest.varied:
+        key = v.entry.ids[0]
+        weight[key] = max(weight[key], float(np.exp(0.5 * (best.cost - v.cost) / tempered)))
+    total = sum(weight.values())
+    rivals = tuple(e for e in contest.singles if e is not winner and weight[e.ids[0]] > RIVAL)
+    after = fitness(best.entry, fit_to, holdout)
+    belief = _belief(after, before) * FURTHER_BELIEF
+    share = {key: belief * value / total for key, value in weight.items()}
+    verdict = Verdict.AMBIGUOUS if rivals else Verdict.IDENTIFIED
+    return Decision(verdict, winner, rivals, share, before, after, best)
 
 
 def _compound(contest: Contest, pair: Entry, weight: Array, before: Fitness, after: Fitness) -> Decision:

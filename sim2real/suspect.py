@@ -20,7 +20,7 @@ from sim2real.drive import SPEED, WHEEL
 from sim2real.evidence import SETTLING_S, Evidence
 from sim2real.observer import Simulation
 from sim2real.selection import fitness
-from sim2real.unknown import EQUATIONS, Equation
+from sim2real.unknown import EQUATIONS, Equation, fit_terms
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,13 @@ def lone_sensor(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Equat
     left = [_misfit_without(e.channel, model, fit_to, holdout) for e in candidates if e.channel is not None]
     best = int(np.argmin(left))
     return candidates[best] if left[best] <= CLEARED else None
+
+
+def lone_wheel(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int = 1) -> float:
+    """Least loss that a free term at one wheel, its motor or its sensor, leaves of the model as it is."""
+    drives, noises = (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
+    at_one = [e for e in EQUATIONS if e.key.startswith(("motor ", "wheel sensor "))]
+    return min(fit_terms(model, drives, noises, jobs, shared=True, only=e)[0].loss for e in at_one)
 
 
 def _misfit_without(channel: int, model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:

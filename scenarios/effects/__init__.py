@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.aero_drag import AeroDrag
 from scenarios.effects.base import Effect, Parameter
-from scenarios.effects.brake_drag import BrakeDrag
+from scenarios.effects.brake_drag import BrakeDrag, BrakeDragOfAxles
 from scenarios.effects.camera_latency import CameraLatency
 from scenarios.effects.camera_pitch import CameraPitch
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
@@ -23,14 +23,14 @@ from scenarios.effects.mu_split import MuSplit
 from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.rolling_resistance import RollingResistance, RollingResistanceForce
 from scenarios.effects.torque_delay import TorqueDelay
-from scenarios.effects.torque_gain import TorqueGain
-from scenarios.effects.torque_lag import TorqueLag
+from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles
+from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages
 from scenarios.effects.tyre_relaxation import TyreRelaxation, TyreRelaxationOfSlip
 from scenarios.effects.tyre_shape import TyreShape
-from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset
+from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset, TyreStiffnessOffsetOfAxles
 from scenarios.effects.vehicle_speed_delay import VehicleSpeedDelay
 from scenarios.effects.vehicle_speed_scale import VehicleSpeedScale
-from scenarios.effects.wheel_inertia_offset import WheelInertiaOffset
+from scenarios.effects.wheel_inertia_offset import WheelInertiaOffset, WheelInertiaOffsetOfAxles
 from scenarios.effects.wheel_radius_offset import WheelRadiusOffset
 from scenarios.effects.wheel_speed_delay import WheelSpeedDelay
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
@@ -76,9 +76,17 @@ EFFECTS: dict[str, type[Effect]] = {
 }
 """All effects by id, in the order in which they act: along the plant, and within a stage as the signal passes them."""
 
+OTHER_FORMS = (
+    TorqueGainOfAxles,
+    TorqueLagInTwoStages,
+    RollingResistanceForce,
+    BrakeDragOfAxles,
+    WheelInertiaOffsetOfAxles,
+    TyreStiffnessOffsetOfAxles,
+    TyreRelaxationOfSlip,
+)
 FORMS: dict[str, tuple[type[Effect], ...]] = {
-    key: (effect, *(other for other in (RollingResistanceForce, TyreRelaxationOfSlip) if other.id == key))
-    for key, effect in EFFECTS.items()
+    key: (effect, *(other for other in OTHER_FORMS if other.id == key)) for key, effect in EFFECTS.items()
 }
 """Every form of each effect, the plant's own first: what goes by one name in the field may act in more than one way."""
 
@@ -92,13 +100,14 @@ def suggestion(word: str, known: list[str]) -> str:
     return f"{hint}Known: {', '.join(known)}."
 
 
-def problems_of(effect_id: str, values: Mapping[str, float], vehicle: Vehicle) -> list[str]:
+def problems_of(effect_id: str, values: Mapping[str, float], vehicle: Vehicle, form: str = "") -> list[str]:
     """Everything that keeps an effect from being made on this vehicle; empty when nothing does."""
     if effect_id not in EFFECTS:
         return [
             f"{effect_id!r} is not an effect that the plant models; {suggestion(effect_id, list(EFFECTS))}"
         ]
-    known = {p.name: p for p in EFFECTS[effect_id].parameters()}
+    kind = next((kind for kind in FORMS[effect_id] if kind.form == form), EFFECTS[effect_id])
+    known = {p.name: p for p in kind.parameters()}
     problems = [
         f"{name!r} is not a parameter of {effect_id}; {suggestion(name, list(known))}"
         for name in values
@@ -128,7 +137,7 @@ def make_effect(effect_id: str, values: Mapping[str, float], vehicle: Vehicle, f
     ValueError
         Unknown id or parameter, a missing parameter, or a value out of bounds; names them all.
     """
-    problems = problems_of(effect_id, values, vehicle)
+    problems = problems_of(effect_id, values, vehicle, form)
     if problems:
         raise ValueError(" ".join(problems))
     return form_of(effect_id, form)(**values)

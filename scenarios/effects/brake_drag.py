@@ -16,6 +16,7 @@ class BrakeDrag(Effect):
     """A constant moment against every turning wheel; it holds a resting wheel and never turns it back."""
 
     id = "brake_drag"
+    form = "all wheels alike"
     stage = "dynamics"
     subsystem = "wheel"
     equation = "I omega' = T - F_x R - T_drag"
@@ -35,3 +36,26 @@ class BrakeDrag(Effect):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The same torque at each wheel, whatever its load."""
         return parameters._replace(drag_torque_nm=self.torque_nm)
+
+
+@dataclass(frozen=True)
+class BrakeDragOfAxles(BrakeDrag):
+    """The brakes of one axle drag more than those of the other; `torque_nm` is the mean of all wheels."""
+
+    form = "axles unlike"
+    equation = "T_drag (1 + unlike) in front, T_drag (1 - unlike) in the rear"
+
+    unlike: float = parameter(
+        "-",
+        "share of the mean that the front axle has more and the rear less",
+        neutral=0.0,
+        low=-1.0,
+        high=1.0,
+        starts=(-0.5, 0.5),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each axle has its torque."""
+        return parameters._replace(
+            drag_torque_nm=self.torque_nm, axle_drag_torque_nm=self.unlike * self.torque_nm
+        )

@@ -68,7 +68,9 @@ def _section(effect: type[Effect]) -> str:
 
 
 def _form(other: type[Effect]) -> str:
-    return f"\n- A diagnosis also tries it as {other.form}: `{other.equation}`. {getdoc(other)}"
+    further = other.parameters()[len(EFFECTS[other.id].parameters()) :]
+    told = "".join(f" Further parameter `{p.name}` [{p.unit}]: {p.meaning}." for p in further)
+    return f"\n- A diagnosis also tries it as {other.form}: `{other.equation}`. {getdoc(other)}{told}"
 
 
 def _row(p: Parameter) -> str:

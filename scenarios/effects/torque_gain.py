@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from scenarios.effects.base import Array, Effect, parameter
+
+FRONT_LESS_REAR = np.array([1.0, 1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True)
@@ -12,6 +16,7 @@ class TorqueGain(Effect):
     """Motors and brakes make more or less torque than commanded, always by the same factor."""
 
     id = "torque_gain"
+    form = "all wheels alike"
     stage = "actuators"
     subsystem = "powertrain"
     equation = "T_true = factor T"
@@ -31,3 +36,24 @@ class TorqueGain(Effect):
     def actuate(self, time_s: Array, torque_nm: Array) -> Array:
         """All torque is scaled."""
         return torque_nm * self.factor
+
+
+@dataclass(frozen=True)
+class TorqueGainOfAxles(TorqueGain):
+    """The factor is another one at the front and at the rear; `factor` is their mean."""
+
+    form = "axles unlike"
+    equation = "T_true = (factor + unlike) T in front, (factor - unlike) T in the rear"
+
+    unlike: float = parameter(
+        "-",
+        "half of what the front axle's factor has more than the rear's",
+        neutral=0.0,
+        low=-0.5,
+        high=0.5,
+        starts=(-0.03, 0.03),
+    )
+
+    def actuate(self, time_s: Array, torque_nm: Array) -> Array:
+        """Each axle's torque is scaled."""
+        return torque_nm * (self.factor + self.unlike * FRONT_LESS_REAR)

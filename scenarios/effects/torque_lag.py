@@ -15,6 +15,7 @@ class TorqueLag(Effect):
     """The torque follows its command with a first-order lag, settled on the first row's command before it."""
 
     id = "torque_lag"
+    form = "in one stage"
     stage = "actuators"
     subsystem = "powertrain"
     equation = "time_constant T_true' = T - T_true, exact for a command linear between the rows"
@@ -42,3 +43,16 @@ class TorqueLag(Effect):
         settled = torque_nm[:1] * (1.0 - now)
         lagged, _ = lfilter([now, before], [1.0, -decay], torque_nm, axis=0, zi=settled)
         return np.asarray(lagged)
+
+
+@dataclass(frozen=True)
+class TorqueLagInTwoStages(TorqueLag):
+    """Two like lags behind each other, as of a current's control and a filter; the time constant is their sum."""
+
+    form = "in two stages"
+    equation = "two lags of time_constant / 2 each"
+
+    def actuate(self, time_s: Array, torque_nm: Array) -> Array:
+        """The first stage's output is the second's command."""
+        stage = TorqueLag(0.5 * self.time_constant_s)
+        return stage.actuate(time_s, stage.actuate(time_s, torque_nm))

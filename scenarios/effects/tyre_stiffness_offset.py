@@ -16,6 +16,7 @@ class TyreStiffnessOffset(Effect):
     """All tyres are stiffer or softer along the road than the vehicle file says."""
 
     id = "tyre_stiffness_offset"
+    form = "all wheels alike"
     stage = "dynamics"
     subsystem = "tyre"
     equation = "F_x(lambda) with the true C_x"
@@ -35,3 +36,26 @@ class TyreStiffnessOffset(Effect):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The true stiffness takes the nominal one's place."""
         return parameters._replace(longitudinal_stiffness_n=self.stiffness_n)
+
+
+@dataclass(frozen=True)
+class TyreStiffnessOffsetOfAxles(TyreStiffnessOffset):
+    """The tyres of the two axles differ, as where stiffness goes with the load; `stiffness_n` is the mean."""
+
+    form = "axles unlike"
+    equation = "C_x (1 + unlike) in front, C_x (1 - unlike) in the rear"
+
+    unlike: float = parameter(
+        "-",
+        "share of the mean that the front axle has more and the rear less",
+        neutral=0.0,
+        low=-0.5,
+        high=0.5,
+        starts=(-0.1, 0.1),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each axle has its stiffness."""
+        return parameters._replace(
+            longitudinal_stiffness_n=self.stiffness_n, axle_stiffness_n=self.unlike * self.stiffness_n
+        )

@@ -16,6 +16,7 @@ class WheelInertiaOffset(Effect):
     """Wheel and motor are harder or easier to spin up than the vehicle file says."""
 
     id = "wheel_inertia_offset"
+    form = "all wheels alike"
     stage = "dynamics"
     subsystem = "wheel"
     equation = "I omega' = T - F_x R with the true I"
@@ -35,3 +36,26 @@ class WheelInertiaOffset(Effect):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The true inertia takes the nominal one's place."""
         return parameters._replace(wheel_inertia_kg_m2=self.inertia_kg_m2)
+
+
+@dataclass(frozen=True)
+class WheelInertiaOffsetOfAxles(WheelInertiaOffset):
+    """Wheels and motors of the two axles differ; `inertia_kg_m2` is the mean."""
+
+    form = "axles unlike"
+    equation = "I (1 + unlike) in front, I (1 - unlike) in the rear"
+
+    unlike: float = parameter(
+        "-",
+        "share of the mean that the front axle has more and the rear less",
+        neutral=0.0,
+        low=-0.5,
+        high=0.5,
+        starts=(-0.2, 0.2),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each axle has its inertia."""
+        return parameters._replace(
+            wheel_inertia_kg_m2=self.inertia_kg_m2, axle_inertia_kg_m2=self.unlike * self.inertia_kg_m2
+        )

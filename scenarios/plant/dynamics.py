@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from scenarios.plant.parameters import (
@@ -239,7 +240,8 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             if slip_lags:
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
-            tyre = tyre_force(theta, abs(acting), load_n, p.longitudinal_stiffness_n)
+            stiffness_n = p.longitudinal_stiffness_n + (p.axle_stiffness_n if i < 2 else -p.axle_stiffness_n)
+            tyre = tyre_force(theta, abs(acting), load_n, stiffness_n)
             if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
                 tyre = reshaped(tyre, abs(acting), theta * load_n, load_n, p)
             force, by_slip, by_load = tyre
@@ -285,8 +287,10 @@ def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, fi
 def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Omega' of one wheel [rad/s^2]; a resting wheel that nothing drives forward stays at rest."""
     resistance_n = wheels.force_n[i] + p.rolling_coefficient * wheels.load_n[i]
-    inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2
-    rate = (torque_nm - resistance_n * p.wheel_radius_m - p.drag_torque_nm) / inertia
+    unlike = 1.0 if i < 2 else -1.0
+    inertia = p.wheel_inertia_kg_m2 + unlike * p.axle_inertia_kg_m2 - p.motor_inertia_kg_m2
+    drag_nm = p.drag_torque_nm + unlike * p.axle_drag_torque_nm
+    rate = (torque_nm - resistance_n * p.wheel_radius_m - drag_nm) / inertia
     return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
 
 
@@ -340,12 +344,13 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
     gh = _GAMMA * h
     pivot = 1.0 + gh * 2.0 * p.drag_kg_m * speed / p.mass_kg
     at = wheels.work
-    per_newton = p.wheel_radius_m / p.wheel_inertia_kg_m2
     for i in range(4):
+        inertia = p.wheel_inertia_kg_m2 + (p.axle_inertia_kg_m2 if i < 2 else -p.axle_inertia_kg_m2)
+        per_newton = p.wheel_radius_m / inertia
         if p.motor_inertia_kg_m2 > 0.0:
             shaft = gh * (gh * p.shaft_stiffness_nm_rad + p.shaft_damping_nm_s_rad)
             motor = at[_MOTOR, i] = p.motor_inertia_kg_m2 + gh * at[_BRAKE, i]
-            inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2 + motor / (motor + shaft) * shaft
+            inertia = inertia - p.motor_inertia_kg_m2 + motor / (motor + shaft) * shaft
             per_newton = p.wheel_radius_m / inertia
         lagged = gh * wheels.work[_LAG, i]
         share = lagged / (1.0 + lagged) if p.relaxation_m > 0.0 else 1.0
@@ -368,9 +373,10 @@ def _solve(
     has_shaft = p.motor_inertia_kg_m2 > 0.0
     stiffness = gh * p.shaft_stiffness_nm_rad
     shaft = gh * (stiffness + p.shaft_damping_nm_s_rad)
-    inertia = p.wheel_inertia_kg_m2 - p.motor_inertia_kg_m2
     rhs = speed_rhs
     for i in range(4):
+        unlike = 1.0 if i < 2 else -1.0
+        inertia = p.wheel_inertia_kg_m2 + unlike * p.axle_inertia_kg_m2 - p.motor_inertia_kg_m2
         if has_shaft:
             k[MOTOR - WHEEL + i] *= p.motor_inertia_kg_m2 / at[_MOTOR, i]
         if has_shaft and wheels.free[i] > 0.0:
@@ -520,6 +526,18 @@ def run(
     return states, accels, slip, force_n, load_n, theta
 
 
+FIELDS = len(DynamicsParameters._fields)
+
+
+@compiled
+def between(ends: NDArray, shares: NDArray) -> DynamicsParameters:
+    """Parameters at the first of some ends and shares of the ways from it to the others."""
+    values = ends[0].copy()
+    for j in range(shares.shape[0]):
+        values += shares[j] * (ends[j + 1] - ends[0])
+    return DynamicsParameters(*to_fixed_tuple(values, FIELDS))  # type: ignore[call-arg]  # its first argument is numba's
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def follow(
     y: NDArray,
@@ -528,8 +546,10 @@ def follow(
     measured: NDArray,
     memory_s: NDArray,
     step_s: float,
-    p: DynamicsParameters,
-    road: RoadTable,
+    ends: NDArray,
+    start_m: NDArray,
+    thetas: NDArray,
+    shares: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
     """Simulate all rows from y while position, speed and wheel speeds are drawn to measurements; see `run`.
 
@@ -545,8 +565,14 @@ def follow(
         Position, speed and wheel speeds; NaN where there is none.
     memory_s : array, shape (6,)
         Time in which a state comes to its measurement [s]; the first rows are averaged instead.
-    step_s, p, road : float, DynamicsParameters, RoadTable
-        Time between the rows [s], car, road.
+    step_s : float
+        Time between the rows [s].
+    ends : array, shape (1 + m, len(DynamicsParameters))
+        The car, and m others that it may vary towards.
+    start_m, thetas : array, shape (segments,), (1 + m, segments, 2)
+        Roads of the same segments, likewise.
+    shares : array, shape (n, m)
+        How far it is towards each, row by row [-].
 
     Returns
     -------
@@ -558,6 +584,10 @@ def follow(
     slip, force_n, load_n, theta = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4))
     first, second = new_wheels()
     trial = np.empty_like(y)
+    road = RoadTable(start_m, thetas[0].copy())
+    p = between(ends, shares[0])
+    for j in range(shares.shape[1]):
+        road.theta[:] += shares[0, j] * (thetas[j + 1] - thetas[0])
     accel = refresh(y, 0.0, p, road, first)
     for k in range(n):
         states[k] = y[:6]
@@ -572,6 +602,11 @@ def follow(
         y[SPEED] += push_m_s2[k] * step_s
         for j in range(SPEED, FORCE):
             y[j] = max(y[j], 0.0)
+        if shares.shape[1] > 0:
+            p = between(ends, shares[k])
+            road.theta[:] = thetas[0]
+            for j in range(shares.shape[1]):
+                road.theta[:] += shares[k, j] * (thetas[j + 1] - thetas[0])
         accel = refresh(y, accel, p, road, first)
         accel = advance(y, trial, torque_nm[k], torque_nm[k + 1], step_s, accel, p, road, first, second)
     return states, accels, slip, force_n, load_n, theta

@@ -54,6 +54,12 @@ class DynamicsParameters(NamedTuple):
     """1: over that way it is the slip that follows, and the force is the steady one of the lagging slip [-]."""
     shaft_stiffness_nm_rad: float = 1e4
     shaft_damping_nm_s_rad: float = 0.0
+    axle_inertia_kg_m2: float = 0.0
+    """What the front wheels' inertia has more than wheel_inertia_kg_m2, and the rear wheels' less [kg m^2]."""
+    axle_drag_torque_nm: float = 0.0
+    """Likewise beside drag_torque_nm [N m]."""
+    axle_stiffness_n: float = 0.0
+    """Likewise beside longitudinal_stiffness_n [N]."""
     motor_inertia_kg_m2: float = 0.0
     """The part of wheel_inertia_kg_m2 that turns with the motor, behind the shaft; 0: no shaft [kg m^2]."""
 

@@ -1,0 +1,176 @@
+"""An effect whose value is not the same everywhere: what it leaves as a constant has its own signature.
+
+Nature has no constants: a grade is uneven, friction comes in patches, a scale sways. Where an effect takes most of a
+gap and leaves more than noise, its parameters may vary, smoothly over time or over place, each by a share of its own
+size. If that takes the rest to the noise, and no term over the car's own motion does as well, the rest is the same
+effect; the constant then is its mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.contest import Contest, Entry, Progress, Varied, run_all, silent
+from sim2real.drive import Drive
+from sim2real.evidence import Evidence, rest_of
+from sim2real.fitting import loss, robust_weight
+from sim2real.observer import Towards
+from sim2real.selection import explains, fitness
+from sim2real.unknown import fit_terms
+
+Array = NDArray[np.float64]
+
+KNOT_S = 1.0
+"""Distance of the knots of a value over time, and over place where that much time is spent [s]."""
+SPREAD = 0.5
+"""Share of its size that a value is expected to vary by, as a standard deviation [-]."""
+STEP = 0.1
+"""Step of the slopes, in noticeable changes of a parameter [-]."""
+ROUNDS = 3
+"""Gauss-Newton steps with the slopes at the constant."""
+TRIED = 2
+"""Best single effects that may vary."""
+MOSTLY = 0.7
+"""As a constant an effect has to take at least this share of the loss: a deviation about zero is another thing [-]."""
+OVER = ("time", "position")
+"""What a value may vary over: that is no property of the car's motion, which would be another effect."""
+
+
+def add_varied(
+    contest: Contest, fit_to: Evidence, holdout: Evidence, jobs: int = 1, progress: Progress = silent
+) -> Contest:
+    """The contest with its best single effects free to vary, and what they leave beside a term over the motion.
+
+    As it is where none of them explains the gap even so.
+    """
+    null = contest.null.loss
+    tried = [e for e in contest.singles[:TRIED] if null - e.loss >= MOSTLY * null]
+    work = [partial(vary, e, fit_to, holdout, over) for e in tried for over in OVER]
+    found = run_all(work, jobs, progress, "varying effects")
+    before = fitness(contest.null, fit_to, holdout)
+    if not any(explains(fitness(v.entry, fit_to, holdout), before) for v in found):
+        return contest
+    drives, noises = (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
+    terms = [
+        fit_terms(e.fitted.candidate.model(e.fitted.x), drives, noises, jobs, shared=True)[0] for e in tried
+    ]
+    motion = min((term.loss for term in terms), default=float("inf"))
+    return replace(contest, varied=tuple(sorted(found, key=lambda v: v.cost)), motion=motion)
+
+
+@dataclass(frozen=True)
+class Bump:
+    """One knot of a parameter's curve: which parameter, and its weight along each drive, None where it has none."""
+
+    parameter: int
+    weights: tuple[Array | None, ...]
+
+
+def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied:
+    """The entry with all its parameters free to vary.
+
+    Parameters
+    ----------
+    entry : Entry
+        Fitted as a constant.
+    fit_to, holdout : Evidence
+        What it is held against; all drives have a curve, over place a common one on the same road.
+    over : str
+        One of `OVER`.
+    """
+    found = entry.fitted
+    candidate, x = found.candidate, found.x
+    low, high = candidate.bounds
+    step = STEP * candidate.scale * np.where(high - x > x - low, 1.0, -1.0)
+    base = candidate.model(x)
+    count = len(x)
+    ends = tuple(candidate.model(x + step * (np.arange(count) == j)) for j in range(count))
+    every = [(e, i) for e in (fit_to, holdout) for i in range(len(e.drives))]
+    drives = [e.drives[i] for e, i in every]
+
+    def left(of: int, shares: Array) -> Array:
+        evidence, i = every[of]
+        drive = drives[of]
+        channels = base.predict(drive, towards=Towards(ends, shares)).channels
+        return np.nan_to_num(evidence.noises[i].whitened(rest_of(drive, channels))).ravel()
+
+    bumps = _bumps(count, drives, over)
+    shares = [np.zeros((len(d), count)) for d in drives]
+    z = [left(i, shares[i]) for i in range(len(drives))]
+    slopes = [np.zeros((len(z_i), len(bumps))) for z_i in z]
+    for b, bump in enumerate(bumps):
+        for i, weight in enumerate(bump.weights):
+            if weight is not None:
+                moved = np.zeros_like(shares[i])
+                moved[:, bump.parameter] = weight
+                slopes[i][:, b] = left(i, moved) - z[i]
+    size = np.maximum(np.abs(x - candidate.neutral), 1e-9)
+    sigma = SPREAD * size / np.abs(step)
+    prior = np.array([1.0 / sigma[bump.parameter] ** 2 for bump in bumps])
+    a = np.zeros(len(bumps))
+    best = sum(loss(part) for part in z)
+    for _ in range(ROUNDS):
+        new = _solved(z, slopes, prior, a)
+        tried = [_along(bumps, new, i, len(d), count) for i, d in enumerate(drives)]
+        z_new = [left(i, tried[i]) for i in range(len(drives))]
+        cost = sum(loss(part) for part in z_new) + float(prior @ new**2)
+        if cost >= best:
+            break
+        best, a, shares, z = cost, new, tried, z_new
+    cut = len(fit_to.drives)
+    spread = np.std(np.concatenate(shares), axis=0) * np.abs(step)
+    varied = Entry(entry.ids, found, np.concatenate(z[:cut]), np.concatenate(z[cut:]))
+    seconds = sum(float(d.time_s[-1] - d.time_s[0]) for d in drives)
+    return Varied(varied, over, spread, float(prior @ a**2), seconds)
+
+
+def _along(bumps: Sequence[Bump], a: Array, drive: int, rows: int, parameters: int) -> Array:
+    shares = np.zeros((rows, parameters))
+    for bump, value in zip(bumps, a, strict=True):
+        weight = bump.weights[drive]
+        if weight is not None:
+            shares[:, bump.parameter] += value * weight
+    return shares
+
+
+def _solved(z: Sequence[Array], slopes: Sequence[Array], prior: Array, a: Array) -> Array:
+    """The next values: reweighted least squares on the residuals at `a`, with the prior."""
+    normal, right = np.diag(prior), -prior * a
+    for part, slope in zip(z, slopes, strict=True):
+        weighted = slope * robust_weight(part)[:, None]
+        normal = normal + slope.T @ weighted
+        right = right - weighted.T @ part
+    return np.asarray(a + np.linalg.solve(normal, right))
+
+
+def _bumps(parameters: int, drives: Sequence[Drive], over: str) -> list[Bump]:
+    """All knots of all parameters' curves."""
+    curves = [
+        d.time_s if over == "time" else np.maximum.accumulate(np.nan_to_num(d.measured[:, 0])) for d in drives
+    ]
+    roads = [d.road if over == "position" else None for d in drives]
+    groups: list[list[int]] = []
+    for i in range(len(drives)):
+        same = next((g for g in groups if roads[i] is not None and roads[g[0]] == roads[i]), None)
+        if same is None:
+            groups.append([i])
+        else:
+            same.append(i)
+    out = []
+    for group in groups:
+        low = min(float(curves[i][0]) for i in group)
+        high = max(float(curves[i][-1]) for i in group)
+        longest = max(float(drives[i].time_s[-1] - drives[i].time_s[0]) for i in group)
+        knots = np.linspace(low, max(high, low + 1e-3), max(round(longest / KNOT_S), 2) + 1)
+        for at in range(len(knots)):
+            hat = np.eye(len(knots))[at]
+            weights = tuple(
+                np.interp(curves[i], knots, hat) if i in group else None for i in range(len(drives))
+            )
+            out += [Bump(j, weights) for j in range(parameters)]
+    return out

@@ -1,0 +1,96 @@
+"""Effects that are not the same everywhere: told by what a constant leaves, and not mistaken for other effects."""
+
+import numpy as np
+import pytest
+from gap_drives import MODEL, clean, noisy, pulses, remeasured, trace
+
+from scenarios.effects import EFFECTS, FORMS
+from scenarios.effects.road_grade import RoadGrade
+from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles
+from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages
+from sim2real.contest import enter
+from sim2real.diagnose import find
+from sim2real.drive import SPEED
+from sim2real.evidence import gather
+from sim2real.fitting import FULL_STEPS, Candidate
+from sim2real.observer import Towards
+from sim2real.result import Verdict
+from sim2real.selection import fitness
+from sim2real.varying import vary
+
+DURATION_S = 16.0
+
+
+def swaying(drive, mean=0.97, sway=0.012):
+    """The drive with a ground speed whose scale sways."""
+    factor = mean + sway * np.sin(2.0 * np.pi * drive.time_s / 8.0)
+    measured = drive.measured.copy()
+    measured[:, SPEED] *= factor
+    return remeasured(drive, measured)
+
+
+@pytest.fixture(scope="module")
+def logs():
+    nominal = clean(pulses(DURATION_S), 14.0)
+    return [noisy(swaying(nominal), seed) for seed in range(3)]
+
+
+def test_a_model_between_two_is_each_at_its_end(logs):
+    other = MODEL.with_effects(RoadGrade(0.03), TorqueGain(1.1))
+    n = len(logs[0])
+    for share, end in ((0.0, MODEL), (1.0, other)):
+        mixed = MODEL.predict(logs[0], towards=Towards((other,), np.full((n, 1), share))).channels
+        np.testing.assert_allclose(mixed, end.predict(logs[0]).channels, rtol=1e-9, atol=1e-9)
+
+
+def test_a_value_that_sways_is_followed_to_the_noise(logs):
+    fit_to, held = gather(MODEL, logs[:2]), gather(MODEL, logs[2:])
+    entry = enter(Candidate(MODEL, ("vehicle_speed_scale",)), fit_to, held, np.array([0.98]), FULL_STEPS)
+    fit_to, held = (
+        e.sharpened(MODEL.with_effects(*entry.fitted.candidate.effects(entry.fitted.x)))
+        for e in (fit_to, held)
+    )
+    entry = enter(entry.fitted.candidate, fit_to, held, entry.fitted.x, FULL_STEPS)
+    varied = vary(entry, fit_to, held, "time")
+    assert fitness(entry, fit_to, held).misfit > 3.0
+    assert fitness(varied.entry, fit_to, held).misfit < 1.5
+    assert varied.spread[0] == pytest.approx(0.012 / np.sqrt(2.0), rel=0.3)
+
+
+def test_a_swaying_scale_is_named_with_its_spread(logs):
+    rest = set(EFFECTS) - {"vehicle_speed_scale", "wheel_radius_offset", "road_grade"}
+    found = find(MODEL, logs[:2], logs[2], exclude=rest)
+    assert found.decision.verdict in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS)
+    assert found.decision.winner.ids == ("vehicle_speed_scale",)
+    assert found.decision.varied is not None
+    assert found.decision.varied.over == "time"
+
+
+def test_axles_that_are_unlike_have_their_mean_and_their_difference():
+    torque = trace((0.0, 100.0), duration_s=2.0)
+    made = TorqueGainOfAxles(0.95, 0.04).actuate(np.arange(len(torque)) * 0.008, torque)
+    np.testing.assert_allclose(made[0], [99.0, 99.0, 91.0, 91.0])
+
+
+def test_two_stages_lag_as_long_as_one_and_begin_later():
+    time_s = np.arange(400) * 0.008
+    step = np.where(time_s[:, None] >= 0.4, 100.0, 0.0) * np.ones(4)
+    one, two = (kind(0.2).actuate(time_s, step)[:, 0] for kind in (TorqueLag, TorqueLagInTwoStages))
+    assert np.trapezoid(step[:, 0] - two, time_s) == pytest.approx(
+        np.trapezoid(step[:, 0] - one, time_s), rel=0.02
+    )
+    assert two[55] < 0.5 * one[55]
+
+
+@pytest.mark.parametrize(
+    "key", ["brake_drag", "wheel_inertia_offset", "tyre_stiffness_offset", "torque_gain"]
+)
+def test_alike_axles_are_the_plain_form(key):
+    plain, unlike = FORMS[key][0], next(k for k in FORMS[key] if k.form == "axles unlike")
+    car = MODEL.vehicle.to_core()
+    value = plain.parameters()[0].start_values(car)[0]
+    drive = clean(pulses(4.0), 12.0)
+    a, b = (MODEL.with_effects(e).predict(drive).channels for e in (plain(value), unlike(value, 0.0)))
+    np.testing.assert_array_equal(a, b)
+    c = MODEL.with_effects(unlike(value, 0.3)).predict(drive).channels
+    assert np.abs(c - a).max() > 1e-6
