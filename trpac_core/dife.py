@@ -89,7 +89,7 @@ class WheelInputs(NamedTuple):
     slip_noise: float = 0.0
     """Standard deviation of the filtered slip through noise alone, which a mean over time lessens [-]."""
     slip_doubt: float = 0.0
-    """That of what slip reads too much all the time, which no mean lessens [-]."""
+    """That of slip's steady offset and of the tyre's curve, which no mean lessens, as far as it counts [-]."""
     slip_rise: float = 0.0
     """`slip_change` with its sign: positive while the tyre is being loaded [-]."""
     noise_s: float = 1.0

@@ -25,7 +25,7 @@ from .readings import (
     plain,
     unusable,
 )
-from .steady import unsettled
+from .steady import quickened, unsettled
 from .tyre import peak_friction, tyre_at_slip
 from .vision.ife import Ife
 from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
@@ -291,9 +291,7 @@ class TrpacEstimator:
             state.following = followed(state.following, tyre.elastic, theta_tyre, noise)
             following = state.following.share()
         line_share = math.sqrt(state.line.slip_variance(size, speed_m_s)) / size
-        evidence = Evidence(
-            theta_tyre, friction, tyre, line_share, noise_share, torque_friction, following
-        )
+        evidence = Evidence(theta_tyre, friction, tyre, line_share, noise_share, torque_friction, following)
         return advanced_variance(
             config.confidence,
             state.variance,
@@ -301,7 +299,7 @@ class TrpacEstimator:
             theta_hat,
             evidence,
             self._averaged,
-            config.gains.gamma,
+            config.gains.gamma * quickened(steady, inputs.noise_s),
             way_m,
             passed_s,
         )

@@ -187,11 +187,10 @@ class EstimatorState:
         return cls(**values)
 
 
-
 def _fusion_state(*values: Any) -> FusionState:
     """A state of its JSON-able values."""
     *plain, steady = values
-    return FusionState(*plain, Steady(*steady))
+    return FusionState._make((*plain, Steady(*steady)))
 
 
 _PARTS: Mapping[str, Any] = {

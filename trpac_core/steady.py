@@ -42,9 +42,7 @@ class Steady(NamedTuple):
 NOTHING = Steady()
 
 
-def held(
-    before: Steady, slip: float, friction: float, rise: float, noise: float, step_s: float
-) -> Steady:
+def held(before: Steady, slip: float, friction: float, rise: float, noise: float, step_s: float) -> Steady:
     """The means after one more reading.
 
     Parameters

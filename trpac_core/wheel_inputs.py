@@ -5,6 +5,8 @@ In plain numbers from end to end: this runs at each step of each wheel.
 
 from __future__ import annotations
 
+import math
+
 from .dife import WheelInputs
 from .estimator_data import EstimatorConfig, EstimatorState, Rates
 from .readings import GREATEST_ACCELERATION_M_S2, Readings, Sensors
@@ -23,8 +25,8 @@ RELEASED = 5.0
 """Time constants of the sensor filter until it has forgotten a locked wheel's torque to 1 % [-]."""
 
 DOUBTED = 0.5
-"""Share of the slip's steady doubt that the guard against noise counts [-]. Noise pulls the estimate at each of its peaks
-and is rectified; an offset shifts it once, and `TRPAC_std` tells by how much it may."""
+"""Share of a steady doubt that the guard against noise counts [-]. Noise pulls the estimate at each of its peaks and so
+adds up; an offset shifts it once, and `TRPAC_std` tells by how much it may."""
 
 
 _new = tuple.__new__
@@ -85,7 +87,8 @@ def wheel_inputs(
     if direction or speed_m_s >= floor_m_s:
         divisor_m_s = speed_m_s if speed_m_s > floor_m_s else floor_m_s
         offset, deviation = state.line.offset(divisor_m_s)
-        deviation *= DOUBTED
+        curve = config.confidence.tyre_share * size
+        deviation = DOUBTED * math.sqrt(deviation * deviation + curve * curve)
         signed = read_slip - offset
         size, direction = (signed, 1.0) if signed > 0.0 else (-signed, -1.0 if signed < 0.0 else 0.0)
         if size > GREATEST_SLIP:
