@@ -14,6 +14,7 @@ from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
 from .observer import advanced_state, settled_state
 from .slip import GREATEST_SLIP, Slip
+from .steady import NOTHING, Steady, held, mean_deviation, quickened
 from .tyre import TyreAtSlip, elastic_friction, force, slip_ratio_force, theta_from_friction, tyre_at_slip
 
 GREATEST_THETA = 1.2
@@ -85,6 +86,14 @@ class WheelInputs(NamedTuple):
     """Way driven over the step to come [m]."""
     torque_known: bool = True
     """False at a locked wheel: its brake holds what the road gives, whatever was commanded."""
+    slip_noise: float = 0.0
+    """Standard deviation of the filtered slip through noise alone, which a mean over time lessens [-]."""
+    slip_doubt: float = 0.0
+    """That of slip's steady offset and of the tyre's curve, which no mean lessens, as far as it counts [-]."""
+    slip_rise: float = 0.0
+    """`slip_change` with its sign: positive while the tyre is being loaded [-]."""
+    noise_s: float = 1.0
+    """Time in which the filtered noise forgets itself: twice the filter's constant [s]."""
 
 
 class Wheel(NamedTuple):
@@ -122,6 +131,8 @@ class FusionState(NamedTuple):
     """Way for which one other class than that has been given [m]."""
     rests: bool = False
     """Whether the tyre has shown theta since that class stands: the camera then has nothing to add."""
+    steady: Steady = NOTHING
+    """Means of slip and used friction since the wheel stands where it stands on the curve."""
 
 
 class FusionStep(NamedTuple):
@@ -157,7 +168,7 @@ def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: Fuz
     end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
     So the force must also be below the elastic one of a slip that is `SIGNIFICANCE` deviations smaller.
     """
-    _, _, _, (size, _), load_n, deviation, change, _, _ = inputs
+    size, load_n, deviation, change = inputs[3][0], inputs[4], inputs[5], inputs[6]
     surely = size - SIGNIFICANCE * (deviation + change)
     below = 0.0
     if surely > 0.0:
@@ -178,6 +189,20 @@ def _shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[floa
     if sensitivity < LEAST_SENSITIVITY:
         return None, 0.0
     return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity
+
+
+def _shown_by_mean(
+    steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float
+) -> tuple[float | None, float]:
+    """As `_shown`, by the means of slip and used friction since slip stands."""
+    slip, friction, rise, _ = steady
+    load_n, noise, doubt, noise_s = inputs[4], inputs[9], inputs[10], inputs[12]
+    deviation = mean_deviation(steady, noise, noise_s, doubt)
+    surely = slip - SIGNIFICANCE * (deviation + abs(rise))
+    if surely <= 0.0:
+        return None, 0.0
+    below = elastic_friction(surely, load_n, longitudinal_stiffness_n)
+    return _shown(friction, tyre_at_slip(slip, load_n, longitudinal_stiffness_n), below)
 
 
 def visible_theta(
@@ -223,8 +248,8 @@ def fusion_step(
         That of the estimate: where the tyre is not seen, a class may claim `confidence.camera_share` of its distance
         from the estimate; without a model all of it.
     """
-    theta_hat, s, unseen_m, before_img, road_img, other_m, rests = state
-    omega, omega_ahead, torque_nm, (size, direction), load_n, deviation, _, way_m, torque_known = inputs
+    theta_hat, s, unseen_m, before_img, road_img, other_m, rests, steady = state
+    omega, omega_ahead, torque_nm, (size, direction), load_n, deviation, _, way_m, torque_known = inputs[:9]
     tyre, slides_below, threshold = look
     inertia, radius_m, C_x = wheel
     K, driven_n = gains.K, direction * load_n
@@ -247,14 +272,21 @@ def fusion_step(
     model_n = driven_n * (share * (g_0 + g_1 * theta_hat))
     if not torque_known:
         s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
-        held = FusionState(theta_hat, s, unseen_m, before_img, road_img, other_m, rests)
-        return FusionStep(held, model_n, None, 0.0, threshold, False, 0.0)
+        waiting = FusionState(theta_hat, s, unseen_m, before_img, road_img, other_m, rests)
+        return FusionStep(waiting, model_n, None, 0.0, threshold, False, 0.0)
     F_hat = model_n - inertia / radius_m * (s + K * omega)  # Eq. (14), see `observed_force`
     theta_tyre, sensitivity = None, 0.0
     excited = size > threshold
     if excited or may_show:
-        theta_tyre, sensitivity = _shown(F_hat * direction / load_n, tyre, slides_below)
+        friction = F_hat * direction / load_n
+        steady = held(steady, size, friction, inputs[11], inputs[9], step_s)
+        if steady[3] > step_s:
+            theta_tyre, sensitivity = _shown_by_mean(steady, inputs, C_x)
+        else:
+            theta_tyre, sensitivity = _shown(friction, tyre, slides_below)
         excited = excited or theta_tyre is not None
+    else:
+        steady = NOTHING
     theta_next, K_v, by_theta_n = theta_hat, 0.0, 0.0
     if excited:
         if theta_img is not None and gains.tyre_first:
@@ -265,7 +297,8 @@ def fusion_step(
             if theta_tyre is None and confidence is not None and gains.tyre_first:
                 difference *= camera_share(confidence, variance, theta_hat)
             K_v = scheduler.K_v(difference)
-        theta_next = _driven(theta_hat, theta_tyre, theta_img, K_v, gains, step_s)
+        quicker = quickened(steady, inputs[12])
+        theta_next = _driven(theta_hat, theta_tyre, theta_img, K_v, gains, step_s, quicker)
         if theta_next != theta_hat:
             by_theta_n = driven_n * tyre.friction_by_theta(theta_hat)
         if theta_tyre is not None:
@@ -284,7 +317,7 @@ def fusion_step(
         radius_m,
         step_s,
     )
-    after = _new(FusionState, (theta_next, s, unseen_m, before_img, road_img, other_m, rests))
+    after = _new(FusionState, (theta_next, s, unseen_m, before_img, road_img, other_m, rests, steady))
     return _new(FusionStep, (after, F_hat, theta_tyre, sensitivity, threshold, excited, K_v))
 
 
@@ -334,9 +367,10 @@ def _driven(
     K_v: float,
     gains: Gains,
     step_s: float,
+    quicker: float,
 ) -> float:
     """theta_hat one step later under Eq. (17) or (18), for the two targets held over the step."""
-    dynamic_rate = gains.gamma if theta_tyre is not None else 0.0
+    dynamic_rate = gains.gamma * quicker if theta_tyre is not None else 0.0
     visual_rate = 0.0
     if theta_img is not None:
         visual_rate = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)

@@ -25,7 +25,8 @@ from .readings import (
     plain,
     unusable,
 )
-from .tyre import peak_friction
+from .steady import quickened, unsettled
+from .tyre import peak_friction, tyre_at_slip
 from .vision.ife import Ife
 from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
 
@@ -278,17 +279,19 @@ class TrpacEstimator:
             return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
         theta_tyre, friction = fused.theta_tyre, fused.tyre_force_n * inputs.slip.direction / inputs.load_n
+        tyre, steady = look.tyre, fused.state.steady
+        if steady.held_s > state.step_s:
+            size, friction = steady.slip, steady.friction
+            tyre = tyre_at_slip(size, inputs.load_n, wheel.longitudinal_stiffness_n)
         noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
         torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
         torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0
         if theta_tyre is not None and friction > max(torque_friction, _LEAST_FRICTION):
-            noise = reading_noise(friction, look.tyre, noise_share, torque_friction)
-            state.following = followed(state.following, look.tyre.elastic, theta_tyre, noise)
+            noise = reading_noise(friction, tyre, noise_share, torque_friction)
+            state.following = followed(state.following, tyre.elastic, theta_tyre, noise)
             following = state.following.share()
         line_share = math.sqrt(state.line.slip_variance(size, speed_m_s)) / size
-        evidence = Evidence(
-            theta_tyre, friction, look.tyre, line_share, noise_share, torque_friction, following
-        )
+        evidence = Evidence(theta_tyre, friction, tyre, line_share, noise_share, torque_friction, following)
         return advanced_variance(
             config.confidence,
             state.variance,
@@ -296,7 +299,7 @@ class TrpacEstimator:
             theta_hat,
             evidence,
             self._averaged,
-            config.gains.gamma,
+            config.gains.gamma * quickened(steady, inputs.noise_s),
             way_m,
             passed_s,
         )
@@ -314,6 +317,8 @@ class TrpacEstimator:
         line = state.line.drifted(config.elastic, passed_s)
         if not (state.settled and inputs.torque_known and speed_m_s > config.floor_m_s):
             return line
+        noise = self._rates.noise_m_s / speed_m_s
+        state.unsettled = unsettled(state.unsettled, inputs.slip_change, noise, passed_s)
         return learned(
             line,
             config.elastic,
@@ -322,8 +327,8 @@ class TrpacEstimator:
             alone.tyre_force_n,
             inputs.load_n,
             self._wheel.longitudinal_stiffness_n,
-            self._rates.noise_m_s / speed_m_s,
-            inputs.slip_change,
+            noise,
+            state.unsettled,
         )
 
     def _hold(

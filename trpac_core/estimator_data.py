@@ -13,6 +13,7 @@ from .elastic import ElasticLine, ElasticModel
 from .excitation import FuzzyScheduler
 from .mismatch import Following
 from .readings import Readings, filter_share
+from .steady import Steady
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface
 from .vision.ife import IfeConfig, IfeState
@@ -139,6 +140,8 @@ class EstimatorState:
     variance: float
     following: Following = field(default_factory=Following)
     """How the tyre's theta follows its slip."""
+    unsettled: float = 0.0
+    """How far slip has lately been from its own course [-]."""
     lag: float = 0.0
     """Smoothed distance of the tyre's theta from the estimate [-]."""
     unasked_s: float = 0.0
@@ -167,6 +170,7 @@ class EstimatorState:
         values = {item.name: getattr(self, item.name) for item in fields(self)}
         for name in _PARTS:
             values[name] = list(values[name])
+        values["fusion"][-1], values["dynamics"][-1] = list(self.fusion.steady), list(self.dynamics.steady)
         values["locked_s"] = None if math.isinf(self.locked_s) else self.locked_s
         values["ife"], values["preview"] = self.ife.to_json(), self.preview.to_json()
         return values
@@ -183,9 +187,15 @@ class EstimatorState:
         return cls(**values)
 
 
+def _fusion_state(*values: Any) -> FusionState:
+    """A state of its JSON-able values."""
+    *plain, steady = values
+    return FusionState._make((*plain, Steady(*steady)))
+
+
 _PARTS: Mapping[str, Any] = {
-    "fusion": FusionState,
-    "dynamics": FusionState,
+    "fusion": _fusion_state,
+    "dynamics": _fusion_state,
     "readings": Readings,
     "line": ElasticLine,
     "following": Following,

@@ -203,21 +203,16 @@ def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> f
     slip = math.sqrt(1.27 * quarter / linear)
     if slip > 0.5:
         slip = 0.5
+    # lambda^2 times the slope of (1 - quarter (1 - lambda) / lambda) G(lambda): a cubic without a linear term
+    cubic, bend = 2.0 * square * (1.0 + quarter), linear * (1.0 + quarter) + square * quarter
+    level = 1.27 * quarter
     for _ in range(NEWTON_STEPS):
-        # lambda^2 times the slope of (1 - quarter (1 - lambda) / lambda) G(lambda)
-        g = (square * slip - linear) * slip + 1.27
-        g_by_slip = 2.0 * square * slip - linear
-        rise = (1.0 + quarter) * slip - quarter
-        value = quarter * g + slip * rise * g_by_slip
+        value = (cubic * slip - bend) * slip * slip + level
         if value > 0.0:
             lower = slip
         else:
             upper = slip
-        value_by_slip = (
-            quarter * g_by_slip
-            + (2.0 * (1.0 + quarter) * slip - quarter) * g_by_slip
-            + 2.0 * square * slip * rise
-        )
+        value_by_slip = (3.0 * cubic * slip - 2.0 * bend) * slip
         proposal = slip - value / value_by_slip if value_by_slip != 0.0 else upper
         if not lower < proposal < upper:
             proposal = 0.5 * (lower + upper)

@@ -5,6 +5,8 @@ In plain numbers from end to end: this runs at each step of each wheel.
 
 from __future__ import annotations
 
+import math
+
 from .dife import WheelInputs
 from .estimator_data import EstimatorConfig, EstimatorState, Rates
 from .readings import GREATEST_ACCELERATION_M_S2, Readings, Sensors
@@ -21,6 +23,10 @@ LOCKED_M_S = 0.5
 torque that was commanded [m/s]."""
 RELEASED = 5.0
 """Time constants of the sensor filter until it has forgotten a locked wheel's torque to 1 % [-]."""
+
+DOUBTED = 0.5
+"""Share of a steady doubt that the guard against noise counts [-]. Noise pulls the estimate at each of its peaks and so
+adds up; an offset shifts it once, and `TRPAC_std` tells by how much it may."""
 
 
 _new = tuple.__new__
@@ -81,6 +87,8 @@ def wheel_inputs(
     if direction or speed_m_s >= floor_m_s:
         divisor_m_s = speed_m_s if speed_m_s > floor_m_s else floor_m_s
         offset, deviation = state.line.offset(divisor_m_s)
+        curve = config.confidence.tyre_share * size
+        deviation = DOUBTED * math.sqrt(deviation * deviation + curve * curve)
         signed = read_slip - offset
         size, direction = (signed, 1.0) if signed > 0.0 else (-signed, -1.0 if signed < 0.0 else 0.0)
         if size > GREATEST_SLIP:
@@ -102,6 +110,10 @@ def wheel_inputs(
             abs(signed - smoothed_slip),
             way_m,
             locked_s > RELEASED * config.sensor_filter_s,
+            noise,
+            deviation,
+            direction * (signed - smoothed_slip),
+            2.0 * config.sensor_filter_s,
         ),
     )
     return _new(Readings, (omega, torque_nm, speed_m_s)), inputs, read_slip, smoothed_slip, locked_s
