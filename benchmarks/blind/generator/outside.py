@@ -177,3 +177,33 @@ STILL_FURTHER: dict[str, Effect] = {
     ),
 }
 """From the third family on."""
+
+
+def _from_wheels(world: World, given: Parameters) -> World:
+    """As a brake controller does it where no other speed is at hand: in part from how the wheels turn."""
+    return world.sensed(speed_rolling=given["share"], wheel_radius_m=world.physics.radius)
+
+
+def _load_that_sways(car: Car, rng: Generator) -> Scale:
+    hertz = float(rng.uniform(0.5, 1.1))
+    return lambda severity: {"share": 0.03 * 10.0**severity, "hertz": hertz}
+
+
+YET_FURTHER: dict[str, Effect] = {
+    "slip_controller": Effect(
+        growing("slip", 0.2, 0.03), lambda w, g: w.moved(slip_allowed=g["slip"]), ("powertrain",)
+    ),
+    "brake_torque_rise": Effect(
+        growing("share", 0.03, 0.4), lambda w, g: w.moved(pad_rise=g["share"]), ("powertrain", "wheel")
+    ),
+    "swaying_load": Effect(
+        _load_that_sways,
+        lambda w, g: w.moved(slosh_share=g["share"], slosh_rate=2.0 * np.pi * g["hertz"]),
+        ("vehicle",),
+    ),
+    "wet_grip_falls_with_speed": Effect(
+        growing("share", 0.05, 0.7), lambda w, g: w.moved(wet_fall=g["share"]), ("road", "tyre")
+    ),
+    "speed_from_wheels": Effect(growing("share", 0.05, 1.0), _from_wheels, ("vehicle_speed_sensor",)),
+}
+"""From the fourth family on."""
