@@ -28,8 +28,8 @@ SMALL_TORQUE_NM, SMALL_M_S2 = 20.0, 0.5
 """About which a direction begins to count: of a torque, of an acceleration."""
 WAIT_S = 0.01
 """Cycle of messages that wait for others on a bus, each as long as chance has it."""
-CUT_SLIP, CUT_SHARE = 0.08, 0.85
-"""Slip over which a slip controller closes, and how much of the torque it takes at most [-]."""
+CUT_SLIP = 0.08
+"""Slip over which a slip controller closes [-]."""
 SLIPPERY = 0.75
 """Friction below which a road is wet or worse [-]."""
 
@@ -70,7 +70,7 @@ def told_friction(p: Physics, wheel: int, position: float) -> float:
     return p.mu_left[k] if wheel % 2 == 0 else p.mu_right[k]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def friction(p: Physics, wheel: int, position: float, speed: float) -> float:
     """The road's friction under a wheel, as the real road has it [-]."""
     at = position + (p.front_arm if wheel < 2 else -p.rear_arm)
@@ -121,7 +121,7 @@ def let_through(p: Physics, torque: float, slip: float) -> float:
     """What a slip controller leaves of a torque that makes a wheel slip [N m]."""
     if torque * slip <= 0.0:
         return torque
-    return torque * (1.0 - CUT_SHARE * min(max((abs(slip) - p.slip_allowed) / CUT_SLIP, 0.0), 1.0))
+    return torque * (1.0 - p.slip_cut * min(max((abs(slip) - p.slip_allowed) / CUT_SLIP, 0.0), 1.0))
 
 
 @njit(cache=True)

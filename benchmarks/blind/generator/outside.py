@@ -189,9 +189,17 @@ def _load_that_sways(car: Car, rng: Generator) -> Scale:
     return lambda severity: {"share": 0.03 * 10.0**severity, "hertz": hertz}
 
 
+def _slip_controller(car: Car, rng: Generator) -> Scale:
+    """Of ever more authority; a weak one already decides whether a wheel locks."""
+    slip = float(rng.uniform(0.03, 0.12))
+    return lambda severity: {"slip": slip, "share": 0.005 * 170.0**severity}
+
+
 YET_FURTHER: dict[str, Effect] = {
     "slip_controller": Effect(
-        growing("slip", 0.2, 0.03), lambda w, g: w.moved(slip_allowed=g["slip"]), ("powertrain",)
+        _slip_controller,
+        lambda w, g: w.moved(slip_allowed=g["slip"], slip_cut=g["share"]),
+        ("powertrain",),
     ),
     "brake_torque_rise": Effect(
         growing("share", 0.03, 0.4), lambda w, g: w.moved(pad_rise=g["share"]), ("powertrain", "wheel")

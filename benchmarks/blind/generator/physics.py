@@ -87,6 +87,7 @@ class Physics(NamedTuple):
     gain_speed: float
     pad_rise: float
     slip_allowed: float
+    slip_cut: float
     dead_band: float
     torque_limit: float
     power: float
