@@ -14,6 +14,7 @@ from test_blind_plant import CAR, ICE, NEUTRAL, QUIET, carried, readings, roll
 from benchmarks.blind.generator import kernel
 from benchmarks.blind.generator.car import Car, Road
 from benchmarks.blind.generator.cases import make_case
+from benchmarks.blind.generator.details import ROLL_M_S
 from benchmarks.blind.generator.driver import drive
 from benchmarks.blind.generator.forms import (
     ASPECTS,
@@ -27,17 +28,17 @@ from benchmarks.blind.generator.forms import (
     draw_forms,
     effect_in,
 )
-from benchmarks.blind.generator.kernel import FLOOR_M_S, ROLL_M_S, N, V, W, fallen, integrate
+from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, W, fallen, integrate
 from benchmarks.blind.generator.library import LIBRARY
-from benchmarks.blind.generator.outside import FURTHER, STILL_FURTHER
+from benchmarks.blind.generator.outside import FURTHER, STILL_FURTHER, YET_FURTHER
 from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
 from benchmarks.blind.generator.table import Group, table
 from benchmarks.blind.generator.tyre import dugoff
 from benchmarks.blind.generator.world import World, nominal
 
-FIRST, SECOND, THIRD = Family
-DRAWN = [SECOND, THIRD]
-CASES = {spec.name: spec for spec in table("full", THIRD)}
+FIRST, SECOND, THIRD, FOURTH = Family
+DRAWN = [SECOND, THIRD, FOURTH]
+CASES = {spec.name: spec for spec in table("full", FOURTH)}
 
 
 def numbered(items):
@@ -246,7 +247,7 @@ def test_relaxation_rings_over_the_travelled_length(chosen):
     assert 1e-3 * np.mean(np.diff(crossings)) == pytest.approx(expected, rel=0.03)
 
 
-@pytest.mark.parametrize("curve", range(5))
+@pytest.mark.parametrize("curve", range(6))
 def test_friction_starts_with_its_slope_and_ends_at_its_floor(curve):
     assert fallen(curve, 0.0, 0.4) == pytest.approx(1.0)
     assert (fallen(curve, 1e-6, 0.4) - 1.0) / 1e-6 == pytest.approx(-0.6, rel=1e-4)
@@ -331,7 +332,9 @@ def test_noise_of_every_kind_has_its_size(noisy):
     assert np.all(np.abs(values.mean(axis=0)) < 0.05 * noise.sigmas)
 
 
-@pytest.mark.parametrize("digits", numbered(DIGITS[name] for name in ("all", "bus", "decimals")))
+@pytest.mark.parametrize(
+    "digits", numbered(DIGITS[n] for n in ("all", "bus", "decimals", "truncating", "converted"))
+)
 def test_digits_take_no_more_than_the_noise(digits):
     path = roll(nominal(CAR, Road()), 10.0, 6.0, 150.0)
     log = make_log(path, np.full((601, 4), 150.0), Sensors(), QUIET, 200.0, np.random.default_rng(0))
@@ -360,13 +363,13 @@ def test_every_driver_stays_within_the_car_and_excites_what_he_should(style, ric
 
 
 def by_further(name: str, **given: float) -> World:
-    return OUTSIDES[THIRD][name].apply(nominal(CAR, Road()), given)
+    return OUTSIDES[FOURTH][name].apply(nominal(CAR, Road()), given)
 
 
-@pytest.mark.parametrize("name", numbered({**FURTHER, **STILL_FURTHER}))
+@pytest.mark.parametrize("name", numbered({**FURTHER, **STILL_FURTHER, **YET_FURTHER}))
 def test_further_deviations_show(name, limit):
     world, drove = limit
-    entry = OUTSIDES[THIRD][name]
+    entry = OUTSIDES[FOURTH][name]
     other = readings(entry.apply(world, entry.at(CAR, np.random.default_rng(0))(1.0)), drove)
     assert np.any(np.sqrt(np.mean((other - readings(world, drove)) ** 2, axis=0)) > 2.0 * QUIET.sigmas)
 

@@ -141,20 +141,23 @@ def test_further_forms_are_told_apart():
     for case, form in zip(cases, forms, strict=True):
         case["seal"]["forms"] = {effect: form}
     further = {a.text: (a.hits, a.n) for a in scored(*cases, result("rich", LAG, RIGHT)).asides}
-    n, of_second = len(forms), len(ASPECTS[Family.SECOND][effect])
-    assert 1 < of_second < n
+    n, of_second, of_third = len(forms), *(len(ASPECTS[f][effect]) for f in (Family.SECOND, Family.THIRD))
+    assert 1 < of_second < of_third < n
     assert further["rich, a form that the first family lacks: right first"] == (n - 1, n - 1)
     assert further["rich, a form that the second family lacks: right first"] == (n - of_second, n - of_second)
+    assert further["rich, a form that the third family lacks: right first"] == (n - of_third, n - of_third)
 
 
 def test_forms_of_effects_that_had_one_are_further_than_both_families():
     effect, forms = next((e, f) for e, f in EFFECT_FORMS.items() if e not in ASPECTS[Family.SECOND])
+    of_third = len(ASPECTS[Family.THIRD][effect])
     cases = [result("rich", {effect: {}}, RIGHT) for _ in forms]
     for case, form in zip(cases, forms, strict=True):
         case["seal"]["forms"] = {effect: form}
     assert [outcome_of(case).further for case in cases] == [
         frozenset(),
-        *[frozenset({FIRST, Family.SECOND})] * (len(forms) - 1),
+        *[frozenset({FIRST, Family.SECOND})] * (of_third - 1),
+        *[frozenset({FIRST, Family.SECOND, Family.THIRD})] * (len(forms) - of_third),
     ]
 
 

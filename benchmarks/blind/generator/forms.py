@@ -14,10 +14,10 @@ from typing import Any
 
 from numpy.random import Generator
 
-from . import forms_second, forms_third
+from . import forms_fourth, forms_second, forms_third
 from .forms_second import Foreign
 from .library import LIBRARY
-from .outside import FURTHER, OUTSIDE, STILL_FURTHER
+from .outside import FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
 from .world import Effect
 
 Forms = dict[str, str]
@@ -33,6 +33,8 @@ class Family(StrEnum):
     """More forms, more log rates, more deviations outside the library."""
     THIRD = "third"
     """Forms of nearly every effect; again more of all else."""
+    FOURTH = "fourth"
+    """Forms of every effect; again more of all else."""
 
 
 def _joined(aspects: Aspects, more: Aspects) -> Aspects:
@@ -41,15 +43,17 @@ def _joined(aspects: Aspects, more: Aspects) -> Aspects:
 
 
 THIRD: Aspects = _joined(forms_second.ASPECTS, forms_third.MORE)
+FOURTH: Aspects = _joined(THIRD, forms_fourth.MORE)
 ASPECTS: dict[Family, Aspects] = {
     Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
     Family.SECOND: forms_second.ASPECTS,
     Family.THIRD: THIRD,
+    Family.FOURTH: FOURTH,
 }
 """All that has forms in each family; what a family does not list has the library's form."""
-EFFECT_FORMS: Aspects = {name: forms for name, forms in THIRD.items() if name in LIBRARY}
-FOREIGN: dict[str, Foreign] = THIRD["foreign_tyre"]
-NOISES, DIGITS, STYLES = THIRD["noise"], THIRD["digits"], THIRD["driver"]
+EFFECT_FORMS: Aspects = {name: forms for name, forms in FOURTH.items() if name in LIBRARY}
+FOREIGN: dict[str, Foreign] = FOURTH["foreign_tyre"]
+NOISES, DIGITS, STYLES = FOURTH["noise"], FOURTH["digits"], FOURTH["driver"]
 
 RATES_HZ: dict[Family, dict[float, float]] = {
     Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
@@ -63,6 +67,16 @@ RATES_HZ: dict[Family, dict[float, float]] = {
         2000.0: 0.05,
     },
     Family.THIRD: {100.0: 0.2, 200.0: 0.2, 250.0: 0.1, 300.0: 0.2, 500.0: 0.1, 600.0: 0.15, 1200.0: 0.05},
+    Family.FOURTH: {
+        100.0: 0.2,
+        150.0: 0.15,
+        200.0: 0.2,
+        350.0: 0.15,
+        500.0: 0.1,
+        750.0: 0.1,
+        1000.0: 0.05,
+        1500.0: 0.05,
+    },
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
@@ -70,6 +84,7 @@ OUTSIDES: dict[Family, dict[str, Effect]] = {
     Family.FIRST: OUTSIDE,
     Family.SECOND: {**OUTSIDE, **FURTHER},
     Family.THIRD: {**OUTSIDE, **FURTHER, **STILL_FURTHER},
+    Family.FOURTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER},
 }
 """Each family's deviations outside the library."""
 
@@ -84,7 +99,7 @@ def draw_forms(family: Family, rng: Generator) -> Forms:
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDES[Family.THIRD]}[name]
+    effect = {**LIBRARY, **OUTSIDES[Family.FOURTH]}[name]
     return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
 
 

@@ -1,9 +1,11 @@
 """The plant's equations and their integration, compiled.
 
-A straight-line car in 36 states, integrated by the classical Runge-Kutta method at one fixed step per car, small enough
+A straight-line car in 42 states, integrated by the classical Runge-Kutta method at one fixed step per car, small enough
 for the stiffest mode: the wheel's eigenvalue is 1.27 C_x R^2 / (I v), so the slip's denominator has a floor of
 `FLOOR_M_S`, below which the drives do not go. A wheel that a brake has stopped stays at rest until the road or the
 motor turns it.
+
+What every wheel calls in every step is inlined: handing on the whole of `Physics` costs a third of the time.
 """
 
 from __future__ import annotations
@@ -14,6 +16,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .details import (
+    ROLL_M_S,
+    SMALL_M_S2,
+    SMALL_TORQUE_NM,
+    USUAL_M_S,
+    WAIT_S,
+    friction,
+    gain_of,
+    let_through,
+    profile_at,
+    radius_at,
+    rolling_of,
+    shaft_of,
+    wait_of,
+)
 from .physics import Physics
 from .tyre import THETA_GRID, dugoff, foreign
 
@@ -25,26 +42,24 @@ COMMAND_STEP_S = 0.01
 RECORD_STEP_S = 0.001
 LEAST_LAG_S = 0.001
 """Of a motor whose torque rises at a limited rate: how closely it follows below the limit."""
-EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER = range(5)
+EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER, LOGARITHMIC = range(6)
 """Codes of the ways in which friction falls."""
 
 BODY_DAMPING = 0.4
 """Of a body that pitches on its springs, over the critical one [-]."""
-PATCH_M = 23.0
-"""From one patch of the road to the next [m]."""
 BEAT_S = 0.7
 """In which two clocks of nearly the same cycle pass each other once [s]."""
-ROLL_M_S = 17.0
-"""Speed that a rolling resistance is stated at where it grows with speed [m/s]."""
 DERATING_S = 12.0
 """In which a motor gets hot [s]."""
+SLOSH_DAMPING = 0.12
+"""Of a load that sways in the car, over the critical one [-]."""
 
-X, V, W, MOTOR, TWIST, SLIP, LAG, ANGLE, HEAT, PITCH, BODY, STAGE, N = (
+X, V, W, MOTOR, TWIST, SLIP, LAG, ANGLE, HEAT, PITCH, BODY, STAGE, RUB, SWAY, SWAYING, N = (
     *(0, 1, 2, 6, 10, 14, 18, 22, 26, 30),
-    *(31, 32, 36),
+    *(31, 32, 36, 40, 41, 42),
 )
 """Where the states lie: position, speed; each wheel's speed, motor speed, twist, slip, torque, angle, heat; pitch; what
-the springs carry of it, or its rate; each motor's first stage.
+the springs carry of it, or its rate; each motor's first stage, each tyre's rubbing; a load's place, speed in the car.
 
 Where the force is what relaxes, `SLIP` holds the force [N].
 """
@@ -61,26 +76,20 @@ def on_grid(table: Array, at: float) -> float:
     return table[i] + (at - i) * (table[i + 1] - table[i])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def commanded(command: Array, wheel: int, time: float) -> float:
     return on_grid(command[:, wheel], time / COMMAND_STEP_S)
 
 
 @njit(cache=True)
-def friction(p: Physics, wheel: int, position: float) -> float:
-    """The road's friction under a wheel, as the real road has it [-]."""
-    at = position + (p.front_arm if wheel < 2 else -p.rear_arm)
-    k = p.border.size - 1
-    while k > 0 and p.border[k] > at:
-        k -= 1
-    mu = p.mu_left[k] if wheel % 2 == 0 else p.mu_right[k]
-    factor = p.factor_left if wheel % 2 == 0 else p.factor_right
-    if p.patch_depth > 0.0:
-        factor = 1.0 + (factor - 1.0) * (1.0 + p.patch_depth * np.sin(2.0 * np.pi * at / PATCH_M))
-    return mu * factor
+def joined(command: Array, wheel: int, time: float, message: float) -> float:
+    """The command as straight lines between messages."""
+    sent = np.floor(time / message)
+    first = commanded(command, wheel, sent * message)
+    return first + (time / message - sent) * (commanded(command, wheel, (sent + 1.0) * message) - first)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def slip_of(rim: float, speed: float) -> float:
     """Signed slip, positive when driving [-]."""
     return (rim - speed) / max(abs(rim), abs(speed), FLOOR_M_S)
@@ -100,14 +109,20 @@ def fallen(curve: int, sliding: float, floor: float) -> float:
         return 1.0 - (1.0 - floor) * min(sliding, 1.0)
     if curve == POWER:
         return floor + (1.0 - floor) / (1.0 + 0.5 * sliding) ** 2
+    if curve == LOGARITHMIC:
+        return 1.0 - (1.0 - floor) * min(np.log1p(sliding), 1.0)
     return floor + (1.0 - floor) * np.exp(-sliding)
 
 
-@njit(cache=True)
-def tyre_force(p: Physics, slip: float, sliding: float, theta: float, load: float, heat: float) -> float:
-    """Signed longitudinal force of one tyre [N]."""
+@njit(cache=True, inline="always")
+def tyre_force(
+    p: Physics, slip: float, sliding: float, theta: float, load: float, heat: float, stiffer: float = 0.0
+) -> float:
+    """Signed longitudinal force of one tyre [N], `stiffer` than the others [N]."""
     size = min(abs(slip), 1.0)
     stiffness = p.stiffness_drive if slip >= 0.0 else p.stiffness_brake
+    if stiffer != 0.0:
+        stiffness += stiffer
     if p.stiffness_load != 0.0:
         stiffness += p.stiffness_load * (min(load / (0.25 * p.mass * GRAVITY), 2.0) - 1.0)
     fade = 1.0 / (1.0 + heat)
@@ -123,15 +138,19 @@ def tyre_force(p: Physics, slip: float, sliding: float, theta: float, load: floa
     return force if slip >= 0.0 else -force
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: float, turning: float) -> float:
     """What the motor is told after dead time, dead band, limits, gain and ripple, before its lag [N m]."""
     heard = time - p.delay
     if p.beat > 0.0:
         heard -= p.beat * (time / BEAT_S - np.floor(time / BEAT_S) - 0.5)
-    if p.message > 0.0:
+    if p.wait > 0.0:
+        heard -= p.wait * wait_of(np.floor(time / WAIT_S))
+    if p.message > 0.0 and not p.message_joined:
         heard = np.floor((heard + 0.5 * p.message) / p.message + 1e-9) * p.message
     torque = commanded(command, wheel, heard)
+    if p.message > 0.0 and p.message_joined:
+        torque = joined(command, wheel, heard, p.message)
     if p.dead_band > 0.0:
         torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
     torque = min(max(torque, -p.torque_limit), p.torque_limit)
@@ -141,6 +160,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         torque *= 1.0 - p.derating * (1.0 - np.exp(-time / DERATING_S))
     if p.ripple > 0.0:
         torque *= 1.0 + p.ripple * np.cos(p.ripple_order * angle)
+    if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0:
+        return torque * gain_of(p.gain[wheel], p.gain_sign, p.gain_speed, p.pad_rise, torque, turning)
     return torque * p.gain[wheel]
 
 
@@ -177,10 +198,15 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
     grade = p.grade
     if p.wave_slope != 0.0:
         grade += p.wave_slope * np.sin(2.0 * np.pi * y[X] / p.wave_length)
+    if p.profile.size > 0:
+        grade += p.grade * profile_at(p.profile, y[X])
     press = p.mass * GRAVITY / np.sqrt(1.0 + grade * grade)
     shifted = y[PITCH]
     if p.springs_share > 0.0:
-        shifted += p.springs_share * (y[BODY] - y[PITCH])
+        share = p.springs_share
+        if p.springs_tilt != 0.0:
+            share += p.springs_tilt * np.tanh(y[PITCH] / SMALL_M_S2)
+        shifted += share * (y[BODY] - y[PITCH])
     total = 0.0
     for w in range(4):
         arm = p.rear_arm if w < 2 else p.front_arm
@@ -188,15 +214,26 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         tilt = 0.5 * p.drag * p.drag_height / length
         air = speed * speed * (0.25 * p.lift + (tilt if w < 2 else -tilt))
         load = max((press * arm + pitch * p.mass * p.cog_height) / (2.0 * length) - air, 0.0)
-        theta = friction(p, w, y[X])
-        rim = y[W + w] * p.radius
-        slip = slip_of(rim, speed)
+        theta = friction(p, w, y[X], speed)
+        radius = p.radius
+        if p.radius_tilt != 0.0 or p.radius_growth != 0.0:
+            radius = radius_at(p, w, speed)
+        rim = y[W + w] * radius
+        slip = slips = slip_of(rim, speed)
         dy[SLIP + w] = 0.0
         if p.relaxation > 0.0:
             path = relaxing(p, y[SLIP + w], theta, load)
+            if p.relaxation_speed != 0.0:
+                path *= 1.0 + p.relaxation_speed * (speed / USUAL_M_S - 1.0)
             dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / path
             slip = y[SLIP + w]
-        force = tyre_force(p, slip, rim - speed, theta, load, y[HEAT + w])
+        rubbing = rim - speed
+        dy[RUB + w] = 0.0
+        if p.falloff_time > 0.0:
+            dy[RUB + w] = (rubbing - y[RUB + w]) / p.falloff_time
+            rubbing = y[RUB + w]
+        stiffer = p.stiffness_tilt if w < 2 else -p.stiffness_tilt
+        force = tyre_force(p, slip, rubbing, theta, load, y[HEAT + w], stiffer)
         if p.force_relaxation > 0.0:
             dy[SLIP + w] = (force - y[SLIP + w]) * max(abs(speed), FLOOR_M_S) / p.force_relaxation
             force = y[SLIP + w]
@@ -209,33 +246,54 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         rolling = p.roll_moment * load * p.radius
         if p.roll_growth > 0.0:
             rolling *= 1.0 + p.roll_growth * ((speed / ROLL_M_S) ** 2 - 1.0)
+        if p.roll_linear > 0.0 or p.roll_wet > 0.0:
+            rolling *= rolling_of(p, w, y[X], speed)
         resisting += rolling
         if resisting > 0.0:
             resisting *= np.tanh(y[W + w] / 0.2)
         resisting += p.bearing * y[W + w]
+        if p.fanning > 0.0:
+            resisting += p.fanning * y[W + w] ** 2
         told = motor_torque(p, command, w, time, y[ANGLE + w], y[W + w])
         dy[STAGE + w] = 0.0
         if p.lag_first > 0.0:
             dy[STAGE + w] = (told - y[STAGE + w]) / p.lag_first
             told = y[STAGE + w]
         follows = p.lag > 0.0 or p.slew > 0.0
-        dy[LAG + w] = (told - y[LAG + w]) / max(p.lag, LEAST_LAG_S) if follows else 0.0
+        lag = p.lag
+        if p.lag_sign != 0.0:
+            lag *= 1.0 + p.lag_sign * np.tanh((told + y[LAG + w]) / SMALL_TORQUE_NM)
+        dy[LAG + w] = (told - y[LAG + w]) / max(lag, LEAST_LAG_S) if follows else 0.0
+        if p.lag > 0.0 and p.lag_damping > 0.0:
+            rate = 2.0 * p.lag_damping / max(lag, LEAST_LAG_S)
+            dy[LAG + w] = y[STAGE + w]
+            dy[STAGE + w] = rate * (rate * (told - y[LAG + w]) - 2.0 * p.lag_damping * y[STAGE + w])
         if p.slew > 0.0:
             dy[LAG + w] = min(max(dy[LAG + w], -p.slew), p.slew)
         torque = y[LAG + w] if follows else told
+        if p.slip_cut > 0.0:
+            torque = let_through(p, torque, slips)
         inertia = p.inertia - p.motor_inertia + (-p.inertia_tilt if w < 2 else p.inertia_tilt)
         dy[MOTOR + w] = dy[TWIST + w] = 0.0
         if p.motor_inertia > 0.0:
             dy[TWIST + w] = y[MOTOR + w] - y[W + w]
             shaft = p.shaft_stiffness * y[TWIST + w] + p.shaft_damping * dy[TWIST + w]
+            if p.shaft_play > 0.0 or p.shaft_tilt != 0.0:
+                shaft = shaft_of(p, w, y[TWIST + w], dy[TWIST + w])
             dy[MOTOR + w] = (torque - shaft) / p.motor_inertia
             torque = shaft
-        dy[W + w] = (torque - force * p.radius * p.lever - resisting) / inertia
+        dy[W + w] = (torque - force * radius * p.lever - resisting) / inertia
     total -= p.drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
     if p.gust_drag > 0.0:
         against = speed + on_grid(p.wind, time / COMMAND_STEP_S)
         total -= p.gust_drag * (against * abs(against) - speed * speed)
     reading = total / p.mass
+    dy[SWAY] = dy[SWAYING] = 0.0
+    if p.slosh_share > 0.0:
+        pull = p.slosh_rate * (p.slosh_rate * y[SWAY] + 2.0 * SLOSH_DAMPING * y[SWAYING])
+        reading = (reading + p.slosh_share * pull) / (1.0 - p.slosh_share)
+        dy[SWAY] = y[SWAYING]
+        dy[SWAYING] = -reading - pull
     dy[X] = speed
     dy[V] = reading - press * grade / p.mass
     lean(p, y, reading, dy)
@@ -297,8 +355,10 @@ def begin(p: Physics, position: float, speed: float, wheels: Array, time: float,
         y[W + w] = y[MOTOR + w] = wheels[w]
         y[SLIP + w] = 0.0 if p.force_relaxation > 0.0 else slip_of(wheels[w] * p.radius, speed)
         y[LAG + w] = y[STAGE + w] = motor_torque(p, command, w, time, 0.0, wheels[w])
+        if p.lag_damping > 0.0:
+            y[STAGE + w] = 0.0
         if p.motor_inertia > 0.0:
-            y[TWIST + w] = y[LAG + w] / p.shaft_stiffness
+            y[TWIST + w] = y[LAG + w] / p.shaft_stiffness + np.sign(y[LAG + w]) * p.shaft_play
     dy = np.empty(N)
     for _ in range(6):
         y[PITCH] = slope(p, y, time, command, dy)

@@ -177,3 +177,41 @@ STILL_FURTHER: dict[str, Effect] = {
     ),
 }
 """From the third family on."""
+
+
+def _from_wheels(world: World, given: Parameters) -> World:
+    """As a brake controller does it where no other speed is at hand: in part from how the wheels turn."""
+    return world.sensed(speed_rolling=given["share"], wheel_radius_m=world.physics.radius)
+
+
+def _load_that_sways(car: Car, rng: Generator) -> Scale:
+    hertz = float(rng.uniform(0.5, 1.1))
+    return lambda severity: {"share": 0.03 * 10.0**severity, "hertz": hertz}
+
+
+def _slip_controller(car: Car, rng: Generator) -> Scale:
+    """Of ever more authority; a weak one already decides whether a wheel locks."""
+    slip = float(rng.uniform(0.03, 0.12))
+    return lambda severity: {"slip": slip, "share": 0.005 * 170.0**severity}
+
+
+YET_FURTHER: dict[str, Effect] = {
+    "slip_controller": Effect(
+        _slip_controller,
+        lambda w, g: w.moved(slip_allowed=g["slip"], slip_cut=g["share"]),
+        ("powertrain",),
+    ),
+    "brake_torque_rise": Effect(
+        growing("share", 0.03, 0.4), lambda w, g: w.moved(pad_rise=g["share"]), ("powertrain", "wheel")
+    ),
+    "swaying_load": Effect(
+        _load_that_sways,
+        lambda w, g: w.moved(slosh_share=g["share"], slosh_rate=2.0 * np.pi * g["hertz"]),
+        ("vehicle",),
+    ),
+    "wet_grip_falls_with_speed": Effect(
+        growing("share", 0.05, 0.7), lambda w, g: w.moved(wet_fall=g["share"]), ("road", "tyre")
+    ),
+    "speed_from_wheels": Effect(growing("share", 0.05, 1.0), _from_wheels, ("vehicle_speed_sensor",)),
+}
+"""From the fourth family on."""

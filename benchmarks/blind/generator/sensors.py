@@ -12,11 +12,14 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from .details import USUAL_M_S, WAIT_S
 from .kernel import ANGLE, BEAT_S, COMMAND_STEP_S, RECORD_STEP_S, N, V, W, X
 
 Array = NDArray[np.floating[Any]]
 WHEELS = ("fl", "fr", "rl", "rr")
 SWAY_S, WARM_S = 9.0, 15.0
+NODDING_S, MOST_NODDING = 0.1, 0.4
+"""How late a body pitches, and by how much that changes a scale's deviation at most [-]."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,8 @@ class Sensors:
 
     A late signal may be one that is averaged or held: `*_average_s` is the time that a reading is the mean of,
     `*_message_s` the time from one message to the next, `*_joined` says that straight lines join the messages, and
-    `*_beat_s` is by how much the age differs over a beat of two clocks. Its mean age stays the delay.
+    `*_beat_s` is by how much the age differs over a beat of two clocks, `*_wait_s` by how much it differs from one
+    message to the next, and `*_filter_s` is the part of it that a low pass takes. Its mean age stays the delay.
     """
 
     wheel_delay_s: float = 0.0
@@ -33,15 +37,23 @@ class Sensors:
     wheel_message_s: float = 0.0
     wheel_joined: bool = False
     wheel_beat_s: float = 0.0
+    wheel_wait_s: float = 0.0
+    wheel_filter_s: float = 0.0
     wheel_teeth: float = 0.0
     wheel_window_s: float = 0.0
     wheel_window_runs: bool = False
     """The window ends at the row, instead of one after the other."""
     wheel_window_shared: bool = False
     """All wheels are counted over the same windows."""
+    wheel_window_parts: int = 1
+    """How many windows overlap: a new one ends that often in the time of one."""
+    wheel_flanks: float = 0.0
+    """By which every second flank comes late [teeth]."""
     wheel_uneven: float = 0.0
     """How far the teeth lie off their places, over a turn [teeth]."""
     wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    wheel_radius_m: float = 0.0
+    """Where a speed is taken from the wheels [m]."""
     wheel_runout: float = 0.0
     """Amplitude of the reading over a turn of the wheel, each wheel with its own phase [-]."""
     speed_delay_s: float = 0.0
@@ -49,17 +61,27 @@ class Sensors:
     speed_message_s: float = 0.0
     speed_joined: bool = False
     speed_beat_s: float = 0.0
+    speed_wait_s: float = 0.0
+    speed_filter_s: float = 0.0
     speed_clock: float = 0.0
     """Share by which the speed sensor's clock is slow: its signal is ever later [-]."""
     speed_scale: float = 1.0
     speed_sway: float = 0.0
     """By which the scale's deviation differs over `SWAY_S` [-]."""
+    speed_scale_growth: float = 0.0
+    """By which the scale's deviation differs at double `USUAL_M_S` [-]."""
+    speed_scale_pitch: float = 0.0
+    """By which it differs with the body's pitch, where the car accelerates [1/(m/s^2)]."""
+    speed_rolling: float = 0.0
+    """Share of the speed that is taken from the wheels [-]."""
     speed_offset_m_s: float = 0.0
     speed_lag_s: float = 0.0
     speed_hold_s: float = 0.0
     accel_bias_m_s2: float = 0.0
     accel_warming: float = 0.0
     """By which the bias differs before and after the sensor is warm, over `WARM_S` [-]."""
+    accel_bias_growth: float = 0.0
+    """By which the bias differs at double `USUAL_M_S` [-]."""
     accel_limit_m_s2: float = np.inf
     accel_scale: float = 1.0
     accel_lag_s: float = 0.0
@@ -122,11 +144,14 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     record = np.arange(len(path)) * RECORD_STEP_S
     rng = np.random.default_rng([sensors.seed, 11])
     wheel_phase, speed_phase, *turns = np.random.default_rng([sensors.seed, 12]).uniform(0.0, 1.0, 6)
+    waits = np.random.default_rng([sensors.seed, 13]).uniform(-0.5, 0.5, (2, int(record[-1] / WAIT_S) + 2))
     wheel_at: Array = time_s - sensors.wheel_delay_s - _beat(time_s, sensors.wheel_beat_s, wheel_phase)
+    wheel_at = wheel_at + mean_age(sensors.wheel_filter_s) - _wait(time_s, sensors.wheel_wait_s, waits[0])
     if not sensors.wheel_joined:
         wheel_at = _sent(wheel_at, sensors.wheel_message_s, wheel_phase)
     speed_at: Array = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
     speed_at = speed_at - _beat(time_s, sensors.speed_beat_s, speed_phase)
+    speed_at = speed_at + mean_age(sensors.speed_filter_s) - _wait(time_s, sensors.speed_wait_s, waits[1])
     if not sensors.speed_joined:
         speed_at = _sent(speed_at, sensors.speed_message_s, speed_phase)
     out = np.empty((time_s.size, 6))
@@ -134,7 +159,7 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
         if sensors.wheel_window_s > 0.0:
             wheel = _count(record, path[:, ANGLE + w], sensors, wheel_at, rng, wheel_phase)
         else:
-            turning = path[:, W + w]
+            turning = _lag(path[:, W + w], sensors.wheel_filter_s)
             if sensors.wheel_joined:
                 turning = _joined(record, turning, sensors.wheel_message_s, wheel_phase)
             wheel = _mean(record, turning, wheel_at, sensors.wheel_average_s)
@@ -142,17 +167,47 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
             angle = np.interp(wheel_at, record, path[:, ANGLE + w])
             wheel = wheel * (1.0 + sensors.wheel_runout * np.cos(angle + 2.0 * np.pi * turns[w]))
         out[:, w] = wheel * sensors.wheel_scale[w]
-    speed = _hold(_lag(path[:, V], sensors.speed_lag_s), sensors.speed_hold_s, rng)
+    speed = path[:, V]
+    if sensors.speed_rolling > 0.0:
+        rolled = path[:, W : W + 4].mean(axis=1) * sensors.wheel_radius_m
+        speed = speed + sensors.speed_rolling * (rolled - speed)
+    speed = _hold(_lag(speed, sensors.speed_lag_s + sensors.speed_filter_s), sensors.speed_hold_s, rng)
     if sensors.speed_joined:
         speed = _joined(record, speed, sensors.speed_message_s, speed_phase)
-    sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
-    scale = sensors.speed_scale if sensors.speed_sway == 0.0 else 1.0 + (sensors.speed_scale - 1.0) * sway
-    out[:, 4] = scale * _mean(record, speed, speed_at, sensors.speed_average_s) + sensors.speed_offset_m_s
+    shown_speed = _mean(record, speed, speed_at, sensors.speed_average_s)
+    out[:, 4] = _scale(path, sensors, time_s, shown_speed) * shown_speed + sensors.speed_offset_m_s
     accel = _lag(path[:, N], sensors.accel_lag_s)
     bias = sensors.accel_bias_m_s2 * (1.0 + sensors.accel_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S)))
+    if sensors.accel_bias_growth != 0.0:
+        faster = np.interp(time_s, record, path[:, V]) / USUAL_M_S - 1.0
+        bias = bias * (1.0 + sensors.accel_bias_growth * faster)
     shown = sensors.accel_scale * np.interp(time_s, record, accel) + bias
     out[:, 5] = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
     return out
+
+
+def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float | Array:
+    """Of the vehicle speed, whose deviation may differ with time, speed and pitch [-]."""
+    if sensors.speed_sway == sensors.speed_scale_growth == sensors.speed_scale_pitch == 0.0:
+        return sensors.speed_scale
+    sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
+    sway = sway + sensors.speed_scale_growth * (speed / USUAL_M_S - 1.0)
+    if sensors.speed_scale_pitch != 0.0:
+        record = np.arange(len(path)) * RECORD_STEP_S
+        nod = sensors.speed_scale_pitch * np.interp(time_s, record, _lag(path[:, N], NODDING_S))
+        sway = sway + np.clip(nod, -MOST_NODDING, MOST_NODDING)
+    return 1.0 + (sensors.speed_scale - 1.0) * sway
+
+
+def mean_age(filter_s: float) -> float:
+    """How late a record's first-order filter makes a ramp [s]."""
+    keep = np.exp(-RECORD_STEP_S / filter_s) if filter_s > 0.0 else 0.0
+    return float(RECORD_STEP_S * keep / (1.0 - keep))
+
+
+def _wait(time_s: Array, size_s: float, waits: Array) -> Array:
+    """How much later than on average a value comes whose message had to wait for others [s]."""
+    return size_s * waits[np.clip(time_s / WAIT_S, 0, waits.size - 1).astype(int)]
 
 
 def _beat(time_s: Array, size_s: float, phase: float) -> Array:
@@ -195,7 +250,8 @@ def _count(
     phase, first = rng.uniform(0.0, 1.0), rng.uniform(0.0, window)
     if sensors.wheel_window_shared:
         first = shared * window
-    ends = time_s if sensors.wheel_window_runs else np.floor((time_s - first) / window) * window + first
+    every = window / sensors.wheel_window_parts
+    ends = time_s if sensors.wheel_window_runs else np.floor((time_s - first) / every) * every + first
     before = np.gradient(angle[:3], RECORD_STEP_S)[0]
 
     def pulses(at: Array) -> Array:
@@ -203,6 +259,8 @@ def _count(
         passed = turned * teeth / (2.0 * np.pi) + phase
         if sensors.wheel_uneven > 0.0:
             passed = passed + sensors.wheel_uneven * np.sin(turned + 2.0 * np.pi * phase)
+        if sensors.wheel_flanks > 0.0:
+            return np.floor(0.5 * passed) + np.floor(0.5 * (passed - 1.0 - sensors.wheel_flanks)) + 1.0
         return np.floor(passed)
 
     return (pulses(ends) - pulses(ends - window)) * 2.0 * np.pi / (teeth * window)

@@ -117,7 +117,7 @@ SIZES: dict[str, Counts] = {
     "full": Counts(rich=5, tyre=1, mild=2, no_gap=75, pairs=1, outside=3, removed=2, timing=1),
 }
 """Full: 22 x 5 rich, 22 with another tyre, 22 x 2 mild, 75 without a gap, 24 pairs, 22 x 2 removed, and 3 of each
-deviation outside: 15, in the second family 18, in the third 23."""
+deviation outside: 15, in the second family 18, in the third 23, in the fourth 28."""
 
 
 def table(size: str, family: Family = Family.FIRST) -> list[Spec]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 THETA_GRID = np.linspace(0.02, 1.5, 75)
-MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED = range(5)
+MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING = range(7)
 """Codes of the foreign curves."""
 
 
@@ -155,6 +155,51 @@ def saturated(slip: float, slope: float, peak: float) -> float:
 
 
 @njit(cache=True)
+def brush_uniform(slip: float, slope: float, peak: float) -> float:
+    """Force of the brush model under an even pressure [N]: a parabola, then all of it slides.
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero [N].
+    peak : float
+        Largest force [N].
+    """
+    if peak <= 0.0:
+        return 0.0
+    x = min(0.5 * slope * slip / peak, 1.0)
+    return peak * x * (2.0 - x)
+
+
+@njit(cache=True)
+def brush_falling(slip: float, slope: float, peak: float, kinetic: float) -> float:
+    """Force of the brush model under a parabolic pressure, whose bristles slide with less friction than they hold [N].
+
+    With the share that holds, l = 1 - slope s / (3 hold), and r the friction's ratio, the force over `hold` is
+    3 (1 - l) l^2 + r (1 - 3 l^2 + 2 l^3), largest at l = 2 (1 - r) / (3 - 2 r) (Pacejka 2012, Sec. 3.2, extended).
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero [N].
+    peak : float
+        Largest force [N].
+    kinetic : float
+        Friction of what slides over that of what holds, below 1 [-].
+    """
+    if peak <= 0.0:
+        return 0.0
+    top = 2.0 * (1.0 - kinetic) / (3.0 - 2.0 * kinetic)
+    hold = peak / (3.0 * (1.0 - top) * top**2 + kinetic * (1.0 - 3.0 * top**2 + 2.0 * top**3))
+    held = max(1.0 - slope * slip / (3.0 * hold), 0.0)
+    return hold * (3.0 * (1.0 - held) * held**2 + kinetic * (1.0 - 3.0 * held**2 + 2.0 * held**3))
+
+
+@njit(cache=True)
 def foreign(curve: int, slip: float, slope: float, peak: float, first: float, second: float) -> float:
     """Force of a foreign curve by its code [N]; `first` and `second` are its own parameters."""
     if curve == BRUSH:
@@ -163,6 +208,10 @@ def foreign(curve: int, slip: float, slope: float, peak: float, first: float, se
         return rational(slip, slope, peak, first, second)
     if curve == DECAYING:
         return decaying(slip, slope, peak, first)
+    if curve == BRUSH_UNIFORM:
+        return brush_uniform(slip, slope, peak)
+    if curve == BRUSH_FALLING:
+        return brush_falling(slip, slope, peak, first)
     if curve == SATURATED:
         return saturated(slip, slope, peak)
     return magic(slip, slope, peak, first, second)
