@@ -261,6 +261,30 @@ def test_table_parts_and_resuming(sweep_of, tmp_path):
         assert ((out / "parts" / name).stat().st_mtime_ns == time) == (name != "0000001.json")
 
 
+ROW = {"run": 0, "number": 0, "seed": 1, "stretch": 0, "parameter": "", "surface": "dry", "estimator": "DE"}
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"cpu_s": 1.5},
+        {"cpu_s": "1.5", "rows": [ROW]},
+        {"cpu_s": 1.5, "rows": [{**ROW, "error_end": "dry"}]},
+        {"cpu_s": 1.5, "rows": [{**ROW, "stretch": [0]}]},
+        {"cpu_s": 1.5, "rows": [{name: ROW[name] for name in ROW if name != "surface"}]},
+        [1.5, [ROW]],
+    ],
+)
+def test_a_damaged_part_is_named(tmp_path, part):
+    parts = Parts(tmp_path / "out", {})
+    parts.open()
+    parts.keep(0, [{**ROW, "error_end": 0.1, "convergence_time_s": None, "level": float("nan")}], 1.5)
+    assert (len(parts.table()), parts.cpu_s()) == (1, [1.5])
+    (tmp_path / "out" / "parts" / "0000001.json").write_text(json.dumps(part))
+    with pytest.raises(ScenarioError, match=r"0000001\.json: damaged.*delete it and run the sweep again"):
+        parts.table()
+
+
 def test_a_folder_of_another_sweep_is_refused(sweep_of, tmp_path):
     Parts(tmp_path / "out", identity(sweep_of())).open()
     with pytest.raises(ScenarioError, match="another sweep"):
