@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
             file = f"{name}_flat.fmu" if options.flat else f"{name}.fmu"
             return build_unit(UNITS[name], options.out / file, flat=options.flat)
 
-        return Product("unit", "unit", UNITS, build, validate, smoke_run)
+        return Product("unit", "unit", UNITS, build, validate, "no problems found", smoke_run)
 
     return run_build("build_fmu.py", load, options.slave)
 

@@ -46,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
             simulate(path, RUN_S)
             return f"{RUN_S:g} s in fmpy"
 
-        return Product("package", "system", SYSTEMS, build, problems, run)
+        return Product("package", "system", SYSTEMS, build, problems, "against the schemas of SSP 1.0", run)
 
     return run_build("build_ssp.py", load, options.system)
 

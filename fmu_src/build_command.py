@@ -27,6 +27,8 @@ class Product:
         Builds the one of a name; returns its path; raises BuildError or OSError.
     validate : callable
         Problems of a built file.
+    valid : str
+        What to say where there are none.
     run : callable
         Runs a built file a little; returns how much, as a phrase.
     """
@@ -36,6 +38,7 @@ class Product:
     known: Collection[str]
     build: Callable[[str], Path]
     validate: Callable[[Path], list[str]]
+    valid: str
     run: Callable[[Path], str]
 
 
@@ -75,7 +78,7 @@ def run_build(program: str, load: Callable[[], Product], name: str) -> int:
     if problems:
         say("\n".join([f"the {product.noun} does not validate:", *problems]))
         return EXIT_INVALID
-    print("validated  no problems found")
+    print(f"validated  {product.valid}")
     try:
         done = product.run(path)
     except Exception as error:  # noqa: BLE001 - fmpy raises bare Exceptions; the exit code tells that the run failed

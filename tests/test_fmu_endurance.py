@@ -38,8 +38,10 @@ QUICK_KINDS = (
     "camera_yaml",
     "vehicle_yaml",
     "road_yaml",
+    "sweep_part_json",
     "log_parquet",
     "surface_onnx",
+    "state_TrpacEstimator",
 )
 """Kinds that are read in milliseconds; CSV logs have tests of their own, and an MDF log takes a process each."""
 
@@ -59,7 +61,9 @@ def test_instances_in_threads_do_what_each_does_alone(unit_folder: Path) -> None
 
 @pytest.mark.parametrize("unit", ["TrpacEstimator", "TrpacEstimator4W"])
 def test_random_inputs_and_calls(unit: str) -> None:
-    assert run_kind(unit, SEED, 200)["shown"] == []
+    result = run_kind(unit, SEED, 300)
+    assert result["shown"] == []
+    assert result["taken_down"] >= 5, "rubbish has met flags that were up"
 
 
 @pytest.mark.parametrize("kind", QUICK_KINDS)
