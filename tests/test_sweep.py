@@ -261,6 +261,23 @@ def test_table_parts_and_resuming(sweep_of, tmp_path):
         assert ((out / "parts" / name).stat().st_mtime_ns == time) == (name != "0000001.json")
 
 
+def test_an_unknown_key_of_a_drawn_number_is_named(tmp_path):
+    # pydantic puts the type that it tried among the keys; the search for it ended in a StopIteration.
+    path = tmp_path / "sweep.yaml"
+    path.write_text(
+        "schema: 1\nname: x\ndescription: x\nscenario: s.yaml\nruns: 1\nseed: 1\n"
+        "pedal: {pulse_s: {unifoorm: [0.3, 0.5]}, grip_use: {uniform: [0.3, 0.x]}}\n"
+    )
+    with pytest.raises(ScenarioError) as error:
+        load_sweep(path)
+    lines = str(error.value).splitlines()
+    assert any(
+        f"{path}: pedal.pulse_s.unifoorm: unknown key; did you mean 'uniform'?" in line for line in lines
+    )
+    assert any(line.startswith(f"{path}: pedal.grip_use.uniform[1]: is '0.x'; ") for line in lines)
+    assert not any("Drawn" in line or ".float" in line for line in lines)
+
+
 ROW = {"run": 0, "number": 0, "seed": 1, "stretch": 0, "parameter": "", "surface": "dry", "estimator": "DE"}
 
 
