@@ -21,15 +21,16 @@ from unittest import mock
 NOT_FORKED = 25
 """Of so many files one is read as users read it, by a process that starts anew."""
 POLL_S = 0.002
+_NUMBERS = count()
 
 
 @contextmanager
 def forked(script: Path) -> Iterator[None]:
     """`subprocess.run` of this script becomes a fork, with the same streams, exit codes, limit and errors."""
-    run, numbers = subprocess.run, count()
+    run = subprocess.run
 
     def instead(command: Sequence[Any], **options: Any) -> Any:
-        if command[-1] != script or next(numbers) % NOT_FORKED == 0:
+        if command[-1] != script or next(_NUMBERS) % NOT_FORKED == 0:
             return run(command, **options)
         return _forked(script, command, options["input"], options["timeout"])
 
