@@ -106,12 +106,9 @@ def examine(path: Path, python: str = sys.executable) -> Examination:
     UnusableError
         If the file is not an FMU, or the interpreter cannot be started.
     """
-    with _opened(path) as archive:
-        findings = [_archive(archive)]
-        contents, found = _contents(archive)
-    findings.append(found)
-    intact = all(finding.state is not State.PROBLEM for finding in findings)
-    findings.append(_description(path))
+    contents, (*of_file, described) = look_at_file(path)
+    intact = all(finding.state is not State.PROBLEM for finding in of_file)
+    findings = [*of_file, described]
     modules = dict(contents.packages) if contents else {}
     probed = _probe(python, sorted(modules))
     findings += _python(probed, modules)
@@ -120,6 +117,20 @@ def examine(path: Path, python: str = sys.executable) -> Examination:
     else:
         findings.append(Finding("trial", State.NOTE, "not run: the file is not what was built"))
     return Examination(contents.unit if contents else path.stem, tuple(findings), probed)
+
+
+def look_at_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
+    """The record of the build, if it can be read, and findings on archive, contents and description.
+
+    Raises
+    ------
+    UnusableError
+        If the file is not an FMU.
+    """
+    with _opened(path) as archive:
+        whole = _archive(archive)
+        contents, recorded = _contents(archive)
+    return contents, (whole, recorded, _description(path))
 
 
 def _opened(path: Path) -> zipfile.ZipFile:

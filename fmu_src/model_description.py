@@ -61,8 +61,14 @@ class UnitInfo:
     stop_time_s: float
 
 
-def model_description(unit: UnitInfo, variables: Sequence[Variable], guid: str) -> bytes:
-    """The XML text of a unit's description; the same arguments give the same bytes."""
+def model_description(
+    unit: UnitInfo, variables: Sequence[Variable], guid: str, *, flat: bool = False
+) -> bytes:
+    """The XML text of a unit's description; the same arguments give the same bytes.
+
+    With `flat` names are made of letters, digits and underscores alone: some tools make structures of dotted ones. The
+    annotations of binary data, which are for the tools that read dots, are then left out.
+    """
     root = Element(
         "fmiModelDescription",
         {
@@ -74,7 +80,7 @@ def model_description(unit: UnitInfo, variables: Sequence[Variable], guid: str) 
             "version": unit.version,
             "license": "MIT",
             "generationTool": f"TRPAC-FMU {unit.version} with PythonFMU",
-            "variableNamingConvention": "structured",
+            "variableNamingConvention": "flat" if flat else "structured",
         },
     )
     SubElement(root, "CoSimulation", {"modelIdentifier": unit.name, **CAPABILITIES})
@@ -87,12 +93,12 @@ def model_description(unit: UnitInfo, variables: Sequence[Variable], guid: str) 
         "DefaultExperiment",
         {"startTime": "0", "stopTime": f"{unit.stop_time_s:g}", "stepSize": f"{unit.step_size_s:g}"},
     )
-    if any(v.binary for v in variables):
+    if any(v.binary for v in variables) and not flat:
         # Without OSI messages in the buffers the annotation names no version of OSI.
         _osmp(SubElement(root, "VendorAnnotations"), "osmp", {"version": OSMP_VERSION})
     listed = SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):
-        _variable(listed, reference, variable)
+        _variable(listed, reference, variable, flat)
     structure = SubElement(root, "ModelStructure")
     outputs = [place for place, v in enumerate(variables, start=1) if v.causality == "output"]
     for group in ("Outputs", "InitialUnknowns"):
@@ -110,9 +116,14 @@ def _units(parent: Element, names: set[str]) -> None:
             SubElement(unit, "BaseUnit", {key: str(value) for key, value in exponents.items()})
 
 
-def _variable(parent: Element, reference: int, variable: Variable) -> None:
+def flat_name(name: str) -> str:
+    """A variable's name in a flat unit."""
+    return name.replace(".", "_")
+
+
+def _variable(parent: Element, reference: int, variable: Variable, flat: bool) -> None:
     attributes = {
-        "name": variable.name,
+        "name": flat_name(variable.name) if flat else variable.name,
         "valueReference": str(reference),
         "description": variable.description,
         "causality": variable.causality,
@@ -135,7 +146,7 @@ def _variable(parent: Element, reference: int, variable: Variable) -> None:
             typed[name] = _text(value)
     scalar = SubElement(parent, "ScalarVariable", attributes)
     SubElement(scalar, variable.kind.value, typed)
-    if variable.binary:
+    if variable.binary and not flat:
         role = variable.name.removeprefix(f"{variable.binary}.")
         binary = {"name": variable.binary, "role": role, "mime-type": IMAGE_TYPE}
         _osmp(SubElement(scalar, "Annotations"), "osmp-binary-variable", binary)

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pythonfmu
 
+from scenarios.whole_files import written_whole
+
 from .contents import CONTENTS_FILE, Contents, sha256_of
 from .model_description import UnitInfo, model_description
 from .variables import Variable
@@ -77,23 +79,52 @@ class BuildError(ValueError):
     """The unit cannot be built; the text lists everything that is wrong."""
 
 
-def build_unit(slave: Slave, target: Path) -> Path:
-    """Write the unit's archive; the same sources give the same bytes. Returns its path; raises BuildError."""
+def build_unit(slave: Slave, target: Path, *, flat: bool = False) -> Path:
+    """Write the unit's archive; the same sources give the same bytes.
+
+    Parameters
+    ----------
+    slave : Slave
+        The unit.
+    target : Path
+        The archive, which is there whole or as it was before.
+    flat : bool
+        Whether its variables have names without dots.
+
+    Returns
+    -------
+    Path
+        `target`.
+
+    Raises
+    ------
+    BuildError
+        Parts of the unit are missing.
+    OSError
+        The archive cannot be written.
+    """
     missing = [str(path) for path in slave.resources if not path.is_file()]
     if missing:
         raise BuildError(f"These files belong into the unit and are not there: {', '.join(missing)}.")
     content = _resources(slave) | _binaries(slave.info.name) | _licences()
-    digest = _digest(slave, content)
+    digest = _digest(model_description(slave.info, slave.variables, "", flat=flat), content)
     content = {_renamed(path, digest): _renamed_imports(path, data, digest) for path, data in content.items()}
     content[f"resources/{slave.info.name}_{digest}.py"] = _entry(slave, digest)
     content["resources/slavemodule.txt"] = f"{slave.info.name}_{digest}".encode()
-    content["modelDescription.xml"] = model_description(slave.info, slave.variables, digest)
+    content["modelDescription.xml"] = model_description(slave.info, slave.variables, digest, flat=flat)
     files = {path: sha256_of(data) for path, data in content.items()}
     record = Contents(slave.info.name, slave.info.version, digest, dict(slave.packages), files)
     content[f"resources/{CONTENTS_FILE}"] = record.to_bytes()
-    target.parent.mkdir(parents=True, exist_ok=True)
+    return write_archive(target, content)
+
+
+def write_archive(target: Path, content: Mapping[str, bytes]) -> Path:
+    """Write a zip archive, whole or not at all; the same content by path gives the same bytes. Returns its path."""
     # Stored, not compressed: compressed bytes differ between versions of zlib.
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as archive:
+    with (
+        written_whole(target.parent) as made,
+        zipfile.ZipFile(made / target.name, "w", zipfile.ZIP_STORED) as archive,
+    ):
         for path in sorted(content):
             entry = zipfile.ZipInfo(path, ZIP_TIME)
             entry.external_attr = 0o644 << 16
@@ -185,9 +216,9 @@ def _licences() -> dict[str, bytes]:
     return files
 
 
-def _digest(slave: Slave, content: dict[str, bytes]) -> str:
-    """Hash of all that the unit is made of, description included."""
-    total = hashlib.sha256(model_description(slave.info, slave.variables, ""))
+def _digest(description: bytes, content: dict[str, bytes]) -> str:
+    """Hash of all that the unit is made of, its description without a hash included."""
+    total = hashlib.sha256(description)
     for path in sorted(content):
         total.update(f"{path}\0{len(content[path])}\0".encode() + content[path])
     return total.hexdigest()[:HASH_DIGITS]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 
 from .interface_4w import TRPAC_ESTIMATOR_4W
 from .interface_plant import REFERENCE_PLANT
-from .packaging import ZIP_TIME, BuildError
+from .packaging import BuildError, write_archive
 from .units import STEP_S, UNITS
 from .variables import Kind, Variable
 
@@ -168,13 +167,7 @@ def build_package(wiring: Wiring, units: Mapping[str, Path], target: Path) -> Pa
         content[f"resources/{name}.ssv"] = parameter_set(name, values)
     for unit in wiring.elements.values():
         content[f"resources/{unit}.fmu"] = units[unit].read_bytes()
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as archive:
-        for path in sorted(content):
-            entry = zipfile.ZipInfo(path, ZIP_TIME)
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, content[path])
-    return target
+    return write_archive(target, content)
 
 
 def system_structure(wiring: Wiring) -> bytes:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import json
 import math
+import re
 import sys
 import time
 from pathlib import Path
@@ -35,6 +36,13 @@ class _Callbacks(ctypes.Structure):
         ("free", _FREE),
         ("step_finished", _POINTER),
         ("environment", _POINTER),
+    )
+
+
+def rolling(name: str) -> float | None:
+    """What a rolling car gives to an input of this name, with its wheel behind a dot or, in flat units, a line."""
+    return next(
+        (value for root, value in ROLLING.items() if re.fullmatch(rf"{root}([._](fl|fr|rl|rr))?", name)), None
     )
 
 
@@ -132,8 +140,9 @@ def run(folder: Path, steps: int) -> dict[str, Any]:
             (a["name"], a["causality"], int(a["valueReference"])) for a, t in instance.scalars if t == "Real"
         ]
         for name, causality, reference in reals:
-            if causality == "input" and name.split(".")[0] in ROLLING:
-                instance.set_real(reference, ROLLING[name.split(".")[0]])
+            value = rolling(name) if causality == "input" else None
+            if value is not None:
+                instance.set_real(reference, value)
         started = time.perf_counter()
         for index in range(steps):
             instance.step(index)

@@ -5,10 +5,12 @@ Every loader reads strictly and raises one ScenarioError that lists all problems
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 import numpy as np
 import yaml
@@ -364,9 +366,8 @@ def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
     """One sentence per problem: key, what is wrong, what was expected."""
     texts = []
     for item in error.errors():
-        place = "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in item["loc"]).lstrip(".")
+        place, known = _place(model, item["loc"])
         if item["type"] == "extra_forbidden":
-            known = _keys_at(model, item["loc"][:-1])
             texts.append(f"{place}: unknown key; {suggestion(str(item['loc'][-1]), known)}")
         elif item["type"] == "missing":
             texts.append(f"{place}: missing; expected this key.")
@@ -380,12 +381,35 @@ def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
     return texts
 
 
-def _keys_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    """Keys of the model that lies at a location inside a file."""
+def _place(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
+    """Where in the file a problem is, and the keys that are known there.
+
+    Among the keys pydantic names the type that it tried, where there are several: those are left out.
+    """
+    place, known = "", list(_fields([model]))
+    types: list[type] = [model]
     for key in location:
         if isinstance(key, int):
+            place += f"[{key}]"
             continue
-        annotation: Any = next(f.annotation for n, f in model.model_fields.items() if (f.alias or n) == key)
-        candidates = [annotation, *getattr(annotation, "__args__", ())]
-        model = next(c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel))
-    return [f.alias or n for n, f in model.model_fields.items()]
+        fields = _fields(types)
+        tried = [t for t in types if re.search(rf"\b{re.escape(t.__name__)}\b", key)]
+        if key not in fields and len(types) > 1 and tried:
+            types = tried
+            continue
+        place += f".{key}"
+        known = list(fields)
+        types = _types(fields[key]) if key in fields else types
+    return place.lstrip("."), known
+
+
+def _fields(types: Iterable[type]) -> dict[str, Any]:
+    """Annotation of each key of the models among these types."""
+    models = [t for t in types if issubclass(t, BaseModel)]
+    return {f.alias or n: f.annotation for m in models for n, f in m.model_fields.items()}
+
+
+def _types(annotation: Any) -> list[type]:
+    """The classes in an annotation."""
+    within = [found for part in get_args(annotation) for found in _types(part)]
+    return within or ([annotation] if isinstance(annotation, type) else [])

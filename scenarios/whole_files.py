@@ -13,7 +13,8 @@ from pathlib import Path
 def written_whole(folder: Path) -> Iterator[Path]:
     """A scratch folder; the files that lie in it when the block ends well are moved to `folder`, else none is.
 
-    It lies beside `folder`, on the same disk, so that a full one shows before anything is moved.
+    It lies in `folder` if that is there, which may be a mounted disk, else beside it: always on the same disk, so that
+    a full one shows before anything is moved.
 
     Raises
     ------
@@ -21,7 +22,8 @@ def written_whole(folder: Path) -> Iterator[Path]:
         The folder cannot be written to, or the disk is full.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=folder.parent) as made:
+    place = folder if folder.is_dir() else folder.parent
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=place) as made:
         yield Path(made)
         folder.mkdir(exist_ok=True)
         for path in sorted(Path(made).iterdir()):

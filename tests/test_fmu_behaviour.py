@@ -51,6 +51,21 @@ def flag_up(unit: Unit) -> None:
     assert unit.get("flag")
 
 
+@pytest.mark.parametrize("step_s", [11.0, 1e300])
+def test_a_step_over_which_nobody_knows_where_the_car_has_gone(open_unit: Open, step_s: float) -> None:
+    """It was taken: after 1e300 s no frame could ever come under the wheel again."""
+    unit = open_unit()
+    flag_up(unit)
+    held = unit.get("TRPAC")
+    unit.step({"road_class": -1}, step_s=step_s)
+    assert not unit.get("flag")
+    assert unit.get("TRPAC") == held
+    assert [(line.status, "expected 0 to 10 s" in line.text) for line in unit.log] == [(WARNING, True)]
+    unit.step(count=20)
+    assert not unit.get("flag"), "what was seen ahead of where the car was is not under the wheel"
+    flag_up(unit)
+
+
 def test_unit_and_estimator_agree_bit_by_bit(open_unit: Open) -> None:
     unit, estimator = open_unit(), Estimator(EstimatorConfig())
     rng = np.random.default_rng(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 import zipfile
@@ -18,9 +19,12 @@ from fmu_unit import Unit
 
 import build_fmu
 from fmu_src import packaging, variable_table
+from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
+from fmu_src.doctor import State, look_at_file
 from fmu_src.fields import field_value
 from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.model_description import UNITS as SI_UNITS
+from fmu_src.model_description import flat_name
 from fmu_src.packaging import BuildError, build_unit, sha256, unpack_unit
 from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
@@ -294,8 +298,45 @@ def test_command_line_builds_validates_and_prints_the_hash(
     assert "no problems found" in printed
 
 
+@pytest.mark.e2e
+def test_flat_names_have_no_dots_and_run_the_same(
+    unit_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A flat unit differs in names alone; doctor and validation find nothing in it."""
+    assert build_fmu.main(["--flat", "--out", str(tmp_path)]) == 0
+    path = tmp_path / "TrpacEstimator_flat.fmu"
+    assert str(path) in capsys.readouterr().out
+    assert [found.text for found in look_at_file(path)[1] if found.state is not State.OK] == []
+    description, dotted = read_model_description(str(path)), read_model_description(str(unit_file))
+    assert description.variableNamingConvention == "flat"
+    assert description.guid != dotted.guid
+    names, usual = ([v.name for v in d.modelVariables] for d in (description, dotted))
+    assert names == [name.replace(".", "_") for name in usual]
+    drive = {"wheel_speed": 52.0, "wheel_torque": 150.0, "vehicle_speed": 15.0, "road_class": 1}
+    flat, other = (
+        Unit(unpack_unit(path, tmp_path / "flat")),
+        Unit(unpack_unit(unit_file, tmp_path / "dotted")),
+    )
+    flat.set({"estimator_theta_initial": 0.4})
+    other.set({"estimator.theta_initial": 0.4})
+    for unit in (flat, other):
+        unit.initialise()
+        unit.step({**drive, "road_class_confidence": 0.9}, step_s=0.01, count=100)
+    assert flat.get("flag")
+    assert list(flat.outputs().values()) == list(other.outputs().values())
+    for unit in (flat, other):
+        unit.free()
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_flat_names_are_names_of_one_variable_each(unit: str) -> None:
+    names = [flat_name(v.name) for v in UNITS[unit].variables]
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) for name in names)
+
+
 def test_command_line_suggests_units(capsys: pytest.CaptureFixture[str]) -> None:
-    assert build_fmu.main(["--slave", "TrpacEstimater"]) == build_fmu.EXIT_USAGE
+    assert build_fmu.main(["--slave", "TrpacEstimater"]) == EXIT_USAGE
     assert "TrpacEstimator" in capsys.readouterr().err
 
 
@@ -305,7 +346,7 @@ def test_command_line_says_which_folder_cannot_be_written(
 ) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
-    assert build_fmu.main(["--out", str(blocked)]) == build_fmu.EXIT_BUILD
+    assert build_fmu.main(["--out", str(blocked)]) == EXIT_BUILD
     assert str(blocked) in capsys.readouterr().err
 
 

@@ -24,6 +24,7 @@ from benchmarks.endurance_fmu import (
 )
 from benchmarks.fuzz.files import KINDS
 from benchmarks.fuzz.run import run_kind
+from fmu_src.packaging import write_archive
 from scenarios.whole_files import written_whole
 
 pytestmark = pytest.mark.e2e
@@ -37,8 +38,10 @@ QUICK_KINDS = (
     "camera_yaml",
     "vehicle_yaml",
     "road_yaml",
+    "sweep_part_json",
     "log_parquet",
     "surface_onnx",
+    "state_TrpacEstimator",
 )
 """Kinds that are read in milliseconds; CSV logs have tests of their own, and an MDF log takes a process each."""
 
@@ -58,7 +61,9 @@ def test_instances_in_threads_do_what_each_does_alone(unit_folder: Path) -> None
 
 @pytest.mark.parametrize("unit", ["TrpacEstimator", "TrpacEstimator4W"])
 def test_random_inputs_and_calls(unit: str) -> None:
-    assert run_kind(unit, SEED, 200)["shown"] == []
+    result = run_kind(unit, SEED, 300)
+    assert result["shown"] == []
+    assert result["taken_down"] >= 5, "rubbish has met flags that were up"
 
 
 @pytest.mark.parametrize("kind", QUICK_KINDS)
@@ -70,13 +75,14 @@ def test_damage_is_damage() -> None:
     """The fuzzing would find what it looks for: a reader that takes anything is found out."""
     import numpy as np
 
-    from benchmarks.fuzz.files import damaged, judge, workplace
+    from benchmarks.fuzz.files import judge, workplace
+    from benchmarks.fuzz.mutations import damaged
 
     kind = KINDS["picture_png"]
     with workplace(kind) as (path, good, right):
         assert judge(kind, path, right) is None
         assert judge(kind, path, right + 1) == "read, with another content"
-        spoilt = [damaged(kind, good, np.random.default_rng([SEED, i])) for i in range(50)]
+        spoilt = [damaged(kind.ways, good, np.random.default_rng([SEED, i])) for i in range(50)]
         assert sum(one != good for one in spoilt) > 45
         path.unlink()
         path.mkdir()
@@ -125,11 +131,32 @@ def test_a_digit_changed_in_a_state_is_found(open_unit: Open) -> None:
     assert unit.get("TRPAC") != 0.3
 
 
-def test_a_full_disk_leaves_no_half_unit() -> None:
+@pytest.mark.parametrize("program", ["build_fmu.py", "build_ssp.py"])
+def test_a_full_disk_leaves_no_half_archive(program: str) -> None:
     if not can_mount():
         pytest.skip("this machine mounts no small file system without special rights")
-    done = small_disk([sys.executable, "build_fmu.py", "--out", "OUT"])
+    done = small_disk([sys.executable, program, "--out", "OUT"])
     assert (done["exit_code"], done["lines_of_error"], done["left"]) == (3, 1, [])
+
+
+def test_an_archive_that_fails_half_way_leaves_the_one_before(tmp_path: Path) -> None:
+    target = write_archive(tmp_path / "unit.fmu", {"a": b"first"})
+    before = target.read_bytes()
+    with pytest.raises(TypeError):
+        write_archive(target, {"a": b"second", "b": None})  # type: ignore[dict-item]
+    assert target.read_bytes() == before
+    assert os.listdir(tmp_path) == ["unit.fmu"]
+    assert write_archive(tmp_path / "unit.fmu", {"a": b"first"}).read_bytes() == before
+
+
+def test_a_result_goes_to_a_folder_that_is_a_disk_of_its_own(tmp_path: Path) -> None:
+    """Nothing is made beside a folder that is there: that may be another disk, or not the user's to write to."""
+    out = tmp_path / "mounted"
+    out.mkdir()
+    with written_whole(out) as made:
+        assert made.parent == out
+        (made / "log.csv").write_text("first")
+    assert os.listdir(out) == ["log.csv"]
 
 
 def _fail_half_way(out: Path) -> None:

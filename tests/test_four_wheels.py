@@ -166,6 +166,21 @@ def test_a_broken_shared_sensor_is_told_once_and_all_wheels_hold(signal, value):
     assert after.problems == ()
 
 
+@pytest.mark.parametrize(
+    "measured", [{"longitudinal_acceleration_m_s2": None}, {"vertical_load_n": (3500.0,) * 4}]
+)
+def test_a_broken_lateral_acceleration_is_told_where_it_would_not_count_too(measured):
+    # It was ignored there: all flags stayed up beside a signal that no car gives.
+    four = FourWheels(FourWheelsConfig())
+    good = sliding()._replace(**measured)
+    before = driven(four, good, 0.3, SPLIT)
+    estimate = driven(four, good._replace(lateral_acceleration_m_s2=1e9), 0.1, SPLIT)
+    assert [wheel.TRPAC for wheel in estimate.wheels] == [wheel.TRPAC for wheel in before.wheels]
+    assert not any(wheel.flag for wheel in estimate.wheels)
+    ((who, text),) = estimate.problems
+    assert (who, "lateral_acceleration_m_s2 is 1e+09" in text) == (CAR, True)
+
+
 def test_lateral_acceleration_moves_load_between_the_sides():
     # In a left turn (a_y > 0) the right wheels bear more: m a_y h / track over the whole car.
     four = FourWheels(FourWheelsConfig())

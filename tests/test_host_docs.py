@@ -73,6 +73,7 @@ def test_page_does_what_it_says(
         pytest.skip(f"{page} needs {program} on Linux")
     (tmp_path / "dist").mkdir()
     (tmp_path / "dist" / unit_file.name).symlink_to(unit_file)
+    (tmp_path / "build_fmu.py").symlink_to(ROOT / "build_fmu.py")
     for block in blocks(PAGES / page):
         if block.file:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")

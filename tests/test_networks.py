@@ -72,3 +72,20 @@ def test_missing_empty_and_foreign_files(tmp_path):
     (tmp_path / "cut.onnx").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(ModelError, match=r"cut\.onnx"):
         Segmenter(tmp_path / "cut.onnx")
+
+
+def test_a_network_that_loads_but_cannot_run_is_named(tmp_path):
+    classifier = SurfaceClassifier(write_classifier(tmp_path / "surface.onnx", only_for=1))
+    patches = np.zeros((2, 64, 96, 3), np.uint8)
+    assert classifier.verdicts(patches[:1]).logits.shape == (1, 3)
+    with pytest.raises(ModelError, match=r"surface\.onnx: a damaged network, it cannot be run: .*Reshape"):
+        classifier.verdicts(patches)
+
+
+def test_masks_that_are_no_numbers_are_refused(tmp_path):
+    segmenter = Segmenter(write_segmenter(tmp_path / "segmenter.onnx", drivable_by="Log"))
+    image = np.full((1200, 1920, 3), 20, np.uint8)
+    assert segmenter.segment(image).drivable[0, 0] == pytest.approx(np.log(20.0))
+    image[0:100, 0:100] = 0
+    with pytest.raises(ModelError, match=r"segmenter\.onnx: expected 'drivable' finite and of 160 x 256"):
+        segmenter.segment(image)

@@ -14,6 +14,7 @@ import pytest
 from fmu_unit import STEP_S, Unit
 
 import build_ssp
+from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
 from fmu_src.packaging import BuildError, build_unit, sha256, unpack_unit
 from fmu_src.ssp import (
     ESTIMATOR,
@@ -265,7 +266,7 @@ def test_command_line_builds_validates_runs_and_prints_the_hash(
     printed = capsys.readouterr().out
     assert sha256(tmp_path / "trpac_one_wheel.ssp") in printed
     assert "against the schemas of SSP 1.0" in printed
-    assert build_ssp.main(["--system", "five_wheels"]) == build_ssp.EXIT_USAGE
+    assert build_ssp.main(["--system", "five_wheels"]) == EXIT_USAGE
     assert "four_wheels, one_wheel" in capsys.readouterr().err
     (tmp_path / "file").write_text("")
-    assert build_ssp.main(["--out", str(tmp_path / "file")]) == build_ssp.EXIT_BUILD
+    assert build_ssp.main(["--out", str(tmp_path / "file")]) == EXIT_BUILD

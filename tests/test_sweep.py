@@ -261,6 +261,47 @@ def test_table_parts_and_resuming(sweep_of, tmp_path):
         assert ((out / "parts" / name).stat().st_mtime_ns == time) == (name != "0000001.json")
 
 
+def test_an_unknown_key_of_a_drawn_number_is_named(tmp_path):
+    # pydantic puts the type that it tried among the keys; the search for it ended in a StopIteration.
+    path = tmp_path / "sweep.yaml"
+    path.write_text(
+        "schema: 1\nname: x\ndescription: x\nscenario: s.yaml\nruns: 1\nseed: 1\n"
+        "pedal: {pulse_s: {unifoorm: [0.3, 0.5]}, grip_use: {uniform: [0.3, 0.x]}}\n"
+    )
+    with pytest.raises(ScenarioError) as error:
+        load_sweep(path)
+    lines = str(error.value).splitlines()
+    assert any(
+        f"{path}: pedal.pulse_s.unifoorm: unknown key; did you mean 'uniform'?" in line for line in lines
+    )
+    assert any(line.startswith(f"{path}: pedal.grip_use.uniform[1]: is '0.x'; ") for line in lines)
+    assert not any("Drawn" in line or ".float" in line for line in lines)
+
+
+ROW = {"run": 0, "number": 0, "seed": 1, "stretch": 0, "parameter": "", "surface": "dry", "estimator": "DE"}
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"cpu_s": 1.5},
+        {"cpu_s": "1.5", "rows": [ROW]},
+        {"cpu_s": 1.5, "rows": [{**ROW, "error_end": "dry"}]},
+        {"cpu_s": 1.5, "rows": [{**ROW, "stretch": [0]}]},
+        {"cpu_s": 1.5, "rows": [{name: ROW[name] for name in ROW if name != "surface"}]},
+        [1.5, [ROW]],
+    ],
+)
+def test_a_damaged_part_is_named(tmp_path, part):
+    parts = Parts(tmp_path / "out", {})
+    parts.open()
+    parts.keep(0, [{**ROW, "error_end": 0.1, "convergence_time_s": None, "level": float("nan")}], 1.5)
+    assert (len(parts.table()), parts.cpu_s()) == (1, [1.5])
+    (tmp_path / "out" / "parts" / "0000001.json").write_text(json.dumps(part))
+    with pytest.raises(ScenarioError, match=r"0000001\.json: damaged.*delete it and run the sweep again"):
+        parts.table()
+
+
 def test_a_folder_of_another_sweep_is_refused(sweep_of, tmp_path):
     Parts(tmp_path / "out", identity(sweep_of())).open()
     with pytest.raises(ScenarioError, match="another sweep"):

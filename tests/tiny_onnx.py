@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-FLOAT, UINT8 = 1, 2
+FLOAT, UINT8, INT64 = 1, 2, 7
 
 
 def _varint(value: int) -> bytes:
@@ -39,6 +39,13 @@ def _mean(target: str, axes: list[int]) -> bytes:
     return _node("ReduceMean", "as_float", target, _field(5, over) + _field(5, flat))
 
 
+def _reshape(source: str, target: str, size: int) -> list[bytes]:
+    tensor = _field(1, 1) + _field(2, INT64) + _field(7, _varint(size))
+    value = _field(1, "value") + _field(5, tensor) + _field(20, 4)
+    constant = _field(2, "size") + _field(4, "Constant") + _field(5, value)
+    return [constant, _field(1, source) + _field(1, "size") + _field(2, target) + _field(4, "Reshape")]
+
+
 def _write(path: Path, nodes: list[bytes], inputs: list[bytes], outputs: list[bytes], metadata: dict) -> Path:
     graph = b"".join(_field(1, node) for node in nodes) + _field(2, "tiny")
     graph += b"".join(_field(11, tensor) for tensor in inputs) + b"".join(_field(12, t) for t in outputs)
@@ -48,8 +55,13 @@ def _write(path: Path, nodes: list[bytes], inputs: list[bytes], outputs: list[by
     return path
 
 
-def write_classifier(path: Path, *, height: int = 64, metadata: dict | None = None) -> Path:
-    """Logits are the mean blue, green and red of each patch; any patch is readable, the more so the brighter it is."""
+def write_classifier(
+    path: Path, *, height: int = 64, metadata: dict | None = None, only_for: int | None = None
+) -> Path:
+    """Logits are the mean blue, green and red of each patch; any patch is readable, the more so the brighter it is.
+
+    With `only_for` it can be loaded, but run on that number of patches alone, as a damaged network may.
+    """
     calibration = {"temperature": "2.5", "classes": "dry,wet,snow_ice"} if metadata is None else metadata
     return _write(
         path,
@@ -57,7 +69,11 @@ def write_classifier(path: Path, *, height: int = 64, metadata: dict | None = No
             _cast("patches"),
             _mean("logits", [1, 2]),
             _mean("grey", [1, 2, 3]),
-            _node("Sigmoid", "grey", "readable"),
+            *(
+                [_node("Sigmoid", "grey", "readable")]
+                if only_for is None
+                else _reshape("grey", "readable", only_for)
+            ),
         ],
         [_tensor("patches", UINT8, ["n", height, 96, 3])],
         [_tensor("logits", FLOAT, ["n", 3]), _tensor("readable", FLOAT, ["n"])],
@@ -65,13 +81,15 @@ def write_classifier(path: Path, *, height: int = 64, metadata: dict | None = No
     )
 
 
-def write_segmenter(path: Path, *, outputs: tuple[str, str] = ("drivable", "shadow")) -> Path:
+def write_segmenter(
+    path: Path, *, outputs: tuple[str, str] = ("drivable", "shadow"), drivable_by: str = "Sigmoid"
+) -> Path:
     """Drivable is the sigmoid of the mean colour: above 0.99 where anything is lit; shadow its mean, unscaled."""
     drivable, shadow = outputs
     mask = [1, 160, 256]
     return _write(
         path,
-        [_cast("image"), _mean(shadow, [3]), _node("Sigmoid", shadow, drivable)],
+        [_cast("image"), _mean(shadow, [3]), _node(drivable_by, shadow, drivable)],
         [_tensor("image", UINT8, [1, 160, 256, 3])],
         [_tensor(drivable, FLOAT, mask), _tensor(shadow, FLOAT, mask)],
         {},

@@ -18,6 +18,7 @@ from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, Ro
 from .mismatch import followed
 from .readings import (
     GREATEST_ACCELERATION_M_S2,
+    LONGEST_STEP_S,
     MOTION,
     Readings,
     Sensors,
@@ -28,6 +29,7 @@ from .readings import (
 from .steady import quickened, unsettled
 from .tyre import peak_friction, tyre_at_slip
 from .vision.ife import Ife
+from .vision.preview import PreviewState
 from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
 
 __all__ = [
@@ -344,7 +346,11 @@ class TrpacEstimator:
         A speed that can be read counts, else the last good one; a picture that came is not lost.
         """
         state = self._state
-        passed_s = step_s if math.isfinite(step_s) and step_s > 0.0 else 0.0
+        passed_s = step_s if 0.0 < step_s <= LONGEST_STEP_S else 0.0
+        if step_s > LONGEST_STEP_S:
+            state.preview = (
+                PreviewState()
+            )  # the car may be anywhere: what was seen ahead is not under the wheel
         if not implausible(sensors, MOTION):
             if frame is not None or frame_failed:
                 acceleration = state.acceleration_m_s2

@@ -35,6 +35,7 @@ OptionalFour = tuple[float | None, float | None, float | None, float | None]
 
 _new = tuple.__new__
 _UNKNOWN: OptionalFour = (None, None, None, None)
+_NO_LOADS: Four = (math.nan, math.nan, math.nan, math.nan)
 
 
 class CarSensors(NamedTuple):
@@ -249,9 +250,12 @@ class FourWheels:
         """Vertical loads for the car's sum, and what the wheels are given of them [N].
 
         A wheel works the load out itself, from the filtered acceleration, unless a sensor or a lateral transfer tells.
+        Where the lateral acceleration is no good reading all are NaN, which no wheel takes, used or not.
         """
         loads = self._static_n
         _, _, _, given, _, accel, lateral, _ = sensors
+        if lateral is not None and not abs(lateral) <= _STEEPEST:
+            return loads, _NO_LOADS
         if accel is not None and abs(accel) <= _STEEPEST:
             front_n, rear_n = self._car.wheel_load(True, accel), self._car.wheel_load(False, accel)
             loads = (front_n, front_n, rear_n, rear_n)
@@ -264,9 +268,7 @@ class FourWheels:
         return (total if all(load > 0.0 and math.isfinite(load) for load in total) else self._static_n), given
 
     def _leaning(self, front_n: float, rear_n: float, lateral_m_s2: float) -> Four:
-        """Loads under lateral acceleration; NaN where that is none, so that no wheel takes them [N]."""
-        if not abs(lateral_m_s2) <= _STEEPEST:
-            return (math.nan, math.nan, math.nan, math.nan)
+        """Loads under lateral acceleration [N]."""
         front, rear = self._roll_kg[0] * lateral_m_s2, self._roll_kg[1] * lateral_m_s2
         return (
             max(front_n - front, LIFTED_N),

@@ -23,6 +23,9 @@ MOTION = ("vehicle_speed_m_s", "steering_angle_rad", "yaw_rate_rad_s")
 GREATEST_ACCELERATION_M_S2 = 15.0
 """No road car's tyres give more: a steeper change of speed is a jump of the signal [m/s^2]."""
 
+LONGEST_STEP_S = 10.0
+"""Over a longer step nobody knows where the car has gone [s]."""
+
 
 @dataclass(slots=True)  # frozen, its making would take 1 us, four times a step
 class Sensors:
@@ -71,7 +74,7 @@ def plain(step_s: float, sensors: Sensors, floor_m_s: float) -> bool:
     load_n, acceleration = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
     yaw_rate = sensors.yaw_rate_rad_s
     return (
-        0.0 <= step_s < math.inf
+        0.0 <= step_s <= LONGEST_STEP_S
         and -floor_m_s <= sensors.vehicle_speed_m_s <= _SPEED
         and 0.0 <= sensors.wheel_speed_rad_s <= _OMEGA
         and -_TORQUE <= sensors.wheel_torque_nm <= _TORQUE
@@ -87,8 +90,8 @@ def unusable(step_s: float, sensors: Sensors, wheel_radius_m: float, floor_m_s: 
 
     A wheel that reads a little below 0 is locked, not reversed: what counts is its speed against the floor.
     """
-    if not math.isfinite(step_s) or step_s < 0.0:
-        return f"Step size is {step_s} s; expected a finite number of seconds, 0 or above."
+    if not 0.0 <= step_s <= LONGEST_STEP_S:
+        return f"Step size is {step_s} s; expected 0 to {LONGEST_STEP_S:g} s. No time has passed."
     bad = implausible(sensors, tuple(PLAUSIBLE))
     if bad:
         return f"{'; '.join(bad)}. Check the signal's source and unit."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
 import sys
@@ -17,9 +18,11 @@ from typing import Any
 import cv2
 import numpy as np
 
+from fmu_src.doctor import State, UnusableError, look_at_file
 from fmu_src.units import MODELS, ROOT
 
-from .mutations import BINARY, TEXT, Rng
+from .forked import forked
+from .mutations import BINARY, TEXT, Rng, damaged
 
 LONGEST_ERROR = 20_000
 """A longer error is no clear one [characters]."""
@@ -49,14 +52,10 @@ class Kind:
     text: bool = False
     exact: bool = False
 
-
-def damaged(kind: Kind, good: bytes, rng: Rng) -> bytes:
-    """The file's bytes after one damage, or two."""
-    ways = TEXT if kind.text else BINARY
-    for _ in range(int(rng.integers(1, 3))):
-        if good:
-            good = ways[int(rng.integers(len(ways)))](good, rng)
-    return good
+    @property
+    def ways(self) -> tuple[Callable[[bytes, Rng], bytes], ...]:
+        """How it is damaged."""
+        return TEXT if self.text else BINARY
 
 
 def judge(kind: Kind, path: Path, right: Any) -> str | None:
@@ -134,10 +133,37 @@ def _load(name: str, module: str = "scenarios.files") -> Callable[[Path], Any]:
     return read
 
 
+def _sweep(folder: Path) -> Path:
+    """A sweep beside the scenario that it names."""
+    _scenario(folder)
+    (folder / "sweeps").mkdir()
+    shutil.copy(folder / "scenario.yaml", folder / "paper_simulation.yaml")
+    return Path(shutil.copy(ROOT / "scenarios" / "sweeps" / "paper_simulation.yaml", folder / "sweeps"))
+
+
+def _sweep_part(folder: Path) -> Path:
+    """What a sweep that goes on finds of a finished run."""
+    from scenarios.sweep.store import Parts
+
+    row = dict.fromkeys(("run", "number", "seed", "stretch"), 0) | {"surface": "dry", "estimator": "DE"}
+    parts = Parts(folder / "out", {})
+    parts.open()
+    parts.keep(0, [{**row, "parameter": "", "error": 0.5}] * 3, 1.5)
+    return folder / "out" / "parts" / "0000000.json"
+
+
 def _scenario_errors() -> tuple[type[Exception], ...]:
     from scenarios.errors import ScenarioError
 
     return (ScenarioError,)
+
+
+def _read_part(path: Path) -> Any:
+    from scenarios.sweep.store import Parts
+
+    parts = Parts(path.parents[1], {})
+    parts.open()
+    return parts.table(), parts.cpu_s()
 
 
 # Logs
@@ -170,7 +196,17 @@ def _read_log(path: Path) -> Any:
     return read_log(path).to_frame().to_numpy(dtype=float)
 
 
-# Networks, units, states
+def _read_mdf(path: Path) -> Any:
+    from sim2real.logs.mdf_file import EXTRACTOR
+
+    sys.path.insert(0, str(EXTRACTOR.parent))
+    importlib.import_module(EXTRACTOR.stem)  # before the first fork: that is what takes the time
+    sys.path.remove(str(EXTRACTOR.parent))
+    with forked(EXTRACTOR):
+        return _read_log(path)
+
+
+# Networks, units, buses
 
 
 def _network(name: str) -> Callable[[Path], Path]:
@@ -215,6 +251,18 @@ def _read_unit(path: Path) -> Any:
         shutil.rmtree(folder)
 
 
+class ProblemFoundError(Exception):
+    """What the doctor says of a damaged unit."""
+
+
+def _examine(path: Path) -> Any:
+    """What a unit holds that the doctor finds nothing in."""
+    problems = [found.text for found in look_at_file(path)[1] if found.state is State.PROBLEM]
+    if problems:
+        raise ProblemFoundError("; ".join(problems))
+    return _read_unit(path)
+
+
 KINDS = {
     "picture_jpeg": Kind(_picture(".jpg"), _decode, _picture_errors),
     "picture_png": Kind(_picture(".png"), _decode, _picture_errors, exact=True),
@@ -237,6 +285,14 @@ KINDS = {
         text=True,
     ),
     "scenario_yaml": Kind(_scenario, _load("load_scenario"), _scenario_errors, text=True),
+    "manoeuvre_yaml": Kind(
+        _shipped("scenarios", "manoeuvres", "road_test_brakes.yaml"),
+        _load("load_manoeuvre"),
+        _scenario_errors,
+        text=True,
+    ),
+    "sweep_yaml": Kind(_sweep, _load("load_sweep", "scenarios.sweep.files"), _scenario_errors, text=True),
+    "sweep_part_json": Kind(_sweep_part, _read_part, _scenario_errors, text=True),
     "mapping_yaml": Kind(
         _shipped("sim2real", "mappings", sorted(os.listdir(ROOT / "sim2real" / "mappings"))[0]),
         _load("load_mapping", "sim2real.logs.mapping"),
@@ -245,12 +301,19 @@ KINDS = {
     ),
     "log_csv": Kind(_log(".csv"), _read_log, _scenario_errors, text=True),
     "log_parquet": Kind(_log(".parquet"), _read_log, _scenario_errors, exact=True),
-    "log_mf4": Kind(_log(".mf4"), _read_log, _scenario_errors),
+    "log_mf4": Kind(_log(".mf4"), _read_mdf, _scenario_errors),
+    "bus_dbc": Kind(
+        _shipped("trpac_hil", "trpac.dbc"),
+        _load("load_codec", "trpac_hil.codec"),
+        _scenario_errors,
+        text=True,
+    ),
     "segmenter_onnx": Kind(_network("segmenter.onnx"), _segment, _network_errors),
     "surface_onnx": Kind(_network("surface.onnx"), _classify, _network_errors),
     "unit_fmu": Kind(_unit, _read_unit, lambda: (ValueError, zipfile.BadZipFile, OSError), exact=True),
+    "unit_examined": Kind(_unit, _examine, lambda: (ProblemFoundError, UnusableError), exact=True),
 }
-"""By short name. A serialised state is no file of ours, but the host's: see `vectors`."""
+"""By short name. A serialised state is no file of ours, but the host's: see `states`."""
 
 
 @contextmanager
@@ -267,7 +330,7 @@ def damaged_files(name: str, seed: int, numbers: range) -> Iterator[tuple[int, s
     with workplace(kind) as (path, good, right):
         for number in numbers:
             yield number, None
-            path.write_bytes(damaged(kind, good, np.random.default_rng([seed, number])))
+            path.write_bytes(damaged(kind.ways, good, np.random.default_rng([seed, number])))
             finding = judge(kind, path, right)
             if finding:
                 yield number, finding

@@ -110,3 +110,11 @@ def _piece(data: bytes, rng: Rng) -> tuple[int, int]:
 
 BINARY: tuple[Callable[[bytes, Rng], bytes], ...] = (cut, flip, flip, lose, blank, rubbish, twice)
 TEXT = (*BINARY, other_number, other_number, other_number, odd_word, odd_word, lose_line, lose_line)
+
+
+def damaged(ways: tuple[Callable[[bytes, Rng], bytes], ...], good: bytes, rng: Rng) -> bytes:
+    """The bytes after one damage, or two."""
+    for _ in range(int(rng.integers(1, 3))):
+        if good:
+            good = ways[int(rng.integers(len(ways)))](good, rng)
+    return good

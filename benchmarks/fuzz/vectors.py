@@ -2,13 +2,14 @@
 
 Rubbish is: a sensor's value that is not finite or beyond what any road car gives (`PLAUSIBLE`), a class or a confidence
 out of its range, a picture that is none. A unit that is given any in a step must not raise the flag of a wheel that it
-concerns. Outputs are always finite and within the bounds that the model description states.
+concerns; after a stretch of good input, whatever came before, a unit with a camera must raise one. Outputs are always
+finite and within the bounds that the model description states.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,20 @@ DISCARD = 2
 ODD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e-308, -0.0, 0.0, 1e9, -1e9, 2.0**31, 5e-324)
 ODD_STEPS_S = (0.0, -0.001, math.nan, math.inf, 1e-9, 1e-12, 1.0, 100.0, 1e300)
 ODD_INTEGERS = (-(2**31), 2**31 - 1, -2, -1, 0, 1, 2, 3, 255)
-STEP_SHARE = {"step": 0.86, "odd_step": 0.04, "restart": 0.03, "state": 0.04, "broken_state": 0.03}
+SHARE = {
+    "step": 0.82,
+    "stretch": 0.04,
+    "odd_step": 0.04,
+    "restart": 0.03,
+    "state": 0.04,
+    "broken_state": 0.03,
+}
+"""How often each act is."""
+GOOD_SHARE = 0.6
+"""How often a step begins with all inputs good, so that rubbish meets a unit whose flag is up."""
+STRETCH, STRETCH_STEP_S = 60, 0.02
+"""Good steps after which the announced road is under the wheels [-], [s]."""
+GOOD_LOAD_N = 3500.0
 LIMITS = {
     "wheel_speed": PLAUSIBLE["wheel_speed_rad_s"],
     "wheel_torque": PLAUSIBLE["wheel_torque_nm"],
@@ -59,23 +73,39 @@ def odd_value(variable: Any, rng: Rng, paths: list[str]) -> Any:
     return paths[int(rng.integers(len(paths)))]
 
 
-def rubbish(values: Mapping[str, Any]) -> set[str]:
-    """Names among a unit's present inputs that no car gives."""
-    bad = set()
-    for name, value in values.items():
-        kind = name.split(".")[0]
-        if kind in LIMITS and not abs(value) <= LIMITS[kind]:
+def good_class(variables: Collection[str], rng: Rng) -> dict[str, Any]:
+    """A class of the road or of each of its sides, as a bus gives it; nothing where the unit takes none."""
+    surface = int(rng.integers(3))
+    values: dict[str, Any] = {name: surface for name in variables if _kind(name) == "road_class"}
+    return values | {
+        n: float(rng.uniform(0.8, 1.0)) for n in variables if _kind(n) == "road_class_confidence"
+    }
+
+
+def rubbish(values: Mapping[str, Any], pictures: Collection[str]) -> set[str]:
+    """Names among a unit's present inputs that no car gives; `pictures` are the paths of good ones."""
+    bad = {name for name, value in values.items() if not abs_within(value, LIMITS.get(_kind(name)))}
+    classes = [name for name in values if _kind(name) == "road_class"]
+    if all(values[name] == -1 for name in classes) and values.get("image_path", "") not in ("", *pictures):
+        bad.add("image_path")
+    if values.get("frame_id", 0) != 0:
+        return bad  # a class that comes with a number is read once, and then is no matter what it is
+    for name in classes:
+        confidence = f"road_class_confidence{name[len('road_class') :]}"
+        if not (-1 <= values[name] <= 2):
             bad.add(name)
-        if values.get("frame_id", 0) != 0:
-            continue  # a class that comes with a number is read once, and then is no matter what it is
-        side = name[len("road_class") :]
-        if kind == "road_class" and not (-1 <= value <= 2):
-            bad.add(name)
-        if kind == "road_class" and value != -1:
-            confidence = values[f"road_class_confidence{side}"]
-            if not 0.0 <= confidence <= 1.0:
-                bad.add(f"road_class_confidence{side}")
+        if values[name] != -1 and not 0.0 <= values[confidence] <= 1.0:
+            bad.add(confidence)
     return bad
+
+
+def abs_within(value: Any, limit: float | None) -> bool:
+    """Whether a value is a number within its limit, if it has one."""
+    return limit is None or abs(value) <= limit
+
+
+def _kind(name: str) -> str:
+    return name.partition(".")[0]
 
 
 def concerned(flag: str, bad: set[str]) -> set[str]:
@@ -87,54 +117,85 @@ def concerned(flag: str, bad: set[str]) -> set[str]:
 
 
 class Driven:
-    """A unit under rubbish; `problems` is what was found in the last act."""
+    """A unit under rubbish.
+
+    Attributes
+    ----------
+    seen_up : int
+        Steps after which a flag was up.
+    taken_down : int
+        Steps in which rubbish met a flag that was up and concerned it.
+    """
 
     def __init__(self, folder: Path, pictures: tuple[Path, Path], broken: list[str]) -> None:
         self._case = CASES[folder.name]
-        self._transport, self._folder = Fmpy(folder), folder
-        self._paths = [*map(str, pictures), *broken, "", "%s%n", "x" * 5000, "\t", "ü#+%()"]
+        self._transport, self._folder, self._pictures = Fmpy(folder), folder, tuple(map(str, pictures))
+        self._paths = [*self._pictures, *broken, "", "%s%n", "x" * 5000, "\t", "ü#+%()"]
         self._unit = self._fresh({})
         self._saved = False
+        self.seen_up, self.taken_down = 0, 0
 
     def _fresh(self, parameters: Mapping[str, Any]) -> Unit:
         unit = Unit(self._transport, self._folder)
         unit.set(parameters)
         for verb in ("setup", "enter", "leave"):
             unit.call(verb)
-        self._now = {n: v.start for n, v in inputs_of(unit).items()}
-        self._now = {n: _started(v, self._now[n]) for n, v in inputs_of(unit).items()}
+        self._start = {n: _started(v, v.start) for n, v in inputs_of(unit).items()}
+        self._now = dict(self._start)
+        self._flags: list[str] = []
         self._discards = bool(parameters)
         return unit
 
     def act(self, rng: Rng) -> list[str]:
         """One random act and what is wrong after it."""
-        act = str(rng.choice(list(STEP_SHARE), p=list(STEP_SHARE.values())))
+        act = str(rng.choice(list(SHARE), p=list(SHARE.values())))
         try:
             problems: list[str] = getattr(self, f"_{act}")(rng)
         except NotAsExpectedError as error:
             return [f"{act}: {error}"]
         return [f"{act}: {problem}" for problem in [*problems, *self._bounds()]]
 
+    def _good(self, rng: Rng) -> dict[str, Any]:
+        # Once a load has come, none at all is a fault.
+        loads = {name: GOOD_LOAD_N for name in self._start if _kind(name) == "vertical_load"}
+        return {**self._start, **loads, **self._case.drive, **good_class(self._start, rng)}
+
     def _set_some(self, rng: Rng) -> None:
         variables = inputs_of(self._unit)
-        # Most of what is set is good, so that the unit is under way when something is not.
-        values: dict[str, Any] = dict(self._case.drive)
+        values = self._good(rng) if rng.random() < GOOD_SHARE else dict(self._case.drive)
         for name in rng.permutation(list(variables))[: int(rng.integers(0, 4))]:
             values[str(name)] = odd_value(variables[str(name)], rng, self._paths)
-        if "road_class" in variables and rng.random() < 0.5:
-            values |= {"road_class": int(rng.integers(3)), "road_class_confidence": float(rng.random())}
         self._unit.set(values)
         self._now |= values
 
     def _step(self, rng: Rng, step_s: float = 0.001) -> list[str]:
         self._set_some(rng)
-        self._unit.call("step", "0x0p+0", step_s.hex(), allowed=(OK, DISCARD) if self._discards else (OK,))
-        bad = rubbish(self._now)
+        before, bad = self._flags, rubbish(self._now, self._pictures)
+        self._step_on(step_s)
+        self.taken_down += any(concerned(flag, bad) for flag in before)
         return [
             f"{flag} is up with rubbish on {', '.join(sorted(concerned(flag, bad)))}"
-            for flag in self._unit.flags()
+            for flag in self._flags
             if concerned(flag, bad)
         ]
+
+    def _step_on(self, step_s: float, count: int = 1) -> None:
+        for _ in range(count):
+            self._unit.call(
+                "step", "0x0p+0", step_s.hex(), allowed=(OK, DISCARD) if self._discards else (OK,)
+            )
+        self._flags = self._unit.flags()
+        self.seen_up += bool(self._flags)
+
+    def _stretch(self, rng: Rng) -> list[str]:
+        """Good input for more than a second: whatever there was before, the road ahead is known again."""
+        values = self._good(rng)
+        self._unit.set(values)
+        self._now |= values
+        self._step_on(STRETCH_STEP_S, STRETCH)
+        if self._case.takes_pictures and not self._discards and not self._flags:
+            return [f"no flag is up after {STRETCH * STRETCH_STEP_S:g} s of good input"]
+        return []
 
     def _odd_step(self, rng: Rng) -> list[str]:
         return self._step(rng, float(ODD_STEPS_S[int(rng.integers(len(ODD_STEPS_S)))]))
@@ -161,7 +222,7 @@ class Driven:
         if self._saved:
             self._unit.call("restore", "0")
             self._unit.call("drop", "0")
-            self._now = {n: self._unit.get(n) for n in self._now}
+            self._look()
         else:
             self._unit.call("save", "0")
         self._saved = not self._saved
@@ -177,9 +238,12 @@ class Driven:
         self._unit.call("deserialise", "2", spoilt.hex())
         self._unit.call("restore", "2")
         self._unit.call("drop", "2")
-        self._now = {n: self._unit.get(n) for n in self._now}
-        self._discards = True  # a state of before the initialisation is a state, too
+        self._look()
         return []
+
+    def _look(self) -> None:
+        """The inputs and flags that a state has brought."""
+        self._now, self._flags = {n: self._unit.get(n) for n in self._now}, self._unit.flags()
 
     def _bounds(self) -> list[str]:
         problems = []
@@ -208,12 +272,15 @@ def write_broken(folder: Path) -> list[str]:
     return [*(str(folder / name) for name in ("text.png", "empty.jpg", "start.jpg", "none.png")), str(folder)]
 
 
-def fuzzed(folder: Path, work: Path, seed: int, numbers: range) -> Iterator[tuple[int, str | None]]:
-    """Number and finding of each act on the unit unpacked in `folder`."""
+def fuzzed(
+    folder: Path, work: Path, seed: int, numbers: range
+) -> Iterator[tuple[int, str | None, dict[str, int]]]:
+    """Number, finding and counts so far of each act on the unit unpacked in `folder`."""
     from benchmarks.conformance.cases import write_pictures
 
     driven = Driven(folder, write_pictures(work), write_broken(work))
     for number in numbers:
-        yield number, None
+        counts = {"seen_up": driven.seen_up, "taken_down": driven.taken_down}
+        yield number, None, counts
         for problem in driven.act(np.random.default_rng([seed, number])):
-            yield number, problem
+            yield number, problem, counts

@@ -111,7 +111,35 @@ class Parts:
 
     def _all(self) -> Iterator[dict[str, Any]]:
         for path in sorted(self._folder.glob("*.json")):
-            yield _read(path)
+            part = _read(path)
+            if not _is_part(part):
+                raise ScenarioError(
+                    f"{path}: damaged, expected 'cpu_s' and the 'rows' of a run; delete it and run the sweep again."
+                )
+            yield part
+
+
+def _is_part(part: Any) -> bool:
+    """Whether this is what `Parts.keep` writes."""
+    if not isinstance(part, dict) or part.keys() != {"cpu_s", "rows"} or not isinstance(part["rows"], list):
+        return False
+    return _is_number(part["cpu_s"]) and all(
+        isinstance(row, dict) and {*TEXT, *WHOLE} <= row.keys() and all(_fits(*item) for item in row.items())
+        for row in part["rows"]
+    )
+
+
+def _fits(column: str, value: Any) -> bool:
+    if column in TEXT:
+        return isinstance(value, str)
+    if column in WHOLE:
+        return isinstance(value, int) and _is_number(value)
+    return value is None or _is_number(value)
+
+
+def _is_number(value: Any) -> bool:
+    """Whether it goes into a column of 64 bits."""
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 63)
 
 
 def as_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -17,10 +17,13 @@ from .regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
 
 MASK_WIDTH_PX = 256
 MASK_HEIGHT_PX = 160
+MASKS = ("drivable", "shadow")
+VERDICTS = ("logits", "readable")
+"""Outputs of the two networks."""
 _ROUNDING = 1e-5
 """By how much the runtime's sigmoid may leave [0, 1]."""
 
-_LOAD_ERRORS = (
+_RUNTIME_ERRORS = (
     ort_errors.Fail,
     ort_errors.InvalidArgument,
     ort_errors.InvalidGraph,
@@ -30,6 +33,7 @@ _LOAD_ERRORS = (
     ort_errors.RuntimeException,
     UnicodeDecodeError,  # the runtime's own error text, where it quotes damaged names
 )
+"""Of a damaged file, some as it is loaded and some not before it is run."""
 _CLASS_LIST = ",".join(surface.label for surface in Surface)
 
 
@@ -95,15 +99,23 @@ class Segmenter:
     def __init__(self, path: str | Path, threads: int = 2) -> None:
         """Load and check the file; raises ModelError."""
         self._session = _load(path, threads)
+        self._path = path
         _check_input(self._session, path, "image", [1, MASK_HEIGHT_PX, MASK_WIDTH_PX, 3])
-        _check_outputs(self._session, path, ("drivable", "shadow"))
+        _check_outputs(self._session, path, MASKS)
 
     def segment(self, image: NDArray[np.uint8]) -> RoadMasks:
-        """Masks of a BGR picture of any size, reduced by area averaging."""
+        """Masks of a BGR picture of any size, reduced by area averaging; raises ModelError if they are none."""
         small = cv2.resize(image, (MASK_WIDTH_PX, MASK_HEIGHT_PX), interpolation=cv2.INTER_AREA)
-        drivable, shadow = self._session.run(["drivable", "shadow"], {"image": small[None]})
         shape = (MASK_HEIGHT_PX, MASK_WIDTH_PX)
-        return RoadMasks(drivable.reshape(shape), shadow.reshape(shape))
+        masks = _run(self._session, self._path, MASKS, {"image": small[None]})
+        for name, mask in zip(MASKS, masks, strict=True):
+            if mask.size != MASK_HEIGHT_PX * MASK_WIDTH_PX or not np.isfinite(mask).all():
+                raise ModelError(
+                    f"{self._path}: expected {name!r} finite and of {MASK_HEIGHT_PX} x {MASK_WIDTH_PX}, got shape "
+                    f"{mask.shape}. Export or train the network again."
+                )
+        drivable, shadow = (mask.reshape(shape) for mask in masks)
+        return RoadMasks(drivable, shadow)
 
 
 class SurfaceClassifier:
@@ -114,7 +126,7 @@ class SurfaceClassifier:
         self._session = _load(path, threads)
         self._path = path
         _check_input(self._session, path, "patches", [None, PATCH_HEIGHT_PX, PATCH_WIDTH_PX, 3])
-        _check_outputs(self._session, path, ("logits", "readable"))
+        _check_outputs(self._session, path, VERDICTS)
         self._temperature = _read_temperature(self._session, path)
 
     @property
@@ -124,7 +136,7 @@ class SurfaceClassifier:
 
     def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
         """Verdicts on BGR patches (n, 64, 96, 3) in one run; raises ModelError if they are not finite."""
-        logits, readable = self._session.run(["logits", "readable"], {"patches": patches})
+        logits, readable = _run(self._session, self._path, VERDICTS, {"patches": patches})
         if logits.shape != (len(patches), len(Surface)) or not np.isfinite(logits).all():
             raise ModelError(
                 f"{self._path}: expected finite logits of shape {(len(patches), len(Surface))}, got shape "
@@ -151,10 +163,26 @@ def _load(path: str | Path, threads: int) -> ort.InferenceSession:
         )
     try:
         return ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    except _LOAD_ERRORS as error:
+    except _RUNTIME_ERRORS as error:
         raise ModelError(
             f"{path}: not an ONNX network that this version of onnxruntime runs: {error}"
         ) from error
+
+
+def _run(
+    session: ort.InferenceSession,
+    path: str | Path,
+    outputs: tuple[str, ...],
+    inputs: dict[str, NDArray[Any]],
+) -> list[NDArray[np.float32]]:
+    """The outputs; ModelError where a file that could be loaded cannot be run."""
+    try:
+        found: list[NDArray[np.float32]] = session.run(list(outputs), inputs)
+    except _RUNTIME_ERRORS as error:
+        raise ModelError(
+            f"{path}: a damaged network, it cannot be run: {error}. Export or train the network again."
+        ) from error
+    return found
 
 
 def _check_input(session: ort.InferenceSession, path: str | Path, name: str, shape: list[int | None]) -> None:

@@ -1,0 +1,90 @@
+"""What `build_fmu.py` and `build_ssp.py` do alike: build a file, validate it, run it, print its path and SHA-256."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+EXIT_USAGE, EXIT_BUILD, EXIT_INVALID, EXIT_RUN = 2, 3, 4, 5
+"""Exit codes: wrong arguments; cannot be built; does not validate; does not run."""
+EPILOG = "Exit codes: 0 done, 2 usage, 3 build, 4 validation, 5 run."
+
+
+@dataclass(frozen=True)
+class Product:
+    """What a build program makes.
+
+    Parameters
+    ----------
+    noun : str
+        What it is called: unit, package.
+    kind, known : str, collection of str
+        What its names are called, and the names that there are.
+    build : callable
+        Builds the one of a name; returns its path; raises BuildError or OSError.
+    validate : callable
+        Problems of a built file.
+    valid : str
+        What to say where there are none.
+    run : callable
+        Runs a built file a little; returns how much, as a phrase.
+    """
+
+    noun: str
+    kind: str
+    known: Collection[str]
+    build: Callable[[str], Path]
+    validate: Callable[[Path], list[str]]
+    valid: str
+    run: Callable[[Path], str]
+
+
+def run_build(program: str, load: Callable[[], Product], name: str) -> int:
+    """Build the one of this name and say what was done; returns the exit code.
+
+    Parameters
+    ----------
+    program : str
+        The file that the user runs, for messages.
+    load : callable
+        Imports what the build needs; raises ImportError under another interpreter than the project's.
+    name : str
+        What to build.
+    """
+
+    def say(text: str) -> None:
+        print(f"{program}: {text}", file=sys.stderr)
+
+    try:
+        product = load()
+        from .packaging import BuildError, sha256
+    except ImportError as error:
+        say(f"{error}. Run it with the project's interpreter: .venv/bin/python {program}")
+        return EXIT_BUILD
+    if name not in product.known:
+        say(f"'{name}' is not a {product.kind}. Known: {', '.join(sorted(product.known))}.")
+        return EXIT_USAGE
+    started = time.perf_counter()
+    try:
+        path = product.build(name)
+    except (BuildError, OSError) as error:
+        say(str(error))
+        return EXIT_BUILD
+    print(f"built      {path.stat().st_size / 1e6:.2f} MB in {time.perf_counter() - started:.1f} s")
+    problems = product.validate(path)
+    if problems:
+        say("\n".join([f"the {product.noun} does not validate:", *problems]))
+        return EXIT_INVALID
+    print(f"validated  {product.valid}")
+    try:
+        done = product.run(path)
+    except Exception as error:  # noqa: BLE001 - fmpy raises bare Exceptions; the exit code tells that the run failed
+        say(f"the {product.noun} does not run: {error}")
+        return EXIT_RUN
+    print(f"ran        {done}")
+    print(f"{product.noun:<10} {path}")
+    print(f"SHA-256    {sha256(path)}")
+    return 0
