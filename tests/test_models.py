@@ -7,13 +7,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import onnxruntime as ort
 import pytest
 
 from models.training import data, patches, scores
 from models.training.calibrate import probabilities
 from models.training.rendered import SEED_RANGES, draw_worlds
 from models.training.segmenter_data import masked_sample, painted_views, plain_view
+from trpac_core.vision.onnx_runtime import ort
 
 ROOT = Path(__file__).parents[1]
 

@@ -1,5 +1,9 @@
 """The networks' contract: inputs, outputs, calibration, and files that do not fit."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from tiny_onnx import write_classifier, write_segmenter
@@ -89,3 +93,22 @@ def test_masks_that_are_no_numbers_are_refused(tmp_path):
     image[0:100, 0:100] = 0
     with pytest.raises(ModelError, match=r"segmenter\.onnx: expected 'drivable' finite and of 160 x 256"):
         segmenter.segment(image)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere reports leave no trace in the home folder")
+def test_loading_networks_leaves_no_trace_in_the_users_home(tmp_path):
+    write_segmenter(tmp_path / "segmenter.onnx")
+    home = tmp_path / "home"
+    home.mkdir()
+    loads = "import sys; from trpac_core.vision.networks import Segmenter; Segmenter(sys.argv[1])"
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("ORT_DISABLE_TELEMETRY", "XDG_CACHE_HOME")
+    }
+    # Within a CI system the runtime keeps still by itself.
+    environment = {k: v for k, v in environment.items() if not k.startswith(("CI", "GITHUB"))}
+    subprocess.run(
+        [sys.executable, "-B", "-c", loads, tmp_path / "segmenter.onnx"],
+        env=environment | {"HOME": str(home)},
+        check=True,
+    )
+    assert [path for path in home.rglob("*") if path.is_file()] == []

@@ -8,11 +8,10 @@ from typing import Any, Protocol
 
 import cv2
 import numpy as np
-import onnxruntime as ort
 from numpy.typing import NDArray
-from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 
 from .classes import Surface
+from .onnx_runtime import ort, ort_errors
 from .regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
 
 MASK_WIDTH_PX = 256
