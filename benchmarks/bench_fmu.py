@@ -1,4 +1,4 @@
-"""Cost of set-3, doStep, get-3 through fmpy: ``python benchmarks/bench_fmu.py [--out FILE.json]``.
+"""Cost of set-3, doStep, get-3 through fmpy: ``python -m benchmarks.bench_fmu [--out FILE.json]``.
 
 Three things take turns in one run, so that a busy machine slows all of them alike: an empty pythonfmu slave, the
 unit, and the estimator's own step without FMI. Figures are medians over rounds [us].
@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import statistics
 import sys
 import tempfile
@@ -22,6 +20,7 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu import FmuBuilder
 
+from benchmarks.ledger import machine
 from fmu_src.packaging import build_unit, sha256, unpack_unit
 from fmu_src.units import UNITS
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
@@ -160,13 +159,8 @@ def main() -> None:
             "steps": STEPS,
             "rounds": ROUNDS,
             "unit_sha256": sha256(archive),
-            "machine": {
-                "cpus": os.cpu_count(),
-                "processor": platform.machine(),
-                "load_1min": os.getloadavg()[0],
-            },
-            "versions": {p: version(p) for p in ("fmpy", "pythonfmu")}
-            | {"python": platform.python_version()},
+            "machine": machine(),
+            "versions": {p: version(p) for p in ("fmpy", "pythonfmu")},
         }
         for instance, _ in (empty, unit, bus):
             instance.terminate()

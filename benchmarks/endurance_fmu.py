@@ -9,7 +9,6 @@ import argparse
 import json
 import multiprocessing
 import os
-import platform
 import shutil
 import signal
 import subprocess
@@ -20,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -29,6 +27,7 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 from benchmarks.conformance.cases import CASES, STEP_S, write_pictures
+from benchmarks.ledger import append
 from fmu_src.packaging import build_unit, sha256, unpack_unit
 from fmu_src.units import UNITS
 
@@ -307,24 +306,12 @@ def main() -> None:
         part, folder, count = options.part
         print(json.dumps(PARTS[part](Path(folder), int(count))), flush=True)
         os._exit(0)  # see "Limits" in docs/fmu.md
-    asked = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
-    line = {
-        "written": datetime.now(UTC).isoformat(timespec="seconds"),
-        "commit": asked.stdout.strip() or None,
-        "machine": {
-            "cpus": os.cpu_count(),
-            "processor": platform.machine(),
-            "load_1min": os.getloadavg()[0],
-            "python": platform.python_version(),
-        },
+    figures = {
         "versions": {p: version(p) for p in ("fmpy", "pythonfmu", "numpy", "onnxruntime")},
         "units": {u: measure(u, options.steps, options.instances) for u in options.unit or CASES},
         "full_disk": full_disk(),
     }
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    with options.out.open("a", encoding="utf-8") as history:
-        history.write(json.dumps(line) + "\n")
-    print(json.dumps(line, indent=2))
+    print(json.dumps(append(options.out, figures), indent=2))
 
 
 if __name__ == "__main__":

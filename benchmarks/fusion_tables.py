@@ -10,7 +10,6 @@ import argparse
 import json
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import UTC, datetime
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 from rich.progress import Progress, TaskID
 
+from benchmarks.ledger import append
 from scenarios.figure17 import draw_figure17
 from scenarios.sweep import figures
 from scenarios.sweep.draw import plan_run, run_keys
@@ -275,16 +275,11 @@ def write(out: Path, pictures: bool) -> None:
     head, rest = text.split(BEGIN)
     tail = rest.split(END)[1]
     PAGE.write_text(head + BEGIN + "\n\n" + "\n".join(blocks(found)) + "\n" + END + tail, encoding="utf-8")
-    line = {
-        "written": datetime.now(UTC).isoformat(timespec="seconds"),
-        "sweeps": {
-            name: {k: v for k, v in part.items() if k != "table"} | slim(summarise(part["table"]))
-            for name, part in found.items()
-        },
+    sweeps = {
+        name: {k: v for k, v in part.items() if k != "table"} | slim(summarise(part["table"]))
+        for name, part in found.items()
     }
-    HISTORY.parent.mkdir(exist_ok=True)
-    with HISTORY.open("a", encoding="utf-8") as history:
-        history.write(json.dumps(line) + "\n")
+    append(HISTORY, {"sweeps": sweeps})
     if pictures:
         draw(found)
 

@@ -1,8 +1,6 @@
 """Drives of the product's own plant with known effects: what the tests of the diagnosis are held on, and a first look.
 
 They flatter it, since plant and library share their forms: its gates were set on opened cases of `benchmarks/blind`.
-
-python -m benchmarks.gap_development --help
 """
 
 from __future__ import annotations
@@ -192,27 +190,3 @@ SEVERITY = {
     "mu_split": lambda s: {"left_factor": 1.0 - 0.7 * s, "right_factor": 1.0},
 }  # fmt: skip
 """One direction of each effect from nothing (0) to a lot (1)."""
-
-
-def severity_for(effect: str, target: float, case: Case) -> tuple[dict[str, float], float]:
-    """Parameters at which the gap is about `target` noise floors, and the gap that they reach."""
-    from dataclasses import replace
-
-    from sim2real.evidence import gather
-    from sim2real.gap import measure
-    from sim2real.observer import Simulation
-
-    model = Simulation(BARE)
-
-    def gap(s: float) -> float:
-        found = drives(replace(case, effects={effect: SEVERITY[effect](s)}), 2)
-        held = gather(model, found)
-        return measure(held, held.residuals(model)).total
-
-    low, high = 0.005, 1.0
-    if gap(high) < target:
-        return SEVERITY[effect](high), gap(high)
-    for _ in range(7):
-        middle = np.sqrt(low * high)
-        low, high = (middle, high) if gap(middle) < target else (low, middle)
-    return SEVERITY[effect](high), gap(high)

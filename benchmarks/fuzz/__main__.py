@@ -9,8 +9,9 @@ import argparse
 import json
 import os
 import sys
-from datetime import UTC, datetime
 from pathlib import Path
+
+from benchmarks.ledger import append
 
 from .run import HISTORY, KIND_NAMES, UNIT_NAMES, child, run_kind
 
@@ -33,14 +34,7 @@ def main() -> int:
         count = options.vectors if name in UNIT_NAMES else options.files
         results[name] = run_kind(name, options.seed, count)
         print(name, json.dumps(results[name]), flush=True)
-    line = {
-        "written": datetime.now(UTC).isoformat(timespec="seconds"),
-        "seed": options.seed,
-        "results": results,
-    }
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    with options.out.open("a", encoding="utf-8") as history:
-        history.write(json.dumps(line) + "\n")
+    append(options.out, {"seed": options.seed, "results": results})
     return int(any(result["findings"] for result in results.values()))
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import platform
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from benchmarks.ledger import append
 from trpac_core.vision.classes import Surface
 
 from .judge import SCENARIOS, VARIANTS, VOTING
@@ -245,10 +243,8 @@ def _how(measured: Measured) -> str:
 
 
 def history_line(measured: Measured) -> dict[str, Any]:
-    """Everything as one JSON-able line."""
+    """Everything that a line of the history holds."""
     return {
-        "written": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": {"processor": platform.machine(), "python": platform.python_version()},
         "networks": measured.networks,
         "missing": list(measured.missing),
         "not_left_out": measured.not_left_out,
@@ -282,8 +278,7 @@ def write_page(measured: Measured) -> None:
     before, after = text.split(BEGIN)[0], text.split(END)[1]
     PAGE.write_text(f"{before}{BEGIN}\n\n{tables(measured)}\n{END}{after}", encoding="utf-8")
     draw(measured, FIGURE)
-    with HISTORY.open("a", encoding="utf-8") as history:
-        history.write(json.dumps(history_line(measured)) + "\n")
+    append(HISTORY, history_line(measured))
 
 
 def draw(measured: Measured, path: Path) -> None:
