@@ -210,9 +210,10 @@ class TrpacEstimator:
         if theta_img is not None or fusion != dynamics:
             model, known = config.confidence, state.variance
             fused = fusion_step(
-                fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, model, known
+                fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, model, known,
+                dynamics, alone[1],
             )
-        after, force_n, _, _, threshold, excited, K_v = fused
+        after, unaided, threshold, excited, K_v = fused
         theta, class_after, class_before = after[0], after[3], fusion[3]
         unasked_s = state.unasked_s + step_s
         if unasked_s >= config.sensor_filter_s or class_after != class_before:
@@ -236,7 +237,7 @@ class TrpacEstimator:
             excited,
             threshold,
             inputs[3][0],
-            force_n,
+            unaided[3],
             theta_seen,
             alone[0][0],
             peak_friction(theta, load_n, C_x),

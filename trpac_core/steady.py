@@ -74,6 +74,11 @@ def held(before: Steady, slip: float, friction: float, rise: float, noise: float
     )
 
 
+def same_slip(first: Steady, second: Steady) -> bool:
+    """Whether both are means of the same slip over the same time, whatever their used friction."""
+    return first[0] == second[0] and first[2] == second[2] and first[3] == second[3]
+
+
 def mean_deviation(steady: Steady, noise: float, noise_s: float, doubt: float) -> float:
     """Standard deviation of the mean slip [-].
 
