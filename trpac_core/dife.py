@@ -238,7 +238,7 @@ def _place(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float)
     slip, _, rise, _ = steady
     load_n, noise, doubt, noise_s = inputs[4], inputs[9], inputs[10], inputs[12]
     surely = slip - SIGNIFICANCE * (mean_deviation(steady, noise, noise_s, doubt) + abs(rise))
-    below = _slides_below(surely, load_n, longitudinal_stiffness_n)
+    below = elastic_friction(surely, load_n, longitudinal_stiffness_n) if surely > 0.0 else 0.0
     return _new(Place, (steady, tyre_at_slip(slip, load_n, longitudinal_stiffness_n), below))
 
 
@@ -399,9 +399,7 @@ def fusion_step(
     above = size > threshold
     if before is None or beside is None:
         unaided = _unaided(state, inputs, look, wheel, gains, step_s, above or may_show, None)
-    elif (
-        theta_hat != before[0] or s != before[1] or steady != before[7] or may_show is not (above or may_show)
-    ):
+    elif theta_hat != before[0] or s != before[1] or steady != before[7] or (above and not may_show):
         unaided = _unaided(state, inputs, look, wheel, gains, step_s, above or may_show, beside[7])
     else:
         unaided = beside

@@ -138,8 +138,7 @@ class TrpacEstimator:
         ImageError
             If the picture does not fit the camera; nothing has changed then.
         """
-        config, rates = self.config, self._rates
-        problem = None
+        config, rates, problem = self.config, self._rates, None
         if not plain(step_s, sensors, config.floor_m_s):
             problem = unusable(step_s, sensors, self._wheel.radius_m, config.floor_m_s)
         if frame is not None and isinstance(frame, RoadClass) and not 0.0 <= frame.confidence <= 1.0:
@@ -149,8 +148,8 @@ class TrpacEstimator:
             return self._hold(step_s, sensors, frame, frame_failed, problem)
         state = self._state
         if step_s != rates.step_s or step_s == 0.0:
-            self._rates = Rates.at(config, step_s, state.step_s)
-        if state.settled and jumped(state.readings, sensors, self._radius_m, step_s):
+            self._rates = rates = Rates.at(config, step_s, state.step_s)
+        if state.settled and jumped(state.readings, sensors, self._radius_m, rates):
             state.settled = False
         acceleration, lagged, load_n = self._moved(sensors)
         if frame is not None or frame_failed:
@@ -189,7 +188,10 @@ class TrpacEstimator:
     ) -> Estimate:
         """Run both estimators over the step with the road that lies under the wheel at its start."""
         config, state = self.config, self._state
-        scheduler, gains, wheel = config.scheduler, config.gains, self._softened(state.line)
+        scheduler, gains = config.scheduler, config.gains
+        softened_by, wheel = self._softened_by
+        if softened_by is not state.line:
+            wheel = self._softened(state.line)
         C_x = wheel[2]
         readings, inputs, read_slip, smoothed_slip, locked_s = wheel_inputs(
             config, self._rates, state, sensors, self._radius_m, step_s, load_n
@@ -248,11 +250,11 @@ class TrpacEstimator:
         return self._last
 
     def _softened(self, line: ElasticLine) -> Wheel:
-        """The wheel with the stiffness that was learnt; worked out anew only where the line has changed."""
-        if line is not self._softened_by[0]:
-            inertia, radius_m, told_n = self._wheel
-            self._softened_by = line, Wheel(inertia, radius_m, told_n / (1.0 + line.compliance()))
-        return self._softened_by[1]
+        """The wheel with the stiffness that was learnt, kept until the line changes."""
+        inertia, radius_m, told_n = self._wheel
+        wheel = Wheel(inertia, radius_m, told_n / (1.0 + line.compliance()))
+        self._softened_by = line, wheel
+        return wheel
 
     def _variance(
         self,
@@ -280,10 +282,10 @@ class TrpacEstimator:
             return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
         theta_tyre, friction = fused.theta_tyre, fused.tyre_force_n * inputs.slip.direction / inputs.load_n
-        tyre, steady = look.tyre, fused.state.steady
+        tyre, steady, place = look.tyre, fused.state.steady, fused.unaided.place
         if steady.held_s > state.step_s:
             size, friction = steady.slip, steady.friction
-            tyre = tyre_at_slip(size, inputs.load_n, wheel.longitudinal_stiffness_n)
+            tyre = place.tyre if place is not None else tyre_at_slip(size, inputs.load_n, wheel[2])
         noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
         torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
         torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0

@@ -57,8 +57,7 @@ def held(before: Steady, slip: float, friction: float, rise: float, noise: float
         Step [s].
     """
     mean_slip, mean_friction, mean_rise, held_s = before
-    level, off = LEVEL * noise, slip - mean_slip
-    away = ELSEWHERE * noise
+    level, away, off = LEVEL * noise, ELSEWHERE * noise, slip - mean_slip
     if held_s == 0.0 or not (-level < rise < level and -away < off < away):
         return _new(Steady, (slip, friction, rise, step_s))
     held_s += step_s

@@ -33,6 +33,7 @@ GREATEST_PEAK_SLIP = 0.95
 """Where the search for the curve's maximum ends [-]."""
 
 
+_NEWTON = range(NEWTON_STEPS)
 _new = tuple.__new__
 """Makes a named tuple of a tuple: a third of the time that its own constructor takes."""
 
@@ -82,19 +83,19 @@ class TyreAtSlip(NamedTuple):
         # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
         left = 1.0 - friction / (elastic * g_0)
         theta = upper * (1.0 - math.sqrt(left)) if left > 0.0 else upper
-        lower = 0.0
-        for _ in range(NEWTON_STEPS):
-            base, share = g_0 + g_1 * theta, theta * (1.0 - kappa * theta)
+        lower, twice_kappa, least, most = 0.0, 2.0 * kappa, -LEAST_STEP, LEAST_STEP
+        for _ in _NEWTON:
+            base = g_0 + g_1 * theta
+            share = theta * (1.0 - kappa * theta)
             excess = share * base - friction
             if excess > 0.0:
                 upper = theta
             else:
                 lower = theta
-            slope = (1.0 - 2.0 * kappa * theta) * base + share * g_1
-            proposal = theta - excess / slope
+            proposal = theta - excess / ((1.0 - twice_kappa * theta) * base + share * g_1)
             if not lower <= proposal <= upper:
                 proposal = 0.5 * (lower + upper)
-            if -LEAST_STEP < proposal - theta < LEAST_STEP:
+            if least < proposal - theta < most:
                 return proposal
             theta = proposal
         return theta
@@ -205,18 +206,19 @@ def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> f
         slip = 0.5
     # lambda^2 times the slope of (1 - quarter (1 - lambda) / lambda) G(lambda): a cubic without a linear term
     cubic, bend = 2.0 * square * (1.0 + quarter), linear * (1.0 + quarter) + square * quarter
-    level = 1.27 * quarter
-    for _ in range(NEWTON_STEPS):
+    level, thrice_cubic, twice_bend = 1.27 * quarter, 3.0 * cubic, 2.0 * bend
+    least, most = -LEAST_SLIP_STEP, LEAST_SLIP_STEP
+    for _ in _NEWTON:
         value = (cubic * slip - bend) * slip * slip + level
         if value > 0.0:
             lower = slip
         else:
             upper = slip
-        value_by_slip = (3.0 * cubic * slip - 2.0 * bend) * slip
+        value_by_slip = (thrice_cubic * slip - twice_bend) * slip
         proposal = slip - value / value_by_slip if value_by_slip != 0.0 else upper
         if not lower < proposal < upper:
             proposal = 0.5 * (lower + upper)
-        if -LEAST_SLIP_STEP < proposal - slip < LEAST_SLIP_STEP:
+        if least < proposal - slip < most:
             return proposal
         slip = proposal
     return slip
