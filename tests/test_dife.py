@@ -18,14 +18,11 @@ from trpac_core.dife import (
     Gains,
     VisualTerm,
     Wheel,
-    WheelInputs,
     fusion_step,
-    least_theta,
-    look_at,
     settled,
-    visible_theta,
 )
 from trpac_core.excitation import FuzzyScheduler
+from trpac_core.sight import WheelInputs, least_theta, look_at, visible_theta
 from trpac_core.slip import Slip
 
 WHEEL = Wheel(1.2, 0.29, 50_000.0)

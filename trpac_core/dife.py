@@ -13,16 +13,39 @@ from typing import NamedTuple
 from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
 from .observer import advanced_state, settled_state
-from .slip import GREATEST_SLIP, Slip
-from .steady import NOTHING, Steady, held, mean_deviation, quickened, same_slip
-from .tyre import TyreAtSlip, elastic_friction, force, tyre_at_slip
+from .sight import (
+    GREATEST_THETA,
+    LEAST_SENSITIVITY,
+    Look,
+    Place,
+    WheelInputs,
+    least_theta,
+    place_of_mean,
+    shown,
+    slides_below,
+)
+from .steady import NOTHING, Steady, held, quickened, same_slip
+from .tyre import force
 
-GREATEST_THETA = 1.2
-"""Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
+__all__ = [
+    "GREATEST_THETA",
+    "LEAST_SENSITIVITY",
+    "LEAST_THETA",
+    "NEVER_SEEN_M",
+    "OTHER_CLASS_M",
+    "SEEN_HOLD_M",
+    "FusionState",
+    "FusionStep",
+    "Gains",
+    "Unaided",
+    "VisualTerm",
+    "Wheel",
+    "fusion_step",
+    "settled",
+]
+
 LEAST_THETA = 0.02
 """Lower end: at 0 the tyre model has no force and the estimate could never leave it [-]."""
-SIGNIFICANCE = 1.5
-"""How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
 SEEN_HOLD_M = 2.0
 """Way after which what the tyre showed no longer speaks for the road under it: the depth of the near group [m]."""
 OTHER_CLASS_M = 2.0
@@ -30,9 +53,6 @@ OTHER_CLASS_M = 2.0
 NEVER_SEEN_M = 1e6
 """Way since the tyre showed theta where it never did [m]."""
 _new = tuple.__new__
-LEAST_SENSITIVITY = 0.1
-"""Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
-nothing to invert [-]."""
 
 
 class VisualTerm(Enum):
@@ -67,51 +87,12 @@ class Gains:
     tyre_first: bool = True
 
 
-class WheelInputs(NamedTuple):
-    """What one wheel's estimator is given at a step."""
-
-    wheel_speed_rad_s: float
-    wheel_speed_ahead_rad_s: float
-    """Mean over the step to come: a wheel that gains speed would else seem to bear too much force."""
-    wheel_torque_nm: float
-    """Mean over the step to come."""
-    slip: Slip
-    load_n: float
-    slip_deviation: float
-    """Standard deviation of the slip through sensor noise and a bias that is not known better [-]."""
-    slip_change: float
-    """Distance of the slip from its own, once more filtered, course [-]: force and slip of a tyre that is being
-    loaded or unloaded pass the filter along the chord of its bent curve, and lie that far beside it."""
-    way_m: float = 0.0
-    """Way driven over the step to come [m]."""
-    torque_known: bool = True
-    """False at a locked wheel: its brake holds what the road gives, whatever was commanded."""
-    slip_noise: float = 0.0
-    """Standard deviation of the filtered slip through noise alone, which a mean over time lessens [-]."""
-    slip_doubt: float = 0.0
-    """That of slip's steady offset and of the tyre's curve, which no mean lessens, as far as it counts [-]."""
-    slip_rise: float = 0.0
-    """`slip_change` with its sign: positive while the tyre is being loaded [-]."""
-    noise_s: float = 1.0
-    """Time in which the filtered noise forgets itself: twice the filter's constant [s]."""
-
-
 class Wheel(NamedTuple):
     """The constants of the wheel: I [kg m^2], R [m], C_x [N]."""
 
     inertia_kg_m2: float
     radius_m: float
     longitudinal_stiffness_n: float
-
-
-class Look(NamedTuple):
-    """What slip and load say before any force is known: the same for DE and DIFE."""
-
-    tyre: TyreAtSlip
-    surely: float
-    """Slip that stands beyond noise; 0 or less where noise hides it [-]."""
-    threshold: float
-    """Excitation threshold without a picture [-]."""
 
 
 class FusionState(NamedTuple):
@@ -133,16 +114,6 @@ class FusionState(NamedTuple):
     """Whether the tyre has shown theta since that class stands: the camera then has nothing to add."""
     steady: Steady = NOTHING
     """Means of slip and used friction since the wheel stands where it stands on the curve."""
-
-
-class Place(NamedTuple):
-    """Where on the curve the mean of slip stands: the same for DE and DIFE."""
-
-    steady: Steady
-    """Means of which the place is taken; that of used friction does not count."""
-    tyre: TyreAtSlip
-    slides_below: float
-    """Used friction below which the tyre surely slides; 0 where noise hides it [-]."""
 
 
 class Unaided(NamedTuple):
@@ -188,7 +159,7 @@ class FusionStep(NamedTuple):
 
     @property
     def sensitivity(self) -> float:
-        """d mu / d theta there, see `Unaided` [-]."""
+        """Sensitivity d mu / d theta there, see `Unaided` [-]."""
         return self.unaided.sensitivity
 
 
@@ -199,56 +170,6 @@ def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains)
     balanced = inputs.wheel_torque_nm / wheel.radius_m
     s = settled_state(model, balanced, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
     return state._replace(s=s)
-
-
-def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: FuzzyScheduler) -> Look:
-    """What slip and load say of the tyre.
-
-    On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
-    end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
-    So the force must also be below the elastic one of a slip that is `SIGNIFICANCE` deviations smaller.
-    """
-    (size, _), load_n, deviation, change = inputs[3:7]
-    surely = size - SIGNIFICANCE * (deviation + change)
-    threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
-    return _new(Look, (tyre_at_slip(size, load_n, longitudinal_stiffness_n), surely, threshold))
-
-
-def _slides_below(surely: float, load_n: float, longitudinal_stiffness_n: float) -> float:
-    """Used friction below which the tyre surely slides; 0 where noise hides it [-]."""
-    return elastic_friction(surely, load_n, longitudinal_stiffness_n) if surely > 0.0 else 0.0
-
-
-def _shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
-    if friction > slides_below or slides_below == 0.0:
-        return None, 0.0
-    theta = tyre.theta(friction)
-    if theta is None:
-        return None, 0.0
-    _, g_0, g_1, kappa = tyre
-    sensitivity = (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
-    if sensitivity < LEAST_SENSITIVITY:
-        return None, 0.0
-    return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity
-
-
-def _place(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float) -> Place:
-    """Where the mean slip stands on the curve, and what of it noise leaves beyond doubt."""
-    slip, _, rise, _ = steady
-    load_n, noise, doubt, noise_s = inputs[4], inputs[9], inputs[10], inputs[12]
-    surely = slip - SIGNIFICANCE * (mean_deviation(steady, noise, noise_s, doubt) + abs(rise))
-    below = elastic_friction(surely, load_n, longitudinal_stiffness_n) if surely > 0.0 else 0.0
-    return _new(Place, (steady, tyre_at_slip(slip, load_n, longitudinal_stiffness_n), below))
-
-
-def visible_theta(
-    force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float
-) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
-    look = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
-    below = _slides_below(look.surely, inputs.load_n, longitudinal_stiffness_n)
-    return _shown(force_n * inputs.slip.direction / inputs.load_n, look.tyre, below)
 
 
 def _unaided(
@@ -286,10 +207,10 @@ def _unaided(
         if steady[3] > step_s:
             place = beside
             if place is None or not same_slip(place[0], steady):
-                place = _place(steady, inputs, C_x)
-            theta_tyre, sensitivity = _shown(steady[1], place[1], place[2])
+                place = place_of_mean(steady, inputs, C_x)
+            theta_tyre, sensitivity = shown(steady[1], place[1], place[2])
         else:
-            theta_tyre, sensitivity = _shown(friction, tyre, _slides_below(surely, load_n, C_x))
+            theta_tyre, sensitivity = shown(friction, tyre, slides_below(surely, load_n, C_x))
         if theta_tyre is not None:
             rate = gains.gamma * quickened(steady, inputs[12])
             theta_next = _driven(theta_hat, rate, rate * theta_tyre, step_s)
@@ -326,7 +247,9 @@ def _led(
         by_tyre = gains.gamma * quickened(unaided.steady, inputs.noise_s)
         rate, pull = by_tyre + rate, by_tyre * unaided.theta_tyre + pull
     theta_next = _driven(theta_hat, rate, pull, step_s)
-    by_theta_n = direction * load_n * look.tyre.friction_by_theta(theta_hat) if theta_next != theta_hat else 0.0
+    by_theta_n = (
+        direction * load_n * look.tyre.friction_by_theta(theta_hat) if theta_next != theta_hat else 0.0
+    )
     theta_rate = (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0
     return theta_next, advanced_state(
         s,
@@ -423,21 +346,6 @@ def fusion_step(
         rests = road_img is not None
     after = _new(FusionState, (theta_next, s, unseen_m, before_img, road_img, other_m, rests, steady))
     return _new(FusionStep, (after, unaided, threshold, excited, K_v))
-
-
-def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
-    """The smallest theta that force and slip allow: the inverse at a slip `SIGNIFICANCE` deviations larger.
-
-    Below the curve's maximum, that is: beyond it a larger slip asks for more theta, but there the tyre is seen.
-    """
-    (size, direction), load_n, deviation, change = inputs[3:7]
-    surely = size + SIGNIFICANCE * (deviation + change)
-    friction = force_n * direction / load_n
-    tyre = tyre_at_slip(surely if surely < GREATEST_SLIP else GREATEST_SLIP, load_n, longitudinal_stiffness_n)
-    theta = tyre.theta(friction)
-    if theta is None:
-        theta = 2.0 * tyre[0] if friction > 0.0 else 0.0
-    return theta if theta < GREATEST_THETA else GREATEST_THETA
 
 
 def _compatible(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .camera_side import RoadUnderWheel, take_frame
 from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
-from .dife import FusionState, FusionStep, Look, Wheel, WheelInputs, fusion_step, look_at, settled
+from .dife import FusionState, FusionStep, Wheel, fusion_step, settled
 from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
 from .mismatch import followed
@@ -25,6 +25,7 @@ from .readings import (
     plain,
     unusable,
 )
+from .sight import Look, WheelInputs, look_at
 from .steady import quickened, unsettled
 from .tyre import peak_friction, tyre_at_slip
 from .vision.ife import Ife
@@ -212,8 +213,18 @@ class TrpacEstimator:
         if theta_img is not None or fusion != dynamics:
             model, known = config.confidence, state.variance
             fused = fusion_step(
-                fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, model, known,
-                dynamics, alone[1],
+                fusion,
+                inputs,
+                look,
+                wheel,
+                gains,
+                scheduler,
+                theta_img,
+                step_s,
+                model,
+                known,
+                dynamics,
+                alone[1],
             )
         after, unaided, threshold, excited, K_v = fused
         theta, class_after, class_before = after[0], after[3], fusion[3]

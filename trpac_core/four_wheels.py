@@ -166,9 +166,9 @@ class FourWheels:
             WHEELS, self._wheels, (left, right, left, right), omega, torque, speeds_m_s, given_n, strict=True
         ):
             one = Sensors(wheel_omega, wheel_torque, wheel_m_s, wheel_n, steering, accel, yaw)
-            estimate = wheel.step(step_s, one, side, frame_failed=frame_failed)
-            if estimate.problem is not None:
-                problems.append((name, estimate.problem))
+            problem = wheel.step(step_s, one, side, frame_failed=frame_failed).problem
+            if problem is not None:
+                problems.append((name, problem))
         self._last = self._together(loads_n, self._told(sensors, problems) if problems else ())
         return self._last
 

@@ -20,6 +20,7 @@ MEMORY_S = 0.2
 FORCE_SETTLES_S = 0.016
 """Time in which the observed force settles after slip moved: 1 / K [s]."""
 
+_LONGEST_S = 2.0 * MEMORY_S
 QUICKEST = 2.0
 """Most by which gamma grows with a mean: K must stay well above it [-]."""
 
@@ -91,7 +92,9 @@ def mean_deviation(steady: Steady, noise: float, noise_s: float, doubt: float) -
         Standard deviation of what slip reads too much all the time, which no mean lessens [-].
     """
     # A mean that forgets with a time constant is as sure as an even one over twice that.
-    held_s = steady[3] if steady[3] < 2.0 * MEMORY_S else 2.0 * MEMORY_S
+    held_s = steady[3]
+    if held_s > _LONGEST_S:
+        held_s = _LONGEST_S
     return math.sqrt(noise * noise / (1.0 + held_s / noise_s) + doubt * doubt)
 
 

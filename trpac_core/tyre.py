@@ -103,17 +103,25 @@ class TyreAtSlip(NamedTuple):
 
 def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> TyreAtSlip:
     """The tyre at this unsigned slip [-], vertical load F_z [N] and longitudinal stiffness C_x [N]."""
-    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
-    kappa = 0.25 / elastic if elastic > 0.0 else math.inf
-    g_0, g_1 = 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip)
-    return _new(TyreAtSlip, (elastic, g_0, g_1, kappa))
+    rolls = 1.0 - slip
+    elastic = longitudinal_stiffness_n * slip / rolls / load_n
+    return _new(
+        TyreAtSlip,
+        (
+            elastic,
+            1.27 + slip * (1.15 * slip - 1.63),
+            0.75 * slip * rolls,
+            0.25 / elastic if elastic > 0.0 else math.inf,
+        ),
+    )
 
 
 def elastic_friction(slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
     """Used friction at L = 1, the most at this slip that theta can be read from [-]."""
-    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
-    g_0, g_1 = 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip)
-    return elastic * (g_0 + 2.0 * g_1 * elastic)
+    rolls = 1.0 - slip
+    elastic = longitudinal_stiffness_n * slip / rolls / load_n
+    g_0 = 1.27 + slip * (1.15 * slip - 1.63)
+    return elastic * (g_0 + 2.0 * (0.75 * slip * rolls) * elastic)
 
 
 def used_friction(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
@@ -235,6 +243,7 @@ def peak_friction(theta: float, load_n: float, longitudinal_stiffness_n: float) 
     if theta <= 0.0:
         return 0.0
     slip = peak_slip(theta, load_n, longitudinal_stiffness_n)
-    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
-    base = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * (1.0 - slip) * theta
+    rolls = 1.0 - slip
+    elastic = longitudinal_stiffness_n * slip / rolls / load_n
+    base = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * rolls * theta
     return (elastic if theta >= 2.0 * elastic else theta * (1.0 - 0.25 / elastic * theta)) * base

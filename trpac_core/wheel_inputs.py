@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 
-from .dife import WheelInputs
 from .estimator_data import EstimatorConfig, EstimatorState, Rates
 from .readings import Readings, Sensors
+from .sight import WheelInputs
 from .slip import GREATEST_SLIP, Slip, signed_parts
 
 MOST_AHEAD = 2.0
