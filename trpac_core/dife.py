@@ -187,15 +187,14 @@ def _unaided(
     `beside` is the place that the other estimator found in this step. A locked wheel tells nothing of its force: the
     observer is then led by the tyre model and the estimate holds.
     """
-    theta_hat, s, _, _, _, _, _, steady = state
-    omega, omega_ahead, torque_nm, (size, direction), load_n, _, _, _, torque_known = inputs[:9]
-    tyre, surely, _ = look
-    elastic, g_0, g_1, kappa = tyre
+    theta_hat, s, omega, slip, load_n = state[0], state[1], inputs[0], inputs[3], inputs[4]
+    elastic, g_0, g_1, kappa = look[0]
     inertia, radius_m, C_x = wheel
+    direction = slip[1]
     K, base, driven_n, free = gains.K, g_0 + g_1 * theta_hat, direction * load_n, theta_hat >= 2.0 * elastic
     share = elastic if free else theta_hat * (1.0 - kappa * theta_hat)
     model_n = driven_n * (share * base)
-    if not torque_known:
+    if not inputs[8]:
         s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
         return _new(Unaided, (theta_hat, s, model_n, model_n, None, 0.0, NOTHING, None))
     force_n = model_n - inertia / radius_m * (s + K * omega)  # Eq. (14), see `observed_force`
@@ -203,14 +202,14 @@ def _unaided(
     theta_next, by_theta_n, theta_rate = theta_hat, 0.0, 0.0
     if asked:
         friction = force_n * direction / load_n
-        steady = held(steady, size, friction, inputs[11], inputs[9], step_s)
+        steady = held(state[7], slip[0], friction, inputs[11], inputs[9], step_s)
         if steady[3] > step_s:
             place = beside
             if place is None or not same_slip(place[0], steady):
                 place = place_of_mean(steady, inputs, C_x)
             theta_tyre, sensitivity = shown(steady[1], place[1], place[2])
         else:
-            theta_tyre, sensitivity = shown(friction, tyre, slides_below(surely, load_n, C_x))
+            theta_tyre, sensitivity = shown(friction, look[0], slides_below(look[1], load_n, C_x))
         if theta_tyre is not None:
             rate = gains.gamma * quickened(steady, inputs[12])
             theta_next = _driven(theta_hat, rate, rate * theta_tyre, step_s)
@@ -220,9 +219,7 @@ def _unaided(
                 by_theta_n = driven_n * slope
     else:
         steady = NOTHING
-    s = advanced_state(
-        s, model_n, by_theta_n, theta_rate, torque_nm, omega_ahead, K, inertia, radius_m, step_s
-    )
+    s = advanced_state(s, model_n, by_theta_n, theta_rate, inputs[2], inputs[1], K, inertia, radius_m, step_s)
     return _new(Unaided, (theta_next, s, model_n, force_n, theta_tyre, sensitivity, steady, place))
 
 

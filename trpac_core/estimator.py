@@ -296,7 +296,7 @@ class TrpacEstimator:
         tyre, steady, place = look.tyre, fused.state.steady, fused.unaided.place
         if steady.held_s > state.step_s:
             size, friction = steady.slip, steady.friction
-            tyre = place.tyre if place is not None else tyre_at_slip(size, inputs.load_n, wheel[2])
+            tyre = place[1] if place is not None else tyre_at_slip(size, inputs.load_n, wheel[2])
         noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
         torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
         torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0

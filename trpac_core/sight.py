@@ -58,14 +58,9 @@ class Look(NamedTuple):
     """Excitation threshold without a picture [-]."""
 
 
-class Place(NamedTuple):
-    """Where on the curve the mean of slip stands: the same for DE and DIFE."""
-
-    steady: Steady
-    """Means of which the place is taken; that of used friction does not count."""
-    tyre: TyreAtSlip
-    slides_below: float
-    """Used friction below which the tyre surely slides; 0 where noise hides it [-]."""
+Place = tuple[Steady, TyreAtSlip, float]
+"""Where on the curve the mean of slip stands, the same for DE and DIFE: the means of which it is taken (used friction does
+not count), the tyre there, and the used friction below which it surely slides, 0 where noise hides it [-]."""
 
 
 def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: FuzzyScheduler) -> Look:
@@ -106,7 +101,7 @@ def place_of_mean(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n:
     load_n, noise, doubt, noise_s = inputs[4], inputs[9], inputs[10], inputs[12]
     surely = slip - SIGNIFICANCE * (mean_deviation(steady, noise, noise_s, doubt) + abs(rise))
     below = elastic_friction(surely, load_n, longitudinal_stiffness_n) if surely > 0.0 else 0.0
-    return _new(Place, (steady, tyre_at_slip(slip, load_n, longitudinal_stiffness_n), below))
+    return steady, tyre_at_slip(slip, load_n, longitudinal_stiffness_n), below
 
 
 def visible_theta(
