@@ -277,24 +277,24 @@ class TrpacEstimator:
         passed_s: float,
     ) -> tuple[float, float]:
         """Variance and lag of the fused estimate after a time."""
-        config, theta_hat = self.config, fused.state.theta_hat
+        config, theta_hat, before_s = self.config, fused.state.theta_hat, state.step_s
+        _, _, _, force_n, theta_tyre, _, steady, place = fused.unaided
+        size, direction = inputs.slip
         way_m = state.speed_m_s * passed_s
         before, after = state.fusion.theta_img, fused.state.theta_img
         if (
-            before is not None
+            theta_tyre is None
+            and before is not None
             and after is not None
-            and fused.theta_tyre is None
             and abs(after - theta_hat) > abs(before - theta_hat)
         ):
             # A class that is farther from the estimate than the one before: the road may be another.
             way_m += config.confidence.class_change_m
-        size = inputs.slip.size
         if size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
             return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
-        theta_tyre, friction = fused.theta_tyre, fused.tyre_force_n * inputs.slip.direction / inputs.load_n
-        tyre, steady, place = look.tyre, fused.state.steady, fused.unaided.place
-        if steady.held_s > state.step_s:
+        tyre, friction = look.tyre, force_n * direction / inputs.load_n
+        if steady.held_s > before_s:
             size, friction = steady.slip, steady.friction
             tyre = place[1] if place is not None else tyre_at_slip(size, inputs.load_n, wheel[2])
         noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size

@@ -59,8 +59,8 @@ class Look(NamedTuple):
 
 
 Place = tuple[Steady, TyreAtSlip, float]
-"""Where on the curve the mean of slip stands, the same for DE and DIFE: the means of which it is taken (used friction does
-not count), the tyre there, and the used friction below which it surely slides, 0 where noise hides it [-]."""
+"""Where on the curve the mean of slip stands, the same for DE and DIFE: the means of which it is taken (used friction
+does not count), the tyre there, and the used friction below which it surely slides, 0 where noise hides it [-]."""
 
 
 def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: FuzzyScheduler) -> Look:
