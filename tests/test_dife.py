@@ -18,14 +18,11 @@ from trpac_core.dife import (
     Gains,
     VisualTerm,
     Wheel,
-    WheelInputs,
     fusion_step,
-    least_theta,
-    look_at,
     settled,
-    visible_theta,
 )
 from trpac_core.excitation import FuzzyScheduler
+from trpac_core.sight import WheelInputs, least_theta, look_at, visible_theta
 from trpac_core.slip import Slip
 
 WHEEL = Wheel(1.2, 0.29, 50_000.0)
@@ -235,3 +232,38 @@ def test_a_locked_wheel_moves_neither_estimate_nor_force():
     assert step.tyre_force_n == pytest.approx(
         tyre.force(0.7, 0.999, LOAD_N, WHEEL.longitudinal_stiffness_n, -1.0)
     )
+
+
+def noisy_course(rng, steps=400):
+    """Inputs of a wheel whose slip comes and goes, locked at times, and classes that come, change and fail."""
+    slip, theta_img = 0.03, None
+    for k in range(steps):
+        if k % 40 == 0:
+            slip, theta_img = rng.choice([0.0, 0.004, 0.02, 0.03, 0.08]), rng.choice([None, 0.2, 0.6, 0.8])
+        noisy = on_road(0.4, abs(slip + 1e-4 * rng.standard_normal()), deviation=1e-4, change=1e-5)
+        yield (
+            noisy._replace(way_m=0.01, torque_known=k % 150 < 140, slip_noise=1e-4, slip_doubt=1e-4),
+            theta_img,
+        )
+
+
+@pytest.mark.parametrize("tyre_first", [True, False])
+def test_what_is_taken_from_the_estimator_beside_changes_nothing(tyre_first):
+    gains, rng = Gains(tyre_first=tyre_first), np.random.default_rng(3)
+    alone, fused = FusionState(0.8, 0.0), FusionState(0.8, 0.0)
+    shared = apart = 0
+    for inputs, theta_img in noisy_course(rng):
+        look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+        given = (inputs, look, WHEEL, gains, SCHEDULER)
+        by_itself = fusion_step(alone, *given, None, STEP_S)
+        expected = fusion_step(fused, *given, theta_img, STEP_S, ConfidenceModel(), 0.04)
+        outcome = fusion_step(
+            fused, *given, theta_img, STEP_S, ConfidenceModel(), 0.04, alone, by_itself.unaided
+        )
+        # All but the last, the place, which names the mean force of the estimator that found it.
+        assert outcome.unaided[:-1] == expected.unaided[:-1]
+        assert outcome._replace(unaided=expected.unaided) == expected
+        shared += outcome.unaided is by_itself.unaided
+        apart += outcome.unaided is not by_itself.unaided
+        alone, fused = by_itself.state, outcome.state
+    assert min(shared, apart) > 20

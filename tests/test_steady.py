@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from trpac_core.dife import FusionState, Gains, Wheel, WheelInputs, fusion_step, look_at, settled
+from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
 from trpac_core.excitation import FuzzyScheduler
+from trpac_core.sight import WheelInputs, look_at
 from trpac_core.slip import Slip
 from trpac_core.steady import (
     ELSEWHERE,

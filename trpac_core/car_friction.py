@@ -31,6 +31,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+_new = tuple.__new__
 _ROOT_2, _ROOT_2_PI = math.sqrt(2.0), math.sqrt(2.0 * math.pi)
 
 
@@ -41,20 +42,24 @@ class Friction(NamedTuple):
     deviation: float
 
 
-def surer(own: Friction, partner: Friction, axle_deviation: float) -> Friction:
-    """A wheel's friction: its own estimate, or that of the other wheel of its side where that one says more.
+Known = tuple[float, float]
+"""An adhesion and its standard deviation, as in `Friction` [-]."""
+
+
+def surer(front: Known, rear: Known, axle_deviation: float) -> tuple[Known, Known]:
+    """The friction of a side's two wheels: each its own estimate, or that of the other where that one says more.
 
     `axle_deviation` is the standard deviation of the road's change over a wheelbase [-].
     """
-    _, deviation = own
-    theta, partner_deviation = partner
-    if deviation <= partner_deviation:
-        return own
-    lent = math.hypot(partner_deviation, axle_deviation)
-    return own if deviation <= lent else Friction(theta, lent)
+    front_deviation, rear_deviation = front[1], rear[1]
+    if front_deviation <= rear_deviation:
+        lent = math.hypot(front_deviation, axle_deviation)
+        return front, rear if rear_deviation <= lent else (front[0], lent)
+    lent = math.hypot(rear_deviation, axle_deviation)
+    return front if front_deviation <= lent else (rear[0], lent), rear
 
 
-def lower(first: Friction, second: Friction) -> Friction:
+def lower(first: Known, second: Known) -> Friction:
     """The smaller of two adhesions, and the root mean square error of taking it for the true minimum.
 
     Examples
@@ -66,7 +71,7 @@ def lower(first: Friction, second: Friction) -> Friction:
     (low_theta, low_deviation), (high_theta, high_deviation) = low, high
     spread = math.hypot(low_deviation, high_deviation)
     if spread == 0.0:
-        return low
+        return Friction(low_theta, low_deviation)
     gap = high_theta - low_theta
     ratio = gap / spread
     right_order = 0.5 * (1.0 + math.erf(ratio / _ROOT_2))
@@ -76,11 +81,11 @@ def lower(first: Friction, second: Friction) -> Friction:
         + (gap * gap + high_deviation * high_deviation) * (1.0 - right_order)
         - gap * spread * density
     )
-    return Friction(low_theta, math.sqrt(square) if square > 0.0 else 0.0)
+    return _new(Friction, (low_theta, math.sqrt(square) if square > 0.0 else 0.0))
 
 
 def car_friction(
-    wheels: tuple[Friction, Friction, Friction, Friction],
+    wheels: tuple[Known, Known, Known, Known],
     load_n: tuple[float, float, float, float],
     axle_deviation: float,
 ) -> Friction:
@@ -102,11 +107,12 @@ def car_friction(
     0.362
     """
     fl, fr, rl, rr = wheels
-    left_theta, left_deviation = surer(fl, rl, axle_deviation)
-    right_theta, right_deviation = surer(fr, rr, axle_deviation)
-    rear_theta, rear_deviation = lower(surer(rl, fl, axle_deviation), surer(rr, fr, axle_deviation))
-    left_n, right_n, rear_n = load_n[0], load_n[1], load_n[2] + load_n[3]
+    (left_theta, left_deviation), rear_left = surer(fl, rl, axle_deviation)
+    (right_theta, right_deviation), rear_right = surer(fr, rr, axle_deviation)
+    rear_theta, rear_deviation = lower(rear_left, rear_right)
+    left_n, right_n, rear_n, rear_right_n = load_n
+    rear_n += rear_right_n
     total_n = left_n + right_n + rear_n
     theta = left_n * left_theta + right_n * right_theta + rear_n * rear_theta
     deviation = left_n * left_deviation + right_n * right_deviation + rear_n * rear_deviation
-    return Friction(theta / total_n, deviation / total_n)
+    return _new(Friction, (theta / total_n, deviation / total_n))

@@ -93,7 +93,8 @@ def theta_at(fraction: float, elastic: float) -> float:
 
 def bounded_variance(theta_hat: float, least: float) -> float:
     """Mean square error where the road is known to be anywhere above `least` [-]."""
-    least = min(least, GREATEST_ROAD - 0.1)
+    if least > GREATEST_ROAD - 0.1:
+        least = GREATEST_ROAD - 0.1
     above, below = GREATEST_ROAD - theta_hat, least - theta_hat
     return (above**3 - below**3) / (3.0 * (GREATEST_ROAD - least))
 

@@ -13,16 +13,39 @@ from typing import NamedTuple
 from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
 from .observer import advanced_state, settled_state
-from .slip import GREATEST_SLIP, Slip
-from .steady import NOTHING, Steady, held, mean_deviation, quickened
-from .tyre import TyreAtSlip, elastic_friction, force, slip_ratio_force, theta_from_friction, tyre_at_slip
+from .sight import (
+    GREATEST_THETA,
+    LEAST_SENSITIVITY,
+    Look,
+    Place,
+    WheelInputs,
+    least_theta,
+    place_of_mean,
+    shown,
+    slides_below,
+)
+from .steady import NOTHING, Steady, held, quickened, same_slip
+from .tyre import force
 
-GREATEST_THETA = 1.2
-"""Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
+__all__ = [
+    "GREATEST_THETA",
+    "LEAST_SENSITIVITY",
+    "LEAST_THETA",
+    "NEVER_SEEN_M",
+    "OTHER_CLASS_M",
+    "SEEN_HOLD_M",
+    "FusionState",
+    "FusionStep",
+    "Gains",
+    "Unaided",
+    "VisualTerm",
+    "Wheel",
+    "fusion_step",
+    "settled",
+]
+
 LEAST_THETA = 0.02
 """Lower end: at 0 the tyre model has no force and the estimate could never leave it [-]."""
-SIGNIFICANCE = 1.5
-"""How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
 SEEN_HOLD_M = 2.0
 """Way after which what the tyre showed no longer speaks for the road under it: the depth of the near group [m]."""
 OTHER_CLASS_M = 2.0
@@ -30,9 +53,6 @@ OTHER_CLASS_M = 2.0
 NEVER_SEEN_M = 1e6
 """Way since the tyre showed theta where it never did [m]."""
 _new = tuple.__new__
-LEAST_SENSITIVITY = 0.1
-"""Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
-nothing to invert [-]."""
 
 
 class VisualTerm(Enum):
@@ -67,51 +87,12 @@ class Gains:
     tyre_first: bool = True
 
 
-class WheelInputs(NamedTuple):
-    """What one wheel's estimator is given at a step."""
-
-    wheel_speed_rad_s: float
-    wheel_speed_ahead_rad_s: float
-    """Mean over the step to come: a wheel that gains speed would else seem to bear too much force."""
-    wheel_torque_nm: float
-    """Mean over the step to come."""
-    slip: Slip
-    load_n: float
-    slip_deviation: float
-    """Standard deviation of the slip through sensor noise and a bias that is not known better [-]."""
-    slip_change: float
-    """Distance of the slip from its own, once more filtered, course [-]: force and slip of a tyre that is being
-    loaded or unloaded pass the filter along the chord of its bent curve, and lie that far beside it."""
-    way_m: float = 0.0
-    """Way driven over the step to come [m]."""
-    torque_known: bool = True
-    """False at a locked wheel: its brake holds what the road gives, whatever was commanded."""
-    slip_noise: float = 0.0
-    """Standard deviation of the filtered slip through noise alone, which a mean over time lessens [-]."""
-    slip_doubt: float = 0.0
-    """That of slip's steady offset and of the tyre's curve, which no mean lessens, as far as it counts [-]."""
-    slip_rise: float = 0.0
-    """`slip_change` with its sign: positive while the tyre is being loaded [-]."""
-    noise_s: float = 1.0
-    """Time in which the filtered noise forgets itself: twice the filter's constant [s]."""
-
-
 class Wheel(NamedTuple):
     """The constants of the wheel: I [kg m^2], R [m], C_x [N]."""
 
     inertia_kg_m2: float
     radius_m: float
     longitudinal_stiffness_n: float
-
-
-class Look(NamedTuple):
-    """What slip and load say before any force is known: the same for DE and DIFE."""
-
-    tyre: TyreAtSlip
-    slides_below: float
-    """Used friction below which the tyre surely slides; 0 where noise hides it [-]."""
-    threshold: float
-    """Excitation threshold without a picture [-]."""
 
 
 class FusionState(NamedTuple):
@@ -135,21 +116,51 @@ class FusionState(NamedTuple):
     """Means of slip and used friction since the wheel stands where it stands on the curve."""
 
 
-class FusionStep(NamedTuple):
-    """Outcome of one step."""
+class Unaided(NamedTuple):
+    """What one step makes of slip, torque and load alone."""
 
-    state: FusionState
-    tyre_force_n: float
+    theta_hat: float
+    """Estimate after the step [-]."""
+    s: float
+    """The observer's s after it [rad/s^2]."""
+    model_n: float
+    """Force of the tyre model at theta_hat before it [N]."""
+    force_n: float
     """Observed force F_hat [N]."""
     theta_tyre: float | None
     """theta(lambda, F_hat); None where the tyre does not show it or the estimate holds [-]."""
     sensitivity: float
     """d mu / d theta there [-]; 0 where it is None."""
+    steady: Steady
+    place: Place | None
+    """None where the newest reading stands for itself."""
+
+
+class FusionStep(NamedTuple):
+    """Outcome of one step."""
+
+    state: FusionState
+    unaided: Unaided
     threshold: float
     """Excitation threshold [-]."""
     excited: bool
     K_v: float
     """Visual gain, [-] in the form (17) and [1/s] in the form (18)."""
+
+    @property
+    def tyre_force_n(self) -> float:
+        """Observed force F_hat [N]."""
+        return self.unaided.force_n
+
+    @property
+    def theta_tyre(self) -> float | None:
+        """theta(lambda, F_hat), see `Unaided` [-]."""
+        return self.unaided.theta_tyre
+
+    @property
+    def sensitivity(self) -> float:
+        """Sensitivity d mu / d theta there, see `Unaided` [-]."""
+        return self.unaided.sensitivity
 
 
 def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains) -> FusionState:
@@ -161,56 +172,94 @@ def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains)
     return state._replace(s=s)
 
 
-def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: FuzzyScheduler) -> Look:
-    """What slip and load say of the tyre.
+def _unaided(
+    state: FusionState,
+    inputs: WheelInputs,
+    look: Look,
+    wheel: Wheel,
+    gains: Gains,
+    step_s: float,
+    asked: bool,
+    beside: Place | None,
+) -> Unaided:
+    """Observer and estimator over a step without a camera; the tyre is asked for theta where slip is high enough.
 
-    On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
-    end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
-    So the force must also be below the elastic one of a slip that is `SIGNIFICANCE` deviations smaller.
+    `beside` is the place that the other estimator found in this step. A locked wheel tells nothing of its force: the
+    observer is then led by the tyre model and the estimate holds.
     """
-    size, load_n, deviation, change = inputs[3][0], inputs[4], inputs[5], inputs[6]
-    surely = size - SIGNIFICANCE * (deviation + change)
-    below = 0.0
-    if surely > 0.0:
-        below = elastic_friction(surely, load_n, longitudinal_stiffness_n)
-    threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
-    return _new(Look, (tyre_at_slip(size, load_n, longitudinal_stiffness_n), below, threshold))
+    theta_hat, s, omega, slip, load_n = state[0], state[1], inputs[0], inputs[3], inputs[4]
+    elastic, g_0, g_1, kappa = look[0]
+    inertia, radius_m, C_x = wheel
+    direction = slip[1]
+    K, base, driven_n, free = gains.K, g_0 + g_1 * theta_hat, direction * load_n, theta_hat >= 2.0 * elastic
+    share = elastic if free else theta_hat * (1.0 - kappa * theta_hat)
+    model_n = driven_n * (share * base)
+    if not inputs[8]:
+        s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
+        return _new(Unaided, (theta_hat, s, model_n, model_n, None, 0.0, NOTHING, None))
+    force_n = model_n - inertia / radius_m * (s + K * omega)  # Eq. (14), see `observed_force`
+    theta_tyre, sensitivity, place = None, 0.0, None
+    theta_next, by_theta_n, theta_rate = theta_hat, 0.0, 0.0
+    if asked:
+        friction = force_n * direction / load_n
+        steady = held(state[7], slip[0], friction, inputs[11], inputs[9], step_s)
+        if steady[3] > step_s:
+            place = beside
+            if place is None or not same_slip(place[0], steady):
+                place = place_of_mean(steady, inputs, C_x)
+            theta_tyre, sensitivity = shown(steady[1], place[1], place[2])
+        else:
+            theta_tyre, sensitivity = shown(friction, look[0], slides_below(look[1], load_n, C_x))
+        if theta_tyre is not None:
+            rate = gains.gamma * quickened(steady, inputs[12])
+            theta_next = _driven(theta_hat, rate, rate * theta_tyre, step_s)
+            if theta_next != theta_hat and step_s > 0.0:
+                theta_rate = (theta_next - theta_hat) / step_s
+                slope = share * g_1 if free else (1.0 - 2.0 * kappa * theta_hat) * base + share * g_1
+                by_theta_n = driven_n * slope
+    else:
+        steady = NOTHING
+    s = advanced_state(s, model_n, by_theta_n, theta_rate, inputs[2], inputs[1], K, inertia, radius_m, step_s)
+    return _new(Unaided, (theta_next, s, model_n, force_n, theta_tyre, sensitivity, steady, place))
 
 
-def _shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
-    if friction > slides_below or slides_below == 0.0:
-        return None, 0.0
-    theta = tyre.theta(friction)
-    if theta is None:
-        return None, 0.0
-    _, g_0, g_1, kappa = tyre
-    sensitivity = (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
-    if sensitivity < LEAST_SENSITIVITY:
-        return None, 0.0
-    return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity
-
-
-def _shown_by_mean(
-    steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float
-) -> tuple[float | None, float]:
-    """As `_shown`, by the means of slip and used friction since slip stands."""
-    slip, friction, rise, _ = steady
-    load_n, noise, doubt, noise_s = inputs[4], inputs[9], inputs[10], inputs[12]
-    deviation = mean_deviation(steady, noise, noise_s, doubt)
-    surely = slip - SIGNIFICANCE * (deviation + abs(rise))
-    if surely <= 0.0:
-        return None, 0.0
-    below = elastic_friction(surely, load_n, longitudinal_stiffness_n)
-    return _shown(friction, tyre_at_slip(slip, load_n, longitudinal_stiffness_n), below)
-
-
-def visible_theta(
-    force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float
-) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
-    look = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
-    return _shown(force_n * inputs.slip.direction / inputs.load_n, look.tyre, look.slides_below)
+def _led(
+    state: FusionState,
+    unaided: Unaided,
+    inputs: WheelInputs,
+    look: Look,
+    wheel: Wheel,
+    gains: Gains,
+    theta_img: float,
+    K_v: float,
+    step_s: float,
+) -> tuple[float, float]:
+    """theta_hat and s after a step of Eq. (17) or (18) in which the camera pulls too."""
+    theta_hat, s = state[:2]
+    _, omega_ahead, torque_nm, (_, direction), load_n = inputs[:5]
+    inertia, radius_m, _ = wheel
+    rate = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)
+    pull = rate * theta_img
+    if unaided.theta_tyre is not None:
+        by_tyre = gains.gamma * quickened(unaided.steady, inputs.noise_s)
+        rate, pull = by_tyre + rate, by_tyre * unaided.theta_tyre + pull
+    theta_next = _driven(theta_hat, rate, pull, step_s)
+    by_theta_n = (
+        direction * load_n * look.tyre.friction_by_theta(theta_hat) if theta_next != theta_hat else 0.0
+    )
+    theta_rate = (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0
+    return theta_next, advanced_state(
+        s,
+        unaided.model_n,
+        by_theta_n,
+        theta_rate,
+        torque_nm,
+        omega_ahead,
+        gains.K,
+        inertia,
+        radius_m,
+        step_s,
+    )
 
 
 def fusion_step(
@@ -224,6 +273,8 @@ def fusion_step(
     step_s: float,
     confidence: ConfidenceModel | None = None,
     variance: float = 0.0,
+    before: FusionState | None = None,
+    beside: Unaided | None = None,
 ) -> FusionStep:
     """One step of observer and estimator.
 
@@ -233,8 +284,6 @@ def fusion_step(
     0.07, against 0.005 so). Else theta_hat holds and the observer
     keeps running. The estimator's equation is linear in theta_hat over a step and is solved exactly, so that it is
     stable for any step size.
-
-    A locked wheel tells nothing of its force: the observer is then led by the tyre model and the estimate holds.
 
     Parameters
     ----------
@@ -247,12 +296,12 @@ def fusion_step(
     confidence, variance : ConfidenceModel, float
         That of the estimate: where the tyre is not seen, a class may claim `confidence.camera_share` of its distance
         from the estimate; without a model all of it.
+    before, beside : FusionState and Unaided, optional
+        DE's state and what it made of it on the same inputs. Where that is the same here it is taken from there; the
+        outcome does not depend on it.
     """
     theta_hat, s, unseen_m, before_img, road_img, other_m, rests, steady = state
-    omega, omega_ahead, torque_nm, (size, direction), load_n, deviation, _, way_m, torque_known = inputs[:9]
-    tyre, slides_below, threshold = look
-    inertia, radius_m, C_x = wheel
-    K, driven_n = gains.K, direction * load_n
+    size, way_m, threshold = inputs[3][0], inputs[7], look[2]
     may_show = size > threshold
     if theta_img is not None:
         if theta_img == road_img:
@@ -263,76 +312,37 @@ def fusion_step(
                 # Another class that stands: what the tyre showed was another road.
                 road_img, other_m, rests = theta_img, 0.0, False
         before_img = theta_img
-        threshold = scheduler.threshold(theta_img, load_n, C_x, deviation)
+        threshold = scheduler.threshold(theta_img, inputs[4], wheel[2], inputs[5])
     unseen_m += way_m
     if unseen_m > NEVER_SEEN_M:
         unseen_m = NEVER_SEEN_M
-    elastic, g_0, g_1, kappa = tyre
-    share = elastic if theta_hat >= 2.0 * elastic else theta_hat * (1.0 - kappa * theta_hat)
-    model_n = driven_n * (share * (g_0 + g_1 * theta_hat))
-    if not torque_known:
-        s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
-        waiting = FusionState(theta_hat, s, unseen_m, before_img, road_img, other_m, rests)
-        return FusionStep(waiting, model_n, None, 0.0, threshold, False, 0.0)
-    F_hat = model_n - inertia / radius_m * (s + K * omega)  # Eq. (14), see `observed_force`
-    theta_tyre, sensitivity = None, 0.0
-    excited = size > threshold
-    if excited or may_show:
-        friction = F_hat * direction / load_n
-        steady = held(steady, size, friction, inputs[11], inputs[9], step_s)
-        if steady[3] > step_s:
-            theta_tyre, sensitivity = _shown_by_mean(steady, inputs, C_x)
-        else:
-            theta_tyre, sensitivity = _shown(friction, tyre, slides_below)
-        excited = excited or theta_tyre is not None
+    above = size > threshold
+    if before is None or beside is None:
+        unaided = _unaided(state, inputs, look, wheel, gains, step_s, above or may_show, None)
+    elif theta_hat != before[0] or s != before[1] or steady != before[7] or (above and not may_show):
+        unaided = _unaided(state, inputs, look, wheel, gains, step_s, above or may_show, beside[7])
     else:
-        steady = NOTHING
-    theta_next, K_v, by_theta_n = theta_hat, 0.0, 0.0
-    if excited:
-        if theta_img is not None and gains.tyre_first:
+        unaided = beside
+    theta_next, s, _, force_n, theta_tyre, _, steady, _ = unaided
+    K_v = 0.0
+    excited = theta_tyre is not None or (above and inputs[8])
+    if excited and theta_img is not None:
+        if gains.tyre_first:
             silent = rests or unseen_m < SEEN_HOLD_M or other_m > 0.0
-            theta_img = _compatible(theta_img, theta_hat, silent, theta_tyre, F_hat, inputs, C_x)
+            theta_img = _compatible(theta_img, theta_hat, silent, theta_tyre, force_n, inputs, wheel[2])
         if theta_img is not None:
             difference = abs(theta_img - theta_hat)
             if theta_tyre is None and confidence is not None and gains.tyre_first:
                 difference *= camera_share(confidence, variance, theta_hat)
             K_v = scheduler.K_v(difference)
-        quicker = quickened(steady, inputs[12])
-        theta_next = _driven(theta_hat, theta_tyre, theta_img, K_v, gains, step_s, quicker)
-        if theta_next != theta_hat:
-            by_theta_n = driven_n * tyre.friction_by_theta(theta_hat)
-        if theta_tyre is not None:
-            unseen_m = 0.0
-            road_img = before_img if road_img is None else road_img
-            rests = road_img is not None
-    s = advanced_state(
-        s,
-        model_n,
-        by_theta_n,
-        (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0,
-        torque_nm,
-        omega_ahead,
-        K,
-        inertia,
-        radius_m,
-        step_s,
-    )
+            if K_v != 0.0:
+                theta_next, s = _led(state, unaided, inputs, look, wheel, gains, theta_img, K_v, step_s)
+    if theta_tyre is not None:
+        unseen_m = 0.0
+        road_img = before_img if road_img is None else road_img
+        rests = road_img is not None
     after = _new(FusionState, (theta_next, s, unseen_m, before_img, road_img, other_m, rests, steady))
-    return _new(FusionStep, (after, F_hat, theta_tyre, sensitivity, threshold, excited, K_v))
-
-
-def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
-    """The smallest theta that force and slip allow: the inverse at a slip `SIGNIFICANCE` deviations larger.
-
-    Below the curve's maximum, that is: beyond it a larger slip asks for more theta, but there the tyre is seen.
-    """
-    surely = inputs.slip.size + SIGNIFICANCE * (inputs.slip_deviation + inputs.slip_change)
-    friction = force_n * inputs.slip.direction / inputs.load_n
-    elastic = slip_ratio_force(min(surely, GREATEST_SLIP), longitudinal_stiffness_n) / inputs.load_n
-    theta = theta_from_friction(friction, min(surely, GREATEST_SLIP), inputs.load_n, longitudinal_stiffness_n)
-    if theta is None:
-        theta = 2.0 * elastic if friction > 0.0 else 0.0
-    return min(theta, GREATEST_THETA)
+    return _new(FusionStep, (after, unaided, threshold, excited, K_v))
 
 
 def _compatible(
@@ -360,26 +370,10 @@ def _compatible(
     return max(theta_img, least_theta(force_n, inputs, longitudinal_stiffness_n))
 
 
-def _driven(
-    theta_hat: float,
-    theta_tyre: float | None,
-    theta_img: float | None,
-    K_v: float,
-    gains: Gains,
-    step_s: float,
-    quicker: float,
-) -> float:
-    """theta_hat one step later under Eq. (17) or (18), for the two targets held over the step."""
-    dynamic_rate = gains.gamma * quicker if theta_tyre is not None else 0.0
-    visual_rate = 0.0
-    if theta_img is not None:
-        visual_rate = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)
-    rate = dynamic_rate + visual_rate
+def _driven(theta_hat: float, rate: float, pull: float, step_s: float) -> float:
+    """theta_hat one step later under theta_hat' = pull - rate theta_hat, both held over the step."""
     if rate == 0.0:
         return theta_hat
-    pull = (dynamic_rate * theta_tyre if theta_tyre is not None else 0.0) + (
-        visual_rate * theta_img if theta_img is not None else 0.0
-    )
     target = pull / rate
     moved = target + (theta_hat - target) * math.exp(-rate * step_s)
     if moved < LEAST_THETA:

@@ -112,19 +112,22 @@ class ElasticLine(NamedTuple):
 
     def slip_variance(self, slip: float, speed_m_s: float) -> float:
         """Mean square error of where the elastic line has a slip, with what was learned and not used in it [-]."""
-        cross = 2.0 * slip * (self.bc / speed_m_s + self.rc)
+        b, r, c, _, _, bc, _, rc, cc = self
+        cross = 2.0 * slip * (bc / speed_m_s + rc)
         offset_variance = self.offset_variance(speed_m_s)
-        used = self.offset(speed_m_s)[0] + slip * self.compliance()
-        unused = self.b / speed_m_s + self.r + slip * self.c - used
-        return max(0.0, offset_variance + cross + slip * slip * self.cc) + unused * unused
+        offset = b / speed_m_s + r
+        unused = offset + slip * c - (beyond(offset, offset_variance) + slip * beyond(c, cc))
+        total = offset_variance + cross + slip * slip * cc
+        return (total if total > 0.0 else 0.0) + unused * unused
 
     def drifted(self, model: ElasticModel, passed_s: float) -> ElasticLine:
         """The line after a time in which the speed signals may have drifted."""
         if model.speed_drift_m_s == 0.0:
             return self
-        grown = self.bb + model.speed_drift_m_s**2 * passed_s
-        most = max(self.bb, model.speed_bias_m_s**2)
-        return self._replace(bb=min(grown, most))
+        b, r, c, bb, br, bc, rr, rc, cc = self
+        grown = bb + model.speed_drift_m_s**2 * passed_s
+        most = max(bb, model.speed_bias_m_s**2)
+        return ElasticLine(b, r, c, grown if grown < most else most, br, bc, rr, rc, cc)
 
 
 def learned(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .camera_side import RoadUnderWheel, take_frame
 from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
-from .dife import FusionState, FusionStep, Look, Wheel, WheelInputs, fusion_step, look_at, settled
+from .dife import FusionState, FusionStep, Wheel, fusion_step, settled
 from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
 from .mismatch import followed
@@ -26,6 +26,7 @@ from .readings import (
     plain,
     unusable,
 )
+from .sight import Look, WheelInputs, look_at
 from .steady import quickened, unsettled
 from .tyre import peak_friction, tyre_at_slip
 from .vision.ife import Ife
@@ -140,8 +141,7 @@ class TrpacEstimator:
         ImageError
             If the picture does not fit the camera; nothing has changed then.
         """
-        config, rates = self.config, self._rates
-        problem = None
+        config, rates, problem = self.config, self._rates, None
         if not plain(step_s, sensors, config.floor_m_s):
             problem = unusable(step_s, sensors, self._wheel.radius_m, config.floor_m_s)
         if frame is not None and isinstance(frame, RoadClass) and not 0.0 <= frame.confidence <= 1.0:
@@ -151,8 +151,8 @@ class TrpacEstimator:
             return self._hold(step_s, sensors, frame, frame_failed, problem)
         state = self._state
         if step_s != rates.step_s or step_s == 0.0:
-            self._rates = Rates.at(config, step_s, state.step_s)
-        if state.settled and jumped(state.readings, sensors, self._radius_m, step_s):
+            self._rates = rates = Rates.at(config, step_s, state.step_s)
+        if state.settled and jumped(state.readings, sensors, self._radius_m, rates):
             state.settled = False
         acceleration, lagged, load_n = self._moved(sensors)
         if frame is not None or frame_failed:
@@ -191,7 +191,10 @@ class TrpacEstimator:
     ) -> Estimate:
         """Run both estimators over the step with the road that lies under the wheel at its start."""
         config, state = self.config, self._state
-        scheduler, gains, wheel = config.scheduler, config.gains, self._softened(state.line)
+        scheduler, gains = config.scheduler, config.gains
+        softened_by, wheel = self._softened_by
+        if softened_by is not state.line:
+            wheel = self._softened(state.line)
         C_x = wheel[2]
         readings, inputs, read_slip, smoothed_slip, locked_s = wheel_inputs(
             config, self._rates, state, sensors, self._radius_m, step_s, load_n
@@ -212,9 +215,20 @@ class TrpacEstimator:
         if theta_img is not None or fusion != dynamics:
             model, known = config.confidence, state.variance
             fused = fusion_step(
-                fusion, inputs, look, wheel, gains, scheduler, theta_img, step_s, model, known
+                fusion,
+                inputs,
+                look,
+                wheel,
+                gains,
+                scheduler,
+                theta_img,
+                step_s,
+                model,
+                known,
+                dynamics,
+                alone[1],
             )
-        after, force_n, _, _, threshold, excited, K_v = fused
+        after, unaided, threshold, excited, K_v = fused
         theta, class_after, class_before = after[0], after[3], fusion[3]
         unasked_s = state.unasked_s + step_s
         if unasked_s >= config.sensor_filter_s or class_after != class_before:
@@ -238,7 +252,7 @@ class TrpacEstimator:
             excited,
             threshold,
             inputs[3][0],
-            force_n,
+            unaided[3],
             theta_seen,
             alone[0][0],
             peak_friction(theta, load_n, C_x),
@@ -249,11 +263,11 @@ class TrpacEstimator:
         return self._last
 
     def _softened(self, line: ElasticLine) -> Wheel:
-        """The wheel with the stiffness that was learnt; worked out anew only where the line has changed."""
-        if line is not self._softened_by[0]:
-            inertia, radius_m, told_n = self._wheel
-            self._softened_by = line, Wheel(inertia, radius_m, told_n / (1.0 + line.compliance()))
-        return self._softened_by[1]
+        """The wheel with the stiffness that was learnt, kept until the line changes."""
+        inertia, radius_m, told_n = self._wheel
+        wheel = Wheel(inertia, radius_m, told_n / (1.0 + line.compliance()))
+        self._softened_by = line, wheel
+        return wheel
 
     def _variance(
         self,
@@ -265,26 +279,26 @@ class TrpacEstimator:
         passed_s: float,
     ) -> tuple[float, float]:
         """Variance and lag of the fused estimate after a time."""
-        config, theta_hat = self.config, fused.state.theta_hat
+        config, theta_hat, before_s = self.config, fused.state.theta_hat, state.step_s
+        _, _, _, force_n, theta_tyre, _, steady, place = fused.unaided
+        size, direction = inputs.slip
         way_m = state.speed_m_s * passed_s
         before, after = state.fusion.theta_img, fused.state.theta_img
         if (
-            before is not None
+            theta_tyre is None
+            and before is not None
             and after is not None
-            and fused.theta_tyre is None
             and abs(after - theta_hat) > abs(before - theta_hat)
         ):
             # A class that is farther from the estimate than the one before: the road may be another.
             way_m += config.confidence.class_change_m
-        size = inputs.slip.size
         if size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
             return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
-        theta_tyre, friction = fused.theta_tyre, fused.tyre_force_n * inputs.slip.direction / inputs.load_n
-        tyre, steady = look.tyre, fused.state.steady
-        if steady.held_s > state.step_s:
+        tyre, friction = look.tyre, force_n * direction / inputs.load_n
+        if steady.held_s > before_s:
             size, friction = steady.slip, steady.friction
-            tyre = tyre_at_slip(size, inputs.load_n, wheel.longitudinal_stiffness_n)
+            tyre = place[1] if place is not None else tyre_at_slip(size, inputs.load_n, wheel[2])
         noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
         torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
         torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0

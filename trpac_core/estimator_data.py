@@ -12,7 +12,14 @@ from .dife import FusionState, Gains
 from .elastic import ElasticLine, ElasticModel
 from .excitation import FuzzyScheduler
 from .mismatch import Following
-from .readings import Readings, filter_share
+from .readings import (
+    GREATEST_ACCELERATION_M_S2,
+    JUMP_M_S,
+    RIM_ACCELERATION_M_S2,
+    RIM_JUMP_M_S,
+    Readings,
+    filter_share,
+)
 from .steady import Steady
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface
@@ -215,6 +222,10 @@ class Rates:
     """What the sensor filter leaves of white noise's standard deviation [-]."""
     noise_m_s: float
     """Standard deviation of the filtered sliding speed [m/s]."""
+    most_m_s: float
+    """How far the speed may be from its filter [m/s]."""
+    most_rim_m_s: float
+    """How far the rim's speed may be from its filter [m/s]."""
 
     @classmethod
     def at(cls, config: EstimatorConfig, step_s: float, before_s: float) -> Rates:
@@ -224,4 +235,12 @@ class Rates:
         share = sensor_share or filter_share(before_s, config.sensor_filter_s)
         gain = math.sqrt(share / (2.0 - share))
         noise_m_s = config.sliding_speed_noise_m_s * gain
-        return cls(step_s, sensor_share, filter_share(step_s, config.acceleration_filter_s), gain, noise_m_s)
+        return cls(
+            step_s,
+            sensor_share,
+            filter_share(step_s, config.acceleration_filter_s),
+            gain,
+            noise_m_s,
+            most_m_s=JUMP_M_S + GREATEST_ACCELERATION_M_S2 * step_s,
+            most_rim_m_s=RIM_JUMP_M_S + RIM_ACCELERATION_M_S2 * step_s,
+        )

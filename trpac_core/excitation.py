@@ -7,8 +7,7 @@ per output set, the table therefore falls apart into two interpolations, which i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 from .tyre import onset_elastic
 
@@ -73,6 +72,8 @@ class FuzzyScheduler:
     class_scatter: float = 0.1
     onset_sensitivity: float = 0.1
     noise_factor: float = 3.0
+    _onsets: dict[float | None, float] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """Onsets that are worked out already, by class."""
 
     def threshold(
         self, theta_img: float | None, load_n: float, longitudinal_stiffness_n: float, slip_deviation: float
@@ -96,11 +97,6 @@ class FuzzyScheduler:
         if slip < noise:
             slip = noise
         return slip if slip < THRESHOLD_LIMIT else THRESHOLD_LIMIT
-
-    @cached_property
-    def _onsets(self) -> dict[float | None, float]:
-        """Onsets that are worked out already, by class."""
-        return {}
 
     def _onset(self, theta_img: float | None) -> float:
         """Elastic friction at which a road of that class begins to show [-]; classes are few, so it is kept."""

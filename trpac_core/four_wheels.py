@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .car_friction import Friction, car_friction
+from .car_friction import car_friction
 from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
 from .readings import PLAUSIBLE, Sensors
 from .vision.results import FrameResult
@@ -167,9 +167,9 @@ class FourWheels:
             WHEELS, self._wheels, (left, right, left, right), omega, torque, speeds_m_s, given_n, strict=True
         ):
             one = Sensors(wheel_omega, wheel_torque, wheel_m_s, wheel_n, steering, accel, yaw)
-            estimate = wheel.step(step_s, one, side, frame_failed=frame_failed)
-            if estimate.problem is not None:
-                problems.append((name, estimate.problem))
+            problem = wheel.step(step_s, one, side, frame_failed=frame_failed).problem
+            if problem is not None:
+                problems.append((name, problem))
         self._last = self._together(loads_n, self._told(sensors, problems) if problems else ())
         return self._last
 
@@ -179,10 +179,10 @@ class FourWheels:
         wheels = fl, fr, rl, rr = front_left.last, front_right.last, rear_left.last, rear_right.last
         theta, deviation = car_friction(
             (
-                _new(Friction, (fl.TRPAC, fl.TRPAC_std)),
-                _new(Friction, (fr.TRPAC, fr.TRPAC_std)),
-                _new(Friction, (rl.TRPAC, rl.TRPAC_std)),
-                _new(Friction, (rr.TRPAC, rr.TRPAC_std)),
+                (fl.TRPAC, fl.TRPAC_std),
+                (fr.TRPAC, fr.TRPAC_std),
+                (rl.TRPAC, rl.TRPAC_std),
+                (rr.TRPAC, rr.TRPAC_std),
             ),
             loads_n,
             self.config.axle_deviation,

@@ -25,6 +25,10 @@ GREATEST_ACCELERATION_M_S2 = 15.0
 
 LONGEST_STEP_S = 10.0
 """Over a longer step nobody knows where the car has gone [s]."""
+JUMP_M_S, RIM_JUMP_M_S = 1.5, 8.0
+"""How far a reading may be from its filter: a bus of 20 Hz at 15 m/s^2, and a wheel that a full brake locks [m/s]."""
+RIM_ACCELERATION_M_S2 = 750.0
+"""Steepest change of a rim's speed: 3000 N m on 1.2 kg m^2 at 0.3 m [m/s^2]."""
 
 
 @dataclass(slots=True)  # frozen, its making would take 1 us, four times a step
@@ -72,13 +76,13 @@ _OMEGA, _TORQUE, _SPEED, _LOAD, _STEERING, _ACCELERATION, _YAW = PLAUSIBLE.value
 def plain(step_s: float, sensors: Sensors, floor_m_s: float) -> bool:
     """Whether a step's input is beyond doubt, at little cost; where it is not, `unusable` decides."""
     load_n, acceleration = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
-    yaw_rate = sensors.yaw_rate_rad_s
+    steering, yaw_rate = sensors.steering_angle_rad, sensors.yaw_rate_rad_s
     return (
         0.0 <= step_s <= LONGEST_STEP_S
         and -floor_m_s <= sensors.vehicle_speed_m_s <= _SPEED
         and 0.0 <= sensors.wheel_speed_rad_s <= _OMEGA
         and -_TORQUE <= sensors.wheel_torque_nm <= _TORQUE
-        and -_STEERING <= sensors.steering_angle_rad <= _STEERING
+        and (not steering or -_STEERING <= steering <= _STEERING)
         and (load_n is None or 0.0 < load_n <= _LOAD)
         and (acceleration is None or -_ACCELERATION <= acceleration <= _ACCELERATION)
         and (yaw_rate is None or -_YAW <= yaw_rate <= _YAW)

@@ -20,6 +20,7 @@ MEMORY_S = 0.2
 FORCE_SETTLES_S = 0.016
 """Time in which the observed force settles after slip moved: 1 / K [s]."""
 
+_LONGEST_S = 2.0 * MEMORY_S
 QUICKEST = 2.0
 """Most by which gamma grows with a mean: K must stay well above it [-]."""
 
@@ -57,8 +58,7 @@ def held(before: Steady, slip: float, friction: float, rise: float, noise: float
         Step [s].
     """
     mean_slip, mean_friction, mean_rise, held_s = before
-    level, off = LEVEL * noise, slip - mean_slip
-    away = ELSEWHERE * noise
+    level, away, off = LEVEL * noise, ELSEWHERE * noise, slip - mean_slip
     if held_s == 0.0 or not (-level < rise < level and -away < off < away):
         return _new(Steady, (slip, friction, rise, step_s))
     held_s += step_s
@@ -74,6 +74,11 @@ def held(before: Steady, slip: float, friction: float, rise: float, noise: float
     )
 
 
+def same_slip(first: Steady, second: Steady) -> bool:
+    """Whether both are means of the same slip over the same time, whatever their used friction."""
+    return first[0] == second[0] and first[2] == second[2] and first[3] == second[3]
+
+
 def mean_deviation(steady: Steady, noise: float, noise_s: float, doubt: float) -> float:
     """Standard deviation of the mean slip [-].
 
@@ -87,7 +92,9 @@ def mean_deviation(steady: Steady, noise: float, noise_s: float, doubt: float) -
         Standard deviation of what slip reads too much all the time, which no mean lessens [-].
     """
     # A mean that forgets with a time constant is as sure as an even one over twice that.
-    held_s = steady[3] if steady[3] < 2.0 * MEMORY_S else 2.0 * MEMORY_S
+    held_s = steady[3]
+    if held_s > _LONGEST_S:
+        held_s = _LONGEST_S
     return math.sqrt(noise * noise / (1.0 + held_s / noise_s) + doubt * doubt)
 
 

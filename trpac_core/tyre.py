@@ -33,6 +33,7 @@ GREATEST_PEAK_SLIP = 0.95
 """Where the search for the curve's maximum ends [-]."""
 
 
+_NEWTON = range(NEWTON_STEPS)
 _new = tuple.__new__
 """Makes a named tuple of a tuple: a third of the time that its own constructor takes."""
 
@@ -82,19 +83,19 @@ class TyreAtSlip(NamedTuple):
         # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
         left = 1.0 - friction / (elastic * g_0)
         theta = upper * (1.0 - math.sqrt(left)) if left > 0.0 else upper
-        lower = 0.0
-        for _ in range(NEWTON_STEPS):
-            base, share = g_0 + g_1 * theta, theta * (1.0 - kappa * theta)
+        lower, twice_kappa, least, most = 0.0, 2.0 * kappa, -LEAST_STEP, LEAST_STEP
+        for _ in _NEWTON:
+            base = g_0 + g_1 * theta
+            share = theta * (1.0 - kappa * theta)
             excess = share * base - friction
             if excess > 0.0:
                 upper = theta
             else:
                 lower = theta
-            slope = (1.0 - 2.0 * kappa * theta) * base + share * g_1
-            proposal = theta - excess / slope
+            proposal = theta - excess / ((1.0 - twice_kappa * theta) * base + share * g_1)
             if not lower <= proposal <= upper:
                 proposal = 0.5 * (lower + upper)
-            if -LEAST_STEP < proposal - theta < LEAST_STEP:
+            if least < proposal - theta < most:
                 return proposal
             theta = proposal
         return theta
@@ -102,17 +103,25 @@ class TyreAtSlip(NamedTuple):
 
 def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> TyreAtSlip:
     """The tyre at this unsigned slip [-], vertical load F_z [N] and longitudinal stiffness C_x [N]."""
-    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
-    kappa = 0.25 / elastic if elastic > 0.0 else math.inf
-    g_0, g_1 = 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip)
-    return _new(TyreAtSlip, (elastic, g_0, g_1, kappa))
+    rolls = 1.0 - slip
+    elastic = longitudinal_stiffness_n * slip / rolls / load_n
+    return _new(
+        TyreAtSlip,
+        (
+            elastic,
+            1.27 + slip * (1.15 * slip - 1.63),
+            0.75 * slip * rolls,
+            0.25 / elastic if elastic > 0.0 else math.inf,
+        ),
+    )
 
 
 def elastic_friction(slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
     """Used friction at L = 1, the most at this slip that theta can be read from [-]."""
-    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
-    g_0, g_1 = 1.27 + slip * (1.15 * slip - 1.63), 0.75 * slip * (1.0 - slip)
-    return elastic * (g_0 + 2.0 * g_1 * elastic)
+    rolls = 1.0 - slip
+    elastic = longitudinal_stiffness_n * slip / rolls / load_n
+    g_0 = 1.27 + slip * (1.15 * slip - 1.63)
+    return elastic * (g_0 + 2.0 * (0.75 * slip * rolls) * elastic)
 
 
 def used_friction(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
@@ -205,18 +214,19 @@ def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> f
         slip = 0.5
     # lambda^2 times the slope of (1 - quarter (1 - lambda) / lambda) G(lambda): a cubic without a linear term
     cubic, bend = 2.0 * square * (1.0 + quarter), linear * (1.0 + quarter) + square * quarter
-    level = 1.27 * quarter
-    for _ in range(NEWTON_STEPS):
+    level, thrice_cubic, twice_bend = 1.27 * quarter, 3.0 * cubic, 2.0 * bend
+    least, most = -LEAST_SLIP_STEP, LEAST_SLIP_STEP
+    for _ in _NEWTON:
         value = (cubic * slip - bend) * slip * slip + level
         if value > 0.0:
             lower = slip
         else:
             upper = slip
-        value_by_slip = (3.0 * cubic * slip - 2.0 * bend) * slip
+        value_by_slip = (thrice_cubic * slip - twice_bend) * slip
         proposal = slip - value / value_by_slip if value_by_slip != 0.0 else upper
         if not lower < proposal < upper:
             proposal = 0.5 * (lower + upper)
-        if -LEAST_SLIP_STEP < proposal - slip < LEAST_SLIP_STEP:
+        if least < proposal - slip < most:
             return proposal
         slip = proposal
     return slip
@@ -233,6 +243,7 @@ def peak_friction(theta: float, load_n: float, longitudinal_stiffness_n: float) 
     if theta <= 0.0:
         return 0.0
     slip = peak_slip(theta, load_n, longitudinal_stiffness_n)
-    elastic = longitudinal_stiffness_n * slip / (1.0 - slip) / load_n
-    base = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * (1.0 - slip) * theta
+    rolls = 1.0 - slip
+    elastic = longitudinal_stiffness_n * slip / rolls / load_n
+    base = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * rolls * theta
     return (elastic if theta >= 2.0 * elastic else theta * (1.0 - 0.25 / elastic * theta)) * base

@@ -7,17 +7,13 @@ from __future__ import annotations
 
 import math
 
-from .dife import WheelInputs
 from .estimator_data import EstimatorConfig, EstimatorState, Rates
-from .readings import GREATEST_ACCELERATION_M_S2, Readings, Sensors
-from .slip import GREATEST_SLIP, Slip, wheel_slip
+from .readings import Readings, Sensors
+from .sight import WheelInputs
+from .slip import GREATEST_SLIP, Slip, signed_parts
 
 MOST_AHEAD = 2.0
 """Most that a step may be longer than the one before for the readings' trend to be trusted over it [-]."""
-JUMP_M_S, RIM_JUMP_M_S = 1.5, 8.0
-"""How far a reading may be from its filter: a bus of 20 Hz at 15 m/s^2, and a wheel that a full brake locks [m/s]."""
-RIM_ACCELERATION_M_S2 = 750.0
-"""Steepest change of a rim's speed: 3000 N m on 1.2 kg m^2 at 0.3 m [m/s^2]."""
 LOCKED_M_S = 0.5
 """Below this rim speed the wheel of a driving car counts as locked: its brake then holds what the road gives, not the
 torque that was commanded [m/s]."""
@@ -33,17 +29,18 @@ _new = tuple.__new__
 """Makes a named tuple of a tuple in a third of the time that its own constructor takes."""
 
 
-def jumped(before: Readings, sensors: Sensors, radius_m: float, step_s: float) -> bool:
+def jumped(before: Readings, sensors: Sensors, radius_m: float, rates: Rates) -> bool:
     """Whether readings are where no car can have gone since: a host that began with zeros, a signal that came back.
 
     The observers would take such a jump for a force that they forget only slowly.
     """
     omega, _, speed_m_s = before
     speed_m_s -= sensors.vehicle_speed_m_s
-    rim_m_s = (omega - sensors.wheel_speed_rad_s) * radius_m
-    most_m_s = JUMP_M_S + GREATEST_ACCELERATION_M_S2 * step_s
-    most_rim_m_s = RIM_JUMP_M_S + RIM_ACCELERATION_M_S2 * step_s
-    return not (-most_m_s <= speed_m_s <= most_m_s and -most_rim_m_s <= rim_m_s <= most_rim_m_s)
+    rim_m_s, most_m_s = (omega - sensors.wheel_speed_rad_s) * radius_m, rates.most_rim_m_s
+    if not -most_m_s <= rim_m_s <= most_m_s:
+        return True
+    most_m_s = rates.most_m_s
+    return not -most_m_s <= speed_m_s <= most_m_s
 
 
 def wheel_inputs(
@@ -61,7 +58,7 @@ def wheel_inputs(
         sensors.wheel_torque_nm,
         sensors.vehicle_speed_m_s,
     )
-    floor_m_s, way_m, share = config.floor_m_s, speed_m_s * step_s, 1.0
+    floor_m_s, way_m, settled = config.floor_m_s, speed_m_s * step_s, state.settled
     locked_s, noise = state.locked_s + step_s, rates.noise_m_s
     if speed_m_s > floor_m_s:
         noise /= speed_m_s
@@ -69,24 +66,24 @@ def wheel_inputs(
             locked_s = 0.0
     else:
         noise /= floor_m_s
-    omega_ahead, torque_ahead_nm = omega, torque_nm
-    if state.settled:
+    omega_ahead, torque_ahead_nm, share = omega, torque_nm, 1.0
+    if settled:
         share = rates.sensor_share
         before_omega, before_nm, before_m_s = state.readings
         omega = before_omega + share * (omega - before_omega)
         torque_nm = before_nm + share * (torque_nm - before_nm)
         speed_m_s = before_m_s + share * (speed_m_s - before_m_s)
         # The mean over the step to come of signals that go on as they came.
-        ratio = step_s / state.step_s if state.step_s else 0.0
+        before_s = state.step_s
+        ratio = step_s / before_s if before_s else 0.0
         half = 0.5 * (ratio if ratio < MOST_AHEAD else MOST_AHEAD)
         omega_ahead = omega + half * (omega - before_omega)
         torque_ahead_nm = torque_nm + half * (torque_nm - before_nm)
-    size, direction = wheel_slip(omega, speed_m_s, radius_m, floor_m_s)
+    size, direction = signed_parts(omega, speed_m_s, radius_m, floor_m_s)
     read_slip = signed = size * direction
     deviation = 0.0
     if direction or speed_m_s >= floor_m_s:
-        divisor_m_s = speed_m_s if speed_m_s > floor_m_s else floor_m_s
-        offset, deviation = state.line.offset(divisor_m_s)
+        offset, deviation = state.line.offset(speed_m_s if speed_m_s > floor_m_s else floor_m_s)
         curve = config.confidence.tyre_share * size
         deviation = DOUBTED * math.sqrt(deviation * deviation + curve * curve)
         signed = read_slip - offset
@@ -94,10 +91,12 @@ def wheel_inputs(
         if size > GREATEST_SLIP:
             size = GREATEST_SLIP
     smoothed_slip = signed
-    if state.settled:
-        smoothed_slip = state.smoothed_slip + share * (signed - state.smoothed_slip)
+    if settled:
+        smoothed_slip = state.smoothed_slip
+        smoothed_slip += share * (signed - smoothed_slip)
     if omega * radius_m >= floor_m_s:
         torque_ahead_nm -= config.vehicle.rolling_resistance * load_n * radius_m
+    rise, filter_s = signed - smoothed_slip, config.sensor_filter_s
     inputs = _new(
         WheelInputs,
         (
@@ -107,13 +106,13 @@ def wheel_inputs(
             _new(Slip, (size, direction)),
             load_n,
             noise if noise > deviation else deviation,
-            abs(signed - smoothed_slip),
+            abs(rise),
             way_m,
-            locked_s > RELEASED * config.sensor_filter_s,
+            locked_s > RELEASED * filter_s,
             noise,
             deviation,
-            direction * (signed - smoothed_slip),
-            2.0 * config.sensor_filter_s,
+            direction * rise,
+            2.0 * filter_s,
         ),
     )
     return _new(Readings, (omega, torque_nm, speed_m_s)), inputs, read_slip, smoothed_slip, locked_s
