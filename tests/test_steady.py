@@ -81,8 +81,8 @@ def test_a_moved_slip_is_forgotten_as_the_force_settles_and_noise_does_not_count
     assert unsettled(moved, 0.0, NOISE, 0.016) == pytest.approx(moved / math.e)
 
 
-def shown_after(theta: float, slip: float, doubt: float) -> float | None:
-    """Time until a wheel at rest on the curve shows theta, from an estimate of 0.8 [s]; None within 0.3 s never."""
+def at_rest(theta: float, slip: float, doubt: float) -> tuple[WheelInputs, FusionState]:
+    """A wheel that stays at one place of the curve, and an estimate of 0.8."""
     load_n, noise = 3217.0, 1.5e-4
     force_n = force(theta, slip, load_n, WHEEL.longitudinal_stiffness_n, 1.0)
     # The wheel gains speed with the car; at an even slip that is all that torque and force differ by: left out here.
@@ -90,7 +90,12 @@ def shown_after(theta: float, slip: float, doubt: float) -> float | None:
         22.0, 22.0, force_n * WHEEL.radius_m, Slip(slip, 1.0), load_n, max(noise, doubt), noise, 0.0, True,
         noise, doubt, 0.0, 2.0 * TAU_S,
     )  # fmt: skip
-    state = settled(FusionState(0.8, 0.0), inputs, WHEEL, GAINS)
+    return inputs, settled(FusionState(0.8, 0.0), inputs, WHEEL, GAINS)
+
+
+def shown_after(theta: float, slip: float, doubt: float) -> float | None:
+    """Time until a wheel at rest on the curve shows theta [s]; None within 0.3 s never."""
+    inputs, state = at_rest(theta, slip, doubt)
     for step in range(300):
         look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
         outcome = fusion_step(state, inputs, look, WHEEL, GAINS, SCHEDULER, None, STEP_S)
@@ -107,6 +112,23 @@ def test_time_shows_what_one_reading_hides_and_doubt_still_hides_it() -> None:
     assert 0.0 < found < 0.2
     assert shown_after(0.18, 0.0068, 5e-4) is None
     assert shown_after(0.9, 0.0068, 3e-5) is None
+
+
+def estimate_after(theta: float, slip: float, doubt: float, theta_img: float | None) -> float:
+    """Estimate after 0.3 s of a wheel at rest on the curve [-]."""
+    inputs, state = at_rest(theta, slip, doubt)
+    look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+    for _ in range(300):
+        state = fusion_step(state, inputs, look, WHEEL, GAINS, SCHEDULER, theta_img, STEP_S).state
+    return state.theta_hat
+
+
+def test_what_the_tyre_alone_does_not_prove_counts_where_the_class_says_the_same() -> None:
+    unsure = (0.18, 0.0068, 5e-4)
+    assert estimate_after(*unsure, None) == 0.8
+    assert estimate_after(*unsure, 0.2) == pytest.approx(0.18, abs=0.005)
+    far = [estimate_after(*unsure, theta_img) for theta_img in (0.5, 0.8)]
+    assert min(far) > 0.4, "a class that is far from what the tyre would show backs nothing"
 
 
 def test_means_survive_a_saved_state() -> None:

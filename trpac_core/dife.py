@@ -19,6 +19,7 @@ from .sight import (
     Look,
     Place,
     WheelInputs,
+    backed_theta,
     least_theta,
     place_of_mean,
     shown,
@@ -75,6 +76,7 @@ class Gains:
     the term rests for 2 m at least, and until the camera has said for 2 m that the road is of another class: a class
     has one value wherever it is, so the one under which the tyre was seen says nothing new. From the first sight
     on, a class that has not yet stood for 2 m says nothing by itself.
+    A tyre that is not sure to slide counts as seen in this where it would show a theta within 0.15 of the class's.
     Where the tyre is not seen, theta_img counts as no less than force and slip allow, and K_v follows the share of
     the difference that the estimate's own variance leaves to the class. Eqs. (17) and (18) as printed have no such
     guard: there a wrong class with its flag up pulls a settled estimate off by
@@ -230,16 +232,16 @@ def _led(
     look: Look,
     wheel: Wheel,
     gains: Gains,
-    theta_img: float,
+    theta_img: float | None,
     K_v: float,
     step_s: float,
 ) -> tuple[float, float]:
-    """theta_hat and s after a step of Eq. (17) or (18) in which the camera pulls too."""
+    """theta_hat and s after a step of Eq. (17) or (18) in which the camera pulls, or what tyre and camera agree on."""
     theta_hat, s = state[:2]
     _, omega_ahead, torque_nm, (_, direction), load_n = inputs[:5]
     inertia, radius_m, _ = wheel
     rate = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)
-    pull = rate * theta_img
+    pull = 0.0 if theta_img is None else rate * theta_img
     if unaided.theta_tyre is not None:
         by_tyre = gains.gamma * quickened(unaided.steady, inputs.noise_s)
         rate, pull = by_tyre + rate, by_tyre * unaided.theta_tyre + pull
@@ -327,16 +329,20 @@ def fusion_step(
     K_v = 0.0
     excited = theta_tyre is not None or (above and inputs[8])
     if excited and theta_img is not None:
+        by_tyre = theta_tyre
         if gains.tyre_first:
             silent = rests or unseen_m < SEEN_HOLD_M or other_m > 0.0
-            theta_img = _compatible(theta_img, theta_hat, silent, theta_tyre, force_n, inputs, wheel[2])
+            if by_tyre is None and not silent:
+                by_tyre = backed_theta(theta_img, steady, inputs, wheel[2])
+            theta_img = _compatible(theta_img, theta_hat, silent, by_tyre, force_n, inputs, wheel[2])
         if theta_img is not None:
             difference = abs(theta_img - theta_hat)
-            if theta_tyre is None and confidence is not None and gains.tyre_first:
+            if by_tyre is None and confidence is not None and gains.tyre_first:
                 difference *= camera_share(confidence, variance, theta_hat)
             K_v = scheduler.K_v(difference)
-            if K_v != 0.0:
-                theta_next, s = _led(state, unaided, inputs, look, wheel, gains, theta_img, K_v, step_s)
+        if K_v != 0.0 or by_tyre is not theta_tyre:
+            led_by = unaided if by_tyre is theta_tyre else unaided._replace(theta_tyre=by_tyre)
+            theta_next, s = _led(state, led_by, inputs, look, wheel, gains, theta_img, K_v, step_s)
     if theta_tyre is not None:
         unseen_m = 0.0
         road_img = before_img if road_img is None else road_img

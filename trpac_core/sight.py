@@ -13,6 +13,12 @@ GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
 SIGNIFICANCE = 1.5
 """How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
+BACKED_SIGNIFICANCE = 0.25
+"""The same where the camera's class is that of such a road: two witnesses need less of each [-]."""
+BACKED_AFTER_S = 0.02
+"""How long a mean must have been held for that: as long as its noise takes to forget itself [s]."""
+NEAR_CLASS = 0.15
+"""How far roads lie about the value of their class [-]."""
 LEAST_SENSITIVITY = 0.1
 """Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
 nothing to invert [-]."""
@@ -95,13 +101,26 @@ def shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float
     return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity
 
 
-def place_of_mean(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float) -> Place:
+def place_of_mean(
+    steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float, significance: float = SIGNIFICANCE
+) -> Place:
     """Where the mean slip stands on the curve, and what of it noise leaves beyond doubt."""
     slip, _, rise, _ = steady
     load_n, noise, doubt, noise_s = inputs[4], inputs[9], inputs[10], inputs[12]
-    surely = slip - SIGNIFICANCE * (mean_deviation(steady, noise, noise_s, doubt) + abs(rise))
+    surely = slip - significance * (mean_deviation(steady, noise, noise_s, doubt) + abs(rise))
     below = elastic_friction(surely, load_n, longitudinal_stiffness_n) if surely > 0.0 else 0.0
     return steady, tyre_at_slip(slip, load_n, longitudinal_stiffness_n), below
+
+
+def backed_theta(
+    theta_img: float, steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float
+) -> float | None:
+    """theta(lambda, F_hat) by the means where tyre and camera agree on it, though the tyre alone is not sure [-]."""
+    if steady[3] < BACKED_AFTER_S:
+        return None
+    _, tyre, below = place_of_mean(steady, inputs, longitudinal_stiffness_n, BACKED_SIGNIFICANCE)
+    theta, _ = shown(steady[1], tyre, below)
+    return theta if theta is not None and abs(theta - theta_img) < NEAR_CLASS else None
 
 
 def visible_theta(
