@@ -172,6 +172,10 @@ def _cause(
         pro.append("What it leaves averages out like noise.")
     else:
         contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
+    if entry is found.decision.winner and found.decision.left_open:
+        contra.append(
+            f"Leaves {100.0 * found.decision.left_open:.0f} % of the gap on the hold-out, as energy."
+        )
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
     for name in at_bound(best):
