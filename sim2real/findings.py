@@ -93,7 +93,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         unknown = decision.verdict is Verdict.UNKNOWN
         seen = [found.fit_to, held] if unknown else [held]
         drives, noises = [d for e in seen for d in e.drives], [n for e in seen for n in e.noises]
-        suspect = lone_sensor(found.model, found.fit_to, held) if unknown else None
+        suspect = None
+        if decision.left_open:  # the gap lies where the rows are doubtful
+            noises = [replace(n, widening=np.ones_like(n.widening)) for n in noises]
+        elif unknown:
+            suspect = lone_sensor(found.model, found.fit_to, held)
         terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown, only=suspect)
         progress("equations", 1, 1)
         if unknown:

@@ -14,6 +14,7 @@ from sim2real.drive import SPEED
 from sim2real.evidence import gather
 from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.observer import Towards
+from sim2real.probing import APART_S, sets_apart, windows
 from sim2real.result import Verdict
 from sim2real.selection import fitness
 from sim2real.varying import vary
@@ -94,3 +95,19 @@ def test_alike_axles_are_the_plain_form(key):
     np.testing.assert_array_equal(a, b)
     c = MODEL.with_effects(unlike(value, 0.3)).predict(drive).channels
     assert np.abs(c - a).max() > 1e-6
+
+
+def test_bumps_far_apart_are_probed_by_one_run():
+    t = np.linspace(0.0, 30.0, 3001)
+    knots = np.arange(31.0)
+    weights = [np.interp(t, knots, row) for row in np.eye(31)] + [np.zeros_like(t)]
+    sets = sets_apart(weights, 1.0)
+    assert sorted(b for chosen in sets for b in chosen) == list(range(31))
+    assert len(sets) == round(APART_S)
+    for chosen in sets:
+        cuts = windows([weights[b] for b in chosen])
+        assert cuts[-1].stop == len(t)
+        for b, cut, following in zip(chosen, cuts, cuts[1:], strict=False):
+            assert np.flatnonzero(weights[b])[0] == cut.start
+            assert cut.stop == following.start
+            assert t[cut.stop] - t[cut.start] == pytest.approx(APART_S, abs=1.0)
