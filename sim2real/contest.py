@@ -132,6 +132,8 @@ class Contest:
         See `sim2real.pairs` for the latter.
     partners : tuple of (float, str)
         What a second effect beside the best single one promises to leave of the fit logs [loss], best first.
+    twins : tuple of Entry
+        Pairs with the plain form of a best effect whose form has a further parameter, see `sim2real.pairs`.
     structured : tuple of Entry
         Single effects with a structural one beside them, see `sim2real.structure`.
     varied : tuple of Varied
@@ -147,6 +149,7 @@ class Contest:
     singles: tuple[Entry, ...]
     pairs: tuple[Entry, ...] = ()
     partners: tuple[tuple[float, str], ...] = ()
+    twins: tuple[Entry, ...] = ()
     structured: tuple[Entry, ...] = ()
     varied: tuple[Varied, ...] = ()
     motion: float = float("inf")

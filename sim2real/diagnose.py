@@ -23,7 +23,7 @@ from sim2real.logs import resample
 from sim2real.merge import camera_side, counter_side, merge
 from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
-from sim2real.pairs import add_pairs, add_partners
+from sim2real.pairs import add_pairs, add_partners, add_twins
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, is_noise, needs_pairs
@@ -159,6 +159,8 @@ def find(
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)
             contest = add_structure(contest, base, fit_to, held, exclude, jobs, progress)
             contest = replace(contest, lone=min(contest.lone, lone_wheel(base, fit_to, held, jobs)))
+        else:
+            contest = add_twins(contest, base, fit_to, held, jobs, progress)
     decision = decide(contest, fit_to, held)
     if decision.verdict is Verdict.UNKNOWN:
         contest = add_varied(contest, fit_to, held, jobs, progress)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, clean, noisy, pulses, remeasured, trace
+from gap_drives import MODEL, STEP_S, clean, noisy, pulses, remeasured, trace
 
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.road_grade import RoadGrade
@@ -111,3 +111,17 @@ def test_bumps_far_apart_are_probed_by_one_run():
             assert np.flatnonzero(weights[b])[0] == cut.start
             assert cut.stop == following.start
             assert t[cut.stop] - t[cut.start] == pytest.approx(APART_S, abs=1.0)
+
+
+def test_unlike_axles_are_told_from_a_second_effect():
+    torque = pulses(DURATION_S)
+    true = TorqueGainOfAxles(1.08, 0.05).actuate(np.arange(len(torque)) * STEP_S, torque)
+    logs = [noisy(clean(true, 14.0, commanded_nm=torque), seed) for seed in range(3)]
+    found = find(
+        MODEL, logs[:2], logs[2], exclude=set(EFFECTS) - {"torque_gain", "mass_offset", "torque_lag"}
+    )
+    assert found.decision.verdict is Verdict.IDENTIFIED
+    assert found.decision.winner.fitted.x == pytest.approx([1.08, 0.05], abs=0.01)
+    assert [sorted(twin.ids) for twin in found.contest.twins]
+    assert all("torque_gain" in twin.ids and twin.size == 2 for twin in found.contest.twins)
+    assert found.contest.twins[0].loss > found.decision.winner.loss
