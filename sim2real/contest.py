@@ -132,6 +132,8 @@ class Contest:
         See `sim2real.pairs` for the latter.
     partners : tuple of (float, str)
         What a second effect beside the best single one promises to leave of the fit logs [loss], best first.
+    twins : tuple of Entry
+        Pairs with the plain form of a best effect whose form has a further parameter, see `sim2real.pairs`.
     structured : tuple of Entry
         Single effects with a structural one beside them, see `sim2real.structure`.
     varied : tuple of Varied
@@ -139,13 +141,15 @@ class Contest:
     motion : float
         Least loss that one of these effects leaves as a constant beside a free term over the car's motion.
     lone : float
-        Least loss that a free term at one wheel alone leaves, without any effect, see `sim2real.suspect`.
+        Least loss that a fault outside the library leaves by itself: a free term at one wheel alone, see
+        `sim2real.suspect`, or a slow speed sensor, see `sim2real.sluggish`.
     """
 
     null: Entry
     singles: tuple[Entry, ...]
     pairs: tuple[Entry, ...] = ()
     partners: tuple[tuple[float, str], ...] = ()
+    twins: tuple[Entry, ...] = ()
     structured: tuple[Entry, ...] = ()
     varied: tuple[Varied, ...] = ()
     motion: float = float("inf")

@@ -12,6 +12,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
+from sim2real.closure import closing
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import drift_of, gather
@@ -22,10 +23,11 @@ from sim2real.logs import resample
 from sim2real.merge import camera_side, counter_side, merge
 from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
-from sim2real.pairs import add_pairs, add_partners
+from sim2real.pairs import add_pairs, add_partners, add_twins
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, is_noise, needs_pairs
+from sim2real.sluggish import slow_speed
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.structure import add_structure
 from sim2real.suspect import lone_wheel
@@ -151,16 +153,19 @@ def find(
         fit_to, held = fit_to.drifting(best, drift), held.drifting(best, drift)
     contest = hold_contest(base, fit_to, held, first, jobs, progress)
     if contest.singles and not is_noise(contest, fit_to, held):
+        contest = replace(contest, lone=slow_speed(contest, base, fit_to, held))
         contest = add_partners(contest, fit_to, jobs, progress)
         if needs_pairs(contest, fit_to, held):
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)
             contest = add_structure(contest, base, fit_to, held, exclude, jobs, progress)
-            contest = replace(contest, lone=lone_wheel(base, fit_to, held, jobs))
+            contest = replace(contest, lone=min(contest.lone, lone_wheel(base, fit_to, held, jobs)))
+        else:
+            contest = add_twins(contest, base, fit_to, held, jobs, progress)
     decision = decide(contest, fit_to, held)
     if decision.verdict is Verdict.UNKNOWN:
         contest = add_varied(contest, fit_to, held, jobs, progress)
         decision = decide(contest, fit_to, held)
-    return Findings(base, fit_to, held, contest, decision, lattice)
+    return Findings(base, fit_to, held, contest, closing(decision, base, held), lattice)
 
 
 def counter_gap(findings: Findings) -> tuple[Measure, Measure]:

@@ -93,7 +93,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         unknown = decision.verdict is Verdict.UNKNOWN
         seen = [found.fit_to, held] if unknown else [held]
         drives, noises = [d for e in seen for d in e.drives], [n for e in seen for n in e.noises]
-        suspect = lone_sensor(found.model, found.fit_to, held) if unknown else None
+        suspect = None
+        if decision.left_open:  # the gap lies where the rows are doubtful
+            noises = [replace(n, widening=np.ones_like(n.widening)) for n in noises]
+        elif unknown:
+            suspect = lone_sensor(found.model, found.fit_to, held)
         terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown, only=suspect)
         progress("equations", 1, 1)
         if unknown:
@@ -172,6 +176,10 @@ def _cause(
         pro.append("What it leaves averages out like noise.")
     else:
         contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
+    if entry is found.decision.winner and found.decision.left_open:
+        contra.append(
+            f"Leaves {100.0 * found.decision.left_open:.0f} % of the gap on the hold-out, as energy."
+        )
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
     for name in at_bound(best):

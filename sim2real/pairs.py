@@ -28,6 +28,8 @@ PAIRS_PER_MEMBER = 3
 """Pairs that are fitted per single effect of the beam, the most promising ones."""
 SWAPS_PER_MEMBER = 3
 """Partners that are tried anew for each member of the best pair."""
+TWINS = 3
+"""Partners of a plain form that are tried against one with a further parameter."""
 LINEAR_PAIRS = 4
 """Further pairs, the most promising by the slopes at the effects' own fits."""
 
@@ -154,6 +156,37 @@ def promising_pairs(contest: Contest) -> list[tuple[str, ...]]:
     )
     chosen += [pair for _, pair in foretold_pairs[:LINEAR_PAIRS]]
     return list(dict.fromkeys(chosen))
+
+
+def add_twins(
+    contest: Contest,
+    model: Simulation,
+    fit_to: Evidence,
+    holdout: Evidence,
+    jobs: int = 1,
+    progress: Progress = silent,
+) -> Contest:
+    """The contest with rivals of a best effect whose form has a further parameter: its plain form in pairs.
+
+    A free difference of the axles bends as far as a second effect does, and passes for one.
+    """
+    best, *others = contest.singles
+    key = best.ids[0]
+    plain = Candidate(model, best.ids, (0,))
+    count = len(plain.parameters)
+    if best.size <= count or not others:
+        return contest
+    entry = enter(plain, fit_to, holdout, best.fitted.x[:count], FULL_STEPS)
+    found = entry.fitted
+    ranked = beside(plain, found.x, found.jacobian, others, fit_to, jobs, progress)
+    entries = {e.ids[0]: e for e in (entry, *others)}
+    work = []
+    for pair in (_ordered(key, other) for _, other in ranked[:TWINS]):
+        a, b = (entries[member].fitted for member in pair)
+        both = Candidate(model, pair, (*a.candidate.forms, *b.candidate.forms))
+        work.append(partial(enter, both, fit_to, holdout, _starts(entries, pair), FULL_STEPS))
+    twins = [pair for pair in run_all(work, jobs, progress, "twins") if is_proper(pair)]
+    return replace(contest, twins=tuple(sorted(twins, key=lambda e: e.loss)))
 
 
 def _ordered(a: str, b: str) -> tuple[str, ...]:

@@ -11,11 +11,12 @@ References
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.contest import Entry
+from sim2real.contest import Entry, run_all, silent
 from sim2real.drive import SPEED, WHEEL
 from sim2real.evidence import SETTLING_S, Evidence
 from sim2real.observer import Simulation
@@ -40,7 +41,8 @@ def lone_wheel(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int
     """Least loss that a free term at one wheel, its motor or its sensor, leaves of the model as it is."""
     drives, noises = (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
     at_one = [e for e in EQUATIONS if e.key.startswith(("motor ", "wheel sensor "))]
-    return min(fit_terms(model, drives, noises, jobs, shared=True, only=e)[0].loss for e in at_one)
+    work = [partial(fit_terms, model, drives, noises, shared=True, only=e) for e in at_one]
+    return min(terms[0].loss for terms in run_all(work, jobs, silent, "one wheel"))
 
 
 def _misfit_without(channel: int, model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:

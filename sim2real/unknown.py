@@ -22,6 +22,7 @@ from sim2real.evidence import rest_of
 from sim2real.fitting import robust, robust_weight
 from sim2real.noise import Noise
 from sim2real.observer import Prediction, Push, Simulation
+from sim2real.probing import sets_apart, windows
 from sim2real.result import Unexplained
 
 Array = NDArray[Any]
@@ -232,20 +233,35 @@ def _fit_term(
     if quantity == "acceleration":
         values = [v / model.vehicle.mass_kg for v in values]
     knots = _knots(values, drives, quantity)
-    columns = []
-    for which, place, hat in _hats(knots, values):
-        column = [np.zeros_like(part) for part in z]
-        for i in which:
-            push = equation.push(model, drives[i], seen[i], equation.step * hat(values[i]))
-            moved = model.predict(drives[i], push).channels
-            column[i] = (_whitened(drives[i], noises[i], moved) - z[i]) / equation.step
-        columns.append((place, np.concatenate([c.ravel() for c in column])))
-    slopes = np.column_stack([c for _, c in columns])
+    hats = _hats(knots, values)
+    slopes = [np.zeros((*part.shape, len(hats))) for part in z]
+    for i, together in _runs(hats, values, quantity):
+        weights = [hats[at][2](values[i]) for at in together]
+        push = equation.push(model, drives[i], seen[i], equation.step * np.sum(weights, axis=0))
+        moved = _whitened(drives[i], noises[i], model.predict(drives[i], push).channels)
+        response = (moved - z[i]) / equation.step
+        rows = windows(weights) if quantity in PER_DRIVE else [slice(None)]
+        for at, cut in zip(together, rows, strict=True):
+            slopes[i][cut, :, at] = response[cut]
     every = np.concatenate([part.ravel() for part in z])
-    y, left = _solve(every, slopes)
+    y, left = _solve(every, np.concatenate([part.reshape(-1, len(hats)) for part in slopes]))
     null = float(np.sum(robust(every)))
-    x = np.array([place for place, _ in columns])
-    return Term(equation, quantity, x, y, left, null, len(columns), int(np.count_nonzero(every)))
+    x = np.array([place for _, place, _ in hats])
+    return Term(equation, quantity, x, y, left, null, len(hats), int(np.count_nonzero(every)))
+
+
+def _runs(
+    hats: Sequence[tuple[list[int], float, Callable[[Array], Array]]], values: Sequence[Array], quantity: str
+) -> list[tuple[int, list[int]]]:
+    """Drives and the basis functions that one run along them probes together."""
+    if quantity not in PER_DRIVE:
+        return [(i, [at]) for at, (which, _, _) in enumerate(hats) for i in which]
+    out = []
+    for i, along in enumerate(values):
+        mine = [at for at, (which, _, _) in enumerate(hats) if i in which]
+        sets = sets_apart([hats[at][2](along) for at in mine], KNOT_S)
+        out += [(i, [mine[at] for at in chosen]) for chosen in sets]
+    return out
 
 
 def _knots(values: Sequence[Array], drives: Sequence[Drive], quantity: str) -> list[Array]:

@@ -20,6 +20,7 @@ from sim2real.drive import Drive
 from sim2real.evidence import Evidence, rest_of
 from sim2real.fitting import loss, robust_weight
 from sim2real.observer import Towards
+from sim2real.probing import sets_apart, windows
 from sim2real.selection import explains, fitness
 from sim2real.unknown import fit_terms
 
@@ -103,12 +104,21 @@ def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied
     shares = [np.zeros((len(d), count)) for d in drives]
     z = [left(i, shares[i]) for i in range(len(drives))]
     slopes = [np.zeros((len(z_i), len(bumps))) for z_i in z]
-    for b, bump in enumerate(bumps):
-        for i, weight in enumerate(bump.weights):
-            if weight is not None:
+    for i, drive in enumerate(drives):
+        for j in range(count):
+            mine = [
+                (b, w)
+                for b, bump in enumerate(bumps)
+                if bump.parameter == j
+                if (w := bump.weights[i]) is not None
+            ]
+            for chosen in sets_apart([w for _, w in mine], KNOT_S):
+                weights = [mine[at][1] for at in chosen]
                 moved = np.zeros_like(shares[i])
-                moved[:, bump.parameter] = weight
-                slopes[i][:, b] = left(i, moved) - z[i]
+                moved[:, j] = np.sum(weights, axis=0)
+                response = (left(i, moved) - z[i]).reshape(len(drive), -1)
+                for at, rows in zip(chosen, windows(weights), strict=True):
+                    slopes[i].reshape(len(drive), -1, len(bumps))[rows, :, mine[at][0]] = response[rows]
     size = np.maximum(np.abs(x - candidate.neutral), 1e-9)
     sigma = SPREAD * size / np.abs(step)
     prior = np.array([1.0 / sigma[bump.parameter] ** 2 for bump in bumps])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, clean, noisy, pulses, remeasured, trace
+from gap_drives import MODEL, STEP_S, clean, noisy, pulses, remeasured, trace
 
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.road_grade import RoadGrade
@@ -14,6 +14,7 @@ from sim2real.drive import SPEED
 from sim2real.evidence import gather
 from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.observer import Towards
+from sim2real.probing import APART_S, sets_apart, windows
 from sim2real.result import Verdict
 from sim2real.selection import fitness
 from sim2real.varying import vary
@@ -94,3 +95,33 @@ def test_alike_axles_are_the_plain_form(key):
     np.testing.assert_array_equal(a, b)
     c = MODEL.with_effects(unlike(value, 0.3)).predict(drive).channels
     assert np.abs(c - a).max() > 1e-6
+
+
+def test_bumps_far_apart_are_probed_by_one_run():
+    t = np.linspace(0.0, 30.0, 3001)
+    knots = np.arange(31.0)
+    weights = [np.interp(t, knots, row) for row in np.eye(31)] + [np.zeros_like(t)]
+    sets = sets_apart(weights, 1.0)
+    assert sorted(b for chosen in sets for b in chosen) == list(range(31))
+    assert len(sets) == round(APART_S)
+    for chosen in sets:
+        cuts = windows([weights[b] for b in chosen])
+        assert cuts[-1].stop == len(t)
+        for b, cut, following in zip(chosen, cuts, cuts[1:], strict=False):
+            assert np.flatnonzero(weights[b])[0] == cut.start
+            assert cut.stop == following.start
+            assert t[cut.stop] - t[cut.start] == pytest.approx(APART_S, abs=1.0)
+
+
+def test_unlike_axles_are_told_from_a_second_effect():
+    torque = pulses(DURATION_S)
+    true = TorqueGainOfAxles(1.08, 0.05).actuate(np.arange(len(torque)) * STEP_S, torque)
+    logs = [noisy(clean(true, 14.0, commanded_nm=torque), seed) for seed in range(3)]
+    found = find(
+        MODEL, logs[:2], logs[2], exclude=set(EFFECTS) - {"torque_gain", "mass_offset", "torque_lag"}
+    )
+    assert found.decision.verdict is Verdict.IDENTIFIED
+    assert found.decision.winner.fitted.x == pytest.approx([1.08, 0.05], abs=0.01)
+    assert [sorted(twin.ids) for twin in found.contest.twins]
+    assert all("torque_gain" in twin.ids and twin.size == 2 for twin in found.contest.twins)
+    assert found.contest.twins[0].loss > found.decision.winner.loss

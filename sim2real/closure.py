@@ -1,0 +1,51 @@
+"""Does the cause close the gap: what it leaves of a log that it was not fitted to, doubtful rows included.
+
+The misfit averages over blocks and lets rows count less where even the right model cannot foretell, near the grip
+limit above all. So a wrong effect may pass it, where most of the gap lies just there. The gap itself counts every row:
+what a cause leaves of it beyond the noise floor, as energy, has to be the lesser part by far.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sim2real.contest import Entry
+from sim2real.evidence import Evidence
+from sim2real.gap import measure, noise_floor
+from sim2real.observer import Simulation
+from sim2real.result import Verdict
+from sim2real.selection import Decision
+
+MOST_LEFT = 1.0 / 6.0
+"""Share of the gap's energy beyond the floor that a cause may leave on the hold-out [-]."""
+OPEN_BELIEF = 0.2
+"""Probability that an effect is the cause though it leaves more [-]."""
+
+
+def left_open(model: Simulation, entry: Entry, holdout: Evidence, seed: int = 0) -> float:
+    """Share of the hold-out's gap, as energy beyond the noise floor, that an entry leaves [-].
+
+    0 where the model as it is leaves no more than the floor; the noise is read anew from what the entry leaves.
+    """
+    added = entry.fitted.candidate.model(entry.fitted.x)
+    held = holdout.sharpened(added)
+    before = measure(held, held.residuals(model)).total ** 2
+    after = measure(held, held.residuals(added)).total ** 2
+    floor = noise_floor(added, held, seed) ** 2
+    return max(after - floor, 0.0) / (before - floor) if before > floor else 0.0
+
+
+def closing(decision: Decision, model: Simulation, holdout: Evidence) -> Decision:
+    """The decision, `unknown` where the one effect that it blames leaves the gap open.
+
+    A pair has stricter gates already.
+    """
+    if decision.verdict not in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS):
+        return decision
+    left = left_open(model, decision.winner, holdout)
+    if left <= MOST_LEFT:
+        return decision
+    probability = {key: OPEN_BELIEF * value for key, value in decision.probability.items()}
+    return replace(
+        decision, verdict=Verdict.UNKNOWN, rivals=(), probability=probability, varied=None, left_open=left
+    )

@@ -1,0 +1,103 @@
+"""What is blamed on no effect: a hum in wheel sensors, a slow sensor, a gap that the cause leaves open."""
+
+import numpy as np
+import pytest
+from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured
+from scipy.signal import lfilter
+
+from scenarios.effects import EFFECTS
+from scenarios.effects.shifting import delayed
+from sim2real.closure import MOST_LEFT, closing, left_open
+from sim2real.contest import enter
+from sim2real.diagnose import find
+from sim2real.drive import CHANNELS, SPEED, WHEEL
+from sim2real.evidence import gather
+from sim2real.fitting import FULL_STEPS, Candidate
+from sim2real.hum import hum
+from sim2real.result import Verdict
+from sim2real.selection import Decision, fitness
+
+DURATION_S = 16.0
+
+
+def only(*keys):
+    return set(EFFECTS) - set(keys)
+
+
+@pytest.fixture(scope="module")
+def nominal():
+    return clean(pulses(DURATION_S), 14.0)
+
+
+def ringing(n, pitch_hz, rng):
+    """Noise of unit variance about one pitch: a resonance 0.3 Hz wide, driven by white noise."""
+    keep = np.exp(-np.pi * 0.3 * STEP_S)
+    turn = 2.0 * np.pi * pitch_hz * STEP_S
+    rows = lfilter([1.0], [1.0, -2.0 * keep * np.cos(turn), keep**2], rng.standard_normal(n))
+    return rows / rows.std()
+
+
+def humming(drive, seed):
+    rng = np.random.default_rng(seed + 100)
+    off = np.zeros_like(drive.measured)
+    for i, pitch_hz in zip(range(WHEEL.start, WHEEL.stop), (18.0, 23.0, 26.0, 31.0), strict=True):
+        off[:, i] = 2.0 * SIGMA[i] * ringing(len(drive), pitch_hz, rng)
+    return noisy(remeasured(drive, drive.measured + off), seed)
+
+
+def test_a_hum_is_no_gap_though_an_effect_would_damp_it(nominal):
+    found = find(
+        MODEL,
+        [humming(nominal, 0), humming(nominal, 1)],
+        humming(nominal, 2),
+        exclude=only("tyre_relaxation"),
+    )
+    null, damping = found.contest.null, found.contest.singles[0]
+    assert damping.loss < 0.97 * null.loss  # what would be taken for an effect
+    assert found.decision.verdict is Verdict.NO_GAP
+
+
+def test_a_hum_is_what_left_and_right_do_not_share():
+    rng = np.random.default_rng(0)
+    rows = rng.standard_normal((2000, len(CHANNELS)))
+    assert not hum(rows, STEP_S).any()
+    rows[:, WHEEL] += 2.0 * ringing(2000, 20.0, rng)[:, None]  # of the driveline
+    assert not hum(rows, STEP_S).any()
+    rows[:, WHEEL.start] += 2.0 * ringing(2000, 30.0, rng)
+    front, rear = hum(rows, STEP_S)[:, [WHEEL.start, WHEEL.start + 2]].T
+    pitch = np.fft.rfftfreq(2000, STEP_S)
+    assert front.any()
+    assert np.all(np.abs(pitch[front] - 30.0) < 5.0)
+    assert not rear.any()
+
+
+def test_a_cause_that_leaves_much_of_the_gap_is_not_blamed(nominal):
+    logs = [
+        noisy(clean(pulses(DURATION_S), 14.0, effects={"torque_gain": {"factor": 1.1}}), seed)
+        for seed in range(3)
+    ]
+    fit_to, held = gather(MODEL, logs[:2]), gather(MODEL, logs[2:])
+    entry = enter(Candidate(MODEL, ("torque_gain",)), fit_to, held, np.array([1.08]), FULL_STEPS)
+    half = enter(Candidate(MODEL, ("torque_gain",)), fit_to, held, np.array([1.05]), 1)
+    fits = fitness(entry, fit_to, held)
+    for which, low, high in ((entry, 0.0, 0.02), (half, MOST_LEFT, 1.0)):
+        assert low <= left_open(MODEL, which, held) <= high
+        said = Decision(Verdict.IDENTIFIED, which, (), {"torque_gain": 0.9}, fits, fits)
+        left = closing(said, MODEL, held)
+        assert left.verdict is (Verdict.IDENTIFIED if which is entry else Verdict.UNKNOWN)
+        assert (left.left_open > 0.0) is (which is half)
+        assert left.probability["torque_gain"] <= 0.9
+
+
+@pytest.mark.parametrize(("slow", "verdict"), [(True, Verdict.UNKNOWN), (False, Verdict.IDENTIFIED)])
+def test_a_slow_speed_sensor_is_not_called_late(nominal, slow, verdict):
+    lag_s = 0.06
+    speed = nominal.measured[:, SPEED]
+    keep = np.exp(-STEP_S / lag_s)
+    filtered = lfilter([1.0 - keep], [1.0, -keep], speed, zi=[keep * speed[0]])[0]
+    measured = nominal.measured.copy()
+    measured[:, SPEED] = filtered if slow else delayed(nominal.time_s, speed, lag_s)
+    logs = [noisy(remeasured(nominal, measured), seed, 0.2 * SIGMA) for seed in range(3)]
+    found = find(MODEL, logs[:2], logs[2], exclude=only("vehicle_speed_delay"))
+    assert found.decision.winner.ids == ("vehicle_speed_delay",)
+    assert found.decision.verdict is verdict
