@@ -181,7 +181,8 @@ NOT_OFFERED = {
 
 def leaves(owner: object, path: str = "") -> list[str]:
     if is_dataclass(owner):
-        return [leaf for f in fields(owner) for leaf in leaves(getattr(owner, f.name), f"{path}.{f.name}")]
+        told = [f.name for f in fields(owner) if f.init]
+        return [leaf for name in told for leaf in leaves(getattr(owner, name), f"{path}.{name}")]
     if isinstance(owner, tuple):
         return [leaf for place, item in enumerate(owner) for leaf in leaves(item, f"{path}.{place}")]
     return [path.removeprefix(".")]
