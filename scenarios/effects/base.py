@@ -79,6 +79,18 @@ def parameter(
     return field(metadata=about)
 
 
+def share_of_axles(start: float, most: float) -> Any:
+    """Declare how unlike the axles are, of an effect whose other parameter is the mean of all wheels."""
+    return parameter(
+        "-",
+        "share of the mean that the front axle has more and the rear less",
+        neutral=0.0,
+        low=-most,
+        high=most,
+        starts=(-start, start),
+    )
+
+
 @dataclass(frozen=True)
 class Effect:
     """Base of all effects: describes itself and leaves every stage as it is."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter
+from scenarios.effects.base import Effect, parameter, share_of_axles
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
@@ -45,14 +45,7 @@ class BrakeDragOfAxles(BrakeDrag):
     form = "axles unlike"
     equation = "T_drag (1 + unlike) in front, T_drag (1 - unlike) in the rear"
 
-    unlike: float = parameter(
-        "-",
-        "share of the mean that the front axle has more and the rear less",
-        neutral=0.0,
-        low=-1.0,
-        high=1.0,
-        starts=(-0.5, 0.5),
-    )
+    unlike: float = share_of_axles(start=0.5, most=1.0)
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Each axle has its torque."""

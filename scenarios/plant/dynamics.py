@@ -208,6 +208,12 @@ def initial_y(speed_m_s: float, position_m: float, p: DynamicsParameters) -> NDA
     return y
 
 
+@inlined
+def _of_axle(i: int, mean: float, unlike: float) -> float:
+    """A wheel's own value, where the front wheels have more than the mean by what the rear ones have less."""
+    return mean + unlike if i < 2 else mean - unlike
+
+
 @compiled
 def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Fill loads, slips, signed forces and force slopes; return what the accelerometer reads [m/s^2].
@@ -240,7 +246,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             if slip_lags:
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
-            stiffness_n = p.longitudinal_stiffness_n + (p.axle_stiffness_n if i < 2 else -p.axle_stiffness_n)
+            stiffness_n = _of_axle(i, p.longitudinal_stiffness_n, p.axle_stiffness_n)
             tyre = tyre_force(theta, abs(acting), load_n, stiffness_n)
             if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
                 tyre = reshaped(tyre, abs(acting), theta * load_n, load_n, p)
@@ -287,9 +293,8 @@ def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, fi
 def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Omega' of one wheel [rad/s^2]; a resting wheel that nothing drives forward stays at rest."""
     resistance_n = wheels.force_n[i] + p.rolling_coefficient * wheels.load_n[i]
-    unlike = 1.0 if i < 2 else -1.0
-    inertia = p.wheel_inertia_kg_m2 + unlike * p.axle_inertia_kg_m2 - p.motor_inertia_kg_m2
-    drag_nm = p.drag_torque_nm + unlike * p.axle_drag_torque_nm
+    inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2) - p.motor_inertia_kg_m2
+    drag_nm = _of_axle(i, p.drag_torque_nm, p.axle_drag_torque_nm)
     rate = (torque_nm - resistance_n * p.wheel_radius_m - drag_nm) / inertia
     return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
 
@@ -345,7 +350,7 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
     pivot = 1.0 + gh * 2.0 * p.drag_kg_m * speed / p.mass_kg
     at = wheels.work
     for i in range(4):
-        inertia = p.wheel_inertia_kg_m2 + (p.axle_inertia_kg_m2 if i < 2 else -p.axle_inertia_kg_m2)
+        inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2)
         per_newton = p.wheel_radius_m / inertia
         if p.motor_inertia_kg_m2 > 0.0:
             shaft = gh * (gh * p.shaft_stiffness_nm_rad + p.shaft_damping_nm_s_rad)
@@ -375,8 +380,7 @@ def _solve(
     shaft = gh * (stiffness + p.shaft_damping_nm_s_rad)
     rhs = speed_rhs
     for i in range(4):
-        unlike = 1.0 if i < 2 else -1.0
-        inertia = p.wheel_inertia_kg_m2 + unlike * p.axle_inertia_kg_m2 - p.motor_inertia_kg_m2
+        inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2) - p.motor_inertia_kg_m2
         if has_shaft:
             k[MOTOR - WHEEL + i] *= p.motor_inertia_kg_m2 / at[_MOTOR, i]
         if has_shaft and wheels.free[i] > 0.0:
@@ -530,11 +534,17 @@ FIELDS = len(DynamicsParameters._fields)
 
 
 @compiled
-def between(ends: NDArray, shares: NDArray) -> DynamicsParameters:
-    """Parameters at the first of some ends and shares of the ways from it to the others."""
+def between(ends: NDArray, shares: NDArray) -> NDArray:
+    """The first of some ends and shares of the ways from it to the others."""
     values = ends[0].copy()
     for j in range(shares.shape[0]):
         values += shares[j] * (ends[j + 1] - ends[0])
+    return values
+
+
+@compiled
+def _car_between(ends: NDArray, shares: NDArray) -> DynamicsParameters:
+    values = between(ends, shares)
     return DynamicsParameters(*to_fixed_tuple(values, FIELDS))  # type: ignore[call-arg]  # its first argument is numba's
 
 
@@ -584,10 +594,8 @@ def follow(
     slip, force_n, load_n, theta = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4))
     first, second = new_wheels()
     trial = np.empty_like(y)
-    road = RoadTable(start_m, thetas[0].copy())
-    p = between(ends, shares[0])
-    for j in range(shares.shape[1]):
-        road.theta[:] += shares[0, j] * (thetas[j + 1] - thetas[0])
+    road = RoadTable(start_m, between(thetas, shares[0]))
+    p = _car_between(ends, shares[0])
     accel = refresh(y, 0.0, p, road, first)
     for k in range(n):
         states[k] = y[:6]
@@ -603,10 +611,8 @@ def follow(
         for j in range(SPEED, FORCE):
             y[j] = max(y[j], 0.0)
         if shares.shape[1] > 0:
-            p = between(ends, shares[k])
-            road.theta[:] = thetas[0]
-            for j in range(shares.shape[1]):
-                road.theta[:] += shares[k, j] * (thetas[j + 1] - thetas[0])
+            p = _car_between(ends, shares[k])
+            road.theta[:] = between(thetas, shares[k])
         accel = refresh(y, accel, p, road, first)
         accel = advance(y, trial, torque_nm[k], torque_nm[k + 1], step_s, accel, p, road, first, second)
     return states, accels, slip, force_n, load_n, theta
