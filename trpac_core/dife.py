@@ -325,7 +325,7 @@ def fusion_step(
         unaided = _unaided(state, inputs, look, wheel, gains, step_s, above or may_show, beside[7])
     else:
         unaided = beside
-    theta_next, s, _, force_n, theta_tyre, _, steady, _ = unaided
+    theta_next, s, _, force_n, theta_tyre, _, steady, place = unaided
     K_v = 0.0
     excited = theta_tyre is not None or (above and inputs[8])
     if excited and theta_img is not None:
@@ -333,7 +333,7 @@ def fusion_step(
         if gains.tyre_first:
             silent = rests or unseen_m < SEEN_HOLD_M or other_m > 0.0
             if by_tyre is None and not silent:
-                by_tyre = backed_theta(theta_img, steady, inputs, wheel[2])
+                by_tyre = backed_theta(theta_img, steady, place, inputs, wheel[2])
             theta_img = _compatible(theta_img, theta_hat, silent, by_tyre, force_n, inputs, wheel[2])
         if theta_img is not None:
             difference = abs(theta_img - theta_hat)

@@ -101,25 +101,39 @@ def shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float
     return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity
 
 
-def place_of_mean(
-    steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float, significance: float = SIGNIFICANCE
-) -> Place:
+def place_of_mean(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float) -> Place:
     """Where the mean slip stands on the curve, and what of it noise leaves beyond doubt."""
+    below = _mean_slides_below(steady, inputs, longitudinal_stiffness_n, SIGNIFICANCE)
+    return steady, tyre_at_slip(steady[0], inputs[4], longitudinal_stiffness_n), below
+
+
+def _mean_slides_below(
+    steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float, significance: float
+) -> float:
+    """`slides_below` of the mean slip."""
     slip, _, rise, _ = steady
-    load_n, noise, doubt, noise_s = inputs[4], inputs[9], inputs[10], inputs[12]
+    noise, doubt, noise_s = inputs[9], inputs[10], inputs[12]
     surely = slip - significance * (mean_deviation(steady, noise, noise_s, doubt) + abs(rise))
-    below = elastic_friction(surely, load_n, longitudinal_stiffness_n) if surely > 0.0 else 0.0
-    return steady, tyre_at_slip(slip, load_n, longitudinal_stiffness_n), below
+    return slides_below(surely, inputs[4], longitudinal_stiffness_n)
 
 
 def backed_theta(
-    theta_img: float, steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float
+    theta_img: float,
+    steady: Steady,
+    place: Place | None,
+    inputs: WheelInputs,
+    longitudinal_stiffness_n: float,
 ) -> float | None:
-    """theta(lambda, F_hat) by the means where tyre and camera agree on it, though the tyre alone is not sure [-]."""
+    """theta(lambda, F_hat) by the means where tyre and camera agree on it, though the tyre alone is not sure [-].
+
+    `place` is where their slip stands, if that has been worked out.
+    """
     if steady[3] < BACKED_AFTER_S:
         return None
-    _, tyre, below = place_of_mean(steady, inputs, longitudinal_stiffness_n, BACKED_SIGNIFICANCE)
-    theta, _ = shown(steady[1], tyre, below)
+    if place is None:
+        place = place_of_mean(steady, inputs, longitudinal_stiffness_n)
+    below = _mean_slides_below(steady, inputs, longitudinal_stiffness_n, BACKED_SIGNIFICANCE)
+    theta, _ = shown(steady[1], place[1], below)
     return theta if theta is not None and abs(theta - theta_img) < NEAR_CLASS else None
 
 
