@@ -7,7 +7,7 @@ import pytest
 
 from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
 from trpac_core.excitation import FuzzyScheduler
-from trpac_core.sight import WheelInputs, look_at
+from trpac_core.sight import WheelInputs, backed_theta, look_at, place_of_mean, shown
 from trpac_core.slip import Slip
 from trpac_core.steady import (
     ELSEWHERE,
@@ -129,6 +129,20 @@ def test_what_the_tyre_alone_does_not_prove_counts_where_the_class_says_the_same
     assert estimate_after(*unsure, 0.2) == pytest.approx(0.18, abs=0.005)
     far = [estimate_after(*unsure, theta_img) for theta_img in (0.5, 0.8)]
     assert min(far) > 0.4, "a class that is far from what the tyre would show backs nothing"
+
+
+@pytest.mark.parametrize(("theta_img", "agree"), [(0.2, False), (0.35, True), (0.5, True), (0.8, False)])
+def test_only_a_class_near_what_the_tyre_would_show_backs_it(theta_img: float, agree: bool) -> None:
+    inputs, _ = at_rest(0.45, 0.017, 1.5e-3)
+    friction = inputs.wheel_torque_nm / WHEEL.radius_m / inputs.load_n
+    steady = Steady(inputs.slip.size, friction, 0.0, 0.1)
+    place = place_of_mean(steady, inputs, WHEEL.longitudinal_stiffness_n)
+    assert shown(friction, place[1], place[2])[0] is None, "the tyre alone is not sure"
+    backed = backed_theta(theta_img, steady, place, inputs, WHEEL.longitudinal_stiffness_n)
+    assert backed == (pytest.approx(0.45, abs=1e-3) if agree else None)
+    assert backed_theta(theta_img, steady, None, inputs, WHEEL.longitudinal_stiffness_n) == backed
+    short = steady._replace(held_s=0.01)
+    assert backed_theta(theta_img, short, place, inputs, WHEEL.longitudinal_stiffness_n) is None
 
 
 def test_means_survive_a_saved_state() -> None:
