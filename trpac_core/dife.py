@@ -41,6 +41,8 @@ __all__ = [
     "Unaided",
     "VisualTerm",
     "Wheel",
+    "dynamics_step",
+    "fused_step",
     "fusion_step",
     "settled",
 ]
@@ -165,6 +167,10 @@ class FusionStep(NamedTuple):
         return self.unaided.sensitivity
 
 
+Outcome = tuple[FusionState, Unaided, float, bool, float]
+"""What makes up a `FusionStep`."""
+
+
 def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains) -> FusionState:
     """The state with its observed force balancing the wheel torque, to start from."""
     slip, load_n = inputs.slip, inputs.load_n
@@ -247,7 +253,7 @@ def _led(
         rate, pull = by_tyre + rate, by_tyre * unaided.theta_tyre + pull
     theta_next = _driven(theta_hat, rate, pull, step_s)
     by_theta_n = (
-        direction * load_n * look.tyre.friction_by_theta(theta_hat) if theta_next != theta_hat else 0.0
+        direction * load_n * look[0].friction_by_theta(theta_hat) if theta_next != theta_hat else 0.0
     )
     theta_rate = (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0
     return theta_next, advanced_state(
@@ -264,6 +270,24 @@ def _led(
     )
 
 
+def dynamics_step(
+    state: FusionState, inputs: WheelInputs, look: Look, wheel: Wheel, gains: Gains, step_s: float
+) -> Outcome:
+    """One step of DE: what `fused_step` makes without a camera of a state that none has ever touched."""
+    threshold = look[2]
+    above = inputs[3][0] > threshold
+    unaided = _unaided(state, inputs, look, wheel, gains, step_s, above, None)
+    theta_next, s, _, _, theta_tyre, _, steady, _ = unaided
+    shows = theta_tyre is not None
+    unseen_m = 0.0
+    if not shows:
+        unseen_m = state[2] + inputs[7]
+        if unseen_m > NEVER_SEEN_M:
+            unseen_m = NEVER_SEEN_M
+    after = _new(FusionState, (theta_next, s, unseen_m, None, None, 0.0, False, steady))
+    return after, unaided, threshold, shows or (above and inputs[8]), 0.0
+
+
 def fusion_step(
     state: FusionState,
     inputs: WheelInputs,
@@ -278,6 +302,25 @@ def fusion_step(
     before: FusionState | None = None,
     beside: Unaided | None = None,
 ) -> FusionStep:
+    """`fused_step` with its outcome by names."""
+    given = (state, inputs, look, wheel, gains, scheduler, theta_img, step_s, confidence, variance)
+    return FusionStep(*fused_step(*given, before, beside))
+
+
+def fused_step(
+    state: FusionState,
+    inputs: WheelInputs,
+    look: Look,
+    wheel: Wheel,
+    gains: Gains,
+    scheduler: FuzzyScheduler,
+    theta_img: float | None,
+    step_s: float,
+    confidence: ConfidenceModel | None = None,
+    variance: float = 0.0,
+    before: FusionState | None = None,
+    beside: Unaided | None = None,
+) -> Outcome:
     """One step of observer and estimator.
 
     The tyre is excited where slip is above the fuzzy threshold. It also is where it visibly slides at a slip above
@@ -304,7 +347,7 @@ def fusion_step(
     """
     theta_hat, s, unseen_m, before_img, road_img, other_m, rests, steady = state
     size, way_m, threshold = inputs[3][0], inputs[7], look[2]
-    may_show = size > threshold
+    above = may_show = size > threshold
     if theta_img is not None:
         if theta_img == road_img:
             other_m = 0.0
@@ -315,10 +358,10 @@ def fusion_step(
                 road_img, other_m, rests = theta_img, 0.0, False
         before_img = theta_img
         threshold = scheduler.threshold(theta_img, inputs[4], wheel[2], inputs[5])
+        above = size > threshold
     unseen_m += way_m
     if unseen_m > NEVER_SEEN_M:
         unseen_m = NEVER_SEEN_M
-    above = size > threshold
     if before is None or beside is None:
         unaided = _unaided(state, inputs, look, wheel, gains, step_s, above or may_show, None)
     elif theta_hat != before[0] or s != before[1] or steady != before[7] or (above and not may_show):
@@ -331,10 +374,13 @@ def fusion_step(
     if excited and theta_img is not None:
         by_tyre = theta_tyre
         if gains.tyre_first:
-            silent = rests or unseen_m < SEEN_HOLD_M or other_m > 0.0
+            silent = by_tyre is None and (rests or unseen_m < SEEN_HOLD_M or other_m > 0.0)
             if by_tyre is None and not silent:
                 by_tyre = backed_theta(theta_img, steady, place, inputs, wheel[2])
-            theta_img = _compatible(theta_img, theta_hat, silent, by_tyre, force_n, inputs, wheel[2])
+            if by_tyre is not None:
+                theta_img = _agreeing(theta_img, theta_hat, by_tyre)
+            else:
+                theta_img = None if silent else max(theta_img, least_theta(force_n, inputs, wheel[2]))
         if theta_img is not None:
             difference = abs(theta_img - theta_hat)
             if by_tyre is None and confidence is not None and gains.tyre_first:
@@ -348,32 +394,19 @@ def fusion_step(
         road_img = before_img if road_img is None else road_img
         rests = road_img is not None
     after = _new(FusionState, (theta_next, s, unseen_m, before_img, road_img, other_m, rests, steady))
-    return _new(FusionStep, (after, unaided, threshold, excited, K_v))
+    return after, unaided, threshold, excited, K_v
 
 
-def _compatible(
-    theta_img: float,
-    theta_hat: float,
-    silent: bool,
-    theta_tyre: float | None,
-    force_n: float,
-    inputs: WheelInputs,
-    longitudinal_stiffness_n: float,
-) -> float | None:
-    """What the camera may still say beside the tyre.
+def _agreeing(theta_img: float, theta_hat: float, theta_tyre: float) -> float | None:
+    """What the camera may still say beside a tyre that is seen.
 
-    None where the tyre is seen to pull the estimate the other way, or where it is not seen and the camera rests after
-    it was; no farther off than what the tyre shows, and not less than it already carries.
+    None where the tyre pulls the estimate the other way; no farther off than what the tyre shows.
     """
-    if theta_tyre is not None:
-        by_tyre, by_camera = theta_tyre - theta_hat, theta_img - theta_hat
-        if by_tyre * by_camera < 0.0:
-            return None
-        # Of noisy samples half lie on the camera's side: without this bound their noise would be rectified.
-        return theta_img if abs(by_camera) < abs(by_tyre) else theta_tyre
-    if silent:
+    by_tyre, by_camera = theta_tyre - theta_hat, theta_img - theta_hat
+    if by_tyre * by_camera < 0.0:
         return None
-    return max(theta_img, least_theta(force_n, inputs, longitudinal_stiffness_n))
+    # Of noisy samples half lie on the camera's side: without this bound their noise would be rectified.
+    return theta_img if abs(by_camera) < abs(by_tyre) else theta_tyre
 
 
 def _driven(theta_hat: float, rate: float, pull: float, step_s: float) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .camera_side import RoadUnderWheel, take_frame
 from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
-from .dife import FusionState, FusionStep, Wheel, fusion_step, settled
+from .dife import FusionState, FusionStep, Wheel, dynamics_step, fused_step, settled
 from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
 from .mismatch import followed
@@ -20,7 +20,6 @@ from .readings import (
     GREATEST_ACCELERATION_M_S2,
     LONGEST_STEP_S,
     MOTION,
-    Readings,
     Sensors,
     implausible,
     plain,
@@ -87,7 +86,7 @@ class TrpacEstimator:
         config, theta = self.config, self.config.theta_initial
         stiffness_n, start = self._wheel.longitudinal_stiffness_n, FusionState(theta, 0.0)
         variance = unknown_variance(config.confidence, theta)
-        self._state = EstimatorState(start, start, Readings(0.0, 0.0, 0.0), config.elastic.start, variance)
+        self._state = EstimatorState(start, start, (0.0, 0.0, 0.0), config.elastic.start, variance)
         self._last = Estimate(
             TRPAC=theta,
             flag=False,
@@ -210,11 +209,11 @@ class TrpacEstimator:
             theta_seen, Q_v = config.class_theta[outcome.surface], outcome.Q_v
             theta_img = theta_seen if flag else None
         look = look_at(inputs, C_x, scheduler)
-        alone = fusion_step(dynamics, inputs, look, wheel, gains, scheduler, None, step_s)
+        alone = dynamics_step(dynamics, inputs, look, wheel, gains, step_s)
         fused = alone
         if theta_img is not None or fusion != dynamics:
             model, known = config.confidence, state.variance
-            fused = fusion_step(
+            fused = fused_step(
                 fusion,
                 inputs,
                 look,
@@ -232,8 +231,8 @@ class TrpacEstimator:
         theta, class_after, class_before = after[0], after[3], fusion[3]
         unasked_s = state.unasked_s + step_s
         if unasked_s >= config.sensor_filter_s or class_after != class_before:
-            variance, lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
-            state.line = self._learned(state, alone, inputs, read_slip, unasked_s)
+            variance, lag = self._variance(state, FusionStep(*fused), inputs, look, wheel, unasked_s)
+            state.line = self._learned(state, FusionStep(*alone), inputs, read_slip, unasked_s)
             state.variance, state.lag = variance, lag
             unasked_s = 0.0
         state.fusion, state.dynamics, state.readings = after, alone[0], readings
@@ -295,7 +294,7 @@ class TrpacEstimator:
         if size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
             return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
-        tyre, friction = look.tyre, force_n * direction / inputs.load_n
+        tyre, friction = look[0], force_n * direction / inputs.load_n
         if steady.held_s > before_s:
             size, friction = steady.slip, steady.friction
             tyre = place[1] if place is not None else tyre_at_slip(size, inputs.load_n, wheel[2])

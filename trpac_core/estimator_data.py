@@ -200,10 +200,16 @@ def _fusion_state(*values: Any) -> FusionState:
     return FusionState._make((*plain, Steady(*steady)))
 
 
+def _readings(*values: float) -> Readings:
+    """Readings of their JSON-able values."""
+    omega, torque_nm, speed_m_s = values
+    return omega, torque_nm, speed_m_s
+
+
 _PARTS: Mapping[str, Any] = {
     "fusion": _fusion_state,
     "dynamics": _fusion_state,
-    "readings": Readings,
+    "readings": _readings,
     "line": ElasticLine,
     "following": Following,
 }

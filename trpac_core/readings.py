@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 PLAUSIBLE = {
     "wheel_speed_rad_s": 1000.0,
@@ -48,12 +47,8 @@ class Sensors:
     yaw_rate_rad_s: float | None = None
 
 
-class Readings(NamedTuple):
-    """Filtered wheel speed [rad/s], wheel torque [N m] and vehicle speed [m/s]."""
-
-    wheel_speed_rad_s: float
-    wheel_torque_nm: float
-    vehicle_speed_m_s: float
+Readings = tuple[float, float, float]
+"""Filtered wheel speed [rad/s], wheel torque [N m] and vehicle speed [m/s]."""
 
 
 def filter_share(step_s: float, time_constant_s: float) -> float:

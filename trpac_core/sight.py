@@ -7,7 +7,7 @@ from typing import NamedTuple
 from .excitation import FuzzyScheduler
 from .slip import GREATEST_SLIP, Slip
 from .steady import Steady, mean_deviation
-from .tyre import TyreAtSlip, elastic_friction, tyre_at_slip
+from .tyre import TyreAtSlip, elastic_friction, theta_of, tyre_at_slip
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
@@ -22,7 +22,6 @@ NEAR_CLASS = 0.15
 LEAST_SENSITIVITY = 0.1
 """Where d mu / d theta is below this, an error of 0.01 in the used friction would be one of 0.1 in theta: there is
 nothing to invert [-]."""
-_new = tuple.__new__
 
 
 class WheelInputs(NamedTuple):
@@ -54,19 +53,14 @@ class WheelInputs(NamedTuple):
     """Time in which the filtered noise forgets itself: twice the filter's constant [s]."""
 
 
-class Look(NamedTuple):
-    """What slip and load say before any force is known: the same for DE and DIFE."""
+Look = tuple[TyreAtSlip, float, float]
+"""What slip and load say before any force is known, the same for DE and DIFE: the tyre, the slip that stands beyond
+noise, 0 or less where noise hides it [-], and the excitation threshold without a picture [-]."""
 
-    tyre: TyreAtSlip
-    surely: float
-    """Slip that stands beyond noise; 0 or less where noise hides it [-]."""
-    threshold: float
-    """Excitation threshold without a picture [-]."""
-
-
-Place = tuple[Steady, TyreAtSlip, float]
+Place = tuple[Steady, TyreAtSlip, float, float]
 """Where on the curve the mean of slip stands, the same for DE and DIFE: the means of which it is taken (used friction
-does not count), the tyre there, and the used friction below which it surely slides, 0 where noise hides it [-]."""
+does not count), the tyre there, the used friction below which it surely slides, 0 where noise hides it [-], and the
+deviation of the mean [-]."""
 
 
 def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: FuzzyScheduler) -> Look:
@@ -79,7 +73,7 @@ def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: Fuz
     size, load_n, deviation, change = inputs[3][0], inputs[4], inputs[5], inputs[6]
     surely = size - SIGNIFICANCE * (deviation + change)
     threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
-    return _new(Look, (tyre_at_slip(size, load_n, longitudinal_stiffness_n), surely, threshold))
+    return tyre_at_slip(size, load_n, longitudinal_stiffness_n), surely, threshold
 
 
 def slides_below(surely: float, load_n: float, longitudinal_stiffness_n: float) -> float:
@@ -91,10 +85,10 @@ def shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
     if friction > slides_below or slides_below == 0.0:
         return None, 0.0
-    theta = tyre.theta(friction)
+    elastic, g_0, g_1, kappa = tyre
+    theta = theta_of(friction, elastic, g_0, g_1, kappa)
     if theta is None:
         return None, 0.0
-    _, g_0, g_1, kappa = tyre
     sensitivity = (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
     if sensitivity < LEAST_SENSITIVITY:
         return None, 0.0
@@ -103,18 +97,11 @@ def shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float
 
 def place_of_mean(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float) -> Place:
     """Where the mean slip stands on the curve, and what of it noise leaves beyond doubt."""
-    below = _mean_slides_below(steady, inputs, longitudinal_stiffness_n, SIGNIFICANCE)
-    return steady, tyre_at_slip(steady[0], inputs[4], longitudinal_stiffness_n), below
-
-
-def _mean_slides_below(
-    steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float, significance: float
-) -> float:
-    """`slides_below` of the mean slip."""
-    slip, _, rise, _ = steady
-    noise, doubt, noise_s = inputs[9], inputs[10], inputs[12]
-    surely = slip - significance * (mean_deviation(steady, noise, noise_s, doubt) + abs(rise))
-    return slides_below(surely, inputs[4], longitudinal_stiffness_n)
+    load_n = inputs[4]
+    deviation = mean_deviation(steady, inputs[9], inputs[12], inputs[10]) + abs(steady[2])
+    tyre = tyre_at_slip(steady[0], load_n, longitudinal_stiffness_n)
+    surely = steady[0] - SIGNIFICANCE * deviation
+    return steady, tyre, slides_below(surely, load_n, longitudinal_stiffness_n), deviation
 
 
 def backed_theta(
@@ -132,7 +119,8 @@ def backed_theta(
         return None
     if place is None:
         place = place_of_mean(steady, inputs, longitudinal_stiffness_n)
-    below = _mean_slides_below(steady, inputs, longitudinal_stiffness_n, BACKED_SIGNIFICANCE)
+    surely = steady[0] - BACKED_SIGNIFICANCE * place[3]
+    below = slides_below(surely, inputs[4], longitudinal_stiffness_n)
     theta, _ = shown(steady[1], place[1], below)
     return theta if theta is not None and abs(theta - theta_img) < NEAR_CLASS else None
 
@@ -141,9 +129,9 @@ def visible_theta(
     force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float
 ) -> tuple[float | None, float]:
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
-    look = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
-    below = slides_below(look.surely, inputs.load_n, longitudinal_stiffness_n)
-    return shown(force_n * inputs.slip.direction / inputs.load_n, look.tyre, below)
+    tyre, surely, _ = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
+    below = slides_below(surely, inputs.load_n, longitudinal_stiffness_n)
+    return shown(force_n * inputs.slip.direction / inputs.load_n, tyre, below)
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:

@@ -8,9 +8,6 @@ GREATEST_SLIP = 0.999
 """A locked or spinning wheel is kept this far from slip 1, where the tyre's slip ratio has its pole [-]."""
 
 
-_new = tuple.__new__
-
-
 class Slip(NamedTuple):
     """Size and direction of a wheel's slip."""
 
@@ -44,22 +41,17 @@ def wheel_slip(
     >>> wheel_slip(50.0, 14.0, 0.29, 1.0)
     Slip(size=0.034482758620689655, direction=1.0)
     """
-    return _new(Slip, signed_parts(wheel_speed_rad_s, vehicle_speed_m_s, wheel_radius_m, floor_m_s))
+    slip = signed_slip(wheel_speed_rad_s * wheel_radius_m, vehicle_speed_m_s, floor_m_s)
+    return Slip(abs(slip), 1.0 if slip > 0.0 else -1.0 if slip < 0.0 else 0.0)
 
 
-def signed_parts(
-    wheel_speed_rad_s: float, vehicle_speed_m_s: float, wheel_radius_m: float, floor_m_s: float
-) -> tuple[float, float]:
-    """Size and direction as `wheel_slip` gives them, for where each tenth of a microsecond counts."""
-    circumferential = wheel_speed_rad_s * wheel_radius_m
-    sliding = circumferential - vehicle_speed_m_s
-    if sliding > 0.0:
-        size, direction, faster = sliding, 1.0, circumferential
-    elif sliding < 0.0:
-        size, direction, faster = -sliding, -1.0, vehicle_speed_m_s
-    else:
-        return 0.0, 0.0
-    if faster < floor_m_s:
-        return 0.0, 0.0
-    size /= faster
-    return size if size < GREATEST_SLIP else GREATEST_SLIP, direction
+def signed_slip(rim_m_s: float, vehicle_speed_m_s: float, floor_m_s: float) -> float:
+    """Size times direction of `wheel_slip`, of the rim's speed omega R [-]."""
+    sliding = rim_m_s - vehicle_speed_m_s
+    faster = rim_m_s if sliding > 0.0 else vehicle_speed_m_s
+    if sliding == 0.0 or faster < floor_m_s:
+        return 0.0
+    slip = sliding / faster
+    if slip > GREATEST_SLIP:
+        return GREATEST_SLIP
+    return slip if slip > -GREATEST_SLIP else -GREATEST_SLIP

@@ -75,30 +75,40 @@ class TyreAtSlip(NamedTuple):
     def theta(self, friction: float) -> float | None:
         """The one theta below L = 1 that gives this used friction; None where none does."""
         elastic, g_0, g_1, kappa = self
-        if friction <= 0.0:
-            return 0.0 if friction == 0.0 else None
-        upper = 2.0 * elastic
-        if friction >= elastic * (g_0 + g_1 * upper):
-            return None
-        # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
-        left = 1.0 - friction / (elastic * g_0)
-        theta = upper * (1.0 - math.sqrt(left)) if left > 0.0 else upper
-        lower, twice_kappa, least, most = 0.0, 2.0 * kappa, -LEAST_STEP, LEAST_STEP
-        for _ in _NEWTON:
-            base = g_0 + g_1 * theta
-            share = theta * (1.0 - kappa * theta)
-            excess = share * base - friction
-            if excess > 0.0:
-                upper = theta
-            else:
-                lower = theta
-            proposal = theta - excess / ((1.0 - twice_kappa * theta) * base + share * g_1)
-            if not lower <= proposal <= upper:
+        return theta_of(friction, elastic, g_0, g_1, kappa)
+
+
+def theta_of(friction: float, elastic: float, g_0: float, g_1: float, kappa: float) -> float | None:
+    """`TyreAtSlip.theta` of its numbers [-]."""
+    if friction <= 0.0:
+        return 0.0 if friction == 0.0 else None
+    upper = 2.0 * elastic
+    if friction >= elastic * (g_0 + g_1 * upper):
+        return None
+    # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
+    left = 1.0 - friction / (elastic * g_0)
+    theta = upper * (1.0 - math.sqrt(left)) if left > 0.0 else upper
+    lower, twice_kappa, least, most = 0.0, 2.0 * kappa, -LEAST_STEP, LEAST_STEP
+    for _ in _NEWTON:
+        base = g_0 + g_1 * theta
+        share = theta * (1.0 - kappa * theta)
+        excess = share * base - friction
+        proposal = theta - excess / ((1.0 - twice_kappa * theta) * base + share * g_1)
+        # The cubic rises: where it is above the friction theta has to fall, else to rise.
+        if excess > 0.0:
+            upper = theta
+            if not proposal >= lower:
                 proposal = 0.5 * (lower + upper)
-            if least < proposal - theta < most:
+            if proposal - theta > least:
                 return proposal
-            theta = proposal
-        return theta
+        else:
+            lower = theta
+            if not proposal <= upper:
+                proposal = 0.5 * (lower + upper)
+            if proposal - theta < most:
+                return proposal
+        theta = proposal
+    return theta
 
 
 def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> TyreAtSlip:

@@ -10,7 +10,7 @@ import math
 from .estimator_data import EstimatorConfig, EstimatorState, Rates
 from .readings import Readings, Sensors
 from .sight import WheelInputs
-from .slip import GREATEST_SLIP, Slip, signed_parts
+from .slip import GREATEST_SLIP, Slip, signed_slip
 
 MOST_AHEAD = 2.0
 """Most that a step may be longer than the one before for the readings' trend to be trusted over it [-]."""
@@ -79,12 +79,12 @@ def wheel_inputs(
         half = 0.5 * (ratio if ratio < MOST_AHEAD else MOST_AHEAD)
         omega_ahead = omega + half * (omega - before_omega)
         torque_ahead_nm = torque_nm + half * (torque_nm - before_nm)
-    size, direction = signed_parts(omega, speed_m_s, radius_m, floor_m_s)
-    read_slip = signed = size * direction
-    deviation = 0.0
-    if direction or speed_m_s >= floor_m_s:
+    rim_m_s = omega * radius_m
+    read_slip = signed = signed_slip(rim_m_s, speed_m_s, floor_m_s)
+    size = direction = deviation = 0.0
+    if read_slip or speed_m_s >= floor_m_s:
         offset, deviation = state.line.offset(speed_m_s if speed_m_s > floor_m_s else floor_m_s)
-        curve = config.confidence.tyre_share * size
+        curve = config.confidence.tyre_share * read_slip
         deviation = DOUBTED * math.sqrt(deviation * deviation + curve * curve)
         signed = read_slip - offset
         size, direction = (signed, 1.0) if signed > 0.0 else (-signed, -1.0 if signed < 0.0 else 0.0)
@@ -94,7 +94,7 @@ def wheel_inputs(
     if settled:
         smoothed_slip = state.smoothed_slip
         smoothed_slip += share * (signed - smoothed_slip)
-    if omega * radius_m >= floor_m_s:
+    if rim_m_s >= floor_m_s:
         torque_ahead_nm -= config.vehicle.rolling_resistance * load_n * radius_m
     rise, filter_s = signed - smoothed_slip, config.sensor_filter_s
     inputs = _new(
@@ -115,4 +115,4 @@ def wheel_inputs(
             2.0 * filter_s,
         ),
     )
-    return _new(Readings, (omega, torque_nm, speed_m_s)), inputs, read_slip, smoothed_slip, locked_s
+    return (omega, torque_nm, speed_m_s), inputs, read_slip, smoothed_slip, locked_s
