@@ -30,6 +30,7 @@ from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
 from fmu_src.variables import Kind, Variable
 from trpac_core.estimator import Estimate, EstimatorConfig
+from trpac_core.estimator_data import OUTPUTS
 
 ROOT = Path(__file__).parent.parent
 SLAVE = UNITS["TrpacEstimator"]
@@ -137,8 +138,9 @@ def test_start_lies_within_the_range(v: Variable) -> None:
 
 
 def test_outputs_are_the_fields_of_the_estimate() -> None:
-    fields = {name.removesuffix("_n").removesuffix("_s") for name in Estimate.__dataclass_fields__}
-    assert fields - {"problem"} == INTERFACE["output"]
+    assert {name.removesuffix("_n").removesuffix("_s") for name in OUTPUTS} == INTERFACE["output"]
+    shown = {*Estimate.__dataclass_fields__, "TRPAC_peak"} - {"problem", "load_n", "longitudinal_stiffness_n"}
+    assert set(OUTPUTS) == shown
 
 
 def plain(value: object) -> object:

@@ -23,10 +23,9 @@ from .sight import (
     least_theta,
     place_of_mean,
     shown,
-    slides_below,
 )
 from .steady import NOTHING, Steady, held, quickened, same_slip
-from .tyre import force
+from .tyre import elastic_friction, force
 
 __all__ = [
     "GREATEST_THETA",
@@ -195,11 +194,13 @@ def _unaided(
     `beside` is the place that the other estimator found in this step. A locked wheel tells nothing of its force: the
     observer is then led by the tyre model and the estimate holds.
     """
-    theta_hat, s, omega, slip, load_n = state[0], state[1], inputs[0], inputs[3], inputs[4]
+    theta_hat, s = state[0], state[1]
+    omega, slip, load_n = inputs[0], inputs[3], inputs[4]
     elastic, g_0, g_1, kappa = look[0]
     inertia, radius_m, C_x = wheel
     direction = slip[1]
-    K, base, driven_n, free = gains.K, g_0 + g_1 * theta_hat, direction * load_n, theta_hat >= 2.0 * elastic
+    K, base, driven_n = gains.K, g_0 + g_1 * theta_hat, direction * load_n
+    free = theta_hat >= 2.0 * elastic
     share = elastic if free else theta_hat * (1.0 - kappa * theta_hat)
     model_n = driven_n * (share * base)
     if not inputs[8]:
@@ -217,7 +218,7 @@ def _unaided(
                 place = place_of_mean(steady, inputs, C_x)
             theta_tyre, sensitivity = shown(steady[1], place[1], place[2])
         else:
-            theta_tyre, sensitivity = shown(friction, look[0], slides_below(look[1], load_n, C_x))
+            theta_tyre, sensitivity = shown(friction, look[0], elastic_friction(look[1], load_n, C_x))
         if theta_tyre is not None:
             rate = gains.gamma * quickened(steady, inputs[12])
             theta_next = _driven(theta_hat, rate, rate * theta_tyre, step_s)
@@ -374,13 +375,17 @@ def fused_step(
     if excited and theta_img is not None:
         by_tyre = theta_tyre
         if gains.tyre_first:
-            silent = by_tyre is None and (rests or unseen_m < SEEN_HOLD_M or other_m > 0.0)
-            if by_tyre is None and not silent:
-                by_tyre = backed_theta(theta_img, steady, place, inputs, wheel[2])
-            if by_tyre is not None:
-                theta_img = _agreeing(theta_img, theta_hat, by_tyre)
+            if theta_tyre is not None:
+                theta_img = _agreeing(theta_img, theta_hat, theta_tyre)
+            elif rests or unseen_m < SEEN_HOLD_M or other_m > 0.0:
+                theta_img = None
             else:
-                theta_img = None if silent else max(theta_img, least_theta(force_n, inputs, wheel[2]))
+                by_tyre = backed_theta(theta_img, steady, place, inputs, wheel[2])
+                if by_tyre is not None:
+                    theta_img = _agreeing(theta_img, theta_hat, by_tyre)
+                else:
+                    # Not less than it already carries.
+                    theta_img = max(theta_img, least_theta(force_n, inputs, wheel[2]))
         if theta_img is not None:
             difference = abs(theta_img - theta_hat)
             if by_tyre is None and confidence is not None and gains.tyre_first:

@@ -27,7 +27,7 @@ from .readings import (
 )
 from .sight import Look, WheelInputs, look_at
 from .steady import quickened, unsettled
-from .tyre import peak_friction, tyre_at_slip
+from .tyre import tyre_at_slip
 from .vision.ife import Ife
 from .vision.preview import PreviewState
 from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
@@ -97,10 +97,11 @@ class TrpacEstimator:
             tyre_force_n=0.0,
             TRPAC_image=theta,
             TRPAC_dynamics=theta,
-            TRPAC_peak=peak_friction(theta, self._static_load_n, stiffness_n),
             image_confidence=0.0,
             frame_age_s=-1.0,
             TRPAC_std=math.sqrt(variance),
+            load_n=self._static_load_n,
+            longitudinal_stiffness_n=stiffness_n,
         )
 
     @property
@@ -203,7 +204,8 @@ class TrpacEstimator:
             fusion = settled(fusion, inputs, wheel, gains)
             dynamics = settled(dynamics, inputs, wheel, gains)
         outcome = self._road.at(state.preview, state.position_m - self._setback_m)
-        flag, theta_img, theta_seen, Q_v, age_s = False, None, self._last.TRPAC_image, 0.0, -1.0
+        flag, theta_img, theta_seen = False, None, self._last.TRPAC_image
+        Q_v, age_s = 0.0, -1.0
         if outcome is not None:
             flag = outcome.flag and not state.frame_failed
             theta_seen, Q_v = config.class_theta[outcome.surface], outcome.Q_v
@@ -254,10 +256,11 @@ class TrpacEstimator:
             unaided[3],
             theta_seen,
             alone[0][0],
-            peak_friction(theta, load_n, C_x),
             Q_v,
             age_s,
             math.sqrt(with_camera(config.confidence, state.variance, theta, theta_img)),
+            load_n,
+            C_x,
         )
         return self._last
 

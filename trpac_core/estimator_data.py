@@ -21,6 +21,7 @@ from .readings import (
     filter_share,
 )
 from .steady import Steady
+from .tyre import peak_friction
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface
 from .vision.ife import IfeConfig, IfeState
@@ -124,16 +125,41 @@ class Estimate:
     """Adhesion of the class that the camera gave the road under the wheel, whatever its flag [-]."""
     TRPAC_dynamics: float
     """The same estimator without the camera (DE) [-]."""
-    TRPAC_peak: float
-    """Maximum of the tyre's curve at TRPAC: what a brake test measures [-]."""
     image_confidence: float
     """Q_v of the road under the wheel, 0 where there is no verdict [-]."""
     frame_age_s: float
     """Time since the picture of the road under the wheel was taken; -1 where there is none [s]."""
     TRPAC_std: float
     """Standard deviation of TRPAC [-]."""
+    load_n: float
+    """Vertical load that all this rests on [N]."""
+    longitudinal_stiffness_n: float
+    """Likewise C_x [N]."""
     problem: str | None = None
     """One sentence where the input was unusable and the last good estimate is held."""
+
+    @property
+    def TRPAC_peak(self) -> float:
+        """Maximum of the tyre's curve at TRPAC: what a brake test measures, worked out when it is asked for [-]."""
+        return peak_friction(self.TRPAC, self.load_n, self.longitudinal_stiffness_n)
+
+
+OUTPUTS = (
+    "TRPAC",
+    "flag",
+    "K_v",
+    "excitation_flag",
+    "excitation_threshold",
+    "slip",
+    "tyre_force_n",
+    "TRPAC_image",
+    "TRPAC_dynamics",
+    "TRPAC_peak",
+    "image_confidence",
+    "frame_age_s",
+    "TRPAC_std",
+)
+"""What of an estimate a table or a bus shows."""
 
 
 @dataclass(slots=True)

@@ -76,13 +76,11 @@ def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: Fuz
     return tyre_at_slip(size, load_n, longitudinal_stiffness_n), surely, threshold
 
 
-def slides_below(surely: float, load_n: float, longitudinal_stiffness_n: float) -> float:
-    """Used friction below which the tyre surely slides; 0 where noise hides it [-]."""
-    return elastic_friction(surely, load_n, longitudinal_stiffness_n) if surely > 0.0 else 0.0
-
-
 def shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it."""
+    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it.
+
+    Below `slides_below` the tyre surely slides; 0 where noise hides it [-].
+    """
     if friction > slides_below or slides_below == 0.0:
         return None, 0.0
     elastic, g_0, g_1, kappa = tyre
@@ -101,7 +99,7 @@ def place_of_mean(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n:
     deviation = mean_deviation(steady, inputs[9], inputs[12], inputs[10]) + abs(steady[2])
     tyre = tyre_at_slip(steady[0], load_n, longitudinal_stiffness_n)
     surely = steady[0] - SIGNIFICANCE * deviation
-    return steady, tyre, slides_below(surely, load_n, longitudinal_stiffness_n), deviation
+    return steady, tyre, elastic_friction(surely, load_n, longitudinal_stiffness_n), deviation
 
 
 def backed_theta(
@@ -120,7 +118,7 @@ def backed_theta(
     if place is None:
         place = place_of_mean(steady, inputs, longitudinal_stiffness_n)
     surely = steady[0] - BACKED_SIGNIFICANCE * place[3]
-    below = slides_below(surely, inputs[4], longitudinal_stiffness_n)
+    below = elastic_friction(surely, inputs[4], longitudinal_stiffness_n)
     theta, _ = shown(steady[1], place[1], below)
     return theta if theta is not None and abs(theta - theta_img) < NEAR_CLASS else None
 
@@ -130,7 +128,7 @@ def visible_theta(
 ) -> tuple[float | None, float]:
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
     tyre, surely, _ = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
-    below = slides_below(surely, inputs.load_n, longitudinal_stiffness_n)
+    below = elastic_friction(surely, inputs.load_n, longitudinal_stiffness_n)
     return shown(force_n * inputs.slip.direction / inputs.load_n, tyre, below)
 
 

@@ -88,7 +88,7 @@ def theta_of(friction: float, elastic: float, g_0: float, g_1: float, kappa: flo
     # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
     left = 1.0 - friction / (elastic * g_0)
     theta = upper * (1.0 - math.sqrt(left)) if left > 0.0 else upper
-    lower, twice_kappa, least, most = 0.0, 2.0 * kappa, -LEAST_STEP, LEAST_STEP
+    lower, twice_kappa = 0.0, 2.0 * kappa
     for _ in _NEWTON:
         base = g_0 + g_1 * theta
         share = theta * (1.0 - kappa * theta)
@@ -99,13 +99,13 @@ def theta_of(friction: float, elastic: float, g_0: float, g_1: float, kappa: flo
             upper = theta
             if not proposal >= lower:
                 proposal = 0.5 * (lower + upper)
-            if proposal - theta > least:
+            if proposal - theta > -LEAST_STEP:
                 return proposal
         else:
             lower = theta
             if not proposal <= upper:
                 proposal = 0.5 * (lower + upper)
-            if proposal - theta < most:
+            if proposal - theta < LEAST_STEP:
                 return proposal
         theta = proposal
     return theta
@@ -127,7 +127,9 @@ def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) ->
 
 
 def elastic_friction(slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
-    """Used friction at L = 1, the most at this slip that theta can be read from [-]."""
+    """Used friction at L = 1, the most at this slip that theta can be read from; 0 at a slip below 0 [-]."""
+    if slip <= 0.0:
+        return 0.0
     rolls = 1.0 - slip
     elastic = longitudinal_stiffness_n * slip / rolls / load_n
     g_0 = 1.27 + slip * (1.15 * slip - 1.63)

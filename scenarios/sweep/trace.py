@@ -12,7 +12,8 @@ from scenarios.plant.sensors import make_scenario_log
 from scenarios.runner import ESTIMATORS, Run, segment_starts, under_the_wheel
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.run import believed_config, camera_of, signals_of
-from trpac_core.estimator import Estimate, TrpacEstimator
+from trpac_core.estimator import TrpacEstimator
+from trpac_core.estimator_data import OUTPUTS
 from trpac_core.readings import Sensors
 
 RENAMED = {"tyre_force_n": "tyre_force", "frame_age_s": "frame_age"}
@@ -37,10 +38,10 @@ def trace(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:
     for row, (omega, torque, speed, acceleration) in enumerate(signals):
         sensors = Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
         rows.append(estimator.step(plan.scenario.step_s, sensors, frames.get(row)))
-    outputs = pd.DataFrame([{name: getattr(e, name) for name in Estimate.__slots__} for e in rows])
+    outputs = pd.DataFrame([{name: getattr(e, name) for name in OUTPUTS} for e in rows])
     parts = [
         make_scenario_log(plan.scenario, trajectory),
-        outputs.rename(columns=RENAMED).drop(columns="problem"),
+        outputs.rename(columns=RENAMED),
         under_the_wheel(plan.scenario, trajectory),
     ]
     table = pd.concat(parts, axis=1)
