@@ -25,7 +25,7 @@ from .sight import (
     shown,
 )
 from .steady import NOTHING, Steady, held, quickened, same_slip
-from .tyre import elastic_friction, force
+from .tyre import elastic_friction, force, sensitivity_of
 
 __all__ = [
     "GREATEST_THETA",
@@ -172,8 +172,8 @@ Outcome = tuple[FusionState, Unaided, float, bool, float]
 
 def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains) -> FusionState:
     """The state with its observed force balancing the wheel torque, to start from."""
-    slip, load_n = inputs.slip, inputs.load_n
-    model = force(state.theta_hat, slip.size, load_n, wheel.longitudinal_stiffness_n, slip.direction)
+    (size, direction), load_n = inputs.slip, inputs.load_n
+    model = force(state.theta_hat, size, load_n, wheel.longitudinal_stiffness_n, direction)
     balanced = inputs.wheel_torque_nm / wheel.radius_m
     s = settled_state(model, balanced, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
     return state._replace(s=s)
@@ -195,10 +195,9 @@ def _unaided(
     observer is then led by the tyre model and the estimate holds.
     """
     theta_hat, s = state[0], state[1]
-    omega, slip, load_n = inputs[0], inputs[3], inputs[4]
+    omega, (size, direction), load_n = inputs[0], inputs[3], inputs[4]
     elastic, g_0, g_1, kappa = look[0]
     inertia, radius_m, C_x = wheel
-    direction = slip[1]
     K, base, driven_n = gains.K, g_0 + g_1 * theta_hat, direction * load_n
     free = theta_hat >= 2.0 * elastic
     share = elastic if free else theta_hat * (1.0 - kappa * theta_hat)
@@ -211,7 +210,7 @@ def _unaided(
     theta_next, by_theta_n, theta_rate = theta_hat, 0.0, 0.0
     if asked:
         friction = force_n * direction / load_n
-        steady = held(state[7], slip[0], friction, inputs[11], inputs[9], step_s)
+        steady = held(state[7], size, friction, inputs[11], inputs[9], step_s)
         if steady[3] > step_s:
             place = beside
             if place is None or not same_slip(place[0], steady):
@@ -254,7 +253,7 @@ def _led(
         rate, pull = by_tyre + rate, by_tyre * unaided.theta_tyre + pull
     theta_next = _driven(theta_hat, rate, pull, step_s)
     by_theta_n = (
-        direction * load_n * look[0].friction_by_theta(theta_hat) if theta_next != theta_hat else 0.0
+        direction * load_n * sensitivity_of(theta_hat, look[0]) if theta_next != theta_hat else 0.0
     )
     theta_rate = (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0
     return theta_next, advanced_state(

@@ -27,7 +27,7 @@ from .readings import (
 )
 from .sight import Look, WheelInputs, look_at
 from .steady import quickened, unsettled
-from .tyre import tyre_at_slip
+from .tyre import TyreAtSlip, cubic_at_slip
 from .vision.ife import Ife
 from .vision.preview import PreviewState
 from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
@@ -297,10 +297,11 @@ class TrpacEstimator:
         if size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
             return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
-        tyre, friction = look[0], force_n * direction / inputs.load_n
+        cubic, friction = look[0], force_n * direction / inputs.load_n
         if steady.held_s > before_s:
             size, friction = steady.slip, steady.friction
-            tyre = place[1] if place is not None else tyre_at_slip(size, inputs.load_n, wheel[2])
+            cubic = place[1] if place is not None else cubic_at_slip(size, inputs.load_n, wheel[2])
+        tyre = TyreAtSlip(*cubic)
         noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
         torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
         torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0

@@ -129,7 +129,7 @@ class FourWheels:
         for wheel in self._wheels:
             wheel.reset()
         self._camera = SidesState()
-        self._last = self._together(self._static_n, ())
+        self._last = self._together([wheel.last for wheel in self._wheels], self._static_n, ())
 
     @property
     def last(self) -> CarEstimate:
@@ -162,21 +162,23 @@ class FourWheels:
         if steering or yaw:
             speeds_m_s = self._local_speeds(sensors)
         loads_n, given_n = self._loads(sensors)
-        problems = []
+        estimates, problems = [], []
         for name, wheel, side, wheel_omega, wheel_torque, wheel_m_s, wheel_n in zip(
             WHEELS, self._wheels, (left, right, left, right), omega, torque, speeds_m_s, given_n, strict=True
         ):
             one = Sensors(wheel_omega, wheel_torque, wheel_m_s, wheel_n, steering, accel, yaw)
-            problem = wheel.step(step_s, one, side, frame_failed=frame_failed).problem
-            if problem is not None:
-                problems.append((name, problem))
-        self._last = self._together(loads_n, self._told(sensors, problems) if problems else ())
+            estimate = wheel.step(step_s, one, side, frame_failed=frame_failed)
+            estimates.append(estimate)
+            if estimate.problem is not None:
+                problems.append((name, estimate.problem))
+        self._last = self._together(estimates, loads_n, self._told(sensors, problems) if problems else ())
         return self._last
 
-    def _together(self, loads_n: Four, problems: tuple[tuple[str, str], ...]) -> CarEstimate:
+    def _together(
+        self, estimates: list[Estimate], loads_n: Four, problems: tuple[tuple[str, str], ...]
+    ) -> CarEstimate:
         """The wheels' estimates and the car's."""
-        front_left, front_right, rear_left, rear_right = self._wheels
-        wheels = fl, fr, rl, rr = front_left.last, front_right.last, rear_left.last, rear_right.last
+        fl, fr, rl, rr = estimates
         theta, deviation = car_friction(
             (
                 (fl.TRPAC, fl.TRPAC_std),
@@ -187,7 +189,7 @@ class FourWheels:
             loads_n,
             self.config.axle_deviation,
         )
-        return _new(CarEstimate, (wheels, theta, deviation, problems))
+        return _new(CarEstimate, ((fl, fr, rl, rr), theta, deviation, problems))
 
     def _told(self, sensors: CarSensors, problems: list[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
         """Problems by whom they concern; one that all wheels share is the car's."""

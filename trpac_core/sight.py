@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .excitation import FuzzyScheduler
-from .slip import GREATEST_SLIP, Slip
+from .slip import GREATEST_SLIP
 from .steady import Steady, mean_deviation
-from .tyre import TyreAtSlip, elastic_friction, theta_of, tyre_at_slip
+from .tyre import Cubic, cubic_at_slip, elastic_friction, theta_of
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
@@ -32,7 +32,8 @@ class WheelInputs(NamedTuple):
     """Mean over the step to come: a wheel that gains speed would else seem to bear too much force."""
     wheel_torque_nm: float
     """Mean over the step to come."""
-    slip: Slip
+    slip: tuple[float, float]
+    """Size and direction, as in `Slip`."""
     load_n: float
     slip_deviation: float
     """Standard deviation of the slip through sensor noise and a bias that is not known better [-]."""
@@ -53,11 +54,11 @@ class WheelInputs(NamedTuple):
     """Time in which the filtered noise forgets itself: twice the filter's constant [s]."""
 
 
-Look = tuple[TyreAtSlip, float, float]
+Look = tuple[Cubic, float, float]
 """What slip and load say before any force is known, the same for DE and DIFE: the tyre, the slip that stands beyond
 noise, 0 or less where noise hides it [-], and the excitation threshold without a picture [-]."""
 
-Place = tuple[Steady, TyreAtSlip, float, float]
+Place = tuple[Steady, Cubic, float, float]
 """Where on the curve the mean of slip stands, the same for DE and DIFE: the means of which it is taken (used friction
 does not count), the tyre there, the used friction below which it surely slides, 0 where noise hides it [-], and the
 deviation of the mean [-]."""
@@ -73,20 +74,20 @@ def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: Fuz
     size, load_n, deviation, change = inputs[3][0], inputs[4], inputs[5], inputs[6]
     surely = size - SIGNIFICANCE * (deviation + change)
     threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
-    return tyre_at_slip(size, load_n, longitudinal_stiffness_n), surely, threshold
+    return cubic_at_slip(size, load_n, longitudinal_stiffness_n), surely, threshold
 
 
-def shown(friction: float, tyre: TyreAtSlip, slides_below: float) -> tuple[float | None, float]:
+def shown(friction: float, tyre: Cubic, slides_below: float) -> tuple[float | None, float]:
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it.
 
     Below `slides_below` the tyre surely slides; 0 where noise hides it [-].
     """
     if friction > slides_below or slides_below == 0.0:
         return None, 0.0
-    elastic, g_0, g_1, kappa = tyre
-    theta = theta_of(friction, elastic, g_0, g_1, kappa)
+    theta = theta_of(friction, tyre)
     if theta is None:
         return None, 0.0
+    _, g_0, g_1, kappa = tyre
     sensitivity = (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
     if sensitivity < LEAST_SENSITIVITY:
         return None, 0.0
@@ -97,7 +98,7 @@ def place_of_mean(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n:
     """Where the mean slip stands on the curve, and what of it noise leaves beyond doubt."""
     load_n = inputs[4]
     deviation = mean_deviation(steady, inputs[9], inputs[12], inputs[10]) + abs(steady[2])
-    tyre = tyre_at_slip(steady[0], load_n, longitudinal_stiffness_n)
+    tyre = cubic_at_slip(steady[0], load_n, longitudinal_stiffness_n)
     surely = steady[0] - SIGNIFICANCE * deviation
     return steady, tyre, elastic_friction(surely, load_n, longitudinal_stiffness_n), deviation
 
@@ -128,8 +129,9 @@ def visible_theta(
 ) -> tuple[float | None, float]:
     """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
     tyre, surely, _ = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
+    _, direction = inputs.slip
     below = elastic_friction(surely, inputs.load_n, longitudinal_stiffness_n)
-    return shown(force_n * inputs.slip.direction / inputs.load_n, tyre, below)
+    return shown(force_n * direction / inputs.load_n, tyre, below)
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
@@ -140,8 +142,8 @@ def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: f
     (size, direction), load_n, deviation, change = inputs[3:7]
     surely = size + SIGNIFICANCE * (deviation + change)
     friction = force_n * direction / load_n
-    tyre = tyre_at_slip(surely if surely < GREATEST_SLIP else GREATEST_SLIP, load_n, longitudinal_stiffness_n)
-    theta = tyre.theta(friction)
+    tyre = cubic_at_slip(surely if surely < GREATEST_SLIP else GREATEST_SLIP, load_n, longitudinal_stiffness_n)
+    theta = theta_of(friction, tyre)
     if theta is None:
         theta = 2.0 * tyre[0] if friction > 0.0 else 0.0
     return theta if theta < GREATEST_THETA else GREATEST_THETA

@@ -34,8 +34,6 @@ GREATEST_PEAK_SLIP = 0.95
 
 
 _NEWTON = range(NEWTON_STEPS)
-_new = tuple.__new__
-"""Makes a named tuple of a tuple: a third of the time that its own constructor takes."""
 
 
 def slip_ratio_force(slip: float, longitudinal_stiffness_n: float) -> float:
@@ -46,6 +44,10 @@ def slip_ratio_force(slip: float, longitudinal_stiffness_n: float) -> float:
 def correction(theta: float, slip: float) -> float:
     """Correction factor G of the modified Dugoff tyre [-]."""
     return (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + 1.27
+
+
+Cubic = tuple[float, float, float, float]
+"""The numbers of a `TyreAtSlip`, bare: where it is made at each step of each wheel."""
 
 
 class TyreAtSlip(NamedTuple):
@@ -67,21 +69,26 @@ class TyreAtSlip(NamedTuple):
 
     def friction_by_theta(self, theta: float) -> float:
         """Sensitivity d mu / d theta [-]: how clearly the tyre shows the road's friction."""
-        elastic, g_0, g_1, kappa = self
-        if theta >= 2.0 * elastic:
-            return elastic * g_1
-        return (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
+        return sensitivity_of(theta, self)
 
     def theta(self, friction: float) -> float | None:
         """The one theta below L = 1 that gives this used friction; None where none does."""
-        elastic, g_0, g_1, kappa = self
-        return theta_of(friction, elastic, g_0, g_1, kappa)
+        return theta_of(friction, self)
 
 
-def theta_of(friction: float, elastic: float, g_0: float, g_1: float, kappa: float) -> float | None:
+def sensitivity_of(theta: float, cubic: Cubic) -> float:
+    """`TyreAtSlip.friction_by_theta` of its numbers [-]."""
+    elastic, g_0, g_1, kappa = cubic
+    if theta >= 2.0 * elastic:
+        return elastic * g_1
+    return (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
+
+
+def theta_of(friction: float, cubic: Cubic) -> float | None:
     """`TyreAtSlip.theta` of its numbers [-]."""
     if friction <= 0.0:
         return 0.0 if friction == 0.0 else None
+    elastic, g_0, g_1, kappa = cubic
     upper = 2.0 * elastic
     if friction >= elastic * (g_0 + g_1 * upper):
         return None
@@ -113,16 +120,18 @@ def theta_of(friction: float, elastic: float, g_0: float, g_1: float, kappa: flo
 
 def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> TyreAtSlip:
     """The tyre at this unsigned slip [-], vertical load F_z [N] and longitudinal stiffness C_x [N]."""
+    return TyreAtSlip(*cubic_at_slip(slip, load_n, longitudinal_stiffness_n))
+
+
+def cubic_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> Cubic:
+    """The numbers of `tyre_at_slip`."""
     rolls = 1.0 - slip
     elastic = longitudinal_stiffness_n * slip / rolls / load_n
-    return _new(
-        TyreAtSlip,
-        (
-            elastic,
-            1.27 + slip * (1.15 * slip - 1.63),
-            0.75 * slip * rolls,
-            0.25 / elastic if elastic > 0.0 else math.inf,
-        ),
+    return (
+        elastic,
+        1.27 + slip * (1.15 * slip - 1.63),
+        0.75 * slip * rolls,
+        0.25 / elastic if elastic > 0.0 else math.inf,
     )
 
 

@@ -10,7 +10,7 @@ import math
 from .estimator_data import EstimatorConfig, EstimatorState, Rates
 from .readings import Readings, Sensors
 from .sight import WheelInputs
-from .slip import GREATEST_SLIP, Slip, signed_slip
+from .slip import GREATEST_SLIP, signed_slip
 
 MOST_AHEAD = 2.0
 """Most that a step may be longer than the one before for the readings' trend to be trusted over it [-]."""
@@ -103,7 +103,7 @@ def wheel_inputs(
             omega,
             omega_ahead,
             torque_ahead_nm,
-            _new(Slip, (size, direction)),
+            (size, direction),
             load_n,
             noise if noise > deviation else deviation,
             abs(rise),
