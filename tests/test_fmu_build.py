@@ -139,7 +139,7 @@ def test_start_lies_within_the_range(v: Variable) -> None:
 
 def test_outputs_are_the_fields_of_the_estimate() -> None:
     assert {name.removesuffix("_n").removesuffix("_s") for name in OUTPUTS} == INTERFACE["output"]
-    shown = {*Estimate.__dataclass_fields__, "TRPAC_peak"} - {"problem", "load_n", "longitudinal_stiffness_n"}
+    shown = {*Estimate._fields, "TRPAC_peak"} - {"problem", "load_n", "longitudinal_stiffness_n"}
     assert set(OUTPUTS) == shown
 
 

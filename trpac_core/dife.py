@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
@@ -90,7 +90,8 @@ class Gains:
     tyre_first: bool = True
 
 
-class Wheel(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Wheel:
     """The constants of the wheel: I [kg m^2], R [m], C_x [N]."""
 
     inertia_kg_m2: float
@@ -197,7 +198,7 @@ def _unaided(
     theta_hat, s = state[0], state[1]
     omega, (size, direction), load_n = inputs[0], inputs[3], inputs[4]
     elastic, g_0, g_1, kappa = look[0]
-    inertia, radius_m, C_x = wheel
+    inertia, radius_m, C_x = wheel.inertia_kg_m2, wheel.radius_m, wheel.longitudinal_stiffness_n
     K, base, driven_n = gains.K, g_0 + g_1 * theta_hat, direction * load_n
     free = theta_hat >= 2.0 * elastic
     share = elastic if free else theta_hat * (1.0 - kappa * theta_hat)
@@ -245,16 +246,14 @@ def _led(
     """theta_hat and s after a step of Eq. (17) or (18) in which the camera pulls, or what tyre and camera agree on."""
     theta_hat, s = state[:2]
     _, omega_ahead, torque_nm, (_, direction), load_n = inputs[:5]
-    inertia, radius_m, _ = wheel
+    inertia, radius_m = wheel.inertia_kg_m2, wheel.radius_m
     rate = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)
     pull = 0.0 if theta_img is None else rate * theta_img
     if unaided.theta_tyre is not None:
         by_tyre = gains.gamma * quickened(unaided.steady, inputs.noise_s)
         rate, pull = by_tyre + rate, by_tyre * unaided.theta_tyre + pull
     theta_next = _driven(theta_hat, rate, pull, step_s)
-    by_theta_n = (
-        direction * load_n * sensitivity_of(theta_hat, look[0]) if theta_next != theta_hat else 0.0
-    )
+    by_theta_n = direction * load_n * sensitivity_of(theta_hat, look[0]) if theta_next != theta_hat else 0.0
     theta_rate = (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0
     return theta_next, advanced_state(
         s,
@@ -288,23 +287,9 @@ def dynamics_step(
     return after, unaided, threshold, shows or (above and inputs[8]), 0.0
 
 
-def fusion_step(
-    state: FusionState,
-    inputs: WheelInputs,
-    look: Look,
-    wheel: Wheel,
-    gains: Gains,
-    scheduler: FuzzyScheduler,
-    theta_img: float | None,
-    step_s: float,
-    confidence: ConfidenceModel | None = None,
-    variance: float = 0.0,
-    before: FusionState | None = None,
-    beside: Unaided | None = None,
-) -> FusionStep:
-    """`fused_step` with its outcome by names."""
-    given = (state, inputs, look, wheel, gains, scheduler, theta_img, step_s, confidence, variance)
-    return FusionStep(*fused_step(*given, before, beside))
+def fusion_step(*given: Any, **more: Any) -> FusionStep:
+    """`fused_step` with its outcome by names; parameters as there."""
+    return FusionStep(*fused_step(*given, **more))
 
 
 def fused_step(
@@ -357,7 +342,7 @@ def fused_step(
                 # Another class that stands: what the tyre showed was another road.
                 road_img, other_m, rests = theta_img, 0.0, False
         before_img = theta_img
-        threshold = scheduler.threshold(theta_img, inputs[4], wheel[2], inputs[5])
+        threshold = scheduler.threshold(theta_img, inputs[4], wheel.longitudinal_stiffness_n, inputs[5])
         above = size > threshold
     unseen_m += way_m
     if unseen_m > NEVER_SEEN_M:
@@ -379,12 +364,12 @@ def fused_step(
             elif rests or unseen_m < SEEN_HOLD_M or other_m > 0.0:
                 theta_img = None
             else:
-                by_tyre = backed_theta(theta_img, steady, place, inputs, wheel[2])
+                by_tyre = backed_theta(theta_img, steady, place, inputs, wheel.longitudinal_stiffness_n)
                 if by_tyre is not None:
                     theta_img = _agreeing(theta_img, theta_hat, by_tyre)
                 else:
                     # Not less than it already carries.
-                    theta_img = max(theta_img, least_theta(force_n, inputs, wheel[2]))
+                    theta_img = max(theta_img, least_theta(force_n, inputs, wheel.longitudinal_stiffness_n))
         if theta_img is not None:
             difference = abs(theta_img - theta_hat)
             if by_tyre is None and confidence is not None and gains.tyre_first:

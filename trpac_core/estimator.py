@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .camera_side import RoadUnderWheel, take_frame
 from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
-from .dife import FusionState, FusionStep, Wheel, dynamics_step, fused_step, settled
+from .dife import FusionState, Outcome, Wheel, dynamics_step, fused_step, settled
 from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
 from .mismatch import followed
@@ -46,6 +46,7 @@ LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
 _LEAST_FRICTION = 1e-6
 """Used friction below which a reading says nothing of the tyre's curve, whatever the noise is said to be [-]."""
+_new = tuple.__new__
 
 
 class TrpacEstimator:
@@ -195,7 +196,7 @@ class TrpacEstimator:
         softened_by, wheel = self._softened_by
         if softened_by is not state.line:
             wheel = self._softened(state.line)
-        C_x = wheel[2]
+        C_x = wheel.longitudinal_stiffness_n
         readings, inputs, read_slip, smoothed_slip, locked_s = wheel_inputs(
             config, self._rates, state, sensors, self._radius_m, step_s, load_n
         )
@@ -233,8 +234,8 @@ class TrpacEstimator:
         theta, class_after, class_before = after[0], after[3], fusion[3]
         unasked_s = state.unasked_s + step_s
         if unasked_s >= config.sensor_filter_s or class_after != class_before:
-            variance, lag = self._variance(state, FusionStep(*fused), inputs, look, wheel, unasked_s)
-            state.line = self._learned(state, FusionStep(*alone), inputs, read_slip, unasked_s)
+            variance, lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
+            state.line = self._learned(state, alone, inputs, read_slip, unasked_s)
             state.variance, state.lag = variance, lag
             unasked_s = 0.0
         state.fusion, state.dynamics, state.readings = after, alone[0], readings
@@ -246,46 +247,50 @@ class TrpacEstimator:
         state.step_s, state.settled = step_s or state.step_s, True
         if outcome is not None:
             age_s = state.time_s - outcome.captured_s
-        self._last = Estimate(
-            theta,
-            flag,
-            K_v,
-            excited,
-            threshold,
-            inputs[3][0],
-            unaided[3],
-            theta_seen,
-            alone[0][0],
-            Q_v,
-            age_s,
-            math.sqrt(with_camera(config.confidence, state.variance, theta, theta_img)),
-            load_n,
-            C_x,
+        self._last = _new(
+            Estimate,
+            (
+                theta,
+                flag,
+                K_v,
+                excited,
+                threshold,
+                inputs[3][0],
+                unaided[3],
+                theta_seen,
+                alone[0][0],
+                Q_v,
+                age_s,
+                math.sqrt(with_camera(config.confidence, state.variance, theta, theta_img)),
+                load_n,
+                C_x,
+                None,
+            ),
         )
         return self._last
 
     def _softened(self, line: ElasticLine) -> Wheel:
         """The wheel with the stiffness that was learnt, kept until the line changes."""
-        inertia, radius_m, told_n = self._wheel
-        wheel = Wheel(inertia, radius_m, told_n / (1.0 + line.compliance()))
+        softer_n = self._wheel.longitudinal_stiffness_n / (1.0 + line.compliance())
+        wheel = replace(self._wheel, longitudinal_stiffness_n=softer_n)
         self._softened_by = line, wheel
         return wheel
 
     def _variance(
         self,
         state: EstimatorState,
-        fused: FusionStep,
+        fused: Outcome,
         inputs: WheelInputs,
         look: Look,
         wheel: Wheel,
         passed_s: float,
     ) -> tuple[float, float]:
         """Variance and lag of the fused estimate after a time."""
-        config, theta_hat, before_s = self.config, fused.state.theta_hat, state.step_s
-        _, _, _, force_n, theta_tyre, _, steady, place = fused.unaided
+        config, theta_hat, before_s = self.config, fused[0].theta_hat, state.step_s
+        _, _, _, force_n, theta_tyre, _, steady, place = fused[1]
         size, direction = inputs.slip
         way_m = state.speed_m_s * passed_s
-        before, after = state.fusion.theta_img, fused.state.theta_img
+        before, after = state.fusion.theta_img, fused[0].theta_img
         if (
             theta_tyre is None
             and before is not None
@@ -300,7 +305,11 @@ class TrpacEstimator:
         cubic, friction = look[0], force_n * direction / inputs.load_n
         if steady.held_s > before_s:
             size, friction = steady.slip, steady.friction
-            cubic = place[1] if place is not None else cubic_at_slip(size, inputs.load_n, wheel[2])
+            cubic = (
+                place[1]
+                if place is not None
+                else cubic_at_slip(size, inputs.load_n, wheel.longitudinal_stiffness_n)
+            )
         tyre = TyreAtSlip(*cubic)
         noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
         torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
@@ -326,7 +335,7 @@ class TrpacEstimator:
     def _learned(
         self,
         state: EstimatorState,
-        alone: FusionStep,
+        alone: Outcome,
         inputs: WheelInputs,
         read_slip: float,
         passed_s: float,
@@ -343,7 +352,7 @@ class TrpacEstimator:
             config.elastic,
             read_slip,
             speed_m_s,
-            alone.tyre_force_n,
+            alone[1].force_n,
             inputs.load_n,
             self._wheel.longitudinal_stiffness_n,
             noise,
@@ -384,8 +393,7 @@ class TrpacEstimator:
         if outcome is not None:
             theta_seen, Q_v = self.config.class_theta[outcome.surface], outcome.Q_v
             age_s = state.time_s - outcome.captured_s
-        self._last = replace(
-            self._last,
+        self._last = self._last._replace(
             flag=False,
             K_v=0.0,
             excitation_flag=False,
@@ -399,8 +407,7 @@ class TrpacEstimator:
 
     def state(self) -> dict[str, Any]:
         """All that is remembered as JSON-able values; floats survive the round trip bit by bit."""
-        last = {field.name: getattr(self._last, field.name) for field in fields(Estimate)}
-        return {"state": self._state.to_json(), "last": last}
+        return {"state": self._state.to_json(), "last": self._last._asdict()}
 
     def restore(self, data: Mapping[str, Any]) -> None:
         """Go back to what `state` gave."""

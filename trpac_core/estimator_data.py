@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from .confidence import ConfidenceModel
 from .dife import FusionState, Gains
@@ -103,8 +103,7 @@ class EstimatorConfig:
         )
 
 
-@dataclass(slots=True)  # frozen, its making would take 2 us of the step's 20
-class Estimate:
+class Estimate(NamedTuple):
     """What the estimator says at a step."""
 
     TRPAC: float

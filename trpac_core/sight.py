@@ -142,7 +142,9 @@ def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: f
     (size, direction), load_n, deviation, change = inputs[3:7]
     surely = size + SIGNIFICANCE * (deviation + change)
     friction = force_n * direction / load_n
-    tyre = cubic_at_slip(surely if surely < GREATEST_SLIP else GREATEST_SLIP, load_n, longitudinal_stiffness_n)
+    tyre = cubic_at_slip(
+        surely if surely < GREATEST_SLIP else GREATEST_SLIP, load_n, longitudinal_stiffness_n
+    )
     theta = theta_of(friction, tyre)
     if theta is None:
         theta = 2.0 * tyre[0] if friction > 0.0 else 0.0
