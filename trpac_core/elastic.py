@@ -30,6 +30,7 @@ CONTRADICTED = 2.0
 """Deviations up to which the car is taken to be as told: what noise teaches does not spoil a car that is [-]."""
 SOFTEST, STIFFEST = 1.0, -0.5
 """Bounds of c [-]: half and double the stiffness that is known."""
+_new = tuple.__new__
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class ElasticLine(NamedTuple):
         b, r, c, bb, br, bc, rr, rc, cc = self
         grown = bb + model.speed_drift_m_s**2 * passed_s
         most = max(bb, model.speed_bias_m_s**2)
-        return ElasticLine(b, r, c, grown if grown < most else most, br, bc, rr, rc, cc)
+        return _new(ElasticLine, (b, r, c, grown if grown < most else most, br, bc, rr, rc, cc))
 
 
 def learned(
@@ -179,14 +180,17 @@ def learned(
         by_r += off * off
         total += off * off
     gain = off / total
-    return ElasticLine(
-        b + by_b * gain,
-        r + by_r * gain,
-        min(max(c + by_c * gain, STIFFEST), SOFTEST),
-        bb - by_b * by_b / total,
-        br - by_b * by_r / total,
-        bc - by_b * by_c / total,
-        rr - by_r * by_r / total,
-        rc - by_r * by_c / total,
-        cc - by_c * by_c / total,
+    return _new(
+        ElasticLine,
+        (
+            b + by_b * gain,
+            r + by_r * gain,
+            min(max(c + by_c * gain, STIFFEST), SOFTEST),
+            bb - by_b * by_b / total,
+            br - by_b * by_r / total,
+            bc - by_b * by_c / total,
+            rr - by_r * by_r / total,
+            rc - by_r * by_c / total,
+            cc - by_c * by_c / total,
+        ),
     )

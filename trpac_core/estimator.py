@@ -115,7 +115,6 @@ class TrpacEstimator:
         step_s: float,
         sensors: Sensors,
         frame: NDArray[np.uint8] | RoadClass | None = None,
-        *,
         frame_failed: bool = False,
     ) -> Estimate:
         """One step: sensors are read at its start and go on over it as they came.
@@ -271,8 +270,9 @@ class TrpacEstimator:
 
     def _softened(self, line: ElasticLine) -> Wheel:
         """The wheel with the stiffness that was learnt, kept until the line changes."""
-        softer_n = self._wheel.longitudinal_stiffness_n / (1.0 + line.compliance())
-        wheel = replace(self._wheel, longitudinal_stiffness_n=softer_n)
+        told = self._wheel
+        softened_n = told.longitudinal_stiffness_n / (1.0 + line.compliance())
+        wheel = Wheel(told.inertia_kg_m2, told.radius_m, softened_n)
         self._softened_by = line, wheel
         return wheel
 

@@ -167,7 +167,7 @@ class FourWheels:
             WHEELS, self._wheels, (left, right, left, right), omega, torque, speeds_m_s, given_n, strict=True
         ):
             one = Sensors(wheel_omega, wheel_torque, wheel_m_s, wheel_n, steering, accel, yaw)
-            estimate = wheel.step(step_s, one, side, frame_failed=frame_failed)
+            estimate = wheel.step(step_s, one, side, frame_failed)
             estimates.append(estimate)
             if estimate.problem is not None:
                 problems.append((name, estimate.problem))

@@ -22,6 +22,7 @@ MEAN_SHARE = 0.02
 second [-]."""
 FORGETTING = 1e-4
 """Growth of the slope's variance with a reading: another part of the curve may be as told [-]."""
+_new = tuple.__new__
 
 
 class Following(NamedTuple):
@@ -60,6 +61,5 @@ def followed(before: Following, elastic: float, theta_tyre: float, noise: float)
     if total > 0.0 and surprise * surprise < REJECTED * REJECTED * total:
         gain = variance * along / total
         slope, variance = slope + gain * surprise, variance * (1.0 - gain * along)
-    return Following(
-        slope, min(1.0, variance + FORGETTING), log_elastic + MEAN_SHARE * along, log_theta + MEAN_SHARE * off
-    )
+    grown = min(1.0, variance + FORGETTING)
+    return _new(Following, (slope, grown, log_elastic + MEAN_SHARE * along, log_theta + MEAN_SHARE * off))
