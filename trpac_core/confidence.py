@@ -18,6 +18,8 @@ from .tyre import TyreAtSlip
 
 LEAST_ROAD, GREATEST_ROAD = 0.05, 1.2
 """Roads lie between these [-]."""
+HELD_SHARE = 0.95
+"""Share of the true values that two standard deviations are to hold [-]."""
 SURELY = 2.0
 """Deviations by which a bound on theta is taken lower than it reads [-]."""
 FARTHEST = 6.0
@@ -45,7 +47,7 @@ class ConfidenceModel:
     class_scatter : float
         Distance of a road from the value of the class that the camera gave it, wrong classes included [-].
     unknown : float
-        Standard deviation of a road of which nothing is known: anywhere between 0.05 and 1.2 [-].
+        Standard deviation of roads of which nothing is known: anywhere between 0.05 and 1.2 [-].
     """
 
     torque_noise_nm: float = 3.2
@@ -61,9 +63,21 @@ MIDDLE_ROAD = 0.5 * (LEAST_ROAD + GREATEST_ROAD)
 """Middle of the roads that may be where nothing is known [-]."""
 
 
+def spread_variance(theta_hat: float, least: float, greatest: float) -> float:
+    """Square of half the distance from the estimate that holds 95 % of the roads between two ends, all alike likely [-].
+
+    Not their mean square: no road lies beyond the ends, so two of its roots would hold every one.
+    """
+    above, below, held = greatest - theta_hat, theta_hat - least, HELD_SHARE * (greatest - least)
+    nearer = above if above < below else below
+    half = 0.25 * held if 2.0 * nearer > held else 0.5 * (held - nearer)
+    return half * half
+
+
 def unknown_variance(model: ConfidenceModel, theta_hat: float) -> float:
-    """Mean square error of an estimate that says nothing of the road [-]."""
-    return model.unknown**2 + (theta_hat - MIDDLE_ROAD) ** 2
+    """That of an estimate that says nothing of the road [-]."""
+    reach = math.sqrt(3.0) * model.unknown
+    return spread_variance(theta_hat, MIDDLE_ROAD - reach, MIDDLE_ROAD + reach)
 
 
 def camera_share(model: ConfidenceModel, variance: float, theta_hat: float) -> float:
@@ -92,11 +106,8 @@ def theta_at(fraction: float, elastic: float) -> float:
 
 
 def bounded_variance(theta_hat: float, least: float) -> float:
-    """Mean square error where the road is known to be anywhere above `least` [-]."""
-    if least > GREATEST_ROAD - 0.1:
-        least = GREATEST_ROAD - 0.1
-    above, below = GREATEST_ROAD - theta_hat, least - theta_hat
-    return (above**3 - below**3) / (3.0 * (GREATEST_ROAD - least))
+    """`spread_variance` where the road is known to be anywhere above `least` [-]."""
+    return spread_variance(theta_hat, least if least < GREATEST_ROAD - 0.1 else GREATEST_ROAD - 0.1, GREATEST_ROAD)
 
 
 class Evidence(NamedTuple):
