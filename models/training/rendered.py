@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -13,7 +16,7 @@ from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import RenderedFrame, SceneLook, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.regions import roi_width_px
+from trpac_core.vision.regions import roi_box, roi_width_px
 
 from .data import IGNORE, Image
 from .patches import ASPECTS, PatchSet, patch_set, reduced
@@ -39,6 +42,13 @@ NEAREST_M, FARTHEST_M = 2.5, 15.0
 ROI_WIDTHS_M = (0.7, 4.5)
 PURE_SHARE = 0.97
 """Least share of a patch that is lit road of one surface [-]; the classifier learns undisturbed looks only."""
+
+DRIVEN_SHARE = 0.6
+"""Share of the patches of further worlds that are cut where and as wide as a driving car cuts them [-]."""
+DRIVEN_M, DRIVEN_ASIDE_M, DRIVEN_WIDTHS_M = (2.5, 12.0), 1.8, (0.9, 2.4)
+"""Their way ahead, their reach to both sides, and the width of road that they show [m]."""
+DRIVEN_PURE_SHARE = 0.7
+"""Least share of one surface in them: a car's regions reach over borders and verges too [-]."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +113,29 @@ def draw_worlds(
     return samples, rendered_patches(cut)
 
 
+def draw_further_worlds(
+    seeds: Sequence[int], patches_per_view: int, processes: int, report: Callable[[], None]
+) -> PatchSet:
+    """Patches alone of further worlds, at the reduced scale; the result does not depend on `processes`."""
+    draw = partial(_world_patches, patches_per_view=patches_per_view)
+    cut: list[list[tuple[Image, int]]] = []
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        for views in pool.map(draw, seeds):
+            cut += views
+            report()
+    return rendered_patches(cut)
+
+
+def _world_patches(seed: int, patches_per_view: int) -> list[list[tuple[Image, int]]]:
+    """Patches of each view of one world, most of them cut as a driving car does."""
+    driven = round(DRIVEN_SHARE * patches_per_view)
+    cv2.setNumThreads(1)
+    return [
+        driven_patches(view, driven) + view_patches(view, patches_per_view - driven)
+        for view in world_views(seed, REDUCED_SCALE)
+    ]
+
+
 def view_sample(view: View) -> Sample:
     """A view as the segmenter's sample, reduced; its shadow is known on the road only."""
     height = round(STORED_WIDTH_PX * SIZE[1] / SIZE[0])
@@ -144,6 +177,33 @@ def view_patches(view: View, count: int) -> list[tuple[Image, int]]:
     return cut
 
 
+def driven_patches(view: View, count: int) -> list[tuple[Image, int]]:
+    """Patches with their class index at the places and widths of a driving car's regions.
+
+    The class is that of the centre. Shadowed places are left out, some verge or another surface is not.
+    """
+    rng = np.random.default_rng([view.patch_seed, 1])
+    frame, camera = view.frame, view.camera
+    cut: list[tuple[Image, int]] = []
+    for _ in range(16 * count):
+        if len(cut) == count:
+            break
+        ahead_m = float(np.exp(rng.uniform(*np.log(DRIVEN_M))))
+        point = np.array([ahead_m, rng.uniform(-DRIVEN_ASIDE_M, DRIVEN_ASIDE_M)])
+        width_m = float(np.exp(rng.uniform(*np.log(DRIVEN_WIDTHS_M))))
+        pixel = camera.ground_to_image(point[None])[0]
+        if not ((pixel >= 0).all() and pixel[0] < camera.width_px and pixel[1] < camera.height_px):
+            continue
+        width = roi_width_px(camera, point, width_m)
+        left, top, right, bottom = roi_box(camera.width_px, camera.height_px, pixel, width)
+        window = np.s_[top:bottom, left:right]
+        label = int(frame.surface[int(pixel[1]), int(pixel[0])])
+        lit = np.mean(~frame.shadow[window]) >= PURE_SHARE
+        if label >= 0 and lit and np.mean(frame.surface[window] == label) >= DRIVEN_PURE_SHARE:
+            cut.append((reduced(frame.image, (left, top, right, bottom)), label))
+    return cut
+
+
 def rendered_patches(found: list[list[tuple[Image, int]]]) -> PatchSet:
     """The patches of several views as one set; each view is one picture."""
     groups = []
@@ -151,6 +211,20 @@ def rendered_patches(found: list[list[tuple[Image, int]]]) -> PatchSet:
         for label in sorted({label for _, label in cut}):
             groups.append(([patch for patch, own in cut if own == label], label, "rendered"))
     return patch_set(groups)
+
+
+def save_patches(file: Path, patches: PatchSet) -> None:
+    """Keep patches in a .npz file."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(".part.npz")
+    np.savez(part, **vars(patches))
+    part.replace(file)
+
+
+def load_patches(file: Path) -> PatchSet:
+    """Patches kept by `save_patches`."""
+    with np.load(file) as kept:
+        return PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))
 
 
 def save_worlds(file: Path, samples: list[Sample], patches: PatchSet) -> None:

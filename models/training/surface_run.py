@@ -37,6 +37,9 @@ TRUNK_SOURCES = ("condition_web", "dry_udacity", "rendered")
 """Sources of the first stage: none on which a leave-one-out score is taken, so that one trunk serves all of those."""
 
 CUTTING_SEED = 1
+FURTHER_CUTS = 2
+"""How often real pictures are cut anew, at other places, for the second stage: the teacher is not asked about these."""
+
 OUTLIERS = {"train": 4000, "val": 800}
 CALIBRATION_PER_SOURCE = 240
 """Most validation patches that one source gives to the calibration, lest one drive decide T."""
@@ -46,7 +49,7 @@ Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 @dataclass(frozen=True)
 class Material:
-    """What the classifier learns from."""
+    """What the classifier learns from; the teacher's features are those of the first patches."""
 
     patches: PatchSet
     teacher: TeacherFeatures | None
@@ -108,6 +111,8 @@ def gather(
     every = of_split(pictures, "train")
     patches = joined([training_patches(every, CUTTING_SEED), rendered["train"]])
     teacher = _ask_teacher(given, patches, steps) if given.teacher else None
+    further = [training_patches(every, CUTTING_SEED + 1 + number) for number in range(FURTHER_CUTS)]
+    patches = joined([patches, *further, *([rendered["further"]] if "further" in rendered else [])])
     kept = np.array([family_of(str(source)) not in given.without for source in patches.sources])
     rng = np.random.default_rng(CUTTING_SEED)
     seen = [picture for picture in every if picture.family not in given.without]
@@ -115,7 +120,9 @@ def gather(
         "train": outlier_patches(rng, seen, patches.patches[kept], OUTLIERS["train"]),
         "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, OUTLIERS["val"]),
     }
-    return Material(patches.where(kept), None if teacher is None else teacher.where(kept), outliers)
+    if teacher is not None:
+        teacher = teacher.where(kept[: len(teacher)])
+    return Material(patches.where(kept), teacher, outliers)
 
 
 def _ask_teacher(given: argparse.Namespace, patches: PatchSet, steps: Steps) -> TeacherFeatures:
@@ -144,13 +151,14 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
     if given.trunk and given.trunk.is_file():
         torch.nn.ModuleList(student).load_state_dict(torch.load(given.trunk, weights_only=True))
         return student
-    chosen = np.isin(material.patches.sources, TRUNK_SOURCES)
+    seen = np.arange(len(material.patches)) < len(material.teacher)
+    chosen = seen & np.isin(material.patches.sources, TRUNK_SOURCES)
     count = max(2, round(given.effort * TRUNK_STEPS))
     with steps("learning the teacher's features", count) as report:
         trunk = learn_features(
             student,
             material.patches.where(chosen),
-            material.teacher.where(chosen),
+            material.teacher.where(chosen[seen]),
             steps=count,
             seed=given.seed,
             report=report,

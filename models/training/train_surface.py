@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,13 +24,15 @@ from .teacher import MAP_CELLS, TeacherFeatures
 BATCH = 96
 LEARNING_RATE = 3e-3
 WEIGHT_DECAY = 2e-2
-AVERAGING = 0.995
+AVERAGING = 0.998
 """Decay of the running average of the weights; the average is what ships."""
 
 MAP_WEIGHT, POOLED_WEIGHT = 1.0, 1.0
 """Weights of the teacher's maps and pooled features in the first stage."""
 HINT_SHARE = 0.5
 """Share of both beside the cross-entropy in the second stage."""
+AHEAD = 3
+"""Batches drawn while the net still learns from earlier ones."""
 READING_STEPS, READING_RATE = 600, 2e-3
 
 Report = Callable[[int, float], None]
@@ -46,19 +50,20 @@ class Taught(NamedTuple):
         return [parameter for part in self for parameter in part.parameters() if parameter.requires_grad]
 
     def train(self) -> nn.ModuleList:
-        """All modules, in training; layers that stay as they are keep their statistics as well."""
-        modules = nn.ModuleList(self).train()
-        for layer in self.net.first_layers:
-            layer.train(any(parameter.requires_grad for parameter in layer.parameters()))
-        return modules
+        """All modules, in training."""
+        return nn.ModuleList(self).train()
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Drawn patches with mirror flags, and what is known of them."""
+    """Drawn patches and what is known of them.
+
+    `taught` are the places of those that the teacher has seen; `pooled` and `maps` are its features of these.
+    """
 
     patches: Tensor
     labels: Tensor
+    taught: Tensor
     pooled: Tensor
     maps: Tensor
 
@@ -92,12 +97,9 @@ def learn_classes(
 ) -> Taught:
     """Second stage: the classes.
 
-    Where there is a teacher its features are kept in view, and the first layers stay as the first stage left them: a
-    thousand pictures of real roads are few, and half of the time is saved.
+    Where there is a teacher its features of the patches that it has seen, the first ones, are kept in view.
     """
     hint = 0.0 if teacher is None else HINT_SHARE
-    for layer in student.net.first_layers:
-        layer.requires_grad_(teacher is None)
     return _train(
         student, patches, teacher, draw_weights(patches), steps, seed, report, hint=hint, classes=1.0
     )
@@ -123,8 +125,7 @@ def _train(
     rate = LEARNING_RATE if hint == 1.0 or teacher is None else LEARNING_RATE / 2
     optimiser = torch.optim.AdamW(student.parameters(), lr=rate, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, total_steps=steps, pct_start=0.15)
-    for step in range(steps):
-        batch = _draw(rng, patches, teacher, shares)
+    for step, batch in enumerate(_drawn_ahead(lambda: _draw(rng, patches, teacher, shares), steps)):
         loss = _loss(student, batch, hint if teacher is not None else 0.0, classes)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
@@ -137,6 +138,17 @@ def _train(
     return Taught(net, maps, pooled)
 
 
+def _drawn_ahead(draw: Callable[[], Batch], count: int) -> Iterator[Batch]:
+    """Batches in order, drawn by a thread of their own."""
+    with ThreadPoolExecutor(1) as drawer:
+        waiting = deque(drawer.submit(draw) for _ in range(min(AHEAD, count)))
+        for number in range(count):
+            batch = waiting.popleft().result()
+            if number + AHEAD < count:
+                waiting.append(drawer.submit(draw))
+            yield batch
+
+
 def _draw(
     rng: np.random.Generator, patches: PatchSet, teacher: TeacherFeatures | None, shares: NDArray[np.float64]
 ) -> Batch:
@@ -146,12 +158,15 @@ def _draw(
         augmented(rng, patches.patches[index], mirror) for index, mirror in zip(chosen, mirrored, strict=True)
     ]
     if teacher is None:
-        pooled = maps = torch.empty(0)
+        taught = pooled = maps = torch.empty(0)
     else:
-        pooled = torch.from_numpy(teacher.pooled[chosen].astype(np.float32))
-        maps = torch.from_numpy(teacher.maps[chosen].astype(np.float32))
-        maps = torch.where(torch.from_numpy(mirrored)[:, None, None, None], maps.flip(3), maps)
-    return Batch(torch.from_numpy(np.stack(views)), torch.from_numpy(patches.labels[chosen]), pooled, maps)
+        seen = chosen < len(teacher)
+        taught = torch.from_numpy(np.flatnonzero(seen))
+        pooled = torch.from_numpy(teacher.pooled[chosen[seen]].astype(np.float32))
+        maps = torch.from_numpy(teacher.maps[chosen[seen]].astype(np.float32))
+        maps = torch.where(torch.from_numpy(mirrored[seen])[:, None, None, None], maps.flip(3), maps)
+    labels = torch.from_numpy(patches.labels[chosen])
+    return Batch(torch.from_numpy(np.stack(views)), labels, taught, pooled, maps)
 
 
 def _loss(student: Taught, batch: Batch, hint: float, classes: float) -> Tensor:
@@ -161,8 +176,10 @@ def _loss(student: Taught, batch: Batch, hint: float, classes: float) -> Tensor:
     if classes:
         logits = student.net.classifier(student.net.dropout(embedding))
         loss = loss + classes * functional.cross_entropy(logits, batch.labels)
-    if hint:
+    if hint and len(batch.taught):
+        middle, embedding = middle[batch.taught], embedding[batch.taught]
         seen = functional.adaptive_avg_pool2d(student.maps(middle), MAP_CELLS)
+        hint *= len(batch.taught) / len(batch.labels)
         loss = loss + hint * MAP_WEIGHT * functional.mse_loss(seen, batch.maps)
         loss = loss + hint * POOLED_WEIGHT * functional.mse_loss(student.pooled(embedding), batch.pooled)
     return loss
