@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from trpac_core.vision.classes import Surface
 
 from .data import Picture
-from .patches import CAMERA_SPREAD
+from .patches import CAMERA_SPREAD, RENDERED_SPREAD
 from .scores import ClassScore, wilson_interval
 from .train_segmenter import SegmentationScore
 
@@ -151,9 +151,9 @@ def surface_card(
         else "In a first stage, without labels, linear maps of the middle maps and of the embedding had to match what\n"
         "blocks 4 to 12 of MobileNetV2 1.0 / 224 (ImageNet weights, Apache-2.0) see: mean and deviation of each\n"
         "channel, and 4 x 6 cells of blocks 9 and 12. They kept half their weight in the second stage, which learns\n"
-        "the classes. Neither that network nor the linear maps are in the file. The first layers learn in the first\n"
-        "stage alone. A first stage that was read from a file is not in the time below: it took 26 min on one busy\n"
-        "processor."
+        "the classes, on the patches that the teacher has seen: the first cut of the real pictures and the first\n"
+        "rendered worlds. Neither that network nor the linear maps are in the file. A first stage that was read from\n"
+        "a file is not in the time below: it took 26 min on one busy processor."
     )
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
     return f"""\
@@ -175,7 +175,7 @@ feed one linear layer.
 {train_patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
 Patches are 3:2 to 3:1 wide before they are squeezed to the input, from 48 pixels to nearly the whole width of the road.
 They are mirrored, shifted, zoomed by up to 12 % and seen with the resolution, gain, gamma and white balance of other
-cameras (within {100 * CAMERA_SPREAD:.0f} %). {left_out}Classes are drawn equally often and sources within a class by
+cameras (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones, whose worlds have drawn theirs already). {left_out}Classes are drawn equally often and sources within a class by
 fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
 weights.
 {teacher}

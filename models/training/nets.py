@@ -106,6 +106,21 @@ class Segmenter(nn.Module):
         return self.drivable(maps), self.shadow(maps)
 
 
+class HalvingDepthwise(nn.Conv2d):
+    """Depthwise 3x3 convolution of stride 2.
+
+    In training it is computed at every pixel and thinned: the same values, but on a processor the gradient of the
+    stride takes several times as long as that of the pixels thrown away.
+    """
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Feature maps in, feature maps of half the size out."""
+        if not self.training:
+            return super().forward(x)
+        whole = functional.conv2d(x, self.weight, None, 1, 1, 1, self.groups)
+        return whole[:, :, ::2, ::2].contiguous(memory_format=torch.channels_last)
+
+
 class ShuffleUnit(nn.Module):
     """Unit of ShuffleNet: grouped 1x1, shuffle, depthwise 3x3, grouped 1x1 (Zhang et al. 2018, figure 2).
 
@@ -122,8 +137,9 @@ class ShuffleUnit(nn.Module):
             nn.BatchNorm2d(middle),
             nn.ReLU(inplace=True),
         )
+        convolution = HalvingDepthwise if stride == 2 else nn.Conv2d
         self.depthwise = nn.Sequential(
-            nn.Conv2d(middle, middle, 3, stride, 1, groups=middle, bias=False), nn.BatchNorm2d(middle)
+            convolution(middle, middle, 3, stride, 1, groups=middle, bias=False), nn.BatchNorm2d(middle)
         )
         self.expand = nn.Sequential(
             nn.Conv2d(middle, branch_out, 1, groups=groups, bias=False), nn.BatchNorm2d(branch_out)
@@ -132,6 +148,9 @@ class ShuffleUnit(nn.Module):
     def shuffle(self, x: Tensor) -> Tensor:
         """Deal the channels of each group to all groups."""
         channels, height, width = x.shape[1:]
+        if self.training:  # in the order of memory that training uses: channels last
+            dealt = x.permute(0, 2, 3, 1).reshape(-1, height, width, self.groups, channels // self.groups)
+            return dealt.transpose(3, 4).reshape(-1, height, width, channels).permute(0, 3, 1, 2)
         grouped = x.reshape(-1, self.groups, channels // self.groups, height, width)
         return grouped.transpose(1, 2).reshape(-1, channels, height, width)
 

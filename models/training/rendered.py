@@ -43,6 +43,8 @@ ROI_WIDTHS_M = (0.7, 4.5)
 PURE_SHARE = 0.97
 """Least share of a patch that is lit road of one surface [-]; the classifier learns undisturbed looks only."""
 
+WORLDS_PER_CAMERA = 6
+"""Further worlds that share a camera: to know where its pixels look takes half of the time that a world takes."""
 DRIVEN_SHARE = 0.6
 """Share of the patches of further worlds that are cut where and as wide as a driving car cuts them [-]."""
 DRIVEN_M, DRIVEN_ASIDE_M, DRIVEN_WIDTHS_M = (2.5, 12.0), 1.8, (0.9, 2.4)
@@ -78,16 +80,16 @@ def random_camera(rng: np.random.Generator, scale: float) -> Camera:
     )
 
 
-def world_views(seed: int, scale: float) -> Iterator[View]:
+def world_views(seed: int, scale: float, camera: Camera | None = None) -> Iterator[View]:
     """Pictures of one world from several places; its class is seed modulo 3, and one world in four changes it.
 
     Half of the worlds have the weather that is likely for their class, half any weather: snow under a summer sky
-    must still be told by its surface.
+    must still be told by its surface. Without a camera the world draws its own.
     """
     rng = np.random.default_rng(seed)
     surface = Surface(seed % 3)
     likely = surface if seed // 3 % 2 == 0 else None
-    camera = random_camera(rng, scale)
+    camera = random_camera(rng, scale) if camera is None else camera
     segments = [SurfaceSegment(-1000.0, surface)]
     if rng.random() < 0.25:
         other = Surface((int(surface) + int(rng.integers(1, 3))) % 3)
@@ -117,22 +119,26 @@ def draw_further_worlds(
     seeds: Sequence[int], patches_per_view: int, processes: int, report: Callable[[], None]
 ) -> PatchSet:
     """Patches alone of further worlds, at the reduced scale; the result does not depend on `processes`."""
-    draw = partial(_world_patches, patches_per_view=patches_per_view)
+    draw = partial(_patches_of_worlds, patches_per_view=patches_per_view)
+    sharing = [seeds[first : first + WORLDS_PER_CAMERA] for first in range(0, len(seeds), WORLDS_PER_CAMERA)]
     cut: list[list[tuple[Image, int]]] = []
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
-        for views in pool.map(draw, seeds):
+        for some, views in zip(sharing, pool.map(draw, sharing), strict=True):
             cut += views
-            report()
+            for _ in some:
+                report()
     return rendered_patches(cut)
 
 
-def _world_patches(seed: int, patches_per_view: int) -> list[list[tuple[Image, int]]]:
-    """Patches of each view of one world, most of them cut as a driving car does."""
-    driven = round(DRIVEN_SHARE * patches_per_view)
+def _patches_of_worlds(seeds: Sequence[int], patches_per_view: int) -> list[list[tuple[Image, int]]]:
+    """Patches of each view of worlds seen by one camera, most of them cut as a driving car does."""
     cv2.setNumThreads(1)
+    camera = random_camera(np.random.default_rng([seeds[0], 2]), REDUCED_SCALE)
+    driven = round(DRIVEN_SHARE * patches_per_view)
     return [
         driven_patches(view, driven) + view_patches(view, patches_per_view - driven)
-        for view in world_views(seed, REDUCED_SCALE)
+        for seed in seeds
+        for view in world_views(seed, REDUCED_SCALE, camera)
     ]
 
 
