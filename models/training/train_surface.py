@@ -191,7 +191,6 @@ def _loss(student: Taught, batch: Batch, hint: float, classes: float) -> Tensor:
     if hint and len(batch.taught):
         middle, embedding = middle[batch.taught], embedding[batch.taught]
         seen = functional.adaptive_avg_pool2d(student.maps(middle), MAP_CELLS)
-        hint *= len(batch.taught) / len(batch.labels)
         loss = loss + hint * MAP_WEIGHT * functional.mse_loss(seen, batch.maps)
         loss = loss + hint * POOLED_WEIGHT * functional.mse_loss(student.pooled(embedding), batch.pooled)
     return loss
