@@ -175,7 +175,8 @@ feed one linear layer.
 {train_patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
 Patches are 3:2 to 3:1 wide before they are squeezed to the input, from 48 pixels to nearly the whole width of the road.
 They are mirrored, shifted, zoomed by up to 12 % and seen with the resolution, gain, gamma and white balance of other
-cameras (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones, whose worlds have drawn theirs already). {left_out}Classes are drawn equally often and sources within a class by
+cameras (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones, whose worlds
+have drawn theirs already). {left_out}Classes are drawn equally often and sources within a class by
 fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
 weights.
 {teacher}

@@ -42,7 +42,7 @@ from .train_segmenter import score_segmenter, train_segmenter
 WORLDS = {"train": 480, "val": 36, "test": 60}
 PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
 FURTHER_WORLDS, FURTHER_PATCHES_PER_VIEW = 2520, 6
-"""Worlds after the first training ones, for the surface classifier alone: many looks count for more than many patches."""
+"""Worlds after the first training ones, for the surface classifier alone: many looks, few patches of each."""
 SEGMENTER_STEPS = 1300
 
 
