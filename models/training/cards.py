@@ -122,7 +122,7 @@ def surface_card(
     temperature, reliabilities, entropies = outcome.temperature, outcome.reliabilities, outcome.entropies
     picture_scores, patch_scores = outcome.picture_scores, outcome.patch_scores
     parameters = sum(parameter.numel() for parameter in outcome.net.parameters())
-    slope, centre = outcome.net.softening.tolist()
+    slope = float(outcome.net.softening)
     readings = table(
         ["patches", "share taken for readable road"],
         [[name, f"{share:.3f}"] for name, share in outcome.readings.items()],
@@ -204,8 +204,10 @@ the number of pictures of the class. Every rendered view is one picture.
 
 ## Calibration
 
-Within the graph the logits are divided by exp({slope:.3f} (s0 - s)) where a patch's sharpness s (log of mean grey
-step over grey deviation) is below s0 = {centre:.3f}: an unsharp patch is less sure. The slope is learned like T.
+Within the graph the logits are divided by exp({slope:.3f} d): a patch that looks disturbed is less sure, one that looks
+clear is surer. d, within {outcome.net.MOST_DISTURBED:g} to both sides, is the logit of a linear head that tells
+clear training patches from the same ones disturbed; it has seen no class. The slope is learned like T, on the
+validation patches.
 
 T = {temperature:.3f} minimises the cross-entropy of the validation patches, undisturbed and disturbed (motion blur on
 all, brightness and contrast on 70 %, abnormal exposure and shadow on 30 % each), from {entropies[0]:.3f} to
@@ -222,7 +224,7 @@ patches it holds. The diagram `reliability.png` is the validation set's, undistu
   same road seconds later. Rendered scores say how well the network knows the renderer, no more.
 - Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
 - Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
-- Sharpness and T know blur; a wrong exposure or a shadow is not softened by itself.
+- A road unlike those in training may look disturbed to the softening, and is less sure than it could be.
 
 ## Data
 

@@ -173,8 +173,8 @@ class SurfaceNet(nn.Module):
     """ShuffleNet with three groups for 64 x 96 patches; middle and last maps feed the classifier.
 
     Texture and gloss live in the middle maps, hence their mean and deviation beside the last stage's. Beside the
-    classes it says whether a patch shows readable road at all, and it softens the logits of unsharp patches; neither
-    changes the class.
+    classes it says whether a patch shows readable road at all, and it softens the logits of patches that look
+    disturbed; neither changes the class.
     """
 
     GROUPS = 3
@@ -182,6 +182,8 @@ class SurfaceNet(nn.Module):
     EMBEDDING = 2 * (240 + 384)
     READING = 32
     """Width of the head that tells readable road."""
+    MOST_DISTURBED = 4.0
+    """Limit of the logit that a patch is disturbed, to both sides, beyond which the softening stays as it is."""
 
     def __init__(self, classes: int = 3, dropout: float = 0.3):
         super().__init__()
@@ -200,7 +202,9 @@ class SurfaceNet(nn.Module):
         self.reading = nn.Sequential(
             nn.Linear(self.EMBEDDING, self.READING), nn.ReLU(), nn.Linear(self.READING, 1)
         )
-        self.softening = nn.Parameter(torch.tensor([0.0, 0.0]), requires_grad=False)
+        self.disturbed_norm = nn.BatchNorm1d(self.EMBEDDING)
+        self.disturbed = nn.Linear(self.EMBEDDING, 1)
+        self.softening = nn.Parameter(torch.tensor(0.0), requires_grad=False)
 
     @property
     def first_layers(self) -> nn.ModuleList:
@@ -225,25 +229,16 @@ class SurfaceNet(nn.Module):
         """Logit that a patch shows readable road, shape (n,)."""
         return self.reading(self.reading_norm(embedding))[:, 0]
 
-    def soft_logits(self, patches: Tensor, embedding: Tensor) -> Tensor:
-        """Logits (n, classes), smaller the less sharp a patch is: `softening` holds slope and centre."""
-        slope, centre = self.softening
-        blur = functional.relu(centre - sharpness(patches))
-        return self.classifier(embedding) * torch.exp(-slope * blur)[:, None]
+    def disturbance(self, embedding: Tensor) -> Tensor:
+        """Logit that a patch is blurred, badly exposed or otherwise disturbed, shape (n,)."""
+        return self.disturbed(self.disturbed_norm(embedding))[:, 0]
+
+    def soft_logits(self, embedding: Tensor) -> Tensor:
+        """Logits (n, classes), smaller the more disturbed a patch looks: `softening` is the slope."""
+        looks = self.disturbance(embedding).clamp(-self.MOST_DISTURBED, self.MOST_DISTURBED)
+        return self.classifier(embedding) * torch.exp(-self.softening * looks)[:, None]
 
     def forward(self, patches: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (n, classes), and the probability of readable road (n,), of uint8 patches (n, 64, 96, 3)."""
         embedding = self.embed(patches)
-        return self.soft_logits(patches, embedding), torch.sigmoid(self.readable(embedding))
-
-
-def sharpness(patches: Tensor) -> Tensor:
-    """Logarithm of the mean grey step between neighbouring pixels over the grey spread, shape (n,) [-].
-
-    A gain or an offset of the exposure leaves it alone; blur lowers it.
-    """
-    grey = patches.float().mean(dim=3)
-    steps = (grey[:, :, 1:] - grey[:, :, :-1]).abs().mean(dim=(1, 2))
-    steps = steps + (grey[:, 1:, :] - grey[:, :-1, :]).abs().mean(dim=(1, 2))
-    centred = grey - grey.mean(dim=(1, 2), keepdim=True)
-    return torch.log((steps + 0.1) / (torch.sqrt(centred.square().mean(dim=(1, 2))) + 0.5))
+        return self.soft_logits(embedding), torch.sigmoid(self.readable(embedding))

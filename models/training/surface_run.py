@@ -25,6 +25,7 @@ from .train_surface import (
     Report,
     Taught,
     learn_classes,
+    learn_disturbed,
     learn_features,
     learn_reading,
     learn_softening,
@@ -86,7 +87,9 @@ def train_and_ship(
             trunk, material.patches, material.teacher, steps=count, seed=given.seed, report=report
         )
     net = taught.net
-    learn_reading(net, _all_looks(material.patches, given.seed), material.outliers["train"], seed=given.seed)
+    clear, disturbed = _all_looks(material.patches, given.seed)
+    learn_reading(net, np.concatenate([clear, disturbed]), material.outliers["train"], seed=given.seed)
+    learn_disturbed(net, clear[::2], disturbed, seed=given.seed)
     train_s = time.monotonic() - start
     outcome = judge(net, _judged_sets(facts.pictures, rendered), material.outliers["val"], given.seed)
     path = given.out / "surface.onnx"
@@ -149,7 +152,8 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
     if material.teacher is None:
         return student
     if given.trunk and given.trunk.is_file():
-        torch.nn.ModuleList(student).load_state_dict(torch.load(given.trunk, weights_only=True))
+        kept = torch.load(given.trunk, weights_only=True)
+        torch.nn.ModuleList(student).load_state_dict(kept, strict=False)  # heads taught last may be absent
         return student
     seen = np.arange(len(material.patches)) < len(material.teacher)
     chosen = seen & np.isin(material.patches.sources, TRUNK_SOURCES)
@@ -170,8 +174,8 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
     return trunk
 
 
-def _all_looks(patches: PatchSet, seed: int) -> Image:
-    """Readable road, undisturbed and disturbed, of all sources alike: for the reading head alone."""
+def _all_looks(patches: PatchSet, seed: int) -> tuple[Image, Image]:
+    """Readable road of all sources alike, and every other of its patches disturbed: for heads that tell no class."""
     rng = np.random.default_rng(seed)
     keep = np.concatenate(
         [
@@ -180,7 +184,7 @@ def _all_looks(patches: PatchSet, seed: int) -> Image:
         ]
     )
     clear = patches.patches[keep]
-    return np.concatenate([clear, calibrate.noised(clear[::2], seed)])
+    return clear, calibrate.noised(clear[::2], seed)
 
 
 def judge(net: SurfaceNet, judged: dict[str, PatchSet], outliers: Image, seed: int) -> Outcome:

@@ -17,7 +17,7 @@ from torch.nn import functional
 
 from .calibrate import cross_entropy
 from .data import Image
-from .nets import SurfaceNet, sharpness
+from .nets import SurfaceNet
 from .patches import PatchSet, augmented, camera_spreads, draw_weights
 from .teacher import MAP_CELLS, TeacherFeatures
 
@@ -38,6 +38,8 @@ FIRST_LAYERS_UNTIL = 0.5
 AHEAD = 3
 """Batches drawn while the net still learns from earlier ones."""
 READING_STEPS, READING_RATE = 600, 2e-3
+DISTURBED_STEPS, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 0.5, 0.5
+"""The head that tells disturbed patches must hold on roads never seen, so it is kept weak."""
 
 Report = Callable[[int, float], None]
 
@@ -220,23 +222,39 @@ def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, seed: in
     net.eval()
 
 
-def learn_softening(net: SurfaceNet, patches: Image, labels: NDArray[np.int64]) -> Tensor:
-    """Slope and centre of the softening by sharpness, shape (2,), by the validation cross-entropy.
+def learn_disturbed(net: SurfaceNet, clear: Image, disturbed: Image, *, seed: int) -> None:
+    """Teach the head that tells disturbed patches from clear ones; no class is used, the rest of the net stays."""
+    torch.manual_seed(seed)
+    features = torch.cat([embeddings(net, clear), embeddings(net, disturbed)])
+    labels = torch.cat([torch.zeros(len(clear)), torch.ones(len(disturbed))])
+    head = nn.ModuleList([net.disturbed_norm, net.disturbed]).train()
+    optimiser = torch.optim.AdamW(head.parameters(), lr=READING_RATE, weight_decay=DISTURBED_DECAY)
+    for _ in range(DISTURBED_STEPS):
+        chosen = torch.randint(len(features), (512,))
+        seen = functional.dropout(net.disturbed_norm(features[chosen]), DISTURBED_DROPOUT)
+        loss = functional.binary_cross_entropy_with_logits(net.disturbed(seen)[:, 0], labels[chosen])
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        optimiser.step()
+    net.eval()
 
-    Logits are divided by exp(slope * (centre - sharpness)) where a patch is less sharp than the centre, the median of
-    the given ones: temperature scaling whose T depends on the picture (parameterised as in Tomani et al. 2022).
+
+def learn_softening(net: SurfaceNet, patches: Image, labels: NDArray[np.int64]) -> Tensor:
+    """Slope of the softening by how disturbed a patch looks, by the validation cross-entropy.
+
+    Temperature scaling whose T depends on the picture (parameterised as in Tomani et al. 2022), T = T0 exp(slope d).
     """
-    net.softening.data = torch.zeros(2)
+    net.softening.data = torch.tensor(0.0)
     logits = verdicts_of(net, patches)[0]
-    sharp = sharpness(torch.from_numpy(patches)).double().numpy()
-    centre = float(np.median(sharp))
-    blur = np.maximum(centre - sharp, 0.0)[:, None]
+    with torch.no_grad():
+        looks = net.disturbance(embeddings(net, patches)).double().numpy()
+    looks = looks.clip(-net.MOST_DISTURBED, net.MOST_DISTURBED)[:, None]
 
     def entropy(values: NDArray[np.float64]) -> float:
-        return cross_entropy(logits * np.exp(-values[0] * blur), labels, float(np.exp(values[1])))
+        return cross_entropy(logits * np.exp(-values[0] * looks), labels, float(np.exp(values[1])))
 
-    found = minimize(entropy, (0.0, 0.5), method="Nelder-Mead")
-    return torch.tensor([max(float(found.x[0]), 0.0), centre], dtype=torch.float32)
+    found = minimize(entropy, (0.0, 0.0), method="Nelder-Mead")
+    return torch.tensor(max(float(found.x[0]), 0.0))
 
 
 def _running_average(average: Tensor, current: Tensor, steps: Tensor | int) -> Tensor:
