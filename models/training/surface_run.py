@@ -153,7 +153,8 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
         return student
     if given.trunk and given.trunk.is_file():
         kept = torch.load(given.trunk, weights_only=True)
-        torch.nn.ModuleList(student).load_state_dict(kept, strict=False)  # heads taught last may be absent
+        kept.pop("0.softening", None)  # this and the heads are learned last, in other forms at times
+        torch.nn.ModuleList(student).load_state_dict(kept, strict=False)
         return student
     seen = np.arange(len(material.patches)) < len(material.teacher)
     chosen = seen & np.isin(material.patches.sources, TRUNK_SOURCES)
