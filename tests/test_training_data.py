@@ -273,6 +273,26 @@ def test_kept_worlds_come_back_as_they_were(tmp_path):
     assert [path.name for path in (tmp_path / "kept").iterdir()] == ["test-2.npz"]
 
 
+def test_kept_patches_come_back_as_they_were(tmp_path):
+    cut = patches.patch_set([([np.full((64, 96, 3), 9, np.uint8)], 2, "rendered")])
+    rendered.save_patches(tmp_path / "kept.npz", cut)
+    kept = rendered.load_patches(tmp_path / "kept.npz")
+    assert (kept.patches == cut.patches).all()
+    assert (kept.labels.tolist(), kept.sources.tolist()) == ([2], ["rendered"])
+
+
+def test_regions_of_a_driving_car_are_cut_on_the_road_and_repeat():
+    seed = rendered.SEED_RANGES["train"].stop - 1
+    (first, *_), (again, *_) = (list(rendered.world_views(seed, 0.25)) for _ in range(2))
+    cut = rendered.driven_patches(first, 4)
+    assert len(cut) == 4
+    assert {label for _, label in cut} <= set(first.frame.surface[first.frame.drivable].tolist())
+    for (patch, label), (same, same_label) in zip(cut, rendered.driven_patches(again, 4), strict=True):
+        assert patch.shape == (64, 96, 3)
+        assert (patch == same).all()
+        assert label == same_label
+
+
 def test_shared_sequence_is_refused(tmp_path):
     picture = np.zeros((20, 20, 3), np.uint8)
     rows = [row("a/0.png", "train", "dry", sequence="one"), row("a/1.png", "test", "dry", sequence="one")]

@@ -98,16 +98,13 @@ def random_view(
     return views
 
 
-def camera_look(rng: np.random.Generator, images: Image, spread: float) -> Image:
-    """Gain, gamma and white balance as they differ between cameras, within `spread` [-] of neutral.
-
-    `images` may have leading axes; the last one is BGR.
-    """
+def camera_look(rng: np.random.Generator, image: Image, spread: float) -> Image:
+    """Gain, gamma and white balance of a BGR picture as they differ between cameras, within `spread` [-] of neutral."""
     gain = np.exp(rng.uniform(-spread, spread) + rng.uniform(-0.3 * spread, 0.3 * spread, 3))
     gamma = np.exp(rng.uniform(-spread, spread))
     levels = np.arange(256) / 255.0
     table = np.clip(255.0 * np.clip(levels[:, None] ** gamma * gain, 0.0, 1.0) + 0.5, 0, 255).astype(np.uint8)
-    return np.stack([table[:, channel][images[..., channel]] for channel in range(3)], axis=-1)
+    return np.asarray(cv2.LUT(image, table[None]), np.uint8)
 
 
 def disturbed_look(rng: np.random.Generator, image: Image) -> Image:

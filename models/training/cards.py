@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from trpac_core.vision.classes import Surface
 
 from .data import Picture
-from .patches import CAMERA_SPREAD
+from .patches import CAMERA_SPREAD, RENDERED_SPREAD
 from .scores import ClassScore, wilson_interval
 from .train_segmenter import SegmentationScore
 
@@ -122,7 +122,7 @@ def surface_card(
     temperature, reliabilities, entropies = outcome.temperature, outcome.reliabilities, outcome.entropies
     picture_scores, patch_scores = outcome.picture_scores, outcome.patch_scores
     parameters = sum(parameter.numel() for parameter in outcome.net.parameters())
-    slope, centre = outcome.net.softening.tolist()
+    slope = float(outcome.net.softening)
     readings = table(
         ["patches", "share taken for readable road"],
         [[name, f"{share:.3f}"] for name, share in outcome.readings.items()],
@@ -151,9 +151,9 @@ def surface_card(
         else "In a first stage, without labels, linear maps of the middle maps and of the embedding had to match what\n"
         "blocks 4 to 12 of MobileNetV2 1.0 / 224 (ImageNet weights, Apache-2.0) see: mean and deviation of each\n"
         "channel, and 4 x 6 cells of blocks 9 and 12. They kept half their weight in the second stage, which learns\n"
-        "the classes. Neither that network nor the linear maps are in the file. The first layers learn in the first\n"
-        "stage alone. A first stage that was read from a file is not in the time below: it took 26 min on one busy\n"
-        "processor."
+        "the classes, on the patches that the teacher has seen: the first cut of the real pictures and the first\n"
+        "rendered worlds. Neither that network nor the linear maps are in the file. A first stage that was read from\n"
+        "a file is not in the time below: it took 26 min on one busy processor."
     )
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
     return f"""\
@@ -175,7 +175,8 @@ feed one linear layer.
 {train_patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
 Patches are 3:2 to 3:1 wide before they are squeezed to the input, from 48 pixels to nearly the whole width of the road.
 They are mirrored, shifted, zoomed by up to 12 % and seen with the resolution, gain, gamma and white balance of other
-cameras (within {100 * CAMERA_SPREAD:.0f} %). {left_out}Classes are drawn equally often and sources within a class by
+cameras (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones, whose worlds
+have drawn theirs already). {left_out}Classes are drawn equally often and sources within a class by
 fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
 weights.
 {teacher}
@@ -203,8 +204,10 @@ the number of pictures of the class. Every rendered view is one picture.
 
 ## Calibration
 
-Within the graph the logits are divided by exp({slope:.3f} (s0 - s)) where a patch's sharpness s (log of mean grey
-step over grey deviation) is below s0 = {centre:.3f}: an unsharp patch is less sure. The slope is learned like T.
+Within the graph the logits are divided by exp({slope:.3f} d): a patch that looks disturbed is less sure, one that looks
+clear is surer. d, within {outcome.net.MOST_DISTURBED:g} to both sides, is the logit of a linear head that tells
+clear training patches from the same ones disturbed; it has seen no class. The slope is learned like T, on the
+validation patches.
 
 T = {temperature:.3f} minimises the cross-entropy of the validation patches, undisturbed and disturbed (motion blur on
 all, brightness and contrast on 70 %, abnormal exposure and shadow on 30 % each), from {entropies[0]:.3f} to
@@ -221,7 +224,7 @@ patches it holds. The diagram `reliability.png` is the validation set's, undistu
   same road seconds later. Rendered scores say how well the network knows the renderer, no more.
 - Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
 - Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
-- Sharpness and T know blur; a wrong exposure or a shadow is not softened by itself.
+- A road unlike those in training may look disturbed to the softening, and is less sure than it could be.
 
 ## Data
 

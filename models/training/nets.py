@@ -106,6 +106,21 @@ class Segmenter(nn.Module):
         return self.drivable(maps), self.shadow(maps)
 
 
+class HalvingDepthwise(nn.Conv2d):
+    """Depthwise 3x3 convolution of stride 2.
+
+    In training it is computed at every pixel and thinned: the same values, but on a processor the gradient of the
+    stride takes several times as long as that of the pixels thrown away.
+    """
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Feature maps in, feature maps of half the size out."""
+        if not self.training:
+            return super().forward(x)
+        whole = functional.conv2d(x, self.weight, None, 1, 1, 1, self.groups)
+        return whole[:, :, ::2, ::2].contiguous(memory_format=torch.channels_last)
+
+
 class ShuffleUnit(nn.Module):
     """Unit of ShuffleNet: grouped 1x1, shuffle, depthwise 3x3, grouped 1x1 (Zhang et al. 2018, figure 2).
 
@@ -122,8 +137,9 @@ class ShuffleUnit(nn.Module):
             nn.BatchNorm2d(middle),
             nn.ReLU(inplace=True),
         )
+        convolution = HalvingDepthwise if stride == 2 else nn.Conv2d
         self.depthwise = nn.Sequential(
-            nn.Conv2d(middle, middle, 3, stride, 1, groups=middle, bias=False), nn.BatchNorm2d(middle)
+            convolution(middle, middle, 3, stride, 1, groups=middle, bias=False), nn.BatchNorm2d(middle)
         )
         self.expand = nn.Sequential(
             nn.Conv2d(middle, branch_out, 1, groups=groups, bias=False), nn.BatchNorm2d(branch_out)
@@ -132,6 +148,9 @@ class ShuffleUnit(nn.Module):
     def shuffle(self, x: Tensor) -> Tensor:
         """Deal the channels of each group to all groups."""
         channels, height, width = x.shape[1:]
+        if self.training:  # in the order of memory that training uses: channels last
+            dealt = x.permute(0, 2, 3, 1).reshape(-1, height, width, self.groups, channels // self.groups)
+            return dealt.transpose(3, 4).reshape(-1, height, width, channels).permute(0, 3, 1, 2)
         grouped = x.reshape(-1, self.groups, channels // self.groups, height, width)
         return grouped.transpose(1, 2).reshape(-1, channels, height, width)
 
@@ -154,8 +173,8 @@ class SurfaceNet(nn.Module):
     """ShuffleNet with three groups for 64 x 96 patches; middle and last maps feed the classifier.
 
     Texture and gloss live in the middle maps, hence their mean and deviation beside the last stage's. Beside the
-    classes it says whether a patch shows readable road at all, and it softens the logits of unsharp patches; neither
-    changes the class.
+    classes it says whether a patch shows readable road at all, and it softens the logits of patches that look
+    disturbed; neither changes the class.
     """
 
     GROUPS = 3
@@ -163,6 +182,8 @@ class SurfaceNet(nn.Module):
     EMBEDDING = 2 * (240 + 384)
     READING = 32
     """Width of the head that tells readable road."""
+    MOST_DISTURBED = 4.0
+    """Limit of the logit that a patch is disturbed, to both sides, beyond which the softening stays as it is."""
 
     def __init__(self, classes: int = 3, dropout: float = 0.3):
         super().__init__()
@@ -181,12 +202,14 @@ class SurfaceNet(nn.Module):
         self.reading = nn.Sequential(
             nn.Linear(self.EMBEDDING, self.READING), nn.ReLU(), nn.Linear(self.READING, 1)
         )
-        self.softening = nn.Parameter(torch.tensor([0.0, 0.0]), requires_grad=False)
+        self.disturbed_norm = nn.BatchNorm1d(self.EMBEDDING)
+        self.disturbed = nn.Linear(self.EMBEDDING, 1)
+        self.softening = nn.Parameter(torch.tensor(0.0), requires_grad=False)
 
     @property
-    def first_layers(self) -> tuple[nn.Module, ...]:
+    def first_layers(self) -> nn.ModuleList:
         """The layers that see edges and grain, at the finest maps."""
-        return self.stem, self.stages[0]
+        return nn.ModuleList([self.stem, self.stages[0]])
 
     def maps(self, patches: Tensor) -> tuple[Tensor, Tensor]:
         """Middle (n, 240, 8, 12) and last (n, 384, 4, 6) maps of uint8 patches (n, 64, 96, 3)."""
@@ -206,25 +229,16 @@ class SurfaceNet(nn.Module):
         """Logit that a patch shows readable road, shape (n,)."""
         return self.reading(self.reading_norm(embedding))[:, 0]
 
-    def soft_logits(self, patches: Tensor, embedding: Tensor) -> Tensor:
-        """Logits (n, classes), smaller the less sharp a patch is: `softening` holds slope and centre."""
-        slope, centre = self.softening
-        blur = functional.relu(centre - sharpness(patches))
-        return self.classifier(embedding) * torch.exp(-slope * blur)[:, None]
+    def disturbance(self, embedding: Tensor) -> Tensor:
+        """Logit that a patch is blurred, badly exposed or otherwise disturbed, shape (n,)."""
+        return self.disturbed(self.disturbed_norm(embedding))[:, 0]
+
+    def soft_logits(self, embedding: Tensor) -> Tensor:
+        """Logits (n, classes), smaller the more disturbed a patch looks: `softening` is the slope."""
+        looks = self.disturbance(embedding).clamp(-self.MOST_DISTURBED, self.MOST_DISTURBED)
+        return self.classifier(embedding) * torch.exp(-self.softening * looks)[:, None]
 
     def forward(self, patches: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (n, classes), and the probability of readable road (n,), of uint8 patches (n, 64, 96, 3)."""
         embedding = self.embed(patches)
-        return self.soft_logits(patches, embedding), torch.sigmoid(self.readable(embedding))
-
-
-def sharpness(patches: Tensor) -> Tensor:
-    """Logarithm of the mean grey step between neighbouring pixels over the grey spread, shape (n,) [-].
-
-    A gain or an offset of the exposure leaves it alone; blur lowers it.
-    """
-    grey = patches.float().mean(dim=3)
-    steps = (grey[:, :, 1:] - grey[:, :, :-1]).abs().mean(dim=(1, 2))
-    steps = steps + (grey[:, 1:, :] - grey[:, :-1, :]).abs().mean(dim=(1, 2))
-    centred = grey - grey.mean(dim=(1, 2), keepdim=True)
-    return torch.log((steps + 0.1) / (torch.sqrt(centred.square().mean(dim=(1, 2))) + 0.5))
+        return self.soft_logits(embedding), torch.sigmoid(self.readable(embedding))

@@ -56,10 +56,11 @@ cameras being dry does not make "dash camera" mean "dry": wet and snowy dash fra
 LEAST_ROADS = (0.95, 0.7)
 """Least share of road in a patch cut by a mask, of one half and the other: some with kerbs and vehicles [-]."""
 
-CAMERA_SPREAD = 0.4
-"""Gain, gamma and white balance of other undisturbed cameras, as a share [-]."""
+CAMERA_SPREAD, RENDERED_SPREAD = 0.4, 0.2
+"""Gain, gamma and white balance of other undisturbed cameras, as a share [-]; of rendered ones, whose worlds have drawn
+theirs already: what brightness tells of snow and asphalt is not to be washed out twice."""
 
-COARSE_SHARE, COARSE_SCALES = 0.25, (0.45, 1.0)
+COARSE_SHARE, COARSE_SCALES = 0.4, (0.3, 1.0)
 """Share of the training looks that come from a coarser camera, and its resolution [-]."""
 
 WEB_STRETCH = (1.2, 1.5)
@@ -234,8 +235,13 @@ def draw_weights(patches: PatchSet) -> NDArray[np.float64]:
     return weights / weights.sum()
 
 
-def augmented(rng: np.random.Generator, patch: Image, mirror: bool) -> Image:
-    """A patch shifted a little, mirrored or not, and seen by another undisturbed camera."""
+def camera_spreads(patches: PatchSet) -> NDArray[np.float64]:
+    """How far the cameras of each patch may differ, shape (n,) [-]."""
+    return np.where(patches.sources == "rendered", RENDERED_SPREAD, CAMERA_SPREAD)
+
+
+def augmented(rng: np.random.Generator, patch: Image, mirror: bool, spread: float) -> Image:
+    """A patch shifted a little, mirrored or not, and seen by another undisturbed camera, see `camera_look`."""
     height, width = patch.shape[:2]
     shift_x, shift_y = rng.integers(-8, 9), rng.integers(-5, 6)
     zoom = np.exp(rng.uniform(-0.12, 0.12))
@@ -253,4 +259,4 @@ def augmented(rng: np.random.Generator, patch: Image, mirror: bool) -> Image:
             moved, (round(factor * width), round(factor * height)), interpolation=cv2.INTER_AREA
         )
         moved = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
-    return camera_look(rng, np.asarray(moved, np.uint8), spread=CAMERA_SPREAD)
+    return camera_look(rng, np.asarray(moved, np.uint8), spread)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -13,7 +16,7 @@ from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import RenderedFrame, SceneLook, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.regions import roi_width_px
+from trpac_core.vision.regions import roi_box, roi_width_px
 
 from .data import IGNORE, Image
 from .patches import ASPECTS, PatchSet, patch_set, reduced
@@ -39,6 +42,15 @@ NEAREST_M, FARTHEST_M = 2.5, 15.0
 ROI_WIDTHS_M = (0.7, 4.5)
 PURE_SHARE = 0.97
 """Least share of a patch that is lit road of one surface [-]; the classifier learns undisturbed looks only."""
+
+WORLDS_PER_CAMERA = 6
+"""Further worlds that share a camera: to know where its pixels look takes half of the time that a world takes."""
+DRIVEN_SHARE = 0.6
+"""Share of the patches of further worlds that are cut where and as wide as a driving car cuts them [-]."""
+DRIVEN_M, DRIVEN_ASIDE_M, DRIVEN_WIDTHS_M = (2.5, 12.0), 1.8, (0.9, 2.4)
+"""Their way ahead, their reach to both sides, and the width of road that they show [m]."""
+DRIVEN_PURE_SHARE = 0.7
+"""Least share of one surface in them: a car's regions reach over borders and verges too [-]."""
 
 
 @dataclass(frozen=True)
@@ -68,16 +80,16 @@ def random_camera(rng: np.random.Generator, scale: float) -> Camera:
     )
 
 
-def world_views(seed: int, scale: float) -> Iterator[View]:
+def world_views(seed: int, scale: float, camera: Camera | None = None) -> Iterator[View]:
     """Pictures of one world from several places; its class is seed modulo 3, and one world in four changes it.
 
     Half of the worlds have the weather that is likely for their class, half any weather: snow under a summer sky
-    must still be told by its surface.
+    must still be told by its surface. Without a camera the world draws its own.
     """
     rng = np.random.default_rng(seed)
     surface = Surface(seed % 3)
     likely = surface if seed // 3 % 2 == 0 else None
-    camera = random_camera(rng, scale)
+    camera = random_camera(rng, scale) if camera is None else camera
     segments = [SurfaceSegment(-1000.0, surface)]
     if rng.random() < 0.25:
         other = Surface((int(surface) + int(rng.integers(1, 3))) % 3)
@@ -101,6 +113,33 @@ def draw_worlds(
             cut.append(view_patches(view, patches_per_view))
         report()
     return samples, rendered_patches(cut)
+
+
+def draw_further_worlds(
+    seeds: Sequence[int], patches_per_view: int, processes: int, report: Callable[[], None]
+) -> PatchSet:
+    """Patches alone of further worlds, at the reduced scale; the result does not depend on `processes`."""
+    draw = partial(_patches_of_worlds, patches_per_view=patches_per_view)
+    sharing = [seeds[first : first + WORLDS_PER_CAMERA] for first in range(0, len(seeds), WORLDS_PER_CAMERA)]
+    cut: list[list[tuple[Image, int]]] = []
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        for some, views in zip(sharing, pool.map(draw, sharing), strict=True):
+            cut += views
+            for _ in some:
+                report()
+    return rendered_patches(cut)
+
+
+def _patches_of_worlds(seeds: Sequence[int], patches_per_view: int) -> list[list[tuple[Image, int]]]:
+    """Patches of each view of worlds seen by one camera, most of them cut as a driving car does."""
+    cv2.setNumThreads(1)
+    camera = random_camera(np.random.default_rng([seeds[0], 2]), REDUCED_SCALE)
+    driven = round(DRIVEN_SHARE * patches_per_view)
+    return [
+        driven_patches(view, driven) + view_patches(view, patches_per_view - driven)
+        for seed in seeds
+        for view in world_views(seed, REDUCED_SCALE, camera)
+    ]
 
 
 def view_sample(view: View) -> Sample:
@@ -144,6 +183,33 @@ def view_patches(view: View, count: int) -> list[tuple[Image, int]]:
     return cut
 
 
+def driven_patches(view: View, count: int) -> list[tuple[Image, int]]:
+    """Patches with their class index at the places and widths of a driving car's regions.
+
+    The class is that of the centre. Shadowed places are left out, some verge or another surface is not.
+    """
+    rng = np.random.default_rng([view.patch_seed, 1])
+    frame, camera = view.frame, view.camera
+    cut: list[tuple[Image, int]] = []
+    for _ in range(16 * count):
+        if len(cut) == count:
+            break
+        ahead_m = float(np.exp(rng.uniform(*np.log(DRIVEN_M))))
+        point = np.array([ahead_m, rng.uniform(-DRIVEN_ASIDE_M, DRIVEN_ASIDE_M)])
+        width_m = float(np.exp(rng.uniform(*np.log(DRIVEN_WIDTHS_M))))
+        pixel = camera.ground_to_image(point[None])[0]
+        if not ((pixel >= 0).all() and pixel[0] < camera.width_px and pixel[1] < camera.height_px):
+            continue
+        width = roi_width_px(camera, point, width_m)
+        left, top, right, bottom = roi_box(camera.width_px, camera.height_px, pixel, width)
+        window = np.s_[top:bottom, left:right]
+        label = int(frame.surface[int(pixel[1]), int(pixel[0])])
+        lit = np.mean(~frame.shadow[window]) >= PURE_SHARE
+        if label >= 0 and lit and np.mean(frame.surface[window] == label) >= DRIVEN_PURE_SHARE:
+            cut.append((reduced(frame.image, (left, top, right, bottom)), label))
+    return cut
+
+
 def rendered_patches(found: list[list[tuple[Image, int]]]) -> PatchSet:
     """The patches of several views as one set; each view is one picture."""
     groups = []
@@ -151,6 +217,20 @@ def rendered_patches(found: list[list[tuple[Image, int]]]) -> PatchSet:
         for label in sorted({label for _, label in cut}):
             groups.append(([patch for patch, own in cut if own == label], label, "rendered"))
     return patch_set(groups)
+
+
+def save_patches(file: Path, patches: PatchSet) -> None:
+    """Keep patches in a .npz file."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(".part.npz")
+    np.savez(part, **vars(patches))
+    part.replace(file)
+
+
+def load_patches(file: Path) -> PatchSet:
+    """Patches kept by `save_patches`."""
+    with np.load(file) as kept:
+        return PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))
 
 
 def save_worlds(file: Path, samples: list[Sample], patches: PatchSet) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import ctypes
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -25,14 +26,28 @@ from . import cards
 from .data import check_trainable, of_split, read_manifest
 from .export import export_segmenter, sha256_of
 from .patches import PatchSet
-from .rendered import SEED_RANGES, draw_worlds, load_worlds, save_worlds
+from .rendered import (
+    SEED_RANGES,
+    draw_further_worlds,
+    draw_worlds,
+    load_patches,
+    load_worlds,
+    save_patches,
+    save_worlds,
+)
 from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
 from .surface_run import train_and_ship
 from .train_segmenter import score_segmenter, train_segmenter
 
 WORLDS = {"train": 480, "val": 36, "test": 60}
 PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
+FURTHER_WORLDS, FURTHER_PATCHES_PER_VIEW = 2520, 6
+"""Worlds after the first training ones, for the surface classifier alone: many looks, few patches of each."""
 SEGMENTER_STEPS = 1300
+
+
+MALLOPT = {"trim threshold": (-1, 2**31 - 1), "top pad": (-2, 2**29), "most mapped blocks": (-4, 0)}
+"""Parameters of glibc's mallopt and their values here."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +62,18 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
     """Train, calibrate, export and document what the command line asks for."""
     pictures = read_manifest(given.data)
     check_trainable(pictures)
+    _keep_memory()
     torch.set_num_threads(given.threads)
     torch.use_deterministic_algorithms(mode=True)
     with _progress() as progress:
         worlds = {split: max(3, round(given.effort * count)) for split, count in WORLDS.items()}
+        further = max(3, round(given.effort * FURTHER_WORLDS))
         start = time.monotonic()
         rendered = _render(progress, worlds, given.worlds)
+        patches = {split: part.patches for split, part in rendered.items()}
+        if given.only != "segmenter":
+            patches["further"] = _render_further(progress, worlds["train"], further, given)
+            worlds["train"] += further
         shown = [Path(word).name if "/" in word else word for word in arguments]
         facts = cards.RunFacts(
             command=" ".join(["python -m models.training", *shown]),
@@ -69,8 +90,15 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
         if given.only != "surface":
             _segmenter(progress, given, facts, rendered)
         if given.only != "segmenter":
-            patches = {split: part.patches for split, part in rendered.items()}
             train_and_ship(given, facts, patches, progress, partial(_steps, progress))
+
+
+def _keep_memory() -> None:
+    """Keep freed memory in the process: else every step gets its maps from the system anew, a fifth of its time."""
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        for parameter, value in MALLOPT.values():
+            mallopt(parameter, value)
 
 
 def _render(progress: Progress, worlds: dict[str, int], store: Path | None) -> dict[str, Rendered]:
@@ -88,6 +116,23 @@ def _render(progress: Progress, worlds: dict[str, int], store: Path | None) -> d
         if file:
             save_worlds(file, rendered[split].samples, rendered[split].patches)
     return rendered
+
+
+def _render_further(progress: Progress, first: int, count: int, given: argparse.Namespace) -> PatchSet:
+    """Patches of `count` training worlds from the `first` on."""
+    file = given.worlds / f"further-{first}-{count}.npz" if given.worlds else None
+    if file and file.is_file():
+        return load_patches(file)
+    task = progress.add_task("rendering further worlds", total=count, note="")
+    patches = draw_further_worlds(
+        SEED_RANGES["train"][first : first + count],
+        FURTHER_PATCHES_PER_VIEW,
+        given.threads,
+        lambda: progress.advance(task),
+    )
+    if file:
+        save_patches(file, patches)
+    return patches
 
 
 def _segmenter(

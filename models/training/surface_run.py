@@ -25,6 +25,7 @@ from .train_surface import (
     Report,
     Taught,
     learn_classes,
+    learn_disturbed,
     learn_features,
     learn_reading,
     learn_softening,
@@ -32,11 +33,14 @@ from .train_surface import (
     verdicts_of,
 )
 
-TRUNK_STEPS, CLASS_STEPS = 1500, 800
+TRUNK_STEPS, CLASS_STEPS = 1500, 3200
 TRUNK_SOURCES = ("condition_web", "dry_udacity", "rendered")
 """Sources of the first stage: none on which a leave-one-out score is taken, so that one trunk serves all of those."""
 
 CUTTING_SEED = 1
+FURTHER_CUTS = 2
+"""How often real pictures are cut anew, at other places, for the second stage: the teacher is not asked about these."""
+
 OUTLIERS = {"train": 4000, "val": 800}
 CALIBRATION_PER_SOURCE = 240
 """Most validation patches that one source gives to the calibration, lest one drive decide T."""
@@ -46,7 +50,7 @@ Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 @dataclass(frozen=True)
 class Material:
-    """What the classifier learns from."""
+    """What the classifier learns from; the teacher's features are those of the first patches."""
 
     patches: PatchSet
     teacher: TeacherFeatures | None
@@ -83,7 +87,9 @@ def train_and_ship(
             trunk, material.patches, material.teacher, steps=count, seed=given.seed, report=report
         )
     net = taught.net
-    learn_reading(net, _all_looks(material.patches, given.seed), material.outliers["train"], seed=given.seed)
+    clear, disturbed = _all_looks(material.patches, given.seed)
+    learn_reading(net, np.concatenate([clear, disturbed]), material.outliers["train"], seed=given.seed)
+    learn_disturbed(net, clear[::2], disturbed, seed=given.seed)
     train_s = time.monotonic() - start
     outcome = judge(net, _judged_sets(facts.pictures, rendered), material.outliers["val"], given.seed)
     path = given.out / "surface.onnx"
@@ -108,6 +114,8 @@ def gather(
     every = of_split(pictures, "train")
     patches = joined([training_patches(every, CUTTING_SEED), rendered["train"]])
     teacher = _ask_teacher(given, patches, steps) if given.teacher else None
+    further = [training_patches(every, CUTTING_SEED + 1 + number) for number in range(FURTHER_CUTS)]
+    patches = joined([patches, *further, *([rendered["further"]] if "further" in rendered else [])])
     kept = np.array([family_of(str(source)) not in given.without for source in patches.sources])
     rng = np.random.default_rng(CUTTING_SEED)
     seen = [picture for picture in every if picture.family not in given.without]
@@ -115,7 +123,9 @@ def gather(
         "train": outlier_patches(rng, seen, patches.patches[kept], OUTLIERS["train"]),
         "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, OUTLIERS["val"]),
     }
-    return Material(patches.where(kept), None if teacher is None else teacher.where(kept), outliers)
+    if teacher is not None:
+        teacher = teacher.where(kept[: len(teacher)])
+    return Material(patches.where(kept), teacher, outliers)
 
 
 def _ask_teacher(given: argparse.Namespace, patches: PatchSet, steps: Steps) -> TeacherFeatures:
@@ -142,15 +152,18 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
     if material.teacher is None:
         return student
     if given.trunk and given.trunk.is_file():
-        torch.nn.ModuleList(student).load_state_dict(torch.load(given.trunk, weights_only=True))
+        kept = torch.load(given.trunk, weights_only=True)
+        kept.pop("0.softening", None)  # this and the heads are learned last, in other forms at times
+        torch.nn.ModuleList(student).load_state_dict(kept, strict=False)
         return student
-    chosen = np.isin(material.patches.sources, TRUNK_SOURCES)
+    seen = np.arange(len(material.patches)) < len(material.teacher)
+    chosen = seen & np.isin(material.patches.sources, TRUNK_SOURCES)
     count = max(2, round(given.effort * TRUNK_STEPS))
     with steps("learning the teacher's features", count) as report:
         trunk = learn_features(
             student,
             material.patches.where(chosen),
-            material.teacher.where(chosen),
+            material.teacher.where(chosen[seen]),
             steps=count,
             seed=given.seed,
             report=report,
@@ -162,8 +175,8 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
     return trunk
 
 
-def _all_looks(patches: PatchSet, seed: int) -> Image:
-    """Readable road, undisturbed and disturbed, of all sources alike: for the reading head alone."""
+def _all_looks(patches: PatchSet, seed: int) -> tuple[Image, Image]:
+    """Readable road of all sources alike, and every other of its patches disturbed: for heads that tell no class."""
     rng = np.random.default_rng(seed)
     keep = np.concatenate(
         [
@@ -172,7 +185,7 @@ def _all_looks(patches: PatchSet, seed: int) -> Image:
         ]
     )
     clear = patches.patches[keep]
-    return np.concatenate([clear, calibrate.noised(clear[::2], seed)])
+    return clear, calibrate.noised(clear[::2], seed)
 
 
 def judge(net: SurfaceNet, judged: dict[str, PatchSet], outliers: Image, seed: int) -> Outcome:
