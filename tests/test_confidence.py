@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from trpac_core.confidence import (
     GREATEST_ROAD,
+    LEAST_ROAD,
     ConfidenceModel,
     Evidence,
     advanced_variance,
@@ -32,10 +33,18 @@ def settled_std(theta, slip, line_share=0.0, noise_share=0.0):
     return variance**0.5
 
 
-@given(st.floats(0.1, 1.1), st.floats(0.1, 1.0))
-def test_a_road_above_a_bound_is_as_far_as_roads_drawn_there(theta_hat, least):
+@given(st.floats(-0.1, 1.1), st.floats(0.1, 1.0))
+def test_two_deviations_hold_95_percent_of_the_roads_above_a_bound(theta_hat, least):
     roads = np.linspace(least, GREATEST_ROAD, 20_001)
-    assert bounded_variance(theta_hat, least) == pytest.approx(np.mean((roads - theta_hat) ** 2), rel=1e-3)
+    held = np.abs(roads - theta_hat) <= 2.0 * bounded_variance(theta_hat, least) ** 0.5
+    assert held.mean() == pytest.approx(0.95, abs=1e-3)
+
+
+@given(st.floats(0.05, 1.2))
+def test_two_deviations_of_the_unknown_hold_95_percent_of_all_roads(theta_hat):
+    roads = np.linspace(LEAST_ROAD, GREATEST_ROAD, 20_001)
+    held = np.abs(roads - theta_hat) <= 2.0 * unknown_variance(MODEL, theta_hat) ** 0.5
+    assert held.mean() == pytest.approx(0.95, abs=1e-2)  # 0.33 is a rounded figure
 
 
 def test_a_class_may_claim_the_less_the_surer_the_estimate_is():

@@ -64,7 +64,7 @@ MIDDLE_ROAD = 0.5 * (LEAST_ROAD + GREATEST_ROAD)
 
 
 def spread_variance(theta_hat: float, least: float, greatest: float) -> float:
-    """Square of half the distance from the estimate that holds 95 % of the roads between two ends, all alike likely [-].
+    """Square of half the distance from the estimate that holds 95 % of the roads between two ends, alike likely [-].
 
     Not their mean square: no road lies beyond the ends, so two of its roots would hold every one.
     """
@@ -107,7 +107,9 @@ def theta_at(fraction: float, elastic: float) -> float:
 
 def bounded_variance(theta_hat: float, least: float) -> float:
     """`spread_variance` where the road is known to be anywhere above `least` [-]."""
-    return spread_variance(theta_hat, least if least < GREATEST_ROAD - 0.1 else GREATEST_ROAD - 0.1, GREATEST_ROAD)
+    return spread_variance(
+        theta_hat, least if least < GREATEST_ROAD - 0.1 else GREATEST_ROAD - 0.1, GREATEST_ROAD
+    )
 
 
 class Evidence(NamedTuple):
