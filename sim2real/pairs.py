@@ -6,7 +6,7 @@ effect take off what a first one leaves?
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
@@ -83,11 +83,7 @@ def add_pairs(
     entries = {e.ids[0]: e for e in contest.singles}
 
     def fit_pairs(wanted: Sequence[tuple[str, ...]], stage: str) -> list[Entry]:
-        work = []
-        for pair in wanted:
-            a, b = (entries[key].fitted for key in pair)
-            both = Candidate(model, pair, (*a.candidate.forms, *b.candidate.forms))
-            work.append(partial(enter, both, fit_to, holdout, _starts(entries, pair), FULL_STEPS))
+        work = [_fit_of_pair(pair, entries, model, fit_to, holdout) for pair in wanted]
         return run_all(work, jobs, progress, stage)
 
     pairs = fit_pairs(promising_pairs(contest), "pairs")
@@ -96,6 +92,15 @@ def add_pairs(
     pairs += fit_pairs(again, "pairs, swapped")
     proper = [pair for pair in pairs if is_proper(pair)]
     return replace(contest, pairs=tuple(sorted(proper, key=lambda e: e.loss)))
+
+
+def _fit_of_pair(
+    pair: tuple[str, ...], entries: dict[str, Entry], model: Simulation, fit_to: Evidence, holdout: Evidence
+) -> Callable[[], Entry]:
+    """The work of fitting two effects together, from where each stands alone."""
+    a, b = (entries[key].fitted for key in pair)
+    both = Candidate(model, pair, (*a.candidate.forms, *b.candidate.forms))
+    return partial(enter, both, fit_to, holdout, _starts(entries, pair), FULL_STEPS)
 
 
 def _starts(entries: dict[str, Entry], pair: tuple[str, ...]) -> Array:
@@ -180,11 +185,9 @@ def add_twins(
     found = entry.fitted
     ranked = beside(plain, found.x, found.jacobian, others, fit_to, jobs, progress)
     entries = {e.ids[0]: e for e in (entry, *others)}
-    work = []
-    for pair in (_ordered(key, other) for _, other in ranked[:TWINS]):
-        a, b = (entries[member].fitted for member in pair)
-        both = Candidate(model, pair, (*a.candidate.forms, *b.candidate.forms))
-        work.append(partial(enter, both, fit_to, holdout, _starts(entries, pair), FULL_STEPS))
+    work = [
+        _fit_of_pair(_ordered(key, other), entries, model, fit_to, holdout) for _, other in ranked[:TWINS]
+    ]
     twins = [pair for pair in run_all(work, jobs, progress, "twins") if is_proper(pair)]
     return replace(contest, twins=tuple(sorted(twins, key=lambda e: e.loss)))
 
