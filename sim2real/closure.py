@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from sim2real.contest import Entry
 from sim2real.evidence import Evidence
 from sim2real.gap import measure, noise_floor
@@ -18,21 +20,28 @@ from sim2real.selection import Decision
 
 MOST_LEFT = 1.0 / 6.0
 """Share of the gap's energy beyond the floor that a cause may leave on the hold-out [-]."""
+FLOOR_DOUBT = 4.0 / 3.0
+"""Up to this many times the noise floor what is left may be the noise's own: where it wanders or flickers, its level on
+one log is known no better [-]."""
+MOST_NEAR_FLOOR = 0.5
+"""Share that a cause may leave there: it takes the better part [-]."""
 OPEN_BELIEF = 0.2
 """Probability that an effect is the cause though it leaves more [-]."""
 
 
-def left_open(model: Simulation, entry: Entry, holdout: Evidence, seed: int = 0) -> float:
-    """Share of the hold-out's gap, as energy beyond the noise floor, that an entry leaves [-].
+def left_open(model: Simulation, entry: Entry, holdout: Evidence, seed: int = 0) -> tuple[float, float]:
+    """What an entry leaves of the hold-out's gap: as a share of its energy beyond the noise floor, and in floors [-].
 
-    0 where the model as it is leaves no more than the floor; the noise is read anew from what the entry leaves.
+    The share is 0 where the model as it is leaves no more than the floor; the noise is read anew from what the entry
+    leaves.
     """
     added = entry.fitted.candidate.model(entry.fitted.x)
     held = holdout.sharpened(added)
     before = measure(held, held.residuals(model)).total ** 2
     after = measure(held, held.residuals(added)).total ** 2
     floor = noise_floor(added, held, seed) ** 2
-    return max(after - floor, 0.0) / (before - floor) if before > floor else 0.0
+    share = max(after - floor, 0.0) / (before - floor) if before > floor else 0.0
+    return share, float(np.sqrt(after / floor))
 
 
 def closing(decision: Decision, model: Simulation, holdout: Evidence) -> Decision:
@@ -42,8 +51,8 @@ def closing(decision: Decision, model: Simulation, holdout: Evidence) -> Decisio
     """
     if decision.verdict not in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS):
         return decision
-    left = left_open(model, decision.winner, holdout)
-    if left <= MOST_LEFT:
+    left, floors = left_open(model, decision.winner, holdout)
+    if left <= (MOST_NEAR_FLOOR if floors <= FLOOR_DOUBT else MOST_LEFT):
         return decision
     probability = {key: OPEN_BELIEF * value for key, value in decision.probability.items()}
     return replace(

@@ -31,6 +31,8 @@ FINALISTS = 6
 """Effects that are fitted to all fit logs with full care, after a first round on one log."""
 PRICE = 0.003
 """Share of the loss that a form of an effect has to take off for each parameter that it has more [-]."""
+FURTHER_FORMS = 8
+"""Effects, the best ones in their plain forms, whose forms with further parameters are fitted, too."""
 NEAR = 0.2
 """Share of the way from an effect's absence to its nearest start that a fit begins at, too [-]."""
 FIRST_ROUND_STEPS = 4
@@ -203,7 +205,7 @@ def first_round(
 ) -> list[Fit]:
     """Every form of every effect that acts on the car's motion or its sensors, fitted roughly to one log.
 
-    A form with more parameters than the effect's first one starts from where that ended.
+    A form with more parameters than the effect's first one starts from where that ended, if that was among the best.
     """
     one_log = fit_to.longest()
 
@@ -219,8 +221,11 @@ def first_round(
     ]
     plain = [c for c in candidates if len(c.parameters) == len(FORMS[c.ids[0]][0].parameters())]
     found = fits([(c, _near_and_far(c)) for c in plain], "effects, first round")
+    ranked = list(dict.fromkeys(f.candidate.ids for f in sorted(found, key=lambda fit: fit.loss)))
     of = {f.candidate.ids: f for f in found if f.candidate.forms == (0,)}
-    more = [(c, _beyond(c, of[c.ids].x)) for c in candidates if c not in plain]
+    more = [
+        (c, _beyond(c, of[c.ids].x)) for c in candidates if c not in plain and c.ids in ranked[:FURTHER_FORMS]
+    ]
     return sorted([*found, *fits(more, "forms, first round")], key=lambda fit: fit.loss)
 
 

@@ -28,8 +28,10 @@ LOCKED = 0.79
 """Share of theta that a locked modified Dugoff tyre keeps: its shape function at slip 1."""
 
 
-def car_with(**effects):
-    return VehicleFile.model_validate({**CAR.model_dump(by_alias=True), "effects": effects})
+def car_with(forms=MappingProxyType({}), **effects):
+    return VehicleFile.model_validate(
+        {**CAR.model_dump(by_alias=True), "effects": effects, "forms": dict(forms)}
+    )
 
 
 def make_road(theta):
@@ -115,6 +117,50 @@ def test_true_radius_sets_free_rolling_and_lever(radius_m):
     assert settled_acceleration(drive(car, 100.0, 1.5, 15.0)) == pytest.approx(expected, rel=2e-3)
 
 
+@pytest.mark.parametrize("behind_m", [-0.5, 0.9])
+def test_a_payload_that_lies_somewhere_loads_the_axles_by_its_moments(behind_m):
+    placed = {"mass_offset": {"mass_kg": 300.0, "behind_m": behind_m}}
+    run = drive(car_with({"mass_offset": "where it lies"}, **placed), 0.0, 0.2, 10.0)
+    core = CAR.to_core()
+    base_m = core.wheelbase_m
+    rear_n = (MASS * core.cog_to_front_axle_m + 300.0 * (core.cog_to_front_axle_m + behind_m)) * G / base_m
+    assert run.vertical_load_n[0, 2:].sum() == pytest.approx(rear_n, rel=1e-9)
+    assert run.vertical_load_n[0].sum() == pytest.approx((MASS + 300.0) * G, rel=1e-12)
+
+
+def test_axles_of_unlike_radius_roll_at_unlike_speeds():
+    values = {"wheel_radius_offset": {"radius_m": 0.3, "unlike": 0.01}}
+    run = drive(car_with({"wheel_radius_offset": "axles unlike"}, **values), 0.0, 1.0, 20.0)
+    speeds = run.wheel_speed_rad_s[-1]
+    assert speeds[0] == speeds[1]
+    assert speeds[2] == speeds[3]
+    slips = 1.0 - run.speed_m_s[-1] / (speeds[[0, 2]] * [0.303, 0.297])
+    assert slips == pytest.approx(0.0, abs=1e-4)
+
+
+def test_what_rolls_alone_leaves_the_lever():
+    car = car_with({"wheel_radius_offset": "rolling alone"}, wheel_radius_offset={"radius_m": 0.31})
+    rolling = drive(car, 0.0, 0.5, 20.0)
+    assert rolling.speed_m_s[-1] / rolling.wheel_speed_rad_s[-1] == pytest.approx(0.31, rel=1e-6)
+    expected = 400.0 / RADIUS / (MASS + 4.0 * INERTIA / RADIUS / 0.31)
+    assert settled_acceleration(drive(car, 100.0, 1.5, 15.0)) == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("by_load", [0.5, 1.0])
+def test_stiffness_goes_with_each_wheels_load(by_load):
+    values = {
+        "tyre_stiffness_offset": {"stiffness_n": 50_000.0, "by_load": by_load},
+        "load_transfer": {"cog_height_m": 0.6},
+    }
+    run = drive(car_with({"tyre_stiffness_offset": "with load"}, **values), 150.0, 0.5, 10.0)
+    for wheel in (0, 3):
+        slip, load = run.slip[-1, wheel], run.vertical_load_n[-1, wheel]
+        stiffness_n = 50_000.0 * (1.0 + by_load * (load / (0.25 * MASS * G) - 1.0))
+        assert run.tyre_force_n[-1, wheel] == pytest.approx(
+            tyre_force(0.9, slip, load, stiffness_n, 1.0), rel=1e-9
+        )
+
+
 @pytest.mark.parametrize("inertia", [0.6, 3.0])
 def test_true_inertia_sets_how_a_wheel_spins_up(inertia):
     """A spinning wheel: I omega' = T - F R with the force that the log holds."""
@@ -187,6 +233,11 @@ class TestActuators:
     def test_gain(self, command):
         assert (self.actuate(command, torque_gain={"factor": 0.8}) == 0.8 * command).all()
 
+    def test_gain_of_driving_and_of_braking(self, command):
+        values = {"torque_gain": {"factor": 0.9, "apart": 0.05}}
+        made = self.actuate(command, forms={"torque_gain": "driving and braking unlike"}, **values)
+        assert made == pytest.approx(np.where(command > 0.0, 0.95, 0.85) * command, rel=1e-12)
+
     @pytest.mark.parametrize("time_constant_s", [1e-4, 0.02, 0.3, 2.0])
     def test_lag_agrees_with_scipys_linear_simulation(self, command, time_constant_s):
         lagged = self.actuate(command, torque_lag={"time_constant_s": time_constant_s})
@@ -246,6 +297,31 @@ class TestRelaxation:
         peak_n = expected[:, 1].max()
         assert peak_n > 1.2 * 20.0 / RADIUS  # it rings
         assert run.tyre_force_n[:, 0] == pytest.approx(expected[:, 1], abs=0.01 * peak_n)
+
+    def test_with_load_each_axle_has_the_length_that_its_load_gives(self):
+        """Both axles' wheels, their lagging slips and the car, at so little slip that the tyres are linear."""
+        length, speed, stiffness = 0.5, 10.0, 1.27 * STIFFNESS
+        car = car_with({"tyre_relaxation": "longer with load"}, tyre_relaxation={"length_m": length})
+        run = drive(car, [(0.0, 0.0), (1e-3, 20.0)], 0.5, speed)
+        front_m, rear_m = length * run.vertical_load_n[0, [0, 2]] / (0.25 * MASS * G)
+        pull, push = -RADIUS * stiffness / INERTIA, 2.0 * stiffness / MASS
+        system = StateSpace(
+            [
+                [0.0, pull, 0.0, 0.0, 0.0],
+                [RADIUS / front_m, -speed / front_m, 0.0, 0.0, -1.0 / front_m],
+                [0.0, 0.0, 0.0, pull, 0.0],
+                [0.0, 0.0, RADIUS / rear_m, -speed / rear_m, -1.0 / rear_m],
+                [0.0, push, 0.0, push, 0.0],
+            ],
+            [[1.0 / INERTIA], [0.0], [1.0 / INERTIA], [0.0], [0.0]],
+            np.eye(5),
+            np.zeros((5, 1)),
+        )
+        _, expected, _ = lsim(system, run.wheel_torque_nm[:, 0], run.time_s, interp=True)
+        assert abs(front_m - rear_m) > 0.02
+        for wheel, slip in ((0, 1), (2, 3)):
+            force = stiffness * expected[:, slip]
+            assert run.tyre_force_n[:, wheel] == pytest.approx(force, abs=0.01 * force.max())
 
     def test_a_stop_ends_at_rest_and_what_is_wound_up_does_not_push_the_car(self):
         knots = [(0.0, 0.0), (0.1, -200.0), (2.0, -200.0), (2.1, 0.0), (6.0, 0.0)]

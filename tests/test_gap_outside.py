@@ -7,15 +7,16 @@ from scipy.signal import lfilter
 
 from scenarios.effects import EFFECTS
 from scenarios.effects.shifting import delayed
-from sim2real.closure import MOST_LEFT, closing, left_open
-from sim2real.contest import enter
+from sim2real import closure
+from sim2real.closure import FLOOR_DOUBT, MOST_LEFT, closing, left_open
+from sim2real.contest import Entry, enter
 from sim2real.diagnose import find
 from sim2real.drive import CHANNELS, SPEED, WHEEL
 from sim2real.evidence import gather
 from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.hum import hum
 from sim2real.result import Verdict
-from sim2real.selection import Decision, fitness
+from sim2real.selection import Decision, Fitness, fitness
 
 DURATION_S = 16.0
 
@@ -81,12 +82,31 @@ def test_a_cause_that_leaves_much_of_the_gap_is_not_blamed(nominal):
     half = enter(Candidate(MODEL, ("torque_gain",)), fit_to, held, np.array([1.05]), 1)
     fits = fitness(entry, fit_to, held)
     for which, low, high in ((entry, 0.0, 0.02), (half, MOST_LEFT, 1.0)):
-        assert low <= left_open(MODEL, which, held) <= high
+        share, floors = left_open(MODEL, which, held)
+        assert low <= share <= high
+        assert (floors > FLOOR_DOUBT) is (which is half)
         said = Decision(Verdict.IDENTIFIED, which, (), {"torque_gain": 0.9}, fits, fits)
         left = closing(said, MODEL, held)
         assert left.verdict is (Verdict.IDENTIFIED if which is entry else Verdict.UNKNOWN)
         assert (left.left_open > 0.0) is (which is half)
         assert left.probability["torque_gain"] <= 0.9
+
+
+@pytest.mark.parametrize(
+    ("share", "floors", "verdict"),
+    [
+        (0.1, 5.0, Verdict.IDENTIFIED),
+        (0.3, 1.2, Verdict.IDENTIFIED),
+        (0.3, 1.5, Verdict.UNKNOWN),
+        (0.6, 1.2, Verdict.UNKNOWN),
+    ],
+)
+def test_what_is_left_near_the_floor_may_be_the_noise(monkeypatch, share, floors, verdict):
+    monkeypatch.setattr(closure, "left_open", lambda *_: (share, floors))
+    null = Entry((), None, np.zeros(1), np.zeros(1))
+    fits = Fitness(1.0, {})
+    said = closing(Decision(Verdict.IDENTIFIED, null, (), {"torque_gain": 0.9}, fits, fits), MODEL, None)
+    assert said.verdict is verdict
 
 
 @pytest.mark.parametrize(("slow", "verdict"), [(True, Verdict.UNKNOWN), (False, Verdict.IDENTIFIED)])

@@ -17,21 +17,29 @@ from scenarios.effects.exposure_shift import ExposureShift
 from scenarios.effects.friction_falloff import FrictionFalloff
 from scenarios.effects.friction_offset import FrictionOffset
 from scenarios.effects.load_transfer import LoadTransfer
-from scenarios.effects.mass_offset import MassOffset
+from scenarios.effects.mass_offset import MassOffset, MassOffsetPlaced
 from scenarios.effects.motion_blur import MotionBlur
 from scenarios.effects.mu_split import MuSplit
 from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.rolling_resistance import RollingResistance, RollingResistanceForce
 from scenarios.effects.torque_delay import TorqueDelay
-from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles
+from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles, TorqueGainOfSigns
 from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages
-from scenarios.effects.tyre_relaxation import TyreRelaxation, TyreRelaxationOfSlip
+from scenarios.effects.tyre_relaxation import TyreRelaxation, TyreRelaxationOfSlip, TyreRelaxationWithLoad
 from scenarios.effects.tyre_shape import TyreShape
-from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset, TyreStiffnessOffsetOfAxles
+from scenarios.effects.tyre_stiffness_offset import (
+    TyreStiffnessOffset,
+    TyreStiffnessOffsetOfAxles,
+    TyreStiffnessOffsetWithLoad,
+)
 from scenarios.effects.vehicle_speed_delay import VehicleSpeedDelay
 from scenarios.effects.vehicle_speed_scale import VehicleSpeedScale
 from scenarios.effects.wheel_inertia_offset import WheelInertiaOffset, WheelInertiaOffsetOfAxles
-from scenarios.effects.wheel_radius_offset import WheelRadiusOffset
+from scenarios.effects.wheel_radius_offset import (
+    WheelRadiusOffset,
+    WheelRadiusOffsetOfAxles,
+    WheelRadiusOffsetRolling,
+)
 from scenarios.effects.wheel_speed_delay import WheelSpeedDelay
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from trpac_core.vehicle import Vehicle
@@ -78,12 +86,18 @@ EFFECTS: dict[str, type[Effect]] = {
 
 OTHER_FORMS = (
     TorqueGainOfAxles,
+    TorqueGainOfSigns,
     TorqueLagInTwoStages,
     RollingResistanceForce,
     BrakeDragOfAxles,
+    MassOffsetPlaced,
+    WheelRadiusOffsetRolling,
+    WheelRadiusOffsetOfAxles,
     WheelInertiaOffsetOfAxles,
     TyreStiffnessOffsetOfAxles,
+    TyreStiffnessOffsetWithLoad,
     TyreRelaxationOfSlip,
+    TyreRelaxationWithLoad,
 )
 FORMS: dict[str, tuple[type[Effect], ...]] = {
     key: (effect, *(other for other in OTHER_FORMS if other.id == key)) for key, effect in EFFECTS.items()

@@ -57,3 +57,24 @@ class TorqueGainOfAxles(TorqueGain):
     def actuate(self, time_s: Array, torque_nm: Array) -> Array:
         """Each axle's torque is scaled."""
         return torque_nm * (self.factor + self.unlike * FRONT_LESS_REAR)
+
+
+@dataclass(frozen=True)
+class TorqueGainOfSigns(TorqueGain):
+    """Motors and brakes are calibrated apart; `factor` is the mean of both."""
+
+    form = "driving and braking unlike"
+    equation = "T_true = (factor + apart) T in driving, (factor - apart) T in braking"
+
+    apart: float = parameter(
+        "-",
+        "half of what the factor in driving has more than that in braking",
+        neutral=0.0,
+        low=-0.5,
+        high=0.5,
+        starts=(-0.03, 0.03),
+    )
+
+    def actuate(self, time_s: Array, torque_nm: Array) -> Array:
+        """Torque of each sign is scaled."""
+        return torque_nm * (self.factor + self.apart * np.sign(torque_nm))

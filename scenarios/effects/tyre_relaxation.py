@@ -48,3 +48,16 @@ class TyreRelaxationOfSlip(TyreRelaxation):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The lagging slip becomes a state."""
         return parameters._replace(relaxation_m=self.length_m, slip_lags=1.0)
+
+
+@dataclass(frozen=True)
+class TyreRelaxationWithLoad(TyreRelaxationOfSlip):
+    """The more load a tyre bears, the longer its contact and its relaxation; `length_m` is that at the mean load."""
+
+    form = "longer with load"
+    equation = "s' = V F_z0 / (length F_z) (slip - s), F_x = F_steady(s), F_z0 = m g / 4"
+    source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 7, relaxation length and contact length"
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The lagging slip is later on the wheels that bear more."""
+        return super().dynamics(parameters)._replace(relaxation_by_load=1.0)

@@ -52,3 +52,25 @@ class TyreStiffnessOffsetOfAxles(TyreStiffnessOffset):
         return parameters._replace(
             longitudinal_stiffness_n=self.stiffness_n, axle_stiffness_n=self.unlike * self.stiffness_n
         )
+
+
+@dataclass(frozen=True)
+class TyreStiffnessOffsetWithLoad(TyreStiffnessOffset):
+    """Stiffness grows with the load, from wheel to wheel and as load shifts; `stiffness_n` is that at the mean load."""
+
+    form = "with load"
+    equation = "C_x (1 + by_load (F_z / F_z0 - 1)), F_z0 = m g / 4"
+    source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 4, slip stiffness over load"
+
+    by_load: float = parameter(
+        "-",
+        "share of the stiffness that goes with the load: 1 in proportion",
+        neutral=0.0,
+        low=-0.5,
+        high=1.5,
+        starts=(-0.2, 0.3, 1.0),
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each wheel has the stiffness that its load gives."""
+        return parameters._replace(longitudinal_stiffness_n=self.stiffness_n, stiffness_by_load=self.by_load)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter
+from scenarios.effects.base import Effect, parameter, share_of_axles
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
@@ -16,6 +16,7 @@ class WheelRadiusOffset(Effect):
     """The true rolling radius of all wheels differs from the vehicle file's: wear, pressure, other tyres."""
 
     id = "wheel_radius_offset"
+    form = "all wheels alike"
     stage = "dynamics"
     subsystem = "wheel"
     equation = "rim speed omega R and moment F_x R with the true R"
@@ -35,3 +36,33 @@ class WheelRadiusOffset(Effect):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The true radius takes the nominal one's place."""
         return parameters._replace(wheel_radius_m=self.radius_m)
+
+
+@dataclass(frozen=True)
+class WheelRadiusOffsetRolling(WheelRadiusOffset):
+    """What the wheel rolls per turn is off, the height of its axle is not: a belt that stretches or creeps."""
+
+    form = "rolling alone"
+    equation = "rim speed omega R with the true R, moment F_x R with the nominal one"
+    source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 1, effective rolling radius and loaded radius"
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The lever stays what it was."""
+        return parameters._replace(
+            wheel_radius_m=self.radius_m,
+            lever_more_m=parameters.lever_more_m + parameters.wheel_radius_m - self.radius_m,
+        )
+
+
+@dataclass(frozen=True)
+class WheelRadiusOffsetOfAxles(WheelRadiusOffset):
+    """The tyres of the two axles differ in wear or pressure; `radius_m` is the mean."""
+
+    form = "axles unlike"
+    equation = "R (1 + unlike) in front, R (1 - unlike) in the rear"
+
+    unlike: float = share_of_axles(start=0.003, most=0.05)
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each axle has its radius."""
+        return parameters._replace(wheel_radius_m=self.radius_m, axle_radius_m=self.unlike * self.radius_m)

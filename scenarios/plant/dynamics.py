@@ -76,6 +76,9 @@ ACCELERATION_TOLERANCE_M_S2 = 1e-7
 RELEASE_SPEED_M_S = 1.0
 """At rest a lagging force that still brakes is released as at this speed: the car would rock back on it [m/s]."""
 
+LEAST_RELAXATION = 0.1
+"""Share of its length that is left of a tyre's relaxation where the load leaves it [-]."""
+
 KNEE_AT, CREST_AT, SLIDING_FROM = 0.6, 2.4, 5.0
 """Stretches, in units of the grip, at which a tyre's deviations are greatest; the last one's half is there [-]."""
 
@@ -197,21 +200,22 @@ def new_wheels() -> tuple[Wheels, Wheels]:
     return first, second
 
 
+@inlined
+def _of_axle(i: int, mean: float, unlike: float) -> float:
+    """A wheel's own value, where the front wheels have more than the mean by what the rear ones have less."""
+    return mean + unlike if i < 2 else mean - unlike
+
+
 @compiled
 def initial_y(speed_m_s: float, position_m: float, p: DynamicsParameters) -> NDArray:
     """The state of a freely rolling car, shape (18,)."""
     y = np.zeros(STATES)
     y[POSITION], y[SPEED] = position_m, speed_m_s
-    y[WHEEL : WHEEL + 4] = speed_m_s / p.wheel_radius_m
+    for i in range(4):
+        y[WHEEL + i] = speed_m_s / _of_axle(i, p.wheel_radius_m, p.axle_radius_m)
     if p.motor_inertia_kg_m2 > 0.0:
         y[MOTOR : MOTOR + 4] = y[WHEEL : WHEEL + 4]
     return y
-
-
-@inlined
-def _of_axle(i: int, mean: float, unlike: float) -> float:
-    """A wheel's own value, where the front wheels have more than the mean by what the rear ones have less."""
-    return mean + unlike if i < 2 else mean - unlike
 
 
 @compiled
@@ -225,6 +229,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
     front_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_rear_axle_m * half_base
     rear_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_front_axle_m * half_base
     transfer_kg = p.mass_kg * p.transfer_height_m * half_base
+    per_mean = 4.0 / (p.mass_kg * p.gravity_m_s2)
     drag_n = p.drag_kg_m * speed * speed
     force_lags = p.relaxation_m > 0.0 and p.slip_lags == 0.0
     slip_lags = p.relaxation_m > 0.0 and p.slip_lags > 0.0
@@ -234,10 +239,12 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
         total_n = 0.0
         total_by_accel = 0.0
         for i in range(4):
-            rim = max(y[WHEEL + i], 0.0) * p.wheel_radius_m
+            radius_m = _of_axle(i, p.wheel_radius_m, p.axle_radius_m)
+            rim = max(y[WHEEL + i], 0.0) * radius_m
             scale = max(rim, speed, FLOOR_SPEED_M_S)
             slip = abs(rim - speed) / scale
             load_n = max(front_n - shift_n, 0.0) if i < 2 else max(rear_n + shift_n, 0.0)
+            more = load_n * per_mean - 1.0
             theta = wheels.theta[i]
             if p.falloff_s_m > 0.0:
                 left = np.exp(-p.falloff_s_m * abs(rim - speed))
@@ -247,6 +254,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
             stiffness_n = _of_axle(i, p.longitudinal_stiffness_n, p.axle_stiffness_n)
+            stiffness_n *= 1.0 + p.stiffness_by_load * more
             tyre = tyre_force(theta, abs(acting), load_n, stiffness_n)
             if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
                 tyre = reshaped(tyre, abs(acting), theta * load_n, load_n, p)
@@ -256,7 +264,8 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             slope = max(by_slip, 0.0)
             if p.relaxation_m > 0.0:
                 rest = speed <= 0.0 and y[FORCE + i] < 0.0
-                wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / p.relaxation_m
+                length_m = p.relaxation_m * max(1.0 + p.relaxation_by_load * more, LEAST_RELAXATION)
+                wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / length_m
                 wheels.work[_PER_STATE, i] = 1.0
             if slip_lags:
                 slope = wheels.work[_PER_STATE, i] = max(slope, LEAST_SLOPE * p.longitudinal_stiffness_n)
@@ -270,7 +279,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             wheels.load_n[i] = load_n
             wheels.slip[i] = slip
             slope /= scale
-            wheels.work[_SLOPE_WHEEL, i] = slope * p.wheel_radius_m * (speed / rim if rim == scale else 1.0)
+            wheels.work[_SLOPE_WHEEL, i] = slope * radius_m * (speed / rim if rim == scale else 1.0)
             wheels.work[_SLOPE_SPEED, i] = -slope * (rim / speed if speed == scale else 1.0)
         # At rest it holds the car and never pushes it back.
         hub_n = most_n if speed > 0.0 else min(most_n, max(total_n - p.mass_kg * p.slope_m_s2, 0.0))
@@ -295,7 +304,8 @@ def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParamet
     resistance_n = wheels.force_n[i] + p.rolling_coefficient * wheels.load_n[i]
     inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2) - p.motor_inertia_kg_m2
     drag_nm = _of_axle(i, p.drag_torque_nm, p.axle_drag_torque_nm)
-    rate = (torque_nm - resistance_n * p.wheel_radius_m - drag_nm) / inertia
+    lever_m = _of_axle(i, p.wheel_radius_m, p.axle_radius_m) + p.lever_more_m
+    rate = (torque_nm - resistance_n * lever_m - drag_nm) / inertia
     return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
 
 
@@ -351,12 +361,13 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
     at = wheels.work
     for i in range(4):
         inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2)
-        per_newton = p.wheel_radius_m / inertia
+        lever_m = _of_axle(i, p.wheel_radius_m, p.axle_radius_m) + p.lever_more_m
+        per_newton = lever_m / inertia
         if p.motor_inertia_kg_m2 > 0.0:
             shaft = gh * (gh * p.shaft_stiffness_nm_rad + p.shaft_damping_nm_s_rad)
             motor = at[_MOTOR, i] = p.motor_inertia_kg_m2 + gh * at[_BRAKE, i]
             inertia = inertia - p.motor_inertia_kg_m2 + motor / (motor + shaft) * shaft
-            per_newton = p.wheel_radius_m / inertia
+            per_newton = lever_m / inertia
         lagged = gh * wheels.work[_LAG, i]
         share = lagged / (1.0 + lagged) if p.relaxation_m > 0.0 else 1.0
         at[_BY_WHEEL, i] = wheels.work[_SLOPE_WHEEL, i] * share

@@ -50,6 +50,8 @@ class DynamicsParameters(NamedTuple):
     """By how much the tyre's force is off where it slides all over [-]."""
     relaxation_m: float = 0.0
     """Way over which the tyre force follows its steady value; 0: at once [m]."""
+    relaxation_by_load: float = 0.0
+    """By which that way grows with a wheel's load, in shares of it over the mean static load: 1 in proportion [-]."""
     slip_lags: float = 0.0
     """1: over that way it is the slip that follows, and the force is the steady one of the lagging slip [-]."""
     shaft_stiffness_nm_rad: float = 1e4
@@ -60,6 +62,12 @@ class DynamicsParameters(NamedTuple):
     """Likewise beside drag_torque_nm [N m]."""
     axle_stiffness_n: float = 0.0
     """Likewise beside longitudinal_stiffness_n [N]."""
+    stiffness_by_load: float = 0.0
+    """By which stiffness grows with a wheel's load, as relaxation_by_load does [-]."""
+    lever_more_m: float = 0.0
+    """What the forces' lever about the axle has more than the rolling radius [m]."""
+    axle_radius_m: float = 0.0
+    """What the front wheels' rolling radius has more than wheel_radius_m, and the rear wheels' less [m]."""
     motor_inertia_kg_m2: float = 0.0
     """The part of wheel_inertia_kg_m2 that turns with the motor, behind the shaft; 0: no shaft [kg m^2]."""
 
