@@ -94,7 +94,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Varied:
-    """An entry whose parameters vary, see `sim2real.varying`.
+    """An entry whose effects' parameters vary, those of a structural one excepted, see `sim2real.varying`.
 
     Attributes
     ----------
@@ -102,8 +102,8 @@ class Varied:
         With the constant's fit and the residuals that the varying effect leaves.
     over : str
         What they vary over, "time" or "position".
-    spread : array, shape (k,)
-        Standard deviation of each parameter along the drives, in its unit.
+    spread : dict
+        Effect id and parameter to its standard deviation along the drives, in its unit.
     price : float
         What the prior asks for the variation, in units of the loss.
     seconds : float
@@ -112,7 +112,7 @@ class Varied:
 
     entry: Entry
     over: str
-    spread: Array
+    spread: dict[tuple[str, str], float]
     price: float
     seconds: float
 
@@ -139,7 +139,8 @@ class Contest:
     structured : tuple of Entry
         Single effects with a structural one beside them, see `sim2real.structure`.
     varied : tuple of Varied
-        Single effects that are not the same everywhere, see `sim2real.varying`.
+        Effects that are not the same everywhere: single ones, or beside a structural one, or two, see
+        `sim2real.varying`.
     motion : float
         Least loss that one of these effects leaves as a constant beside a free term over the car's motion.
     lone : float

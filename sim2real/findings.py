@@ -163,7 +163,7 @@ def _cause(
     alone = _joint(found, entry)
     values = {name: value for (effect, name), value in together.items() if effect == key}
     values = values or {name: value for (_, name), value in alone.items()}
-    if found.decision.varied and entry is found.decision.winner:
+    if found.decision.varied and key in found.decision.winner.ids:
         values = _as_means(values, found.decision.varied, best)
     excited = _excited(next(iter(alone.values())), float(best.candidate.scale[0]))
     fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
@@ -223,25 +223,34 @@ STRETCH_S = 4.0 * KNOT_S
 def _as_means(values: dict[str, Interval], varied: Varied, found: Fit) -> dict[str, Interval]:
     """Intervals of what varies along the logs, as of means of finitely many stretches."""
     low, high = found.candidate.bounds
-    out = {}
-    for (name, value), spread, least, most in zip(values.items(), varied.spread, low, high, strict=True):
+    out = dict(values)
+    for (key, p), least, most in zip(found.candidate.parameters, low, high, strict=True):
+        value, spread = values[p.name], varied.spread.get((key, p.name), 0.0)
         half = np.hypot(
             0.5 * (value.high - value.low), 1.96 * spread / np.sqrt(max(varied.seconds / STRETCH_S, 1.0))
         )
-        out[name] = replace(
+        out[p.name] = replace(
             value, low=float(max(value.value - half, least)), high=float(min(value.value + half, most))
         )
     return out
 
 
 def _variation(decision: Decision) -> Variation | None:
-    """How the cause varies, where it does."""
+    """How the cause varies, where it does; of two, the one that varies more against its size."""
     varied = decision.varied
     if varied is None:
         return None
-    names = [p.name for _, p in varied.entry.fitted.candidate.parameters]
+    found = varied.entry.fitted
+    size = dict(
+        zip(
+            ((key, p.name) for key, p in found.candidate.parameters),
+            np.abs(found.x - found.candidate.neutral),
+            strict=True,
+        )
+    )
+    most = max(varied.spread, key=lambda name: varied.spread[name] / max(float(size[name]), 1e-9))[0]
     return Variation(
-        varied.entry.ids[0], varied.over, dict(zip(names, map(float, varied.spread), strict=True))
+        most, varied.over, {name: value for (key, name), value in varied.spread.items() if key == most}
     )
 
 

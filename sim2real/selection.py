@@ -40,7 +40,11 @@ FURTHER_BELIEF = 0.8
 LIBRARY_BELIEF = 0.93
 """Probability that what explains all by itself is the cause, not the like of one that no library holds [-]."""
 PAIR_LEAVES = 0.5
-"""A pair is taken in place of one effect only where it at least halves the misfit [-]."""
+"""A pair is taken in place of one effect only where it at least halves the misfit, or the loss beyond noise [-]."""
+ALONE = 0.05
+"""Share of what a pair takes off the loss that the better of its effects takes alone, at least [-]."""
+PAIR_LOSS = 0.75
+"""Share of one effect's loss that a pair may leave where that effect explains all by itself [-]."""
 PAIR_MISFIT = 1.4
 """Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
 PAIR_SHARE = 0.02
@@ -231,8 +235,12 @@ def _decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         shares = probabilities(contest, list(contest.pairs), fit_to, holdout)[1:]
         pair = contest.pairs[int(shares.argmax())]  # of equals, the one that needs fewer parameters
         paired = fitness(pair, fit_to, holdout)
-        enough = max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
-        if paired.misfit < min(PAIR_LEAVES * after.misfit, enough):
+        enough = paired.misfit < max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
+        if (
+            enough
+            and not _cancel(contest, pair)
+            and _takes_two(best, pair, after, paired, explains(after, before))
+        ):
             return _compound(contest, pair, shares, before, paired)
     structured = _structured(contest, before, fit_to, holdout)
     if structured:
@@ -272,10 +280,9 @@ def _structured(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Ev
     beside = fitness(best, fit_to, holdout)
     alone = next(e for e in contest.singles if e.ids[0] == best.ids[0])
     needed = alone.loss - best.loss > FURTHER_GAIN * inflation(best, fit_to, holdout)
-    null = contest.null.loss
-    major = null - alone.loss >= MAJOR * (null - best.loss)
     among = sum(of[e.ids] for e in contest.structured)  # 0 where pairs fit better beyond measure
-    if not (among and needed and major and explains(beside, before)):
+    outdone = any(of[e.ids] * RIVAL > of[best.ids] and two_are_needed(contest, e) for e in contest.pairs)
+    if not (among and needed and _is_needed(contest, best) and explains(beside, before)) or outdone:
         return None
     rivals = tuple(e for e in entries if e is not best and of[e.ids] > RIVAL * of[best.ids])
     share = {e.ids[0]: 0.0 for e in contest.singles}
@@ -294,7 +301,10 @@ def _varying(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Evide
     if not able:
         return None
     best = able[0]
-    winner = next(e for e in contest.singles if e.ids == best.entry.ids)
+    every = (*contest.singles, *contest.structured, *contest.pairs)
+    winner = next(e for e in every if e.ids == best.entry.ids)
+    if not _is_needed(contest, winner):
+        return None
     if winner.loss - contest.motion > MOTION_SHARE * (winner.loss - best.entry.loss):
         return None
     tempered = SOFTNESS * inflation(best.entry, fit_to, holdout) + FORM * (
@@ -305,12 +315,54 @@ def _varying(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Evide
         key = v.entry.ids[0]
         weight[key] = max(weight[key], float(np.exp(0.5 * (best.cost - v.cost) / tempered)))
     total = sum(weight.values())
-    rivals = tuple(e for e in contest.singles if e is not winner and weight[e.ids[0]] > RIVAL)
     after = fitness(best.entry, fit_to, holdout)
     belief = _belief(after, before) * FURTHER_BELIEF
+    if winner in contest.pairs:
+        share = {key: 0.5 * belief if key in winner.ids else 0.0 for key in weight}
+        return Decision(Verdict.COMPOUND, winner, (), share, before, after, best)
+    rivals = tuple(e for e in contest.singles if e.ids[0] != winner.ids[0] and weight[e.ids[0]] > RIVAL)
     share = {key: belief * value / total for key, value in weight.items()}
     verdict = Verdict.AMBIGUOUS if rivals else Verdict.IDENTIFIED
     return Decision(verdict, winner, rivals, share, before, after, best)
+
+
+def two_are_needed(contest: Contest, pair: Entry) -> bool:
+    """Whether a pair leaves at most half of the loss that the best single effect leaves, and is no mere play of two."""
+    return pair.loss <= PAIR_LEAVES * min(e.loss for e in contest.singles) and not _cancel(contest, pair)
+
+
+def _cancel(contest: Contest, pair: Entry) -> bool:
+    """Whether neither of two effects does anything alone: together they only undo each other in most signals."""
+    null = contest.null.loss
+    alone = min(e.loss for e in contest.singles if e.ids[0] in pair.ids)
+    return null - alone < ALONE * (null - pair.loss)
+
+
+def _takes_two(best: Entry, pair: Entry, after: Fitness, paired: Fitness, explained: bool) -> bool:
+    """Whether a pair does so much better than the best single effect that it is taken in its place.
+
+    It halves the misfit, or the loss beyond noise; where one explains all by itself it halves the misfit and takes a
+    fair share of all loss besides, as the second may be no more than how the first differs from the library's form.
+    """
+    halves = paired.misfit < PAIR_LEAVES * after.misfit
+    if explained:
+        return halves and pair.loss <= PAIR_LOSS * best.loss
+    return halves or loss_beyond_noise(pair) <= PAIR_LEAVES * loss_beyond_noise(best)
+
+
+def loss_beyond_noise(entry: Entry) -> float:
+    """What an entry leaves of the loss beyond that of unit noise [-]."""
+    return entry.loss - float(np.count_nonzero(entry.z_fit) + np.count_nonzero(entry.z_hold))
+
+
+def _is_needed(contest: Contest, entry: Entry) -> bool:
+    """Whether the effect beside a structural one does most of the work, and the second of two is worth its place."""
+    if entry in contest.pairs:
+        return two_are_needed(contest, entry)
+    if entry in contest.structured:
+        alone = next(e for e in contest.singles if e.ids[0] == entry.ids[0])
+        return contest.null.loss - alone.loss >= MAJOR * (contest.null.loss - entry.loss)
+    return True
 
 
 def _compound(contest: Contest, pair: Entry, weight: Array, before: Fitness, after: Fitness) -> Decision:

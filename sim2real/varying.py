@@ -15,13 +15,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.effects import EFFECTS
 from sim2real.contest import Contest, Entry, Progress, Varied, run_all, silent
 from sim2real.drive import Drive
 from sim2real.evidence import Evidence, rest_of
 from sim2real.fitting import loss, robust_weight
 from sim2real.observer import Towards
 from sim2real.probing import sets_apart, windows
-from sim2real.selection import explains, fitness
+from sim2real.selection import explains, fitness, loss_beyond_noise, two_are_needed
 from sim2real.unknown import fit_terms
 
 Array = NDArray[np.float64]
@@ -37,7 +38,8 @@ ROUNDS = 3
 TRIED = 2
 """Best single effects that may vary."""
 MOSTLY = 0.7
-"""As a constant an effect has to take at least this share of the loss: a deviation about zero is another thing [-]."""
+"""As a constant an effect has to take at least this share of what the loss has more than noise: a deviation about zero
+is another thing [-]."""
 OVER = ("time", "position")
 """What a value may vary over: that is no property of the car's motion, which would be another effect."""
 
@@ -45,23 +47,28 @@ OVER = ("time", "position")
 def add_varied(
     contest: Contest, fit_to: Evidence, holdout: Evidence, jobs: int = 1, progress: Progress = silent
 ) -> Contest:
-    """The contest with its best single effects free to vary, and what they leave beside a term over the motion.
+    """The contest with its best effects free to vary, and what they leave beside a term over the motion.
 
-    As it is where none of them explains the gap even so.
+    Single effects first, then the best beside another tyre's curve, then the best pair, or that before all where it
+    leaves half of what one leaves: the first that explain the gap. As it is where none does.
     """
-    null = contest.null.loss
-    tried = [e for e in contest.singles[:TRIED] if null - e.loss >= MOSTLY * null]
-    work = [partial(vary, e, fit_to, holdout, over) for e in tried for over in OVER]
-    found = run_all(work, jobs, progress, "varying effects")
-    before = fitness(contest.null, fit_to, holdout)
-    if not any(explains(fitness(v.entry, fit_to, holdout), before) for v in found):
-        return contest
+    null = contest.null
+    excess = loss_beyond_noise(null)
+    before = fitness(null, fit_to, holdout)
     drives, noises = (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
-    terms = [
-        fit_terms(e.fitted.candidate.model(e.fitted.x), drives, noises, jobs, shared=True)[0] for e in tried
-    ]
-    motion = min((term.loss for term in terms), default=float("inf"))
-    return replace(contest, varied=tuple(sorted(found, key=lambda v: v.cost)), motion=motion)
+    pairs = contest.pairs[:1]
+    groups = [contest.singles[:TRIED], contest.structured[:1]]
+    groups.insert(0 if any(two_are_needed(contest, pair) for pair in pairs) else 2, pairs)
+    for group in groups:
+        tried = [e for e in group if null.loss - e.loss >= MOSTLY * excess]
+        work = [partial(vary, e, fit_to, holdout, over) for e in tried for over in OVER]
+        found = run_all(work, jobs, progress, "varying effects")
+        if any(explains(fitness(v.entry, fit_to, holdout), before) for v in found):
+            models = [e.fitted.candidate.model(e.fitted.x) for e in tried]
+            terms = [fit_terms(model, drives, noises, jobs, shared=True)[0] for model in models]
+            motion = min(term.loss for term in terms)
+            return replace(contest, varied=tuple(sorted(found, key=lambda v: v.cost)), motion=motion)
+    return contest
 
 
 @dataclass(frozen=True)
@@ -73,7 +80,7 @@ class Bump:
 
 
 def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied:
-    """The entry with all its parameters free to vary.
+    """The entry with all parameters of its effects free to vary; those of a structural one stay.
 
     Parameters
     ----------
@@ -100,12 +107,13 @@ def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied
         channels = base.predict(drive, towards=Towards(ends, shares)).channels
         return np.nan_to_num(evidence.noises[i].whitened(rest_of(drive, channels))).ravel()
 
-    bumps = _bumps(count, drives, over)
+    free = [j for j, (key, _) in enumerate(candidate.parameters) if not EFFECTS[key].structural]
+    bumps = _bumps(free, drives, over)
     shares = [np.zeros((len(d), count)) for d in drives]
     z = [left(i, shares[i]) for i in range(len(drives))]
     slopes = [np.zeros((len(z_i), len(bumps))) for z_i in z]
     for i, drive in enumerate(drives):
-        for j in range(count):
+        for j in free:
             mine = [
                 (b, w)
                 for b, bump in enumerate(bumps)
@@ -133,7 +141,10 @@ def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied
             break
         best, a, shares, z = cost, new, tried, z_new
     cut = len(fit_to.drives)
-    spread = np.std(np.concatenate(shares), axis=0) * np.abs(step)
+    spreads = np.std(np.concatenate(shares), axis=0) * np.abs(step)
+    spread = {
+        (key, p.name): float(spreads[j]) for j, (key, p) in enumerate(candidate.parameters) if j in free
+    }
     varied = Entry(entry.ids, found, np.concatenate(z[:cut]), np.concatenate(z[cut:]))
     seconds = sum(float(d.time_s[-1] - d.time_s[0]) for d in drives)
     return Varied(varied, over, spread, float(prior @ a**2), seconds)
@@ -158,8 +169,8 @@ def _solved(z: Sequence[Array], slopes: Sequence[Array], prior: Array, a: Array)
     return np.asarray(a + np.linalg.solve(normal, right))
 
 
-def _bumps(parameters: int, drives: Sequence[Drive], over: str) -> list[Bump]:
-    """All knots of all parameters' curves."""
+def _bumps(free: Sequence[int], drives: Sequence[Drive], over: str) -> list[Bump]:
+    """All knots of the curves of the parameters that are free."""
     curves = [
         d.time_s if over == "time" else np.maximum.accumulate(np.nan_to_num(d.measured[:, 0])) for d in drives
     ]
@@ -182,5 +193,5 @@ def _bumps(parameters: int, drives: Sequence[Drive], over: str) -> list[Bump]:
             weights = tuple(
                 np.interp(curves[i], knots, hat) if i in group else None for i in range(len(drives))
             )
-            out += [Bump(j, weights) for j in range(parameters)]
+            out += [Bump(j, weights) for j in free]
     return out

@@ -8,10 +8,11 @@ from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles
 from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages
-from sim2real.contest import enter
+from sim2real.contest import enter, silent
 from sim2real.diagnose import find
 from sim2real.drive import SPEED
 from sim2real.evidence import gather
+from sim2real.findings import describe
 from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.observer import Towards
 from sim2real.probing import APART_S, sets_apart, windows
@@ -55,7 +56,7 @@ def test_a_value_that_sways_is_followed_to_the_noise(logs):
     varied = vary(entry, fit_to, held, "time")
     assert fitness(entry, fit_to, held).misfit > 3.0
     assert fitness(varied.entry, fit_to, held).misfit < 1.5
-    assert varied.spread[0] == pytest.approx(0.012 / np.sqrt(2.0), rel=0.3)
+    assert varied.spread["vehicle_speed_scale", "factor"] == pytest.approx(0.012 / np.sqrt(2.0), rel=0.3)
 
 
 def test_a_swaying_scale_is_named_with_its_spread(logs):
@@ -65,6 +66,23 @@ def test_a_swaying_scale_is_named_with_its_spread(logs):
     assert found.decision.winner.ids == ("vehicle_speed_scale",)
     assert found.decision.varied is not None
     assert found.decision.varied.over == "time"
+
+
+def test_two_causes_are_named_though_one_of_them_sways():
+    nominal = clean(pulses(DURATION_S), 14.0, effects={"torque_gain": {"factor": 1.12}})
+    both = [noisy(swaying(nominal), seed) for seed in range(3)]
+    few = {"vehicle_speed_scale", "torque_gain", "aero_drag", "tyre_stiffness_offset"}
+    found = find(MODEL, both[:2], both[2], exclude=set(EFFECTS) - few)
+    assert found.decision.verdict is Verdict.COMPOUND
+    assert found.decision.winner.ids == ("torque_gain", "vehicle_speed_scale")
+    assert found.decision.varied is not None
+    spread = found.decision.varied.spread
+    assert spread["vehicle_speed_scale", "factor"] > 5e-3
+    said = describe(found, seed=0, jobs=1, progress=silent)
+    assert said.variation.effect == "vehicle_speed_scale"
+    gain, scale = (next(c for c in said.causes if c.effect == key) for key in found.decision.winner.ids)
+    assert gain.parameters["factor"].low <= 1.12 <= gain.parameters["factor"].high
+    assert scale.parameters["factor"].low <= 0.97 <= scale.parameters["factor"].high
 
 
 def test_axles_that_are_unlike_have_their_mean_and_their_difference():
