@@ -43,8 +43,9 @@ PAIR_LEAVES = 0.5
 """A pair is taken in place of one effect only where it at least halves the misfit, or the loss beyond noise [-]."""
 ALONE = 0.05
 """Share of what a pair takes off the loss that the better of its effects takes alone, at least [-]."""
-PAIR_LOSS = 0.75
-"""Share of one effect's loss that a pair may leave where that effect explains all by itself [-]."""
+PAIR_LOSS = 0.7
+"""Share of the best effect's loss that a pair may leave where that effect explains all by itself, or the pair only as
+it varies [-]."""
 PAIR_MISFIT = 1.4
 """Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
 PAIR_SHARE = 0.02
@@ -326,9 +327,9 @@ def _varying(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Evide
     return Decision(verdict, winner, rivals, share, before, after, best)
 
 
-def two_are_needed(contest: Contest, pair: Entry) -> bool:
-    """Whether a pair leaves at most half of the loss that the best single effect leaves, and is no mere play of two."""
-    return pair.loss <= PAIR_LEAVES * min(e.loss for e in contest.singles) and not _cancel(contest, pair)
+def two_are_needed(contest: Contest, pair: Entry, leaves: float = PAIR_LEAVES) -> bool:
+    """Whether a pair leaves at most this share of the loss that the best effect leaves, and does not only cancel."""
+    return pair.loss <= leaves * min(e.loss for e in contest.singles) and not _cancel(contest, pair)
 
 
 def _cancel(contest: Contest, pair: Entry) -> bool:
@@ -358,7 +359,7 @@ def loss_beyond_noise(entry: Entry) -> float:
 def _is_needed(contest: Contest, entry: Entry) -> bool:
     """Whether the effect beside a structural one does most of the work, and the second of two is worth its place."""
     if entry in contest.pairs:
-        return two_are_needed(contest, entry)
+        return two_are_needed(contest, entry, PAIR_LOSS)
     if entry in contest.structured:
         alone = next(e for e in contest.singles if e.ids[0] == entry.ids[0])
         return contest.null.loss - alone.loss >= MAJOR * (contest.null.loss - entry.loss)
