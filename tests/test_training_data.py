@@ -22,6 +22,7 @@ from models.training import (
     scores,
     segmenter_data,
     teacher,
+    textures,
 )
 from models.training.__main__ import main
 
@@ -150,7 +151,29 @@ def test_outliers_repeat_by_seed_and_differ_from_one_another(made_up):
     np.testing.assert_array_equal(
         first, outliers.outlier_patches(np.random.default_rng(3), pictures, road, 24)
     )
-    assert len({patch.tobytes() for patch in first[::2]}) == 12
+    drawn, spoilt = first[1::2], first[::4]
+    assert len({patch.tobytes() for patch in (*drawn, *spoilt)}) == 18
+
+
+@pytest.mark.parametrize("kind", textures.KINDS)
+def test_drawn_textures_repeat_by_seed_and_none_is_like_another(kind):
+    first, again = (
+        [textures.KINDS[kind](rng) for _ in range(8)] for rng in map(np.random.default_rng, (5, 5))
+    )
+    np.testing.assert_array_equal(first, again)
+    assert {(patch.shape, patch.dtype) for patch in first} == {((64, 96, 3), np.dtype(np.uint8))}
+    distances = [
+        np.abs(one.astype(float) - other).mean() for one in first for other in first if one is not other
+    ]
+    assert min(distances) > 3.0, "grey levels between two drawings"
+
+
+def test_colours_have_the_hue_and_saturation_asked_for():
+    rng = np.random.default_rng(0)
+    for hue, channel in ((0.0, 2), (1 / 3, 1), (2 / 3, 0)):
+        colour = textures.coloured(rng, (hue, hue), (0.6, 0.6))
+        np.testing.assert_allclose(np.delete(colour, channel), 0.4, atol=1e-9)
+        assert colour[channel] == pytest.approx(1.0)
 
 
 def test_areas_of_the_teachers_cells_are_shared_out_whole():

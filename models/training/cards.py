@@ -184,8 +184,9 @@ weights.
 {versions_text(facts)}
 
 `readable` is a head of its own, taught last, which leaves the rest as it is: road of all sources, undisturbed and
-disturbed, against sky, trees and houses of the upper part of the pictures, noise, clouds, stripes, and roads that are
-too dark, too bright or far out of focus to be read.
+disturbed, against drawn walls, boards, cloth, plants, sky, bodywork, facades, lettering and covers (half of what is no
+road), sky, trees and houses of the upper part of the training pictures (a quarter), and noise, clouds, stripes, and
+roads that are too dark, too bright or far out of focus to be read (a quarter).
 
 ## Scores on pictures
 

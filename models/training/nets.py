@@ -180,7 +180,7 @@ class SurfaceNet(nn.Module):
     GROUPS = 3
     STAGES = ((96, 3), (240, 6), (384, 2))
     EMBEDDING = 2 * (240 + 384)
-    READING = 32
+    READING = 64
     """Width of the head that tells readable road."""
     MOST_DISTURBED = 4.0
     """Limit of the logit that a patch is disturbed, to both sides, beyond which the softening stays as it is."""

@@ -15,6 +15,7 @@ from trpac_core.vision.regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
 
 from .data import Image, Picture
 from .patches import MIN_WIDTH_PX, reduced
+from .textures import KINDS
 
 UPPER_SHARE = 0.45
 """Upper share of a forward camera's picture that holds sky, trees and houses, and hardly ever road [-]."""
@@ -23,19 +24,24 @@ SIZE = (PATCH_WIDTH_PX, PATCH_HEIGHT_PX)
 
 
 def outlier_patches(rng: np.random.Generator, pictures: Sequence[Picture], road: Image, count: int) -> Image:
-    """Patches without readable road, shape (count, 64, 96, 3): half real surroundings, half covered or spoilt looks.
+    """Patches without readable road, shape (count, 64, 96, 3).
+
+    Half are drawn (`textures.KINDS`), a quarter real surroundings, a quarter covered or spoilt looks.
 
     `pictures` give the surroundings, `road` (n, 64, 96, 3) the roads that are spoilt.
     """
+    drawn = list(KINDS.values())
     spoilt: list[Callable[[np.random.Generator, Image], Image]] = [
         _cloud, _noise, _dark, _bright, _defocused, _stripes
     ]  # fmt: skip
     patches = []
     for number in range(count):
         if number % 2:
+            patches.append(drawn[number // 2 % len(drawn)](rng))
+        elif number % 4:
             patches.append(_upper_part(rng, pictures[rng.integers(len(pictures))]))
         else:
-            patches.append(spoilt[number // 2 % len(spoilt)](rng, road[rng.integers(len(road))]))
+            patches.append(spoilt[number // 4 % len(spoilt)](rng, road[rng.integers(len(road))]))
     return np.stack(patches)
 
 

@@ -41,7 +41,10 @@ CUTTING_SEED = 1
 FURTHER_CUTS = 2
 """How often real pictures are cut anew, at other places, for the second stage: the teacher is not asked about these."""
 
-OUTLIERS = {"train": 4000, "val": 800}
+OUTLIERS = {"train": 12000, "val": 1600}
+LOOKS, READ_LOOKS = {"": 1500}, {"": 1500, "condition_web": 7500, "rendered": 5500}
+"""Most patches of each source ("" stands for all others) for the head that tells disturbed patches, and for the one
+that tells readable road, which must know many roads."""
 CALIBRATION_PER_SOURCE = 240
 """Most validation patches that one source gives to the calibration, lest one drive decide T."""
 
@@ -87,9 +90,7 @@ def train_and_ship(
             trunk, material.patches, material.teacher, steps=count, seed=given.seed, report=report
         )
     net = taught.net
-    clear, disturbed = _all_looks(material.patches, given.seed)
-    learn_reading(net, np.concatenate([clear, disturbed]), material.outliers["train"], seed=given.seed)
-    learn_disturbed(net, clear[::2], disturbed, seed=given.seed)
+    learn_heads(net, material, given.seed)
     train_s = time.monotonic() - start
     outcome = judge(net, _judged_sets(facts.pictures, rendered), material.outliers["val"], given.seed)
     path = given.out / "surface.onnx"
@@ -153,7 +154,8 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
         return student
     if given.trunk and given.trunk.is_file():
         kept = torch.load(given.trunk, weights_only=True)
-        kept.pop("0.softening", None)  # this and the heads are learned last, in other forms at times
+        heads = ("0.softening", "0.reading", "0.disturbed")  # learned last, in other forms at times
+        kept = {name: value for name, value in kept.items() if not name.startswith(heads)}
         torch.nn.ModuleList(student).load_state_dict(kept, strict=False)
         return student
     seen = np.arange(len(material.patches)) < len(material.teacher)
@@ -175,17 +177,25 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
     return trunk
 
 
-def _all_looks(patches: PatchSet, seed: int) -> tuple[Image, Image]:
-    """Readable road of all sources alike, and every other of its patches disturbed: for heads that tell no class."""
+def learn_heads(net: SurfaceNet, material: Material, seed: int) -> None:
+    """Teach the heads that tell readable road and disturbed patches; the rest of the net stays."""
+    roads = _looks(material.patches, seed, READ_LOOKS)
+    readable = np.concatenate([roads, calibrate.noised(roads, seed + 1)])
+    learn_reading(net, readable, material.outliers["train"], seed=seed)
+    clear = _looks(material.patches, seed, LOOKS)[::2]
+    learn_disturbed(net, clear, calibrate.noised(clear, seed), seed=seed)
+
+
+def _looks(patches: PatchSet, seed: int, most: dict[str, int]) -> Image:
+    """Undisturbed patches of all sources, at most so many of each: for heads that tell no class."""
     rng = np.random.default_rng(seed)
     keep = np.concatenate(
         [
-            rng.permutation(np.flatnonzero(patches.sources == source))[:1500]
+            rng.permutation(np.flatnonzero(patches.sources == source))[: most.get(str(source), most[""])]
             for source in np.unique(patches.sources)
         ]
     )
-    clear = patches.patches[keep]
-    return clear, calibrate.noised(clear[::2], seed)
+    return patches.patches[keep]
 
 
 def judge(net: SurfaceNet, judged: dict[str, PatchSet], outliers: Image, seed: int) -> Outcome:

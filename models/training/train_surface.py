@@ -37,8 +37,8 @@ FIRST_LAYERS_UNTIL = 0.5
 """Share of the second stage after which the first layers stay as they are; a quarter of a step's time is saved then."""
 AHEAD = 3
 """Batches drawn while the net still learns from earlier ones."""
-READING_STEPS, READING_RATE = 600, 2e-3
-DISTURBED_STEPS, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 0.5, 0.5
+READING_STEPS, READING_RATE = 2000, 2e-3
+DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3, 0.5, 0.5
 """The head that tells disturbed patches must hold on roads never seen, so it is kept weak."""
 
 Report = Callable[[int, float], None]
@@ -213,12 +213,13 @@ def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, seed: in
     weights = torch.where(labels > 0, 0.5 / len(readable), 0.5 / len(outliers))
     head = nn.ModuleList([net.reading_norm, net.reading]).train()
     optimiser = torch.optim.AdamW(head.parameters(), lr=READING_RATE, weight_decay=WEIGHT_DECAY)
-    for _ in range(READING_STEPS):
-        chosen = torch.multinomial(weights, 512, replacement=True)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, READING_STEPS)
+    for chosen in torch.multinomial(weights, READING_STEPS * 512, replacement=True).view(READING_STEPS, 512):
         loss = functional.binary_cross_entropy_with_logits(net.readable(features[chosen]), labels[chosen])
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
         optimiser.step()
+        schedule.step()
     net.eval()
 
 
@@ -228,7 +229,7 @@ def learn_disturbed(net: SurfaceNet, clear: Image, disturbed: Image, *, seed: in
     features = torch.cat([embeddings(net, clear), embeddings(net, disturbed)])
     labels = torch.cat([torch.zeros(len(clear)), torch.ones(len(disturbed))])
     head = nn.ModuleList([net.disturbed_norm, net.disturbed]).train()
-    optimiser = torch.optim.AdamW(head.parameters(), lr=READING_RATE, weight_decay=DISTURBED_DECAY)
+    optimiser = torch.optim.AdamW(head.parameters(), lr=DISTURBED_RATE, weight_decay=DISTURBED_DECAY)
     for _ in range(DISTURBED_STEPS):
         chosen = torch.randint(len(features), (512,))
         seen = functional.dropout(net.disturbed_norm(features[chosen]), DISTURBED_DROPOUT)
