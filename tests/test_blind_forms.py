@@ -31,7 +31,7 @@ from benchmarks.blind.generator.forms import (
 )
 from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, W, integrate
 from benchmarks.blind.generator.library import LIBRARY
-from benchmarks.blind.generator.outside import FURTHER, LAST, STILL_FURTHER, YET_FURTHER
+from benchmarks.blind.generator.outside import EVEN_FURTHER, FURTHER, STILL_FURTHER, YET_FURTHER
 from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
 from benchmarks.blind.generator.table import Group, table
 from benchmarks.blind.generator.tyre import dugoff
@@ -374,7 +374,7 @@ def by_further(name: str, **given: float) -> World:
 
 
 SHOWN_IN_DRIVING = tuple(
-    n for n in {**FURTHER, **STILL_FURTHER, **YET_FURTHER, **LAST} if n != "slip_controller"
+    n for n in {**FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER} if n != "slip_controller"
 )
 """That one acts where a driven wheel slips, as it does in tests/test_blind_forms_fourth.py and not on this drive."""
 

@@ -83,14 +83,18 @@ def test_a_late_tasks_windows_differ_and_lose_nothing(ramp):
     assert off == pytest.approx(0.15 / np.sqrt(6.0), rel=0.1)
 
 
-def test_a_whole_turn_has_every_tooth_however_they_are_scattered():
+def test_scattered_teeth_come_at_their_own_moments_and_none_is_lost(ramp):
     speed = 2.0 * np.pi / 0.04 * CAR.wheel_radius_m
     path, at = roll(nominal(CAR, Road()), speed, 3.0), np.arange(1.0, 2.9, 0.0137)
-    for window, teeth in ((0.04, 64.0), (0.02, 32.0)):
-        given = {"teeth": 64.0, "window_s": window}
-        sensors = with_form("wheel_speed_quantisation", "scattered_teeth", **given).sensors
-        pulses = read(path, sensors, at)[:, 0] * 64.0 * window / (2.0 * np.pi)
-        assert np.abs(pulses - teeth).max() == pytest.approx(1.0 if window < 0.03 else 0.0, abs=1e-6)
+    whole = with_form("wheel_speed_quantisation", "scattered_teeth", teeth=64.0, window_s=0.04).sensors
+    assert_allclose(read(path, whole, at)[:, :4] * 0.04 / (2.0 * np.pi), 1.0, atol=1e-9)
+    own, even = (
+        read(ramp, replace(whole, wheel_window_s=0.01, wheel_scatter=scatter), np.arange(1.0, 9.0, 0.01))
+        for scatter in (whole.wheel_scatter, 1e-9)
+    )
+    off = np.abs(own - even)[:, :4] * 0.64 / (2.0 * np.pi)
+    assert off.max() < 2.1
+    assert np.mean(off > 0.5) == pytest.approx(2.0 * 0.1 * np.sqrt(2.0 / np.pi), rel=0.2)
 
 
 def test_scale_differs_on_coarse_stretches_and_while_it_warms_up():

@@ -17,7 +17,7 @@ from numpy.random import Generator
 from . import forms_fifth, forms_fourth, forms_second, forms_third
 from .forms_second import Foreign
 from .library import LIBRARY
-from .outside import FURTHER, LAST, OUTSIDE, STILL_FURTHER, YET_FURTHER
+from .outside import EVEN_FURTHER, FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
 from .world import Effect
 
 Forms = dict[str, str]
@@ -99,7 +99,7 @@ OUTSIDES: dict[Family, dict[str, Effect]] = {
     Family.SECOND: {**OUTSIDE, **FURTHER},
     Family.THIRD: {**OUTSIDE, **FURTHER, **STILL_FURTHER},
     Family.FOURTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER},
-    Family.FIFTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER, **LAST},
+    Family.FIFTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER},
 }
 """Each family's deviations outside the library."""
 

@@ -216,7 +216,7 @@ YET_FURTHER: dict[str, Effect] = {
 }
 """From the fourth family on."""
 
-LAST: dict[str, Effect] = {
+EVEN_FURTHER: dict[str, Effect] = {
     "actuator_hysteresis": Effect(
         growing("torque_nm", 3.0, 60.0), lambda w, g: w.moved(actuator_play=g["torque_nm"]), ("powertrain",)
     ),
