@@ -16,6 +16,7 @@ from benchmarks.blind.generator.car import Car, Road
 from benchmarks.blind.generator.cases import make_case
 from benchmarks.blind.generator.details import ROLL_M_S
 from benchmarks.blind.generator.driver import drive
+from benchmarks.blind.generator.falling import fallen
 from benchmarks.blind.generator.forms import (
     ASPECTS,
     DIGITS,
@@ -28,17 +29,17 @@ from benchmarks.blind.generator.forms import (
     draw_forms,
     effect_in,
 )
-from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, W, fallen, integrate
+from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, W, integrate
 from benchmarks.blind.generator.library import LIBRARY
-from benchmarks.blind.generator.outside import FURTHER, STILL_FURTHER, YET_FURTHER
+from benchmarks.blind.generator.outside import EVEN_FURTHER, FURTHER, STILL_FURTHER, YET_FURTHER
 from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
 from benchmarks.blind.generator.table import Group, table
 from benchmarks.blind.generator.tyre import dugoff
 from benchmarks.blind.generator.world import World, nominal
 
-FIRST, SECOND, THIRD, FOURTH = Family
-DRAWN = [SECOND, THIRD, FOURTH]
-CASES = {spec.name: spec for spec in table("full", FOURTH)}
+FIRST, SECOND, THIRD, FOURTH, FIFTH = Family
+DRAWN = [SECOND, THIRD, FOURTH, FIFTH]
+CASES = {spec.name: spec for spec in table("full", FIFTH)}
 
 
 def numbered(items):
@@ -46,8 +47,9 @@ def numbered(items):
     return [pytest.param(item, id=str(i)) for i, item in enumerate(items)]
 
 
-def forms_of(*effects: str):
-    return numbered((effect, form) for effect in effects for form in EFFECT_FORMS[effect])
+def forms_of(*effects: str, but: str = ""):
+    """Forms of effects; `but` is one that has a test of its own."""
+    return numbered((effect, form) for effect in effects for form in EFFECT_FORMS[effect] if form != but)
 
 
 def with_form(effect: str, form: str, car: Car = CAR, road: Road | None = None, **given: float) -> World:
@@ -137,7 +139,7 @@ def test_the_first_family_has_one_form_of_everything():
 @pytest.mark.parametrize("family", DRAWN)
 def test_later_families_draw_every_form(family):
     drawn, aspects = (
-        [draw_forms(family, np.random.default_rng(seed)) for seed in range(90)],
+        [draw_forms(family, np.random.default_rng(seed)) for seed in range(250)],
         ASPECTS[family],
     )
     assert {a: {forms[a] for forms in drawn} for a in aspects} == {a: set(f) for a, f in aspects.items()}
@@ -208,7 +210,7 @@ def test_the_severest_effect_shows_in_every_form(chosen, limit):
     assert np.any(np.sqrt(np.mean(other**2, axis=0)) > 2.0 * QUIET.sigmas)
 
 
-@pytest.mark.parametrize("chosen", forms_of("rolling_resistance"))
+@pytest.mark.parametrize("chosen", forms_of("rolling_resistance", but="coarse_stretches"))
 def test_resistance_is_the_coefficient_times_the_weight(chosen):
     lost = 5.0 * 0.015 * CAR.mass_kg * 9.81 / carried(CAR)
     path = roll(with_form(*chosen, coefficient=0.015), ROLL_M_S + 0.5 * lost, 5.0)
@@ -235,7 +237,7 @@ def test_loads_settle_at_the_moment_of_the_inertia(chosen):
     assert path[-1, kernel.PITCH] == pytest.approx(path[-1, N], rel=1e-2)
 
 
-@pytest.mark.parametrize("chosen", forms_of("tyre_relaxation"))
+@pytest.mark.parametrize("chosen", forms_of("tyre_relaxation", but="unlike_axles"))
 def test_relaxation_rings_over_the_travelled_length(chosen):
     """w' and the lagged force are a damped oscillator of 1.27 C R^2 / (I L), damping v / (2 L), in every form."""
     length, speed, heavy = 0.5, 20.0, replace(CAR, mass_kg=1e5)
@@ -247,7 +249,7 @@ def test_relaxation_rings_over_the_travelled_length(chosen):
     assert 1e-3 * np.mean(np.diff(crossings)) == pytest.approx(expected, rel=0.03)
 
 
-@pytest.mark.parametrize("curve", range(6))
+@pytest.mark.parametrize("curve", range(7))
 def test_friction_starts_with_its_slope_and_ends_at_its_floor(curve):
     assert fallen(curve, 0.0, 0.4) == pytest.approx(1.0)
     assert (fallen(curve, 1e-6, 0.4) - 1.0) / 1e-6 == pytest.approx(-0.6, rel=1e-4)
@@ -282,9 +284,9 @@ def test_sensors_are_late_by_the_delay_on_average(chosen, delay):
     path = roll(nominal(CAR, Road()), 10.0, 20.0, 50.0)
     sensors = with_form(*chosen, delay_s=delay).sensors
     at, true, late = reading(path, sensors)
-    column = 0 if chosen[0] == "wheel_speed_delay" else 4
-    rate = np.gradient(true[:, column], at)
-    ages = (true - late)[:, column] / rate
+    columns = slice(0, 4) if chosen[0] == "wheel_speed_delay" else slice(4, 5)
+    rate = np.gradient(true[:, columns], at, axis=0)
+    ages = (true - late)[:, columns] / rate
     assert np.mean(ages) == pytest.approx(delay, rel=0.02)
     assert ages.min() > -1e-3
 
@@ -314,7 +316,7 @@ def test_foreign_tyres_have_the_slope_and_the_peak(foreign):
         expected = np.array([dugoff(s, CAR.stiffness_n, theta, load) for s in slips])
         assert kernel.tyre_force(p, 1e-5, 0.0, theta, load, 0.0) == pytest.approx(1.27 * 0.5, rel=2e-3)
         assert force.max() == pytest.approx(expected.max(), rel=2e-3)
-        assert np.all(np.diff(force[: int(np.argmax(force))]) > 0.0)
+        assert np.all(np.diff(force[: int(np.argmax(force > (1.0 - 1e-9) * force.max()))]) > 0.0)
         assert force[-1] > 0.5 * expected[-1]
 
 
@@ -334,7 +336,11 @@ def test_noise_of_every_kind_has_its_size(noisy):
 
 
 @pytest.mark.parametrize(
-    "digits", numbered(DIGITS[n] for n in ("all", "bus", "decimals", "truncating", "converted"))
+    "digits",
+    numbered(
+        DIGITS[n]
+        for n in ("all", "bus", "decimals", "truncating", "converted", "converted_in_bits", "on_change")
+    ),
 )
 def test_digits_take_no_more_than_the_noise(digits):
     path = roll(nominal(CAR, Road()), 10.0, 6.0, 150.0)
@@ -364,17 +370,19 @@ def test_every_driver_stays_within_the_car_and_excites_what_he_should(style, ric
 
 
 def by_further(name: str, **given: float) -> World:
-    return OUTSIDES[FOURTH][name].apply(nominal(CAR, Road()), given)
+    return OUTSIDES[FIFTH][name].apply(nominal(CAR, Road()), given)
 
 
-SHOWN_IN_DRIVING = tuple(n for n in {**FURTHER, **STILL_FURTHER, **YET_FURTHER} if n != "slip_controller")
+SHOWN_IN_DRIVING = tuple(
+    n for n in {**FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER} if n != "slip_controller"
+)
 """That one acts where a driven wheel slips, as it does in tests/test_blind_forms_fourth.py and not on this drive."""
 
 
 @pytest.mark.parametrize("name", numbered(SHOWN_IN_DRIVING))
 def test_further_deviations_show(name, limit):
     world, drove = limit
-    entry = OUTSIDES[FOURTH][name]
+    entry = OUTSIDES[FIFTH][name]
     other = readings(entry.apply(world, entry.at(CAR, np.random.default_rng(0))(1.0)), drove)
     assert np.any(np.sqrt(np.mean((other - readings(world, drove)) ** 2, axis=0)) > 2.0 * QUIET.sigmas)
 

@@ -32,14 +32,59 @@ CUT_SLIP = 0.08
 """Slip over which a slip controller closes [-]."""
 SLIPPERY = 0.75
 """Friction below which a road is wet or worse [-]."""
+TEXTURE_M = 66.0
+"""From one stretch of coarse asphalt to the next [m]."""
+GRAIN_M = 78.0
+"""The same as an optical sensor sees it [m]."""
+SHUT_M_S = 3.0
+"""About a speed within which shutters close [m/s]."""
+USUAL_NM = 150.0
+"""Torque that a gain is stated at where it changes with the torque [N m]."""
+RUB_RAD_S = 0.1
+"""About which a joint's friction turns [rad/s]."""
+
+
+@njit(cache=True, inline="always")
+def spread(axles: float, cross: float, wheel: int) -> float:
+    """What one wheel has more than the mean: front over rear, and one diagonal over the other."""
+    return (axles if wheel < 2 else -axles) + (cross if wheel == 0 or wheel == 3 else -cross)
 
 
 @njit(cache=True)
-def radius_at(p: Physics, wheel: int, speed: float) -> float:
+def in_share(p: Physics, tilt: float, wheel: int) -> float:
+    """What one wheel has more than the mean by weight at rest [-]."""
+    half = 0.5 * (p.front_arm + p.rear_arm)
+    return tilt * p.front_arm / half if wheel < 2 else -tilt * p.rear_arm / half
+
+
+@njit(cache=True)
+def drag_of(fast: float, speed: float) -> float:
+    """Of a drag that is another before and after `USUAL_M_S` [-]."""
+    return 1.0 + fast * np.tanh((speed - USUAL_M_S) / SHUT_M_S)
+
+
+@njit(cache=True)
+def released(share: float, turning: float) -> float:
+    """Of pads that a fast disc knocks back [-]."""
+    return 1.0 - share * (min(turning / USUAL_RAD_S, 2.0) - 1.0)
+
+
+@njit(cache=True)
+def lag_of(p: Physics, wheel: int, turning: float) -> float:
+    """Of a lag that is another at each axle, or at each speed [-]."""
+    return (1.0 + spread(p.lag_tilt, 0.0, wheel)) * (
+        1.0 + p.lag_speed * (min(turning / USUAL_RAD_S, 2.0) - 1.0)
+    )
+
+
+@njit(cache=True)
+def radius_at(p: Physics, wheel: int, speed: float, angle: float) -> float:
     """Rolling radius of a wheel [m]."""
     radius = p.radius
-    if p.radius_tilt != 0.0:
-        radius += p.radius_tilt if wheel < 2 else -p.radius_tilt
+    if p.radius_tilt != 0.0 or p.radius_side != 0.0:
+        radius += spread(p.radius_tilt, p.radius_side, wheel)
+    if p.out_of_round > 0.0:
+        radius *= 1.0 + p.out_of_round * np.cos(angle + 2.3 * wheel)
     if p.radius_growth != 0.0:
         radius += p.radius_growth * ((speed / USUAL_M_S) ** 2 - 1.0)
     return radius
@@ -83,6 +128,10 @@ def friction(p: Physics, wheel: int, position: float, speed: float) -> float:
         factor = 1.0 + (factor - 1.0) * (1.0 + p.patch_depth * np.sin(2.0 * np.pi * at / PATCH_M))
     if p.stretch_depth > 0.0:
         factor = stretched(p.stretch_depth, factor, at)
+    if p.blotches.size > 0:
+        factor = 1.0 + (factor - 1.0) * (1.0 + profile_at(p.blotches, at))
+    if p.grip_tilt != 0.0:
+        factor = 1.0 + (factor - 1.0) * (1.0 + in_share(p, p.grip_tilt, wheel))
     if p.wet_fall > 0.0 and mu < SLIPPERY:
         factor *= max(1.0 - p.wet_fall * (speed / USUAL_M_S - 1.0), 0.4)
     return mu * factor
@@ -94,12 +143,21 @@ def rolling_of(p: Physics, wheel: int, position: float, speed: float) -> float:
     rolling = 1.0 + p.roll_linear * (speed / ROLL_M_S - 1.0)
     if p.roll_wet > 0.0 and told_friction(p, wheel, position) < SLIPPERY:
         rolling *= 1.0 + p.roll_wet
+    if p.roll_texture > 0.0:
+        at = position + (p.front_arm if wheel < 2 else -p.rear_arm)
+        rolling *= 1.0 + p.roll_texture * np.tanh(4.0 * np.sin(2.0 * np.pi * at / TEXTURE_M))
+    if p.roll_tilt != 0.0:
+        rolling *= 1.0 + in_share(p, p.roll_tilt, wheel)
     return rolling
 
 
 @njit(cache=True)
-def gain_of(gain: float, sign: float, fast: float, pads: float, torque: float, turning: float) -> float:
-    """What a motor or brake gives over what it is told, by direction, speed, and for pads by their bite [-]."""
+def gain_of(
+    gain: float, sign: float, fast: float, pads: float, hard: float, torque: float, turning: float
+) -> float:
+    """What a motor or brake gives over what it is told, by direction, speed, torque, and for pads by their bite [-]."""
+    if hard != 0.0:
+        gain = 1.0 + (gain - 1.0) * (1.0 + hard * (min(abs(torque) / USUAL_NM, 2.0) - 1.0))
     if sign != 0.0:
         gain = 1.0 + (gain - 1.0) * (1.0 + sign * np.tanh(torque / SMALL_TORQUE_NM))
     if fast != 0.0:
@@ -126,9 +184,14 @@ def let_through(p: Physics, torque: float, slip: float) -> float:
 
 @njit(cache=True)
 def shaft_of(p: Physics, wheel: int, twist: float, rate: float) -> float:
-    """Torque of a shaft whose play is taken up, and of which left and right may differ [N m]."""
+    """Torque of a shaft whose play is taken up, whose joints may rub, and which may differ from the others [N m]."""
     stiffness = p.shaft_stiffness * (1.0 + (p.shaft_tilt if wheel % 2 == 0 else -p.shaft_tilt))
+    if p.shaft_axles != 0.0:
+        stiffness *= 1.0 + spread(p.shaft_axles, 0.0, wheel)
     wound = twist - min(max(twist, -p.shaft_play), p.shaft_play)
     if p.shaft_play > 0.0 and wound == 0.0:
         return 0.0
-    return stiffness * wound + p.shaft_damping * rate
+    torque = stiffness * wound + p.shaft_damping * rate
+    if p.shaft_friction > 0.0:
+        torque += p.shaft_friction * np.tanh(rate / RUB_RAD_S)
+    return torque

@@ -14,10 +14,10 @@ from typing import Any
 
 from numpy.random import Generator
 
-from . import forms_fourth, forms_second, forms_third
+from . import forms_fifth, forms_fourth, forms_second, forms_third
 from .forms_second import Foreign
 from .library import LIBRARY
-from .outside import FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
+from .outside import EVEN_FURTHER, FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
 from .world import Effect
 
 Forms = dict[str, str]
@@ -35,6 +35,8 @@ class Family(StrEnum):
     """Forms of nearly every effect; again more of all else."""
     FOURTH = "fourth"
     """Forms of every effect; again more of all else."""
+    FIFTH = "fifth"
+    """Again more of everything, and more pairs."""
 
 
 def _joined(aspects: Aspects, more: Aspects) -> Aspects:
@@ -44,16 +46,18 @@ def _joined(aspects: Aspects, more: Aspects) -> Aspects:
 
 THIRD: Aspects = _joined(forms_second.ASPECTS, forms_third.MORE)
 FOURTH: Aspects = _joined(THIRD, forms_fourth.MORE)
+FIFTH: Aspects = _joined(FOURTH, forms_fifth.MORE)
 ASPECTS: dict[Family, Aspects] = {
     Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
     Family.SECOND: forms_second.ASPECTS,
     Family.THIRD: THIRD,
     Family.FOURTH: FOURTH,
+    Family.FIFTH: FIFTH,
 }
 """All that has forms in each family; what a family does not list has the library's form."""
-EFFECT_FORMS: Aspects = {name: forms for name, forms in FOURTH.items() if name in LIBRARY}
-FOREIGN: dict[str, Foreign] = FOURTH["foreign_tyre"]
-NOISES, DIGITS, STYLES = FOURTH["noise"], FOURTH["digits"], FOURTH["driver"]
+EFFECT_FORMS: Aspects = {name: forms for name, forms in FIFTH.items() if name in LIBRARY}
+FOREIGN: dict[str, Foreign] = FIFTH["foreign_tyre"]
+NOISES, DIGITS, STYLES = FIFTH["noise"], FIFTH["digits"], FIFTH["driver"]
 
 RATES_HZ: dict[Family, dict[float, float]] = {
     Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
@@ -77,6 +81,16 @@ RATES_HZ: dict[Family, dict[float, float]] = {
         1000.0: 0.05,
         1500.0: 0.05,
     },
+    Family.FIFTH: {
+        100.0: 0.2,
+        200.0: 0.2,
+        250.0: 0.1,
+        450.0: 0.15,
+        550.0: 0.1,
+        900.0: 0.1,
+        1000.0: 0.1,
+        1300.0: 0.05,
+    },
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
@@ -85,6 +99,7 @@ OUTSIDES: dict[Family, dict[str, Effect]] = {
     Family.SECOND: {**OUTSIDE, **FURTHER},
     Family.THIRD: {**OUTSIDE, **FURTHER, **STILL_FURTHER},
     Family.FOURTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER},
+    Family.FIFTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER},
 }
 """Each family's deviations outside the library."""
 
@@ -99,7 +114,7 @@ def draw_forms(family: Family, rng: Generator) -> Forms:
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDES[Family.FOURTH]}[name]
+    effect = {**LIBRARY, **OUTSIDES[Family.FIFTH]}[name]
     return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from .details import PROFILE_STEP_M
+from .falling import LOGARITHMIC
 from .forms_second import Apply, Foreign, falling, payload
-from .kernel import LOGARITHMIC
 from .library import LIBRARY
 from .recording_fourth import DIGITS_FOURTH, NOISES_FOURTH
 from .styles_fourth import ASSISTED, HURRIED

@@ -9,7 +9,7 @@ from typing import Any
 from numpy.random import Generator
 
 from .driver import BRISK
-from .kernel import HYPERBOLIC, SATURATING
+from .falling import HYPERBOLIC, SATURATING
 from .library import LIBRARY
 from .recording import DIGITS, NOISES
 from .styles import RESTLESS, SQUEEZING

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from .falling import POWER, STRAIGHT
 from .forms_second import Apply, Foreign, falling, message_of, payload
-from .kernel import POWER, STRAIGHT
 from .library import LIBRARY
 from .recording import DIGITS_THIRD, NOISES_THIRD
 from .styles_third import ONE_PEDAL, PROVING

@@ -16,21 +16,29 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .commands import COMMAND_STEP_S, commanded, joined, on_grid
 from .details import (
     ROLL_M_S,
+    SLIPPERY,
     SMALL_M_S2,
     SMALL_TORQUE_NM,
     USUAL_M_S,
     WAIT_S,
+    drag_of,
     friction,
     gain_of,
+    lag_of,
     let_through,
     profile_at,
     radius_at,
+    released,
     rolling_of,
     shaft_of,
+    spread,
+    told_friction,
     wait_of,
 )
+from .falling import fallen
 from .physics import Physics
 from .tyre import THETA_GRID, dugoff, foreign
 
@@ -38,12 +46,9 @@ Array = NDArray[np.floating[Any]]
 
 GRAVITY = 9.81
 FLOOR_M_S = 1.5
-COMMAND_STEP_S = 0.01
 RECORD_STEP_S = 0.001
 LEAST_LAG_S = 0.001
 """Of a motor whose torque rises at a limited rate: how closely it follows below the limit."""
-EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER, LOGARITHMIC = range(6)
-"""Codes of the ways in which friction falls."""
 
 BODY_DAMPING = 0.4
 """Of a body that pitches on its springs, over the critical one [-]."""
@@ -65,53 +70,10 @@ Where the force is what relaxes, `SLIP` holds the force [N].
 """
 
 
-@njit(cache=True)
-def on_grid(table: Array, at: float) -> float:
-    """`table` at `at` steps from its start, linear between, held beyond."""
-    if at <= 0.0:
-        return table[0]
-    i = int(at)
-    if i >= table.size - 1:
-        return table[-1]
-    return table[i] + (at - i) * (table[i + 1] - table[i])
-
-
-@njit(cache=True, inline="always")
-def commanded(command: Array, wheel: int, time: float) -> float:
-    return on_grid(command[:, wheel], time / COMMAND_STEP_S)
-
-
-@njit(cache=True)
-def joined(command: Array, wheel: int, time: float, message: float) -> float:
-    """The command as straight lines between messages."""
-    sent = np.floor(time / message)
-    first = commanded(command, wheel, sent * message)
-    return first + (time / message - sent) * (commanded(command, wheel, (sent + 1.0) * message) - first)
-
-
 @njit(cache=True, inline="always")
 def slip_of(rim: float, speed: float) -> float:
     """Signed slip, positive when driving [-]."""
     return (rim - speed) / max(abs(rim), abs(speed), FLOOR_M_S)
-
-
-@njit(cache=True)
-def fallen(curve: int, sliding: float, floor: float) -> float:
-    """Share of the friction that is left; `sliding` is the speed times the falloff [-].
-
-    Whatever the curve, it is 1 with the slope -(1 - `floor`) at rest, and `floor` in the end.
-    """
-    if curve == HYPERBOLIC:
-        return floor + (1.0 - floor) / (1.0 + sliding)
-    if curve == SATURATING:
-        return floor + (1.0 - floor) * (1.0 - np.tanh(sliding))
-    if curve == STRAIGHT:
-        return 1.0 - (1.0 - floor) * min(sliding, 1.0)
-    if curve == POWER:
-        return floor + (1.0 - floor) / (1.0 + 0.5 * sliding) ** 2
-    if curve == LOGARITHMIC:
-        return 1.0 - (1.0 - floor) * min(np.log1p(sliding), 1.0)
-    return floor + (1.0 - floor) * np.exp(-sliding)
 
 
 @njit(cache=True, inline="always")
@@ -142,13 +104,20 @@ def tyre_force(
 def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: float, turning: float) -> float:
     """What the motor is told after dead time, dead band, limits, gain and ripple, before its lag [N m]."""
     heard = time - p.delay
+    if p.delay_tilt != 0.0:
+        heard -= spread(p.delay_tilt, 0.0, wheel)
     if p.beat > 0.0:
         heard -= p.beat * (time / BEAT_S - np.floor(time / BEAT_S) - 0.5)
     if p.wait > 0.0:
         heard -= p.wait * wait_of(np.floor(time / WAIT_S))
     if p.message > 0.0 and not p.message_joined:
-        heard = np.floor((heard + 0.5 * p.message) / p.message + 1e-9) * p.message
+        sent = np.floor((heard + 0.5 * p.message) / p.message + 1e-9)
+        if p.message_lost > 0.0 and wait_of(sent) > 0.5 - p.message_lost:
+            sent -= 1.0
+        heard = sent * p.message
     torque = commanded(command, wheel, heard)
+    if p.axle_share > 0.0:
+        torque += p.axle_share * (commanded(command, (wheel + 2) % 4, heard) - torque)
     if p.message > 0.0 and p.message_joined:
         torque = joined(command, wheel, heard, p.message)
     if p.dead_band > 0.0:
@@ -160,8 +129,10 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         torque *= 1.0 - p.derating * (1.0 - np.exp(-time / DERATING_S))
     if p.ripple > 0.0:
         torque *= 1.0 + p.ripple * np.cos(p.ripple_order * angle)
-    if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0:
-        return torque * gain_of(p.gain[wheel], p.gain_sign, p.gain_speed, p.pad_rise, torque, turning)
+    if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0 or p.gain_load != 0.0:
+        return torque * gain_of(
+            p.gain[wheel], p.gain_sign, p.gain_speed, p.pad_rise, p.gain_load, torque, turning
+        )
     return torque * p.gain[wheel]
 
 
@@ -187,7 +158,10 @@ def lean(p: Physics, y: Array, reading: float, dy: Array) -> None:
         dy[PITCH] = y[BODY]
         dy[BODY] = p.body_rate * (p.body_rate * (reading - y[PITCH]) - 2.0 * BODY_DAMPING * y[BODY])
         return
-    dy[PITCH] = (reading - y[PITCH]) / p.pitch_time
+    pitch_time = p.pitch_time
+    if p.pitch_sign != 0.0:
+        pitch_time *= 1.0 + p.pitch_sign * np.tanh((reading - y[PITCH]) / SMALL_M_S2)
+    dy[PITCH] = (reading - y[PITCH]) / pitch_time
     dy[BODY] = (reading - y[BODY]) / p.springs_time if p.springs_share > 0.0 else 0.0
 
 
@@ -216,8 +190,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         load = max((press * arm + pitch * p.mass * p.cog_height) / (2.0 * length) - air, 0.0)
         theta = friction(p, w, y[X], speed)
         radius = p.radius
-        if p.radius_tilt != 0.0 or p.radius_growth != 0.0:
-            radius = radius_at(p, w, speed)
+        if p.radius_tilt != 0.0 or p.radius_growth != 0.0 or p.radius_side != 0.0 or p.out_of_round > 0.0:
+            radius = radius_at(p, w, speed, y[ANGLE + w])
         rim = y[W + w] * radius
         slip = slips = slip_of(rim, speed)
         dy[SLIP + w] = 0.0
@@ -225,6 +199,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             path = relaxing(p, y[SLIP + w], theta, load)
             if p.relaxation_speed != 0.0:
                 path *= 1.0 + p.relaxation_speed * (speed / USUAL_M_S - 1.0)
+            if p.relaxation_tilt != 0.0:
+                path *= 1.0 + spread(p.relaxation_tilt, 0.0, w)
             dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / path
             slip = y[SLIP + w]
         rubbing = rim - speed
@@ -232,7 +208,7 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.falloff_time > 0.0:
             dy[RUB + w] = (rubbing - y[RUB + w]) / p.falloff_time
             rubbing = y[RUB + w]
-        stiffer = p.stiffness_tilt if w < 2 else -p.stiffness_tilt
+        stiffer = spread(p.stiffness_tilt, p.stiffness_side, w)
         force = tyre_force(p, slip, rubbing, theta, load, y[HEAT + w], stiffer)
         if p.force_relaxation > 0.0:
             dy[SLIP + w] = (force - y[SLIP + w]) * max(abs(speed), FLOOR_M_S) / p.force_relaxation
@@ -243,12 +219,16 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         resisting = p.brake_drag * p.brake_share[w]
         if p.brake_pulse > 0.0:
             resisting *= 1.0 + p.brake_pulse * np.cos(y[ANGLE + w] + 1.7 * w)
+        if p.brake_release > 0.0:
+            resisting *= released(p.brake_release, y[W + w])
         rolling = p.roll_moment * load * p.radius
         if p.roll_growth > 0.0:
             rolling *= 1.0 + p.roll_growth * ((speed / ROLL_M_S) ** 2 - 1.0)
-        if p.roll_linear > 0.0 or p.roll_wet > 0.0:
+        if p.roll_linear > 0.0 or p.roll_wet > 0.0 or p.roll_texture > 0.0 or p.roll_tilt != 0.0:
             rolling *= rolling_of(p, w, y[X], speed)
         resisting += rolling
+        if p.slush > 0.0 and told_friction(p, w, y[X]) < SLIPPERY:
+            resisting += 0.25 * p.slush * speed * speed * radius
         if resisting > 0.0:
             resisting *= np.tanh(y[W + w] / 0.2)
         resisting += p.bearing * y[W + w]
@@ -259,10 +239,14 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.lag_first > 0.0:
             dy[STAGE + w] = (told - y[STAGE + w]) / p.lag_first
             told = y[STAGE + w]
-        follows = p.lag > 0.0 or p.slew > 0.0
+        follows = p.lag > 0.0 or p.slew > 0.0 or p.actuator_play > 0.0
         lag = p.lag
         if p.lag_sign != 0.0:
             lag *= 1.0 + p.lag_sign * np.tanh((told + y[LAG + w]) / SMALL_TORQUE_NM)
+        if p.lag_tilt != 0.0 or p.lag_speed != 0.0:
+            lag *= lag_of(p, w, y[W + w])
+        if p.actuator_play > 0.0:
+            told -= min(max(told - y[LAG + w], -p.actuator_play), p.actuator_play)
         dy[LAG + w] = (told - y[LAG + w]) / max(lag, LEAST_LAG_S) if follows else 0.0
         if p.lag > 0.0 and p.lag_damping > 0.0:
             rate = 2.0 * p.lag_damping / max(lag, LEAST_LAG_S)
@@ -273,17 +257,20 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         torque = y[LAG + w] if follows else told
         if p.slip_cut > 0.0:
             torque = let_through(p, torque, slips)
-        inertia = p.inertia - p.motor_inertia + (-p.inertia_tilt if w < 2 else p.inertia_tilt)
+        inertia = p.inertia - p.motor_inertia + spread(-p.inertia_tilt, p.inertia_side, w)
         dy[MOTOR + w] = dy[TWIST + w] = 0.0
         if p.motor_inertia > 0.0:
             dy[TWIST + w] = y[MOTOR + w] - y[W + w]
             shaft = p.shaft_stiffness * y[TWIST + w] + p.shaft_damping * dy[TWIST + w]
-            if p.shaft_play > 0.0 or p.shaft_tilt != 0.0:
+            if p.shaft_play > 0.0 or p.shaft_tilt != 0.0 or p.shaft_axles != 0.0 or p.shaft_friction > 0.0:
                 shaft = shaft_of(p, w, y[TWIST + w], dy[TWIST + w])
             dy[MOTOR + w] = (torque - shaft) / p.motor_inertia
             torque = shaft
         dy[W + w] = (torque - force * radius * p.lever - resisting) / inertia
-    total -= p.drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
+    drag = p.drag
+    if p.drag_fast != 0.0:
+        drag *= drag_of(p.drag_fast, speed)
+    total -= drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
     if p.gust_drag > 0.0:
         against = speed + on_grid(p.wind, time / COMMAND_STEP_S)
         total -= p.gust_drag * (against * abs(against) - speed * speed)

@@ -215,3 +215,29 @@ YET_FURTHER: dict[str, Effect] = {
     "speed_from_wheels": Effect(growing("share", 0.05, 1.0), _from_wheels, ("vehicle_speed_sensor",)),
 }
 """From the fourth family on."""
+
+EVEN_FURTHER: dict[str, Effect] = {
+    "actuator_hysteresis": Effect(
+        growing("torque_nm", 3.0, 60.0), lambda w, g: w.moved(actuator_play=g["torque_nm"]), ("powertrain",)
+    ),
+    "axles_share_torque": Effect(
+        growing("share", 0.03, 0.5), lambda w, g: w.moved(axle_share=g["share"]), ("powertrain",)
+    ),
+    "wheels_out_of_round": Effect(
+        growing("share", 0.001, 0.02), lambda w, g: w.moved(out_of_round=g["share"]), ("wheel", "tyre")
+    ),
+    "slush_drag": Effect(
+        growing("n_s2_m2", 0.15, 4.0), lambda w, g: w.moved(slush=g["n_s2_m2"]), ("road", "tyre", "wheel")
+    ),
+    "accelerometer_pitches": Effect(
+        growing("share", 0.02, 0.25),
+        lambda w, g: w.sensed(accel_pitch=g["share"]),
+        ("accelerometer", "vehicle"),
+    ),
+    "speed_in_steps": Effect(
+        growing("step_m_s", 0.03, 1.0),
+        lambda w, g: w.sensed(speed_step_m_s=g["step_m_s"]),
+        ("vehicle_speed_sensor",),
+    ),
+}
+"""From the fifth family on."""

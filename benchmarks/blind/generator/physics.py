@@ -21,21 +21,28 @@ class Physics(NamedTuple):
     springs_share: float
     springs_time: float
     springs_tilt: float
+    pitch_sign: float
     body_rate: float
     radius: float
     radius_tilt: float
     radius_growth: float
+    radius_side: float
+    out_of_round: float
     lever: float
     inertia: float
     inertia_tilt: float
+    inertia_side: float
     stiffness_drive: float
     stiffness_brake: float
     stiffness_load: float
     stiffness_tilt: float
+    stiffness_side: float
     factor_left: float
     factor_right: float
     patch_depth: float
     stretch_depth: float
+    blotches: Array
+    grip_tilt: float
     wet_fall: float
     falloff: float
     falloff_floor: float
@@ -45,6 +52,7 @@ class Physics(NamedTuple):
     relaxation_load: bool
     relaxation_shrinks: bool
     relaxation_speed: float
+    relaxation_tilt: float
     force_relaxation: float
     foreign_share: float
     foreign_curve: int
@@ -56,6 +64,7 @@ class Physics(NamedTuple):
     drag: float
     drag_height: float
     fanning: float
+    drag_fast: float
     lift: float
     gust_drag: float
     wind: Array
@@ -64,27 +73,38 @@ class Physics(NamedTuple):
     roll_growth: float
     roll_linear: float
     roll_wet: float
+    roll_texture: float
+    roll_tilt: float
+    slush: float
     brake_drag: float
     brake_share: Array
     brake_pulse: float
+    brake_release: float
     bearing: float
     grade: float
     wave_slope: float
     wave_length: float
     profile: Array
     delay: float
+    delay_tilt: float
     message: float
     message_joined: bool
+    message_lost: float
     beat: float
     wait: float
     lag: float
     lag_first: float
     lag_sign: float
     lag_damping: float
+    lag_tilt: float
+    lag_speed: float
+    actuator_play: float
     slew: float
     gain: Array
     gain_sign: float
     gain_speed: float
+    gain_load: float
+    axle_share: float
     pad_rise: float
     slip_allowed: float
     slip_cut: float
@@ -98,6 +118,8 @@ class Physics(NamedTuple):
     shaft_damping: float
     shaft_play: float
     shaft_tilt: float
+    shaft_axles: float
+    shaft_friction: float
     motor_inertia: float
     slosh_share: float
     slosh_rate: float

@@ -12,12 +12,14 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .details import USUAL_M_S, WAIT_S
+from .details import GRAIN_M, USUAL_M_S, WAIT_S
 from .kernel import ANGLE, BEAT_S, COMMAND_STEP_S, RECORD_STEP_S, N, V, W, X
 
 Array = NDArray[np.floating[Any]]
 WHEELS = ("fl", "fr", "rl", "rr")
 SWAY_S, WARM_S = 9.0, 15.0
+SLOW_S = (5.3, 11.0, 17.0)
+"""Periods of what a bias wanders by."""
 NODDING_S, MOST_NODDING = 0.1, 0.4
 """How late a body pitches, and by how much that changes a scale's deviation at most [-]."""
 
@@ -29,7 +31,8 @@ class Sensors:
     A late signal may be one that is averaged or held: `*_average_s` is the time that a reading is the mean of,
     `*_message_s` the time from one message to the next, `*_joined` says that straight lines join the messages, and
     `*_beat_s` is by how much the age differs over a beat of two clocks, `*_wait_s` by how much it differs from one
-    message to the next, and `*_filter_s` is the part of it that a low pass takes. Its mean age stays the delay.
+    message to the next, `*_filter_s` is the part of it that a low pass takes, and `*_lost` the share of messages in
+    whose place the one before stands. Its mean age stays the delay.
     """
 
     wheel_delay_s: float = 0.0
@@ -39,6 +42,9 @@ class Sensors:
     wheel_beat_s: float = 0.0
     wheel_wait_s: float = 0.0
     wheel_filter_s: float = 0.0
+    wheel_lost: float = 0.0
+    wheel_turn_s: float = 0.0
+    """By how much the last wheel's reading is older than on average, and the first one's younger."""
     wheel_teeth: float = 0.0
     wheel_window_s: float = 0.0
     wheel_window_runs: bool = False
@@ -49,6 +55,10 @@ class Sensors:
     """How many windows overlap: a new one ends that often in the time of one."""
     wheel_flanks: float = 0.0
     """By which every second flank comes late [teeth]."""
+    wheel_window_jitter: float = 0.0
+    """By how much a window ends sooner at most, the next one beginning there [windows]."""
+    wheel_scatter: float = 0.0
+    """Standard deviation of the teeth's places, each with its own error [teeth]."""
     wheel_uneven: float = 0.0
     """How far the teeth lie off their places, over a turn [teeth]."""
     wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
@@ -63,6 +73,7 @@ class Sensors:
     speed_beat_s: float = 0.0
     speed_wait_s: float = 0.0
     speed_filter_s: float = 0.0
+    speed_lost: float = 0.0
     speed_clock: float = 0.0
     """Share by which the speed sensor's clock is slow: its signal is ever later [-]."""
     speed_scale: float = 1.0
@@ -72,6 +83,12 @@ class Sensors:
     """By which the scale's deviation differs at double `USUAL_M_S` [-]."""
     speed_scale_pitch: float = 0.0
     """By which it differs with the body's pitch, where the car accelerates [1/(m/s^2)]."""
+    speed_scale_grain: float = 0.0
+    """By which it differs on a coarse road's stretches [-]."""
+    speed_scale_warming: float = 0.0
+    """By which it differs before and after the sensor is warm, over `WARM_S` [-]."""
+    speed_step_m_s: float = 0.0
+    """In which the speed is told, what is below a step dropped."""
     speed_rolling: float = 0.0
     """Share of the speed that is taken from the wheels [-]."""
     speed_offset_m_s: float = 0.0
@@ -82,6 +99,10 @@ class Sensors:
     """By which the bias differs before and after the sensor is warm, over `WARM_S` [-]."""
     accel_bias_growth: float = 0.0
     """By which the bias differs at double `USUAL_M_S` [-]."""
+    accel_wander: float = 0.0
+    """By which the bias differs over `SLOW_S` [-]."""
+    accel_pitch: float = 0.0
+    """What gravity adds to the reading as the body pitches, after `NODDING_S` [-]."""
     accel_limit_m_s2: float = np.inf
     accel_scale: float = 1.0
     accel_lag_s: float = 0.0
@@ -148,14 +169,16 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     wheel_at: Array = time_s - sensors.wheel_delay_s - _beat(time_s, sensors.wheel_beat_s, wheel_phase)
     wheel_at = wheel_at + mean_age(sensors.wheel_filter_s) - _wait(time_s, sensors.wheel_wait_s, waits[0])
     if not sensors.wheel_joined:
-        wheel_at = _sent(wheel_at, sensors.wheel_message_s, wheel_phase)
+        wheel_at = _sent(wheel_at, sensors.wheel_message_s, wheel_phase, sensors.wheel_lost, sensors.seed)
     speed_at: Array = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
     speed_at = speed_at - _beat(time_s, sensors.speed_beat_s, speed_phase)
     speed_at = speed_at + mean_age(sensors.speed_filter_s) - _wait(time_s, sensors.speed_wait_s, waits[1])
     if not sensors.speed_joined:
-        speed_at = _sent(speed_at, sensors.speed_message_s, speed_phase)
-    out = np.empty((time_s.size, 6))
+        speed_at = _sent(speed_at, sensors.speed_message_s, speed_phase, sensors.speed_lost, sensors.seed)
+    out, asked = np.empty((time_s.size, 6)), wheel_at
     for w in range(4):
+        if sensors.wheel_turn_s > 0.0:
+            wheel_at = asked - sensors.wheel_turn_s * (2.0 * w / 3.0 - 1.0)
         if sensors.wheel_window_s > 0.0:
             wheel = _count(record, path[:, ANGLE + w], sensors, wheel_at, rng, wheel_phase)
         else:
@@ -176,11 +199,17 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
         speed = _joined(record, speed, sensors.speed_message_s, speed_phase)
     shown_speed = _mean(record, speed, speed_at, sensors.speed_average_s)
     out[:, 4] = _scale(path, sensors, time_s, shown_speed) * shown_speed + sensors.speed_offset_m_s
+    if sensors.speed_step_m_s > 0.0:
+        out[:, 4] = np.floor(out[:, 4] / sensors.speed_step_m_s) * sensors.speed_step_m_s
     accel = _lag(path[:, N], sensors.accel_lag_s)
+    if sensors.accel_pitch > 0.0:
+        accel = accel + sensors.accel_pitch * _lag(path[:, N], NODDING_S)
     bias = sensors.accel_bias_m_s2 * (1.0 + sensors.accel_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S)))
     if sensors.accel_bias_growth != 0.0:
         faster = np.interp(time_s, record, path[:, V]) / USUAL_M_S - 1.0
         bias = bias * (1.0 + sensors.accel_bias_growth * faster)
+    if sensors.accel_wander > 0.0:
+        bias = bias * (1.0 + sensors.accel_wander * _slow(time_s, sensors.seed))
     shown = sensors.accel_scale * np.interp(time_s, record, accel) + bias
     out[:, 5] = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
     return out
@@ -188,7 +217,8 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
 
 def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float | Array:
     """Of the vehicle speed, whose deviation may differ with time, speed and pitch [-]."""
-    if sensors.speed_sway == sensors.speed_scale_growth == sensors.speed_scale_pitch == 0.0:
+    differs = (sensors.speed_sway, sensors.speed_scale_growth, sensors.speed_scale_pitch)
+    if not any((*differs, sensors.speed_scale_grain, sensors.speed_scale_warming)):
         return sensors.speed_scale
     sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
     sway = sway + sensors.speed_scale_growth * (speed / USUAL_M_S - 1.0)
@@ -196,7 +226,19 @@ def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float 
         record = np.arange(len(path)) * RECORD_STEP_S
         nod = sensors.speed_scale_pitch * np.interp(time_s, record, _lag(path[:, N], NODDING_S))
         sway = sway + np.clip(nod, -MOST_NODDING, MOST_NODDING)
+    if sensors.speed_scale_grain > 0.0:
+        place = np.interp(time_s, np.arange(len(path)) * RECORD_STEP_S, path[:, X])
+        sway = sway + sensors.speed_scale_grain * np.tanh(4.0 * np.sin(2.0 * np.pi * place / GRAIN_M))
+    if sensors.speed_scale_warming > 0.0:
+        sway = sway + sensors.speed_scale_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S))
     return 1.0 + (sensors.speed_scale - 1.0) * sway
+
+
+def _slow(time_s: Array, seed: int) -> Array:
+    """What a bias wanders by, of size 1 at most [-]."""
+    phases = np.random.default_rng([seed, 14]).uniform(0.0, 2.0 * np.pi, len(SLOW_S))
+    waves = [np.sin(2.0 * np.pi * time_s / s + phase) for s, phase in zip(SLOW_S, phases, strict=True)]
+    return np.mean(waves, axis=0)
 
 
 def mean_age(filter_s: float) -> float:
@@ -223,11 +265,17 @@ def _joined(record: Array, signal: Array, message_s: float, phase: float) -> Arr
     return np.interp(record, sent, np.interp(sent, record, signal))
 
 
-def _sent(at: Array, message_s: float, phase: float) -> Array:
-    """The messages' times nearest to `at` [s]."""
+def _sent(at: Array, message_s: float, phase: float, lost: float, seed: int) -> Array:
+    """The messages' times nearest to `at` [s]; of a lost one, that of the last that was not."""
     if message_s == 0.0:
         return at
-    return (np.floor(at / message_s - phase + 0.5) + phase) * message_s
+    sent = np.floor(at / message_s - phase + 0.5)
+    if lost > 0.0:
+        number = (sent - sent.min()).astype(int)
+        kept = np.random.default_rng([seed, 15]).random(number.max() + 1) >= lost
+        kept[0] = True
+        sent = sent.min() + np.maximum.accumulate(np.where(kept, np.arange(kept.size), 0))[number]
+    return (sent + phase) * message_s
 
 
 def _mean(record: Array, signal: Array, at: Array, over_s: float) -> Array:
@@ -252,6 +300,12 @@ def _count(
         first = shared * window
     every = window / sensors.wheel_window_parts
     ends = time_s if sensors.wheel_window_runs else np.floor((time_s - first) / every) * every + first
+    begins = ends - window
+    if sensors.wheel_window_jitter > 0.0:
+        sooner = -sensors.wheel_window_jitter * window * rng.uniform(size=int(record[-1] / window) + 4)
+        number = np.round((ends - first) / window).astype(int) + 2
+        begins, ends = begins + sooner[number - 1], ends + sooner[number]
+    scatter = sensors.wheel_scatter * rng.standard_normal(int(teeth)) if sensors.wheel_scatter > 0.0 else None
     before = np.gradient(angle[:3], RECORD_STEP_S)[0]
 
     def pulses(at: Array) -> Array:
@@ -261,9 +315,12 @@ def _count(
             passed = passed + sensors.wheel_uneven * np.sin(turned + 2.0 * np.pi * phase)
         if sensors.wheel_flanks > 0.0:
             return np.floor(0.5 * passed) + np.floor(0.5 * (passed - 1.0 - sensors.wheel_flanks)) + 1.0
+        if scatter is not None:
+            tooth = np.floor(passed)
+            return tooth + (passed - tooth > 0.5 + scatter[tooth.astype(int) % scatter.size])
         return np.floor(passed)
 
-    return (pulses(ends) - pulses(ends - window)) * 2.0 * np.pi / (teeth * window)
+    return (pulses(ends) - pulses(begins)) * 2.0 * np.pi / (teeth * window)
 
 
 def _lag(signal: Array, time_constant_s: float) -> Array:

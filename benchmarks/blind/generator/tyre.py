@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 THETA_GRID = np.linspace(0.02, 1.5, 75)
-MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING = range(7)
+MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING, CUBED, HYPERBOLIC_TANGENT = range(
+    9
+)
 """Codes of the foreign curves."""
 
 
@@ -200,6 +202,29 @@ def brush_falling(slip: float, slope: float, peak: float, kinetic: float) -> flo
 
 
 @njit(cache=True)
+def cubed(slip: float, slope: float, peak: float, curvature: float) -> float:
+    """Force of 1 - exp(-(x + E x^2 + (E^2 + 1/12) x^3)) times the peak, x = `slope` s / peak [N].
+
+    The static part of the UniTire model (Guo, Lu 2007, Vehicle System Dynamics 45, 79-99).
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero [N].
+    peak : float
+        Largest force, that of a wheel that slides [N].
+    curvature : float
+        E [-].
+    """
+    if peak <= 0.0:
+        return 0.0
+    x = slope * slip / peak
+    return peak * (1.0 - np.exp(-x * (1.0 + x * (curvature + x * (curvature**2 + 1.0 / 12.0)))))
+
+
+@njit(cache=True)
 def foreign(curve: int, slip: float, slope: float, peak: float, first: float, second: float) -> float:
     """Force of a foreign curve by its code [N]; `first` and `second` are its own parameters."""
     if curve == BRUSH:
@@ -214,6 +239,10 @@ def foreign(curve: int, slip: float, slope: float, peak: float, first: float, se
         return brush_falling(slip, slope, peak, first)
     if curve == SATURATED:
         return saturated(slip, slope, peak)
+    if curve == CUBED:
+        return cubed(slip, slope, peak, first)
+    if curve == HYPERBOLIC_TANGENT:
+        return peak * np.tanh(slope * slip / peak) if peak > 0.0 else 0.0
     return magic(slip, slope, peak, first, second)
 
 

@@ -11,7 +11,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .car import Car, Road
-from .kernel import EXPONENTIAL, FLOOR_M_S, GRAVITY, RECORD_STEP_S
+from .falling import EXPONENTIAL
+from .kernel import FLOOR_M_S, GRAVITY, RECORD_STEP_S
 from .physics import Physics
 from .sensors import Sensors
 from .tyre import MAGIC, THETA_GRID, peaks
@@ -44,8 +45,10 @@ class World:
     def split(self) -> int:
         """Integration steps per record that keep the classical Runge-Kutta method well inside its stability (2.78)."""
         p = self.physics
-        wheel = p.radius**2 / (p.inertia - abs(p.inertia_tilt) - p.motor_inertia) + 4.0 / p.mass
+        lightest = p.inertia - abs(p.inertia_tilt) - abs(p.inertia_side) - p.motor_inertia
+        wheel = p.radius**2 / lightest + 4.0 / p.mass
         stiffness = max(p.stiffness_drive, p.stiffness_brake) + abs(p.stiffness_load) + abs(p.stiffness_tilt)
+        stiffness += abs(p.stiffness_side)
         rate = 1.27 * stiffness * wheel / FLOOR_M_S
         return max(3, int(np.ceil(rate * RECORD_STEP_S / 2.0)))
 
@@ -87,21 +90,28 @@ def nominal(car: Car, road: Road) -> World:
             springs_share=0.0,
             springs_time=1.0,
             springs_tilt=0.0,
+            pitch_sign=0.0,
             body_rate=0.0,
             radius=car.wheel_radius_m,
             radius_tilt=0.0,
             radius_growth=0.0,
+            radius_side=0.0,
+            out_of_round=0.0,
             lever=1.0,
             inertia=car.wheel_inertia_kg_m2,
             inertia_tilt=0.0,
+            inertia_side=0.0,
             stiffness_drive=car.stiffness_n,
             stiffness_brake=car.stiffness_n,
             stiffness_load=0.0,
             stiffness_tilt=0.0,
+            stiffness_side=0.0,
             factor_left=1.0,
             factor_right=1.0,
             patch_depth=0.0,
             stretch_depth=0.0,
+            blotches=np.zeros(0),
+            grip_tilt=0.0,
             wet_fall=0.0,
             falloff=0.0,
             falloff_floor=1.0,
@@ -111,6 +121,7 @@ def nominal(car: Car, road: Road) -> World:
             relaxation_load=False,
             relaxation_shrinks=False,
             relaxation_speed=0.0,
+            relaxation_tilt=0.0,
             force_relaxation=0.0,
             foreign_share=0.0,
             foreign_curve=MAGIC,
@@ -122,6 +133,7 @@ def nominal(car: Car, road: Road) -> World:
             drag=0.5 * AIR_KG_M3 * area,
             drag_height=0.0,
             fanning=0.0,
+            drag_fast=0.0,
             lift=0.0,
             gust_drag=0.0,
             wind=np.zeros(2),
@@ -130,27 +142,38 @@ def nominal(car: Car, road: Road) -> World:
             roll_growth=0.0,
             roll_linear=0.0,
             roll_wet=0.0,
+            roll_texture=0.0,
+            roll_tilt=0.0,
+            slush=0.0,
             brake_drag=0.0,
             brake_share=np.ones(4),
             brake_pulse=0.0,
+            brake_release=0.0,
             bearing=0.0,
             grade=0.0,
             wave_slope=0.0,
             wave_length=1.0,
             profile=np.zeros(0),
             delay=0.0,
+            delay_tilt=0.0,
             message=0.0,
             message_joined=False,
+            message_lost=0.0,
             beat=0.0,
             wait=0.0,
             lag=0.0,
             lag_first=0.0,
             lag_sign=0.0,
             lag_damping=0.0,
+            lag_tilt=0.0,
+            lag_speed=0.0,
+            actuator_play=0.0,
             slew=0.0,
             gain=np.ones(4),
             gain_sign=0.0,
             gain_speed=0.0,
+            gain_load=0.0,
+            axle_share=0.0,
             pad_rise=0.0,
             slip_allowed=1.0,
             slip_cut=0.0,
@@ -164,6 +187,8 @@ def nominal(car: Car, road: Road) -> World:
             shaft_damping=0.0,
             shaft_play=0.0,
             shaft_tilt=0.0,
+            shaft_axles=0.0,
+            shaft_friction=0.0,
             motor_inertia=0.0,
             slosh_share=0.0,
             slosh_rate=1.0,

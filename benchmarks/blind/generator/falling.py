@@ -1,0 +1,30 @@
+"""Ways in which friction falls with the sliding speed, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER, LOGARITHMIC, ARCTANGENT = range(7)
+"""Their codes."""
+
+
+@njit(cache=True)
+def fallen(curve: int, sliding: float, floor: float) -> float:
+    """Share of the friction that is left; `sliding` is the speed times the falloff [-].
+
+    Whatever the curve, it is 1 with the slope -(1 - `floor`) at rest, and `floor` in the end.
+    """
+    if curve == HYPERBOLIC:
+        return floor + (1.0 - floor) / (1.0 + sliding)
+    if curve == SATURATING:
+        return floor + (1.0 - floor) * (1.0 - np.tanh(sliding))
+    if curve == STRAIGHT:
+        return 1.0 - (1.0 - floor) * min(sliding, 1.0)
+    if curve == POWER:
+        return floor + (1.0 - floor) / (1.0 + 0.5 * sliding) ** 2
+    if curve == LOGARITHMIC:
+        return 1.0 - (1.0 - floor) * min(np.log1p(sliding), 1.0)
+    if curve == ARCTANGENT:
+        return 1.0 - (1.0 - floor) * 2.0 / np.pi * np.arctan(0.5 * np.pi * sliding)
+    return floor + (1.0 - floor) * np.exp(-sliding)
