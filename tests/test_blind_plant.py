@@ -249,7 +249,7 @@ def test_the_nominal_car_is_the_products(name, family, tmp_path):
         "position_m",
     ]
     off = path[:, [W, W + 3, V, N, X]] - log[signals].to_numpy()
-    # A wheel that comes back from the limit does so a row sooner in one of the two: that time, 2 % of it all, is left out.
+    # A wheel that comes back from the limit does so a row sooner in one of the two: that time, 2 % of all, is left out.
     off = np.sort(np.abs(off), axis=0)[: -len(off) // 50]
     assert np.all(np.sqrt(np.mean(off**2, axis=0)) < [0.008, 0.008, 5e-4, 4e-3, 2e-3])
 
