@@ -67,6 +67,9 @@ RELATIVE_TOLERANCE = 5e-5
 BRAKE_FADE_RAD_S = 0.02
 """Motor speed below which its brake fades out; the rim then creeps by no more than the slip's floor [rad/s]."""
 
+FOLLOWING = 4.0
+"""Tolerances that do where the plant follows measurements, whose noise is fifteen times what that leaves [-]."""
+
 SHORTEST_STEP_S = 1e-5
 """A sub-step of this length is taken whatever its error estimate says [s]."""
 
@@ -483,9 +486,30 @@ def advance(
     `first` must hold the forces at y, and does so again at the end. Sub-steps end at every road border that a wheel
     crosses and shrink until their error estimate is accepted.
     """
+    return _advance(y, trial, torque_nm, next_torque_nm, step_s, accel, p, road, first, second, step_s, 1.0)[
+        0
+    ]
+
+
+@compiled
+def _advance(
+    y: NDArray,
+    trial: NDArray,
+    torque_nm: NDArray,
+    next_torque_nm: NDArray,
+    step_s: float,
+    accel: float,
+    p: DynamicsParameters,
+    road: RoadTable,
+    first: Wheels,
+    second: Wheels,
+    h: float,
+    looser: float,
+) -> tuple[float, float]:
+    """As `advance`, from a first sub-step of h and with `looser` tolerances; also returns the first one that held."""
     count = _states(p)
     at_s = 0.0
-    h = step_s
+    held_s = 0.0
     ahead_m = look_up_theta(y[POSITION], p, road, first.theta)
     while step_s - at_s > 1e-9 * step_s:
         h = min(h, step_s - at_s)
@@ -495,17 +519,18 @@ def advance(
         error, new_accel = _try_step(
             y, trial, torque_nm, next_torque_nm, begin, end, h, accel, p, first, second
         )
-        tolerance = TOLERANCE_M_S + RELATIVE_TOLERANCE * y[SPEED]
+        tolerance = looser * (TOLERANCE_M_S + RELATIVE_TOLERANCE * y[SPEED])
         if error > tolerance and h > SHORTEST_STEP_S:
             h = max(h * max(0.9 * np.sqrt(tolerance / error), 0.1), SHORTEST_STEP_S)
             continue
         for j in range(count):
             y[j] = trial[j]
+        held_s = h if at_s == 0.0 else held_s
         at_s += h
         h *= min(0.9 * np.sqrt(tolerance / max(error, 1e-3 * tolerance)), 10.0)
         ahead_m = look_up_theta(y[POSITION], p, road, first.theta)
         accel = forces(y, new_accel, p, first)
-    return accel
+    return accel, held_s
 
 
 @compiled
@@ -608,6 +633,7 @@ def follow(
     road = RoadTable(start_m, between(thetas, shares[0]))
     p = _car_between(ends, shares[0])
     accel = refresh(y, 0.0, p, road, first)
+    held_s = step_s
     for k in range(n):
         states[k] = y[:6]
         accels[k] = accel
@@ -625,5 +651,8 @@ def follow(
             p = _car_between(ends, shares[k])
             road.theta[:] = between(thetas, shares[k])
         accel = refresh(y, accel, p, road, first)
-        accel = advance(y, trial, torque_nm[k], torque_nm[k + 1], step_s, accel, p, road, first, second)
+        torque, next_torque = torque_nm[k], torque_nm[k + 1]
+        accel, held_s = _advance(
+            y, trial, torque, next_torque, step_s, accel, p, road, first, second, 2.0 * held_s, FOLLOWING
+        )
     return states, accels, slip, force_n, load_n, theta
