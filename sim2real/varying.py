@@ -8,7 +8,7 @@ effect; the constant then is its mean.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -111,22 +111,7 @@ def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied
     bumps = _bumps(free, drives, over)
     shares = [np.zeros((len(d), count)) for d in drives]
     z = [left(i, shares[i]) for i in range(len(drives))]
-    slopes = [np.zeros((len(z_i), len(bumps))) for z_i in z]
-    for i, drive in enumerate(drives):
-        for j in free:
-            mine = [
-                (b, w)
-                for b, bump in enumerate(bumps)
-                if bump.parameter == j
-                if (w := bump.weights[i]) is not None
-            ]
-            for chosen in sets_apart([w for _, w in mine], KNOT_S):
-                weights = [mine[at][1] for at in chosen]
-                moved = np.zeros_like(shares[i])
-                moved[:, j] = np.sum(weights, axis=0)
-                response = (left(i, moved) - z[i]).reshape(len(drive), -1)
-                for at, rows in zip(chosen, windows(weights), strict=True):
-                    slopes[i].reshape(len(drive), -1, len(bumps))[rows, :, mine[at][0]] = response[rows]
+    slopes = [_slopes(partial(left, i), z[i], shares[i], bumps, i) for i in range(len(drives))]
     size = np.maximum(np.abs(x - candidate.neutral), 1e-9)
     sigma = SPREAD * size / np.abs(step)
     prior = np.array([1.0 / sigma[bump.parameter] ** 2 for bump in bumps])
@@ -150,6 +135,33 @@ def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied
     return Varied(varied, over, spread, float(prior @ a**2), seconds)
 
 
+@dataclass(frozen=True)
+class Slopes:
+    """What one drive's residuals do with the bumps that it has."""
+
+    columns: NDArray[np.int64]
+    values: Array
+
+
+def _slopes(
+    left: Callable[[Array], Array], z: Array, at_rest: Array, bumps: Sequence[Bump], drive: int
+) -> Slopes:
+    """Finite differences of a drive's residuals by its bumps; those that lie far apart share a run."""
+    mine = [(b, bump.parameter, w) for b, bump in enumerate(bumps) if (w := bump.weights[drive]) is not None]
+    values = np.zeros((len(at_rest), len(z) // len(at_rest), len(mine)))
+    for parameter in sorted({j for _, j, _ in mine}):
+        own = [at for at, (_, j, _) in enumerate(mine) if j == parameter]
+        for chosen in sets_apart([mine[at][2] for at in own], KNOT_S):
+            columns = [own[k] for k in chosen]
+            weights = [mine[at][2] for at in columns]
+            moved = at_rest.copy()
+            moved[:, parameter] += np.sum(weights, axis=0)
+            response = (left(moved) - z).reshape(len(at_rest), -1)
+            for at, rows in zip(columns, windows(weights), strict=True):
+                values[rows, :, at] = response[rows]
+    return Slopes(np.array([b for b, _, _ in mine], dtype=np.int64), values.reshape(len(z), -1))
+
+
 def _along(bumps: Sequence[Bump], a: Array, drive: int, rows: int, parameters: int) -> Array:
     shares = np.zeros((rows, parameters))
     for bump, value in zip(bumps, a, strict=True):
@@ -159,13 +171,13 @@ def _along(bumps: Sequence[Bump], a: Array, drive: int, rows: int, parameters: i
     return shares
 
 
-def _solved(z: Sequence[Array], slopes: Sequence[Array], prior: Array, a: Array) -> Array:
+def _solved(z: Sequence[Array], slopes: Sequence[Slopes], prior: Array, a: Array) -> Array:
     """The next values: reweighted least squares on the residuals at `a`, with the prior."""
     normal, right = np.diag(prior), -prior * a
     for part, slope in zip(z, slopes, strict=True):
-        weighted = slope * robust_weight(part)[:, None]
-        normal = normal + slope.T @ weighted
-        right = right - weighted.T @ part
+        weighted = slope.values * robust_weight(part)[:, None]
+        normal[np.ix_(slope.columns, slope.columns)] += slope.values.T @ weighted
+        right[slope.columns] -= weighted.T @ part
     return np.asarray(a + np.linalg.solve(normal, right))
 
 
