@@ -205,7 +205,11 @@ def start(columns: dict[str, Array], step_s: float, p: DynamicsParameters) -> Ar
             return float("nan")
         return float(np.polynomial.Polynomial.fit(rows[good], values[good], 1)(0.0))
 
-    speed = max(np.nan_to_num(at_start(CHANNELS[SPEED])), 0.0)
+    rims_m_s = np.array([at_start(name) for name in CHANNELS[WHEEL]]) * p.wheel_radius_m
+    speed = at_start(CHANNELS[SPEED])
+    if not np.isfinite(speed) and np.isfinite(rims_m_s).any():  # not measured yet: as fast as the wheels roll
+        speed = float(np.nanmean(rims_m_s))
+    speed = max(np.nan_to_num(speed), 0.0)
     y = dynamics.initial_y(speed, float(np.nan_to_num(at_start(CHANNELS[POSITION]))), p)
     for i, name in enumerate(CHANNELS[WHEEL]):
         value = at_start(name)

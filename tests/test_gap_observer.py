@@ -135,6 +135,13 @@ def test_a_log_that_is_measured_at_its_start_alone_is_the_plain_simulation_from_
     assert np.all(np.abs(seen.channels - drive.measured) < FOLLOWED)
 
 
+def test_a_car_whose_speed_is_not_measured_yet_begins_as_fast_as_its_wheels_roll(tame):
+    measured = tame.measured.copy()
+    measured[:40, SPEED] = np.nan
+    seen = MODEL.predict(remeasured(tame, measured)).states
+    np.testing.assert_allclose(seen[:40, SPEED], tame.measured[:40, SPEED], atol=0.05)
+
+
 def test_a_wrong_state_is_forgotten_with_the_memory(tame):
     measured = tame.measured.copy()
     rows = slice(250, 251)

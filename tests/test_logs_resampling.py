@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from log_maker import make_frame, save
 
 from sim2real.logs import read_log, resample
-from sim2real.logs.resampling import hold, onto
+from sim2real.logs.resampling import hold, lost_share, onto
 
 STEPS = st.sampled_from([0.001, 0.002, 0.0025, 0.004, 0.01, 0.013, 0.05])
 
@@ -98,3 +98,24 @@ def test_hold_knows_nothing_before_the_first():
 def test_steps_that_make_no_grid(tmp_path, step_s):
     with pytest.raises(ValueError, match="expected more than 0 and at most the log's 3 s"):
         resample(read(tmp_path, make_frame()), step_s)
+
+
+@pytest.mark.parametrize("every", [2, 3, 5])
+def test_a_signal_that_comes_slower_than_the_rows_has_its_own_rate(every):
+    time_s = np.arange(1000) * 0.01
+    values = np.where(np.arange(1000) % every == 0, 3.0 + 2.0 * time_s, np.nan)
+    assert lost_share(values, 0.01) == pytest.approx(0.0, abs=5e-3)
+    grid = np.arange(0.0, 9.9, 0.008)
+    found = onto(time_s, values, grid, 0.008)
+    np.testing.assert_allclose(found, 3.0 + 2.0 * grid, atol=1e-9)
+    values[300:360] = np.nan
+    assert lost_share(values, 0.01) == pytest.approx(0.06, abs=0.01)
+    found = onto(time_s, values, grid, 0.008)
+    assert np.isnan(found[(grid > 3.01) & (grid < 3.54)]).all()
+
+
+def test_a_signal_that_comes_once_a_second_is_lost_between():
+    time_s = np.arange(1000) * 0.01
+    values = np.where(np.arange(1000) % 100 == 0, 3.0, np.nan)
+    assert lost_share(values, 0.01) == pytest.approx(0.99)
+    assert np.isnan(onto(time_s, values, np.arange(0.004, 9.9, 0.008), 0.008)).mean() > 0.98

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.logs.contract import REQUIRED, TIME, WHEEL_SPEEDS
-from sim2real.logs.resampling import BROKEN, median_step
+from sim2real.logs.resampling import BROKEN, lost_share, median_step
 from sim2real.logs.table import SHOWN, Array, Finding, and_more
 from sim2real.logs.units import factor
 
@@ -115,8 +115,8 @@ def _gap_findings(gaps: tuple[tuple[float, float], ...]) -> Iterator[Finding]:
         yield Finding(f"has no rows {listed}{and_more(len(gaps))}.", fatal=False)
 
 
-def check_values(signals: Mapping[str, Array], row: Row) -> Iterator[Finding]:
-    """Infinite and lost values, and values that a column cannot have."""
+def check_values(time_s: Array | None, signals: Mapping[str, Array], row: Row) -> Iterator[Finding]:
+    """Infinite and lost values, and values that a column cannot have; `time_s` where the clock can be used."""
     for name, values in signals.items():
         infinite = np.flatnonzero(np.isinf(values))
         if len(infinite):
@@ -127,7 +127,9 @@ def check_values(signals: Mapping[str, Array], row: Row) -> Iterator[Finding]:
         if share == 1.0:
             tail = "expected measured values." if name in REQUIRED else "it is taken as not measured."
             yield Finding(f"column {name} has no value at all; {tail}", fatal=name in REQUIRED)
-        elif name in REQUIRED and share > LOST_WARNING:
+            continue
+        share = share if time_s is None else lost_share(values, median_step(time_s))
+        if name in REQUIRED and share > LOST_WARNING:
             fatal = share > LOST_SHARE
             tail = f"; expected at most {LOST_SHARE:.0%}." if fatal else "."
             yield Finding(f"column {name}: {share:.0%} of its samples are lost{tail}", fatal)

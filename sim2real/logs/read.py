@@ -60,7 +60,7 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
     findings += [
         *clock.findings,
         *made.findings,
-        *check_values(made.signals, row),
+        *check_values(time_s if clock.usable else None, made.signals, row),
         *check_wheels(made.signals),
     ]
     if clock.usable:

@@ -16,6 +16,9 @@ DECIMATION = 1.5
 BROKEN = 1.5
 """Samples further apart than this many steps have lost ones between them: jitter may move a sample by half a step."""
 
+SLOWEST_S = 0.1
+"""A signal whose samples come further apart than this is lost between them: a line no longer tells what it did [s]."""
+
 SAME = 1e-6
 """Fraction of a step within which two times are the same: times in files are rounded."""
 
@@ -89,6 +92,7 @@ def onto(time_s: Array, values: Array, at_s: Array, step_s: float) -> Array:
     array, shape (k,)
         NaN outside the samples' times and wherever a lost sample would be needed.
     """
+    time_s, values = of_its_own(time_s, values)
     if len(time_s) < 2:
         return np.full(len(at_s), np.nan)
     own = median_step(time_s)
@@ -105,6 +109,23 @@ def onto(time_s: Array, values: Array, at_s: Array, step_s: float) -> Array:
     mean[np.interp(high, time_s, lost) - np.interp(low, time_s, lost) > SAME * own] = np.nan
     point[inside] = mean
     return point
+
+
+def of_its_own(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """A signal's own samples: one that comes slower than the log's rows has its own rate, and none lost between."""
+    there = np.isfinite(values)
+    if np.count_nonzero(there) < 2 or median_step(time_s[there]) > SLOWEST_S:
+        return time_s, values
+    return time_s[there], values[there]
+
+
+def lost_share(values: Array, step_s: float) -> float:
+    """Share of a signal's samples that are lost in the rows of a log with this step, at its own rate [-]."""
+    rows = np.flatnonzero(np.isfinite(values))
+    every = round(float(np.median(np.diff(rows)))) if len(rows) > 1 else 1
+    if every * step_s > SLOWEST_S:
+        every = 1
+    return max(1.0 - len(rows) * every / len(values), 0.0)
 
 
 def _interpolate(time_s: Array, values: Array, at_s: Array, own_s: float) -> Array:
