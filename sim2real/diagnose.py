@@ -26,7 +26,6 @@ from sim2real.observer import Simulation
 from sim2real.pairs import add_pairs, add_partners, add_twins
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
-from sim2real.running import with_running_window
 from sim2real.selection import decide, is_noise, needs_pairs
 from sim2real.sluggish import slow_speed
 from sim2real.sources import Sources, read_source, read_sources
@@ -144,7 +143,6 @@ def find(
 ) -> Findings:
     """Hold the contest and decide it."""
     lattice = None if model.has(COUNTER) else common_lattice([d.lattice for d in (*fit, holdout)])
-    lattice = lattice and with_running_window(lattice, model, fit)
     base = model.with_effects(lattice.effect()) if lattice else model
     fit_to, held = gather(base, fit), gather(base, [holdout])
     first = first_round(base, fit_to, exclude, jobs, progress)

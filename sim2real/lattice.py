@@ -42,8 +42,6 @@ SEEN = 1.5
 """Least window that a log shows, in steps of the log [-]."""
 UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
-RUNNING = 0.2
-"""How closely a window that was fitted is known [-]."""
 MOST_SAMPLES = 1200
 SEARCH = 3000
 
@@ -82,20 +80,12 @@ class Lattice:
         Noise beside the rounding [rad/s].
     step_s : float
         The log's own; a window of no more than it cannot be seen [s].
-    runs : bool
-        Whether the window runs along with the log and was fitted, see `sim2real.running`, not seen.
     """
 
     quantum_rad_s: float
     window_s: float
     sigma_rad_s: float
     step_s: float
-    runs: bool = False
-
-    @property
-    def is_seen(self) -> bool:
-        """Whether the values tell the window."""
-        return self.window_s > SEEN * self.step_s
 
     @property
     def teeth(self) -> int:
@@ -109,9 +99,9 @@ class Lattice:
     @property
     def window_range_s(self) -> tuple[float, float]:
         """What the window may be [s]."""
-        if self.runs:
-            return (1.0 - RUNNING) * self.window_s, (1.0 + RUNNING) * self.window_s
-        least = self.window_s - 0.5 * self.step_s if self.is_seen else UNSEEN * self.step_s
+        least = (
+            UNSEEN * self.step_s if self.window_s <= SEEN * self.step_s else self.window_s - 0.5 * self.step_s
+        )
         return least, self.window_s + 0.5 * self.step_s
 
     @property

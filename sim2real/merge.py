@@ -131,10 +131,9 @@ def counter_side(lattice: Lattice, before: Measure, after: Measure, excluded: bo
         Whether the effect was left out of the library.
     """
     old, new = before.signals["wheel_speed"], after.signals["wheel_speed"]
-    window = f"{1e3 * lattice.window_s:.4g} ms"
     what = (
-        f"All wheel speeds are multiples of {lattice.quantum_rad_s:.4g} rad/s and "
-        f"{f'are means over {window}' if lattice.runs else f'change every {window}'}."
+        f"All wheel speeds are multiples of {lattice.quantum_rad_s:.4g} rad/s and change every "
+        f"{1e3 * lattice.window_s:.4g} ms."
     )
     if excluded:
         term = Unexplained(

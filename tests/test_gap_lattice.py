@@ -2,16 +2,13 @@
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured
+from gap_drives import random_drives
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from scenarios.effects.wheel_speed_delay import WheelSpeedDelay
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
-from sim2real.drive import CHANNELS, WHEEL
 from sim2real.lattice import Lattice, SmoothCounter, common_lattice, find_lattice, is_digit
-from sim2real.running import with_running_window
 
 RATE_HZ = 500.0
 TURN = 2.0 * np.pi
@@ -237,35 +234,3 @@ def test_round_numbers_are_told_from_a_counters_quanta():
     assert not any(
         is_digit(TURN / (teeth * w)) for teeth in (48, 96, 100, 1018, 4096) for w in (0.005, 0.01, 0.04)
     )
-
-
-# --- a window that runs along with the log
-
-UNSEEN_WINDOW = Lattice(2.0 * np.pi / (60.0 * 0.12), 1e-3, 0.02, 1e-3)
-
-
-def rolling_logs(effect):
-    """Two drives whose wheel speeds a sensor makes something of; rounding is noise here."""
-    names = [name for name in CHANNELS if name.startswith("wheel_speed_")]
-    logs = []
-    for seed in range(2):
-        drive = clean(pulses(12.0), 12.0)
-        told = effect.sense(drive.time_s, dict(zip(names, drive.measured[:, WHEEL].T, strict=True)))
-        measured = drive.measured.copy()
-        measured[:, WHEEL] = np.column_stack([told[name] for name in names])
-        logs.append(noisy(remeasured(drive, measured), seed))
-    return logs
-
-
-def test_a_window_that_runs_is_read_from_what_it_averages():
-    found = with_running_window(UNSEEN_WINDOW, MODEL, rolling_logs(SmoothCounter(60.0, 0.12)))
-    assert found.runs
-    assert found.window_s == pytest.approx(0.12, rel=0.1)
-    assert found.teeth == pytest.approx(60, rel=0.1)
-    low, high = found.window_range_s
-    assert low < 0.12 < high
-
-
-@pytest.mark.parametrize("effect", [WheelSpeedDelay(0.1), WheelSpeedDelay(0.0)])
-def test_a_delay_is_no_window(effect):
-    assert with_running_window(UNSEEN_WINDOW, MODEL, rolling_logs(effect)) == UNSEEN_WINDOW
