@@ -241,14 +241,9 @@ def _variation(decision: Decision) -> Variation | None:
     if varied is None:
         return None
     found = varied.entry.fitted
-    size = dict(
-        zip(
-            ((key, p.name) for key, p in found.candidate.parameters),
-            np.abs(found.x - found.candidate.neutral),
-            strict=True,
-        )
-    )
-    most = max(varied.spread, key=lambda name: varied.spread[name] / max(float(size[name]), 1e-9))[0]
+    sizes = np.maximum(np.abs(found.x - found.candidate.neutral), 1e-9)
+    size = {(key, p.name): s for (key, p), s in zip(found.candidate.parameters, sizes, strict=True)}
+    most, _ = max(varied.spread, key=lambda name: varied.spread[name] / size[name])
     return Variation(
         most, varied.over, {name: value for (key, name), value in varied.spread.items() if key == most}
     )

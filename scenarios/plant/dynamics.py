@@ -480,33 +480,15 @@ def advance(
     road: RoadTable,
     first: Wheels,
     second: Wheels,
-) -> float:
-    """Move y over one output step with torque linear between its ends; return the accelerometer there [m/s^2].
-
-    `first` must hold the forces at y, and does so again at the end. Sub-steps end at every road border that a wheel
-    crosses and shrink until their error estimate is accepted.
-    """
-    return _advance(y, trial, torque_nm, next_torque_nm, step_s, accel, p, road, first, second, step_s, 1.0)[
-        0
-    ]
-
-
-@compiled
-def _advance(
-    y: NDArray,
-    trial: NDArray,
-    torque_nm: NDArray,
-    next_torque_nm: NDArray,
-    step_s: float,
-    accel: float,
-    p: DynamicsParameters,
-    road: RoadTable,
-    first: Wheels,
-    second: Wheels,
     h: float,
     looser: float,
 ) -> tuple[float, float]:
-    """As `advance`, from a first sub-step of h and with `looser` tolerances; also returns the first one that held."""
+    """Move y over one output step with torque linear between its ends; return the accelerometer there [m/s^2].
+
+    `first` must hold the forces at y, and does so again at the end. Sub-steps end at every road border that a wheel
+    crosses and shrink until their error estimate is accepted, from a first one of h [s] and with tolerances `looser`
+    than the plant's own by that factor. Also returns the first sub-step that held [s].
+    """
     count = _states(p)
     at_s = 0.0
     held_s = 0.0
@@ -562,7 +544,8 @@ def run(
         slip[k], force_n[k] = first.slip, first.force_n
         load_n[k], theta[k] = first.load_n, first.theta
         if k + 1 < n:
-            accel = advance(y, trial, torque_nm[k], torque_nm[k + 1], step_s, accel, p, road, first, second)
+            torque, next_torque = torque_nm[k], torque_nm[k + 1]
+        accel, _ = advance(y, trial, torque, next_torque, step_s, accel, p, road, first, second, step_s, 1.0)
     return states, accels, slip, force_n, load_n, theta
 
 
@@ -652,7 +635,7 @@ def follow(
             road.theta[:] = between(thetas, shares[k])
         accel = refresh(y, accel, p, road, first)
         torque, next_torque = torque_nm[k], torque_nm[k + 1]
-        accel, held_s = _advance(
+        accel, held_s = advance(
             y, trial, torque, next_torque, step_s, accel, p, road, first, second, 2.0 * held_s, FOLLOWING
         )
     return states, accels, slip, force_n, load_n, theta

@@ -215,7 +215,7 @@ def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> Pla
     first, second = dynamics.new_wheels()
     for own, given in zip(first, state.wheels, strict=True):
         own[:] = given
-    accel = dynamics.advance(
+    accel, _ = dynamics.advance(
         y,
         np.empty_like(y),
         np.array(state.wheel_torque_nm),
@@ -226,6 +226,8 @@ def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> Pla
         setup.road,
         first,
         second,
+        float(step_s),
+        1.0,
     )
     fl, fr, rl, rr = map(float, torque)
     return PlantState(setup, state.time_s + step_s, accel, y, (fl, fr, rl, rr), first)
