@@ -50,8 +50,8 @@ LEAST_THETA = 0.02
 """Lower end: at 0 the tyre model has no force and the estimate could never leave it [-]."""
 SEEN_HOLD_M = 2.0
 """Way after which what the tyre showed no longer speaks for the road under it: the depth of the near group [m]."""
-OTHER_CLASS_M = 2.0
-"""Way for which another class must stand to be another road: one picture's verdict reaches no farther [m]."""
+OTHER_CLASS_M = 4.0
+"""Way for which another class must stand to be another road: twice what one picture's verdict reaches [m]."""
 NEVER_SEEN_M = 1e6
 """Way since the tyre showed theta where it never did [m]."""
 _new = tuple.__new__
@@ -74,9 +74,9 @@ class Gains:
 
     With `tyre_first` the camera hurries the estimate along but does not drag it away from what the tyre shows: where
     theta(lambda, F_hat) is seen, the visual term acts only in its direction and no farther than it. After it was seen
-    the term rests for 2 m at least, and until the camera has said for 2 m that the road is of another class: a class
+    the term rests for 2 m at least, and until the camera has said for 4 m that the road is of another class: a class
     has one value wherever it is, so the one under which the tyre was seen says nothing new. From the first sight
-    on, a class that has not yet stood for 2 m says nothing by itself.
+    on, a class that has not yet stood for 4 m says nothing by itself.
     A tyre that is not sure to slide counts as seen in this where it would show a theta within 0.15 of the class's.
     Where the tyre is not seen, theta_img counts as no less than force and slip allow, and K_v follows the share of
     the difference that the estimate's own variance leaves to the class. Eqs. (17) and (18) as printed have no such

@@ -11,7 +11,7 @@ from .tyre import Cubic, cubic_at_slip, elastic_friction, theta_of
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
-SIGNIFICANCE = 1.5
+SIGNIFICANCE = 2.0
 """How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
 BACKED_SIGNIFICANCE = 0.25
 """The same where the camera's class is that of such a road: two witnesses need less of each [-]."""

@@ -160,6 +160,9 @@ def rows_of(
         segment_starts(scenario), segment, theta, theta_initial, estimates, tracks.excited, scenario.step_s
     )
     visible = shown(scenario, trajectory)
+    by_shown_time = score_run(
+        segment_starts(scenario), segment, theta, theta_initial, estimates, visible, scenario.step_s
+    )
     rows = []
     for place, index in enumerate(np.unique(segment)):
         here = segment == index
@@ -179,6 +182,7 @@ def rows_of(
         for name, track in tracks.by_name.items():
             part = Track(track.TRPAC[here], track.TRPAC_std[here])
             measures = extra_scores(part, theta[here], tracks.excited[here], visible[here], scenario.step_s)
+            measures["shown_convergence_time_s"] = by_shown_time[name][place]["convergence_time_s"]
             rows.append(truth | {"estimator": name} | scores[name][place] | measures)
     return rows
 
