@@ -15,7 +15,7 @@ from scenarios.files import load_vehicle
 from sim2real.closure import closing
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
-from sim2real.evidence import drift_of, gather
+from sim2real.evidence import drift_of, gather, residuals
 from sim2real.findings import Findings, describe
 from sim2real.gap import measure
 from sim2real.lattice import common_lattice
@@ -23,6 +23,7 @@ from sim2real.logs import resample
 from sim2real.merge import camera_side, counter_side, merge
 from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
+from sim2real.orders import Order, counts, read_order, without_swing
 from sim2real.pairs import add_pairs, add_partners, add_twins
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
@@ -144,6 +145,7 @@ def find(
     """Hold the contest and decide it."""
     lattice = None if model.has(COUNTER) else common_lattice([d.lattice for d in (*fit, holdout)])
     base = model.with_effects(lattice.effect()) if lattice else model
+    order, (*fit, holdout) = without_order(base, [*fit, holdout])
     fit_to, held = gather(base, fit), gather(base, [holdout])
     first = first_round(base, fit_to, exclude, jobs, progress)
     if first:
@@ -165,7 +167,22 @@ def find(
     if decision.verdict is Verdict.UNKNOWN:
         contest = add_varied(contest, fit_to, held, jobs, progress)
         decision = decide(contest, fit_to, held)
-    return Findings(base, fit_to, held, contest, closing(decision, base, held), lattice)
+    if order is not None and decision.verdict is Verdict.NO_GAP:
+        decision = replace(decision, verdict=Verdict.UNKNOWN)
+        return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)
+    return Findings(base, fit_to, held, contest, closing(decision, base, held), lattice, order)
+
+
+def without_order(model: Simulation, drives: Sequence[Drive]) -> tuple[Order | None, list[Drive]]:
+    """What repeats with the wheels' angle and is more than noise, and the logs without it."""
+    rests = [residuals(model, drive) for drive in drives]
+    order = read_order(drives, rests)
+    if order is None:
+        return None, list(drives)
+    calm = [without_swing(drive, rest, order) for drive, rest in zip(drives, rests, strict=True)]
+    if not counts(calm, gather(model, calm).noises):
+        return None, list(drives)
+    return order, calm
 
 
 def counter_gap(findings: Findings) -> tuple[Measure, Measure]:

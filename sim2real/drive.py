@@ -57,6 +57,8 @@ class Drive:
         Channels that are evidence: measured, and not computed from others.
     lattice : Lattice or None
         What a pulse-counting sensor left in the wheel speeds, as logged.
+    swing : array, shape (n, 7), or None
+        What was taken off `measured` since it repeats with the wheels' angle, see `sim2real.orders`.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Drive:
     moving: NDArray[np.bool_]
     counted: NDArray[np.bool_]
     lattice: Lattice | None = None
+    swing: Array | None = None
 
     @property
     def step_s(self) -> float:

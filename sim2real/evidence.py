@@ -51,6 +51,11 @@ class Evidence:
         pairs = zip(self.drives, self.noises, strict=True)
         return replace(self, noises=tuple(with_drift(model, d, n, drift) for d, n in pairs))
 
+    def swinging(self) -> Evidence:
+        """The same drives with what repeats with the wheels' angle, if that was taken off, in their noise as it is."""
+        drives = [d if d.swing is None else replace(d, measured=d.measured + d.swing) for d in self.drives]
+        return replace(self, drives=tuple(drives))
+
     def longest(self) -> Evidence:
         """The longest drive alone."""
         i = int(np.argmax([len(d) for d in self.drives]))

@@ -18,6 +18,8 @@ from sim2real.gap import intervals, measure, noise_floor, shrink
 from sim2real.lattice import Lattice
 from sim2real.next_manoeuvre import propose
 from sim2real.observer import Simulation
+from sim2real.orders import Order
+from sim2real.orders import characterise as swing_in_words
 from sim2real.result import (
     Cause,
     Diagnosis,
@@ -27,6 +29,7 @@ from sim2real.result import (
     Place,
     Structure,
     Trace,
+    Unexplained,
     Variation,
     Verdict,
 )
@@ -56,6 +59,10 @@ class Findings:
     contest: Contest
     decision: Decision
     lattice: Lattice | None = None
+    order: Order | None = None
+    """What repeats with the wheels' angle: it was taken off the logs before the contest."""
+    only_order: bool = False
+    """Whether that is the whole gap."""
 
     def added(self) -> tuple[Effect, ...]:
         """What the verdict blames, to be added to the model."""
@@ -75,7 +82,7 @@ class Findings:
 def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Diagnosis:
     """Everything that a diagnosis says."""
     decision = found.decision
-    held = _final_noise(found)
+    held = _final_noise(found).swinging()
     before = held.residuals(found.model)
     added = found.model.with_effects(*found.added())
     after = held.residuals(added)
@@ -100,9 +107,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
             suspect = lone_sensor(found.model, found.fit_to, held)
         terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown, only=suspect)
         progress("equations", 1, 1)
-        if unknown:
+        if found.only_order:
+            unexplained = _swinging(found)
+        elif unknown:
             unexplained = characterise(terms, suspect)
-        subsystem = _subsystem(decision, terms)
+        subsystem = unexplained.subsystem if unexplained else _subsystem(decision, terms)
         taken = loss(held.whitened(before)) - loss(held.whitened(after))
         places, heat = _where(found, held, before, terms, subsystem, taken)
     return Diagnosis(
@@ -113,6 +122,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
                 _sentence(decision, gap, causes, unexplained.sentence if unexplained else ""),
                 _beside(structure),
                 _uneven(variation),
+                _swinging(found).sentence if found.order and not found.only_order else "",
             )
             if part
         ),
@@ -129,6 +139,15 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         traces=_traces(found, held, added),
         provenance={"seed": seed},
     )
+
+
+def _swinging(found: Findings) -> Unexplained:
+    """What repeats with the wheels' angle, and what of the misfit it takes."""
+    assert found.order is not None
+    calm = [found.fit_to, found.holdout]
+    left = sum(loss(e.whitened(e.residuals(found.model))) for e in calm)
+    whole = sum(loss(e.whitened(e.residuals(found.model))) for e in (part.swinging() for part in calm))
+    return swing_in_words(found.order, [d for e in calm for d in e.drives], 1.0 - left / max(whole, 1e-12))
 
 
 def _final_noise(found: Findings) -> Evidence:
