@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from .excitation import FuzzyScheduler
@@ -11,8 +12,14 @@ from .tyre import Cubic, cubic_at_slip, elastic_friction, theta_of
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
-SIGNIFICANCE = 2.0
-"""How many standard deviations of slip must lie between the tyre and one that does not slide at all [-]."""
+SIGNIFICANCE = 1.5
+"""How many standard deviations of slip must lie between the tyre and one that does not slide at all, for a mean that
+has long been held [-]."""
+YOUNG = 1.0
+"""How many more for a single reading [-]: a young mean is another one at each step, and one of many is soon far off."""
+YOUNG_S = 0.08
+"""Time with which a mean that is held outgrows that [s]."""
+AT_ONCE = SIGNIFICANCE + YOUNG
 BACKED_SIGNIFICANCE = 0.25
 """The same where the camera's class is that of such a road: two witnesses need less of each [-]."""
 BACKED_AFTER_S = 0.02
@@ -69,10 +76,10 @@ def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: Fuz
 
     On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
     end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
-    So the force must also be below the elastic one of a slip that is `SIGNIFICANCE` deviations smaller.
+    So the force must also be below the elastic one of a slip that is `AT_ONCE` deviations smaller.
     """
     size, load_n, deviation, change = inputs[3][0], inputs[4], inputs[5], inputs[6]
-    surely = size - SIGNIFICANCE * (deviation + change)
+    surely = size - AT_ONCE * (deviation + change)
     threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
     return cubic_at_slip(size, load_n, longitudinal_stiffness_n), surely, threshold
 
@@ -99,7 +106,8 @@ def place_of_mean(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n:
     load_n = inputs[4]
     deviation = mean_deviation(steady, inputs[9], inputs[12], inputs[10]) + abs(steady[2])
     tyre = cubic_at_slip(steady[0], load_n, longitudinal_stiffness_n)
-    surely = steady[0] - SIGNIFICANCE * deviation
+    significance = SIGNIFICANCE + YOUNG * math.exp(-steady[3] / YOUNG_S)
+    surely = steady[0] - significance * deviation
     return steady, tyre, elastic_friction(surely, load_n, longitudinal_stiffness_n), deviation
 
 
@@ -135,12 +143,12 @@ def visible_theta(
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
-    """The smallest theta that force and slip allow: the inverse at a slip `SIGNIFICANCE` deviations larger.
+    """The smallest theta that force and slip allow: the inverse at a slip `AT_ONCE` deviations larger.
 
     Below the curve's maximum, that is: beyond it a larger slip asks for more theta, but there the tyre is seen.
     """
     (size, direction), load_n, deviation, change = inputs[3:7]
-    surely = size + SIGNIFICANCE * (deviation + change)
+    surely = size + AT_ONCE * (deviation + change)
     friction = force_n * direction / load_n
     tyre = cubic_at_slip(
         surely if surely < GREATEST_SLIP else GREATEST_SLIP, load_n, longitudinal_stiffness_n
