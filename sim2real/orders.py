@@ -48,7 +48,7 @@ LEAST_SHARE = 0.5
 FOLLOWS_TORQUE = 0.5
 """Correlation of the swing's size with the torque's from which on it is the torque that swings [-]."""
 CURVE = 24
-"""Places of a turn at which the mean swing is told."""
+"""Places of a swing at which its mean curve is told."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def counts(drives: Sequence[Drive], noises: Sequence[Noise]) -> bool:
 
 
 def characterise(order: Order, drives: Sequence[Drive], share: float) -> Unexplained:
-    """The swing in the form of a result: the mean curve over a turn, of the wheel that swings most.
+    """The swing in the form of a result: the mean curve over the wheel's angle in one swing [rad].
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def characterise(order: Order, drives: Sequence[Drive], share: float) -> Unexpla
         f"The wheels' speed swings {often} per turn of the wheel, by {size:.3g} rad/s; it {grows} and {moves}. "
         f"Such a swing takes {100.0 * share:.0f} % of the misfit: look at the {order.subsystem.replace('_', ' ')}."
     )
-    at = (np.arange(CURVE) + 0.5) / CURVE * 2.0 * np.pi
+    at = (np.arange(CURVE) + 0.5) / CURVE * 2.0 * np.pi / order.per_turn
     shape = f"repeats {often} per turn"
     return Unexplained(
         order.subsystem,
