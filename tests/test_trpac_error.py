@@ -251,7 +251,8 @@ def test_a_tyre_thought_too_soft_misses_the_road_and_is_judged_for_it():
     error = trpac_error(CAR, drive, effects_of(effects))
     assert error.before == pytest.approx(0.8 - 0.45)  # never leaves its start value
     assert error.after < 0.025
-    assert re.search(r"Judged over [1-9]\.\d s before", error.sentence)
+    assert re.search(r"Judged over 0\.0 s before and [1-9]\.\d s after", error.sentence)
+    assert "Before, it never does" in error.sentence
 
 
 def test_a_locked_wheel_tells_nothing_by_its_commanded_torque():
