@@ -58,24 +58,28 @@ _VEHICLE_PARAMETERS = (
     _parameter(
         "wheel.left", "", "left_side", "The wheel is on the left side: whose track the camera looks at"
     ),
-    _parameter("vehicle.mass", "kg", "vehicle.mass_kg", "Mass of the car", 1.0),
-    _parameter("vehicle.wheelbase", "m", "vehicle.wheelbase_m", "Wheelbase", 0.1),
-    _parameter("vehicle.track", "m", "vehicle.track_m", "Track width", 0.1),
-    _parameter("vehicle.cog_height", "m", "vehicle.cog_height_m", "Height of the centre of gravity", 0.0),
+    _parameter("vehicle.mass", "kg", "vehicle.mass_kg", "Mass of the car", 1.0, 1e6),
+    _parameter("vehicle.wheelbase", "m", "vehicle.wheelbase_m", "Wheelbase", 0.1, 100.0),
+    _parameter("vehicle.track", "m", "vehicle.track_m", "Track width", 0.1, 100.0),
+    _parameter(
+        "vehicle.cog_height", "m", "vehicle.cog_height_m", "Height of the centre of gravity", 0.0, 100.0
+    ),
     _parameter(
         "vehicle.cog_to_rear_axle",
         "m",
         "vehicle.cog_to_rear_axle_m",
         "Centre of gravity to rear axle",
         0.0,
+        100.0,
     ),
-    _parameter("vehicle.wheel_radius", "m", "vehicle.wheel_radius_m", "Rolling radius R", 0.01),
+    _parameter("vehicle.wheel_radius", "m", "vehicle.wheel_radius_m", "Rolling radius R", 0.01, 10.0),
     _parameter(
         "vehicle.wheel_inertia",
         "kg.m2",
         "vehicle.wheel_inertia_kg_m2",
         "Inertia I of a wheel",
         1e-3,
+        1e6,
     ),
     _parameter(
         "tyre.rolling_resistance",
@@ -91,6 +95,7 @@ _VEHICLE_PARAMETERS = (
         "vehicle.longitudinal_stiffness_n",
         "Longitudinal stiffness C_x per unit slip",
         10_000.0,
+        1e9,
     ),
 )
 
@@ -218,6 +223,7 @@ _ESTIMATOR_PARAMETERS = (
         "confidence.torque_noise_nm",
         "Standard deviation of the torque",
         0.0,
+        1e6,
     ),
     _parameter(
         "confidence.tyre_share",
@@ -225,6 +231,7 @@ _ESTIMATOR_PARAMETERS = (
         "confidence.tyre_share",
         "Error of the tyre model, as a share of the used friction",
         0.0,
+        10.0,
     ),
     _parameter(
         "confidence.road_change",
@@ -232,6 +239,7 @@ _ESTIMATOR_PARAMETERS = (
         "confidence.road_change",
         "Wander of the adhesion per root of a metre driven unseen",
         0.0,
+        10.0,
     ),
     _parameter(
         "confidence.car_share",
@@ -239,6 +247,7 @@ _ESTIMATOR_PARAMETERS = (
         "confidence.car_share",
         "Error of load and torque, as a share of the adhesion that no driving can tell",
         0.0,
+        10.0,
     ),
     _parameter(
         "confidence.class_change",
@@ -246,6 +255,7 @@ _ESTIMATOR_PARAMETERS = (
         "confidence.class_change_m",
         "Way driven unseen that a change of the camera's class counts as",
         0.0,
+        1e6,
     ),
     _parameter(
         "confidence.class_scatter",
@@ -253,6 +263,7 @@ _ESTIMATOR_PARAMETERS = (
         "confidence.class_scatter",
         "Standard deviation of a road from the value of the class that the camera gave it",
         0.0,
+        10.0,
     ),
     _parameter(
         "tolerance.speed_bias",
@@ -260,6 +271,7 @@ _ESTIMATOR_PARAMETERS = (
         "elastic.speed_bias_m_s",
         "Standard deviation of a constant error of the sliding speed, learnt while the tyre adheres",
         0.0,
+        100.0,
     ),
     _parameter(
         "tolerance.speed_drift",
@@ -267,6 +279,7 @@ _ESTIMATOR_PARAMETERS = (
         "elastic.speed_drift_m_s",
         "How far that error wanders per root of a second",
         0.0,
+        100.0,
     ),
     _parameter(
         "tolerance.rolling_radius",
@@ -274,6 +287,7 @@ _ESTIMATOR_PARAMETERS = (
         "elastic.ratio",
         "Standard deviation of the rolling radius as a share of it, learnt while the tyre adheres",
         0.0,
+        1.0,
     ),
     _parameter(
         "tolerance.longitudinal_stiffness",
@@ -281,6 +295,7 @@ _ESTIMATOR_PARAMETERS = (
         "elastic.compliance",
         "Standard deviation of the tyre's compliance as a share of it, learnt while the tyre adheres",
         0.0,
+        10.0,
     ),
     _parameter(
         "confidence.unknown",
@@ -288,6 +303,7 @@ _ESTIMATOR_PARAMETERS = (
         "confidence.unknown",
         "Standard deviation where nothing is known",
         0.0,
+        10.0,
     ),
 )
 
