@@ -352,6 +352,17 @@ def test_energy_is_conserved(knots, theta, speed):
     assert gained == pytest.approx(np.trapezoid(power - losses, run.time_s), abs=5e-3 * scale)
 
 
+@pytest.mark.parametrize("rows", [1, 2, 7, 200])
+@pytest.mark.parametrize("effects", [{}, EVERYTHING], ids=["as it is", "everything"])
+def test_a_run_leaves_the_state_at_its_last_row(effects, rows):
+    """Drivers go on from there: what looks ahead pulse by pulse, and the rig's car block by block."""
+    setup = make_setup(with_effects(**effects), DRY)
+    y = dynamics.initial_y(5.0, 0.0, setup.parameters)
+    states = dynamics.run(y, constant(200.0, (rows - 1) * 1e-3), 1e-3, setup.parameters, setup.road)[0]
+    assert len(states) == rows
+    np.testing.assert_array_equal(y[: states.shape[1]], states[-1])
+
+
 @pytest.mark.parametrize("car", [CAR, with_effects(**EVERYTHING)], ids=["as it is", "everything"])
 def test_step_by_step_is_the_same_motion_bit_for_bit(car):
     road = make_road((0.0, 0.9, 0.9), (0.5, 0.3, 0.5))

@@ -545,7 +545,9 @@ def run(
         load_n[k], theta[k] = first.load_n, first.theta
         if k + 1 < n:
             torque, next_torque = torque_nm[k], torque_nm[k + 1]
-        accel, _ = advance(y, trial, torque, next_torque, step_s, accel, p, road, first, second, step_s, 1.0)
+            accel, _ = advance(
+                y, trial, torque, next_torque, step_s, accel, p, road, first, second, step_s, 1.0
+            )
     return states, accels, slip, force_n, load_n, theta
 
 
