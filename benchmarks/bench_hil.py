@@ -22,7 +22,8 @@ from typing import Any
 
 from scenarios.files import load_scenario
 from scenarios.pictures import PictureJob, draw
-from trpac_hil.deadlines import Deadlines, SystemClock, wait_until
+from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock, wait_until
+from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.loop import LONG_NS
 from trpac_hil.partner import PLAIN_SCENARIO, PartnerJob
 from trpac_hil.realtime import loop_core, pin, raise_priority, undisturbed
@@ -44,20 +45,26 @@ def bare_loop(duration_s: float, rate_hz: float, realtime: bool, core: int | Non
         raise_priority()
     clock, slots, done = SystemClock(), round(duration_s * rate_hz), -1
     missed_ns: list[int] = []
-    with undisturbed():
-        deadlines = Deadlines(clock.now_ns() + 100_000_000, round(1e9 / rate_hz))
+    with undisturbed(), ThreadAccounts() as accounts:
+        deadlines, delays = Deadlines(clock.now_ns() + 100_000_000, round(1e9 / rate_hz)), Delays(accounts)
         while done + 1 < slots:
-            now_ns = wait_until(clock, deadlines.due_ns(done + 1))
+            due_ns = deadlines.due_ns(done + 1)
+            now_ns = wait_until(clock, due_ns)
             slot = deadlines.next_slot(done, now_ns)
-            missed_ns += [deadlines.missed_by_ns(left_out, now_ns) for left_out in range(done + 1, slot)]
+            missed = [deadlines.missed_by_ns(left_out, now_ns) for left_out in range(done + 1, slot)]
             while clock.now_ns() < now_ns + BUSY_NS:
                 continue
-            missed_ns.append(deadlines.missed_by_ns(slot, clock.now_ns()))
+            missed.append(deadlines.missed_by_ns(slot, clock.now_ns()))
+            delays.settle(
+                due_ns - SPIN_NS, deadlines.due_ns(slot + 1), sum(late > LONG_NS for late in missed)
+            )
+            missed_ns += missed
             done = slot
     return {
         "duration_s": duration_s,
         "overruns": sum(missed > 0 for missed in missed_ns),
         "beyond_5_ms": sum(missed > LONG_NS for missed in missed_ns),
+        "beyond_5_ms_by": delays.longs,
         "worst_ms": round(max(0, *missed_ns) * 1e-6, 4),
     }
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import can
 
 from trpac_hil.codec import Codec
+from trpac_hil.delays import Spent
 from trpac_hil.unit import Estimates, Wiring
 
 MS = 1_000_000
@@ -19,7 +20,7 @@ class FakeClock:
         self.time_ns = 1_000 * MS
         self.wall_offset_ns = 5_000_000 * MS
         self.overshoot_ns: dict[int, int] = {}
-        self.worked_ns = 0
+        self.worked_ns = self.queued_ns = self.blocked = 0
         self.sleeps = 0
 
     def now_ns(self) -> int:
@@ -31,8 +32,12 @@ class FakeClock:
     def cpu_ns(self) -> int:
         return self.worked_ns
 
+    def spent(self) -> Spent:
+        return Spent(self.time_ns, self.worked_ns, self.queued_ns, self.blocked)
+
     def sleep_ns(self, duration_ns: int) -> None:
         self.sleeps += 1
+        self.blocked += 1
         self.time_ns += duration_ns + self.overshoot_ns.pop(self.sleeps, 0)
 
 

@@ -13,6 +13,7 @@ from trpac_core.vision.classes import Surface
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.codec import INPUT_MESSAGES, load_codec
 from trpac_hil.deadlines import Deadlines
+from trpac_hil.delays import Delays
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import (
@@ -74,6 +75,7 @@ class Bench:
             self.sight,
             self.ring,
             self.events,
+            Delays(self.clock),
             spin_ns=self.spin_ns,
         )
         counts = self.loop.run(lambda: False, slots)
@@ -137,6 +139,31 @@ def test_of_cycles_that_take_too_long_those_count_as_overworked_whose_thread_wor
     assert (counts.late_ends, counts.overworked) == (2, 1)
     assert bench.table["cpu_us"].max() == pytest.approx(2200.0)
     assert np.median(bench.table["cpu_us"]) == pytest.approx(200.0)
+
+
+def test_each_long_overrun_is_put_down_to_what_took_most_of_its_time() -> None:
+    bench = Bench()
+
+    def slow(number: int) -> None:
+        clock = bench.clock
+        clock.worked_ns += MS // 5
+        clock.time_ns += MS // 5
+        if number in (10, 20, 30, 40):
+            clock.time_ns += 8 * MS
+        if number == 20:
+            clock.worked_ns += 7 * MS
+        if number == 30:
+            clock.queued_ns += 7 * MS
+        if number == 40:
+            clock.blocked += 1
+
+    bench.unit.during_step = slow
+    bench.clock.overshoot_ns = {60: 12 * MS}
+    counts = bench.run(100)
+    # 8.2 ms from its begin: the cycle misses its deadline by 7.2 ms, those left out after it by 6.2 and 5.2 ms. A sleep
+    # that lasts 12 ms too long leaves out 12 slots, of which the first six are late by 11 to 6 ms.
+    assert counts.long_causes == {"own_work": 3, "other_work": 3, "waiting": 3, "machine": 3 + 6, "untold": 0}
+    assert sum(counts.long_causes.values()) == counts.long_overruns
 
 
 def test_a_sleep_that_overshoots_is_an_overrun_of_the_slots_that_it_slept_through() -> None:

@@ -11,6 +11,7 @@ import can
 
 from trpac_hil.codec import Codec
 from trpac_hil.deadlines import SPIN_NS, Clock, Deadlines, WallWatch, wait_until
+from trpac_hil.delays import Delays
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
 from trpac_hil.placing import Odometer
@@ -67,14 +68,15 @@ class Counts:
     """What the loop counts itself.
 
     `overruns` are cycles that ended after their deadline and cycles left out; `long_overruns` those of them by more
-    than 5 ms; `worst_ns` is the greatest time by which a deadline was missed. `overworked` are cycles whose own
-    processor time was longer than a period: all other overruns are time that the loop spent waiting for the processor.
+    than 5 ms, by `trpac_hil.delays.CAUSES` in `long_causes`; `worst_ns` is the greatest time by which a deadline was
+    missed. `overworked` are cycles whose own processor time was longer than a period.
     """
 
     cycles: int = 0
     late_ends: int = 0
     left_out: int = 0
     long_overruns: int = 0
+    long_causes: dict[str, int] = field(default_factory=dict)
     worst_ns: int = 0
     overworked: int = 0
     discarded: int = 0
@@ -103,6 +105,8 @@ class Loop:
         Where each cycle's row goes.
     events : Events
         Told what happens.
+    delays : Delays
+        Told of each cycle, to know what long overruns came of.
     check : callable
         Looks after the helpers, ten times a second.
     """
@@ -118,6 +122,7 @@ class Loop:
         sight: Sight,
         ring: Ring,
         events: Events,
+        delays: Delays,
         check: Callable[[], None] = lambda: None,
         spin_ns: int = SPIN_NS,
     ) -> None:
@@ -125,6 +130,7 @@ class Loop:
         self._clock, self._deadlines, self._spin_ns = clock, deadlines, spin_ns
         self._bus, self._unit, self._codec, self._inputs = bus, unit, codec, inputs
         self._sight, self._ring, self._events, self._check = sight, ring, events, check
+        self._delays = delays
         self._wall = WallWatch(clock)
         self._polled_ns = clock.now_ns()
         self._unit_time_s, self._unit_slot = 0.0, -1
@@ -140,15 +146,19 @@ class Loop:
         deadlines, clock, done = self._deadlines, self._clock, -1
         self._polled_ns = wait_until(clock, deadlines.due_ns(-1), self._spin_ns)
         self._bus.receive()  # what has come by now may be of any age
+        self._delays.start()
         while not stop() and (slots is None or done + 1 < slots):
-            now_ns = wait_until(clock, deadlines.due_ns(done + 1), self._spin_ns)
+            due_ns, longs = deadlines.due_ns(done + 1), self.counts.long_overruns
+            now_ns = wait_until(clock, due_ns, self._spin_ns)
             slot = deadlines.next_slot(done, now_ns)
-            if slots is not None and slot >= slots:
-                self._leave_out(done + 1, slots - done - 1, now_ns)
-                break
-            self._leave_out(done + 1, slot - done - 1, now_ns)
-            self._cycle(slot, slot - done - 1, now_ns)
+            left_out = (slot if slots is None else min(slot, slots)) - done - 1
+            self._leave_out(done + 1, left_out, now_ns)
+            if slots is None or slot < slots:
+                self._cycle(slot, left_out, now_ns)
+            longs = self.counts.long_overruns - longs
+            self._delays.settle(due_ns - self._spin_ns, deadlines.due_ns(slot + 1), longs)
             done = slot
+        self.counts.long_causes = dict(self._delays.longs)
         self._send_estimate(self._unit.last.held(), ENDED)
         return self.counts
 

@@ -26,6 +26,7 @@ from trpac_hil.bus import BusSettings, Link
 from trpac_hil.camera import RESULTS_KEPT, CameraJob, Folder, result_columns, watch
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, load_codec
 from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock
+from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
 from trpac_hil.ferry import Ferry, ferry_ring
@@ -257,6 +258,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
             sight,
             ring,
             events,
+            Delays(stack.enter_context(ThreadAccounts())),
             lambda: rig.check(events),
             settings.spin_ns,
         )

@@ -50,6 +50,7 @@ def summarise(
             "ended_late": counts.late_ends,
             "left_out": counts.left_out,
             "beyond_5_ms": counts.long_overruns,
+            "beyond_5_ms_by": counts.long_causes,
             "overworked": counts.overworked,
             "worst_ms": round(counts.worst_ns * 1e-6, 4),
         },

@@ -1,0 +1,87 @@
+"""Causes of long delays, on threads that the test holds up in a known way."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from trpac_hil.delays import SCHEDULER_FILE, Spent, ThreadAccounts, cause
+
+MS = 1_000_000
+needs_linux = pytest.mark.skipif(not SCHEDULER_FILE.exists(), reason="this system has no schedstat")
+
+
+def busy(duration_s: float) -> None:
+    """Work until the thread itself has had so much processor time."""
+    end_s = time.thread_time() + duration_s
+    while time.thread_time() < end_s:
+        continue
+
+
+def test_without_the_systems_accounts_nothing_is_claimed() -> None:
+    assert cause(Spent(0, 0), Spent(9 * MS, MS), 0) == "untold"
+
+
+@pytest.mark.parametrize(
+    ("ended", "slept_ns", "expected"),
+    [
+        (Spent(9 * MS, 8 * MS, 0, 0), 0, "own_work"),
+        (Spent(9 * MS, MS, 8 * MS, 0), 0, "other_work"),
+        (Spent(9 * MS, MS, 0, 0), 0, "machine"),
+        (Spent(9 * MS, MS, 0, 1), 0, "waiting"),
+        (Spent(19 * MS, MS, 0, 1), 10 * MS, "machine"),
+        (Spent(19 * MS, MS, 0, 2), 10 * MS, "waiting"),
+        (Spent(19 * MS, 5 * MS, 2 * MS, 1), 10 * MS, "own_work"),
+    ],
+)
+def test_the_greatest_part_beside_the_sleep_names_the_cause(
+    ended: Spent, slept_ns: int, expected: str
+) -> None:
+    assert cause(Spent(0, 0, 0, 0), ended, slept_ns) == expected
+
+
+@needs_linux
+def test_a_thread_that_works_is_told_from_one_that_waits_for_a_lock() -> None:
+    with ThreadAccounts() as accounts:
+        began = accounts.spent()
+        busy(0.2)
+        worked = accounts.spent()
+        threading.Event().wait(0.2)
+        waited = accounts.spent()
+    assert cause(began, worked, 0) == "own_work"
+    assert cause(worked, waited, 0) == "waiting"
+
+
+@needs_linux
+def test_a_sleep_that_was_asked_for_is_no_delay_of_anybody() -> None:
+    with ThreadAccounts() as accounts:
+        began = accounts.spent()
+        time.sleep(0.2)
+        busy(0.1)
+        assert cause(began, accounts.spent(), 200 * MS) == "own_work"
+
+
+@needs_linux
+def test_two_that_share_a_core_hold_each_other_up() -> None:
+    code = "from test_hil_delays import share_a_core; print(share_a_core())"
+    here = os.path.dirname(__file__)
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=here, check=True)
+    assert told.stdout.strip() == "other_work"
+
+
+def share_a_core() -> str:
+    """What a thread of low priority was held up by, while another process worked on its core."""
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as other, ThreadAccounts() as accounts:
+        time.sleep(0.5)
+        os.nice(10)
+        began = accounts.spent()
+        busy(0.1)
+        ended = accounts.spent()
+        other.kill()
+    return cause(began, ended, 0)
