@@ -35,7 +35,7 @@ from sim2real.result import (
 )
 from sim2real.selection import Decision, fitness
 from sim2real.suspect import lone_sensor
-from sim2real.unknown import Term, characterise, fit_terms
+from sim2real.unknown import EQUATIONS, WHOLE_CAR, Term, characterise, fit_terms
 from sim2real.varying import KNOT_S
 
 Array = NDArray[np.float64]
@@ -101,11 +101,13 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         seen = [found.fit_to, held] if unknown else [held]
         drives, noises = [d for e in seen for d in e.drives], [n for e in seen for n in e.noises]
         suspect = None
+        equations = EQUATIONS if unknown else WHOLE_CAR
         if decision.left_open:  # the gap lies where the rows are doubtful
             noises = [replace(n, widening=np.ones_like(n.widening)) for n in noises]
         elif unknown:
             suspect = lone_sensor(found.model, found.fit_to, held)
-        terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown, only=suspect)
+            equations = (suspect,) if suspect else EQUATIONS
+        terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown, equations=equations)
         progress("equations", 1, 1)
         if found.only_order:
             unexplained = _swinging(found)

@@ -152,6 +152,7 @@ def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None, st
     low, high = candidate.bounds
     count = 0
     seen: dict[bytes, Array] = {}
+    sloped: dict[bytes, Array] = {}
 
     def passed(x: Array) -> Array:
         nonlocal count
@@ -166,7 +167,11 @@ def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None, st
         return seen[key]
 
     def jacobian(x: Array) -> Array:
-        return slopes(passed, x, z_at(x), candidate)
+        key = x.tobytes()
+        if key not in sloped:
+            sloped.clear()
+            sloped[key] = slopes(passed, x, z_at(x), candidate)
+        return sloped[key].copy()  # least squares may weigh them in place
 
     points = candidate.starts if start is None else np.atleast_2d(start)
     tried = [z_at(x) for x in points] if len(points) > 1 else []

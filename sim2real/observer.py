@@ -196,23 +196,26 @@ def _foretold(effect: Effect) -> Effect:
 def start(columns: dict[str, Array], step_s: float, p: DynamicsParameters) -> Array:
     """The plant's state at the first row: straight lines through the first tenth of a second of each channel."""
     count = max(round(0.1 / step_s), 5)
-    rows = np.arange(count)
-
-    def at_start(name: str) -> float:
-        values = columns[name][:count]
-        good = np.isfinite(values)
-        if good.sum() < 3:
-            return float("nan")
-        return float(np.polynomial.Polynomial.fit(rows[good], values[good], 1)(0.0))
-
-    rims_m_s = np.array([at_start(name) for name in CHANNELS[WHEEL]]) * p.wheel_radius_m
-    speed = at_start(CHANNELS[SPEED])
+    position_m, speed, *wheels = _at_first_row(
+        np.column_stack([columns[name][:count] for name in CHANNELS[:6]])
+    )
+    rims_m_s = np.array(wheels) * p.wheel_radius_m
     if not np.isfinite(speed) and np.isfinite(rims_m_s).any():  # not measured yet: as fast as the wheels roll
         speed = float(np.nanmean(rims_m_s))
-    speed = max(np.nan_to_num(speed), 0.0)
-    y = dynamics.initial_y(speed, float(np.nan_to_num(at_start(CHANNELS[POSITION]))), p)
-    for i, name in enumerate(CHANNELS[WHEEL]):
-        value = at_start(name)
+    y = dynamics.initial_y(max(np.nan_to_num(speed), 0.0), float(np.nan_to_num(position_m)), p)
+    for i, value in enumerate(wheels):
         if np.isfinite(value):
             y[2 + i] = max(value, 0.0)
     return y
+
+
+def _at_first_row(values: Array) -> list[float]:
+    """Of each column the value at its first row by a straight line through all; NaN where fewer than three are there."""
+    good = np.isfinite(values)
+    number = np.maximum(good.sum(axis=0), 1)
+    known = np.where(good, values, 0.0)
+    row = good * np.arange(len(values))[:, None]
+    middle, mean = row.sum(axis=0) / number, known.sum(axis=0) / number
+    apart = np.where(good, row - middle, 0.0)
+    slope = (apart * known).sum(axis=0) / np.maximum((apart**2).sum(axis=0), 1e-12)
+    return [float(v) for v in np.where(number >= 3, mean - slope * middle, np.nan)]

@@ -21,7 +21,7 @@ from sim2real.drive import SPEED, WHEEL
 from sim2real.evidence import SETTLING_S, Evidence
 from sim2real.observer import Simulation
 from sim2real.selection import fitness
-from sim2real.unknown import EQUATIONS, Equation, fit_terms
+from sim2real.unknown import AT_ONE_WHEEL, EQUATIONS, Equation, fit_terms
 
 Array = NDArray[np.float64]
 
@@ -40,8 +40,7 @@ def lone_sensor(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Equat
 def lone_wheel(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int = 1) -> float:
     """Least loss that a free term at one wheel, its motor or its sensor, leaves of the model as it is."""
     drives, noises = (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
-    at_one = [e for e in EQUATIONS if e.key.startswith(("motor ", "wheel sensor "))]
-    work = [partial(fit_terms, model, drives, noises, shared=True, only=e) for e in at_one]
+    work = [partial(fit_terms, model, drives, noises, shared=True, equations=(e,)) for e in AT_ONE_WHEEL]
     return min(terms[0].loss for terms in run_all(work, jobs, silent, "one wheel"))
 
 

@@ -139,6 +139,9 @@ EQUATIONS = (
     ),
 )  # fmt: skip
 """Every equation of the car with the quantities that a term in it may depend on."""
+AT_ONE_WHEEL = tuple(e for e in EQUATIONS if e.key.startswith(("motor ", "wheel sensor ")))
+"""Those of a single motor or wheel sensor."""
+WHOLE_CAR = tuple(e for e in EQUATIONS if e not in AT_ONE_WHEEL)
 
 QUANTITIES: dict[str, tuple[str, Callable[[Drive, Prediction], Array]]] = {
     "speed": ("m/s", lambda drive, seen: seen.states[:, SPEED]),
@@ -190,17 +193,17 @@ def fit_terms(
     jobs: int = 1,
     *,
     shared: bool = False,
-    only: Equation | None = None,
+    equations: Sequence[Equation] = EQUATIONS,
 ) -> list[Term]:
-    """All free terms, fitted to these drives, best quasi-likelihood first.
+    """All free terms of these equations, fitted to these drives, best quasi-likelihood first.
 
-    `shared` leaves out `PER_DRIVE`; `only` keeps the terms of one equation.
+    `shared` leaves out `PER_DRIVE`.
     """
     seen = [model.predict(drive) for drive in drives]
     z = [_whitened(drive, noise, p.channels) for drive, noise, p in zip(drives, noises, seen, strict=True)]
     work = [
         (equation, quantity)
-        for equation in ((only,) if only else EQUATIONS)
+        for equation in equations
         for quantity in equation.quantities
         if not (shared and quantity in PER_DRIVE)
     ]
