@@ -20,7 +20,7 @@ from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant import dynamics
 from scenarios.plant.dynamics import DynamicsParameters, RoadTable
 from scenarios.plant.pipeline import make_setup
-from sim2real.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL, Drive
+from sim2real.drive import ACCEL, CHANNELS, Drive
 from sim2real.lattice import SmoothCounter
 
 Array = NDArray[np.float64]
