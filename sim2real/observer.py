@@ -210,7 +210,7 @@ def start(columns: dict[str, Array], step_s: float, p: DynamicsParameters) -> Ar
 
 
 def _at_first_row(values: Array) -> list[float]:
-    """Each column at its first row, by a straight line through all of it; NaN where fewer than three values are there."""
+    """Each column at its first row by a straight line through all of it; NaN where fewer than three are there."""
     good = np.isfinite(values)
     number = np.maximum(good.sum(axis=0), 1)
     known = np.where(good, values, 0.0)
