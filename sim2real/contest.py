@@ -144,8 +144,8 @@ class Contest:
     motion : float
         Least loss that one of these effects leaves as a constant beside a free term over the car's motion.
     lone : float
-        Least loss that a fault outside the library leaves by itself: a free term at one wheel alone, see
-        `sim2real.suspect`, or a slow speed sensor, see `sim2real.sluggish`.
+        Least loss that a fault outside the library leaves by itself: a free term at one wheel alone or
+        between the axles, see `sim2real.suspect`, or a slow speed sensor, see `sim2real.sluggish`.
     """
 
     null: Entry

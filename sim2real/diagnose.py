@@ -31,7 +31,7 @@ from sim2real.selection import decide, is_noise, needs_pairs
 from sim2real.sluggish import slow_speed
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.structure import add_structure
-from sim2real.suspect import lone_wheel
+from sim2real.suspect import unlike_wheels
 from sim2real.trpac_error import trpac_error
 from sim2real.varying import add_varied
 
@@ -160,7 +160,7 @@ def find(
         if needs_pairs(contest, fit_to, held):
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)
             contest = add_structure(contest, base, fit_to, held, exclude, jobs, progress)
-            contest = replace(contest, lone=min(contest.lone, lone_wheel(base, fit_to, held, jobs)))
+            contest = replace(contest, lone=min(contest.lone, unlike_wheels(base, fit_to, held, jobs)))
         else:
             contest = add_twins(contest, base, fit_to, held, jobs, progress)
     decision = decide(contest, fit_to, held)

@@ -8,7 +8,7 @@ subsystem and quantity, and its curve is the shape.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -16,12 +16,12 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from scenarios.files import WHEELS
-from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
+from sim2real.drive import Drive
+from sim2real.equations import EQUATIONS, PER_DRIVE, QUANTITIES, Equation
 from sim2real.evidence import rest_of
 from sim2real.fitting import robust, robust_weight
 from sim2real.noise import Noise
-from sim2real.observer import Prediction, Push, Simulation
+from sim2real.observer import Prediction, Simulation
 from sim2real.probing import sets_apart, windows
 from sim2real.result import Unexplained
 
@@ -33,129 +33,12 @@ KNOT_S = 2.0
 """Distance of the knots of a curve over time [s]."""
 PRICE_PER_KNOT = 10.0
 """Price of a fitted value, about the logarithm of the number of residuals [-]."""
-RIDGE = 1e-6
-"""Share of the greatest slope that a term's values are held to zero with [-]."""
-
-
-@dataclass(frozen=True)
-class Equation:
-    """A place for a further term: the push of a unit term on a drive, and the names that a reader knows it by."""
-
-    key: str
-    subsystem: str
-    signal: str
-    unit: str
-    step: float
-    """Size of the term for finite differences, in `unit`."""
-    push: Callable[[Simulation, Drive, Prediction, Array], Push]
-    quantities: tuple[str, ...]
-    channel: int | None = None
-    """Of a single sensor's equation: its channel."""
-
-
-def _none(drive: Drive) -> dict[str, Array]:
-    n = len(drive)
-    return {"torque_nm": np.zeros((n, 4)), "accel_m_s2": np.zeros(n), "offset": np.zeros((n, len(CHANNELS)))}
-
-
-def _torque(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
-    return Push(**{**_none(drive), "torque_nm": np.repeat(term[:, None], 4, axis=1)}, felt=False)
-
-
-def _motor(wheel: int, model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
-    none = _none(drive)
-    none["torque_nm"][:, wheel] = term
-    return Push(**none, felt=False)
-
-
-def _creep(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
-    """A slip that the tyre has beside its own: the wheel turns faster or slower at the same force."""
-    none = _none(drive)
-    none["offset"][:, WHEEL] = (term * seen.states[:, SPEED] / model.vehicle.wheel_radius_m)[:, None]
-    return Push(**none, felt=False)
-
-
-def _force(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
-    return Push(**{**_none(drive), "accel_m_s2": term / model.vehicle.mass_kg}, felt=True)
-
-
-def _gravity(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
-    return Push(**{**_none(drive), "accel_m_s2": term}, felt=False)
-
-
-def _tyre(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
-    extra = seen.force_n * term[:, None]
-    return Push(
-        **{
-            **_none(drive),
-            "torque_nm": -extra * model.vehicle.wheel_radius_m,
-            "accel_m_s2": extra.sum(axis=1) / model.vehicle.mass_kg,
-        },
-        felt=True,
-    )
-
-
-def _sensor(columns: slice, model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
-    none = _none(drive)
-    none["offset"][:, columns] = term[:, None]
-    return Push(**none, felt=False)
-
-
-def _one(column: int) -> slice:
-    return slice(column, column + 1)
-
-
-EQUATIONS = (
-    Equation("torque", "powertrain", "wheel_torque", "N m", 5.0, _torque, ("torque", "acceleration", "time")),
-    Equation("bearing", "wheel", "wheel_torque", "N m", 5.0, _torque, ("speed",)),
-    Equation("force", "vehicle", "accel_x", "N", 50.0, _force, ("speed", "acceleration", "time", "position")),
-    Equation("gravity", "road", "vehicle_speed", "m/s^2", 0.05, _gravity, ("time", "position")),
-    Equation("tyre", "tyre", "wheel_speed", "-", 0.02, _tyre, ("speed", "torque", "slip", "time", "position")),
-    Equation("creep", "tyre", "wheel_speed", "-", 0.005, _creep, ("acceleration",)),
-    Equation(
-        "speed sensor", "vehicle_speed_sensor", "vehicle_speed", "m/s", 0.05,
-        partial(_sensor, _one(SPEED)), ("speed", "acceleration", "time"), SPEED,
-    ),
-    Equation(
-        "accelerometer", "accelerometer", "accel_x", "m/s^2", 0.05,
-        partial(_sensor, _one(ACCEL)), ("speed", "acceleration", "time"), ACCEL,
-    ),
-    Equation(
-        "wheel sensors", "wheel_speed_sensor", "wheel_speed", "rad/s", 0.1,
-        partial(_sensor, WHEEL), ("speed", "acceleration", "time"),
-    ),
-    *(
-        Equation(
-            f"wheel sensor {name}", "wheel_speed_sensor", f"wheel_speed_{name}", "rad/s", 0.1,
-            partial(_sensor, _one(WHEEL.start + i)), ("speed", "acceleration"), WHEEL.start + i,
-        )
-        for i, name in enumerate(WHEELS)
-    ),
-    *(
-        Equation(
-            f"motor {name}", "powertrain", f"wheel_torque_{name}", "N m", 5.0, partial(_motor, i), ("torque",)
-        )
-        for i, name in enumerate(WHEELS)
-    ),
-)  # fmt: skip
-"""Every equation of the car with the quantities that a term in it may depend on."""
-AT_ONE_WHEEL = tuple(e for e in EQUATIONS if e.key.startswith(("motor ", "wheel sensor ")))
-"""Those of a single motor or wheel sensor."""
-WHOLE_CAR = tuple(e for e in EQUATIONS if e not in AT_ONE_WHEEL)
-
-QUANTITIES: dict[str, tuple[str, Callable[[Drive, Prediction], Array]]] = {
-    "speed": ("m/s", lambda drive, seen: seen.states[:, SPEED]),
-    "torque": ("N m", lambda drive, seen: drive.torque_nm.mean(axis=1)),
-    "acceleration": ("m/s^2", lambda drive, seen: seen.force_n.sum(axis=1)),
-    "slip": ("-", lambda drive, seen: np.sign(seen.force_n.sum(axis=1)) * seen.slip.mean(axis=1)),
-    "time": ("s", lambda drive, seen: drive.time_s),
-    "position": ("m", lambda drive, seen: seen.states[:, 0]),
-}
-"""Unit and values of what a term may depend on; acceleration is the tyres' force, scaled by the mass later."""
-PER_DRIVE = ("time", "position")
-"""Quantities whose curve is another one in each drive."""
 PRICE_PER_DRIVE = 1.4
 """By how much more such a curve has to explain: it tells less than one over the car's own motion [-]."""
+REFINED = 4
+"""Equations whose best terms are held to what the model really does with them."""
+RIDGE = 1e-6
+"""Share of the greatest slope that a term's values are held to zero with [-]."""
 
 
 @dataclass(frozen=True)
@@ -232,30 +115,105 @@ def _fit_term(
     equation: Equation,
     quantity: str,
 ) -> Term:
-    values = [QUANTITIES[quantity][1](drive, p) for drive, p in zip(drives, seen, strict=True)]
-    if quantity == "acceleration":
-        values = [v / model.vehicle.mass_kg for v in values]
-    knots = _knots(values, drives, quantity)
-    hats = _hats(knots, values)
-    slopes = [np.zeros((*part.shape, len(hats))) for part in z]
-    for i, together in _runs(hats, values, quantity):
-        weights = [hats[at][2](values[i]) for at in together]
-        push = equation.push(model, drives[i], seen[i], equation.step * np.sum(weights, axis=0))
-        moved = _whitened(drives[i], noises[i], model.predict(drives[i], push).channels)
-        response = (moved - z[i]) / equation.step
-        rows = windows(weights) if quantity in PER_DRIVE else [slice(None)]
-        for at, cut in zip(together, rows, strict=True):
-            slopes[i][cut, :, at] = response[cut]
+    values = _along(model, drives, seen, quantity)
+    hats = _hats(_knots(values, drives, quantity), values)
+    free = _Free(model, drives, noises, seen, equation, quantity, values, hats)
     every = np.concatenate([part.ravel() for part in z])
-    y, left = _solve(every, np.concatenate([part.reshape(-1, len(hats)) for part in slopes]))
+    y, left = _solve(every, free.slopes(z, np.zeros(len(hats))))
     null = float(np.sum(robust(every)))
     x = np.array([place for _, place, _ in hats])
     return Term(equation, quantity, x, y, left, null, len(hats), int(np.count_nonzero(every)))
 
 
-def _runs(
-    hats: Sequence[tuple[list[int], float, Callable[[Array], Array]]], values: Sequence[Array], quantity: str
-) -> list[tuple[int, list[int]]]:
+def _along(
+    model: Simulation, drives: Sequence[Drive], seen: Sequence[Prediction], quantity: str
+) -> list[Array]:
+    """What a term depends on, along each drive."""
+    values = [QUANTITIES[quantity][1](drive, p) for drive, p in zip(drives, seen, strict=True)]
+    return [v / model.vehicle.mass_kg for v in values] if quantity == "acceleration" else values
+
+
+Hat = tuple[list[int], float, Callable[[Array], Array]]
+"""A basis function: the drives that it acts in, its knot, and itself."""
+
+
+@dataclass(frozen=True)
+class _Free:
+    """A free term on drives: what any values of its curve leave, and how that changes with each of them."""
+
+    model: Simulation
+    drives: Sequence[Drive]
+    noises: Sequence[Noise]
+    seen: Sequence[Prediction]
+    equation: Equation
+    quantity: str
+    values: Sequence[Array]
+    hats: Sequence[Hat]
+
+    def moved(self, i: int, term: Array) -> Array:
+        """Whitened residuals of a drive with this term in its equation."""
+        push = self.equation.push(self.model, self.drives[i], self.seen[i], term)
+        return _whitened(self.drives[i], self.noises[i], self.model.predict(self.drives[i], push).channels)
+
+    def term(self, i: int, y: Array) -> Array:
+        """The term along a drive."""
+        out = np.zeros(len(self.values[i]))
+        for at, (which, _, hat) in enumerate(self.hats):
+            if i in which:
+                out += y[at] * hat(self.values[i])
+        return out
+
+    def left(self, y: Array) -> list[Array]:
+        """Whitened residuals per drive that a curve leaves."""
+        return [self.moved(i, self.term(i, y)) for i in range(len(self.drives))]
+
+    def slopes(self, z: Sequence[Array], y: Array) -> Array:
+        """Finite differences of all residuals around a curve that leaves z, shape (residuals, values)."""
+        slopes = [np.zeros((*part.shape, len(self.hats))) for part in z]
+        for i, together in _runs(self.hats, self.values, self.quantity):
+            weights = [self.hats[at][2](self.values[i]) for at in together]
+            step = self.equation.step
+            response = (self.moved(i, self.term(i, y) + step * np.sum(weights, axis=0)) - z[i]) / step
+            rows = windows(weights) if self.quantity in PER_DRIVE else [slice(None)]
+            for at, cut in zip(together, rows, strict=True):
+                slopes[i][cut, :, at] = response[cut]
+        return np.concatenate([part.reshape(-1, len(self.hats)) for part in slopes])
+
+
+def with_refined(
+    model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], terms: Sequence[Term], jobs: int = 1
+) -> list[Term]:
+    """Terms, best first, of which the best of each of the most promising equations are `refined`."""
+    first: dict[str, Term] = {}
+    for term in terms:
+        first.setdefault(term.equation.key, term)
+    chosen = list(first.values())[:REFINED]
+    better = Parallel(n_jobs=jobs, prefer="threads")(
+        delayed(refined)(model, drives, noises, term) for term in chosen
+    )
+    return sorted([*better, *(t for t in terms if not any(t is c for c in chosen))], key=score)
+
+
+def refined(model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], term: Term) -> Term:
+    """A term as it really does: its curve solved once more around itself, and the loss that the model then leaves.
+
+    A great term, half a motor's torque, say, is more than the slopes around its absence foretell.
+    """
+    seen = [model.predict(drive) for drive in drives]
+    values = _along(model, drives, seen, term.quantity)
+    hats = _hats(_knots(values, drives, term.quantity), values)
+    free = _Free(model, drives, noises, seen, term.equation, term.quantity, values, hats)
+    z = free.left(term.y)
+    every = np.concatenate([part.ravel() for part in z])
+    change, _ = _solve(every, free.slopes(z, term.y))
+    again = float(sum(np.sum(robust(part)) for part in free.left(term.y + change)))
+    here = float(np.sum(robust(every)))
+    if again < here:
+        return replace(term, y=term.y + change, loss=again)
+    return replace(term, loss=here)
+
+
+def _runs(hats: Sequence[Hat], values: Sequence[Array], quantity: str) -> list[tuple[int, list[int]]]:
     """Drives and the basis functions that one run along them probes together."""
     if quantity not in PER_DRIVE:
         return [(i, [at]) for at, (which, _, _) in enumerate(hats) for i in which]
@@ -277,10 +235,8 @@ def _knots(values: Sequence[Array], drives: Sequence[Drive], quantity: str) -> l
     return [shared] * len(drives) if len(shared) > 1 else [shared + np.array([0.0, 1.0])] * len(drives)
 
 
-def _hats(
-    knots: Sequence[Array], values: Sequence[Array]
-) -> list[tuple[list[int], float, Callable[[Array], Array]]]:
-    """Basis functions: the drives that each acts in, its knot, and the function."""
+def _hats(knots: Sequence[Array], values: Sequence[Array]) -> list[Hat]:
+    """Basis functions of a curve over these knots."""
 
     def hat(x: Array, at: int, u: Array) -> Array:
         return np.interp(u, x, np.eye(len(x))[at])

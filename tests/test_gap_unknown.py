@@ -5,11 +5,9 @@ import pytest
 from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of
 
 from sim2real.drive import ACCEL, SPEED
+from sim2real.equations import EQUATIONS, PER_DRIVE, QUANTITIES
 from sim2real.evidence import gather
 from sim2real.unknown import (
-    EQUATIONS,
-    PER_DRIVE,
-    QUANTITIES,
     Term,
     characterise,
     fit_terms,
