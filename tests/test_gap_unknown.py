@@ -11,9 +11,11 @@ from sim2real.unknown import (
     Term,
     characterise,
     fit_terms,
+    refined,
     score,
     shape_of,
     sign_of,
+    with_refined,
 )
 
 EQUATION = {equation.key: equation for equation in EQUATIONS}
@@ -116,6 +118,40 @@ def test_a_term_is_fitted_through_a_sliding_wheel_too():
     best = terms_of(*drives)[0]
     assert best.equation.subsystem in ("tyre", "powertrain", "wheel", "wheel_speed_sensor")
     assert 1.0 - best.loss / best.null_loss > 0.2
+
+
+def test_a_great_term_is_known_by_what_the_model_does_with_it():
+    """A motor that gives half of its torque, close to sliding: slopes around its absence foretell too little."""
+    commanded = 4.0 * pulses(12.0)
+    actual = commanded.copy()
+    actual[:, 2] *= 0.5
+    held = gather(MODEL, [noisy(clean(actual, 14.0, commanded_nm=commanded))])
+    terms = fit_terms(MODEL, held.drives, held.noises, 2)
+    foretold = next(t for t in terms if t.equation.key == "motor rl")
+    best = with_refined(MODEL, held.drives, held.noises, terms, 2)[0]
+    assert best.equation.key == "motor rl"
+    assert foretold.loss > 0.1 * foretold.null_loss
+    assert best.loss < 0.01 * best.null_loss
+    np.testing.assert_allclose(best.y, -0.5 * best.x, atol=20.0)
+
+
+def test_a_term_that_is_small_stays_as_it_was_foretold():
+    commanded = pulses(12.0)
+    held = gather(MODEL, [noisy(clean(0.99 * commanded, 14.0, commanded_nm=commanded))])
+    foretold = fit_terms(MODEL, held.drives, held.noises, 2, equations=[EQUATION["torque"]])[0]
+    again = refined(MODEL, held.drives, held.noises, foretold)
+    assert again.loss == pytest.approx(foretold.loss, rel=1e-3)
+    np.testing.assert_allclose(again.y, foretold.y, atol=0.3)
+
+
+def test_torque_that_the_axles_share_otherwise_is_found_between_them():
+    commanded = pulses(12.0)
+    actual = commanded * np.array([0.85, 0.85, 1.15, 1.15])
+    held = gather(MODEL, [noisy(clean(actual, 14.0, commanded_nm=commanded))])
+    terms = fit_terms(MODEL, held.drives, held.noises, 2)
+    found = characterise(terms)
+    assert (found.subsystem, terms[0].equation.key) == ("powertrain", "axles")
+    np.testing.assert_allclose(found.y, -0.15 * found.x, atol=4.0)
 
 
 def test_a_log_whose_gap_is_elsewhere_in_time_shares_no_curve():
