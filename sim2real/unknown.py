@@ -115,22 +115,12 @@ def _fit_term(
     equation: Equation,
     quantity: str,
 ) -> Term:
-    values = _along(model, drives, seen, quantity)
-    hats = _hats(_knots(values, drives, quantity), values)
-    free = _Free(model, drives, noises, seen, equation, quantity, values, hats)
+    free = _free(model, drives, noises, seen, equation, quantity)
     every = np.concatenate([part.ravel() for part in z])
-    y, left = _solve(every, free.slopes(z, np.zeros(len(hats))))
+    y, left = _solve(every, free.slopes(z, np.zeros(len(free.hats))))
     null = float(np.sum(robust(every)))
-    x = np.array([place for _, place, _ in hats])
-    return Term(equation, quantity, x, y, left, null, len(hats), int(np.count_nonzero(every)))
-
-
-def _along(
-    model: Simulation, drives: Sequence[Drive], seen: Sequence[Prediction], quantity: str
-) -> list[Array]:
-    """What a term depends on, along each drive."""
-    values = [QUANTITIES[quantity][1](drive, p) for drive, p in zip(drives, seen, strict=True)]
-    return [v / model.vehicle.mass_kg for v in values] if quantity == "acceleration" else values
+    x = np.array([place for _, place, _ in free.hats])
+    return Term(equation, quantity, x, y, left, null, len(x), int(np.count_nonzero(every)))
 
 
 Hat = tuple[list[int], float, Callable[[Array], Array]]
@@ -180,6 +170,22 @@ class _Free:
         return np.concatenate([part.reshape(-1, len(self.hats)) for part in slopes])
 
 
+def _free(
+    model: Simulation,
+    drives: Sequence[Drive],
+    noises: Sequence[Noise],
+    seen: Sequence[Prediction],
+    equation: Equation,
+    quantity: str,
+) -> _Free:
+    """A free term with knots where its quantity lies on these drives."""
+    values = [QUANTITIES[quantity][1](drive, p) for drive, p in zip(drives, seen, strict=True)]
+    if quantity == "acceleration":
+        values = [v / model.vehicle.mass_kg for v in values]
+    hats = _hats(_knots(values, drives, quantity), values)
+    return _Free(model, drives, noises, seen, equation, quantity, values, hats)
+
+
 def with_refined(
     model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], terms: Sequence[Term], jobs: int = 1
 ) -> list[Term]:
@@ -200,9 +206,7 @@ def refined(model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise],
     A great term, half a motor's torque, say, is more than the slopes around its absence foretell.
     """
     seen = [model.predict(drive) for drive in drives]
-    values = _along(model, drives, seen, term.quantity)
-    hats = _hats(_knots(values, drives, term.quantity), values)
-    free = _Free(model, drives, noises, seen, term.equation, term.quantity, values, hats)
+    free = _free(model, drives, noises, seen, term.equation, term.quantity)
     z = free.left(term.y)
     every = np.concatenate([part.ravel() for part in z])
     change, _ = _solve(every, free.slopes(z, term.y))
