@@ -144,3 +144,4 @@ QUANTITIES: dict[str, tuple[str, Callable[[Drive, Prediction], Array]]] = {
 """Unit and values of what a term may depend on; acceleration is the tyres' force, scaled by the mass later."""
 PER_DRIVE = ("time", "position")
 """Quantities whose curve is another one in each drive."""
+OF_THE_MOTION = tuple(key for key in QUANTITIES if key not in PER_DRIVE)

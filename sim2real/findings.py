@@ -12,7 +12,7 @@ from scenarios.effects import EFFECTS, Effect
 from sim2real import where
 from sim2real.contest import Contest, Entry, Progress, Varied
 from sim2real.drive import CHANNELS
-from sim2real.equations import EQUATIONS, WHOLE_CAR
+from sim2real.equations import EQUATIONS, OF_THE_MOTION, QUANTITIES, WHOLE_CAR
 from sim2real.evidence import Evidence
 from sim2real.fitting import Fit, loss
 from sim2real.gap import intervals, measure, noise_floor, shrink
@@ -36,7 +36,7 @@ from sim2real.result import (
 )
 from sim2real.selection import Decision, fitness
 from sim2real.suspect import lone_sensor
-from sim2real.unknown import Term, characterise, fit_terms, with_refined
+from sim2real.unknown import Term, characterise, finer, fit_terms, with_refined
 from sim2real.varying import KNOT_S
 
 Array = NDArray[np.float64]
@@ -108,9 +108,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         elif unknown:
             suspect = lone_sensor(found.model, found.fit_to, held)
             equations = (suspect,) if suspect else EQUATIONS
-        terms = fit_terms(found.model, drives, noises, jobs, shared=not unknown, equations=equations)
+        over = tuple(QUANTITIES) if unknown else OF_THE_MOTION
+        terms = fit_terms(found.model, drives, noises, jobs, equations=equations, quantities=over)
         if unknown:
             terms = with_refined(found.model, drives, noises, terms, jobs)
+            terms = finer(found.model, drives[-1:], noises[-1:], terms, jobs)
         progress("equations", 1, 1)
         if found.only_order:
             unexplained = _swinging(found)

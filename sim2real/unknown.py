@@ -7,7 +7,7 @@ subsystem and quantity, and its curve is the shape.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -31,10 +31,14 @@ KNOTS = 6
 """Values of a curve over a quantity of the motion."""
 KNOT_S = 2.0
 """Distance of the knots of a curve over time [s]."""
+FINE_KNOT_S = 0.25
+"""The same where the curves over the motion and the coarse ones over time tell little [s]."""
 PRICE_PER_KNOT = 10.0
 """Price of a fitted value, about the logarithm of the number of residuals [-]."""
 PRICE_PER_DRIVE = 1.4
 """By how much more such a curve has to explain: it tells less than one over the car's own motion [-]."""
+LITTLE = 0.5
+"""Below this share of the loss the best term tells little [-]."""
 REFINED = 4
 """Equations whose best terms are held to what the model really does with them."""
 RIDGE = 1e-6
@@ -75,23 +79,22 @@ def fit_terms(
     noises: Sequence[Noise],
     jobs: int = 1,
     *,
-    shared: bool = False,
     equations: Sequence[Equation] = EQUATIONS,
+    quantities: Collection[str] = tuple(QUANTITIES),
+    knot_s: float = KNOT_S,
 ) -> list[Term]:
-    """All free terms of these equations, fitted to these drives, best quasi-likelihood first.
-
-    `shared` leaves out `PER_DRIVE`.
-    """
+    """All free terms of these equations over these quantities, fitted to these drives, best quasi-likelihood first."""
     seen = [model.predict(drive) for drive in drives]
     z = [_whitened(drive, noise, p.channels) for drive, noise, p in zip(drives, noises, seen, strict=True)]
     work = [
         (equation, quantity)
         for equation in equations
         for quantity in equation.quantities
-        if not (shared and quantity in PER_DRIVE)
+        if quantity in quantities
     ]
     found = Parallel(n_jobs=jobs, prefer="threads")(
-        delayed(_fit_term)(model, drives, noises, seen, z, equation, quantity) for equation, quantity in work
+        delayed(_fit_term)(_free(model, drives, noises, seen, equation, quantity, knot_s), z)
+        for equation, quantity in work
     )
     return sorted(found, key=score)
 
@@ -102,25 +105,21 @@ def score(term: Term) -> float:
     return priced * (PRICE_PER_DRIVE if term.quantity in PER_DRIVE else 1.0)
 
 
+def explained(term: Term) -> float:
+    """Share of the loss that a term takes, its price paid [-]."""
+    return 1.0 - score(term) / max(term.null_loss, 1e-12)
+
+
 def _whitened(drive: Drive, noise: Noise, channels: Array) -> Array:
     return np.nan_to_num(noise.whitened(rest_of(drive, channels)))
 
 
-def _fit_term(
-    model: Simulation,
-    drives: Sequence[Drive],
-    noises: Sequence[Noise],
-    seen: Sequence[Prediction],
-    z: Sequence[Array],
-    equation: Equation,
-    quantity: str,
-) -> Term:
-    free = _free(model, drives, noises, seen, equation, quantity)
+def _fit_term(free: _Free, z: Sequence[Array]) -> Term:
     every = np.concatenate([part.ravel() for part in z])
     y, left = _solve(every, free.slopes(z, np.zeros(len(free.hats))))
     null = float(np.sum(robust(every)))
     x = np.array([place for _, place, _ in free.hats])
-    return Term(equation, quantity, x, y, left, null, len(x), int(np.count_nonzero(every)))
+    return Term(free.equation, free.quantity, x, y, left, null, len(x), int(np.count_nonzero(every)))
 
 
 Hat = tuple[list[int], float, Callable[[Array], Array]]
@@ -139,6 +138,7 @@ class _Free:
     quantity: str
     values: Sequence[Array]
     hats: Sequence[Hat]
+    knot_s: float
 
     def moved(self, i: int, term: Array) -> Array:
         """Whitened residuals of a drive with this term in its equation."""
@@ -160,7 +160,7 @@ class _Free:
     def slopes(self, z: Sequence[Array], y: Array) -> Array:
         """Finite differences of all residuals around a curve that leaves z, shape (residuals, values)."""
         slopes = [np.zeros((*part.shape, len(self.hats))) for part in z]
-        for i, together in _runs(self.hats, self.values, self.quantity):
+        for i, together in _runs(self.hats, self.values, self.quantity, self.knot_s):
             weights = [self.hats[at][2](self.values[i]) for at in together]
             step = self.equation.step
             response = (self.moved(i, self.term(i, y) + step * np.sum(weights, axis=0)) - z[i]) / step
@@ -177,13 +177,27 @@ def _free(
     seen: Sequence[Prediction],
     equation: Equation,
     quantity: str,
+    knot_s: float = KNOT_S,
 ) -> _Free:
     """A free term with knots where its quantity lies on these drives."""
     values = [QUANTITIES[quantity][1](drive, p) for drive, p in zip(drives, seen, strict=True)]
     if quantity == "acceleration":
         values = [v / model.vehicle.mass_kg for v in values]
-    hats = _hats(_knots(values, drives, quantity), values)
-    return _Free(model, drives, noises, seen, equation, quantity, values, hats)
+    hats = _hats(_knots(values, drives, quantity, knot_s), values)
+    return _Free(model, drives, noises, seen, equation, quantity, values, hats, knot_s)
+
+
+def finer(
+    model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], terms: Sequence[Term], jobs: int = 1
+) -> list[Term]:
+    """Terms that follow these drives closely, where they tell more than all others, and those tell little.
+
+    What sways or beats within a second or two is no curve over the car's motion: waves of the road, a load that swings.
+    """
+    if explained(terms[0]) >= LITTLE:
+        return list(terms)
+    close = fit_terms(model, drives, noises, jobs, quantities=("time",), knot_s=FINE_KNOT_S)
+    return close if explained(close[0]) > explained(terms[0]) else list(terms)
 
 
 def with_refined(
@@ -217,22 +231,24 @@ def refined(model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise],
     return replace(term, loss=here)
 
 
-def _runs(hats: Sequence[Hat], values: Sequence[Array], quantity: str) -> list[tuple[int, list[int]]]:
+def _runs(
+    hats: Sequence[Hat], values: Sequence[Array], quantity: str, knot_s: float
+) -> list[tuple[int, list[int]]]:
     """Drives and the basis functions that one run along them probes together."""
     if quantity not in PER_DRIVE:
         return [(i, [at]) for at, (which, _, _) in enumerate(hats) for i in which]
     out = []
     for i, along in enumerate(values):
         mine = [at for at, (which, _, _) in enumerate(hats) if i in which]
-        sets = sets_apart([hats[at][2](along) for at in mine], KNOT_S)
+        sets = sets_apart([hats[at][2](along) for at in mine], knot_s)
         out += [(i, [mine[at] for at in chosen]) for chosen in sets]
     return out
 
 
-def _knots(values: Sequence[Array], drives: Sequence[Drive], quantity: str) -> list[Array]:
+def _knots(values: Sequence[Array], drives: Sequence[Drive], quantity: str, knot_s: float) -> list[Array]:
     """Knots per drive; the same for all where the curve is the same."""
     if quantity in PER_DRIVE:
-        count = [max(round((d.time_s[-1] - d.time_s[0]) / KNOT_S), 2) + 1 for d in drives]
+        count = [max(round((d.time_s[-1] - d.time_s[0]) / knot_s), 2) + 1 for d in drives]
         return [np.linspace(v.min(), v.max(), n) for v, n in zip(values, count, strict=True)]
     every = np.concatenate([v[d.moving] for v, d in zip(values, drives, strict=True)])
     shared = np.unique(np.quantile(every, np.linspace(0.01, 0.99, KNOTS)))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scenarios.effects import EFFECTS
 from sim2real.contest import Contest, Entry, Progress, Varied, run_all, silent
 from sim2real.drive import Drive
+from sim2real.equations import OF_THE_MOTION
 from sim2real.evidence import Evidence, rest_of
 from sim2real.fitting import loss, robust_weight
 from sim2real.observer import Towards
@@ -65,7 +66,7 @@ def add_varied(
         found = run_all(work, jobs, progress, "varying effects")
         if any(explains(fitness(v.entry, fit_to, holdout), before) for v in found):
             models = [e.fitted.candidate.model(e.fitted.x) for e in tried]
-            terms = [fit_terms(model, drives, noises, jobs, shared=True)[0] for model in models]
+            terms = [fit_terms(model, drives, noises, jobs, quantities=OF_THE_MOTION)[0] for model in models]
             motion = min(term.loss for term in terms)
             return replace(contest, varied=tuple(sorted(found, key=lambda v: v.cost)), motion=motion)
     return contest

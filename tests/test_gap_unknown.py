@@ -5,7 +5,7 @@ import pytest
 from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of
 
 from sim2real.drive import ACCEL, SPEED
-from sim2real.equations import EQUATIONS, PER_DRIVE, QUANTITIES
+from sim2real.equations import EQUATIONS, OF_THE_MOTION, PER_DRIVE, QUANTITIES
 from sim2real.evidence import gather
 from sim2real.unknown import (
     Term,
@@ -170,7 +170,7 @@ def test_a_curve_of_more_values_has_to_leave_less():
 
 def test_what_is_shared_leaves_the_curves_over_time_out():
     held = gather(MODEL, [noisy(clean(pulses(3.0), 14.0))])
-    found = fit_terms(MODEL, held.drives, held.noises, 1, shared=True)
+    found = fit_terms(MODEL, held.drives, held.noises, 1, quantities=OF_THE_MOTION)
     assert found
     assert not {t.quantity for t in found} & set(PER_DRIVE)
 
