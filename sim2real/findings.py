@@ -12,7 +12,7 @@ from scenarios.effects import EFFECTS, Effect
 from sim2real import where
 from sim2real.contest import Contest, Entry, Progress, Varied
 from sim2real.drive import CHANNELS
-from sim2real.equations import EQUATIONS, OF_THE_MOTION, QUANTITIES, WHOLE_CAR
+from sim2real.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
 from sim2real.evidence import Evidence
 from sim2real.fitting import Fit, loss
 from sim2real.gap import intervals, measure, noise_floor, shrink
@@ -92,32 +92,17 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     structure = _structure(found, held, whole)
     variation = _variation(decision)
     causes = _causes(found, held, before, seed)
+    swing = _swinging(found) if found.order else None
     terms: list[Term] = []
     unexplained = None
     places: tuple[Place, ...] = ()
     heat: dict[str, dict[str, float]] = {}
     if decision.verdict is not Verdict.NO_GAP:
         progress("equations", 0, 1)
-        unknown = decision.verdict is Verdict.UNKNOWN
-        seen = [found.fit_to, held] if unknown else [held]
-        drives, noises = [d for e in seen for d in e.drives], [n for e in seen for n in e.noises]
-        suspect = None
-        equations = EQUATIONS if unknown else WHOLE_CAR
-        if decision.left_open:  # the gap lies where the rows are doubtful
-            noises = [replace(n, widening=np.ones_like(n.widening)) for n in noises]
-        elif unknown:
-            suspect = lone_sensor(found.model, found.fit_to, held)
-            equations = (suspect,) if suspect else EQUATIONS
-        over = tuple(QUANTITIES) if unknown else OF_THE_MOTION
-        terms = fit_terms(found.model, drives, noises, jobs, equations=equations, quantities=over)
-        if unknown:
-            terms = with_refined(found.model, drives, noises, terms, jobs)
-            terms = finer(found.model, drives[-1:], noises[-1:], terms, jobs)
+        terms, unexplained = _terms(found, held, jobs)
         progress("equations", 1, 1)
-        if found.only_order:
-            unexplained = _swinging(found)
-        elif unknown:
-            unexplained = characterise(terms, suspect)
+        if swing and unexplained and (found.only_order or swing.share > unexplained.share):
+            unexplained = swing
         subsystem = unexplained.subsystem if unexplained else _subsystem(decision, terms)
         taken = loss(held.whitened(before)) - loss(held.whitened(after))
         places, heat = _where(found, held, before, terms, subsystem, taken)
@@ -129,7 +114,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
                 _sentence(decision, gap, causes, unexplained.sentence if unexplained else ""),
                 _beside(structure),
                 _uneven(variation),
-                _swinging(found).sentence if found.order and not found.only_order else "",
+                swing.sentence if swing and unexplained is not swing else "",
             )
             if part
         ),
@@ -146,6 +131,26 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         traces=_traces(found, held, added),
         provenance={"seed": seed},
     )
+
+
+def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unexplained | None]:
+    """Free terms, best first, and what they say of a gap that no effect explains."""
+    decision = found.decision
+    if decision.verdict is not Verdict.UNKNOWN:
+        return fit_terms(
+            found.model, held.drives, held.noises, jobs, equations=WHOLE_CAR, quantities=OF_THE_MOTION
+        ), None
+    drives, noises = (*found.fit_to.drives, *held.drives), (*found.fit_to.noises, *held.noises)
+    suspect = None
+    if decision.left_open:  # the gap lies where the rows are doubtful
+        noises = tuple(replace(n, widening=np.ones_like(n.widening)) for n in noises)
+    else:
+        suspect = lone_sensor(found.model, found.fit_to, held)
+    terms = fit_terms(found.model, drives, noises, jobs, equations=(suspect,) if suspect else EQUATIONS)
+    terms = with_refined(found.model, drives, noises, terms, jobs)
+    if not suspect:
+        terms = finer(found.model, drives[-1:], noises[-1:], terms, jobs)
+    return terms, characterise(terms, suspect)
 
 
 def _swinging(found: Findings) -> Unexplained:
