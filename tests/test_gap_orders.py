@@ -7,11 +7,14 @@ from scipy.integrate import cumulative_trapezoid
 
 from scenarios.plant import simulate
 from sim2real import orders
+from sim2real.contest import Contest, Entry, silent
 from sim2real.diagnose import diagnose, without_order
-from sim2real.drive import ACCEL, CHANNELS, WHEEL, make_drive
-from sim2real.evidence import residuals
+from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, make_drive
+from sim2real.evidence import gather, residuals
+from sim2real.findings import Findings, describe
 from sim2real.orders import read_order
 from sim2real.result import Verdict
+from sim2real.selection import Decision, fitness
 
 DURATION_S = 24.0
 AMPLITUDE = 0.15
@@ -125,6 +128,34 @@ def test_ripple_of_the_torque_is_the_powertrains_and_moves_the_car():
     assert order is not None
     assert order.per_turn == pytest.approx(5.0, abs=0.07)
     assert (order.moves_car, order.subsystem) == (True, "powertrain")
+
+
+def told_of_unknown(logs):
+    """What is said of logs whose gap no effect explains, without holding the contest."""
+    order, calm = without_order(MODEL, logs)
+    fit_to, held = gather(MODEL, calm[:-1]), gather(MODEL, calm[-1:])
+    null = Entry((), None, fit_to.whitened(fit_to.residuals(MODEL)), held.whitened(held.residuals(MODEL)))
+    contest = Contest(null, ())
+    fit = fitness(null, fit_to, held)
+    decision = Decision(Verdict.UNKNOWN, null, (), {}, fit, fit)
+    found = Findings(MODEL, fit_to, held, contest, decision, None, order)
+    return describe(found, seed=0, jobs=2, progress=silent).unexplained
+
+
+def test_what_takes_more_of_an_unknown_gap_is_told(nominal):
+    """A swing beside a small fault of the speed sensor, and the same beside a great one."""
+    logs = [swinging(d, i, at_order(1.0)) for i, d in enumerate((*nominal, nominal[0]))]
+
+    def with_speed_off_by(share):
+        off = []
+        for drive in logs:
+            measured = drive.measured.copy()
+            measured[:, SPEED] *= 1.0 + share
+            off.append(remeasured(drive, measured))
+        return told_of_unknown(off)
+
+    assert with_speed_off_by(0.0002).depends_on == "wheel angle"
+    assert with_speed_off_by(0.05).subsystem == "vehicle_speed_sensor"
 
 
 def test_a_tone_wheel_off_its_centre_is_unknown_and_named(nominal):

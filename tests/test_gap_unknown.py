@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of
 
-from sim2real.drive import ACCEL, SPEED
+from sim2real.drive import ACCEL, SPEED, WHEEL
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, PER_DRIVE, QUANTITIES
 from sim2real.evidence import gather
 from sim2real.unknown import (
     Term,
     characterise,
+    explained,
+    finer,
     fit_terms,
     refined,
     score,
@@ -152,6 +154,30 @@ def test_torque_that_the_axles_share_otherwise_is_found_between_them():
     found = characterise(terms)
     assert (found.subsystem, terms[0].equation.key) == ("powertrain", "axles")
     np.testing.assert_allclose(found.y, -0.15 * found.x, atol=4.0)
+
+
+@pytest.mark.parametrize(("subsystem", "at"), [("road", "gravity"), ("vehicle", "force")])
+def test_what_sways_within_two_seconds_is_followed_closely(subsystem, at):
+    """Waves in the road, or a load that swings: the accelerometer feels the second only."""
+    drive = clean(pulses(12.0), 14.0)
+    sway = 0.3 * np.sin(2.0 * np.pi * 0.9 * drive.time_s)
+    told = np.cumsum(sway) * (drive.time_s[1] - drive.time_s[0])
+    measured = drive.measured.copy()
+    measured[:, SPEED] += told - told.mean()
+    measured[:, WHEEL] += ((told - told.mean()) / MODEL.vehicle.wheel_radius_m)[:, None]
+    if at == "force":
+        measured[:, ACCEL] += sway
+    held = gather(MODEL, [noisy(remeasured(drive, measured))])
+    terms = fit_terms(MODEL, held.drives, held.noises, 2)
+    assert explained(terms[0]) < 0.5
+    close = finer(MODEL, held.drives, held.noises, terms, 2)
+    assert (close[0].equation.key, close[0].equation.subsystem) == (at, subsystem)
+    assert explained(close[0]) > 0.6
+
+
+def test_what_is_told_by_a_curve_over_the_motion_is_not_followed_closely(dragged):
+    held = gather(MODEL, [noisy(clean(pulses(8.0), 14.0))])
+    assert finer(MODEL, held.drives, held.noises, dragged) == dragged
 
 
 def test_a_log_whose_gap_is_elsewhere_in_time_shares_no_curve():
