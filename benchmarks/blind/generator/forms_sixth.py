@@ -26,10 +26,10 @@ ROLL_LINEAR, ROLL_GROWTH, ROLL_LOAD = 0.05, 0.06, -0.1
 """Of a tyre on the drum: by which its resistance is more at double speed, and with its square; power of the load."""
 ROLL_SIDE = 0.15
 """By which the left tyres resist more, nearer the road's edge and its grit."""
-BRIDGES_M = (0.0, 95.0, 105.0, 125.0, 135.0, 240.0, 250.0, 265.0, 275.0, 385.0)
+BRIDGES_M = (0.0, 85.0, 100.0, 125.0, 140.0, 235.0, 250.0, 275.0, 290.0, 385.0)
 BRIDGES = (0.0, 0.0, 0.4, -0.4, 0.0, 0.0, -0.35, 0.35, 0.0, 0.0)
 """How much more or less of a grade there is: a road that has sunk on either side of a bridge, and over a pipe."""
-BENDS_M = (0.0, 70.0, 75.0, 95.0, 100.0, 190.0, 195.0, 220.0, 225.0, 280.0, 285.0, 305.0, 310.0)
+BENDS_M = (0.0, 60.0, 75.0, 95.0, 110.0, 180.0, 195.0, 220.0, 235.0, 275.0, 290.0, 310.0, 325.0)
 BENDS = (0.1, 0.1, -0.4, -0.4, 0.1, 0.1, -0.4, -0.4, 0.1, 0.1, -0.4, -0.4, 0.1)
 """The same of a pass, which is flatter in its bends."""
 SEATS, LOOSE, LOOSE_HZ = 0.35, 0.4, 1.1
