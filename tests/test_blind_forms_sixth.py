@@ -320,8 +320,8 @@ def test_a_driveline_with_rubber_rings_softer_about_rest():
 
 
 def test_motors_brake_less_the_slower_they_turn():
-    p = by_further("regeneration_fades", below_m_s=8.0).physics
-    for torque, speed, share in ((-100.0, 4.0, 0.5), (-100.0, 10.0, 1.0), (100.0, 4.0, 1.0)):
+    p = by_further("regeneration_fades", below_m_s=8.0, share=0.6).physics
+    for torque, speed, share in ((-100.0, 4.0, 0.7), (-100.0, 10.0, 1.0), (100.0, 4.0, 1.0)):
         command = np.full((5, 4), torque)
         given = kernel.motor_torque(p, command, 0, 0.01, 0.0, speed / CAR.wheel_radius_m)
         assert given == pytest.approx(share * torque)

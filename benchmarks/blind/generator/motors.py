@@ -53,8 +53,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         torque *= 1.0 - p.derating * (1.0 - np.exp(-time / DERATING_S))
     if p.ripple > 0.0:
         torque *= 1.0 + p.ripple * np.cos(p.ripple_order * angle)
-    if p.regen_fade > 0.0 and torque < 0.0:
-        torque *= min(turning / p.regen_fade, 1.0)
+    if p.regen_lost > 0.0 and torque < 0.0:
+        torque *= 1.0 - p.regen_lost * (1.0 - min(turning / p.regen_fade, 1.0))
     gain = p.gain[wheel]
     if p.gain_warm != 0.0:
         gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_warm * warmth(time))

@@ -35,13 +35,18 @@ def _mixed_tyres(world: World, given: Parameters) -> World:
     return world.moved(stiffness_tilt=given["front_more"] * world.physics.stiffness_drive)
 
 
+def _fading(car: Car, rng: Generator) -> Scale:
+    below = float(rng.uniform(7.0, 12.0))
+    return lambda severity: {"below_m_s": below, "share": 0.04 * 22.0**severity}
+
+
 def _blending(world: World, given: Parameters) -> World:
-    """The motors brake less below a speed, and the brakes do not make up for it."""
-    return world.moved(regen_fade=given["below_m_s"] / world.physics.radius)
+    """The motors brake less below a speed, and the brakes make up for a part of it only."""
+    return world.moved(regen_fade=given["below_m_s"] / world.physics.radius, regen_lost=given["share"])
 
 
 LAST_FURTHER: dict[str, Effect] = {
-    "regeneration_fades": Effect(growing("below_m_s", 4.5, 25.0), _blending, ("powertrain",)),
+    "regeneration_fades": Effect(_fading, _blending, ("powertrain",)),
     "torque_dropouts": Effect(
         growing("hold_s", 0.02, 0.7), lambda w, g: w.moved(stall=g["hold_s"]), ("powertrain",)
     ),

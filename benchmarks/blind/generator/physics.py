@@ -120,6 +120,7 @@ class Physics(NamedTuple):
     axle_share: float
     pad_rise: float
     regen_fade: float
+    regen_lost: float
     slip_allowed: float
     slip_cut: float
     dead_band: float
