@@ -95,7 +95,7 @@ def test_a_body_on_its_springs_overshoots_by_its_damping():
     assert overshoot == pytest.approx(np.exp(-np.pi * damping / np.sqrt(1.0 - damping**2)), abs=0.02)
 
 
-@pytest.mark.parametrize("chosen", forms_of("tyre_relaxation"))
+@pytest.mark.parametrize("chosen", forms_of("tyre_relaxation", but=("partly_at_once",)))
 def test_relaxation_length_is_that_of_a_wheel_at_rest_in_the_mean(chosen):
     p = with_form(*chosen, length_m=0.4).physics
     load = 0.25 * p.mass * 9.81
@@ -149,7 +149,7 @@ def test_lag_shifts_the_speed_by_its_time(chosen):
     assert np.mean(times) == pytest.approx(0.1, rel=0.01)
 
 
-@pytest.mark.parametrize("chosen", forms_of("torque_gain"))
+@pytest.mark.parametrize("chosen", forms_of("torque_gain", but=("warming",)))
 def test_gain_scales_the_acceleration(chosen):
     worlds, gains = (with_form(*chosen, factor=0.9), nominal(CAR, Road())), []
     for sign in (1.0, -1.0):
