@@ -384,9 +384,9 @@ def by_further(name: str, **given: float) -> World:
 SHOWN_IN_DRIVING = tuple(
     n
     for n in {**FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER, **LAST_FURTHER}
-    if n != "slip_controller"
+    if n not in ("slip_controller", "regeneration_fades")
 )
-"""That one acts where a driven wheel slips, as it does in tests/test_blind_forms_fourth.py and not on this drive."""
+"""Those two act where a driven wheel slips and in slow braking, as in tests of their own and not on this drive."""
 
 
 @pytest.mark.parametrize("name", numbered(SHOWN_IN_DRIVING))
