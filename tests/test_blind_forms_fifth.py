@@ -120,7 +120,7 @@ def test_coarse_stretches_resist_by_their_mean():
 
 def test_unlike_axles_resist_by_the_weight_that_they_bear():
     p = with_form("rolling_resistance", "unlike_axles", coefficient=0.02).physics
-    shares = np.array([details.rolling_of(p, w, 0.0, 17.0) for w in range(4)])
+    shares = np.array([details.rolling_of(p, w, 0.0, 17.0, 1.0) for w in range(4)])
     loads = np.array([p.rear_arm, p.rear_arm, p.front_arm, p.front_arm])
     assert shares @ loads / loads.sum() == pytest.approx(1.0)
     assert 1.1 < shares[0] / shares[2] < 1.7

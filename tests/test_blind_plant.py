@@ -251,7 +251,8 @@ def test_the_nominal_car_is_the_products(name, family, tmp_path):
     off = path[:, [W, W + 3, V, N, X]] - log[signals].to_numpy()
     # A wheel that comes back from the limit does so a row sooner in one of the two: that time, 2 % of all, is left out.
     off = np.sort(np.abs(off), axis=0)[: -len(off) // 50]
-    assert np.all(np.sqrt(np.mean(off**2, axis=0)) < [0.008, 0.008, 5e-4, 4e-3, 2e-3])
+    # Speed and place run free over 14 s and keep what such rows did: less than a tenth of the best sensor's noise.
+    assert np.all(np.sqrt(np.mean(off**2, axis=0)) < [0.008, 0.008, 8e-4, 4e-3, 2e-3])
 
 
 NEUTRAL = {

@@ -18,6 +18,12 @@ ROLL_M_S = 17.0
 """Speed that a rolling resistance is stated at where it grows with speed [m/s]."""
 USUAL_M_S = 20.0
 """Speed that a deviation is stated at where it changes with speed [m/s]."""
+WARM_S = 15.0
+"""In which what warms up is warm [s]."""
+CROSS_RISE = 3.0
+"""By which a drag grows with the square of the angle that the air comes from [1/rad^2]."""
+STALL_S = 1.6
+"""From one message that a controller waits for to the next [s]."""
 USUAL_RAD_S = 65.0
 """The same of a motor that turns [rad/s]."""
 STRETCH_M = 57.0
@@ -64,17 +70,39 @@ def drag_of(fast: float, speed: float) -> float:
 
 
 @njit(cache=True)
+def crossed(wind: float, speed: float) -> float:
+    """Of a drag in a wind from the side, over that at `USUAL_M_S`: the air is faster and comes askew [-]."""
+    now, usual = (wind / max(speed, wind)) ** 2, (wind / USUAL_M_S) ** 2
+    return (1.0 + CROSS_RISE * now) * np.sqrt(1.0 + now) / (1.0 + CROSS_RISE * usual) / np.sqrt(1.0 + usual)
+
+
+@njit(cache=True)
+def warmth(time: float) -> float:
+    """From -1 of what is cold to 1 of what is warm; none on the mean of a drive [-]."""
+    return 1.0 - 2.0 * np.exp(-time / WARM_S)
+
+
+@njit(cache=True)
+def stiffened(p: Physics, time: float, speed: float) -> float:
+    """What a warm, fast tyre is stiffer by [N]."""
+    return p.stiffness_warm * warmth(time) + p.stiffness_speed * (min(speed / USUAL_M_S, 2.0) - 1.0)
+
+
+@njit(cache=True)
 def released(share: float, turning: float) -> float:
     """Of pads that a fast disc knocks back [-]."""
     return 1.0 - share * (min(turning / USUAL_RAD_S, 2.0) - 1.0)
 
 
 @njit(cache=True)
-def lag_of(p: Physics, wheel: int, turning: float) -> float:
-    """Of a lag that is another at each axle, or at each speed [-]."""
-    return (1.0 + spread(p.lag_tilt, 0.0, wheel)) * (
+def lag_of(p: Physics, wheel: int, turning: float, told: float, given: float) -> float:
+    """Of a lag that is another at each wheel, at each speed, or where torque is built up and let go [-]."""
+    lag = (1.0 + spread(p.lag_tilt, p.lag_side, wheel)) * (
         1.0 + p.lag_speed * (min(turning / USUAL_RAD_S, 2.0) - 1.0)
     )
+    if p.lag_rise != 0.0:
+        lag *= 1.0 + p.lag_rise * np.tanh((abs(told) - abs(given)) / SMALL_TORQUE_NM)
+    return lag
 
 
 @njit(cache=True)
@@ -83,6 +111,8 @@ def radius_at(p: Physics, wheel: int, speed: float, angle: float) -> float:
     radius = p.radius
     if p.radius_tilt != 0.0 or p.radius_side != 0.0:
         radius += spread(p.radius_tilt, p.radius_side, wheel)
+    if p.radius_sides != 0.0:
+        radius += p.radius_sides if wheel % 2 == 0 else -p.radius_sides
     if p.out_of_round > 0.0:
         radius *= 1.0 + p.out_of_round * np.cos(angle + 2.3 * wheel)
     if p.radius_growth != 0.0:
@@ -132,14 +162,16 @@ def friction(p: Physics, wheel: int, position: float, speed: float) -> float:
         factor = 1.0 + (factor - 1.0) * (1.0 + profile_at(p.blotches, at))
     if p.grip_tilt != 0.0:
         factor = 1.0 + (factor - 1.0) * (1.0 + in_share(p, p.grip_tilt, wheel))
+    if p.grip_speed != 0.0:
+        factor = 1.0 + (factor - 1.0) * (1.0 + p.grip_speed * (min(speed / USUAL_M_S, 2.0) - 1.0))
     if p.wet_fall > 0.0 and mu < SLIPPERY:
         factor *= max(1.0 - p.wet_fall * (speed / USUAL_M_S - 1.0), 0.4)
     return mu * factor
 
 
 @njit(cache=True)
-def rolling_of(p: Physics, wheel: int, position: float, speed: float) -> float:
-    """What resists a wheel's rolling over what does so on a dry road at `ROLL_M_S` [-]."""
+def rolling_of(p: Physics, wheel: int, position: float, speed: float, loaded: float) -> float:
+    """What resists a wheel over that on a dry road at `ROLL_M_S`; `loaded` is 1 of a quarter of the weight [-]."""
     rolling = 1.0 + p.roll_linear * (speed / ROLL_M_S - 1.0)
     if p.roll_wet > 0.0 and told_friction(p, wheel, position) < SLIPPERY:
         rolling *= 1.0 + p.roll_wet
@@ -148,6 +180,10 @@ def rolling_of(p: Physics, wheel: int, position: float, speed: float) -> float:
         rolling *= 1.0 + p.roll_texture * np.tanh(4.0 * np.sin(2.0 * np.pi * at / TEXTURE_M))
     if p.roll_tilt != 0.0:
         rolling *= 1.0 + in_share(p, p.roll_tilt, wheel)
+    if p.roll_side != 0.0:
+        rolling *= 1.0 + (p.roll_side if wheel % 2 == 0 else -p.roll_side)
+    if p.roll_load != 0.0:
+        rolling *= max(loaded, 1e-3) ** p.roll_load
     return rolling
 
 
@@ -175,6 +211,14 @@ def wait_of(cycle: float) -> float:
 
 
 @njit(cache=True)
+def stalled(duration: float, heard: float) -> float:
+    """The time of what a controller goes by that for `duration`, now and then, gets nothing new [s]."""
+    cycle = np.floor(heard / STALL_S)
+    begun = (cycle + 0.5 + 0.25 * wait_of(cycle)) * STALL_S
+    return begun if begun <= heard < begun + duration else heard
+
+
+@njit(cache=True)
 def let_through(p: Physics, torque: float, slip: float) -> float:
     """What a slip controller leaves of a torque that makes a wheel slip [N m]."""
     if torque * slip <= 0.0:
@@ -188,6 +232,8 @@ def shaft_of(p: Physics, wheel: int, twist: float, rate: float) -> float:
     stiffness = p.shaft_stiffness * (1.0 + (p.shaft_tilt if wheel % 2 == 0 else -p.shaft_tilt))
     if p.shaft_axles != 0.0:
         stiffness *= 1.0 + spread(p.shaft_axles, 0.0, wheel)
+    if p.shaft_rise != 0.0:
+        stiffness *= 1.0 + p.shaft_rise * (np.tanh(stiffness * abs(twist) / USUAL_NM) - 0.5)
     wound = twist - min(max(twist, -p.shaft_play), p.shaft_play)
     if p.shaft_play > 0.0 and wound == 0.0:
         return 0.0

@@ -14,10 +14,11 @@ from typing import Any
 
 from numpy.random import Generator
 
-from . import forms_fifth, forms_fourth, forms_second, forms_third
+from . import forms_fifth, forms_fourth, forms_second, forms_sixth, forms_third
 from .forms_second import Foreign
 from .library import LIBRARY
 from .outside import EVEN_FURTHER, FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
+from .outside_sixth import LAST_FURTHER
 from .world import Effect
 
 Forms = dict[str, str]
@@ -37,6 +38,8 @@ class Family(StrEnum):
     """Forms of every effect; again more of all else."""
     FIFTH = "fifth"
     """Again more of everything, and more pairs."""
+    SIXTH = "sixth"
+    """The same once more."""
 
 
 def _joined(aspects: Aspects, more: Aspects) -> Aspects:
@@ -47,17 +50,19 @@ def _joined(aspects: Aspects, more: Aspects) -> Aspects:
 THIRD: Aspects = _joined(forms_second.ASPECTS, forms_third.MORE)
 FOURTH: Aspects = _joined(THIRD, forms_fourth.MORE)
 FIFTH: Aspects = _joined(FOURTH, forms_fifth.MORE)
+SIXTH: Aspects = _joined(FIFTH, forms_sixth.MORE)
 ASPECTS: dict[Family, Aspects] = {
     Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
     Family.SECOND: forms_second.ASPECTS,
     Family.THIRD: THIRD,
     Family.FOURTH: FOURTH,
     Family.FIFTH: FIFTH,
+    Family.SIXTH: SIXTH,
 }
 """All that has forms in each family; what a family does not list has the library's form."""
-EFFECT_FORMS: Aspects = {name: forms for name, forms in FIFTH.items() if name in LIBRARY}
-FOREIGN: dict[str, Foreign] = FIFTH["foreign_tyre"]
-NOISES, DIGITS, STYLES = FIFTH["noise"], FIFTH["digits"], FIFTH["driver"]
+EFFECT_FORMS: Aspects = {name: forms for name, forms in SIXTH.items() if name in LIBRARY}
+FOREIGN: dict[str, Foreign] = SIXTH["foreign_tyre"]
+NOISES, DIGITS, STYLES = SIXTH["noise"], SIXTH["digits"], SIXTH["driver"]
 
 RATES_HZ: dict[Family, dict[float, float]] = {
     Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
@@ -91,6 +96,16 @@ RATES_HZ: dict[Family, dict[float, float]] = {
         1000.0: 0.1,
         1300.0: 0.05,
     },
+    Family.SIXTH: {
+        100.0: 0.2,
+        150.0: 0.1,
+        200.0: 0.2,
+        300.0: 0.1,
+        400.0: 0.1,
+        650.0: 0.1,
+        700.0: 0.1,
+        1000.0: 0.1,
+    },
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
@@ -100,6 +115,14 @@ OUTSIDES: dict[Family, dict[str, Effect]] = {
     Family.THIRD: {**OUTSIDE, **FURTHER, **STILL_FURTHER},
     Family.FOURTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER},
     Family.FIFTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER},
+    Family.SIXTH: {
+        **OUTSIDE,
+        **FURTHER,
+        **STILL_FURTHER,
+        **YET_FURTHER,
+        **EVEN_FURTHER,
+        **LAST_FURTHER,
+    },
 }
 """Each family's deviations outside the library."""
 
@@ -114,7 +137,7 @@ def draw_forms(family: Family, rng: Generator) -> Forms:
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDES[Family.FIFTH]}[name]
+    effect = {**LIBRARY, **OUTSIDES[Family.SIXTH]}[name]
     return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
 
 

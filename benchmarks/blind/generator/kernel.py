@@ -16,17 +16,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .commands import COMMAND_STEP_S, commanded, joined, on_grid
+from .commands import COMMAND_STEP_S, on_grid
 from .details import (
     ROLL_M_S,
     SLIPPERY,
     SMALL_M_S2,
     SMALL_TORQUE_NM,
     USUAL_M_S,
-    WAIT_S,
+    crossed,
     drag_of,
     friction,
-    gain_of,
     lag_of,
     let_through,
     profile_at,
@@ -35,10 +34,11 @@ from .details import (
     rolling_of,
     shaft_of,
     spread,
+    stiffened,
     told_friction,
-    wait_of,
 )
 from .falling import fallen
+from .motors import motor_torque
 from .physics import Physics
 from .tyre import THETA_GRID, dugoff, foreign
 
@@ -52,10 +52,6 @@ LEAST_LAG_S = 0.001
 
 BODY_DAMPING = 0.4
 """Of a body that pitches on its springs, over the critical one [-]."""
-BEAT_S = 0.7
-"""In which two clocks of nearly the same cycle pass each other once [s]."""
-DERATING_S = 12.0
-"""In which a motor gets hot [s]."""
 SLOSH_DAMPING = 0.12
 """Of a load that sways in the car, over the critical one [-]."""
 
@@ -98,42 +94,6 @@ def tyre_force(
         other = foreign(p.foreign_curve, size, rise, top, p.foreign_first, p.foreign_second)
         force += p.foreign_share * (other - force)
     return force if slip >= 0.0 else -force
-
-
-@njit(cache=True, inline="always")
-def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: float, turning: float) -> float:
-    """What the motor is told after dead time, dead band, limits, gain and ripple, before its lag [N m]."""
-    heard = time - p.delay
-    if p.delay_tilt != 0.0:
-        heard -= spread(p.delay_tilt, 0.0, wheel)
-    if p.beat > 0.0:
-        heard -= p.beat * (time / BEAT_S - np.floor(time / BEAT_S) - 0.5)
-    if p.wait > 0.0:
-        heard -= p.wait * wait_of(np.floor(time / WAIT_S))
-    if p.message > 0.0 and not p.message_joined:
-        sent = np.floor((heard + 0.5 * p.message) / p.message + 1e-9)
-        if p.message_lost > 0.0 and wait_of(sent) > 0.5 - p.message_lost:
-            sent -= 1.0
-        heard = sent * p.message
-    torque = commanded(command, wheel, heard)
-    if p.axle_share > 0.0:
-        torque += p.axle_share * (commanded(command, (wheel + 2) % 4, heard) - torque)
-    if p.message > 0.0 and p.message_joined:
-        torque = joined(command, wheel, heard, p.message)
-    if p.dead_band > 0.0:
-        torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
-    torque = min(max(torque, -p.torque_limit), p.torque_limit)
-    if p.power > 0.0:
-        torque = min(torque, p.power / max(turning, 1.0))
-    if p.derating > 0.0:
-        torque *= 1.0 - p.derating * (1.0 - np.exp(-time / DERATING_S))
-    if p.ripple > 0.0:
-        torque *= 1.0 + p.ripple * np.cos(p.ripple_order * angle)
-    if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0 or p.gain_load != 0.0:
-        return torque * gain_of(
-            p.gain[wheel], p.gain_sign, p.gain_speed, p.pad_rise, p.gain_load, torque, turning
-        )
-    return torque * p.gain[wheel]
 
 
 @njit(cache=True)
@@ -190,7 +150,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         load = max((press * arm + pitch * p.mass * p.cog_height) / (2.0 * length) - air, 0.0)
         theta = friction(p, w, y[X], speed)
         radius = p.radius
-        if p.radius_tilt != 0.0 or p.radius_growth != 0.0 or p.radius_side != 0.0 or p.out_of_round > 0.0:
+        unlike = p.radius_tilt != 0.0 or p.radius_side != 0.0 or p.radius_sides != 0.0
+        if unlike or p.radius_growth != 0.0 or p.out_of_round > 0.0:
             radius = radius_at(p, w, speed, y[ANGLE + w])
         rim = y[W + w] * radius
         slip = slips = slip_of(rim, speed)
@@ -203,12 +164,16 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
                 path *= 1.0 + spread(p.relaxation_tilt, 0.0, w)
             dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / path
             slip = y[SLIP + w]
+            if p.relaxation_direct > 0.0:
+                slip += p.relaxation_direct * (slips - slip)
         rubbing = rim - speed
         dy[RUB + w] = 0.0
         if p.falloff_time > 0.0:
             dy[RUB + w] = (rubbing - y[RUB + w]) / p.falloff_time
             rubbing = y[RUB + w]
         stiffer = spread(p.stiffness_tilt, p.stiffness_side, w)
+        if p.stiffness_warm != 0.0 or p.stiffness_speed != 0.0:
+            stiffer += stiffened(p, time, speed)
         force = tyre_force(p, slip, rubbing, theta, load, y[HEAT + w], stiffer)
         if p.force_relaxation > 0.0:
             dy[SLIP + w] = (force - y[SLIP + w]) * max(abs(speed), FLOOR_M_S) / p.force_relaxation
@@ -224,8 +189,9 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         rolling = p.roll_moment * load * p.radius
         if p.roll_growth > 0.0:
             rolling *= 1.0 + p.roll_growth * ((speed / ROLL_M_S) ** 2 - 1.0)
-        if p.roll_linear > 0.0 or p.roll_wet > 0.0 or p.roll_texture > 0.0 or p.roll_tilt != 0.0:
-            rolling *= rolling_of(p, w, y[X], speed)
+        differs = p.roll_linear > 0.0 or p.roll_tilt != 0.0 or p.roll_side != 0.0 or p.roll_load != 0.0
+        if differs or p.roll_wet > 0.0 or p.roll_texture > 0.0:
+            rolling *= rolling_of(p, w, y[X], speed, load / (0.25 * p.mass * GRAVITY))
         resisting += rolling
         if p.slush > 0.0 and told_friction(p, w, y[X]) < SLIPPERY:
             resisting += 0.25 * p.slush * speed * speed * radius
@@ -243,8 +209,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         lag = p.lag
         if p.lag_sign != 0.0:
             lag *= 1.0 + p.lag_sign * np.tanh((told + y[LAG + w]) / SMALL_TORQUE_NM)
-        if p.lag_tilt != 0.0 or p.lag_speed != 0.0:
-            lag *= lag_of(p, w, y[W + w])
+        if p.lag_tilt != 0.0 or p.lag_speed != 0.0 or p.lag_side != 0.0 or p.lag_rise != 0.0:
+            lag *= lag_of(p, w, y[W + w], told, y[LAG + w])
         if p.actuator_play > 0.0:
             told -= min(max(told - y[LAG + w], -p.actuator_play), p.actuator_play)
         dy[LAG + w] = (told - y[LAG + w]) / max(lag, LEAST_LAG_S) if follows else 0.0
@@ -262,7 +228,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.motor_inertia > 0.0:
             dy[TWIST + w] = y[MOTOR + w] - y[W + w]
             shaft = p.shaft_stiffness * y[TWIST + w] + p.shaft_damping * dy[TWIST + w]
-            if p.shaft_play > 0.0 or p.shaft_tilt != 0.0 or p.shaft_axles != 0.0 or p.shaft_friction > 0.0:
+            unlike = p.shaft_tilt != 0.0 or p.shaft_axles != 0.0
+            if unlike or p.shaft_play > 0.0 or p.shaft_friction > 0.0 or p.shaft_rise != 0.0:
                 shaft = shaft_of(p, w, y[TWIST + w], dy[TWIST + w])
             dy[MOTOR + w] = (torque - shaft) / p.motor_inertia
             torque = shaft
@@ -270,6 +237,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
     drag = p.drag
     if p.drag_fast != 0.0:
         drag *= drag_of(p.drag_fast, speed)
+    if p.drag_cross > 0.0:
+        drag *= crossed(p.drag_cross, speed)
     total -= drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
     if p.gust_drag > 0.0:
         against = speed + on_grid(p.wind, time / COMMAND_STEP_S)

@@ -27,6 +27,7 @@ class Physics(NamedTuple):
     radius_tilt: float
     radius_growth: float
     radius_side: float
+    radius_sides: float
     out_of_round: float
     lever: float
     inertia: float
@@ -37,12 +38,15 @@ class Physics(NamedTuple):
     stiffness_load: float
     stiffness_tilt: float
     stiffness_side: float
+    stiffness_warm: float
+    stiffness_speed: float
     factor_left: float
     factor_right: float
     patch_depth: float
     stretch_depth: float
     blotches: Array
     grip_tilt: float
+    grip_speed: float
     wet_fall: float
     falloff: float
     falloff_floor: float
@@ -53,6 +57,7 @@ class Physics(NamedTuple):
     relaxation_shrinks: bool
     relaxation_speed: float
     relaxation_tilt: float
+    relaxation_direct: float
     force_relaxation: float
     foreign_share: float
     foreign_curve: int
@@ -65,6 +70,7 @@ class Physics(NamedTuple):
     drag_height: float
     fanning: float
     drag_fast: float
+    drag_cross: float
     lift: float
     gust_drag: float
     wind: Array
@@ -75,6 +81,8 @@ class Physics(NamedTuple):
     roll_wet: float
     roll_texture: float
     roll_tilt: float
+    roll_side: float
+    roll_load: float
     slush: float
     brake_drag: float
     brake_share: Array
@@ -87,16 +95,20 @@ class Physics(NamedTuple):
     profile: Array
     delay: float
     delay_tilt: float
+    delay_sign: float
     message: float
     message_joined: bool
     message_lost: float
     beat: float
     wait: float
+    stall: float
     lag: float
     lag_first: float
     lag_sign: float
     lag_damping: float
     lag_tilt: float
+    lag_side: float
+    lag_rise: float
     lag_speed: float
     actuator_play: float
     slew: float
@@ -104,8 +116,11 @@ class Physics(NamedTuple):
     gain_sign: float
     gain_speed: float
     gain_load: float
+    gain_warm: float
     axle_share: float
     pad_rise: float
+    regen_fade: float
+    regen_lost: float
     slip_allowed: float
     slip_cut: float
     dead_band: float
@@ -120,6 +135,7 @@ class Physics(NamedTuple):
     shaft_tilt: float
     shaft_axles: float
     shaft_friction: float
+    shaft_rise: float
     motor_inertia: float
     slosh_share: float
     slosh_rate: float

@@ -12,14 +12,13 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .details import GRAIN_M, USUAL_M_S, WAIT_S
-from .kernel import ANGLE, BEAT_S, COMMAND_STEP_S, RECORD_STEP_S, N, V, W, X
+from .details import GRAIN_M, USUAL_M_S, USUAL_RAD_S, WAIT_S, WARM_S
+from .kernel import ANGLE, COMMAND_STEP_S, RECORD_STEP_S, N, V, W, X
+from .signals import beat, hold, joined, jumping, lag, mean, mean_age, paced, sent, slow, wait
 
 Array = NDArray[np.floating[Any]]
 WHEELS = ("fl", "fr", "rl", "rr")
-SWAY_S, WARM_S = 9.0, 15.0
-SLOW_S = (5.3, 11.0, 17.0)
-"""Periods of what a bias wanders by."""
+SWAY_S = 9.0
 NODDING_S, MOST_NODDING = 0.1, 0.4
 """How late a body pitches, and by how much that changes a scale's deviation at most [-]."""
 
@@ -45,14 +44,19 @@ class Sensors:
     wheel_lost: float = 0.0
     wheel_turn_s: float = 0.0
     """By how much the last wheel's reading is older than on average, and the first one's younger."""
+    wheel_axles_s: float = 0.0
+    """By how much the rear wheels' readings are older than on average, and the front ones' younger."""
+    wheel_paced_s: float = 0.0
+    """Part of the delay that goes with the time of a pulse, at the usual speed."""
+    wheel_hold_s: float = 0.0
     wheel_teeth: float = 0.0
     wheel_window_s: float = 0.0
     wheel_window_runs: bool = False
     """The window ends at the row, instead of one after the other."""
     wheel_window_shared: bool = False
     """All wheels are counted over the same windows."""
-    wheel_window_parts: int = 1
-    """How many windows overlap: a new one ends that often in the time of one."""
+    wheel_window_parts: float = 1
+    """How many windows overlap: a new one ends that often in the time of one. A half: every second one is told."""
     wheel_flanks: float = 0.0
     """By which every second flank comes late [teeth]."""
     wheel_window_jitter: float = 0.0
@@ -74,6 +78,10 @@ class Sensors:
     speed_wait_s: float = 0.0
     speed_filter_s: float = 0.0
     speed_lost: float = 0.0
+    speed_paced_s: float = 0.0
+    """Part of the delay that goes with the time for a distance, at the usual speed."""
+    speed_ahead_s: float = 0.0
+    """What the speed is predicted over, though it is not late."""
     speed_clock: float = 0.0
     """Share by which the speed sensor's clock is slow: its signal is ever later [-]."""
     speed_scale: float = 1.0
@@ -87,6 +95,8 @@ class Sensors:
     """By which it differs on a coarse road's stretches [-]."""
     speed_scale_warming: float = 0.0
     """By which it differs before and after the sensor is warm, over `WARM_S` [-]."""
+    speed_scale_jumps: float = 0.0
+    """By which it differs from one lock to the next [-]."""
     speed_step_m_s: float = 0.0
     """In which the speed is told, what is below a step dropped."""
     speed_rolling: float = 0.0
@@ -101,6 +111,9 @@ class Sensors:
     """By which the bias differs at double `USUAL_M_S` [-]."""
     accel_wander: float = 0.0
     """By which the bias differs over `SLOW_S` [-]."""
+    accel_bias_grain: float = 0.0
+    """By which the bias differs on a coarse road's stretches [-]."""
+    accel_delay_s: float = 0.0
     accel_pitch: float = 0.0
     """What gravity adds to the reading as the body pitches, after `NODDING_S` [-]."""
     accel_limit_m_s2: float = np.inf
@@ -166,26 +179,35 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     rng = np.random.default_rng([sensors.seed, 11])
     wheel_phase, speed_phase, *turns = np.random.default_rng([sensors.seed, 12]).uniform(0.0, 1.0, 6)
     waits = np.random.default_rng([sensors.seed, 13]).uniform(-0.5, 0.5, (2, int(record[-1] / WAIT_S) + 2))
-    wheel_at: Array = time_s - sensors.wheel_delay_s - _beat(time_s, sensors.wheel_beat_s, wheel_phase)
-    wheel_at = wheel_at + mean_age(sensors.wheel_filter_s) - _wait(time_s, sensors.wheel_wait_s, waits[0])
+    wheel_at: Array = time_s - sensors.wheel_delay_s - beat(time_s, sensors.wheel_beat_s, wheel_phase)
+    wheel_at = wheel_at + mean_age(sensors.wheel_filter_s) - wait(time_s, sensors.wheel_wait_s, waits[0])
     if not sensors.wheel_joined:
-        wheel_at = _sent(wheel_at, sensors.wheel_message_s, wheel_phase, sensors.wheel_lost, sensors.seed)
+        wheel_at = sent(wheel_at, sensors.wheel_message_s, wheel_phase, sensors.wheel_lost, sensors.seed)
     speed_at: Array = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
-    speed_at = speed_at - _beat(time_s, sensors.speed_beat_s, speed_phase)
-    speed_at = speed_at + mean_age(sensors.speed_filter_s) - _wait(time_s, sensors.speed_wait_s, waits[1])
+    speed_at = speed_at - beat(time_s, sensors.speed_beat_s, speed_phase)
+    speed_at = speed_at + mean_age(sensors.speed_filter_s) - wait(time_s, sensors.speed_wait_s, waits[1])
     if not sensors.speed_joined:
-        speed_at = _sent(speed_at, sensors.speed_message_s, speed_phase, sensors.speed_lost, sensors.seed)
+        speed_at = sent(speed_at, sensors.speed_message_s, speed_phase, sensors.speed_lost, sensors.seed)
+    if sensors.speed_paced_s > 0.0:
+        pace = paced(np.interp(time_s, record, path[:, V]), USUAL_M_S)
+        speed_at = speed_at - sensors.speed_paced_s * pace
     out, asked = np.empty((time_s.size, 6)), wheel_at
     for w in range(4):
         if sensors.wheel_turn_s > 0.0:
             wheel_at = asked - sensors.wheel_turn_s * (2.0 * w / 3.0 - 1.0)
+        if sensors.wheel_axles_s > 0.0:
+            wheel_at = asked - (-sensors.wheel_axles_s if w < 2 else sensors.wheel_axles_s)
+        if sensors.wheel_paced_s > 0.0:
+            pace = paced(np.interp(time_s, record, path[:, W + w]), USUAL_RAD_S)
+            wheel_at = asked - sensors.wheel_paced_s * pace
         if sensors.wheel_window_s > 0.0:
             wheel = _count(record, path[:, ANGLE + w], sensors, wheel_at, rng, wheel_phase)
         else:
-            turning = _lag(path[:, W + w], sensors.wheel_filter_s)
+            turning = lag(path[:, W + w], sensors.wheel_filter_s)
+            turning = hold(turning, sensors.wheel_hold_s, np.random.default_rng([sensors.seed, 17]))
             if sensors.wheel_joined:
-                turning = _joined(record, turning, sensors.wheel_message_s, wheel_phase)
-            wheel = _mean(record, turning, wheel_at, sensors.wheel_average_s)
+                turning = joined(record, turning, sensors.wheel_message_s, wheel_phase)
+            wheel = mean(record, turning, wheel_at, sensors.wheel_average_s)
         if sensors.wheel_runout > 0.0:
             angle = np.interp(wheel_at, record, path[:, ANGLE + w])
             wheel = wheel * (1.0 + sensors.wheel_runout * np.cos(angle + 2.0 * np.pi * turns[w]))
@@ -194,23 +216,27 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     if sensors.speed_rolling > 0.0:
         rolled = path[:, W : W + 4].mean(axis=1) * sensors.wheel_radius_m
         speed = speed + sensors.speed_rolling * (rolled - speed)
-    speed = _hold(_lag(speed, sensors.speed_lag_s + sensors.speed_filter_s), sensors.speed_hold_s, rng)
+    if sensors.speed_ahead_s > 0.0:
+        speed = speed + sensors.speed_ahead_s * path[:, N]
+    speed = hold(lag(speed, sensors.speed_lag_s + sensors.speed_filter_s), sensors.speed_hold_s, rng)
     if sensors.speed_joined:
-        speed = _joined(record, speed, sensors.speed_message_s, speed_phase)
-    shown_speed = _mean(record, speed, speed_at, sensors.speed_average_s)
+        speed = joined(record, speed, sensors.speed_message_s, speed_phase)
+    shown_speed = mean(record, speed, speed_at, sensors.speed_average_s)
     out[:, 4] = _scale(path, sensors, time_s, shown_speed) * shown_speed + sensors.speed_offset_m_s
     if sensors.speed_step_m_s > 0.0:
         out[:, 4] = np.floor(out[:, 4] / sensors.speed_step_m_s) * sensors.speed_step_m_s
-    accel = _lag(path[:, N], sensors.accel_lag_s)
+    accel = lag(path[:, N], sensors.accel_lag_s)
     if sensors.accel_pitch > 0.0:
-        accel = accel + sensors.accel_pitch * _lag(path[:, N], NODDING_S)
+        accel = accel + sensors.accel_pitch * lag(path[:, N], NODDING_S)
     bias = sensors.accel_bias_m_s2 * (1.0 + sensors.accel_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S)))
     if sensors.accel_bias_growth != 0.0:
         faster = np.interp(time_s, record, path[:, V]) / USUAL_M_S - 1.0
         bias = bias * (1.0 + sensors.accel_bias_growth * faster)
     if sensors.accel_wander > 0.0:
-        bias = bias * (1.0 + sensors.accel_wander * _slow(time_s, sensors.seed))
-    shown = sensors.accel_scale * np.interp(time_s, record, accel) + bias
+        bias = bias * (1.0 + sensors.accel_wander * slow(time_s, sensors.seed))
+    if sensors.accel_bias_grain > 0.0:
+        bias = bias * (1.0 + sensors.accel_bias_grain * _coarse(path, time_s))
+    shown = sensors.accel_scale * np.interp(time_s - sensors.accel_delay_s, record, accel) + bias
     out[:, 5] = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
     return out
 
@@ -218,76 +244,27 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
 def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float | Array:
     """Of the vehicle speed, whose deviation may differ with time, speed and pitch [-]."""
     differs = (sensors.speed_sway, sensors.speed_scale_growth, sensors.speed_scale_pitch)
-    if not any((*differs, sensors.speed_scale_grain, sensors.speed_scale_warming)):
+    if not any((*differs, sensors.speed_scale_grain, sensors.speed_scale_warming, sensors.speed_scale_jumps)):
         return sensors.speed_scale
     sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
     sway = sway + sensors.speed_scale_growth * (speed / USUAL_M_S - 1.0)
     if sensors.speed_scale_pitch != 0.0:
         record = np.arange(len(path)) * RECORD_STEP_S
-        nod = sensors.speed_scale_pitch * np.interp(time_s, record, _lag(path[:, N], NODDING_S))
+        nod = sensors.speed_scale_pitch * np.interp(time_s, record, lag(path[:, N], NODDING_S))
         sway = sway + np.clip(nod, -MOST_NODDING, MOST_NODDING)
     if sensors.speed_scale_grain > 0.0:
-        place = np.interp(time_s, np.arange(len(path)) * RECORD_STEP_S, path[:, X])
-        sway = sway + sensors.speed_scale_grain * np.tanh(4.0 * np.sin(2.0 * np.pi * place / GRAIN_M))
+        sway = sway + sensors.speed_scale_grain * _coarse(path, time_s)
     if sensors.speed_scale_warming > 0.0:
         sway = sway + sensors.speed_scale_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S))
+    if sensors.speed_scale_jumps > 0.0:
+        sway = sway + sensors.speed_scale_jumps * jumping(time_s, sensors.seed)
     return 1.0 + (sensors.speed_scale - 1.0) * sway
 
 
-def _slow(time_s: Array, seed: int) -> Array:
-    """What a bias wanders by, of size 1 at most [-]."""
-    phases = np.random.default_rng([seed, 14]).uniform(0.0, 2.0 * np.pi, len(SLOW_S))
-    waves = [np.sin(2.0 * np.pi * time_s / s + phase) for s, phase in zip(SLOW_S, phases, strict=True)]
-    return np.mean(waves, axis=0)
-
-
-def mean_age(filter_s: float) -> float:
-    """How late a record's first-order filter makes a ramp [s]."""
-    keep = np.exp(-RECORD_STEP_S / filter_s) if filter_s > 0.0 else 0.0
-    return float(RECORD_STEP_S * keep / (1.0 - keep))
-
-
-def _wait(time_s: Array, size_s: float, waits: Array) -> Array:
-    """How much later than on average a value comes whose message had to wait for others [s]."""
-    return size_s * waits[np.clip(time_s / WAIT_S, 0, waits.size - 1).astype(int)]
-
-
-def _beat(time_s: Array, size_s: float, phase: float) -> Array:
-    """How much later than on average a value comes whose sender's clock passes the reader's [s]."""
-    return size_s * (np.mod(time_s / BEAT_S + phase, 1.0) - 0.5)
-
-
-def _joined(record: Array, signal: Array, message_s: float, phase: float) -> Array:
-    """The signal as straight lines between its messages."""
-    if message_s == 0.0:
-        return signal
-    sent = np.arange(phase * message_s, record[-1], message_s)
-    return np.interp(record, sent, np.interp(sent, record, signal))
-
-
-def _sent(at: Array, message_s: float, phase: float, lost: float, seed: int) -> Array:
-    """The messages' times nearest to `at` [s]; of a lost one, that of the last that was not."""
-    if message_s == 0.0:
-        return at
-    sent = np.floor(at / message_s - phase + 0.5)
-    if lost > 0.0:
-        number = (sent - sent.min()).astype(int)
-        kept = np.random.default_rng([seed, 15]).random(number.max() + 1) >= lost
-        kept[0] = True
-        sent = sent.min() + np.maximum.accumulate(np.where(kept, np.arange(kept.size), 0))[number]
-    return (sent + phase) * message_s
-
-
-def _mean(record: Array, signal: Array, at: Array, over_s: float) -> Array:
-    """Mean of the signal over `over_s` around `at`; what it was when the record began stands for all before."""
-    if over_s == 0.0:
-        return np.interp(at, record, signal)
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))]) * RECORD_STEP_S
-
-    def until(end: Array) -> Array:
-        return np.interp(end, record, area) + signal[0] * np.minimum(end, 0.0)
-
-    return (until(at + 0.5 * over_s) - until(at - 0.5 * over_s)) / over_s
+def _coarse(path: Array, time_s: Array) -> Array:
+    """1 on a coarse road's stretches and -1 between them [-]."""
+    place = np.interp(time_s, np.arange(len(path)) * RECORD_STEP_S, path[:, X])
+    return np.asarray(np.tanh(4.0 * np.sin(2.0 * np.pi * place / GRAIN_M)))
 
 
 def _count(
@@ -321,25 +298,6 @@ def _count(
         return np.floor(passed)
 
     return (pulses(ends) - pulses(begins)) * 2.0 * np.pi / (teeth * window)
-
-
-def _lag(signal: Array, time_constant_s: float) -> Array:
-    if time_constant_s == 0.0:
-        return signal
-    keep = np.exp(-RECORD_STEP_S / time_constant_s)
-    return lfilter([1.0 - keep], [1.0, -keep], signal, zi=[keep * signal[0]])[0]
-
-
-def _hold(signal: Array, duration_s: float, rng: Generator) -> Array:
-    """Dropouts: every second or two the last value stands for `duration_s`."""
-    if duration_s == 0.0:
-        return signal
-    source = np.arange(signal.size)
-    at = 0.0
-    while (at := at + duration_s + rng.uniform(0.7, 2.0)) < signal.size * RECORD_STEP_S:
-        start = int(at / RECORD_STEP_S)
-        source[start : start + int(duration_s / RECORD_STEP_S)] = start
-    return signal[source]
 
 
 def noise_of(noise: Noise, time_s: Array, rng: Generator) -> Array:

@@ -14,6 +14,7 @@ THETA_GRID = np.linspace(0.02, 1.5, 75)
 MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING, CUBED, HYPERBOLIC_TANGENT = range(
     9
 )
+BLENDED, TWO_LINES, PLAIN_DUGOFF = range(9, 12)
 """Codes of the foreign curves."""
 
 
@@ -225,6 +226,70 @@ def cubed(slip: float, slope: float, peak: float, curvature: float) -> float:
 
 
 @njit(cache=True)
+def blended(slip: float, slope: float, peak: float, order: float) -> float:
+    """Force of a line and a level blended, (1/line^n + 1/level^n)^(-1/n), with its peak at the locked wheel [N].
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero, above `peak` [N].
+    peak : float
+        Largest force [N].
+    order : float
+        n [-].
+    """
+    if peak <= 0.0 or slip <= 0.0:
+        return 0.0
+    rest = (slope / peak) ** order - 1.0
+    return slope * slip / (1.0 + rest * slip**order) ** (1.0 / order)
+
+
+@njit(cache=True)
+def two_lines(slip: float, slope: float, peak: float, sliding: float) -> float:
+    """Force of a parabola up to the peak and a straight fall to the locked wheel's [N].
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero, above twice `peak` [N].
+    peak : float
+        Largest force [N].
+    sliding : float
+        Force of the locked wheel over the peak [-].
+    """
+    if peak <= 0.0:
+        return 0.0
+    best = 2.0 * peak / slope
+    x = slip / best
+    if x <= 1.0:
+        return peak * x * (2.0 - x)
+    return peak * (1.0 - (1.0 - sliding) * (slip - best) / (1.0 - best))
+
+
+@njit(cache=True)
+def plain_dugoff(slip: float, slope: float, peak: float) -> float:
+    """Force of Dugoff's tyre without the modified one's shape, with its peak at the locked wheel [N].
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero [N].
+    peak : float
+        Largest force [N].
+    """
+    if peak <= 0.0:
+        return 0.0
+    adhesion = slope * slip / max(1.0 - slip, 1e-12)
+    return adhesion if adhesion < 0.5 * peak else peak * (1.0 - 0.25 * peak / adhesion)
+
+
+@njit(cache=True)
 def foreign(curve: int, slip: float, slope: float, peak: float, first: float, second: float) -> float:
     """Force of a foreign curve by its code [N]; `first` and `second` are its own parameters."""
     if curve == BRUSH:
@@ -243,6 +308,12 @@ def foreign(curve: int, slip: float, slope: float, peak: float, first: float, se
         return cubed(slip, slope, peak, first)
     if curve == HYPERBOLIC_TANGENT:
         return peak * np.tanh(slope * slip / peak) if peak > 0.0 else 0.0
+    if curve == BLENDED:
+        return blended(slip, slope, peak, first)
+    if curve == TWO_LINES:
+        return two_lines(slip, slope, peak, first)
+    if curve == PLAIN_DUGOFF:
+        return plain_dugoff(slip, slope, peak)
     return magic(slip, slope, peak, first, second)
 
 

@@ -1,0 +1,63 @@
+"""What the motors are told and give, before their lag, compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .commands import commanded, joined
+from .details import SMALL_TORQUE_NM, WAIT_S, gain_of, spread, stalled, wait_of, warmth
+from .physics import Physics
+
+Array = NDArray[np.floating[Any]]
+
+BEAT_S = 0.7
+"""In which two clocks of nearly the same cycle pass each other once [s]."""
+DERATING_S = 12.0
+"""In which a motor gets hot [s]."""
+
+
+@njit(cache=True, inline="always")
+def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: float, turning: float) -> float:
+    """What the motor is told after dead time, dead band, limits, gain and ripple, before its lag [N m]."""
+    heard = time - p.delay
+    if p.delay_tilt != 0.0:
+        heard -= spread(p.delay_tilt, 0.0, wheel)
+    if p.delay_sign != 0.0:
+        heard += p.delay_sign * np.tanh(commanded(command, wheel, heard) / SMALL_TORQUE_NM)
+    if p.beat > 0.0:
+        heard -= p.beat * (time / BEAT_S - np.floor(time / BEAT_S) - 0.5)
+    if p.wait > 0.0:
+        heard -= p.wait * wait_of(np.floor(time / WAIT_S))
+    if p.stall > 0.0:
+        heard = stalled(p.stall, heard)
+    if p.message > 0.0 and not p.message_joined:
+        sent = np.floor((heard + 0.5 * p.message) / p.message + 1e-9)
+        if p.message_lost > 0.0 and wait_of(sent) > 0.5 - p.message_lost:
+            sent -= 1.0
+        heard = sent * p.message
+    torque = commanded(command, wheel, heard)
+    if p.axle_share > 0.0:
+        torque += p.axle_share * (commanded(command, (wheel + 2) % 4, heard) - torque)
+    if p.message > 0.0 and p.message_joined:
+        torque = joined(command, wheel, heard, p.message)
+    if p.dead_band > 0.0:
+        torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
+    torque = min(max(torque, -p.torque_limit), p.torque_limit)
+    if p.power > 0.0:
+        torque = min(torque, p.power / max(turning, 1.0))
+    if p.derating > 0.0:
+        torque *= 1.0 - p.derating * (1.0 - np.exp(-time / DERATING_S))
+    if p.ripple > 0.0:
+        torque *= 1.0 + p.ripple * np.cos(p.ripple_order * angle)
+    if p.regen_lost > 0.0 and torque < 0.0:
+        torque *= 1.0 - p.regen_lost * (1.0 - min(turning / p.regen_fade, 1.0))
+    gain = p.gain[wheel]
+    if p.gain_warm != 0.0:
+        gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_warm * warmth(time))
+    if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0 or p.gain_load != 0.0:
+        return torque * gain_of(gain, p.gain_sign, p.gain_speed, p.pad_rise, p.gain_load, torque, turning)
+    return torque * gain

@@ -1,0 +1,110 @@
+"""What becomes of a signal on its way: late, held, averaged, filtered."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from .details import WAIT_S
+from .kernel import RECORD_STEP_S
+from .motors import BEAT_S
+
+Array = NDArray[np.floating[Any]]
+
+SLOW_S = (5.3, 11.0, 17.0)
+"""Periods of what a bias wanders by."""
+JUMP_S = 3.5
+"""From one jump of a scale to the next."""
+MOST_PACED = 3.0
+"""How much older than at the usual speed a value that comes with the distance may be."""
+
+
+def slow(time_s: Array, seed: int) -> Array:
+    """What a bias wanders by, of size 1 at most [-]."""
+    phases = np.random.default_rng([seed, 14]).uniform(0.0, 2.0 * np.pi, len(SLOW_S))
+    waves = [np.sin(2.0 * np.pi * time_s / s + phase) for s, phase in zip(SLOW_S, phases, strict=True)]
+    return np.mean(waves, axis=0)
+
+
+def paced(turning: Array, usual: float) -> Array:
+    """How much older than at the `usual` speed a value is that takes a distance, over its age there [-]."""
+    return np.asarray(np.minimum(usual / np.maximum(turning, 1e-3), MOST_PACED) - 1.0)
+
+
+def jumping(time_s: Array, seed: int) -> Array:
+    """One of two levels, every `JUMP_S` the other [-]."""
+    phase = np.random.default_rng([seed, 16]).uniform(0.0, 2.0)
+    return 1.0 - 2.0 * (np.floor(time_s / JUMP_S + phase) % 2.0)
+
+
+def mean_age(filter_s: float) -> float:
+    """How late a record's first-order filter makes a ramp [s]."""
+    keep = np.exp(-RECORD_STEP_S / filter_s) if filter_s > 0.0 else 0.0
+    return float(RECORD_STEP_S * keep / (1.0 - keep))
+
+
+def wait(time_s: Array, size_s: float, waits: Array) -> Array:
+    """How much later than on average a value comes whose message had to wait for others [s]."""
+    return size_s * waits[np.clip(time_s / WAIT_S, 0, waits.size - 1).astype(int)]
+
+
+def beat(time_s: Array, size_s: float, phase: float) -> Array:
+    """How much later than on average a value comes whose sender's clock passes the reader's [s]."""
+    return size_s * (np.mod(time_s / BEAT_S + phase, 1.0) - 0.5)
+
+
+def joined(record: Array, signal: Array, message_s: float, phase: float) -> Array:
+    """The signal as straight lines between its messages."""
+    if message_s == 0.0:
+        return signal
+    sent = np.arange(phase * message_s, record[-1], message_s)
+    return np.interp(record, sent, np.interp(sent, record, signal))
+
+
+def sent(at: Array, message_s: float, phase: float, lost: float, seed: int) -> Array:
+    """The messages' times nearest to `at` [s]; of a lost one, that of the last that was not."""
+    if message_s == 0.0:
+        return at
+    sent = np.floor(at / message_s - phase + 0.5)
+    if lost > 0.0:
+        number = (sent - sent.min()).astype(int)
+        kept = np.random.default_rng([seed, 15]).random(number.max() + 1) >= lost
+        kept[0] = True
+        sent = sent.min() + np.maximum.accumulate(np.where(kept, np.arange(kept.size), 0))[number]
+    return (sent + phase) * message_s
+
+
+def mean(record: Array, signal: Array, at: Array, over_s: float) -> Array:
+    """Mean of the signal over `over_s` around `at`; what it was when the record began stands for all before."""
+    if over_s == 0.0:
+        return np.interp(at, record, signal)
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))]) * RECORD_STEP_S
+
+    def until(end: Array) -> Array:
+        return np.interp(end, record, area) + signal[0] * np.minimum(end, 0.0)
+
+    return (until(at + 0.5 * over_s) - until(at - 0.5 * over_s)) / over_s
+
+
+def lag(signal: Array, time_constant_s: float) -> Array:
+    """What a first-order low pass makes of a record."""
+    if time_constant_s == 0.0:
+        return signal
+    keep = np.exp(-RECORD_STEP_S / time_constant_s)
+    return lfilter([1.0 - keep], [1.0, -keep], signal, zi=[keep * signal[0]])[0]
+
+
+def hold(signal: Array, duration_s: float, rng: Generator) -> Array:
+    """Dropouts: every second or two the last value stands for `duration_s`."""
+    if duration_s == 0.0:
+        return signal
+    source = np.arange(signal.size)
+    at = 0.0
+    while (at := at + duration_s + rng.uniform(0.7, 2.0)) < signal.size * RECORD_STEP_S:
+        start = int(at / RECORD_STEP_S)
+        source[start : start + int(duration_s / RECORD_STEP_S)] = start
+    return signal[source]
