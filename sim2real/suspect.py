@@ -31,7 +31,12 @@ CLEARED = 1.4
 
 
 def lone_sensor(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Equation | None:
-    """The equation of the one sensor that everything else speaks against; None where there is none."""
+    """The equation of the one sensor that everything else speaks against; None where there is none.
+
+    Nor where all together are no more than noise: then leaving one out tells nothing.
+    """
+    if _misfit(model, fit_to, holdout) <= CLEARED:
+        return None
     candidates = [e for e in EQUATIONS if e.channel is not None]
     left = [_misfit_without(e.channel, model, fit_to, holdout) for e in candidates if e.channel is not None]
     best = int(np.argmin(left))
@@ -48,12 +53,16 @@ def unlike_wheels(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: 
     return min(best.loss, refined(model, drives, noises, best).loss)
 
 
-def _misfit_without(channel: int, model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:
-    z_fit, z_hold = (_z_without(channel, model, e) for e in (fit_to, holdout))
+def _misfit(model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:
+    z_fit, z_hold = (e.whitened(e.residuals(model)) for e in (fit_to, holdout))
     return fitness(Entry((), None, z_fit, z_hold), fit_to, holdout).misfit
 
 
-def _z_without(channel: int, model: Simulation, evidence: Evidence) -> Array:
+def _misfit_without(channel: int, model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:
+    return _misfit(model, _without(channel, model, fit_to), _without(channel, model, holdout))
+
+
+def _without(channel: int, model: Simulation, evidence: Evidence) -> Evidence:
     drives = []
     for drive in evidence.drives:
         measured, counted = drive.measured.copy(), drive.counted.copy()
@@ -64,5 +73,4 @@ def _z_without(channel: int, model: Simulation, evidence: Evidence) -> Array:
         measured[~begun, channel] = np.nan
         counted[channel] = False
         drives.append(replace(drive, measured=measured, counted=counted))
-    without = replace(evidence, drives=tuple(drives))
-    return without.whitened(without.residuals(model))
+    return replace(evidence, drives=tuple(drives))

@@ -218,6 +218,11 @@ def test_where_the_car_itself_differs_no_sensor_stands_alone(effects):
     assert lone_sensor(MODEL, one, other) is None
 
 
+def test_where_nothing_is_more_than_noise_no_sensor_stands_alone():
+    held = gather(MODEL, random_drives({}, count=1, seed=8, duration_s=8.0))
+    assert lone_sensor(MODEL, held, held) is None
+
+
 def test_an_unknown_sensor_fault_is_told_in_words():
     logs = [spoiled(ACCEL, lambda a: a + 0.3 * np.abs(a), seed) for seed in (0, 1)]
     said = diagnose(MODEL, logs[:1], logs[1], exclude=only("mass_offset", "aero_drag"))
