@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes.util
-from importlib.util import find_spec
-
 import pytest
+from foreign_clients import need_client
 
 from benchmarks.conformance.cases import CASES
 from benchmarks.conformance.clients import CLIENTS
@@ -50,11 +48,7 @@ def test_a_document_is_read_as_it_was_written() -> None:
 @pytest.mark.e2e
 @pytest.mark.parametrize("client", SHORT)
 def test_a_short_run_gives_the_documents_cells(bench: Bench, client: str) -> None:
-    package = CLIENTS[client].package
-    if find_spec(package) is None:
-        pytest.skip(f"needs {package}: pip install -e .[conformance]")
-    if package == "ecospy" and ctypes.util.find_library("tbb") is None:
-        pytest.skip("ecospy needs the system library libtbb.so.12 (Debian: apt-get install libtbb12)")
+    need_client(CLIENTS[client].package)
     cells = run_cells(bench, client, UNIT, SHORT[client])
     committed = read_cells(DOCUMENT.read_text(encoding="utf-8"))
     assert {p: (c.outcome, c.reason) for p, c in cells.items() if c.outcome is not committed[p].outcome} == {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import re
 import shutil
@@ -13,6 +12,7 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 import pytest
+from foreign_clients import need_client
 
 ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "docs" / "hosts"
@@ -66,9 +66,8 @@ def runs(page: Path) -> list[tuple[str, str | None]]:
 def test_page_does_what_it_says(
     unit_file: Path, tmp_path: Path, page: str, packages: tuple[str, ...], program: str | None
 ) -> None:
-    missing = [name for name in packages if importlib.util.find_spec(name) is None]
-    if missing:
-        pytest.skip(f"{page} needs {', '.join(missing)}")
+    for package in packages:
+        need_client(package)
     if program is not None and (shutil.which(program) is None or not sys.platform.startswith("linux")):
         pytest.skip(f"{page} needs {program} on Linux")
     (tmp_path / "dist").mkdir()

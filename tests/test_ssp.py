@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmu_unit import STEP_S, Unit
+from foreign_clients import need_client
 
 import build_ssp
 from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
@@ -239,7 +240,7 @@ def drive(
 def test_other_tools_run_the_package_to_the_same_end(
     drive: tuple[Path, int, dict[str, float]], client: str, code: str
 ) -> None:
-    pytest.importorskip(client)
+    need_client(client)
     package, steps, reached = drive
     done = subprocess.run(
         [sys.executable, "-c", code, package, str(steps), *reached],
