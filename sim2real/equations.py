@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.effects.torque_gain import FRONT_LESS_REAR
 from scenarios.files import WHEELS
 from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
 from sim2real.observer import Prediction, Push, Simulation
 
 Array = NDArray[Any]
-
-FRONT_LESS_REAR = np.array([1.0, 1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True)

@@ -200,14 +200,19 @@ def finer(
     return close if explained(close[0]) > explained(terms[0]) else list(terms)
 
 
+def best_of_each(terms: Sequence[Term]) -> list[Term]:
+    """The first term of each equation; of terms best first."""
+    first: dict[str, Term] = {}
+    for term in terms:
+        first.setdefault(term.equation.key, term)
+    return list(first.values())
+
+
 def with_refined(
     model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], terms: Sequence[Term], jobs: int = 1
 ) -> list[Term]:
     """Terms, best first, of which the best of each of the most promising equations are `refined`."""
-    first: dict[str, Term] = {}
-    for term in terms:
-        first.setdefault(term.equation.key, term)
-    chosen = list(first.values())[:REFINED]
+    chosen = best_of_each(terms)[:REFINED]
     better = Parallel(n_jobs=jobs, prefer="threads")(
         delayed(refined)(model, drives, noises, term) for term in chosen
     )
