@@ -42,7 +42,7 @@ class Estimator(Protocol):
 class CameraSlave(GuardedSlave):
     """Sensors and camera frames into an estimator, its estimate out.
 
-    A unit gives `bus` and overrides `build`, `sensors`, `publish` and `problems`.
+    A unit gives `bus` and `views` and overrides `build`, `sensors`, `shown` and `problems`.
     """
 
     bus: ClassVar[tuple[BusClass, ...]]
@@ -58,10 +58,6 @@ class CameraSlave(GuardedSlave):
     @abstractmethod
     def sensors(self) -> Any:
         """The inputs as the estimator's sensors."""
-
-    @abstractmethod
-    def publish(self, estimate: Any) -> None:
-        """Set the outputs."""
 
     @abstractmethod
     def problems(self, estimate: Any) -> Iterable[tuple[str, str]]:
@@ -86,10 +82,9 @@ class CameraSlave(GuardedSlave):
         self._estimator = self.build(self.values, self._networks)
         self._connected: set[str] = set()
         self._frame = FrameState()
-        self.publish(self._estimator.last)
 
     def step(self, step_s: float) -> None:
-        """Hand sensors and a new frame to the estimator, and publish its estimate."""
+        """Hand sensors and a new frame to the estimator, whose last estimate the outputs show."""
         sensors = self.sensors()
         if not self.values[BUFFERS_ENABLED] and in_memory(self.values):
             self._tell_buffers_off()
@@ -103,7 +98,6 @@ class CameraSlave(GuardedSlave):
             problem = str(error)
             self._frame = replace(self._frame, failed=True)
             estimate = self._estimator.step(step_s, sensors, frame_failed=True)
-        self.publish(estimate)
         if problem:
             self.report("frame", Fmi2Status.warning, f"{self.modelName}: {problem}")
         for kind, text in self.problems(estimate):

@@ -71,7 +71,9 @@ def next_frame(
     frame_id, source = values["frame_id"], _source(values, bus)
     if not source:
         # A picture in memory is set for one step: that none is set now ends nothing.
-        return (seen if seen.source == BUFFER else FrameState("", frame_id, seen.failed)), None, None
+        if seen.source == BUFFER or (not seen.source and seen.frame_id == frame_id):
+            return seen, None, None
+        return FrameState("", frame_id, seen.failed), None, None
     unnumbered = source in (BUS, BUFFER) and frame_id == 0
     if (source, frame_id) == (seen.source, seen.frame_id) and not unnumbered:
         return seen, None, None

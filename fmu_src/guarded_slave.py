@@ -13,7 +13,7 @@ import sys
 import threading
 import zlib
 from _thread import interrupt_main
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, ClassVar
 
@@ -96,6 +96,17 @@ def holes(items: list[Any]) -> list[int]:
     ]
 
 
+class Held(dict[str, Any]):
+    """Values by name; what is not held here is shown from where it lives, when it is asked for."""
+
+    def __init__(self, values: Mapping[str, Any], show: Callable[[str], Value]) -> None:
+        super().__init__(values)
+        self._show = show
+
+    def __missing__(self, name: str) -> Value:
+        return self._show(name)
+
+
 class InstantiationError(RuntimeError):
     """The unit cannot be instantiated; the text says why, ready for a printf-like logger."""
 
@@ -104,12 +115,14 @@ class GuardedSlave(Fmi2Slave):
     """Variables by name, guarded callbacks, log lines once per kind, and the whole state as bytes.
 
     A slave gives `variables` and overrides `prepare`, `initialise`, `step`, `inner_state` and
-    `restore_inner_state`; all of them may raise.
+    `restore_inner_state`, and `shown` where outputs need not be worked out unless they are read; all may raise.
     """
 
     variables: ClassVar[tuple[Variable, ...]] = ()
     volatile: ClassVar[frozenset[str]] = frozenset()
     """Inputs that hold for one step only, such as addresses: `clear_volatile` forgets them, no state holds them."""
+    views: ClassVar[frozenset[str]] = frozenset()
+    """Outputs that `shown` gives; `values` does not hold them."""
     _prepared: ClassVar[bool] = False
 
     def __init__(self, **kwargs: Any) -> None:
@@ -121,7 +134,7 @@ class GuardedSlave(Fmi2Slave):
             v.name: NEUTRAL[v.kind] if v.start is None else v.start for v in self.variables
         }
         self._forgotten = {name: self._starts[name] for name in sorted(self.volatile)}
-        self.values: dict[str, Any] = dict(self._starts)
+        self.values = Held({n: s for n, s in self._starts.items() if n not in self.views}, self._view)
         self._names: dict[Kind, dict[int, str]] = {
             kind: {vr: v.name for vr, v in enumerate(self.variables) if v.kind is kind} for kind in Kind
         }
@@ -160,12 +173,21 @@ class GuardedSlave(Fmi2Slave):
         """Advance by one communication step [s]."""
         raise NotImplementedError
 
+    def shown(self, name: str) -> Value:
+        """An output of `views` after the last step, or after the initialisation."""
+        raise NotImplementedError
+
     def inner_state(self) -> Any:
         """What `step` keeps between calls, JSON-able and exact."""
         return None
 
     def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
         """Take back what `inner_state` gave under these variable values, or raise and change nothing."""
+
+    def _view(self, name: str) -> Value:
+        if name not in self.views:
+            raise KeyError(name)
+        return self.shown(name) if self._ready else self._starts[name]
 
     def clear_volatile(self) -> None:
         """Forget the inputs that hold for one step only."""
@@ -233,7 +255,9 @@ class GuardedSlave(Fmi2Slave):
                 f"{self.modelName}: value references {unknown} are no {kind.value} of this unit: read as "
                 f"{NEUTRAL[kind]!r}.",
             )
-            return [values.get(names.get(reference, ""), NEUTRAL[kind]) for reference in references]
+            return [
+                values[names[reference]] if reference in names else NEUTRAL[kind] for reference in references
+            ]
 
     @guarded(_nothing)
     def set_real(self, vrs: list[int], values: list[float]) -> None:
@@ -327,7 +351,7 @@ class GuardedSlave(Fmi2Slave):
         if content["ready"]:
             self.restore_inner_state(content["values"], content["inner"])
         self._settable = self._inputs if content["initialised"] else self._inputs_and_parameters
-        self.values = content["values"]
+        self.values = Held(content["values"], self._view)
         self._ready = content["ready"]
 
     def _refuse_state(self, reason: str) -> None:

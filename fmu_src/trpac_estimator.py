@@ -12,8 +12,9 @@ from trpac_core.vision.ife import Ife
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 
 from .camera_slave import CameraSlave
-from .estimate_outputs import OF_ESTIMATE, OUTPUTS
+from .estimate_outputs import OF_ESTIMATE
 from .frames import ONE_CLASS, BusClass
+from .guarded_slave import Value
 from .interface import TRPAC_ESTIMATOR
 from .parameters import configuration
 from .variables import Variable
@@ -24,6 +25,7 @@ class TrpacEstimator(CameraSlave):
 
     variables: ClassVar[tuple[Variable, ...]] = TRPAC_ESTIMATOR
     volatile: ClassVar[frozenset[str]] = frozenset(v.name for v in TRPAC_ESTIMATOR if v.binary)
+    views: ClassVar[frozenset[str]] = frozenset(OF_ESTIMATE)
     bus: ClassVar[tuple[BusClass, ...]] = ONE_CLASS
 
     def build(
@@ -46,9 +48,10 @@ class TrpacEstimator(CameraSlave):
             self.optional("yaw_rate"),
         )
 
-    def publish(self, estimate: Estimate) -> None:
-        """Set the outputs."""
-        self.values.update(zip(OUTPUTS, OF_ESTIMATE(estimate), strict=True))
+    def shown(self, name: str) -> Value:
+        """An output, from the last estimate."""
+        value: Value = OF_ESTIMATE[name](self._estimator.last)
+        return value
 
     def problems(self, estimate: Estimate) -> Iterable[tuple[str, str]]:
         """Unusable readings."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from itertools import chain
+from operator import attrgetter
 from typing import Any, ClassVar
 
 from trpac_core.four_wheels import WHEELS, CarEstimate, CarSensors, FourWheels, FourWheelsConfig
@@ -11,17 +11,19 @@ from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.sides import SidesIfe
 
 from .camera_slave import CameraSlave
-from .estimate_outputs import OF_ESTIMATE, OUTPUTS
+from .estimate_outputs import OF_ESTIMATE
 from .frames import CLASS_PER_SIDE, BusClass
+from .guarded_slave import Value
 from .interface_4w import TRPAC_ESTIMATOR_4W
 from .parameters import configuration
 from .variables import Variable
 
-_OUTPUTS = (
-    *(f"{name}.{wheel}" for wheel in WHEELS for name in OUTPUTS),
-    "TRPAC.vehicle",
-    "TRPAC_std.vehicle",
-)
+_OF_WHEEL = {
+    f"{name}.{wheel}": (place, of_estimate)
+    for place, wheel in enumerate(WHEELS)
+    for name, of_estimate in OF_ESTIMATE.items()
+}
+_OF_CAR = {"TRPAC.vehicle": attrgetter("TRPAC"), "TRPAC_std.vehicle": attrgetter("TRPAC_std")}
 _LOADS = tuple(f"vertical_load.{wheel}" for wheel in WHEELS)
 
 
@@ -30,6 +32,7 @@ class TrpacEstimator4W(CameraSlave):
 
     variables: ClassVar[tuple[Variable, ...]] = TRPAC_ESTIMATOR_4W
     volatile: ClassVar[frozenset[str]] = frozenset(v.name for v in TRPAC_ESTIMATOR_4W if v.binary)
+    views: ClassVar[frozenset[str]] = frozenset(_OF_WHEEL) | frozenset(_OF_CAR)
     bus: ClassVar[tuple[BusClass, ...]] = CLASS_PER_SIDE
 
     def build(
@@ -64,10 +67,15 @@ class TrpacEstimator4W(CameraSlave):
             self.optional("yaw_rate"),
         )
 
-    def publish(self, estimate: CarEstimate) -> None:
-        """Set the outputs."""
-        car = (estimate.TRPAC, estimate.TRPAC_std)
-        self.values.update(zip(_OUTPUTS, chain(*map(OF_ESTIMATE, estimate.wheels), car), strict=True))
+    def shown(self, name: str) -> Value:
+        """An output, from the last estimate of its wheel or of the car."""
+        estimate = self._estimator.last
+        if name in _OF_CAR:
+            of_car: Value = _OF_CAR[name](estimate)
+            return of_car
+        place, of_estimate = _OF_WHEEL[name]
+        of_wheel: Value = of_estimate(estimate.wheels[place])
+        return of_wheel
 
     def problems(self, estimate: CarEstimate) -> Iterable[tuple[str, str]]:
         """Unusable readings, by the wheel that holds."""
