@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-APART_S = 8.0
-"""Bumps that begin this far apart are probed at once: the observer's memory is 1 s, a bump lasts a few [s]."""
+FORGOTTEN_S = 4.0
+"""Bumps of which one begins this long after the other's end are probed at once: the observer's memory is 1 s [s]."""
 
 
 def sets_apart(weights: Sequence[Array], spacing_s: float) -> list[list[int]]:
-    """Bumps along a drive, in order and `spacing_s` apart on average, in sets that one run each can probe [1]_.
+    """Bumps along a drive, in order, `spacing_s` apart and twice as long, in sets that one run each can probe [1]_.
 
     Bumps that are nowhere above 0 are in no set.
 
@@ -23,7 +23,7 @@ def sets_apart(weights: Sequence[Array], spacing_s: float) -> list[list[int]]:
     .. [1] Curtis, Powell, Reid (1974), IMA J. Appl. Math. 13, 117-119, doi:10.1093/imamat/13.1.117.
     """
     alive = [i for i, weight in enumerate(weights) if np.any(weight > 0.0)]
-    count = max(round(APART_S / spacing_s), 1)
+    count = max(round((2.0 * spacing_s + FORGOTTEN_S) / spacing_s), 1)
     return [alive[at::count] for at in range(min(count, len(alive)))]
 
 

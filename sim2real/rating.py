@@ -53,6 +53,7 @@ def rating(time_s: Array, measured: Array, simulated: Array) -> float | None:
     """
     from objective_rating_metrics.rating import ISO18571  # seconds to import; only who rates waits for it
 
+    _keep_compiled()
     if not len(time_s) == len(measured) == len(simulated):
         raise ValueError(
             f"Curves of {len(time_s)}, {len(measured)} and {len(simulated)} samples; expected equal lengths."
@@ -72,6 +73,16 @@ def rating(time_s: Array, measured: Array, simulated: Array) -> float | None:
             dt=float(time[1] - time[0]),
         ).overall_rating(ndigits=-1)
     return float(value) if np.isfinite(value) else None
+
+
+def _keep_compiled() -> None:
+    """Have the time warping's compiled code kept on disk: its package compiles it anew in every process, for 20 s."""
+    from dtwalign.backtrack import _backtrack_jit
+    from dtwalign.cost import _calc_cumsum_matrix_jit
+
+    for function in (_backtrack_jit, _calc_cumsum_matrix_jit):
+        if not function.signatures:
+            function.enable_caching()
 
 
 def _bridged(time_s: Array, curve: Array, lost: NDArray[np.bool_]) -> Array:

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
+from scipy.sparse import csc_array, sparray
 
 from sim2real.drive import Drive
 from sim2real.equations import EQUATIONS, PER_DRIVE, QUANTITIES, Equation
@@ -26,6 +27,8 @@ from sim2real.probing import sets_apart, windows
 from sim2real.result import Unexplained
 
 Array = NDArray[Any]
+Slopes: TypeAlias = Array | csc_array
+"""Sparse for a curve over time or way, each value of which acts for a few seconds."""
 
 KNOTS = 6
 """Values of a curve over a quantity of the motion."""
@@ -148,7 +151,8 @@ class _Free:
     def term(self, i: int, y: Array) -> Array:
         """The term along a drive."""
         out = np.zeros(len(self.values[i]))
-        for at, (which, _, hat) in enumerate(self.hats):
+        for at in np.flatnonzero(y).tolist():
+            which, _, hat = self.hats[at]
             if i in which:
                 out += y[at] * hat(self.values[i])
         return out
@@ -157,17 +161,31 @@ class _Free:
         """Whitened residuals per drive that a curve leaves."""
         return [self.moved(i, self.term(i, y)) for i in range(len(self.drives))]
 
-    def slopes(self, z: Sequence[Array], y: Array) -> Array:
+    def slopes(self, z: Sequence[Array], y: Array) -> Slopes:
         """Finite differences of all residuals around a curve that leaves z, shape (residuals, values)."""
-        slopes = [np.zeros((*part.shape, len(self.hats))) for part in z]
+        columns: list[list[tuple[int, Array]]] = [[] for _ in self.hats]
+        begins = np.cumsum([0, *(part.size for part in z)])
         for i, together in _runs(self.hats, self.values, self.quantity, self.knot_s):
             weights = [self.hats[at][2](self.values[i]) for at in together]
             step = self.equation.step
             response = (self.moved(i, self.term(i, y) + step * np.sum(weights, axis=0)) - z[i]) / step
-            rows = windows(weights) if self.quantity in PER_DRIVE else [slice(None)]
+            rows = windows(weights) if self.quantity in PER_DRIVE else [slice(0, len(response))]
             for at, cut in zip(together, rows, strict=True):
-                slopes[i][cut, :, at] = response[cut]
-        return np.concatenate([part.reshape(-1, len(self.hats)) for part in slopes])
+                begin = begins[i] + cut.start * response.shape[1]
+                columns[at].append((int(begin), response[cut].ravel()))
+        matrix = _columns(columns, int(begins[-1]))
+        return matrix if self.quantity in PER_DRIVE else _dense(matrix)
+
+
+def _columns(parts: Sequence[Sequence[tuple[int, Array]]], rows: int) -> csc_array:
+    """A matrix of columns that are 0 but for stretches, each with the row that it begins at; of ascending rows."""
+    values = [np.concatenate([stretch for _, stretch in column]) for column in parts]
+    where = [
+        np.concatenate([np.arange(begin, begin + len(stretch)) for begin, stretch in column])
+        for column in parts
+    ]
+    ends = np.cumsum([0, *(len(column) for column in values)])
+    return csc_array((np.concatenate(values), np.concatenate(where), ends), shape=(rows, len(parts)))
 
 
 def _free(
@@ -273,15 +291,19 @@ def _hats(knots: Sequence[Array], values: Sequence[Array]) -> list[Hat]:
     return [([d], float(k), partial(hat, x, i)) for d, x in enumerate(knots) for i, k in enumerate(x)]
 
 
-def _solve(z: Array, slopes: Array) -> tuple[Array, float]:
+def _dense(matrix: Array | sparray) -> Array:
+    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+
+
+def _solve(z: Array, slopes: Slopes) -> tuple[Array, float]:
     """Values of the term by reweighted least squares, and the loss that they leave."""
     y: Array = np.zeros(slopes.shape[1])
     for _ in range(3):
         rest = z + slopes @ y
         weight = robust_weight(rest)
-        normal = slopes.T @ (slopes * weight[:, None])
+        normal = _dense(slopes.T @ (slopes * weight[:, None]))
         normal += RIDGE * np.eye(len(y)) * max(float(np.diag(normal).max()), 1e-12)
-        y = np.linalg.solve(normal, -slopes.T @ (weight * z))
+        y = np.linalg.solve(normal, -(slopes.T @ (weight * z)))
     return y, float(np.sum(robust(z + slopes @ y)))
 
 

@@ -15,7 +15,7 @@ from sim2real.evidence import gather
 from sim2real.findings import describe
 from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.observer import Towards
-from sim2real.probing import APART_S, sets_apart, windows
+from sim2real.probing import FORGOTTEN_S, sets_apart, windows
 from sim2real.result import Verdict
 from sim2real.selection import fitness
 from sim2real.varying import vary
@@ -122,14 +122,14 @@ def test_bumps_far_apart_are_probed_by_one_run():
     weights = [np.interp(t, knots, row) for row in np.eye(31)] + [np.zeros_like(t)]
     sets = sets_apart(weights, 1.0)
     assert sorted(b for chosen in sets for b in chosen) == list(range(31))
-    assert len(sets) == round(APART_S)
+    assert len(sets) == round(2.0 + FORGOTTEN_S)
     for chosen in sets:
         cuts = windows([weights[b] for b in chosen])
         assert cuts[-1].stop == len(t)
         for b, cut, following in zip(chosen, cuts, cuts[1:], strict=False):
             assert np.flatnonzero(weights[b])[0] == cut.start
             assert cut.stop == following.start
-            assert t[cut.stop] - t[cut.start] == pytest.approx(APART_S, abs=1.0)
+            assert t[cut.stop] - t[cut.start] == pytest.approx(2.0 + FORGOTTEN_S, abs=1.0)
 
 
 def test_unlike_axles_are_told_from_a_second_effect():

@@ -619,15 +619,19 @@ def follow(
     p = _car_between(ends, shares[0])
     accel = refresh(y, 0.0, p, road, first)
     held_s = step_s
+    drawn = 1.0 - np.exp(-step_s / memory_s)
     for k in range(n):
-        states[k] = y[:6]
         accels[k] = accel
-        slip[k], force_n[k], load_n[k], theta[k] = first.slip, first.force_n, first.load_n, first.theta
+        for j in range(6):
+            states[k, j] = y[j]
+        for i in range(4):  # copied as arrays they take a tenth of all time
+            slip[k, i], force_n[k, i] = first.slip[i], first.force_n[i]
+            load_n[k, i], theta[k, i] = first.load_n[i], first.theta[i]
         if k + 1 == n:
             break
         for j in range(6):
             if np.isfinite(measured[k, j]):
-                share = max(1.0 - np.exp(-step_s / memory_s[j]), 1.0 / (k + 5.0))
+                share = max(drawn[j], 1.0 / (k + 5.0))
                 y[j] += share * (measured[k, j] - y[j])
         y[SPEED] += push_m_s2[k] * step_s
         for j in range(SPEED, FORCE):
