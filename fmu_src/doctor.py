@@ -9,7 +9,6 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -18,7 +17,7 @@ from typing import Any
 
 from .contents import CONTENTS_FILE, ContentError, Contents, deviations, read_contents
 from .host import LEAST_PYTHON
-from .packaging import SAFE_PATH, unpack_unit
+from .packaging import DAMAGED, SAFE_PATH, brief, unpack_unit
 
 RECORD = f"resources/{CONTENTS_FILE}"
 DESCRIPTION = "modelDescription.xml"
@@ -140,9 +139,9 @@ def _opened(path: Path) -> zipfile.ZipFile:
         raise UnusableError(
             f"{path}: no such file. Expected a unit: python build_fmu.py makes one."
         ) from None
-    except (OSError, zipfile.BadZipFile) as error:
+    except (OSError, *DAMAGED) as error:
         raise UnusableError(
-            f"{path}: cannot be opened as an FMU, which is a zip archive ({error})."
+            f"{path}: cannot be opened as an FMU, which is a zip archive ({brief(error)})."
         ) from error
     size = sum(entry.file_size for entry in archive.infolist())
     if DESCRIPTION not in archive.namelist() or size > MOST_UNPACKED_BYTES:
@@ -156,8 +155,8 @@ def _archive(archive: zipfile.ZipFile) -> Finding:
     damaged = None
     try:
         damaged = archive.testzip()
-    except (zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError) as error:
-        damaged = str(error)
+    except (OSError, *DAMAGED) as error:
+        damaged = brief(error)
     if damaged:
         return Finding("archive", State.PROBLEM, f"damaged at {damaged}", "Copy or build the unit again.")
     return Finding("archive", State.OK, f"{len(archive.namelist())} files, all checksums right")
@@ -174,8 +173,8 @@ def _contents(archive: zipfile.ZipFile) -> tuple[Contents | None, Finding]:
         there = {name for name in names if name != RECORD and not name.endswith("/")}
         every = sorted(there | set(contents.files), key=lambda name: (not name.endswith(".onnx"), name))
         problems = deviations(contents, every, archive.read)
-    except (ContentError, zipfile.BadZipFile, zlib.error) as error:
-        return None, Finding("contents", State.PROBLEM, str(error), "Copy or build the unit again.")
+    except (ContentError, *DAMAGED) as error:
+        return None, Finding("contents", State.PROBLEM, brief(error), "Copy or build the unit again.")
     if problems:
         return contents, Finding("contents", State.PROBLEM, _some(problems), "Copy or build the unit again.")
     networks = [name for name in every if name.endswith(".onnx")]
@@ -194,7 +193,7 @@ def _description(path: Path) -> Finding:
     try:
         problems = [str(problem) for problem in validate_fmu(str(path))]
     except Exception as error:  # noqa: BLE001 - fmpy raises bare Exceptions, and a damaged file may raise anything
-        problems = [" ".join(str(error).split()) or type(error).__name__]
+        problems = [brief(error)]
     if problems:
         return Finding("description", State.PROBLEM, _some(problems), "Build the unit again.")
     return Finding("description", State.OK, f"fmpy's validation finds nothing in {DESCRIPTION}")

@@ -6,6 +6,7 @@ import hashlib
 import re
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distribution, version
@@ -132,6 +133,16 @@ def write_archive(target: Path, content: Mapping[str, bytes]) -> Path:
     return target
 
 
+class UnitFileError(ValueError):
+    """A unit's file cannot be unpacked; the text says why and what to do."""
+
+
+DAMAGED = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError)
+"""What zipfile raises of a damaged archive; which one depends on the byte."""
+LONGEST_REASON = 200
+"""Characters of another package's error that a message quotes."""
+
+
 def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
     """Unpack a unit to a folder whose path the wrapper can read; returns the folder.
 
@@ -144,23 +155,48 @@ def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
 
     Raises
     ------
-    ValueError
-        If the path holds a character that crashes the wrapper, or an entry of the archive leaves the folder.
+    UnitFileError
+        If the path holds a character that crashes the wrapper, an entry of the archive leaves the folder, or the
+        archive is damaged.
     """
     folder = Path(tempfile.mkdtemp(prefix="trpac-fmu-")) if folder is None else folder
     path = str(folder.resolve())
     if not SAFE_PATH.fullmatch(path):
         bad = "".join(sorted(set(re.sub(SAFE_PATH, "", path))))
-        raise ValueError(
+        raise UnitFileError(
             f"{path}: the unit's wrapper crashes on the characters {bad!r} in its path. Unpack to a path of "
             "letters, digits, spaces and . _ - only, for example by setting TMPDIR."
         )
-    with zipfile.ZipFile(archive) as content:
-        for name in content.namelist():
-            if not (folder / name).resolve().is_relative_to(folder.resolve()):
-                raise ValueError(f"{archive}: its entry '{name}' would be written outside of {folder}.")
-        content.extractall(folder)
+    try:
+        with zipfile.ZipFile(archive) as content:
+            for name in content.namelist():
+                if not (folder / name).resolve().is_relative_to(folder.resolve()):
+                    raise UnitFileError(
+                        f"{archive}: its entry '{name}' would be written outside of {folder}."
+                    )
+            content.extractall(folder)
+    except DAMAGED as error:
+        raise UnitFileError(
+            f"{archive}: cannot be unpacked: {brief(error)}. Copy or build the unit again."
+        ) from error
     return folder
+
+
+def require_whole(archive: Path) -> None:
+    """Read a unit's archive to its end; raises UnitFileError where it is damaged."""
+    try:
+        with zipfile.ZipFile(archive) as content:
+            damaged = content.testzip()
+    except DAMAGED as error:
+        damaged = brief(error)
+    if damaged:
+        raise UnitFileError(f"{archive}: damaged at {damaged}. Copy or build the unit again.")
+
+
+def brief(error: Exception) -> str:
+    """What an error says in a line: zipfile puts whole names into it, and a damaged one may be as long as the file."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= LONGEST_REASON else f"{text[:LONGEST_REASON]} ..."
 
 
 def sha256(path: Path) -> str:

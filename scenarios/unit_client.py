@@ -11,9 +11,9 @@ import pandas as pd
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from fmu_src.packaging import unpack_unit
+from fmu_src.packaging import UnitFileError, unpack_unit
 from scenarios.camera.files import load_camera
-from scenarios.files import Scenario
+from scenarios.files import Scenario, ScenarioError
 from scenarios.pictures import frame_steps
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
@@ -115,8 +115,16 @@ def run_unit(
     -------
     DataFrame
         One row per step: the unit's outputs at the step's end.
+
+    Raises
+    ------
+    ScenarioError
+        If the archive is damaged or cannot be unpacked here.
     """
-    folder = unpack_unit(fmu)
+    try:
+        folder = unpack_unit(fmu)
+    except UnitFileError as error:
+        raise ScenarioError(str(error)) from error
     try:
         description = read_model_description(str(folder))
         references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}

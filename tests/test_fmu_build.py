@@ -283,6 +283,40 @@ def test_unpacking_refuses_entries_that_leave_the_folder(tmp_path: Path) -> None
     assert not (tmp_path / "escaped.txt").exists()
 
 
+def damaged_unit(unit_file: Path, target: Path, what: str) -> Path:
+    """A unit with wrong bytes where its directory of entries says something of the first one."""
+    data = bytearray(unit_file.read_bytes())
+    entry = data.index(b"PK\x01\x02")
+    if what == "version":
+        data[entry + 6 : entry + 8] = (139).to_bytes(2, "little")
+    elif what == "length of a name":
+        data[entry + 28 : entry + 30] = (65535).to_bytes(2, "little")
+    else:
+        data[data.index(b"<fmiModelDescription") + 3] ^= 1
+    target.write_bytes(data)
+    return target
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize("what", ["version", "length of a name", "content"])
+def test_a_damaged_unit_is_one_short_sentence_to_every_user_of_it(
+    unit_file: Path, tmp_path: Path, what: str
+) -> None:
+    path = damaged_unit(unit_file, tmp_path / "damaged.fmu", what)
+    with pytest.raises(ValueError, match=r"damaged\.fmu: cannot be unpacked: .*Copy or build") as told:
+        unpack_unit(path, tmp_path / "inside")
+    assert len(str(told.value)) < 400 + len(str(tmp_path))
+    trpac, out = str(Path(sys.executable).with_name("trpac")), str(tmp_path / "out")
+    for command in (
+        [trpac, "run", "scenarios/paper_simulation.yaml", "--fmu", str(path), "--out", out],
+        [trpac, "fmu", "doctor", str(path)],
+    ):
+        ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+        assert ended.returncode != 0
+        assert "Traceback" not in ended.stderr + ended.stdout
+        assert len(ended.stderr + ended.stdout) < 4000
+
+
 @pytest.mark.e2e
 def test_a_path_with_spaces_runs(unit_file: Path, tmp_path: Path) -> None:
     unit = Unit(unpack_unit(unit_file, tmp_path / "with a space"))

@@ -80,6 +80,13 @@ def _require(fmu: Path | None, out: Path) -> None:
     """Refuse before the work what would fail after it."""
     if fmu is not None and not zipfile.is_zipfile(fmu):
         raise ScenarioError(f"{fmu}: no unit there. Build one: .venv/bin/python build_fmu.py")
+    if fmu is not None:
+        from fmu_src.packaging import UnitFileError, require_whole
+
+        try:
+            require_whole(fmu)
+        except UnitFileError as error:
+            raise ScenarioError(str(error)) from error
     if out.exists() and not out.is_dir():
         raise ScenarioError(f"{out}: a file. Expected a folder to write into.")
 

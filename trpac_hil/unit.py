@@ -14,7 +14,7 @@ from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
-from fmu_src.packaging import unpack_unit
+from fmu_src.packaging import UnitFileError, unpack_unit
 from trpac_hil.errors import HilError
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -114,7 +114,10 @@ class Unit:
         if not zipfile.is_zipfile(archive):
             raise HilError(f"{archive}: no unit there. Build one: .venv/bin/python build_fmu.py")
         self.archive = archive
-        self._folder = unpack_unit(archive)
+        try:
+            self._folder = unpack_unit(archive)
+        except UnitFileError as error:
+            raise HilError(str(error)) from error
         self._slave: FMU2Slave | None = None
         try:
             self._open(settings, wheel)

@@ -8,7 +8,6 @@ import shutil
 import sys
 import tempfile
 import warnings
-import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -310,7 +309,7 @@ KINDS = {
     ),
     "segmenter_onnx": Kind(_network("segmenter.onnx"), _segment, _network_errors),
     "surface_onnx": Kind(_network("surface.onnx"), _classify, _network_errors),
-    "unit_fmu": Kind(_unit, _read_unit, lambda: (ValueError, zipfile.BadZipFile, OSError), exact=True),
+    "unit_fmu": Kind(_unit, _read_unit, lambda: (ValueError, OSError), exact=True),
     "unit_examined": Kind(_unit, _examine, lambda: (ProblemFoundError, UnusableError), exact=True),
 }
 """By short name. A serialised state is no file of ours, but the host's: see `states`."""
