@@ -165,7 +165,7 @@ def test_a_reader_that_crashes_or_hangs_is_one_too(tmp_path, monkeypatch, capfd,
     write_log(frame, tmp_path / "log.mf4")
     (tmp_path / "reader.py").write_text(code)
     monkeypatch.setattr(mdf_file, "EXTRACTOR", tmp_path / "reader.py")
-    monkeypatch.setattr(mdf_file, "TIMEOUT_S", 1.0)
+    monkeypatch.setattr(mdf_file, "LEAST_LIMIT_S", 1.0)
     with pytest.raises(LogError, match=expected):
         read_log(tmp_path / "log.mf4")
     assert capfd.readouterr().err == ""

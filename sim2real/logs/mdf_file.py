@@ -20,8 +20,8 @@ from sim2real.logs.table import Array, Finding, Table, Text, Wanted, numbered
 EXTRACTOR = Path(__file__).with_name("mdf_channels.py")
 """Runs as a program of its own: on damaged files asammdf may crash the interpreter."""
 
-TIMEOUT_S = 600.0
-"""Reading takes seconds; a damaged file may keep the reader busy for ever."""
+LEAST_LIMIT_S, LIMIT_S_PER_MB = 60.0, 1.0
+"""Reading takes seconds, some for every 100 MB; a damaged file may keep the reader busy for ever."""
 
 SLOW_STEP_S = 0.05
 """A channel slower than this is interpolated with a warning: what happens between its samples is not known [s]."""
@@ -89,17 +89,18 @@ def read_mdf(path: Path, wanted: Wanted) -> Table:
 
 
 def _extract(path: Path, names: frozenset[str]) -> dict[str, Any]:
+    limit_s = LEAST_LIMIT_S + LIMIT_S_PER_MB * path.stat().st_size * 1e-6
     try:
         done = subprocess.run(
             [sys.executable, "-P", EXTRACTOR],
             input=pickle.dumps((path, names)),
             capture_output=True,
-            timeout=TIMEOUT_S,
+            timeout=limit_s,
             check=True,
         )
     except subprocess.TimeoutExpired as error:
         raise LogError(
-            f"{path}: is no MDF that can be read within {TIMEOUT_S:g} s; expected a whole file."
+            f"{path}: is no MDF that can be read within {limit_s:.0f} s; expected a whole file."
         ) from error
     except subprocess.CalledProcessError as error:
         last = error.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
