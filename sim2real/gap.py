@@ -94,8 +94,10 @@ def _block_squares(
     return np.array(rows_before), np.array(rows_after), np.array(rows_count, dtype=np.float64)
 
 
-INTERVAL_FACTOR = 2.4
-"""Intervals are wider than the sandwich by this, since forms differ: nine of ten opened cases lie within so."""
+INTERVAL_FACTOR = 3.0
+"""Intervals are wider than the sandwich by this, since forms differ: nine of ten known cases lie within so."""
+SCORE_BLOCK_S = 5.0
+"""Blocks of the sandwich: what a form leaves goes with speed or torque, and so on for whole pieces of driving [s]."""
 LEAST_HALF_WIDTH = 0.01
 """No interval is narrower than this share of a noticeable change to either side: grids and integrators differ [-]."""
 
@@ -120,7 +122,7 @@ def intervals(found: Fit, evidence: Evidence) -> list[tuple[float, float, float]
     meat = np.zeros_like(bread)
     for part, drive in zip(evidence.parts, evidence.drives, strict=True):
         channels = drive.measured.shape[1]
-        length = drive.rows_in(BLOCK_S) * channels
+        length = drive.rows_in(SCORE_BLOCK_S) * channels
         for at in range(part.start, part.stop, length):
             cut = slice(at, min(at + length, part.stop))
             score = scaled[cut].T @ (weight[cut] * found.z[cut])
