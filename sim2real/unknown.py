@@ -179,13 +179,15 @@ class _Free:
 
 def _columns(parts: Sequence[Sequence[tuple[int, Array]]], rows: int) -> csc_array:
     """A matrix of columns that are 0 but for stretches, each with the row that it begins at; of ascending rows."""
-    values = [np.concatenate([stretch for _, stretch in column]) for column in parts]
+    none = np.empty(0)
+    values = [np.concatenate([none, *(stretch for _, stretch in column)]) for column in parts]
     where = [
-        np.concatenate([np.arange(begin, begin + len(stretch)) for begin, stretch in column])
+        np.concatenate([none, *(np.arange(begin, begin + len(stretch)) for begin, stretch in column)])
         for column in parts
     ]
     ends = np.cumsum([0, *(len(column) for column in values)])
-    return csc_array((np.concatenate(values), np.concatenate(where), ends), shape=(rows, len(parts)))
+    data, row = np.concatenate(values), np.concatenate(where).astype(np.int64)
+    return csc_array((data, row, ends), shape=(rows, len(parts)))
 
 
 def _free(

@@ -7,6 +7,7 @@ import math
 from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import cv2
 import made_up_diagnosis as made_up
@@ -336,6 +337,16 @@ class TestRating:
 
     def test_the_same_curve_is_rated_one(self):
         assert rating(self.time, self.curve, self.curve) == pytest.approx(1.0)
+
+    def test_its_compiled_code_is_kept_for_the_next_process(self):
+        from dtwalign.backtrack import _backtrack_jit
+        from dtwalign.cost import _calc_cumsum_matrix_jit
+
+        rating(self.time, self.curve, self.curve + 0.1)
+        for function in (_backtrack_jit, _calc_cumsum_matrix_jit):
+            found = function.stats
+            assert sum(found.cache_hits.values()) + sum(found.cache_misses.values()) == 1
+            assert any(Path(found.cache_path).glob(f"*{function.__name__}*.nbi"))
 
     def test_it_falls_with_the_deviation(self):
         values = [
