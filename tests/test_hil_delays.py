@@ -45,25 +45,37 @@ def test_the_greatest_part_beside_the_sleep_names_the_cause(
     assert cause(Spent(0, 0, 0, 0), ended, slept_ns) == expected
 
 
+TRIES = 20
+"""Stretches of which one at least has to be undisturbed: a busy machine may queue a thread longer than it works."""
+
+
 @needs_linux
 def test_a_thread_that_works_is_told_from_one_that_waits_for_a_lock() -> None:
+    working, waiting = [], []
     with ThreadAccounts() as accounts:
-        began = accounts.spent()
-        busy(0.2)
-        worked = accounts.spent()
-        threading.Event().wait(0.2)
-        waited = accounts.spent()
-    assert cause(began, worked, 0) == "own_work"
-    assert cause(worked, waited, 0) == "waiting"
+        for _ in range(TRIES):
+            began = accounts.spent()
+            busy(0.05)
+            worked = accounts.spent()
+            threading.Event().wait(0.05)
+            working.append(cause(began, worked, 0))
+            waiting.append(cause(worked, accounts.spent(), 0))
+    assert "own_work" in working
+    assert "waiting" not in working
+    assert "waiting" in waiting
+    assert "own_work" not in waiting
 
 
 @needs_linux
 def test_a_sleep_that_was_asked_for_is_no_delay_of_anybody() -> None:
+    causes = []
     with ThreadAccounts() as accounts:
-        began = accounts.spent()
-        time.sleep(0.2)
-        busy(0.1)
-        assert cause(began, accounts.spent(), 200 * MS) == "own_work"
+        for _ in range(TRIES):
+            began = accounts.spent()
+            time.sleep(0.05)
+            busy(0.03)
+            causes.append(cause(began, accounts.spent(), 50 * MS))
+    assert "own_work" in causes
 
 
 @needs_linux
