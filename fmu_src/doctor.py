@@ -17,7 +17,7 @@ from typing import Any
 
 from .contents import CONTENTS_FILE, ContentError, Contents, deviations, read_contents
 from .host import LEAST_PYTHON
-from .packaging import DAMAGED, SAFE_PATH, brief, unpack_unit
+from .packaging import DAMAGED, SAFE_PATH, brief, damage, unpack_unit
 
 RECORD = f"resources/{CONTENTS_FILE}"
 DESCRIPTION = "modelDescription.xml"
@@ -152,12 +152,7 @@ def _opened(path: Path) -> zipfile.ZipFile:
 
 
 def _archive(archive: zipfile.ZipFile) -> Finding:
-    damaged = None
-    try:
-        damaged = archive.testzip()
-    except (OSError, *DAMAGED) as error:
-        damaged = brief(error)
-    if damaged:
+    if damaged := damage(archive):
         return Finding("archive", State.PROBLEM, f"damaged at {damaged}", "Copy or build the unit again.")
     return Finding("archive", State.OK, f"{len(archive.namelist())} files, all checksums right")
 

@@ -182,11 +182,19 @@ def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
     return folder
 
 
+def damage(archive: zipfile.ZipFile) -> str | None:
+    """Where an open archive is damaged or why it cannot be read, in a line; None where it is whole."""
+    try:
+        return archive.testzip()
+    except (OSError, *DAMAGED) as error:
+        return brief(error)
+
+
 def require_whole(archive: Path) -> None:
     """Read a unit's archive to its end; raises UnitFileError where it is damaged."""
     try:
         with zipfile.ZipFile(archive) as content:
-            damaged = content.testzip()
+            damaged = damage(content)
     except DAMAGED as error:
         damaged = brief(error)
     if damaged:
