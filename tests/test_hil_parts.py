@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
-import threading
 from pathlib import Path
-from typing import Any
 
 import can
 import numpy as np
@@ -28,7 +25,7 @@ from trpac_hil.ferry import Ferry, Wire, ferry_ring
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
 from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
-from trpac_hil.realtime import PRIORITY, give_way, loop_core, raise_priority
+from trpac_hil.realtime import loop_core
 from trpac_hil.records import columns
 from trpac_hil.shared import Ring
 from trpac_hil.spread import Spread
@@ -350,25 +347,6 @@ def test_a_bus_that_is_not_there_at_the_start_is_one_sentence() -> None:
 
 
 # A process beside the loop, and what the system grants
-
-
-@pytest.mark.skipif(not hasattr(os, "sched_setscheduler"), reason="this system has no ranks of threads")
-def test_a_thread_beside_the_loop_ranks_just_below_it() -> None:
-    ranks: dict[str, Any] = {}
-
-    def measure() -> None:
-        ranks["asked"] = raise_priority()
-        ranks["loop"] = os.sched_getparam(0).sched_priority
-        give_way()
-        ranks["beside"], ranks["kind"] = os.sched_getparam(0).sched_priority, os.sched_getscheduler(0)
-
-    thread = threading.Thread(target=measure)  # priorities are a thread's own: this one's end with it
-    thread.start()
-    thread.join()
-    if "refused" in ranks["asked"]:
-        assert ranks["beside"] == ranks["loop"] == 0
-        pytest.skip(ranks["asked"])
-    assert (ranks["loop"], ranks["beside"], ranks["kind"]) == (PRIORITY, PRIORITY - 1, os.SCHED_FIFO)
 
 
 @given(

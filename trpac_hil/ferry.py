@@ -12,7 +12,6 @@ import can
 
 from trpac_hil.bus import Link
 from trpac_hil.deadlines import Clock, Deadlines, wait_until
-from trpac_hil.realtime import give_way
 from trpac_hil.shared import Ring
 
 _COLUMNS = 5
@@ -63,8 +62,7 @@ class Ferry:
         self._ring, self._link, self._clock = ring, link, clock
 
     def run(self, start_ns: int, period_ns: int, stop: Callable[[], bool]) -> None:
-        """Take over once per period until told to stop, in a thread that gives way to the loop's."""
-        give_way()
+        """Take over once per period until told to stop."""
         deadlines, done = Deadlines(start_ns, period_ns), -1
         while not stop():
             now_ns = wait_until(self._clock, deadlines.due_ns(done + 1), 0)

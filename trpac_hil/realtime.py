@@ -57,8 +57,7 @@ def raise_priority() -> str:
     if not hasattr(os, "sched_setscheduler"):
         return "real-time priority: this system has none that can be asked for here"
     try:
-        # Threads that start later inherit it, and keep most of it: one that is held up with the interpreter holds the
-        # loop up.
+        # Threads that start later inherit it, as they must: one that is held up with the interpreter holds the loop up.
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except PermissionError:
         return (
@@ -68,14 +67,6 @@ def raise_priority() -> str:
     except OSError as error:
         return f"real-time priority: refused ({error.strerror})"
     return f"real-time priority: SCHED_FIFO {PRIORITY}"
-
-
-def give_way() -> None:
-    """Rank the calling thread just below the loop: of equals the first one to run keeps the core until it sleeps."""
-    if not hasattr(os, "sched_getscheduler") or os.sched_getscheduler(0) != os.SCHED_FIFO:
-        return
-    rank = max(os.sched_getparam(0).sched_priority - 1, os.sched_get_priority_min(os.SCHED_FIFO))
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(rank))
 
 
 def lower_priority() -> None:
