@@ -1,12 +1,15 @@
 """The camera's benchmark: what is true of a frame, what counts as wrong, and how sure the shares are."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.testing import assert_allclose
 
+from benchmarks.patch_width import table
 from benchmarks.table4 import __main__ as command
 from benchmarks.table4 import drives
 from benchmarks.table4.clips import ASSUMED, AssumedFile, camera_over
@@ -22,7 +25,7 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import IfeConfig
 from trpac_core.vision.networks import RoadMasks
-from trpac_core.vision.regions import project
+from trpac_core.vision.regions import LEAST_ROI_WIDTH_PX, cut_patch, project
 from trpac_core.vision.trajectory import Motion
 
 SOURCES = load_strict(ASSUMED, AssumedFile).sources
@@ -227,3 +230,26 @@ def test_kept_verdicts_are_read_as_they_were_written(tmp_path, monkeypatch, netw
     )
     assert "| w/ interference | IFE | 12.8 | " in tables(measured)
     assert json.loads(json.dumps(history_line(measured)))["networks"] == {"full": {"a": "b"}}
+
+
+def test_wider_patches_are_cut_wider_and_the_table_tells_their_errors(tmp_path, monkeypatch, networks):
+    monkeypatch.setattr(drives, "FRAMES", 1)
+    monkeypatch.setattr(drives, "SCALE", 0.25)
+    (sequence,), _ = drives.rendered_drives(tmp_path, 1, lambda *_: None, first_seed=6_000_100)
+    assert sequence.name == "6000100"
+    cut = []
+    monkeypatch.setattr(
+        "trpac_core.vision.ife.cut_patch",
+        lambda image, centre, width: cut.append(width) or cut_patch(image, centre, width),
+    )
+    widths = {f"{w} m": {"roi_width_m": w} for w in (1.0, 2.0)}
+    verdicts = judged(replace(sequence, roi_scale=1.5), networks, "normal", widths)
+    standard, narrow, wide = np.array(cut).reshape(3, -1)  # the first for the near group's corners
+    assert_allclose(standard, 1.2 * narrow)
+    assert_allclose(wide, 2.0 * narrow)
+    assert narrow.max() > LEAST_ROI_WIDTH_PX
+    verdicts["found"] = np.where(verdicts["method"] == "2.0 m", verdicts["truth"], -1)
+    lines = table(verdicts).splitlines()
+    assert lines[0] == "| set | scenario | 1.0 m | 2.0 m |"
+    assert lines[2].startswith("| rendered drives | normal | 100.0 [")
+    assert "| 0.0 [" in lines[2]

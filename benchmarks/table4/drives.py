@@ -111,10 +111,12 @@ def _renderer_sha256() -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in code)).hexdigest()
 
 
-def rendered_drives(kept: Path, count: int, told: Callable[[int, int], None]) -> tuple[list[Sequence], float]:
-    """The first drives from `FIRST_SEED`, drawn where the folder `kept` lacks them; CPU time of all when drawn [s]."""
+def rendered_drives(
+    kept: Path, count: int, told: Callable[[int, int], None], first_seed: int = FIRST_SEED
+) -> tuple[list[Sequence], float]:
+    """The first drives from a seed, drawn where the folder `kept` lacks them; CPU time of all when drawn [s]."""
     drives, cpu_s = [], 0.0
-    for done, drawn in enumerate(plans(count)):
+    for done, drawn in enumerate(plans(count, first_seed)):
         folder = kept / str(drawn.seed)
         written = folder / PLAN
         if not (written.is_file() and written.read_text(encoding="utf-8") == described(drawn)):
@@ -125,9 +127,9 @@ def rendered_drives(kept: Path, count: int, told: Callable[[int, int], None]) ->
     return drives, cpu_s
 
 
-def plans(count: int) -> Iterator[Plan]:
+def plans(count: int, first_seed: int = FIRST_SEED) -> Iterator[Plan]:
     """The plans of the first drives."""
-    return (plan(FIRST_SEED + number) for number in range(count))
+    return (plan(first_seed + number) for number in range(count))
 
 
 def _sequence(drawn: Plan, folder: Path) -> Sequence:

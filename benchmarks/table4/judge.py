@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,9 @@ from trpac_core.vision.voting import Voting, VotingConfig
 from .sequences import Image, Sequence, majority
 
 SCENARIOS: dict[str, Disturbance] = {"normal": NONE, "w/ interference": PAPER}
-VARIANTS: dict[str, dict[str, bool]] = {
+Changes = Mapping[str, Any]
+"""Fields of `IfeConfig` with other values."""
+VARIANTS: dict[str, Changes] = {
     "IFE": {},
     "no trajectory": {"use_trajectory": False},
     "shadow kept": {"remove_shadow": False},
@@ -67,7 +70,7 @@ class Networks:
 
 
 def judged(
-    sequence: Sequence, networks: Networks, scenario: str, variants: Iterable[str] = tuple(VARIANTS)
+    sequence: Sequence, networks: Networks, scenario: str, variants: Mapping[str, Changes] = VARIANTS
 ) -> pd.DataFrame:
     """Verdicts on every frame of a sequence.
 
@@ -79,8 +82,8 @@ def judged(
         That classify.
     scenario : str
         Key of `SCENARIOS`.
-    variants : iterable of str
-        Keys of `VARIANTS`.
+    variants : mapping
+        Name to what differs from the units' estimator.
 
     Returns
     -------
@@ -89,12 +92,14 @@ def judged(
         group's corners that are of the true class), found, flag, Q_v.
     """
     kept = Kept(networks.classifier)
-    camera = sequence.camera
-    base = IfeConfig(camera=camera, groups_looked_at=1)
-    base = replace(base, roi_width_m=sequence.roi_scale * base.roi_width_m)
-    estimators = {name: Ife(replace(base, **VARIANTS[name]), networks.segmenter, kept) for name in variants}
+    base = _config(sequence)
+    estimators = {
+        name: Ife(_config(sequence, changes), networks.segmenter, kept) for name, changes in variants.items()
+    }
     voting = Voting(
-        VotingConfig(camera=camera, roi_width_m=base.roi_width_m), networks.segmenter, networks.classifier
+        VotingConfig(camera=sequence.camera, roi_width_m=base.roi_width_m),
+        networks.segmenter,
+        networks.classifier,
     )
     states = dict.fromkeys(estimators, IfeState())
     corners_m = near_corners(base, networks, sequence)
@@ -111,6 +116,12 @@ def judged(
         found = NO_ROAD if vote.surface is None else int(vote.surface)
         rows.append((*common, VOTING, int(truth), share, found, True, np.nan))
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _config(sequence: Sequence, changes: Changes | None = None) -> IfeConfig:
+    """Of the near group alone, as in the units, with regions of the sequence's scale."""
+    config = replace(IfeConfig(camera=sequence.camera, groups_looked_at=1), **(changes or {}))
+    return replace(config, roi_width_m=sequence.roi_scale * config.roi_width_m)
 
 
 COLUMNS = (
