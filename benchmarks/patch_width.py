@@ -1,8 +1,9 @@
-"""How wide a patch of road the surface network should look at: wrong frames per 100 by the width.
+"""How wide the patches of road should be that the surface network looks at: wrong frames per 100.
 
-``python -m benchmarks.patch_width --data ROAD_IMAGES [--models DIR] [--widths 0.8 1.2 ...] [--out DIR]`` judges
+``python -m benchmarks.patch_width --data ROAD_IMAGES [--models DIR] [--patches 1.2 1.2x1.7 ...] [--out DIR]`` judges
 rendered drives of seeds of their own and the validation parts of the real clips, none of which the networks were
-trained on or are scored on, and prints a table.
+trained on or are scored on, and prints a table. 1.2x1.7 are patches around 1.2 m, spread by a factor of 1.7 to both
+sides; 1.2 alone are patches all alike.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from .table4.sequences import Sequence
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRST_SEED = 6_000_100
+PATCHES = ["0.8", "1.2", "1.4", "1.8", "2.4", "1.2x1.3", "1.2x1.7", "1.2x2.2"]
 EVERY = 2
 """Of the frames of a rendered drive: neighbours are 0.5 m apart and much alike."""
 
@@ -31,7 +33,6 @@ def main() -> None:
     given = _options()
     cv2.setNumThreads(1)
     networks = Networks.load(given.models)
-    widths = {f"{width:g} m": {"roi_width_m": width} for width in given.widths}
     with Progress() as bars:
         drawing = bars.add_task("rendered drives", total=given.drives)
         drives, _ = rendered_drives(
@@ -43,20 +44,21 @@ def main() -> None:
         found = []
         for sequence in sequences:
             for scenario in SCENARIOS:
-                found.append(judged(sequence, networks, scenario, widths))
+                found.append(judged(sequence, networks, scenario, given.patches))
                 bars.advance(task)
     print(table(pd.concat(found, ignore_index=True)))
 
 
 def table(verdicts: pd.DataFrame) -> str:
-    """Wrong frames per 100 with their intervals, a row per set and scenario, a column per width, as Markdown."""
-    of_widths = verdicts[verdicts["method"] != VOTING]
-    rendered = of_widths["source"].str.startswith("rendered")
-    sets = of_widths["source"].mask(rendered, "rendered drives")
-    widths = list(dict.fromkeys(of_widths["method"]))
-    lines = [f"| set | scenario | {' | '.join(widths)} |", "|---" * (2 + len(widths)) + "|"]
-    for (name, scenario), rows in of_widths.groupby([sets, "scenario"], sort=False):
-        scores = (str(n_w(rows[rows["method"] == width])) for width in widths)
+    """Wrong frames per 100, all and those of flag 1, a row per set and scenario, a column per patches, as Markdown."""
+    ours = verdicts[verdicts["method"] != VOTING]
+    rendered = ours["source"].str.startswith("rendered")
+    sets = ours["source"].mask(rendered, "rendered drives")
+    patches = list(dict.fromkeys(ours["method"]))
+    lines = [f"| set | scenario | {' | '.join(patches)} |", "|---" * (2 + len(patches)) + "|"]
+    for (name, scenario), rows in ours.groupby([sets, "scenario"], sort=False):
+        of_each = [rows[rows["method"] == each] for each in patches]
+        scores = (f"{n_w(each).value:.1f} ({n_w(each[each['flag']]).value:.1f})" for each in of_each)
         lines.append(f"| {name} | {scenario} | {' | '.join(scores)} |")
     return "\n".join(lines)
 
@@ -77,10 +79,23 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--data", type=Path, help="folder of real road pictures; none: rendered drives only")
     parser.add_argument("--models", type=Path, default=ROOT / "models", help="folder of both networks")
-    parser.add_argument("--widths", type=float, nargs="+", default=[0.8, 1.0, 1.2, 1.4, 1.8, 2.4], help="[m]")
+    parser.add_argument("--patches", nargs="+", default=PATCHES, help="widths [m], or widths and spreads")
     parser.add_argument("--drives", type=int, default=36, help="rendered drives of 30 frames")
     parser.add_argument("--out", type=Path, default=Path("out/patch_width"), help="where these are kept")
-    return parser.parse_args()
+    given = parser.parse_args()
+    try:
+        given.patches = {text: changes(text) for text in given.patches}
+    except ValueError:
+        parser.error(
+            f"--patches {' '.join(given.patches)}: expected widths such as 1.2, or 1.2x1.7 with a spread"
+        )
+    return given
+
+
+def changes(patches: str) -> dict[str, float]:
+    """What `1.2x1.7` changes in the estimator; raises ValueError."""
+    width, _, spread = patches.partition("x")
+    return {"roi_width_m": float(width), "roi_spread": float(spread or 1.0)}
 
 
 if __name__ == "__main__":

@@ -359,7 +359,16 @@ _IMAGE_PARAMETERS = (
         for place, group in enumerate(_GROUPS)
     ),
     _parameter("image.grid", "m", "vision.a_m", "Grid size a", 1e-3),
-    _parameter("image.roi_width", "m", "vision.roi_width_m", "Width of road that a patch shows", 0.05),
+    _parameter(
+        "image.roi_width", "m", "vision.roi_width_m", "Width of road that a patch shows, in the mean", 0.05
+    ),
+    _parameter(
+        "image.roi_spread",
+        "1",
+        "vision.roi_spread",
+        "A group's widest patch is wider by this, its narrowest narrower",
+        1.0,
+    ),
     _parameter("image.track_step", "m", "vision.step_m", "Distance between the track's ellipses", 0.01),
     _parameter("image.k1", "m/s", "vision.k1", "Growth of the track's uncertainty along, below k2", 1e-12),
     _parameter("image.k2", "m/s", "vision.k2", "Growth of the track's uncertainty across", 1e-12),

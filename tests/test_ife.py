@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
@@ -109,6 +110,26 @@ def test_plain_road(surface, speed_m_s):
     assert [group.n_roi for group in result.groups] == [4, 6, 8]
     assert state.frame_count == 1
     assert all(max(group.weights) == group.weights[surface] for group in state.evidence)
+
+
+@pytest.mark.parametrize("group", [0, 1, 2])
+def test_a_groups_patches_are_evenly_spread_in_width_at_the_same_places(group):
+    image = np.random.default_rng(0).integers(0, 255, (CAMERA.height_px, CAMERA.width_px, 3)).astype(np.uint8)
+    alike, spread = (
+        Ife(IfeConfig(roi_spread=s), Masks(), Middle()).look(
+            IfeState(), image, Motion(10.0), CAMERA, Masks().masks, np.ones((160, 256), np.bool_)
+        )[group]
+        for s in (1.0, 1.5)
+    )
+    assert_allclose(spread.centres_px, alike.centres_px)
+    factors = spread.widths_px / alike.widths_px
+    assert (factors[0], factors[-1]) == (pytest.approx(1.0 / 1.5), pytest.approx(1.5))
+    assert_allclose(factors[1:] / factors[:-1], 1.5 ** (2.0 / (len(factors) - 1)))
+
+
+def test_patches_cannot_be_spread_by_less_than_nothing():
+    with pytest.raises(ValueError, match="roi_spread must be 1"):
+        IfeConfig(roi_spread=0.9)
 
 
 def test_each_group_speaks_of_its_own_stretch_of_road():

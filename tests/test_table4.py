@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from benchmarks.patch_width import table
+from benchmarks.patch_width import changes, table
 from benchmarks.table4 import __main__ as command
 from benchmarks.table4 import drives
 from benchmarks.table4.clips import ASSUMED, AssumedFile, camera_over
@@ -242,14 +242,14 @@ def test_wider_patches_are_cut_wider_and_the_table_tells_their_errors(tmp_path, 
         "trpac_core.vision.ife.cut_patch",
         lambda image, centre, width: cut.append(width) or cut_patch(image, centre, width),
     )
-    widths = {f"{w} m": {"roi_width_m": w} for w in (1.0, 2.0)}
+    widths = {text: changes(text) for text in ("1x1.7", "2x1.7")}
     verdicts = judged(replace(sequence, roi_scale=1.5), networks, "normal", widths)
     standard, narrow, wide = np.array(cut).reshape(3, -1)  # the first for the near group's corners
     assert_allclose(standard, 1.2 * narrow)
     assert_allclose(wide, 2.0 * narrow)
     assert narrow.max() > LEAST_ROI_WIDTH_PX
-    verdicts["found"] = np.where(verdicts["method"] == "2.0 m", verdicts["truth"], -1)
+    verdicts["found"] = np.where(verdicts["method"] == "2x1.7", verdicts["truth"], -1)
     lines = table(verdicts).splitlines()
-    assert lines[0] == "| set | scenario | 1.0 m | 2.0 m |"
-    assert lines[2].startswith("| rendered drives | normal | 100.0 [")
-    assert "| 0.0 [" in lines[2]
+    assert lines[0] == "| set | scenario | 1x1.7 | 2x1.7 |"
+    assert lines[2].startswith("| rendered drives | normal | 100.0 (")
+    assert "| 0.0 (" in lines[2]

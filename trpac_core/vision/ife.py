@@ -70,7 +70,10 @@ class IfeConfig:
     b : tuple of 3 ints
         Patches per group.
     roi_width_m : float
-        Width of road that a patch shows [m].
+        Width of road that a group's patches show in the geometric mean [m].
+    roi_spread : float
+        Factor by which the widest is wider and the narrowest narrower, the others evenly between [-]: grain shows in
+        narrow patches, gloss and snow beside the tracks in wide ones.
     step_m : float
         Distance between ellipses, and step of the covariance recursion [m].
     k1, k2 : float
@@ -102,6 +105,7 @@ class IfeConfig:
     a_m: float = 0.02
     b: tuple[int, int, int] = (4, 6, 8)
     roi_width_m: float = 1.2
+    roi_spread: float = 1.7
     step_m: float = 0.25
     k1: float = 5e-5
     k2: float = 2e-4
@@ -148,7 +152,8 @@ class IfeConfig:
             f"start deviation must be at most {MOST_DEVIATION_M:g} m and k2 {MOST_GROWTH_M_S:g} m/s, patch and strip "
             f"{MOST_WIDTH_M:g} m wide": self.start_deviation_m <= MOST_DEVIATION_M
             and self.k2 <= MOST_GROWTH_M_S
-            and max(self.roi_width_m, 2.0 * self.strip_half_width_m) <= MOST_WIDTH_M,
+            and max(self.roi_width_m * self.roi_spread, 2.0 * self.strip_half_width_m) <= MOST_WIDTH_M,
+            "roi_spread must be 1 (all patches alike) or more": self.roi_spread >= 1.0,
             "sigma must lie in [0, 1]": 0.0 <= self.weight_law.sigma <= 1.0,
             "least_mass must lie in [0, 1]": 0.0 <= self.least_mass <= 1.0,
             "seed must not be negative": self.seed >= 0,
@@ -312,7 +317,8 @@ class Ife:
             corners = classify_corners(road.ground_m[road.usable], camera, usable)
         key = (config.seed, frame, index, list(SIDES).index(config.side))
         drawn = sample(corners, config.b[index], key)
-        widths = roi_widths_px(camera, corners.ground_m[drawn], config.roi_width_m)
+        widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, len(drawn))
+        widths = roi_widths_px(camera, corners.ground_m[drawn], widths_m)
         return Region(corners, corners.pixel[drawn], widths, ellipses, len(drawn))
 
     def _tracks(self, motion: Motion) -> list[Ellipses]:

@@ -149,7 +149,9 @@ def sample(corners: Corners, b: int, key: Sequence[int]) -> NDArray[np.intp]:
     return np.random.default_rng(list(key)).choice(candidates, min(b, len(candidates)), replace=False)
 
 
-def roi_widths_px(camera: Camera, ground_m: NDArray[np.float64], roi_width_m: float) -> NDArray[np.float64]:
+def roi_widths_px(
+    camera: Camera, ground_m: NDArray[np.float64], roi_width_m: float | NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Widths of the regions around ground points, shape (n,) [px]: see `roi_width_px`."""
     step = np.array([0.0, _PROBE_M / 2.0])
     left, right = camera.ground_to_image(ground_m + step), camera.ground_to_image(ground_m - step)
