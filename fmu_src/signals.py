@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from trpac_core.dife import GREATEST_THETA
 from trpac_core.vision.classes import Surface
 
@@ -11,7 +13,8 @@ NO_ROAD_CLASS = -1
 """Value of `road_class` that means: no class by bus, use the picture."""
 
 
-def _input(
+def _signal(
+    causality: str,
     name: str,
     unit: str,
     description: str,
@@ -19,21 +22,13 @@ def _input(
     maximum: float | None = None,
     nominal: float | None = None,
 ) -> Variable:
-    return Variable(name, Kind.REAL, "input", "continuous", description, unit, 0.0, minimum, maximum, nominal)
-
-
-def _output(
-    name: str,
-    unit: str,
-    description: str,
-    minimum: float | None = None,
-    maximum: float | None = None,
-    nominal: float | None = None,
-) -> Variable:
+    start = 0.0 if causality == "input" else None
     return Variable(
-        name, Kind.REAL, "output", "continuous", description, unit, None, minimum, maximum, nominal
+        name, Kind.REAL, causality, "continuous", description, unit, start, minimum, maximum, nominal
     )
 
+
+_input, _output = partial(_signal, "input"), partial(_signal, "output")
 
 WRONG_ADDRESS = (
     "The unit cannot catch a wrong address: it crashes the host (image.buffers_enabled turns this off)"

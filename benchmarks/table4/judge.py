@@ -27,6 +27,7 @@ VARIANTS: dict[str, Changes] = {
     "shadow kept": {"remove_shadow": False},
     "not calibrated": {"calibrate": False},
     "equal weights": {"weight_evidence": False},
+    "patches of one width": {"roi_spread": 1.0},
 }
 VOTING = "voting"
 DISTURBANCE_SEED = 5_000_000
