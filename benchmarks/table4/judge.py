@@ -27,7 +27,7 @@ VARIANTS: dict[str, Changes] = {
     "shadow kept": {"remove_shadow": False},
     "not calibrated": {"calibrate": False},
     "equal weights": {"weight_evidence": False},
-    "patches of one width": {"roi_spread": 1.0},
+    "several widths": {"roi_spread": 1.7},
 }
 VOTING = "voting"
 DISTURBANCE_SEED = 5_000_000

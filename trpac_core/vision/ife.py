@@ -72,8 +72,8 @@ class IfeConfig:
     roi_width_m : float
         Width of road that a group's patches show in the geometric mean [m].
     roi_spread : float
-        Factor by which the widest is wider and the narrowest narrower, the others evenly between [-]: grain shows in
-        narrow patches, gloss and snow beside the tracks in wide ones.
+        Factor by which the widest is wider and the narrowest narrower, the others evenly between [-]; 1: all alike.
+        Grain shows in narrow patches, gloss and snow beside the tracks in wide ones, where the road is wide enough.
     step_m : float
         Distance between ellipses, and step of the covariance recursion [m].
     k1, k2 : float
@@ -105,7 +105,7 @@ class IfeConfig:
     a_m: float = 0.02
     b: tuple[int, int, int] = (4, 6, 8)
     roi_width_m: float = 1.2
-    roi_spread: float = 1.7
+    roi_spread: float = 1.0
     step_m: float = 0.25
     k1: float = 5e-5
     k2: float = 2e-4
