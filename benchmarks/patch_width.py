@@ -16,11 +16,12 @@ import cv2
 import pandas as pd
 from rich.progress import Progress
 
+from trpac_core.vision.ife import IfeConfig
+
 from .table4.clips import real_sequences
 from .table4.drives import rendered_drives
 from .table4.judge import SCENARIOS, VOTING, Networks, judged
 from .table4.scores import n_w
-from .table4.sequences import Sequence
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRST_SEED = 6_000_100
@@ -39,7 +40,8 @@ def main() -> None:
             given.out, given.drives, lambda done, _: bars.update(drawing, completed=done), FIRST_SEED
         )
         sequences = [replace(drive, frames=drive.frames[::EVERY]) for drive in drives]
-        sequences += _validation_parts(given.data) if given.data else []
+        real = real_sequences(given.data) if given.data else []
+        sequences += [part for part in (s.validation_part() for s in real) if part.frames]
         task = bars.add_task("judged", total=len(sequences) * len(SCENARIOS))
         found = []
         for sequence in sequences:
@@ -63,14 +65,6 @@ def table(verdicts: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
-def _validation_parts(data: Path) -> list[Sequence]:
-    parts = (
-        replace(s, frames=tuple(frame for frame in s.frames if frame.part == "val"))
-        for s in real_sequences(data)
-    )
-    return [part for part in parts if part.frames]
-
-
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.patch_width",
@@ -85,17 +79,17 @@ def _options() -> argparse.Namespace:
     given = parser.parse_args()
     try:
         given.patches = {text: changes(text) for text in given.patches}
-    except ValueError:
-        parser.error(
-            f"--patches {' '.join(given.patches)}: expected widths such as 1.2, or 1.2x1.7 with a spread"
-        )
+    except ValueError as error:
+        parser.error(f"--patches: expected widths such as 1.2, or 1.2x1.7 with a spread ({error})")
     return given
 
 
 def changes(patches: str) -> dict[str, float]:
     """What `1.2x1.7` changes in the estimator; raises ValueError."""
     width, _, spread = patches.partition("x")
-    return {"roi_width_m": float(width), "roi_spread": float(spread or 1.0)}
+    changed = {"roi_width_m": float(width), "roi_spread": float(spread or 1.0)}
+    IfeConfig(**changed)  # refuses what the estimator would, before any drive is drawn
+    return changed
 
 
 if __name__ == "__main__":

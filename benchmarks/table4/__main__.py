@@ -18,7 +18,6 @@ import json
 import sys
 import time
 from collections.abc import Sequence as Row
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -134,7 +133,7 @@ def _verdicts(
                 missing.add(f"{sequence.source}: no networks in '{name}'")
                 if not options.not_left_out:
                     continue
-            shown = _validation_part(sequence) if name == FULL and sequence.left_out != FULL else sequence
+            shown = sequence.validation_part() if name == FULL and sequence.left_out != FULL else sequence
             if not shown.frames:
                 continue
             for scenario in SCENARIOS:
@@ -144,11 +143,6 @@ def _verdicts(
     if not found:
         return pd.DataFrame(columns=[*COLUMNS, "networks", "consecutive"]), missing
     return pd.concat(found, ignore_index=True), missing
-
-
-def _validation_part(sequence: Sequence) -> Sequence:
-    """The frames that the networks of `full` were not trained on."""
-    return replace(sequence, frames=tuple(frame for frame in sequence.frames if frame.part == "val"))
 
 
 def _kept(sequence: Sequence, folder: Path, scenario: str, out: Path, load) -> pd.DataFrame:

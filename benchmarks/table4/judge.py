@@ -93,7 +93,7 @@ def judged(
         group's corners that are of the true class), found, flag, Q_v.
     """
     kept = Kept(networks.classifier)
-    base = _config(sequence)
+    base = _config(sequence, {})
     estimators = {
         name: Ife(_config(sequence, changes), networks.segmenter, kept) for name, changes in variants.items()
     }
@@ -119,9 +119,9 @@ def judged(
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _config(sequence: Sequence, changes: Changes | None = None) -> IfeConfig:
+def _config(sequence: Sequence, changes: Changes) -> IfeConfig:
     """Of the near group alone, as in the units, with regions of the sequence's scale."""
-    config = replace(IfeConfig(camera=sequence.camera, groups_looked_at=1), **(changes or {}))
+    config = replace(IfeConfig(camera=sequence.camera, groups_looked_at=1), **changes)
     return replace(config, roi_width_m=sequence.roi_scale * config.roi_width_m)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -68,6 +68,10 @@ class Sequence:
     memory: bool = True
     consecutive: bool = True
     notes: dict[str, str] = field(default_factory=dict)
+
+    def validation_part(self) -> Sequence:
+        """The frames of the split's part 'val': networks that learned from the source have not seen them."""
+        return replace(self, frames=tuple(frame for frame in self.frames if frame.part == "val"))
 
     def picture(self, frame: Frame) -> Image:
         """The picture as the estimator gets it, BGR; raises OSError."""
