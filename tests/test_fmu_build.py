@@ -25,7 +25,7 @@ from fmu_src.fields import field_value
 from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.model_description import UNITS as SI_UNITS
 from fmu_src.model_description import flat_name
-from fmu_src.packaging import BuildError, build_unit, sha256, unpack_unit
+from fmu_src.packaging import BuildError, UnitFileError, build_unit, require_whole, sha256, unpack_unit
 from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
 from fmu_src.variables import Kind, Variable
@@ -315,6 +315,19 @@ def test_a_damaged_unit_is_one_short_sentence_to_every_user_of_it(
         assert ended.returncode != 0
         assert "Traceback" not in ended.stderr + ended.stdout
         assert len(ended.stderr + ended.stdout) < 4000
+
+
+@pytest.mark.e2e
+def test_a_wrong_checksum_is_found_before_the_unit_is_used(unit_file: Path, tmp_path: Path) -> None:
+    require_whole(unit_file)
+    path = damaged_unit(unit_file, tmp_path / "damaged.fmu", "content")
+    with pytest.raises(
+        UnitFileError, match=r"damaged\.fmu: damaged at modelDescription\.xml\. Copy or build"
+    ):
+        require_whole(path)
+    found = {finding.what: finding for finding in look_at_file(path)[1]}
+    assert found["archive"].state is State.PROBLEM
+    assert found["archive"].text == "damaged at modelDescription.xml"
 
 
 @pytest.mark.e2e
