@@ -1,5 +1,7 @@
 """What is blamed on no effect: a hum in wheel sensors, a slow sensor, a gap that the cause leaves open."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured
@@ -15,8 +17,9 @@ from sim2real.drive import CHANNELS, SPEED, WHEEL
 from sim2real.evidence import gather
 from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.hum import hum
+from sim2real.law import held_to_curves
 from sim2real.result import Verdict
-from sim2real.selection import Decision, Fitness, fitness
+from sim2real.selection import EXPLAINED_MISFIT, Decision, Fitness, fitness
 
 DURATION_S = 16.0
 
@@ -121,3 +124,44 @@ def test_a_slow_speed_sensor_is_not_called_late(nominal, slow, verdict):
     found = find(MODEL, logs[:2], logs[2], exclude=only("vehicle_speed_delay"))
     assert found.decision.winner.ids == ("vehicle_speed_delay",)
     assert found.decision.verdict is verdict
+
+
+# --- an effect whose work a free curve does as well
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    """Logs of a car that is 60 kg heavier than its simulation."""
+    real = {"mass_offset": {"mass_kg": 60.0}}
+    return [
+        noisy(clean(f * pulses(DURATION_S), 14.0, effects=real), seed)
+        for seed, f in enumerate((1.0, 0.8, 1.2))
+    ]
+
+
+@pytest.fixture(scope="module")
+def mistaken(loaded):
+    """What is found where the library knows a torque's gain and no payload."""
+    return find(MODEL, loaded[:2], loaded[2], exclude=only("torque_gain"))
+
+
+def test_a_look_alike_whose_law_is_not_the_cars_is_not_blamed(mistaken):
+    """A torque's gain for a payload: a force over acceleration does as well, and the slip says that torque is right."""
+    decision = mistaken.decision
+    assert decision.verdict is Verdict.UNKNOWN
+    assert decision.winner.ids == ("torque_gain",)
+    assert decision.after.misfit < EXPLAINED_MISFIT  # no other gate would have seen it
+    assert sum(decision.probability.values()) < 0.25
+
+
+def test_the_right_effect_is_held_to_curves_and_stands(loaded):
+    found = find(MODEL, loaded[:2], loaded[2], exclude=only("torque_gain", "mass_offset"))
+    assert found.decision.verdict is Verdict.IDENTIFIED
+    assert found.decision.winner.ids == ("mass_offset",)
+
+
+@pytest.mark.parametrize("verdict", [Verdict.NO_GAP, Verdict.UNKNOWN, Verdict.COMPOUND])
+def test_only_one_effect_is_held_to_curves(mistaken, verdict):
+    decision = replace(mistaken.decision, verdict=verdict)
+    said = held_to_curves(decision, mistaken.contest, mistaken.model, mistaken.fit_to, mistaken.holdout)
+    assert said is decision

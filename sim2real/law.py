@@ -1,0 +1,62 @@
+"""Does the effect's law say more than a free curve: else the cause may be another one that looks like it.
+
+An effect is believed since its equation, with one or two values, foretells what a curve of many values in the wrong
+place cannot. Where a free curve over the car's motion does as well in its place, and beside it still finds what is no
+noise, the law is not the car's: a load that the library lacks passes for a torque's gain that way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sim2real.contest import Contest
+from sim2real.equations import OF_THE_MOTION, WHOLE_CAR
+from sim2real.evidence import Evidence
+from sim2real.observer import Simulation
+from sim2real.result import Verdict
+from sim2real.selection import FURTHER_GAIN, Decision, inflation
+from sim2real.unknown import Term, fit_terms, with_refined
+
+MORE_BESIDE = 0.0075
+"""Share of what the effect takes off the loss that a curve beside it takes, too: less is how its form differs [-]."""
+LAWLESS_BELIEF = 0.2
+"""Probability that an effect is the cause though a curve does its work [-]."""
+
+
+def held_to_curves(
+    decision: Decision,
+    contest: Contest,
+    model: Simulation,
+    fit_to: Evidence,
+    holdout: Evidence,
+    jobs: int = 1,
+) -> Decision:
+    """The decision, `unknown` where free curves do the work of the one effect that it blames, and more.
+
+    An effect that varies was held to a curve beside it already, see `sim2real.varying`; two effects together do what no
+    single curve does.
+    """
+    if decision.verdict not in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS) or decision.varied:
+        return decision
+    winner = decision.winner
+    found = winner.fitted
+    more = winner.loss - _curves(found.candidate.model(found.x), fit_to, holdout, jobs)[0].loss
+    noise = FURTHER_GAIN * inflation(winner, fit_to, holdout)
+    if more < max(noise, MORE_BESIDE * (contest.null.loss - winner.loss)):
+        return decision
+    drives, noises = _all_of(fit_to, holdout)
+    instead = with_refined(model, drives, noises, _curves(model, fit_to, holdout, jobs), jobs)[0]
+    if instead.loss > winner.loss:
+        return decision
+    probability = {key: LAWLESS_BELIEF * value for key, value in decision.probability.items()}
+    return replace(decision, verdict=Verdict.UNKNOWN, rivals=(), probability=probability)
+
+
+def _curves(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int) -> list[Term]:
+    """Free curves over the car's motion in each equation of a model, best first."""
+    drives, noises = _all_of(fit_to, holdout)
+    return fit_terms(model, drives, noises, jobs, equations=WHOLE_CAR, quantities=OF_THE_MOTION)
+
+
+def _all_of(fit_to: Evidence, holdout: Evidence) -> tuple[tuple, tuple]:
+    return (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
