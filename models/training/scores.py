@@ -58,12 +58,19 @@ def by_patch(logits: NDArray[np.float64], patches: PatchSet) -> ClassScore:
 
 
 def by_picture(logits: NDArray[np.float64], patches: PatchSet, temperature: float) -> ClassScore:
-    """Confusion over pictures: the class of the largest mean log probability of a picture's patches."""
+    """Confusion over pictures."""
+    return _confusion(*picture_verdicts(logits, patches, temperature))
+
+
+def picture_verdicts(
+    logits: NDArray[np.float64], patches: PatchSet, temperature: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """True class of each picture, and the one found: of the largest mean log probability of its patches."""
     logs = np.log(np.maximum(probabilities(logits, temperature), 1e-12))
     numbers, first, index = np.unique(patches.pictures, return_index=True, return_inverse=True)
     summed = np.zeros((len(numbers), logits.shape[1]))
     np.add.at(summed, index, logs)
-    return _confusion(patches.labels[first], summed.argmax(axis=1))
+    return patches.labels[first], summed.argmax(axis=1)
 
 
 def _confusion(true: NDArray[np.int64], found: NDArray[np.int64]) -> ClassScore:
