@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, Effect
-from sim2real import where
+from sim2real import sentences, where
 from sim2real.contest import Contest, Entry, Progress, Varied
 from sim2real.drive import CHANNELS
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
@@ -111,9 +111,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         sentence=" ".join(
             part
             for part in (
-                _sentence(decision, gap, causes, unexplained.sentence if unexplained else ""),
-                _beside(structure),
-                _uneven(variation),
+                sentences.verdict(decision, gap, causes),
+                unexplained.sentence if unexplained else "",
+                "" if found.only_order else sentences.nearest(decision, found.contest),
+                sentences.beside(structure),
+                sentences.uneven(variation),
                 swing.sentence if swing and unexplained is not swing else "",
             )
             if part
@@ -210,6 +212,10 @@ def _cause(
     if entry is found.decision.winner and found.decision.left_open:
         contra.append(
             f"Leaves {100.0 * found.decision.left_open:.0f} % of the gap on the hold-out, as energy."
+        )
+    if entry is found.decision.winner and found.decision.curve:
+        contra.append(
+            f"A free curve ({found.decision.curve}) does its work as well, and one beside it finds more."
         )
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
@@ -365,46 +371,3 @@ def _traces(found: Findings, held: Evidence, added: Simulation) -> tuple[Trace, 
         for name, unit in SHOWN.items()
         for i in [CHANNELS.index(name)]
     )
-
-
-def _sentence(decision: Decision, gap: Gap, causes: Sequence[Cause], term: str) -> str:
-    size = f"{gap.before.total:.1f} times the noise floor"
-    if decision.verdict is Verdict.NO_GAP:
-        return "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
-    if decision.verdict is Verdict.UNKNOWN:
-        return f"There is a gap of {size}, and no effect of the library explains it. {term}".strip()
-    top = causes[0]
-    cut = f"it takes the gap from {gap.before.total:.1f} to {gap.after.total:.1f} times the noise floor"
-    if decision.verdict is Verdict.COMPOUND:
-        return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
-    if decision.verdict is Verdict.AMBIGUOUS:
-        others = ", ".join(e.name.replace("+", " with ") for e in decision.rivals)
-        return f"The gap of {size} is {top.effect} or as well {others}: these logs cannot tell them apart."
-    values = ", ".join(f"{name} {_number(v)}" for name, v in top.parameters.items())
-    return f"The gap of {size} is {top.effect} ({values}): {cut}."
-
-
-def _beside(structure: Structure | None) -> str:
-    """The structural part in a sentence."""
-    if structure is None:
-        return ""
-    values = ", ".join(f"{name} {100.0 * v.value:+.0f} %" for name, v in structure.parameters.items())
-    return (
-        f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}), "
-        f"which leaves {structure.gap_after:.1f}: a difference of the models, not a fault."
-    )
-
-
-def _uneven(variation: Variation | None) -> str:
-    """How the cause varies, in a sentence."""
-    if variation is None:
-        return ""
-    values = ", ".join(f"{name} by {spread:.2g}" for name, spread in variation.spread.items())
-    along = "time" if variation.over == "time" else "the road"
-    return f"It is not the same everywhere: along {along} it varies ({values}, standard deviation)."
-
-
-def _number(value: Interval) -> str:
-    """A value in four digits with its unit, if it has one."""
-    text = np.format_float_positional(value.value, precision=4, fractional=False, trim="-")
-    return text if value.unit == "-" else f"{text} {value.unit}"

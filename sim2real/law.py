@@ -49,7 +49,8 @@ def held_to_curves(
     if instead.loss > winner.loss:
         return decision
     probability = {key: LAWLESS_BELIEF * value for key, value in decision.probability.items()}
-    return replace(decision, verdict=Verdict.UNKNOWN, rivals=(), probability=probability)
+    curve = f"{instead.equation.key} over {instead.quantity}"
+    return replace(decision, verdict=Verdict.UNKNOWN, rivals=(), probability=probability, curve=curve)
 
 
 def _curves(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int) -> list[Term]:

@@ -197,6 +197,8 @@ class Decision:
         How the winner's parameters vary, where they do.
     left_open : float
         Share of the hold-out's gap that the winner leaves, where that is why it is not blamed, see `sim2real.closure`.
+    curve : str
+        The free curve that does the winner's work as well, where that is why it is not blamed, see `sim2real.law`.
     """
 
     verdict: Verdict
@@ -207,6 +209,7 @@ class Decision:
     after: Fitness
     varied: Varied | None = None
     left_open: float = 0.0
+    curve: str = ""
 
 
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:

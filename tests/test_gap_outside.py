@@ -11,10 +11,11 @@ from scenarios.effects import EFFECTS
 from scenarios.effects.shifting import delayed
 from sim2real import closure
 from sim2real.closure import FLOOR_DOUBT, MOST_LEFT, closing, left_open
-from sim2real.contest import Entry, enter
+from sim2real.contest import Entry, enter, silent
 from sim2real.diagnose import find
 from sim2real.drive import CHANNELS, SPEED, WHEEL
 from sim2real.evidence import gather
+from sim2real.findings import describe
 from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.hum import hum
 from sim2real.law import held_to_curves
@@ -152,6 +153,13 @@ def test_a_look_alike_whose_law_is_not_the_cars_is_not_blamed(mistaken):
     assert decision.winner.ids == ("torque_gain",)
     assert decision.after.misfit < EXPLAINED_MISFIT  # no other gate would have seen it
     assert sum(decision.probability.values()) < 0.25
+    assert decision.curve.endswith("over acceleration")
+
+
+def test_what_comes_nearest_is_told_and_what_speaks_against_it(mistaken):
+    said = describe(mistaken, seed=0, jobs=1, progress=silent)
+    assert "Nearest comes torque_gain: it takes " in said.sentence
+    assert any("A free curve (" in reason for reason in said.causes[0].evidence_against)
 
 
 def test_the_right_effect_is_held_to_curves_and_stands(loaded):

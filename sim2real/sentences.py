@@ -1,0 +1,74 @@
+"""A verdict in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim2real.contest import Contest
+from sim2real.result import Cause, Gap, Interval, Structure, Variation, Verdict
+from sim2real.selection import Decision, loss_beyond_noise
+
+NEAR = 0.8
+"""Share of the loss beyond noise from which on what comes nearest to an explanation is worth a sentence [-]."""
+
+
+def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
+    """The verdict itself."""
+    size = f"{gap.before.total:.1f} times the noise floor"
+    if decision.verdict is Verdict.NO_GAP:
+        return "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
+    if decision.verdict is Verdict.UNKNOWN:
+        return f"There is a gap of {size}, and no effect of the library explains it."
+    top = causes[0]
+    cut = f"it takes the gap from {gap.before.total:.1f} to {gap.after.total:.1f} times the noise floor"
+    if decision.verdict is Verdict.COMPOUND:
+        return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
+    if decision.verdict is Verdict.AMBIGUOUS:
+        others = ", ".join(e.name.replace("+", " with ") for e in decision.rivals)
+        return f"The gap of {size} is {top.effect} or as well {others}: these logs cannot tell them apart."
+    values = ", ".join(f"{name} {_number(v)}" for name, v in top.parameters.items())
+    return f"The gap of {size} is {top.effect} ({values}): {cut}."
+
+
+def nearest(decision: Decision, contest: Contest) -> str:
+    """What comes nearest where nothing explains the gap, if that is near."""
+    entries = [*contest.singles, *contest.structured, *contest.pairs]
+    if decision.verdict is not Verdict.UNKNOWN or not entries:
+        return ""
+    best, null = min(entries, key=lambda e: e.loss), contest.null
+    if loss_beyond_noise(best) > (1.0 - NEAR) * loss_beyond_noise(null):
+        return ""
+    share = 1.0 - best.loss / max(null.loss, 1e-12)
+    curve = " beside another curve of the tyres" if best in contest.structured else ""
+    return (
+        f"Nearest comes {best.name.replace('+', ' with ')}{curve}: it takes {100.0 * share:.0f} % of the misfit, "
+        "and what it leaves or how says that it is not all, or not it."
+    )
+
+
+def beside(structure: Structure | None) -> str:
+    """The structural part."""
+    if structure is None:
+        return ""
+    values = ", ".join(f"{name} {100.0 * v.value:+.0f} %" for name, v in structure.parameters.items())
+    return (
+        f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}), "
+        f"which leaves {structure.gap_after:.1f}: a difference of the models, not a fault."
+    )
+
+
+def uneven(variation: Variation | None) -> str:
+    """How the cause varies."""
+    if variation is None:
+        return ""
+    values = ", ".join(f"{name} by {spread:.2g}" for name, spread in variation.spread.items())
+    along = "time" if variation.over == "time" else "the road"
+    return f"It is not the same everywhere: along {along} it varies ({values}, standard deviation)."
+
+
+def _number(value: Interval) -> str:
+    """A value in four digits with its unit, if it has one."""
+    text = np.format_float_positional(value.value, precision=4, fractional=False, trim="-")
+    return text if value.unit == "-" else f"{text} {value.unit}"
