@@ -95,6 +95,25 @@ def test_a_tyre_that_goes_on_showing_something_else_widens_at_once():
     assert variance**0.5 > 0.4
 
 
+@given(st.floats(0.05, 3.0), st.floats(1e-4, 0.3), st.floats(0.0, 0.3), st.floats(0.0, 0.3))
+def test_any_force_leaves_a_variance_between_none_and_that_of_the_unknown(fraction, slip, line, noise):
+    """Also one far beyond the elastic line, which no tyre of the model has but a car with another tyre."""
+    at = tyre_at_slip(slip, LOAD_N, C_X)
+    evidence = Evidence(0.5, fraction * at.elastic * at.g_0, at, line, noise, 0.0)
+    variance, lag = advanced_variance(MODEL, 1e-4, 0.0, 0.5, evidence, 0.11, 12.5, 0.0, 0.01)
+    assert 0.0 <= variance <= unknown_variance(MODEL, 0.5)
+    assert lag == 0.0
+
+
+def test_a_force_surely_beyond_the_elastic_one_says_only_that_the_road_has_more():
+    at = tyre_at_slip(0.005, LOAD_N, C_X)
+    evidence = Evidence(0.5, 1.5 * at.elastic * at.g_0, at, 0.01, 0.01, 0.0)
+    variance, lag = 1e-4, 0.0
+    for _ in range(400):
+        variance, lag = advanced_variance(MODEL, variance, lag, 0.5, evidence, 0.11, 12.5, 0.0, 0.01)
+    assert variance == pytest.approx(bounded_variance(0.5, 2.0 * at.elastic), rel=0.05)
+
+
 def test_the_camera_narrows_where_it_agrees_and_widens_where_it_does_not():
     unknown, sure = unknown_variance(MODEL, 0.8), 1e-4
     assert with_camera(MODEL, unknown, 0.8, 0.8) < unknown

@@ -186,8 +186,10 @@ def advanced_variance(
     # Bayes' rule with all roads alike likely; exp(-x^2 / 2) integrates to sqrt(2 pi) half over those that slide.
     apart, above = (1.0 - fraction) / (fraction * share), GREATEST_ROAD - 2.0 * elastic
     if above > 0.0 and apart < FARTHEST:
-        odds = math.exp(-0.5 * apart * apart) * above / (math.sqrt(2.0 * math.pi) * half)
-        settled += odds / (1.0 + odds) * bounded_variance(theta_tyre, 2.0 * elastic)
+        elsewhere, here = math.exp(-0.5 * apart * apart) * above, math.sqrt(2.0 * math.pi) * half
+        # `here` is 0 where the force is surely more than the elastic one: no road that slides is known by it.
+        share_elsewhere = elsewhere / (elsewhere + here) if here > 0.0 else 1.0
+        settled += share_elsewhere * bounded_variance(theta_tyre, 2.0 * elastic)
     # A theta that follows the slip is no road's: then any road above would do.
     if following > 0.0:
         settled += following * following * (bounded_variance(theta_tyre, theta_tyre) - settled)
