@@ -114,6 +114,15 @@ def test_a_force_surely_beyond_the_elastic_one_says_only_that_the_road_has_more(
     assert variance == pytest.approx(bounded_variance(0.5, 2.0 * at.elastic), rel=0.05)
 
 
+@pytest.mark.parametrize("fraction", [0.5, 1.0, 1.5])
+def test_a_car_that_is_configured_without_any_error_is_no_error(fraction):
+    at = tyre_at_slip(0.01, LOAD_N, C_X)
+    evidence = Evidence(0.5, fraction * at.elastic * at.g_0, at, 0.0, 0.0, 0.0)
+    sure = ConfidenceModel(tyre_share=0.0, car_share=0.0)
+    variance, _ = advanced_variance(sure, 1e-4, 0.0, 0.5, evidence, 0.11, 12.5, 0.0, 0.01)
+    assert 0.0 <= variance <= unknown_variance(sure, 0.5)
+
+
 def test_the_camera_narrows_where_it_agrees_and_widens_where_it_does_not():
     unknown, sure = unknown_variance(MODEL, 0.8), 1e-4
     assert with_camera(MODEL, unknown, 0.8, 0.8) < unknown

@@ -184,7 +184,9 @@ def advanced_variance(
     settled = half * half + scale * scale
     # The same error may make a tyre that does not slide look like one that does: then any road above would do. By
     # Bayes' rule with all roads alike likely; exp(-x^2 / 2) integrates to sqrt(2 pi) half over those that slide.
-    apart, above = (1.0 - fraction) / (fraction * share), GREATEST_ROAD - 2.0 * elastic
+    above = GREATEST_ROAD - 2.0 * elastic
+    # Without any error, as one may configure it, all is surely on its side.
+    apart = (1.0 - fraction) / (fraction * share) if share > 0.0 else math.copysign(math.inf, 1.0 - fraction)
     if above > 0.0 and apart < FARTHEST:
         elsewhere, here = math.exp(-0.5 * apart * apart) * above, math.sqrt(2.0 * math.pi) * half
         # `here` is 0 where the force is surely more than the elastic one: no road that slides is known by it.
@@ -197,7 +199,7 @@ def advanced_variance(
     variance = min(variance, unknown_variance(model, theta_hat))
     # Where the tyre goes on showing something else than the estimate, the estimate is off by that.
     lag += min(1.0, LAG_RATE_1_S * step_s) * (theta_tyre - theta_hat - lag)
-    off = abs(lag) - half / share * noise_share
+    off = abs(lag) - (half / share * noise_share if share > 0.0 else 0.0)
     return (max(variance, off * off) if off > 0.0 else variance), lag
 
 
