@@ -34,9 +34,9 @@ def held_to_curves(
     """The decision, `unknown` where free curves do the work of the one effect that it blames, and more.
 
     An effect that varies was held to a curve beside it already, see `sim2real.varying`; two effects together do what no
-    single curve does.
+    single curve does; where several are named none is blamed alone.
     """
-    if decision.verdict not in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS) or decision.varied:
+    if decision.verdict is not Verdict.IDENTIFIED or decision.varied:
         return decision
     winner = decision.winner
     found = winner.fitted

@@ -168,7 +168,7 @@ def test_the_right_effect_is_held_to_curves_and_stands(loaded):
     assert found.decision.winner.ids == ("mass_offset",)
 
 
-@pytest.mark.parametrize("verdict", [Verdict.NO_GAP, Verdict.UNKNOWN, Verdict.COMPOUND])
+@pytest.mark.parametrize("verdict", [Verdict.NO_GAP, Verdict.AMBIGUOUS, Verdict.UNKNOWN, Verdict.COMPOUND])
 def test_only_one_effect_is_held_to_curves(mistaken, verdict):
     decision = replace(mistaken.decision, verdict=verdict)
     said = held_to_curves(decision, mistaken.contest, mistaken.model, mistaken.fit_to, mistaken.holdout)
