@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scenarios.effects import EFFECTS
 from sim2real.contest import Contest
 from sim2real.result import Cause, Gap, Interval, Structure, Variation, Verdict
 from sim2real.selection import Decision, loss_beyond_noise
@@ -42,9 +43,15 @@ def nearest(decision: Decision, contest: Contest) -> str:
         return ""
     share = 1.0 - best.loss / max(null.loss, 1e-12)
     curve = " beside another curve of the tyres" if best in contest.structured else ""
+    found = best.fitted
+    values = ", ".join(
+        f"{p.name} {value:.4g}" + (f" {p.unit}" if p.unit != "-" else "")
+        for (key, p), value in zip(found.candidate.parameters, found.x, strict=True)
+        if not EFFECTS[key].structural
+    )
     return (
-        f"Nearest comes {best.name.replace('+', ' with ')}{curve}: it takes {100.0 * share:.0f} % of the misfit, "
-        "and what it leaves or how says that it is not all, or not it."
+        f"Nearest comes {best.name.replace('+', ' with ')} ({values}){curve}: it takes {100.0 * share:.0f} % of the "
+        "misfit, and what it leaves or how says that it is not all, or not it."
     )
 
 

@@ -158,7 +158,7 @@ def test_a_look_alike_whose_law_is_not_the_cars_is_not_blamed(mistaken):
 
 def test_what_comes_nearest_is_told_and_what_speaks_against_it(mistaken):
     said = describe(mistaken, seed=0, jobs=1, progress=silent)
-    assert "Nearest comes torque_gain: it takes " in said.sentence
+    assert "Nearest comes torque_gain (factor 0.962" in said.sentence
     assert any("A free curve (" in reason for reason in said.causes[0].evidence_against)
 
 
