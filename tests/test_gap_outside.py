@@ -168,6 +168,18 @@ def test_the_right_effect_is_held_to_curves_and_stands(loaded):
     assert found.decision.winner.ids == ("mass_offset",)
 
 
+def test_an_effect_whose_law_is_a_curve_itself_stands_where_nothing_is_left_beside_it():
+    """A bias of the accelerometer: a curve over speed there does its work as well, of course."""
+    real = {"accelerometer_bias": {"bias_m_s2": 0.3}}
+    logs = [
+        noisy(clean(f * pulses(DURATION_S), 14.0, effects=real), seed)
+        for seed, f in enumerate((1.0, 0.8, 1.2))
+    ]
+    found = find(MODEL, logs[:2], logs[2], exclude=only("accelerometer_bias", "mass_offset"))
+    assert found.decision.verdict is Verdict.IDENTIFIED
+    assert found.decision.winner.ids == ("accelerometer_bias",)
+
+
 @pytest.mark.parametrize("verdict", [Verdict.NO_GAP, Verdict.AMBIGUOUS, Verdict.UNKNOWN, Verdict.COMPOUND])
 def test_only_one_effect_is_held_to_curves(mistaken, verdict):
     decision = replace(mistaken.decision, verdict=verdict)
