@@ -7,8 +7,6 @@ what a cause leaves of it beyond the noise floor, as energy, has to be the lesse
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from sim2real.contest import Entry
@@ -16,7 +14,7 @@ from sim2real.evidence import Evidence
 from sim2real.gap import measure, noise_floor
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
-from sim2real.selection import Decision
+from sim2real.selection import Decision, doubted
 
 MOST_LEFT = 1.0 / 6.0
 """Share of the gap's energy beyond the floor that a cause may leave on the hold-out [-]."""
@@ -54,7 +52,4 @@ def closing(decision: Decision, model: Simulation, holdout: Evidence) -> Decisio
     left, floors = left_open(model, decision.winner, holdout)
     if left <= (MOST_NEAR_FLOOR if floors <= FLOOR_DOUBT else MOST_LEFT):
         return decision
-    probability = {key: OPEN_BELIEF * value for key, value in decision.probability.items()}
-    return replace(
-        decision, verdict=Verdict.UNKNOWN, rivals=(), probability=probability, varied=None, left_open=left
-    )
+    return doubted(decision, OPEN_BELIEF, varied=None, left_open=left)

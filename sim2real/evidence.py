@@ -92,3 +92,8 @@ def drift_of(model: Simulation, *evidence: Evidence) -> Array:
     drives = [d for e in evidence for d in e.drives]
     noises = [n for e in evidence for n in e.noises]
     return read_drift(drives, noises, [residuals(model, d) for d in drives])
+
+
+def all_logs(*parts: Evidence) -> tuple[tuple[Drive, ...], tuple[Noise, ...]]:
+    """Drives and noises of all parts, in order."""
+    return tuple(d for part in parts for d in part.drives), tuple(n for part in parts for n in part.noises)

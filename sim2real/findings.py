@@ -13,7 +13,7 @@ from sim2real import sentences, where
 from sim2real.contest import Contest, Entry, Progress, Varied
 from sim2real.drive import CHANNELS
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
-from sim2real.evidence import Evidence
+from sim2real.evidence import Evidence, all_logs
 from sim2real.fitting import Fit, loss
 from sim2real.gap import intervals, measure, noise_floor, shrink
 from sim2real.lattice import Lattice
@@ -142,7 +142,7 @@ def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unex
         return fit_terms(
             found.model, held.drives, held.noises, jobs, equations=WHOLE_CAR, quantities=OF_THE_MOTION
         ), None
-    drives, noises = (*found.fit_to.drives, *held.drives), (*found.fit_to.noises, *held.noises)
+    drives, noises = all_logs(found.fit_to, held)
     suspect = None
     if decision.left_open:  # the gap lies where the rows are doubtful
         noises = tuple(replace(n, widening=np.ones_like(n.widening)) for n in noises)

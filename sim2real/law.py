@@ -7,14 +7,12 @@ noise, the law is not the car's: a load that the library lacks passes for a torq
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from sim2real.contest import Contest
 from sim2real.equations import OF_THE_MOTION, WHOLE_CAR
-from sim2real.evidence import Evidence
+from sim2real.evidence import Evidence, all_logs
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
-from sim2real.selection import FURTHER_GAIN, Decision, inflation
+from sim2real.selection import FURTHER_GAIN, Decision, doubted, inflation
 from sim2real.unknown import Term, fit_terms, with_refined
 
 MORE_BESIDE = 0.0075
@@ -44,20 +42,14 @@ def held_to_curves(
     noise = FURTHER_GAIN * inflation(winner, fit_to, holdout)
     if more < max(noise, MORE_BESIDE * (contest.null.loss - winner.loss)):
         return decision
-    drives, noises = _all_of(fit_to, holdout)
+    drives, noises = all_logs(fit_to, holdout)
     instead = with_refined(model, drives, noises, _curves(model, fit_to, holdout, jobs), jobs)[0]
     if instead.loss > winner.loss:
         return decision
-    probability = {key: LAWLESS_BELIEF * value for key, value in decision.probability.items()}
-    curve = f"{instead.equation.key} over {instead.quantity}"
-    return replace(decision, verdict=Verdict.UNKNOWN, rivals=(), probability=probability, curve=curve)
+    return doubted(decision, LAWLESS_BELIEF, curve=f"{instead.equation.key} over {instead.quantity}")
 
 
 def _curves(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int) -> list[Term]:
     """Free curves over the car's motion in each equation of a model, best first."""
-    drives, noises = _all_of(fit_to, holdout)
+    drives, noises = all_logs(fit_to, holdout)
     return fit_terms(model, drives, noises, jobs, equations=WHOLE_CAR, quantities=OF_THE_MOTION)
-
-
-def _all_of(fit_to: Evidence, holdout: Evidence) -> tuple[tuple, tuple]:
-    return (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,8 +221,13 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     margin = FURTHER_GAIN * inflation(said.winner, fit_to, holdout)
     if contest.lone > said.winner.loss - margin:
         return said
-    probability = _scaled(said.probability, LONE_BELIEF)
-    return replace(said, verdict=Verdict.UNKNOWN, rivals=(), probability=probability)
+    return doubted(said, LONE_BELIEF)
+
+
+def doubted(decision: Decision, belief: float, **why: Any) -> Decision:
+    """The decision as `unknown`, with this share of its probabilities; `why` are its fields that tell the reason."""
+    probability = _scaled(decision.probability, belief)
+    return replace(decision, verdict=Verdict.UNKNOWN, rivals=(), probability=probability, **why)
 
 
 def _decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:

@@ -8,7 +8,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS
 from sim2real.contest import Contest
-from sim2real.result import Cause, Gap, Interval, Structure, Variation, Verdict
+from sim2real.result import Cause, Gap, Structure, Variation, Verdict
 from sim2real.selection import Decision, loss_beyond_noise
 
 NEAR = 0.8
@@ -29,7 +29,7 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     if decision.verdict is Verdict.AMBIGUOUS:
         others = ", ".join(e.name.replace("+", " with ") for e in decision.rivals)
         return f"The gap of {size} is {top.effect} or as well {others}: these logs cannot tell them apart."
-    values = ", ".join(f"{name} {_number(v)}" for name, v in top.parameters.items())
+    values = ", ".join(f"{name} {_number(v.value, v.unit)}" for name, v in top.parameters.items())
     return f"The gap of {size} is {top.effect} ({values}): {cut}."
 
 
@@ -45,7 +45,7 @@ def nearest(decision: Decision, contest: Contest) -> str:
     curve = " beside another curve of the tyres" if best in contest.structured else ""
     found = best.fitted
     values = ", ".join(
-        f"{p.name} {value:.4g}" + (f" {p.unit}" if p.unit != "-" else "")
+        f"{p.name} {_number(value, p.unit)}"
         for (key, p), value in zip(found.candidate.parameters, found.x, strict=True)
         if not EFFECTS[key].structural
     )
@@ -75,7 +75,7 @@ def uneven(variation: Variation | None) -> str:
     return f"It is not the same everywhere: along {along} it varies ({values}, standard deviation)."
 
 
-def _number(value: Interval) -> str:
+def _number(value: float, unit: str) -> str:
     """A value in four digits with its unit, if it has one."""
-    text = np.format_float_positional(value.value, precision=4, fractional=False, trim="-")
-    return text if value.unit == "-" else f"{text} {value.unit}"
+    text = np.format_float_positional(value, precision=4, fractional=False, trim="-")
+    return text if unit == "-" else f"{text} {unit}"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sim2real.contest import Entry
 from sim2real.drive import SPEED, WHEEL
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, UNLIKE, Equation
-from sim2real.evidence import SETTLING_S, Evidence
+from sim2real.evidence import SETTLING_S, Evidence, all_logs
 from sim2real.observer import Simulation
 from sim2real.selection import fitness
 from sim2real.unknown import best_of_each, fit_terms, refined
@@ -44,7 +44,7 @@ def lone_sensor(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Equat
 
 def unlike_wheels(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int = 1) -> float:
     """Least loss that a free term at one wheel, its motor or its sensor, or between the axles leaves."""
-    drives, noises = (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
+    drives, noises = all_logs(fit_to, holdout)
     terms = fit_terms(model, drives, noises, jobs, equations=UNLIKE, quantities=OF_THE_MOTION)
     best = min(best_of_each(terms), key=lambda term: term.loss)
     return min(best.loss, refined(model, drives, noises, best).loss)

@@ -19,7 +19,7 @@ from scenarios.effects import EFFECTS
 from sim2real.contest import Contest, Entry, Progress, Varied, run_all, silent
 from sim2real.drive import Drive
 from sim2real.equations import OF_THE_MOTION
-from sim2real.evidence import Evidence, rest_of
+from sim2real.evidence import Evidence, all_logs, rest_of
 from sim2real.fitting import loss, robust_weight
 from sim2real.observer import Towards
 from sim2real.probing import sets_apart, windows
@@ -56,7 +56,7 @@ def add_varied(
     null = contest.null
     excess = loss_beyond_noise(null)
     before = fitness(null, fit_to, holdout)
-    drives, noises = (*fit_to.drives, *holdout.drives), (*fit_to.noises, *holdout.noises)
+    drives, noises = all_logs(fit_to, holdout)
     pairs = contest.pairs[:1]
     groups = [contest.singles[:TRIED], contest.structured[:1]]
     groups.insert(0 if any(two_are_needed(contest, pair) for pair in pairs) else 2, pairs)

@@ -130,14 +130,17 @@ def test_a_slow_speed_sensor_is_not_called_late(nominal, slow, verdict):
 # --- an effect whose work a free curve does as well
 
 
+def three_logs(effects):
+    return [
+        noisy(clean(f * pulses(DURATION_S), 14.0, effects=effects), seed)
+        for seed, f in enumerate((1.0, 0.8, 1.2))
+    ]
+
+
 @pytest.fixture(scope="module")
 def loaded():
     """Logs of a car that is 60 kg heavier than its simulation."""
-    real = {"mass_offset": {"mass_kg": 60.0}}
-    return [
-        noisy(clean(f * pulses(DURATION_S), 14.0, effects=real), seed)
-        for seed, f in enumerate((1.0, 0.8, 1.2))
-    ]
+    return three_logs({"mass_offset": {"mass_kg": 60.0}})
 
 
 @pytest.fixture(scope="module")
@@ -170,11 +173,7 @@ def test_the_right_effect_is_held_to_curves_and_stands(loaded):
 
 def test_an_effect_whose_law_is_a_curve_itself_stands_where_nothing_is_left_beside_it():
     """A bias of the accelerometer: a curve over speed there does its work as well, of course."""
-    real = {"accelerometer_bias": {"bias_m_s2": 0.3}}
-    logs = [
-        noisy(clean(f * pulses(DURATION_S), 14.0, effects=real), seed)
-        for seed, f in enumerate((1.0, 0.8, 1.2))
-    ]
+    logs = three_logs({"accelerometer_bias": {"bias_m_s2": 0.3}})
     found = find(MODEL, logs[:2], logs[2], exclude=only("accelerometer_bias", "mass_offset"))
     assert found.decision.verdict is Verdict.IDENTIFIED
     assert found.decision.winner.ids == ("accelerometer_bias",)

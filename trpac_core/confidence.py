@@ -22,6 +22,8 @@ HELD_SHARE = 0.95
 """Share of the true values that two standard deviations are to hold [-]."""
 SURELY = 2.0
 """Deviations by which a bound on theta is taken lower than it reads [-]."""
+LEAST_SHARE = 1e-9
+"""Least error of the used friction, as a share: one may configure a car without any [-]."""
 FARTHEST = 6.0
 """Deviations from the elastic line beyond which a tyre surely slides [-]."""
 LAG_RATE_1_S = 50.0
@@ -178,15 +180,13 @@ def advanced_variance(
             variance = bound if least > theta_hat else min(variance, bound)
         return variance, 0.0
     from_torque = torque_friction * torque_friction * averaged / (friction * friction)
-    share = math.sqrt(sure + noise_share * noise_share * averaged + from_torque)
+    share = max(math.sqrt(sure + noise_share * noise_share * averaged + from_torque), LEAST_SHARE)
     low, high = theta_at(fraction * (1.0 - share), elastic), theta_at(fraction * (1.0 + share), elastic)
     half, scale = 0.5 * (high - low), model.car_share * theta_tyre
     settled = half * half + scale * scale
     # The same error may make a tyre that does not slide look like one that does: then any road above would do. By
     # Bayes' rule with all roads alike likely; exp(-x^2 / 2) integrates to sqrt(2 pi) half over those that slide.
-    above = GREATEST_ROAD - 2.0 * elastic
-    # Without any error, as one may configure it, all is surely on its side.
-    apart = (1.0 - fraction) / (fraction * share) if share > 0.0 else math.copysign(math.inf, 1.0 - fraction)
+    apart, above = (1.0 - fraction) / (fraction * share), GREATEST_ROAD - 2.0 * elastic
     if above > 0.0 and apart < FARTHEST:
         elsewhere, here = math.exp(-0.5 * apart * apart) * above, math.sqrt(2.0 * math.pi) * half
         # `here` is 0 where the force is surely more than the elastic one: no road that slides is known by it.
@@ -199,7 +199,7 @@ def advanced_variance(
     variance = min(variance, unknown_variance(model, theta_hat))
     # Where the tyre goes on showing something else than the estimate, the estimate is off by that.
     lag += min(1.0, LAG_RATE_1_S * step_s) * (theta_tyre - theta_hat - lag)
-    off = abs(lag) - (half / share * noise_share if share > 0.0 else 0.0)
+    off = abs(lag) - half / share * noise_share
     return (max(variance, off * off) if off > 0.0 else variance), lag
 
 
