@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.data import Picture, of_split, read_manifest
+from models.training.data import MANIFEST, DataFolderError, Picture, of_split, read_manifest
 from models.training.patches import PatchSet, judged_patches
 from models.training.scores import picture_verdicts, wilson_interval
 from trpac_core.vision.classes import Surface
@@ -27,15 +27,16 @@ SETS = {"stills, same search": "condition_web", "other cameras": "other_cameras/
 Hits = NDArray[np.bool_]
 
 
-def main() -> None:
-    given = _options()
-    test = of_split(read_manifest(given.data), "test")
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the table; one line and exit code 1 where a set has no pictures in the folder."""
+    given = _options(arguments)
+    test = _test_pictures(given.data)
     networks = [SurfaceClassifier(path) for path in given.networks]
     numbers = " | ".join(str(i + 1) for i in range(len(networks)))
     print(f"| set | score | pictures | {numbers} | mean [95 %] |")
     print("|---" * (4 + len(networks)) + "|")
-    for name, source in SETS.items():
-        for line in rows(name, [p for p in test if p.source.startswith(source)], networks):
+    for name, pictures in test.items():
+        for line in rows(name, pictures, networks):
             print(line)
 
 
@@ -84,7 +85,23 @@ def _right(network: SurfaceClassifier, patches: PatchSet) -> Hits:
     return true == found
 
 
-def _options() -> argparse.Namespace:
+def _test_pictures(folder: Path) -> dict[str, list[Picture]]:
+    """The test pictures of each set; raises SystemExit where the folder cannot be read or lacks a set."""
+    try:
+        test = of_split(read_manifest(folder), "test")
+    except DataFolderError as error:
+        raise SystemExit(f"training_seeds: {error}") from error
+    sets = {name: [p for p in test if p.source.startswith(source)] for name, source in SETS.items()}
+    for name, pictures in sets.items():
+        if not pictures:
+            raise SystemExit(
+                f"training_seeds: {folder / MANIFEST}: no test pictures for '{name}'; "
+                f"expected rows of split test whose files lie in {SETS[name]}"
+            )
+    return sets
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.training_seeds", description=__doc__)
     parser.add_argument(
         "--data", type=Path, required=True, help="folder of road pictures with its manifest.csv"
@@ -92,7 +109,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "networks", type=Path, nargs="+", help="surface networks, one per seed of the training"
     )
-    return parser.parse_args()
+    return parser.parse_args(arguments)
 
 
 if __name__ == "__main__":

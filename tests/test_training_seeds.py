@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.training_seeds import interval, rows
-from models.training.data import Picture
+from benchmarks.training_seeds import interval, main, rows
+from models.training.data import COLUMNS, MANIFEST, Picture
 from models.training.scores import wilson_interval
 from trpac_core.vision.classes import Surface
 
@@ -59,3 +59,12 @@ def test_a_set_has_a_line_for_all_and_for_each_class_that_it_holds(tmp_path):
         ["recall dry", "1", "1.000", "1.000"],
         ["recall snow_ice", "4", "0.750", "0.750"],
     ]
+
+
+def test_a_folder_without_test_pictures_is_refused_by_name(tmp_path):
+    (tmp_path / MANIFEST).write_text(",".join(COLUMNS) + "\n", encoding="utf-8")
+    with pytest.raises(SystemExit, match=r"no test pictures for 'stills, same search'.*condition_web"):
+        main(["--data", str(tmp_path), "any.onnx"])
+    (tmp_path / MANIFEST).unlink()
+    with pytest.raises(SystemExit, match=r"manifest\.csv: not found"):
+        main(["--data", str(tmp_path), "any.onnx"])
