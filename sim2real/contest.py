@@ -143,6 +143,8 @@ class Contest:
         `sim2real.varying`.
     motion : float
         Least loss that one of these effects leaves as a constant beside a free term over the car's motion.
+    instead : float
+        Least loss that such a term leaves in the place of all effects.
     lone : float
         Least loss that a fault outside the library leaves by itself: a free term at one wheel alone or
         between the axles, see `sim2real.suspect`, or a slow speed sensor, see `sim2real.sluggish`.
@@ -156,6 +158,7 @@ class Contest:
     structured: tuple[Entry, ...] = ()
     varied: tuple[Varied, ...] = ()
     motion: float = float("inf")
+    instead: float = float("inf")
     lone: float = float("inf")
 
 

@@ -166,7 +166,7 @@ def find(
             contest = add_twins(contest, base, fit_to, held, jobs, progress)
     decision = decide(contest, fit_to, held)
     if decision.verdict is Verdict.UNKNOWN:
-        contest = add_varied(contest, fit_to, held, jobs, progress)
+        contest = add_varied(contest, base, fit_to, held, jobs, progress)
         decision = decide(contest, fit_to, held)
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)

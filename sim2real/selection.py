@@ -61,6 +61,8 @@ FORM = 3e-4
 """Share of what the best entry explains that no entry is held to: the library's forms are not nature's [-]."""
 MOTION_SHARE = 0.95
 """A term of a few values over the car's motion that takes this share of what a varying effect does is the cause [-]."""
+INSTEAD_SHARE = 0.8
+"""One without any effect that does this much of it, too: the effect was never needed [-]."""
 LONE_BELIEF = 0.2
 """Probability that an effect of the library is the cause though a fault outside it explains more [-]."""
 FLOOR_MISFIT = 1.5
@@ -305,7 +307,8 @@ def _structured(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Ev
 def _varying(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Evidence) -> Decision | None:
     """The verdict on an effect that is not the same everywhere; None where that does not explain the gap either.
 
-    A term over the car's motion that does as well beside a constant says that it is another effect.
+    A term over the car's motion that does as well beside a constant, or nearly so in its place, says that it is another
+    effect.
     """
     able = [v for v in contest.varied if explains(fitness(v.entry, fit_to, holdout), before)]
     if not able:
@@ -315,7 +318,10 @@ def _varying(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Evide
     winner = next(e for e in every if e.ids == best.entry.ids)
     if not _is_needed(contest, winner):
         return None
-    if winner.loss - contest.motion > MOTION_SHARE * (winner.loss - best.entry.loss):
+    gained = winner.loss - best.entry.loss
+    if winner.loss - contest.motion > MOTION_SHARE * gained:
+        return None
+    if winner.loss - contest.instead > INSTEAD_SHARE * gained:
         return None
     tempered = SOFTNESS * inflation(best.entry, fit_to, holdout) + FORM * (
         contest.null.loss - best.entry.loss

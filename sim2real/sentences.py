@@ -14,6 +14,9 @@ from sim2real.selection import Decision, loss_beyond_noise
 NEAR = 0.8
 """Share of the loss beyond noise from which on what comes nearest to an explanation is worth a sentence [-]."""
 
+SHOWN = 3
+"""How many effects a sentence lists; the report and the JSON have all."""
+
 
 def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     """The verdict itself."""
@@ -27,10 +30,23 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     if decision.verdict is Verdict.COMPOUND:
         return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
     if decision.verdict is Verdict.AMBIGUOUS:
-        others = ", ".join(e.name.replace("+", " with ") for e in decision.rivals)
-        return f"The gap of {size} is {top.effect} or as well {others}: these logs cannot tell them apart."
+        return f"The gap of {size} is {top.effect}{_rivals(decision)}: these logs cannot tell which."
     values = ", ".join(f"{name} {_number(v.value, v.unit)}" for name, v in top.parameters.items())
     return f"The gap of {size} is {top.effect} ({values}): {cut}."
+
+
+def _rivals(decision: Decision) -> str:
+    """What else it may be, and what may stand beside it."""
+    key = decision.winner.name
+    others = [e.name.replace("+", " with ") for e in decision.rivals if key not in e.ids]
+    partners = [k for e in decision.rivals if key in e.ids for k in e.name.split("+") if k != key]
+    beside = f", perhaps not alone (with {_some(partners)})" if partners else ""
+    return (f" or as well {_some(others)}" if others else "") + beside
+
+
+def _some(names: Sequence[str]) -> str:
+    more = len(names) - SHOWN
+    return " or ".join([*names[:SHOWN], *([f"one of {more} more"] if more > 0 else [])])
 
 
 def nearest(decision: Decision, contest: Contest) -> str:

@@ -21,10 +21,11 @@ from sim2real.drive import Drive
 from sim2real.equations import OF_THE_MOTION
 from sim2real.evidence import Evidence, all_logs, rest_of
 from sim2real.fitting import loss, robust_weight
-from sim2real.observer import Towards
+from sim2real.noise import Noise
+from sim2real.observer import Simulation, Towards
 from sim2real.probing import sets_apart, windows
 from sim2real.selection import explains, fitness, loss_beyond_noise, two_are_needed
-from sim2real.unknown import fit_terms
+from sim2real.unknown import Term, fit_terms, with_refined
 
 Array = NDArray[np.float64]
 
@@ -46,9 +47,14 @@ OVER = ("time", "position")
 
 
 def add_varied(
-    contest: Contest, fit_to: Evidence, holdout: Evidence, jobs: int = 1, progress: Progress = silent
+    contest: Contest,
+    model: Simulation,
+    fit_to: Evidence,
+    holdout: Evidence,
+    jobs: int = 1,
+    progress: Progress = silent,
 ) -> Contest:
-    """The contest with its best effects free to vary, and what they leave beside a term over the motion.
+    """The contest with its best effects free to vary, and what terms over the motion leave beside or without them.
 
     Single effects first, then the best beside another tyre's curve, then the best pair, or that before all where it
     leaves half of what one leaves: the first that explain the gap. As it is where none does.
@@ -65,11 +71,18 @@ def add_varied(
         work = [partial(vary, e, fit_to, holdout, over) for e in tried for over in OVER]
         found = run_all(work, jobs, progress, "varying effects")
         if any(explains(fitness(v.entry, fit_to, holdout), before) for v in found):
-            models = [e.fitted.candidate.model(e.fitted.x) for e in tried]
-            terms = [fit_terms(model, drives, noises, jobs, quantities=OF_THE_MOTION)[0] for model in models]
-            motion = min(term.loss for term in terms)
-            return replace(contest, varied=tuple(sorted(found, key=lambda v: v.cost)), motion=motion)
+            constant = [e.fitted.candidate.model(e.fitted.x) for e in tried]
+            motion = min(_over_motion(each, drives, noises, jobs)[0].loss for each in constant)
+            alone = with_refined(model, drives, noises, _over_motion(model, drives, noises, jobs), jobs)
+            varied = tuple(sorted(found, key=lambda v: v.cost))
+            return replace(contest, varied=varied, motion=motion, instead=min(t.loss for t in alone))
     return contest
+
+
+def _over_motion(
+    model: Simulation, drives: Sequence[Drive], noises: Sequence[Noise], jobs: int
+) -> list[Term]:
+    return fit_terms(model, drives, noises, jobs, quantities=OF_THE_MOTION)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from sim2real.hum import hum
 from sim2real.law import held_to_curves
 from sim2real.result import Verdict
 from sim2real.selection import EXPLAINED_MISFIT, Decision, Fitness, fitness
+from sim2real.sentences import verdict as verdict_of
 
 DURATION_S = 16.0
 
@@ -184,3 +185,30 @@ def test_only_one_effect_is_held_to_curves(mistaken, verdict):
     decision = replace(mistaken.decision, verdict=verdict)
     said = held_to_curves(decision, mistaken.contest, mistaken.model, mistaken.fit_to, mistaken.holdout)
     assert said is decision
+
+
+# --- what an ambiguous verdict says
+
+
+@pytest.mark.parametrize(
+    ("rivals", "said"),
+    [
+        ([("mass_offset",)], "torque_gain or as well mass_offset: these"),
+        ([("torque_gain", "aero_drag")], "torque_gain, perhaps not alone (with aero_drag): these"),
+        (
+            [("mass_offset", "road_grade"), *(("torque_gain", key) for key in "abcde")],
+            "torque_gain or as well mass_offset with road_grade, perhaps not alone (with a or b or c or one of 2 more)",
+        ),
+    ],
+)
+def test_a_sentence_lists_a_few_rivals_and_counts_the_others(mistaken, monkeypatch, rivals, said):
+    for key in "abcde":
+        monkeypatch.setitem(EFFECTS, key, EFFECTS["aero_drag"])
+    null = mistaken.contest.null
+    decision = replace(
+        mistaken.decision,
+        verdict=Verdict.AMBIGUOUS,
+        rivals=tuple(replace(null, ids=ids) for ids in rivals),
+    )
+    found = describe(mistaken, seed=0, jobs=1, progress=silent)
+    assert said in verdict_of(decision, found.gap, found.causes)

@@ -1,5 +1,7 @@
 """Effects that are not the same everywhere: told by what a constant leaves, and not mistaken for other effects."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_drives import MODEL, STEP_S, clean, noisy, pulses, remeasured, trace
@@ -17,7 +19,7 @@ from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.observer import Towards
 from sim2real.probing import FORGOTTEN_S, sets_apart, windows
 from sim2real.result import Verdict
-from sim2real.selection import fitness
+from sim2real.selection import decide, fitness
 from sim2real.varying import vary
 
 DURATION_S = 16.0
@@ -83,6 +85,22 @@ def test_two_causes_are_named_though_one_of_them_sways():
     gain, scale = (next(c for c in said.causes if c.effect == key) for key in found.decision.winner.ids)
     assert gain.parameters["factor"].low <= 1.12 <= gain.parameters["factor"].high
     assert scale.parameters["factor"].low <= 0.97 <= scale.parameters["factor"].high
+
+
+def test_torque_that_a_dead_band_takes_is_no_gain_that_varies():
+    """Six values over the torque do in the gain's place what the gain does only as it varies."""
+    rng = np.random.default_rng(3)
+    sizes = [(t, rng.choice([-1, 1]) * rng.uniform(5.0, 200.0)) for t in range(17)]
+    command = trace(*((t + dt, size) for t, size in sizes for dt in (0.0, 0.7)), duration_s=DURATION_S)
+    real = np.sign(command) * np.maximum(np.abs(command) - 12.0, 0.0)
+    logs = [noisy(clean(real, 14.0, commanded_nm=command), seed) for seed in range(3)]
+    found = find(MODEL, logs[:2], logs[2], exclude=set(EFFECTS) - {"torque_gain"})
+    assert found.decision.verdict is Verdict.UNKNOWN
+    free = replace(found.contest, motion=np.inf)  # as where a curve beside the gain does a little less
+    assert decide(free, found.fit_to, found.holdout).verdict is Verdict.UNKNOWN
+    fooled = decide(replace(free, instead=np.inf), found.fit_to, found.holdout)
+    assert fooled.varied is not None
+    assert fooled.winner.ids == ("torque_gain",)
 
 
 def test_axles_that_are_unlike_have_their_mean_and_their_difference():
