@@ -20,6 +20,13 @@ def friction_force(theta, slip, load, stiffness):
     return stiffness * slip / (1.0 - slip) * f * g
 
 
+def shrunk(theta, slip, load, stiffness, step=1e-6):
+    """Share of its length that a relaxation keeps which goes with the force's slope, here a difference quotient."""
+    slip = abs(slip) + step
+    ends = [friction_force(theta, slip + side * step, load, stiffness) for side in (-0.5, 0.5)]
+    return np.clip((ends[1] - ends[0]) / step / (1.27 * stiffness), 0.1, 1.0)
+
+
 OPTIONS = {
     "h": 0.0,  # height that acceleration moves load through
     "k": 0.0,  # drag per speed squared
@@ -31,6 +38,7 @@ OPTIONS = {
     "falloff_floor": 1.0,
     "relaxation": 0.0,
     "slip_lags": False,
+    "relaxation_by_slope": False,
     "shaft_stiffness": 0.0,
     "shaft_damping": 0.0,
     "motor_inertia": 0.0,
@@ -90,7 +98,13 @@ def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, 
             guess[0] = (forces.sum() - car["k"] * v * v - car["c_hub"] * loads.sum()) / car["m"]
         transport = np.maximum(np.maximum(wheels * car["radius"], v), floor)
         behind = (slip if car["slip_lags"] else steady) - lagged
-        force_rate = transport / car["relaxation"] * behind if lags else np.zeros(4)
+        lengths = np.full(4, car["relaxation"])
+        if car["relaxation_by_slope"]:
+            lengths *= [
+                shrunk(mu, s, load, car["stiffness"])
+                for mu, s, load in zip(theta, acting, loads, strict=True)
+            ]
+        force_rate = transport / lengths * behind if lags else np.zeros(4)
         torque = torque_at(t)
         twist_rate = motor_rate = np.zeros(4)
         if has_shaft:

@@ -25,7 +25,12 @@ from scenarios.effects.rolling_resistance import RollingResistance, RollingResis
 from scenarios.effects.torque_delay import TorqueDelay
 from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles, TorqueGainOfSigns
 from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages
-from scenarios.effects.tyre_relaxation import TyreRelaxation, TyreRelaxationOfSlip, TyreRelaxationWithLoad
+from scenarios.effects.tyre_relaxation import (
+    TyreRelaxation,
+    TyreRelaxationOfSlip,
+    TyreRelaxationWhileItAdheres,
+    TyreRelaxationWithLoad,
+)
 from scenarios.effects.tyre_shape import TyreShape
 from scenarios.effects.tyre_stiffness_offset import (
     TyreStiffnessOffset,
@@ -98,6 +103,7 @@ OTHER_FORMS = (
     TyreStiffnessOffsetWithLoad,
     TyreRelaxationOfSlip,
     TyreRelaxationWithLoad,
+    TyreRelaxationWhileItAdheres,
 )
 FORMS: dict[str, tuple[type[Effect], ...]] = {
     key: (effect, *(other for other in OTHER_FORMS if other.id == key)) for key, effect in EFFECTS.items()

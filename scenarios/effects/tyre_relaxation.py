@@ -61,3 +61,16 @@ class TyreRelaxationWithLoad(TyreRelaxationOfSlip):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The lagging slip is later on the wheels that bear more."""
         return super().dynamics(parameters)._replace(relaxation_by_load=1.0)
+
+
+@dataclass(frozen=True)
+class TyreRelaxationWhileItAdheres(TyreRelaxationOfSlip):
+    """Only what adheres has to be deformed: the nearer the tyre is to sliding, the sooner its force follows."""
+
+    form = "shorter as the tyre slides"
+    equation = "s' = V / max(length F'(s) / F'(0), 0.1 length) (slip - s), F_x = F(s), F the steady force"
+    source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 7, relaxation length of a tyre at finite slip"
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The lag shrinks with the slope of the force at the lagging slip."""
+        return super().dynamics(parameters)._replace(relaxation_by_slope=1.0)

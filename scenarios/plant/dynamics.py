@@ -80,7 +80,10 @@ RELEASE_SPEED_M_S = 1.0
 """At rest a lagging force that still brakes is released as at this speed: the car would rock back on it [m/s]."""
 
 LEAST_RELAXATION = 0.1
-"""Share of its length that is left of a tyre's relaxation where the load leaves it [-]."""
+"""Share of its length that is left of a tyre's relaxation where the load leaves it, or where it slides [-]."""
+
+INITIAL_SLOPE = 1.27
+"""Slope of the force by slip without any, in units of C_x: the tyre's shape there [-]."""
 
 KNEE_AT, CREST_AT, SLIDING_FROM = 0.6, 2.4, 5.0
 """Stretches, in units of the grip, at which a tyre's deviations are greatest; the last one's half is there [-]."""
@@ -126,7 +129,7 @@ def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> 
     ----------
     .. [1] Bian et al. (2014), SAE 2014-01-0123; coefficients as in docs/plant.md.
     """
-    shape = (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + 1.27
+    shape = (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + INITIAL_SLOPE
     shape_by_slip = 2.0 * (1.15 - 0.75 * theta) * slip - (1.63 - 0.75 * theta)
     grip_n = theta * load_n
     if grip_n * (1.0 - slip) >= 2.0 * stiffness_n * slip:  # L >= 1: the whole contact patch adheres
@@ -267,7 +270,9 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             slope = max(by_slip, 0.0)
             if p.relaxation_m > 0.0:
                 rest = speed <= 0.0 and y[FORCE + i] < 0.0
-                length_m = p.relaxation_m * max(1.0 + p.relaxation_by_load * more, LEAST_RELAXATION)
+                gone = p.relaxation_by_slope * max(1.0 - slope / (INITIAL_SLOPE * stiffness_n), 0.0)
+                share = max((1.0 + p.relaxation_by_load * more) * (1.0 - gone), LEAST_RELAXATION)
+                length_m = p.relaxation_m * share
                 wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / length_m
                 wheels.work[_PER_STATE, i] = 1.0
             if slip_lags:

@@ -52,6 +52,8 @@ class DynamicsParameters(NamedTuple):
     """Way over which the tyre force follows its steady value; 0: at once [m]."""
     relaxation_by_load: float = 0.0
     """By which that way grows with a wheel's load, in shares of it over the mean static load: 1 in proportion [-]."""
+    relaxation_by_slope: float = 0.0
+    """Share of that way that shrinks as the force's slope by slip does; 1: all of it [-]."""
     slip_lags: float = 0.0
     """1: over that way it is the slip that follows, and the force is the steady one of the lagging slip [-]."""
     shaft_stiffness_nm_rad: float = 1e4
