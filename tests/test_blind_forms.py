@@ -32,15 +32,16 @@ from benchmarks.blind.generator.forms import (
 from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, W, integrate
 from benchmarks.blind.generator.library import LIBRARY
 from benchmarks.blind.generator.outside import EVEN_FURTHER, FURTHER, STILL_FURTHER, YET_FURTHER
+from benchmarks.blind.generator.outside_seventh import BEYOND
 from benchmarks.blind.generator.outside_sixth import LAST_FURTHER
 from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
 from benchmarks.blind.generator.table import Group, table
 from benchmarks.blind.generator.tyre import dugoff
 from benchmarks.blind.generator.world import World, nominal
 
-FIRST, SECOND, THIRD, FOURTH, FIFTH, SIXTH = Family
-DRAWN = [SECOND, THIRD, FOURTH, FIFTH, SIXTH]
-CASES = {spec.name: spec for spec in table("full", SIXTH)}
+FIRST, SECOND, THIRD, FOURTH, FIFTH, SIXTH, SEVENTH = Family
+DRAWN = [SECOND, THIRD, FOURTH, FIFTH, SIXTH, SEVENTH]
+CASES = {spec.name: spec for spec in table("full", SEVENTH)}
 
 
 def numbered(items):
@@ -214,7 +215,7 @@ def test_the_severest_effect_shows_in_every_form(chosen, limit):
     assert np.any(np.sqrt(np.mean(other**2, axis=0)) > 2.0 * QUIET.sigmas)
 
 
-@pytest.mark.parametrize("chosen", forms_of("rolling_resistance", but=("coarse_stretches",)))
+@pytest.mark.parametrize("chosen", forms_of("rolling_resistance", but=("coarse_stretches", "warming")))
 def test_resistance_is_the_coefficient_times_the_weight(chosen):
     lost = 5.0 * 0.015 * CAR.mass_kg * 9.81 / carried(CAR)
     path = roll(with_form(*chosen, coefficient=0.015), ROLL_M_S + 0.5 * lost, 5.0)
@@ -241,7 +242,9 @@ def test_loads_settle_at_the_moment_of_the_inertia(chosen):
     assert path[-1, kernel.PITCH] == pytest.approx(path[-1, N], rel=1e-2)
 
 
-@pytest.mark.parametrize("chosen", forms_of("tyre_relaxation", but=("unlike_axles", "partly_at_once")))
+@pytest.mark.parametrize(
+    "chosen", forms_of("tyre_relaxation", but=("unlike_axles", "partly_at_once", "warming"))
+)
 def test_relaxation_rings_over_the_travelled_length(chosen):
     """w' and the lagged force are a damped oscillator of 1.27 C R^2 / (I L), damping v / (2 L), in every form."""
     length, speed, heavy = 0.5, 20.0, replace(CAR, mass_kg=1e5)
@@ -253,7 +256,7 @@ def test_relaxation_rings_over_the_travelled_length(chosen):
     assert 1e-3 * np.mean(np.diff(crossings)) == pytest.approx(expected, rel=0.03)
 
 
-@pytest.mark.parametrize("curve", range(8))
+@pytest.mark.parametrize("curve", range(9))
 def test_friction_starts_with_its_slope_and_ends_at_its_floor(curve):
     assert fallen(curve, 0.0, 0.4) == pytest.approx(1.0)
     assert (fallen(curve, 1e-6, 0.4) - 1.0) / 1e-6 == pytest.approx(-0.6, rel=1e-4)
@@ -283,7 +286,7 @@ def test_torque_comes_late_by_the_delay(chosen):
 
 
 @pytest.mark.parametrize(
-    "chosen", forms_of("wheel_speed_delay", "vehicle_speed_delay", but=("older_when_slow",))
+    "chosen", forms_of("wheel_speed_delay", "vehicle_speed_delay", but=("older_when_slow", "queue"))
 )
 @pytest.mark.parametrize("delay", [0.004, 0.05])
 def test_sensors_are_late_by_the_delay_on_average(chosen, delay):
@@ -347,7 +350,7 @@ def test_noise_of_every_kind_has_its_size(noisy):
         form
         for name, form in DIGITS.items()
         if name not in ("repeating", "losing_runs", "overrunning", "slow_receiver", "in_ticks")
-        and name not in ("losing_frames", "slow_accelerometer")
+        and name not in ("losing_frames", "slow_accelerometer", "in_turns", "waking")
     ),
 )
 def test_digits_take_no_more_than_the_noise(digits):
@@ -378,12 +381,12 @@ def test_every_driver_stays_within_the_car_and_excites_what_he_should(style, ric
 
 
 def by_further(name: str, **given: float) -> World:
-    return OUTSIDES[SIXTH][name].apply(nominal(CAR, Road()), given)
+    return OUTSIDES[SEVENTH][name].apply(nominal(CAR, Road()), given)
 
 
 SHOWN_IN_DRIVING = tuple(
     n
-    for n in {**FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER, **LAST_FURTHER}
+    for n in {**FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER, **LAST_FURTHER, **BEYOND}
     if n not in ("slip_controller", "regeneration_fades")
 )
 """Those two act where a driven wheel slips and in slow braking, as in tests of their own and not on this drive."""
@@ -392,7 +395,7 @@ SHOWN_IN_DRIVING = tuple(
 @pytest.mark.parametrize("name", numbered(SHOWN_IN_DRIVING))
 def test_further_deviations_show(name, limit):
     world, drove = limit
-    entry = OUTSIDES[SIXTH][name]
+    entry = OUTSIDES[SEVENTH][name]
     other = readings(entry.apply(world, entry.at(CAR, np.random.default_rng(0))(1.0)), drove)
     assert np.any(np.sqrt(np.mean((other - readings(world, drove)) ** 2, axis=0)) > 2.0 * QUIET.sigmas)
 

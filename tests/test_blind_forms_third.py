@@ -59,7 +59,7 @@ def test_grade_pulls_by_its_mean(chosen):
     assert 22.0**2 - path[end, V] ** 2 == pytest.approx(2.0 * pull * path[end, X], rel=5e-3)
 
 
-@pytest.mark.parametrize("chosen", forms_of("wheel_radius_offset"))
+@pytest.mark.parametrize("chosen", forms_of("wheel_radius_offset", but=("warming",)))
 def test_radius_is_that_of_free_rolling(chosen):
     world = with_form(*chosen, radius_m=0.30)
     free = roll(world, 20.0, 1.0)[-1]

@@ -150,16 +150,13 @@ def test_further_forms_are_told_apart():
 
 def test_forms_of_effects_that_had_one_are_further_than_both_families():
     effect, forms = next((e, f) for e, f in EFFECT_FORMS.items() if e not in ASPECTS[Family.SECOND])
-    of_third, of_fourth, of_fifth = (len(ASPECTS[family][effect]) for family in list(Family)[2:5])
+    sizes = [len(ASPECTS[family].get(effect, [None])) for family in Family]
     cases = [result("rich", {effect: {}}, RIGHT) for _ in forms]
     for case, form in zip(cases, forms, strict=True):
         case["seal"]["forms"] = {effect: form}
     assert [outcome_of(case).further for case in cases] == [
-        frozenset(),
-        *[frozenset({FIRST, Family.SECOND})] * (of_third - 1),
-        *[frozenset({FIRST, Family.SECOND, Family.THIRD})] * (of_fourth - of_third),
-        *[frozenset(list(Family)[:-2])] * (of_fifth - of_fourth),
-        *[frozenset(list(Family)[:-1])] * (len(forms) - of_fifth),
+        frozenset(lacking for lacking, n in zip(Family, sizes, strict=True) if n <= i)
+        for i in range(len(forms))
     ]
 
 

@@ -230,7 +230,7 @@ def _asides(
         aside(f"rich, gap {low:g} to {high:g}: right first", inside, lambda o: o.right_within(1))
     aside("rich, the simulation's tyre: right first", of[Group.RICH], lambda o: o.right_within(1))
     aside("rich, another tyre: right first", of[Group.TYRE], lambda o: o.right_within(1))
-    for family in (Family.FIRST, Family.SECOND, Family.THIRD, Family.FOURTH, Family.FIFTH):
+    for family in list(Family)[:-1]:
         aside(
             f"rich, a form that the {family} family lacks: right first",
             [o for o in rich if family in o.further],

@@ -40,6 +40,12 @@ SLIPPERY = 0.75
 """Friction below which a road is wet or worse [-]."""
 TEXTURE_M = 66.0
 """From one stretch of coarse asphalt to the next [m]."""
+GRAVEL_M, GRAVEL_SHARE = 95.0, 0.2
+"""From one stretch of loose gravel to the next [m], and the share of the road that has it."""
+WAKE_S, WEAVE_S = 10.0, 6.0
+"""From one car ahead to the next; in which a car goes from side to side of its lane and back."""
+MAP_NM = 100.0
+"""Over which a torque map's error goes up and down between its points [N m]."""
 GRAIN_M = 78.0
 """The same as an optical sensor sees it [m]."""
 SHUT_M_S = 3.0
@@ -61,6 +67,12 @@ def in_share(p: Physics, tilt: float, wheel: int) -> float:
     """What one wheel has more than the mean by weight at rest [-]."""
     half = 0.5 * (p.front_arm + p.rear_arm)
     return tilt * p.front_arm / half if wheel < 2 else -tilt * p.rear_arm / half
+
+
+@njit(cache=True)
+def in_wake(share: float, time: float) -> float:
+    """Of a drag that is less behind others, and more on a free road [-]."""
+    return 1.0 - share * np.tanh(4.0 * np.sin(2.0 * np.pi * time / WAKE_S))
 
 
 @njit(cache=True)
@@ -89,6 +101,19 @@ def stiffened(p: Physics, time: float, speed: float) -> float:
 
 
 @njit(cache=True)
+def coarse(at: float) -> float:
+    """1 on stretches of coarse asphalt and -1 between them [-]."""
+    return np.tanh(4.0 * np.sin(2.0 * np.pi * at / TEXTURE_M))
+
+
+@njit(cache=True)
+def gravelly(at: float) -> float:
+    """1 where loose gravel lies and 0 elsewhere, with short ends [-]."""
+    off = abs(at / GRAVEL_M - np.floor(at / GRAVEL_M) - 0.5) * GRAVEL_M
+    return 0.5 - 0.5 * np.tanh(off - 0.5 * GRAVEL_SHARE * GRAVEL_M)
+
+
+@njit(cache=True)
 def released(share: float, turning: float) -> float:
     """Of pads that a fast disc knocks back [-]."""
     return 1.0 - share * (min(turning / USUAL_RAD_S, 2.0) - 1.0)
@@ -96,12 +121,14 @@ def released(share: float, turning: float) -> float:
 
 @njit(cache=True)
 def lag_of(p: Physics, wheel: int, turning: float, told: float, given: float) -> float:
-    """Of a lag that is another at each wheel, at each speed, or where torque is built up and let go [-]."""
+    """Of a lag that is another at each wheel, speed or torque, or where torque is built up and let go [-]."""
     lag = (1.0 + spread(p.lag_tilt, p.lag_side, wheel)) * (
         1.0 + p.lag_speed * (min(turning / USUAL_RAD_S, 2.0) - 1.0)
     )
     if p.lag_rise != 0.0:
         lag *= 1.0 + p.lag_rise * np.tanh((abs(told) - abs(given)) / SMALL_TORQUE_NM)
+    if p.lag_load != 0.0:
+        lag *= 1.0 + p.lag_load * (min(abs(told) / USUAL_NM, 2.0) - 1.0)
     return lag
 
 
@@ -146,7 +173,7 @@ def told_friction(p: Physics, wheel: int, position: float) -> float:
 
 
 @njit(cache=True, inline="always")
-def friction(p: Physics, wheel: int, position: float, speed: float) -> float:
+def friction(p: Physics, wheel: int, position: float, speed: float, time: float = 0.0) -> float:
     """The road's friction under a wheel, as the real road has it [-]."""
     at = position + (p.front_arm if wheel < 2 else -p.rear_arm)
     k = p.border.size - 1
@@ -164,6 +191,10 @@ def friction(p: Physics, wheel: int, position: float, speed: float) -> float:
         factor = 1.0 + (factor - 1.0) * (1.0 + in_share(p, p.grip_tilt, wheel))
     if p.grip_speed != 0.0:
         factor = 1.0 + (factor - 1.0) * (1.0 + p.grip_speed * (min(speed / USUAL_M_S, 2.0) - 1.0))
+    if p.grip_warm != 0.0:
+        factor = 1.0 + (factor - 1.0) * (1.0 + p.grip_warm * warmth(time))
+    if p.grip_sway != 0.0:
+        factor = 1.0 + (factor - 1.0) * (1.0 + p.grip_sway * np.sin(2.0 * np.pi * time / WEAVE_S))
     if p.wet_fall > 0.0 and mu < SLIPPERY:
         factor *= max(1.0 - p.wet_fall * (speed / USUAL_M_S - 1.0), 0.4)
     return mu * factor

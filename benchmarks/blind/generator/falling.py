@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER, LOGARITHMIC, ARCTANGENT, TWO_RATES = range(8)
+EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER, LOGARITHMIC, ARCTANGENT, TWO_RATES, ROOTED = range(9)
 """Their codes."""
 
 
@@ -29,4 +29,6 @@ def fallen(curve: int, sliding: float, floor: float) -> float:
         return 1.0 - (1.0 - floor) * 2.0 / np.pi * np.arctan(0.5 * np.pi * sliding)
     if curve == TWO_RATES:
         return floor + (1.0 - floor) * 0.5 * (np.exp(-1.7 * sliding) + np.exp(-0.3 * sliding))
+    if curve == ROOTED:
+        return floor + (1.0 - floor) / (sliding + np.sqrt(1.0 + sliding * sliding))
     return floor + (1.0 - floor) * np.exp(-sliding)

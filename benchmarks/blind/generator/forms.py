@@ -14,10 +14,11 @@ from typing import Any
 
 from numpy.random import Generator
 
-from . import forms_fifth, forms_fourth, forms_second, forms_sixth, forms_third
+from . import forms_fifth, forms_fourth, forms_second, forms_seventh, forms_sixth, forms_third
 from .forms_second import Foreign
 from .library import LIBRARY
 from .outside import EVEN_FURTHER, FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
+from .outside_seventh import BEYOND
 from .outside_sixth import LAST_FURTHER
 from .world import Effect
 
@@ -40,6 +41,8 @@ class Family(StrEnum):
     """Again more of everything, and more pairs."""
     SIXTH = "sixth"
     """The same once more."""
+    SEVENTH = "seventh"
+    """And again, of nearly everything."""
 
 
 def _joined(aspects: Aspects, more: Aspects) -> Aspects:
@@ -51,6 +54,7 @@ THIRD: Aspects = _joined(forms_second.ASPECTS, forms_third.MORE)
 FOURTH: Aspects = _joined(THIRD, forms_fourth.MORE)
 FIFTH: Aspects = _joined(FOURTH, forms_fifth.MORE)
 SIXTH: Aspects = _joined(FIFTH, forms_sixth.MORE)
+SEVENTH: Aspects = _joined(SIXTH, forms_seventh.MORE)
 ASPECTS: dict[Family, Aspects] = {
     Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
     Family.SECOND: forms_second.ASPECTS,
@@ -58,11 +62,12 @@ ASPECTS: dict[Family, Aspects] = {
     Family.FOURTH: FOURTH,
     Family.FIFTH: FIFTH,
     Family.SIXTH: SIXTH,
+    Family.SEVENTH: SEVENTH,
 }
 """All that has forms in each family; what a family does not list has the library's form."""
-EFFECT_FORMS: Aspects = {name: forms for name, forms in SIXTH.items() if name in LIBRARY}
-FOREIGN: dict[str, Foreign] = SIXTH["foreign_tyre"]
-NOISES, DIGITS, STYLES = SIXTH["noise"], SIXTH["digits"], SIXTH["driver"]
+EFFECT_FORMS: Aspects = {name: forms for name, forms in SEVENTH.items() if name in LIBRARY}
+FOREIGN: dict[str, Foreign] = SEVENTH["foreign_tyre"]
+NOISES, DIGITS, STYLES = SEVENTH["noise"], SEVENTH["digits"], SEVENTH["driver"]
 
 RATES_HZ: dict[Family, dict[float, float]] = {
     Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
@@ -106,6 +111,16 @@ RATES_HZ: dict[Family, dict[float, float]] = {
         700.0: 0.1,
         1000.0: 0.1,
     },
+    Family.SEVENTH: {
+        100.0: 0.15,
+        150.0: 0.1,
+        200.0: 0.2,
+        250.0: 0.15,
+        500.0: 0.1,
+        600.0: 0.1,
+        850.0: 0.1,
+        1000.0: 0.1,
+    },
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
@@ -123,6 +138,15 @@ OUTSIDES: dict[Family, dict[str, Effect]] = {
         **EVEN_FURTHER,
         **LAST_FURTHER,
     },
+    Family.SEVENTH: {
+        **OUTSIDE,
+        **FURTHER,
+        **STILL_FURTHER,
+        **YET_FURTHER,
+        **EVEN_FURTHER,
+        **LAST_FURTHER,
+        **BEYOND,
+    },
 }
 """Each family's deviations outside the library."""
 
@@ -137,7 +161,7 @@ def draw_forms(family: Family, rng: Generator) -> Forms:
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDES[Family.SIXTH]}[name]
+    effect = {**LIBRARY, **OUTSIDES[Family.SEVENTH]}[name]
     return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
 
 

@@ -23,9 +23,12 @@ from .details import (
     SMALL_M_S2,
     SMALL_TORQUE_NM,
     USUAL_M_S,
+    coarse,
     crossed,
     drag_of,
     friction,
+    gravelly,
+    in_wake,
     lag_of,
     let_through,
     profile_at,
@@ -36,6 +39,7 @@ from .details import (
     spread,
     stiffened,
     told_friction,
+    warmth,
 )
 from .falling import fallen
 from .motors import motor_torque
@@ -141,6 +145,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.springs_tilt != 0.0:
             share += p.springs_tilt * np.tanh(y[PITCH] / SMALL_M_S2)
         shifted += share * (y[BODY] - y[PITCH])
+        if p.springs_rub > 0.0:
+            shifted = y[BODY] + min(max(y[PITCH] - y[BODY], -p.springs_rub), p.springs_rub)
     total = 0.0
     for w in range(4):
         arm = p.rear_arm if w < 2 else p.front_arm
@@ -148,11 +154,13 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         tilt = 0.5 * p.drag * p.drag_height / length
         air = speed * speed * (0.25 * p.lift + (tilt if w < 2 else -tilt))
         load = max((press * arm + pitch * p.mass * p.cog_height) / (2.0 * length) - air, 0.0)
-        theta = friction(p, w, y[X], speed)
+        theta = friction(p, w, y[X], speed, time)
         radius = p.radius
         unlike = p.radius_tilt != 0.0 or p.radius_side != 0.0 or p.radius_sides != 0.0
         if unlike or p.radius_growth != 0.0 or p.out_of_round > 0.0:
             radius = radius_at(p, w, speed, y[ANGLE + w])
+        if p.radius_warm != 0.0:
+            radius += p.radius_warm * warmth(time)
         rim = y[W + w] * radius
         slip = slips = slip_of(rim, speed)
         dy[SLIP + w] = 0.0
@@ -160,6 +168,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             path = relaxing(p, y[SLIP + w], theta, load)
             if p.relaxation_speed != 0.0:
                 path *= 1.0 + p.relaxation_speed * (speed / USUAL_M_S - 1.0)
+            if p.relaxation_warm != 0.0:
+                path *= 1.0 + p.relaxation_warm * warmth(time)
             if p.relaxation_tilt != 0.0:
                 path *= 1.0 + spread(p.relaxation_tilt, 0.0, w)
             dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / path
@@ -174,6 +184,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         stiffer = spread(p.stiffness_tilt, p.stiffness_side, w)
         if p.stiffness_warm != 0.0 or p.stiffness_speed != 0.0:
             stiffer += stiffened(p, time, speed)
+        if p.stiffness_texture != 0.0:
+            stiffer += p.stiffness_texture * coarse(y[X] + (p.front_arm if w < 2 else -p.rear_arm))
         force = tyre_force(p, slip, rubbing, theta, load, y[HEAT + w], stiffer)
         if p.force_relaxation > 0.0:
             dy[SLIP + w] = (force - y[SLIP + w]) * max(abs(speed), FLOOR_M_S) / p.force_relaxation
@@ -186,13 +198,20 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             resisting *= 1.0 + p.brake_pulse * np.cos(y[ANGLE + w] + 1.7 * w)
         if p.brake_release > 0.0:
             resisting *= released(p.brake_release, y[W + w])
+        if p.brake_warm != 0.0:
+            resisting *= 1.0 + p.brake_warm * warmth(time)
         rolling = p.roll_moment * load * p.radius
         if p.roll_growth > 0.0:
             rolling *= 1.0 + p.roll_growth * ((speed / ROLL_M_S) ** 2 - 1.0)
         differs = p.roll_linear > 0.0 or p.roll_tilt != 0.0 or p.roll_side != 0.0 or p.roll_load != 0.0
         if differs or p.roll_wet > 0.0 or p.roll_texture > 0.0:
             rolling *= rolling_of(p, w, y[X], speed, load / (0.25 * p.mass * GRAVITY))
+        if p.roll_warm != 0.0:
+            rolling *= 1.0 + p.roll_warm * warmth(time)
         resisting += rolling
+        if p.gravel > 0.0:
+            at = y[X] + (p.front_arm if w < 2 else -p.rear_arm)
+            resisting += p.gravel * load * p.radius * gravelly(at)
         if p.slush > 0.0 and told_friction(p, w, y[X]) < SLIPPERY:
             resisting += 0.25 * p.slush * speed * speed * radius
         if resisting > 0.0:
@@ -209,7 +228,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         lag = p.lag
         if p.lag_sign != 0.0:
             lag *= 1.0 + p.lag_sign * np.tanh((told + y[LAG + w]) / SMALL_TORQUE_NM)
-        if p.lag_tilt != 0.0 or p.lag_speed != 0.0 or p.lag_side != 0.0 or p.lag_rise != 0.0:
+        unlike = p.lag_tilt != 0.0 or p.lag_speed != 0.0 or p.lag_side != 0.0
+        if unlike or p.lag_rise != 0.0 or p.lag_load != 0.0:
             lag *= lag_of(p, w, y[W + w], told, y[LAG + w])
         if p.actuator_play > 0.0:
             told -= min(max(told - y[LAG + w], -p.actuator_play), p.actuator_play)
@@ -221,9 +241,15 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.slew > 0.0:
             dy[LAG + w] = min(max(dy[LAG + w], -p.slew), p.slew)
         torque = y[LAG + w] if follows else told
+        if p.lag_direct > 0.0 and follows:
+            torque += p.lag_direct * (told - torque)
+        if p.axle_viscous > 0.0:
+            torque += p.axle_viscous * (y[W + (w + 2) % 4] - y[W + w])
         if p.slip_cut > 0.0:
             torque = let_through(p, torque, slips)
         inertia = p.inertia - p.motor_inertia + spread(-p.inertia_tilt, p.inertia_side, w)
+        if p.inertia_sides != 0.0:
+            inertia += p.inertia_sides if w % 2 == 0 else -p.inertia_sides
         dy[MOTOR + w] = dy[TWIST + w] = 0.0
         if p.motor_inertia > 0.0:
             dy[TWIST + w] = y[MOTOR + w] - y[W + w]
@@ -239,6 +265,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         drag *= drag_of(p.drag_fast, speed)
     if p.drag_cross > 0.0:
         drag *= crossed(p.drag_cross, speed)
+    if p.drag_wake > 0.0:
+        drag *= in_wake(p.drag_wake, time)
     total -= drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
     if p.gust_drag > 0.0:
         against = speed + on_grid(p.wind, time / COMMAND_STEP_S)

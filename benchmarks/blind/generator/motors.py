@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .commands import commanded, joined
-from .details import SMALL_TORQUE_NM, WAIT_S, gain_of, spread, stalled, wait_of, warmth
+from .details import MAP_NM, SMALL_TORQUE_NM, WAIT_S, gain_of, spread, stalled, wait_of, warmth
 from .physics import Physics
 
 Array = NDArray[np.floating[Any]]
@@ -26,6 +26,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
     heard = time - p.delay
     if p.delay_tilt != 0.0:
         heard -= spread(p.delay_tilt, 0.0, wheel)
+    if p.delay_turn != 0.0:
+        heard -= p.delay_turn * (2.0 * wheel / 3.0 - 1.0)
     if p.delay_sign != 0.0:
         heard += p.delay_sign * np.tanh(commanded(command, wheel, heard) / SMALL_TORQUE_NM)
     if p.beat > 0.0:
@@ -44,6 +46,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         torque += p.axle_share * (commanded(command, (wheel + 2) % 4, heard) - torque)
     if p.message > 0.0 and p.message_joined:
         torque = joined(command, wheel, heard, p.message)
+    if p.axle_split != 0.0:
+        torque *= 1.0 + spread(p.axle_split, 0.0, wheel)
     if p.dead_band > 0.0:
         torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
     torque = min(max(torque, -p.torque_limit), p.torque_limit)
@@ -58,6 +62,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
     gain = p.gain[wheel]
     if p.gain_warm != 0.0:
         gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_warm * warmth(time))
+    if p.gain_map != 0.0:
+        gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_map * np.sin(2.0 * np.pi * abs(torque) / MAP_NM))
     if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0 or p.gain_load != 0.0:
         return torque * gain_of(gain, p.gain_sign, p.gain_speed, p.pad_rise, p.gain_load, torque, turning)
     return torque * gain

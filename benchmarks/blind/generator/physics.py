@@ -21,6 +21,7 @@ class Physics(NamedTuple):
     springs_share: float
     springs_time: float
     springs_tilt: float
+    springs_rub: float
     pitch_sign: float
     body_rate: float
     radius: float
@@ -28,11 +29,13 @@ class Physics(NamedTuple):
     radius_growth: float
     radius_side: float
     radius_sides: float
+    radius_warm: float
     out_of_round: float
     lever: float
     inertia: float
     inertia_tilt: float
     inertia_side: float
+    inertia_sides: float
     stiffness_drive: float
     stiffness_brake: float
     stiffness_load: float
@@ -40,6 +43,7 @@ class Physics(NamedTuple):
     stiffness_side: float
     stiffness_warm: float
     stiffness_speed: float
+    stiffness_texture: float
     factor_left: float
     factor_right: float
     patch_depth: float
@@ -47,6 +51,8 @@ class Physics(NamedTuple):
     blotches: Array
     grip_tilt: float
     grip_speed: float
+    grip_warm: float
+    grip_sway: float
     wet_fall: float
     falloff: float
     falloff_floor: float
@@ -57,6 +63,7 @@ class Physics(NamedTuple):
     relaxation_shrinks: bool
     relaxation_speed: float
     relaxation_tilt: float
+    relaxation_warm: float
     relaxation_direct: float
     force_relaxation: float
     foreign_share: float
@@ -71,6 +78,7 @@ class Physics(NamedTuple):
     fanning: float
     drag_fast: float
     drag_cross: float
+    drag_wake: float
     lift: float
     gust_drag: float
     wind: Array
@@ -83,11 +91,14 @@ class Physics(NamedTuple):
     roll_tilt: float
     roll_side: float
     roll_load: float
+    roll_warm: float
+    gravel: float
     slush: float
     brake_drag: float
     brake_share: Array
     brake_pulse: float
     brake_release: float
+    brake_warm: float
     bearing: float
     grade: float
     wave_slope: float
@@ -96,6 +107,7 @@ class Physics(NamedTuple):
     delay: float
     delay_tilt: float
     delay_sign: float
+    delay_turn: float
     message: float
     message_joined: bool
     message_lost: float
@@ -110,6 +122,8 @@ class Physics(NamedTuple):
     lag_side: float
     lag_rise: float
     lag_speed: float
+    lag_load: float
+    lag_direct: float
     actuator_play: float
     slew: float
     gain: Array
@@ -117,7 +131,10 @@ class Physics(NamedTuple):
     gain_speed: float
     gain_load: float
     gain_warm: float
+    gain_map: float
     axle_share: float
+    axle_split: float
+    axle_viscous: float
     pad_rise: float
     regen_fade: float
     regen_lost: float

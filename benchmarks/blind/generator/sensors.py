@@ -13,14 +13,31 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from .details import GRAIN_M, USUAL_M_S, USUAL_RAD_S, WAIT_S, WARM_S
-from .kernel import ANGLE, COMMAND_STEP_S, RECORD_STEP_S, N, V, W, X
-from .signals import beat, hold, joined, jumping, lag, mean, mean_age, paced, sent, slow, wait
+from .kernel import ANGLE, COMMAND_STEP_S, MOTOR, RECORD_STEP_S, N, V, W, X
+from .signals import (
+    beat,
+    hold,
+    joined,
+    jumping,
+    lag,
+    limited,
+    mean,
+    mean_age,
+    paced,
+    sent,
+    slow,
+    wait,
+)
 
 Array = NDArray[np.floating[Any]]
 WHEELS = ("fl", "fr", "rl", "rr")
 SWAY_S = 9.0
 NODDING_S, MOST_NODDING = 0.1, 0.4
 """How late a body pitches, and by how much that changes a scale's deviation at most [-]."""
+MEMORY_S, MEMORY_M_S2 = 1.5, 1.0
+"""How long a sensor remembers where it was bent to, and from what acceleration on."""
+SHAKE_HZ = 12.7
+"""Of a wheel that hops on its tyre."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +65,10 @@ class Sensors:
     """By how much the rear wheels' readings are older than on average, and the front ones' younger."""
     wheel_paced_s: float = 0.0
     """Part of the delay that goes with the time of a pulse, at the usual speed."""
+    wheel_queue_s: float = 0.0
+    """By which a reading is older while a gateway's queue holds one more, and younger else."""
+    wheel_at_motor: bool = False
+    """The speeds are those of the motors' shafts."""
     wheel_hold_s: float = 0.0
     wheel_teeth: float = 0.0
     wheel_window_s: float = 0.0
@@ -63,6 +84,8 @@ class Sensors:
     """By how much a window ends sooner at most, the next one beginning there [windows]."""
     wheel_scatter: float = 0.0
     """Standard deviation of the teeth's places, each with its own error [teeth]."""
+    wheel_shakes: float = 0.0
+    """By how much the sensor moves along the teeth as the wheel hops [teeth]."""
     wheel_uneven: float = 0.0
     """How far the teeth lie off their places, over a turn [teeth]."""
     wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
@@ -72,6 +95,8 @@ class Sensors:
     """Amplitude of the reading over a turn of the wheel, each wheel with its own phase [-]."""
     speed_delay_s: float = 0.0
     speed_average_s: float = 0.0
+    speed_average_twice: bool = False
+    """The mean is of means over the same time."""
     speed_message_s: float = 0.0
     speed_joined: bool = False
     speed_beat_s: float = 0.0
@@ -97,6 +122,10 @@ class Sensors:
     """By which it differs before and after the sensor is warm, over `WARM_S` [-]."""
     speed_scale_jumps: float = 0.0
     """By which it differs from one lock to the next [-]."""
+    speed_scale_wander: float = 0.0
+    """By which it differs over `SLOW_S` [-]."""
+    speed_rate_m_s2: float = np.inf
+    """As fast as the told speed may change."""
     speed_step_m_s: float = 0.0
     """In which the speed is told, what is below a step dropped."""
     speed_rolling: float = 0.0
@@ -113,6 +142,10 @@ class Sensors:
     """By which the bias differs over `SLOW_S` [-]."""
     accel_bias_grain: float = 0.0
     """By which the bias differs on a coarse road's stretches [-]."""
+    accel_bias_memory: float = 0.0
+    """By which the bias differs after the one direction and the other [-]."""
+    accel_bend_s2_m: float = 0.0
+    """What the reading's square adds to it [1/(m/s^2)]."""
     accel_delay_s: float = 0.0
     accel_pitch: float = 0.0
     """What gravity adds to the reading as the body pitches, after `NODDING_S` [-]."""
@@ -181,6 +214,9 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     waits = np.random.default_rng([sensors.seed, 13]).uniform(-0.5, 0.5, (2, int(record[-1] / WAIT_S) + 2))
     wheel_at: Array = time_s - sensors.wheel_delay_s - beat(time_s, sensors.wheel_beat_s, wheel_phase)
     wheel_at = wheel_at + mean_age(sensors.wheel_filter_s) - wait(time_s, sensors.wheel_wait_s, waits[0])
+    if sensors.wheel_queue_s > 0.0:
+        late = sensors.wheel_queue_s * jumping(time_s, sensors.seed)
+        wheel_at = np.maximum.accumulate(wheel_at - late)
     if not sensors.wheel_joined:
         wheel_at = sent(wheel_at, sensors.wheel_message_s, wheel_phase, sensors.wheel_lost, sensors.seed)
     speed_at: Array = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
@@ -203,7 +239,7 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
         if sensors.wheel_window_s > 0.0:
             wheel = _count(record, path[:, ANGLE + w], sensors, wheel_at, rng, wheel_phase)
         else:
-            turning = lag(path[:, W + w], sensors.wheel_filter_s)
+            turning = lag(path[:, (MOTOR if sensors.wheel_at_motor else W) + w], sensors.wheel_filter_s)
             turning = hold(turning, sensors.wheel_hold_s, np.random.default_rng([sensors.seed, 17]))
             if sensors.wheel_joined:
                 turning = joined(record, turning, sensors.wheel_message_s, wheel_phase)
@@ -218,9 +254,13 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
         speed = speed + sensors.speed_rolling * (rolled - speed)
     if sensors.speed_ahead_s > 0.0:
         speed = speed + sensors.speed_ahead_s * path[:, N]
+    if np.isfinite(sensors.speed_rate_m_s2):
+        speed = limited(speed, sensors.speed_rate_m_s2)
     speed = hold(lag(speed, sensors.speed_lag_s + sensors.speed_filter_s), sensors.speed_hold_s, rng)
     if sensors.speed_joined:
         speed = joined(record, speed, sensors.speed_message_s, speed_phase)
+    if sensors.speed_average_twice:
+        speed = mean(record, speed, record, sensors.speed_average_s)
     shown_speed = mean(record, speed, speed_at, sensors.speed_average_s)
     out[:, 4] = _scale(path, sensors, time_s, shown_speed) * shown_speed + sensors.speed_offset_m_s
     if sensors.speed_step_m_s > 0.0:
@@ -236,6 +276,11 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
         bias = bias * (1.0 + sensors.accel_wander * slow(time_s, sensors.seed))
     if sensors.accel_bias_grain > 0.0:
         bias = bias * (1.0 + sensors.accel_bias_grain * _coarse(path, time_s))
+    if sensors.accel_bias_memory > 0.0:
+        bent = lag(np.tanh(path[:, N] / MEMORY_M_S2), MEMORY_S)
+        bias = bias * (1.0 + sensors.accel_bias_memory * np.interp(time_s, record, bent))
+    if sensors.accel_bend_s2_m != 0.0:
+        accel = accel + sensors.accel_bend_s2_m * accel * accel
     shown = sensors.accel_scale * np.interp(time_s - sensors.accel_delay_s, record, accel) + bias
     out[:, 5] = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
     return out
@@ -244,7 +289,8 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
 def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float | Array:
     """Of the vehicle speed, whose deviation may differ with time, speed and pitch [-]."""
     differs = (sensors.speed_sway, sensors.speed_scale_growth, sensors.speed_scale_pitch)
-    if not any((*differs, sensors.speed_scale_grain, sensors.speed_scale_warming, sensors.speed_scale_jumps)):
+    places = (sensors.speed_scale_grain, sensors.speed_scale_warming, sensors.speed_scale_jumps)
+    if not any((*differs, *places, sensors.speed_scale_wander)):
         return sensors.speed_scale
     sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
     sway = sway + sensors.speed_scale_growth * (speed / USUAL_M_S - 1.0)
@@ -258,6 +304,8 @@ def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float 
         sway = sway + sensors.speed_scale_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S))
     if sensors.speed_scale_jumps > 0.0:
         sway = sway + sensors.speed_scale_jumps * jumping(time_s, sensors.seed)
+    if sensors.speed_scale_wander > 0.0:
+        sway = sway + sensors.speed_scale_wander * slow(time_s, sensors.seed)
     return 1.0 + (sensors.speed_scale - 1.0) * sway
 
 
@@ -290,6 +338,8 @@ def _count(
         passed = turned * teeth / (2.0 * np.pi) + phase
         if sensors.wheel_uneven > 0.0:
             passed = passed + sensors.wheel_uneven * np.sin(turned + 2.0 * np.pi * phase)
+        if sensors.wheel_shakes > 0.0:
+            passed = passed + sensors.wheel_shakes * np.sin(2.0 * np.pi * (SHAKE_HZ * at + phase))
         if sensors.wheel_flanks > 0.0:
             return np.floor(0.5 * passed) + np.floor(0.5 * (passed - 1.0 - sensors.wheel_flanks)) + 1.0
         if scatter is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
@@ -96,6 +97,15 @@ def lag(signal: Array, time_constant_s: float) -> Array:
         return signal
     keep = np.exp(-RECORD_STEP_S / time_constant_s)
     return lfilter([1.0 - keep], [1.0, -keep], signal, zi=[keep * signal[0]])[0]
+
+
+@njit(cache=True)
+def limited(signal: Array, rate: float) -> Array:
+    """A record that follows by `rate` per second at most."""
+    out, most = signal.copy(), rate * RECORD_STEP_S
+    for i in range(1, out.size):
+        out[i] = out[i - 1] + min(max(signal[i] - out[i - 1], -most), most)
+    return out
 
 
 def hold(signal: Array, duration_s: float, rng: Generator) -> Array:

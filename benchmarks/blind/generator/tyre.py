@@ -14,7 +14,7 @@ THETA_GRID = np.linspace(0.02, 1.5, 75)
 MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING, CUBED, HYPERBOLIC_TANGENT = range(
     9
 )
-BLENDED, TWO_LINES, PLAIN_DUGOFF = range(9, 12)
+BLENDED, TWO_LINES, PLAIN_DUGOFF, SINE_RISE, ARCTANGENT = range(9, 14)
 """Codes of the foreign curves."""
 
 
@@ -290,6 +290,51 @@ def plain_dugoff(slip: float, slope: float, peak: float) -> float:
 
 
 @njit(cache=True)
+def sine_rise(slip: float, slope: float, peak: float, sliding: float) -> float:
+    """Force of a quarter of a sine up to the peak, and a bell's fall to `sliding` of it over five times as far [N].
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero [N].
+    peak : float
+        Largest force [N].
+    sliding : float
+        Force of a wheel that slides over the peak [-].
+    """
+    if peak <= 0.0:
+        return 0.0
+    x = slope * slip / peak
+    if x <= 0.5 * np.pi:
+        return peak * np.sin(x)
+    beyond = (x - 0.5 * np.pi) / (2.5 * np.pi)
+    return peak * (sliding + (1.0 - sliding) * np.exp(-beyond * beyond))
+
+
+@njit(cache=True)
+def arctangent(slip: float, slope: float, peak: float) -> float:
+    """Force of an arctangent whose peak is the locked wheel's [N].
+
+    Parameters
+    ----------
+    slip : float
+        Unsigned slip [-].
+    slope : float
+        Force per slip at zero, well above `peak` [N].
+    peak : float
+        Largest force [N].
+    """
+    if peak <= 0.0:
+        return 0.0
+    top = peak
+    for _ in range(8):
+        top = 0.5 * np.pi * peak / np.arctan(0.5 * np.pi * slope / top)
+    return top * 2.0 / np.pi * np.arctan(0.5 * np.pi * slope * slip / top)
+
+
+@njit(cache=True)
 def foreign(curve: int, slip: float, slope: float, peak: float, first: float, second: float) -> float:
     """Force of a foreign curve by its code [N]; `first` and `second` are its own parameters."""
     if curve == BRUSH:
@@ -314,6 +359,10 @@ def foreign(curve: int, slip: float, slope: float, peak: float, first: float, se
         return two_lines(slip, slope, peak, first)
     if curve == PLAIN_DUGOFF:
         return plain_dugoff(slip, slope, peak)
+    if curve == SINE_RISE:
+        return sine_rise(slip, slope, peak, first)
+    if curve == ARCTANGENT:
+        return arctangent(slip, slope, peak)
     return magic(slip, slope, peak, first, second)
 
 

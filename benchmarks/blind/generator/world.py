@@ -45,10 +45,12 @@ class World:
     def split(self) -> int:
         """Integration steps per record that keep the classical Runge-Kutta method well inside its stability (2.78)."""
         p = self.physics
-        lightest = p.inertia - abs(p.inertia_tilt) - abs(p.inertia_side) - p.motor_inertia
+        lightest = p.inertia - abs(p.inertia_tilt) - abs(p.inertia_side) - abs(p.inertia_sides)
+        lightest -= p.motor_inertia
         wheel = p.radius**2 / lightest + 4.0 / p.mass
         stiffness = max(p.stiffness_drive, p.stiffness_brake) + abs(p.stiffness_load) + abs(p.stiffness_tilt)
         stiffness += abs(p.stiffness_side) + abs(p.stiffness_warm) + abs(p.stiffness_speed)
+        stiffness += abs(p.stiffness_texture)
         rate = 1.27 * stiffness * wheel / FLOOR_M_S
         return max(3, int(np.ceil(rate * RECORD_STEP_S / 2.0)))
 
@@ -90,6 +92,7 @@ def nominal(car: Car, road: Road) -> World:
             springs_share=0.0,
             springs_time=1.0,
             springs_tilt=0.0,
+            springs_rub=0.0,
             pitch_sign=0.0,
             body_rate=0.0,
             radius=car.wheel_radius_m,
@@ -97,11 +100,13 @@ def nominal(car: Car, road: Road) -> World:
             radius_growth=0.0,
             radius_side=0.0,
             radius_sides=0.0,
+            radius_warm=0.0,
             out_of_round=0.0,
             lever=1.0,
             inertia=car.wheel_inertia_kg_m2,
             inertia_tilt=0.0,
             inertia_side=0.0,
+            inertia_sides=0.0,
             stiffness_drive=car.stiffness_n,
             stiffness_brake=car.stiffness_n,
             stiffness_load=0.0,
@@ -109,6 +114,7 @@ def nominal(car: Car, road: Road) -> World:
             stiffness_side=0.0,
             stiffness_warm=0.0,
             stiffness_speed=0.0,
+            stiffness_texture=0.0,
             factor_left=1.0,
             factor_right=1.0,
             patch_depth=0.0,
@@ -116,6 +122,8 @@ def nominal(car: Car, road: Road) -> World:
             blotches=np.zeros(0),
             grip_tilt=0.0,
             grip_speed=0.0,
+            grip_warm=0.0,
+            grip_sway=0.0,
             wet_fall=0.0,
             falloff=0.0,
             falloff_floor=1.0,
@@ -126,6 +134,7 @@ def nominal(car: Car, road: Road) -> World:
             relaxation_shrinks=False,
             relaxation_speed=0.0,
             relaxation_tilt=0.0,
+            relaxation_warm=0.0,
             relaxation_direct=0.0,
             force_relaxation=0.0,
             foreign_share=0.0,
@@ -140,6 +149,7 @@ def nominal(car: Car, road: Road) -> World:
             fanning=0.0,
             drag_fast=0.0,
             drag_cross=0.0,
+            drag_wake=0.0,
             lift=0.0,
             gust_drag=0.0,
             wind=np.zeros(2),
@@ -152,11 +162,14 @@ def nominal(car: Car, road: Road) -> World:
             roll_tilt=0.0,
             roll_side=0.0,
             roll_load=0.0,
+            roll_warm=0.0,
+            gravel=0.0,
             slush=0.0,
             brake_drag=0.0,
             brake_share=np.ones(4),
             brake_pulse=0.0,
             brake_release=0.0,
+            brake_warm=0.0,
             bearing=0.0,
             grade=0.0,
             wave_slope=0.0,
@@ -165,6 +178,7 @@ def nominal(car: Car, road: Road) -> World:
             delay=0.0,
             delay_tilt=0.0,
             delay_sign=0.0,
+            delay_turn=0.0,
             message=0.0,
             message_joined=False,
             message_lost=0.0,
@@ -179,6 +193,8 @@ def nominal(car: Car, road: Road) -> World:
             lag_side=0.0,
             lag_rise=0.0,
             lag_speed=0.0,
+            lag_load=0.0,
+            lag_direct=0.0,
             actuator_play=0.0,
             slew=0.0,
             gain=np.ones(4),
@@ -186,7 +202,10 @@ def nominal(car: Car, road: Road) -> World:
             gain_speed=0.0,
             gain_load=0.0,
             gain_warm=0.0,
+            gain_map=0.0,
             axle_share=0.0,
+            axle_split=0.0,
+            axle_viscous=0.0,
             pad_rise=0.0,
             regen_fade=1.0,
             regen_lost=0.0,
