@@ -174,6 +174,9 @@ def test_three_wheels_are_alike_and_the_fourth_is_a_spare():
     path = roll(world, 10.0, 1.0, 20.0)
     inertia = 20.0 / (path[-1, W : W + 4] - path[0, W : W + 4])
     assert_allclose(inertia, 1.2 + 0.8 * np.array([1.3, 1.3, 1.3, 0.1]), rtol=1e-3)
+    light = with_form("wheel_inertia_offset", "spare_wheel", inertia_kg_m2=0.6)
+    alike = with_form("wheel_inertia_offset", "all_alike", inertia_kg_m2=0.6 - 0.18)
+    assert light.split == alike.split
 
 
 def test_dampers_carry_what_their_friction_bears():

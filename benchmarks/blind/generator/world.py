@@ -11,6 +11,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .car import Car, Road
+from .details import spread
 from .falling import EXPONENTIAL
 from .kernel import FLOOR_M_S, GRAVITY, RECORD_STEP_S
 from .physics import Physics
@@ -45,8 +46,11 @@ class World:
     def split(self) -> int:
         """Integration steps per record that keep the classical Runge-Kutta method well inside its stability (2.78)."""
         p = self.physics
-        lightest = p.inertia - abs(p.inertia_tilt) - abs(p.inertia_side) - abs(p.inertia_sides)
-        lightest -= p.motor_inertia
+        lightest = p.inertia - abs(p.inertia_tilt) - abs(p.inertia_side) - p.motor_inertia
+        if p.inertia_sides != 0.0:  # which may cancel the others at the lightest wheel
+            left = np.array([1.0, -1.0, 1.0, -1.0]) * p.inertia_sides
+            more = [spread(-p.inertia_tilt, p.inertia_side, w) + left[w] for w in range(4)]
+            lightest = p.inertia + min(more) - p.motor_inertia
         wheel = p.radius**2 / lightest + 4.0 / p.mass
         stiffness = max(p.stiffness_drive, p.stiffness_brake) + abs(p.stiffness_load) + abs(p.stiffness_tilt)
         stiffness += abs(p.stiffness_side) + abs(p.stiffness_warm) + abs(p.stiffness_speed)
