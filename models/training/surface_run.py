@@ -33,7 +33,7 @@ from .train_surface import (
     verdicts_of,
 )
 
-TRUNK_STEPS, CLASS_STEPS = 1500, 3200
+TRUNK_STEPS, CLASS_STEPS = 1500, 4000
 TRUNK_SOURCES = ("condition_web", "dry_udacity", "rendered")
 """Sources of the first stage: none on which a leave-one-out score is taken, so that one trunk serves all of those."""
 
