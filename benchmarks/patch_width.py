@@ -22,6 +22,7 @@ from .table4.clips import real_sequences
 from .table4.drives import rendered_drives
 from .table4.judge import SCENARIOS, VOTING, Networks, judged
 from .table4.scores import n_w
+from .table4.sequences import Sequence
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRST_SEED = 6_000_100
@@ -35,13 +36,7 @@ def main() -> None:
     cv2.setNumThreads(1)
     networks = Networks.load(given.models)
     with Progress() as bars:
-        drawing = bars.add_task("rendered drives", total=given.drives)
-        drives, _ = rendered_drives(
-            given.out, given.drives, lambda done, _: bars.update(drawing, completed=done), FIRST_SEED
-        )
-        sequences = [replace(drive, frames=drive.frames[::EVERY]) for drive in drives]
-        real = real_sequences(given.data) if given.data else []
-        sequences += [part for part in (s.validation_part() for s in real) if part.frames]
+        sequences = development_sequences(given.out, given.drives, given.data, bars)
         task = bars.add_task("judged", total=len(sequences) * len(SCENARIOS))
         found = []
         for sequence in sequences:
@@ -49,6 +44,15 @@ def main() -> None:
                 found.append(judged(sequence, networks, scenario, given.patches))
                 bars.advance(task)
     print(table(pd.concat(found, ignore_index=True)))
+
+
+def development_sequences(out: Path, count: int, data: Path | None, bars: Progress) -> list[Sequence]:
+    """Rendered drives of seeds of their own, kept in `out`, and the validation parts of the real clips in `data`."""
+    drawing = bars.add_task("rendered drives", total=count)
+    drives, _ = rendered_drives(out, count, lambda done, _: bars.update(drawing, completed=done), FIRST_SEED)
+    rendered = [replace(drive, frames=drive.frames[::EVERY]) for drive in drives]
+    real = real_sequences(data) if data else []
+    return rendered + [part for part in (sequence.validation_part() for sequence in real) if part.frames]
 
 
 def table(verdicts: pd.DataFrame) -> str:

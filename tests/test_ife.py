@@ -388,7 +388,7 @@ def test_where_the_renderer_puts_a_change_of_surface_the_estimator_finds_it(posi
 @pytest.mark.parametrize("surface", list(Surface))
 @pytest.mark.parametrize("sky", ["overcast", "clear"])
 def test_trained_networks_on_rendered_road(surface, sky):
-    """Plainly dry, plainly wet, plainly snowy: every frame, and all but one with the flag set."""
+    """Plainly dry, plainly wet, plainly snowy: most frames carry the flag, and all that do are right."""
     files = MODELS / "segmenter.onnx", MODELS / "surface.onnx"
     if missing := [file.name for file in files if not file.is_file()]:
         pytest.skip(f"needs the trained networks: {missing} not in models/")
@@ -397,14 +397,15 @@ def test_trained_networks_on_rendered_road(surface, sky):
     look = SceneLook(seed=11, film=0.95, puddles=0.8, **light)
     renderer = Renderer(CAMERA, [SurfaceSegment(0.0, surface)], look)
     state, results = IfeState(), []
-    for position_m in (0.0, 12.0, 24.0):
+    for position_m in (0.0, 6.0, 12.0, 18.0, 24.0):
         state, result = ife.process(state, renderer.frame(position_m).image, Motion(10.0))
         results.append(result)
     verdicts = [
-        (result.surface.label, round(result.p_util, 2), round(result.P_fusion, 2)) for result in results
+        (result.surface.label, round(result.p_util, 2), round(result.near.m_0, 2)) for result in results
     ]
-    assert all(result.surface is surface for result in results), verdicts
-    assert sum(result.flag for result in results) >= 2, verdicts
+    believed = [result.surface for result in results if result.flag]
+    assert set(believed) == {surface}, verdicts
+    assert len(believed) >= 3, verdicts
 
 
 @pytest.mark.parametrize("grey", [0, 90, 255])

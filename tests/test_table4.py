@@ -123,7 +123,7 @@ def made_up(sequence, truth, found, flag=True, part="", method="IFE"):
     count = len(truth)
     rows = zip(range(count), truth, found, np.broadcast_to(flag, count), strict=True)
     return pd.DataFrame(
-        [(sequence, "s", part, n, "normal", method, t, 1.0, f, bool(up), 0.9) for n, t, f, up in rows],
+        [(sequence, "s", part, n, "normal", method, t, 1.0, f, bool(up), 0.9, 0.8) for n, t, f, up in rows],
         columns=list(COLUMNS),
     )
 
@@ -224,7 +224,7 @@ def test_kept_verdicts_are_read_as_they_were_written(tmp_path, monkeypatch, netw
     fresh = command._kept(sequence, MODELS, "w/ interference", tmp_path, lambda: networks)
     again = command._kept(sequence, MODELS, "w/ interference", tmp_path, lambda: pytest.fail("judged twice"))
     assert (fresh["found"] == judged(sequence, networks, "w/ interference")["found"]).all(), "a run repeats"
-    assert (again.drop(columns="Q_v") == fresh.drop(columns="Q_v")).all(axis=None)
+    pd.testing.assert_frame_equal(again, fresh)
     measured = Measured(
         again.assign(networks="full", consecutive=True), (), False, None, 0.0, 0.0, {"full": {"a": "b"}}
     )

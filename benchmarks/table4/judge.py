@@ -90,7 +90,7 @@ def judged(
     -------
     DataFrame
         One row per frame and method: sequence, source, part, frame, scenario, method, truth, share (of the near
-        group's corners that are of the true class), found, flag, Q_v.
+        group's corners that are of the true class), found, flag, Q_v, m_0.
     """
     kept = Kept(networks.classifier)
     base = _config(sequence, {})
@@ -112,10 +112,11 @@ def judged(
         common = (sequence.name, sequence.source, frame.part, number, scenario)
         for name, ife in estimators.items():
             states[name], result = ife.process(states[name], image, sequence.motion, masks=masks)
-            rows.append((*common, name, int(truth), share, int(result.surface), result.flag, result.Q_v))
+            verdict = (int(result.surface), result.flag, result.Q_v, result.near.m_0)
+            rows.append((*common, name, int(truth), share, *verdict))
         vote = voting.process(number, image, masks=masks)
         found = NO_ROAD if vote.surface is None else int(vote.surface)
-        rows.append((*common, VOTING, int(truth), share, found, True, np.nan))
+        rows.append((*common, VOTING, int(truth), share, found, True, np.nan, np.nan))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -137,6 +138,7 @@ COLUMNS = (
     "found",
     "flag",
     "Q_v",
+    "m_0",
 )
 
 
