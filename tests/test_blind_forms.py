@@ -181,8 +181,9 @@ def test_the_seal_tells_the_forms(family):
     assert all(seal["forms"][aspect] in forms for aspect, forms in ASPECTS[family].items())
 
 
-def test_removed_cases_have_the_forms_of_their_twins():
+def test_removed_cases_show_the_forms_and_logs_of_their_twins():
     removed = next(s for s in CASES.values() if s.group is Group.REMOVED)
+    assert removed.exclude == CASES[removed.data].effects
     shown, told = make_case(removed, 5, THIRD), make_case(CASES[removed.data], 5, THIRD)
     assert shown.forms == told.forms
     assert shown.logs["holdout"].equals(told.logs["holdout"])

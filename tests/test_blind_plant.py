@@ -292,7 +292,7 @@ class LimitDrive:
 
     def __init__(self) -> None:
         self.world = nominal(CAR, ICE)
-        self._driven = drive(CAR, self.world, True, 16.0, np.random.default_rng(2))
+        self._driven = drive(CAR, self.world, True, 9.0, np.random.default_rng(2))
         self._path = self._moved(self.world)
         self.nominal = self.readings(self.world)
 
