@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from scenarios.effects import EFFECTS
 from scenarios.effects.shifting import delayed
-from sim2real import closure
+from sim2real import closure, law
 from sim2real.closure import FLOOR_DOUBT, MOST_LEFT, closing, left_open
 from sim2real.contest import Entry, enter, silent
 from sim2real.diagnose import find
@@ -178,6 +178,19 @@ def test_an_effect_whose_law_is_a_curve_itself_stands_where_nothing_is_left_besi
     found = find(MODEL, logs[:2], logs[2], exclude=only("accelerometer_bias", "mass_offset"))
     assert found.decision.verdict is Verdict.IDENTIFIED
     assert found.decision.winner.ids == ("accelerometer_bias",)
+
+
+def test_an_effect_whose_work_no_curve_does_stands_though_more_is_found_beside_it(monkeypatch):
+    """A late torque, in a car that is loaded too: a curve beside it finds the load, none is late in its place."""
+    logs = three_logs({"torque_delay": {"delay_s": 0.08}, "mass_offset": {"mass_kg": 40.0}})
+    found = find(MODEL, logs[:2], logs[2], exclude=only("torque_delay"))
+    blamed = replace(found.decision, verdict=Verdict.IDENTIFIED, varied=None)
+    assert blamed.winner.ids == ("torque_delay",)
+    asked = []
+    tried = law.with_refined
+    monkeypatch.setattr(law, "with_refined", lambda *given: asked.append(1) or tried(*given))
+    assert held_to_curves(blamed, found.contest, found.model, found.fit_to, found.holdout) is blamed
+    assert asked, "a curve in its place was tried"
 
 
 @pytest.mark.parametrize("verdict", [Verdict.NO_GAP, Verdict.AMBIGUOUS, Verdict.UNKNOWN, Verdict.COMPOUND])
