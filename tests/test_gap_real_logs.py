@@ -1,10 +1,13 @@
 """Cases of logs that this project did not make: their files, their gap budgets, and one whole diagnosis."""
 
+import sys
+
 import pytest
 
 from scenarios.effects import EFFECTS
 from scenarios.errors import ScenarioError
 from scenarios.files import load_road
+from sim2real.cases.__main__ import main
 from sim2real.cases.case import FOLDER, budget, case_names, load_case, stages
 from sim2real.diagnose import diagnose
 from sim2real.result import Verdict
@@ -49,6 +52,20 @@ def test_holdouts_share_no_time_with_what_is_fitted_to():
 def test_an_unknown_case_is_refused_with_those_that_there_are():
     with pytest.raises(ScenarioError, match=r"'bmw' is no case\. Known: bmw_m8"):
         load_case("bmw")
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("step", ["-1", "5"])
+def test_a_step_that_a_case_has_not_is_refused_with_those_that_it_has(
+    logs, step, tmp_path, monkeypatch, capsys
+):
+    asked = ["cases", str(logs), "chrono", "--step", step, "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(sys, "argv", asked)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert f"chrono has no step {step}; it has 0 (as weighed), 1 (" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.data

@@ -30,8 +30,11 @@ def main() -> int:
             found = stages(name, asked.data)
             if asked.step is None:
                 _print(name, found)
-            else:
+            elif 0 <= asked.step < len(found):
                 _diagnose(found[asked.step], asked.out)
+            else:
+                steps = ", ".join(f"{index} ({stage.name})" for index, stage in enumerate(found))
+                parser.error(f"argument --step: {name} has no step {asked.step}; it has {steps}")
     except (ScenarioError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
