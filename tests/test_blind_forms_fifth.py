@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_blind_forms import CASES, by_further, driven, numbered, with_form
+from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
 from benchmarks.blind.generator import details, forms_fifth, kernel
 from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.cases import make_case
 from benchmarks.blind.generator.details import (
     PROFILE_STEP_M,
     SHUT_M_S,
@@ -31,48 +30,6 @@ LOCKED = 0.79 * 0.9 * 9.81
 AIRBORNE = Road((0.0,), (1e-9,))
 SHAFT = {"stiffness_nm_rad": 9000.0, "damping_nm_s_rad": 4.0, "motor_inertia_kg_m2": 0.6}
 SPLIT = {"left_factor": 0.5, "right_factor": 1.0}
-
-
-@pytest.mark.parametrize(
-    ("name", "rows", "means"),
-    [
-        (
-            "no_gap-2-calm",
-            2590,
-            [
-                12.901892,
-                10.382003,
-                76.903632,
-                76.901394,
-                76.892471,
-                76.892213,
-                23.956712,
-                0.098,
-                324.025806,
-            ],
-        ),
-        (
-            "rich-vehicle_speed_scale-1",
-            9257,
-            [
-                -3.866563,
-                21.12476,
-                39.526632,
-                39.526948,
-                39.350729,
-                39.350679,
-                11.905634,
-                -0.08092,
-                154.166778,
-            ],
-        ),
-    ],
-)
-def test_the_fourth_family_is_as_it_was(name, rows, means):
-    log = make_case(CASES[name], 1, Family.FOURTH).logs["fit_2"]
-    assert len(log) == rows
-    told = log.drop(columns=["time_s", "wheel_torque_fr_nm", "wheel_torque_rr_nm"]).mean()
-    assert_allclose(told, means, rtol=1e-5, atol=1e-5)
 
 
 def test_what_the_family_adds_is_what_the_page_says():

@@ -8,12 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from test_blind_forms import CASES, by_further, driven, numbered, reading, with_form
+from test_blind_forms import by_further, driven, numbered, reading, with_form
 from test_blind_plant import CAR, QUIET, carried, roll
 
 from benchmarks.blind.generator import details, forms_fourth, kernel
 from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.cases import make_case
 from benchmarks.blind.generator.details import ROLL_M_S, STRETCH_M, USUAL_M_S, USUAL_RAD_S
 from benchmarks.blind.generator.forms import Family, is_further
 from benchmarks.blind.generator.kernel import ANGLE, LAG, MOTOR, SWAY, TWIST, N, V, W, X
@@ -35,48 +34,6 @@ LOCKED = 0.79 * 0.9 * 9.81
 """Deceleration with locked wheels on a dry road [m/s^2]."""
 WET = Road((0.0,), (0.5,))
 SHAFT = {"stiffness_nm_rad": 9000.0, "damping_nm_s_rad": 4.0, "motor_inertia_kg_m2": 0.6}
-
-
-@pytest.mark.parametrize(
-    ("name", "rows", "means"),
-    [
-        (
-            "no_gap-2-calm",
-            2590,
-            [
-                -5.249183,
-                -1.063537,
-                71.022835,
-                71.002791,
-                71.048135,
-                71.026794,
-                22.138505,
-                -0.023851,
-                306.76425,
-            ],
-        ),
-        (
-            "rich-tyre_relaxation-1",
-            5790,
-            [
-                -35.098762,
-                -23.644594,
-                39.99656,
-                39.981308,
-                39.585286,
-                39.569101,
-                12.124704,
-                -0.347435,
-                194.515141,
-            ],
-        ),
-    ],
-)
-def test_the_third_family_is_as_it_was(name, rows, means):
-    log = make_case(CASES[name], 1, Family.THIRD).logs["fit_2"]
-    assert len(log) == rows
-    told = log.drop(columns=["time_s", "wheel_torque_fr_nm", "wheel_torque_rr_nm"]).mean()
-    assert_allclose(told, means, rtol=1e-5, atol=1e-5)
 
 
 # --- effects

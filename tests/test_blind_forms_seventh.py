@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_blind_forms import CASES, by_further, driven, numbered, with_form
+from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
 from benchmarks.blind.generator import details, forms_seventh, kernel
 from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.cases import make_case
 from benchmarks.blind.generator.details import (
     GRAVEL_M,
     GRAVEL_SHARE,
@@ -35,53 +34,6 @@ AIRBORNE = Road((0.0,), (1e-9,))
 HALF_WARM_S = WARM_S * np.log(2.0)
 """When what warms up is as on the mean."""
 NO_COMMAND = np.zeros((2, 4))
-
-
-@pytest.mark.parametrize(
-    ("name", "rows", "means"),
-    [
-        (
-            "no_gap-2-calm",
-            2590,
-            [-1.959653, 2.226641, 73.700229, 73.700253, 73.716277, 73.71402, 22.974608, 0.000483, 315.023154],
-        ),
-        (
-            "rich-torque_lag-2",
-            2800,
-            [
-                -18.879169,
-                35.099395,
-                38.069887,
-                37.954143,
-                37.535787,
-                37.583282,
-                11.643892,
-                0.009077,
-                165.236433,
-            ],
-        ),
-        (
-            "rich-tyre_relaxation-0",
-            8445,
-            [
-                35.556706,
-                43.637911,
-                48.599246,
-                48.59822,
-                49.770487,
-                49.772179,
-                16.559829,
-                0.199407,
-                234.185583,
-            ],
-        ),
-    ],
-)
-def test_the_sixth_family_is_as_it_was(name, rows, means):
-    log = make_case(CASES[name], 1, Family.SIXTH).logs["fit_2"]
-    assert len(log) == rows
-    told = log.drop(columns=["time_s", "wheel_torque_fr_nm", "wheel_torque_rr_nm"]).mean()
-    assert_allclose(told, means, rtol=1e-5, atol=1e-5)
 
 
 def test_what_the_family_adds_is_what_the_page_says():

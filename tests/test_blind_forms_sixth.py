@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_blind_forms import CASES, by_further, driven, numbered, with_form
+from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
 from benchmarks.blind.generator import details, forms_sixth, kernel
 from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.cases import make_case
 from benchmarks.blind.generator.details import (
     PROFILE_STEP_M,
     ROLL_M_S,
@@ -30,38 +29,6 @@ LOCKED = 0.79 * 0.9 * 9.81
 AIRBORNE = Road((0.0,), (1e-9,))
 SHAFT = {"stiffness_nm_rad": 9000.0, "damping_nm_s_rad": 0.0, "motor_inertia_kg_m2": 0.6}
 SPLIT = {"left_factor": 0.5, "right_factor": 1.0}
-
-
-@pytest.mark.parametrize(
-    ("name", "rows", "means"),
-    [
-        (
-            "no_gap-2-calm",
-            2590,
-            [4.700745, 1.201473, 73.33288, 73.329822, 73.319396, 73.319787, 22.852346, 0.023536, 313.361189],
-        ),
-        (
-            "rich-vehicle_speed_scale-2",
-            22725,
-            [
-                -10.898632,
-                31.691942,
-                50.009615,
-                50.009678,
-                51.619226,
-                51.619128,
-                14.922997,
-                0.117304,
-                200.79179,
-            ],
-        ),
-    ],
-)
-def test_the_fifth_family_is_as_it_was(name, rows, means):
-    log = make_case(CASES[name], 1, Family.FIFTH).logs["fit_2"]
-    assert len(log) == rows
-    told = log.drop(columns=["time_s", "wheel_torque_fr_nm", "wheel_torque_rr_nm"]).mean()
-    assert_allclose(told, means, rtol=1e-5, atol=1e-5)
 
 
 def test_what_the_family_adds_is_what_the_page_says():

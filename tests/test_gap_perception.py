@@ -52,9 +52,9 @@ def any_camera(seed, **faults):
 # no gap
 
 
-def test_no_gap_raises_no_alarm_in_a_hundred_drives():
+def test_no_gap_raises_no_alarm_in_sixty_drives():
     alarms = []
-    for seed in range(104):
+    for seed in range(60):
         finding = diagnose(
             any_camera(seed),
             seed,
@@ -69,7 +69,7 @@ def test_no_gap_raises_no_alarm_in_a_hundred_drives():
         else:
             assert finding.causes == finding.ambiguous_with == ()
             assert finding.after == finding.before
-    assert len(alarms) <= 2, alarms
+    assert len(alarms) <= 1, alarms
 
 
 def test_pictures_that_fall_alike_on_every_border_are_no_shift():
@@ -124,7 +124,7 @@ def test_at_one_speed_delay_and_angle_are_ambiguous(faults):
 
 def test_latency_is_found_with_its_delay_over_severities_and_cameras():
     inside, errors, found, shrinks = [], [], [], []
-    for seed in range(30):
+    for seed in range(20):
         delay = (0.06, 0.1, 0.15, 0.3, 0.6)[seed % 5]
         camera = any_camera(seed, delay_s=delay, fps=(20.0, 40.0)[seed % 2])
         finding = diagnose(camera, seed, speeds=SPEEDS[(0, 1, 4)[seed % 3]])
@@ -142,7 +142,7 @@ def test_latency_is_found_with_its_delay_over_severities_and_cameras():
 def test_pitch_is_found_with_its_angle():
     """The distance that stamps shift by, at a near end 2.9 m ahead of a lens 1.4 m high."""
     inside, found = [], []
-    for seed in range(24):
+    for seed in range(18):
         pitch = (-0.12, -0.07, 0.08, 0.12, 0.2, 0.25)[seed % 6]
         distance = 2.9 - 1.4 / np.tan(np.arctan(1.4 / 2.9) + pitch)
         camera = any_camera(seed, distance_m=distance, fps=40.0, share=0.5)
