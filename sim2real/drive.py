@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,6 +121,23 @@ def make_drive(
     moving = np.nan_to_num(speed, nan=np.inf) > LEAST_SPEED_M_S
     counted = np.isfinite(measured).any(axis=0) & np.array([name not in without for name in CHANNELS])
     return Drive(name, road, time_s, torque, measured, moving, counted, lattice)
+
+
+def awake(drive: Drive) -> Drive:
+    """The drive from where the car's speed is known on: by its sensor, or by a wheel where it has none.
+
+    Loggers start before their sensors do, and a model that has to guess how fast the car was is off for seconds.
+    """
+    speed = drive.measured[:, SPEED]
+    known = np.isfinite(speed if np.isfinite(speed).any() else drive.measured[:, WHEEL].T)
+    first = int(np.argmax(np.atleast_2d(known).any(axis=0)))
+    return replace(
+        drive,
+        time_s=drive.time_s[first:],
+        torque_nm=drive.torque_nm[first:],
+        measured=drive.measured[first:],
+        moving=drive.moving[first:],
+    )
 
 
 def grid_step(rate_hz: float) -> float:

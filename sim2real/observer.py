@@ -199,14 +199,29 @@ def start(columns: dict[str, Array], step_s: float, p: DynamicsParameters) -> Ar
     position_m, speed, *wheels = _at_first_row(
         np.column_stack([columns[name][:count] for name in CHANNELS[:6]])
     )
+    if not np.isfinite(position_m):
+        position_m = _before_first_fix(columns["position_m"], columns["vehicle_speed_m_s"], step_s, count)
     rims_m_s = np.array(wheels) * p.wheel_radius_m
     if not np.isfinite(speed) and np.isfinite(rims_m_s).any():  # not measured yet: as fast as the wheels roll
         speed = float(np.nanmean(rims_m_s))
-    y = dynamics.initial_y(max(np.nan_to_num(speed), 0.0), float(np.nan_to_num(position_m)), p)
+    y = dynamics.initial_y(max(np.nan_to_num(speed), 0.0), position_m, p)
     for i, value in enumerate(wheels):
         if np.isfinite(value):
             y[2 + i] = max(value, 0.0)
     return y
+
+
+def _before_first_fix(position_m: Array, speed_m_s: Array, step_s: float, count: int) -> float:
+    """Position at the first row, from the first few that are known and the way to them; 0 where none is [m]."""
+    fixes = np.flatnonzero(np.isfinite(position_m))[:count]
+    known = np.flatnonzero(np.isfinite(speed_m_s))
+    if not len(fixes):
+        return 0.0
+    way_m = np.zeros(len(position_m))
+    if len(known):
+        speed = np.interp(np.arange(len(position_m)), known, speed_m_s[known])
+        way_m[1:] = np.cumsum(0.5 * (speed[1:] + speed[:-1])) * step_s
+    return float(np.mean(position_m[fixes] - way_m[fixes]))
 
 
 def _at_first_row(values: Array) -> list[float]:

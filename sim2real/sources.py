@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scenarios.errors import ScenarioError
 from scenarios.files import WHEELS, RoadFile, VehicleFile, load_road, load_vehicle
-from sim2real.drive import Drive, grid_step, make_drive
+from sim2real.drive import Drive, awake, grid_step, make_drive
 from sim2real.lattice import find_lattice
 from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
 
@@ -97,9 +97,14 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
         raise ScenarioError("\n".join(problems))
     time_s, signals = resample(log, grid_step(log.rate_hz))
     wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
-    drive = make_drive(log_path.name, course, time_s, signals, log.derived, find_lattice(log.time_s, wheels))
-    if not drive.moving.any():
+    whole = make_drive(log_path.name, course, time_s, signals, log.derived, find_lattice(log.time_s, wheels))
+    if not whole.moving.any():
         raise ScenarioError(f"{log_path}: the car never moves; expected a log of driving.")
+    drive = awake(whole)
+    asleep_s = float(drive.time_s[0] - whole.time_s[0])
+    if asleep_s > 0.0:
+        left_out = f"the first {asleep_s:.3g} s are left out: nothing tells yet how fast the car is."
+        log = replace(log, warnings=(*log.warnings, left_out))
     return Source(log, course, road_path, drive)
 
 

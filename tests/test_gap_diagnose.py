@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from gap_drives import DRY, MODEL, clean, noisy, pulses, random_drives, road_of, trace
+from gap_drives import DRY, MODEL, clean, noisy, pulses, random_drives, remeasured, road_of, trace
 
 import sim2real
 from benchmarks.gap_development import BARE
@@ -349,6 +349,19 @@ def test_a_log_without_a_needed_column_names_it(folder, tmp_path):
         read_sources(
             folder / "vehicle.yaml", folder / "dry.yaml", [f"{tmp_path}/bad.csv"], f"{folder}/holdout.csv"
         )
+
+
+def test_what_the_logger_wrote_before_the_sensors_woke_is_left_out_and_said(folder, tmp_path):
+    drive = noisy(clean(pulses(6.0), 13.0))
+    measured = drive.measured.copy()
+    measured[:125] = np.nan
+    write_log(remeasured(drive, measured), tmp_path / "waking.csv")
+    found = read_sources(
+        folder / "vehicle.yaml", folder / "dry.yaml", [f"{tmp_path}/waking.csv"], f"{folder}/holdout.csv"
+    )
+    assert found.fit[0].drive.time_s[0] == pytest.approx(1.0)
+    assert "the first 1 s are left out: nothing tells yet how fast the car is." in found.fit[0].log.warnings
+    assert not any("left out" in text for text in found.holdout.log.warnings)
 
 
 def test_a_car_that_never_moves_is_refused(folder, tmp_path):

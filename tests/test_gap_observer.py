@@ -29,7 +29,7 @@ from scenarios.effects.torque_gain import TorqueGain
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.files import VehicleFile
 from scenarios.plant import simulate
-from sim2real.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL
+from sim2real.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL, awake
 from sim2real.evidence import residuals
 from sim2real.lattice import SmoothCounter
 from sim2real.observer import MEMORY_S, Push, Simulation
@@ -45,6 +45,54 @@ def no_push(n):
 def tame():
     """A drive below the grip limit, without noise."""
     return clean(pulses(8.0), 15.0)
+
+
+# --- sensors that wake after the logger
+
+
+@pytest.fixture(scope="module")
+def braking():
+    """A drive whose first seconds are the hardest braking: nobody who does not see it knows how fast the car is."""
+    torque = trace((0, 0), (0.2, -500), (1.2, -500), (1.4, 0), (2.5, 0), (3, 300), (5, 300), duration_s=6.0)
+    return noisy(clean(torque, 25.0))
+
+
+def asleep(drive, channels, first):
+    measured = drive.measured.copy()
+    measured[:first, channels] = np.nan
+    return awake(remeasured(drive, measured))
+
+
+@pytest.mark.parametrize(
+    "channels", [slice(SPEED, ACCEL), slice(POSITION, ACCEL), slice(SPEED, SPEED + 1), slice(0, ACCEL + 1)]
+)
+def test_a_drive_begins_where_its_speed_is_known(braking, channels):
+    drive = asleep(braking, channels, 120)
+    np.testing.assert_array_equal(drive.time_s, braking.time_s[120:])
+    np.testing.assert_array_equal(drive.measured, braking.measured[120:])
+    np.testing.assert_allclose(rms(residuals(MODEL, drive) / SIGMA), 1.0, atol=0.12)
+
+
+def test_without_a_speed_sensor_it_begins_where_a_wheel_is_known(braking):
+    measured = braking.measured.copy()
+    measured[:, SPEED] = np.nan
+    measured[:120, WHEEL] = np.nan
+    measured[:200, 2] = np.nan
+    drive = awake(remeasured(braking, measured))
+    np.testing.assert_array_equal(drive.time_s, braking.time_s[120:])
+
+
+@pytest.mark.parametrize("channels", [slice(POSITION, POSITION + 1), slice(ACCEL, ACCEL + 1), WHEEL])
+def test_what_else_wakes_late_costs_no_row_and_no_residual(braking, channels):
+    drive = asleep(braking, channels, 120)
+    assert len(drive) == len(braking)
+    np.testing.assert_allclose(rms(residuals(MODEL, drive) / SIGMA), 1.0, atol=0.12)
+
+
+def test_a_drive_that_is_awake_stays_as_it_is(braking):
+    same = awake(braking)
+    np.testing.assert_array_equal(same.time_s, braking.time_s)
+    np.testing.assert_array_equal(same.measured, braking.measured)
 
 
 # --- noise where the model is right

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from scenarios.errors import ScenarioError
 from scenarios.files import WHEELS, VehicleFile, load_road, load_vehicle
-from sim2real.drive import Drive, grid_step, make_drive
+from sim2real.drive import Drive, awake, grid_step, make_drive
 from sim2real.evidence import Evidence, gather
 from sim2real.gap import measure
 from sim2real.lattice import find_lattice
@@ -121,7 +121,7 @@ def _drive(name: str, mapping: str, window: Window, data: Path) -> Drive:
     wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
     lattice = find_lattice(log.time_s, wheels)
     road = load_road(FOLDER / name / window.road)
-    return make_drive(log.name, road, time_s, signals, log.derived, lattice)
+    return awake(make_drive(log.name, road, time_s, signals, log.derived, lattice))
 
 
 def budget(found: list[Stage]) -> list[Measure]:
