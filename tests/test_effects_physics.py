@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
-from scipy.integrate import cumulative_trapezoid
+from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.signal import StateSpace, lsim
 
 from scenarios.effects.rolling_resistance import RollingResistanceForce
@@ -251,6 +251,35 @@ class TestActuators:
         still = np.full((800, 4), -123.0)
         lagged = self.actuate(still, torque_lag={"time_constant_s": 0.1})
         assert lagged == pytest.approx(still, rel=1e-12)
+
+    @pytest.mark.parametrize("apart", [-0.6, 0.3])
+    def test_a_lag_of_rise_and_fall_agrees_with_the_differential_equation(self, command, apart):
+        values = {"torque_lag": {"time_constant_s": 0.05, "apart": apart}}
+        lagged = self.actuate(command, forms={"torque_lag": "rising and falling unlike"}, **values)
+
+        def slope(t, y):
+            told = np.array([np.interp(t, self.TIME, wheel) for wheel in command.T])
+            return (told - y) / (0.05 * (1.0 + apart * np.where(y * (told - y) >= 0.0, 1.0, -1.0)))
+
+        exact = solve_ivp(slope, (0.0, self.TIME[-1]), command[0], t_eval=self.TIME, max_step=self.STEP_S)
+        # Falling turns to rising within a part of a row, 0.5 ms, in which 200 N m of lag go by 5 N m at 0.02 s.
+        assert lagged == pytest.approx(exact.y.T, abs=5.0)
+        assert np.sqrt(np.mean((lagged - exact.y.T) ** 2)) < 0.5
+
+    def test_a_lag_of_rise_and_fall_is_the_plain_one_where_both_are_alike_or_only_one_happens(self):
+        growing = np.repeat(np.linspace(0.0, -300.0, 800)[:, None], 4, axis=1)
+        form = {"torque_lag": "rising and falling unlike"}
+        rise, fall, plain = (
+            self.actuate(torque, forms=kind, torque_lag={"time_constant_s": tau, **more})
+            for torque, kind, tau, more in (
+                (growing, form, 0.08, {"apart": 0.25}),
+                (growing[::-1], form, 0.08, {"apart": 0.25}),
+                (growing, {}, 0.1, {}),
+            )
+        )
+        assert rise == pytest.approx(plain, abs=1e-9)
+        alone = self.actuate(growing[::-1], torque_lag={"time_constant_s": 0.06})
+        assert fall == pytest.approx(alone, abs=1e-9)
 
     def test_delay_of_whole_steps_shifts_the_rows(self, command):
         late = self.actuate(command, torque_delay={"delay_s": 25 * self.STEP_S})

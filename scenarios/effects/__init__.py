@@ -24,7 +24,7 @@ from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.rolling_resistance import RollingResistance, RollingResistanceForce
 from scenarios.effects.torque_delay import TorqueDelay
 from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles, TorqueGainOfSigns
-from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages
+from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages, TorqueLagOfRiseAndFall
 from scenarios.effects.tyre_relaxation import (
     TyreRelaxation,
     TyreRelaxationOfSlip,
@@ -93,6 +93,7 @@ OTHER_FORMS = (
     TorqueGainOfAxles,
     TorqueGainOfSigns,
     TorqueLagInTwoStages,
+    TorqueLagOfRiseAndFall,
     RollingResistanceForce,
     BrakeDragOfAxles,
     MassOffsetPlaced,

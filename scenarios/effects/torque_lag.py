@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.signal import lfilter
 
 from scenarios.effects.base import Array, Effect, parameter
@@ -56,3 +57,51 @@ class TorqueLagInTwoStages(TorqueLag):
         """The first stage's output is the second's command."""
         stage = TorqueLag(0.5 * self.time_constant_s)
         return stage.actuate(time_s, stage.actuate(time_s, torque_nm))
+
+
+@dataclass(frozen=True)
+class TorqueLagOfRiseAndFall(TorqueLag):
+    """Pressure or boost that is built up more slowly than it is let go, or faster; `time_constant_s` is the mean."""
+
+    form = "rising and falling unlike"
+    equation = "time_constant (1 + apart) where the torque grows, time_constant (1 - apart) where it falls"
+
+    apart: float = parameter(
+        "-",
+        "half of what the time constant of growing torque has more than that of falling, per mean",
+        neutral=0.0,
+        low=-0.8,
+        high=0.8,
+        starts=(-0.3, 0.3),
+    )
+
+    def actuate(self, time_s: Array, torque_nm: Array) -> Array:
+        """In parts of a row, each with the time constant of its beginning."""
+        if self.apart == 0.0 or self.time_constant_s == 0.0 or len(time_s) < 2:
+            return super().actuate(time_s, torque_nm)
+        step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1) / PARTS
+        growing, falling = (self.time_constant_s * (1.0 + sign * self.apart) / step_s for sign in (1.0, -1.0))
+        return np.asarray(_follow(np.ascontiguousarray(torque_nm, dtype=np.float64), growing, falling))
+
+
+PARTS = 4
+"""Parts of a row in each of which the torque either grows or falls."""
+
+
+@njit(cache=True)
+def _follow(torque_nm: Array, growing: float, falling: float) -> Array:
+    """The lag of each wheel, exact for a command linear between the rows; time constants in parts of a row."""
+    followed = np.empty_like(torque_nm)
+    for wheel in range(torque_nm.shape[1]):
+        y = torque_nm[0, wheel]
+        followed[0, wheel] = y
+        for i in range(1, len(torque_nm)):
+            told = torque_nm[i - 1, wheel]
+            slope = (torque_nm[i, wheel] - told) / PARTS
+            for _ in range(PARTS):
+                ratio = growing if y * (told + 0.5 * slope - y) >= 0.0 else falling
+                behind = ratio * slope
+                y = told + slope - behind + (y - told + behind) * np.exp(-1.0 / ratio)
+                told += slope
+            followed[i, wheel] = y
+    return followed
