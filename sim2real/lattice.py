@@ -39,7 +39,7 @@ DIGITS = 2e-4
 FIVES = 4
 """Greatest power of five in a round number."""
 SEEN = 1.5
-"""Least window that a log shows, in steps of the log [-]."""
+"""Least window that a log shows, in its steps; samples further apart have lost ones between them [-]."""
 UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
 MOST_SAMPLES = 1200
@@ -125,7 +125,7 @@ def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
     values = [w[np.isfinite(w)] for w in wheels]
     if min(len(v) for v in values) < 100:
         return None
-    step_s = float(np.median(np.diff(time_s)))
+    step_s = max(float(np.median(np.diff(time_s[np.isfinite(w)]))) for w in wheels)
     length = max(round(SMOOTHING_S / step_s), 3)
     fast = np.concatenate([v - uniform_filter1d(v, length) for v in values])
     spread = 1.4826 * float(np.median(np.abs(fast)))
@@ -175,11 +175,17 @@ def _best_quantum(values: Array, low: float, high: float) -> tuple[float, float]
     return float(near[int(finer.argmax())]), float(finer.max())
 
 
+def _changes(time_s: Array, wheel: Array, quantum: float) -> Array:
+    """Times at which a wheel's value changes, those across lost samples excepted: nobody knows when [s]."""
+    there = np.isfinite(wheel)
+    at, steps = time_s[there], np.round(wheel[there] / quantum)
+    since = np.diff(at)
+    return at[1:][(np.abs(np.diff(steps)) > 0.5) & (since < SEEN * np.median(since))]
+
+
 def _window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s: float) -> float:
     """The longest window at whose ends alone the values change; the log's step where they change at any row [s]."""
-    changes = [
-        time_s[1:][np.abs(np.diff(np.round(w / quantum))) > 0.5] for w in wheels if np.isfinite(w).all()
-    ]
+    changes = [_changes(time_s, w, quantum) for w in wheels]
     # the counter's window need not be a multiple of the log's step, and the log sees its end a part of a step late
     early = [c[c < c[0] + CHANGES_S] - c[0] for c in changes if len(c)]
     early = [c for c in early if len(c) >= FEWEST_CHANGES]

@@ -98,6 +98,27 @@ def test_lost_samples_do_not_hide_it():
     found = find_lattice(time_s, patchy)
     assert found is not None
     assert found.quantum_rad_s == pytest.approx(TURN / (48 * 0.04), rel=1e-3)
+    assert found.window_s == pytest.approx(0.04, abs=0.001)
+    assert found.teeth == 48
+
+
+def test_wheels_that_are_logged_in_turns_show_their_window():
+    time_s, wheels = counted_wheels(48, 0.04, 0.05)
+    in_turns = [np.where(np.arange(len(w)) % 2 == i % 2, w, np.nan) for i, w in enumerate(wheels)]
+    found = find_lattice(time_s, in_turns)
+    assert found is not None
+    assert found.window_s == pytest.approx(0.04, abs=0.001)
+    assert found.teeth == 48
+    assert found.step_s == pytest.approx(2.0 * (time_s[1] - time_s[0]))
+
+
+def test_changes_across_a_gap_tell_no_time():
+    time_s, wheels = counted_wheels(48, 0.04, 0.05)
+    at = np.arange(len(time_s))
+    holes = [np.where(at % 23 < 6, np.nan, w) for w in wheels]
+    found = find_lattice(time_s, holes)
+    assert found is not None
+    assert found.window_s == pytest.approx(0.04, abs=0.001)
 
 
 def test_wheels_whose_windows_begin_at_times_of_their_own_share_one_window():
