@@ -147,7 +147,9 @@ class Contest:
         Least loss that such a term leaves in the place of all effects.
     lone : float
         Least loss that a fault outside the library leaves by itself: a free term at one wheel alone or
-        between the axles, see `sim2real.suspect`, or a slow speed sensor, see `sim2real.sluggish`.
+        between the axles, see `sim2real.suspect`, or the impostor.
+    impostor : Entry or None
+        What passes for the best effect, fitted in its place, see `sim2real.sluggish`.
     """
 
     null: Entry
@@ -160,6 +162,7 @@ class Contest:
     motion: float = float("inf")
     instead: float = float("inf")
     lone: float = float("inf")
+    impostor: Entry | None = None
 
 
 def hold_contest(

@@ -29,7 +29,7 @@ from sim2real.pairs import add_pairs, add_partners, add_twins
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, is_noise, needs_pairs
-from sim2real.sluggish import slow_speed
+from sim2real.sluggish import impostor
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.structure import add_structure
 from sim2real.suspect import unlike_wheels
@@ -156,7 +156,8 @@ def find(
         fit_to, held = fit_to.drifting(best, drift), held.drifting(best, drift)
     contest = hold_contest(base, fit_to, held, first, jobs, progress)
     if contest.singles and not is_noise(contest, fit_to, held):
-        contest = replace(contest, lone=slow_speed(contest, base, fit_to, held))
+        passes = impostor(contest, base, fit_to, held)
+        contest = replace(contest, impostor=passes, lone=passes.loss if passes else contest.lone)
         contest = add_partners(contest, fit_to, jobs, progress)
         if needs_pairs(contest, fit_to, held):
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)

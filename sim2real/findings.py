@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, Effect
-from sim2real import sentences, where
+from sim2real import sentences, sluggish, where
 from sim2real.contest import Contest, Entry, Progress, Varied
 from sim2real.drive import CHANNELS
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
@@ -103,6 +103,9 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         progress("equations", 1, 1)
         if swing and unexplained and (found.only_order or swing.share > unexplained.share):
             unexplained = swing
+        passes = sluggish.characterise(found.contest)
+        if passes and unexplained and passes.share > unexplained.share:
+            unexplained = passes
         subsystem = unexplained.subsystem if unexplained else _subsystem(decision, terms)
         taken = loss(held.whitened(before)) - loss(held.whitened(after))
         places, heat = _where(found, held, before, terms, subsystem, taken)

@@ -1,4 +1,4 @@
-"""What is blamed on no effect: a hum in wheel sensors, a slow sensor, a gap that the cause leaves open."""
+"""What is blamed on no effect: a hum, a slow sensor, a limited rate of torque, a gap that the cause leaves open."""
 
 from dataclasses import replace
 
@@ -9,7 +9,8 @@ from scipy.signal import lfilter
 
 from scenarios.effects import EFFECTS
 from scenarios.effects.shifting import delayed
-from sim2real import closure, law
+from scenarios.effects.torque_lag import TorqueLag
+from sim2real import closure, law, sluggish
 from sim2real.closure import FLOOR_DOUBT, MOST_LEFT, closing, left_open
 from sim2real.contest import Entry, enter, silent
 from sim2real.diagnose import find
@@ -126,6 +127,49 @@ def test_a_slow_speed_sensor_is_not_called_late(nominal, slow, verdict):
     found = find(MODEL, logs[:2], logs[2], exclude=only("vehicle_speed_delay"))
     assert found.decision.winner.ids == ("vehicle_speed_delay",)
     assert found.decision.verdict is verdict
+    said = sluggish.characterise(found.contest)
+    assert (said is not None) is slow
+    if said:
+        assert said.subsystem == "vehicle_speed_sensor"
+        (filtering,) = found.contest.impostor.fitted.candidate.effects(found.contest.impostor.fitted.x)
+        assert filtering.delay_s == pytest.approx(
+            lag_s - 0.5 * STEP_S, rel=0.02
+        )  # the log's filter knows no half rows
+        assert f"low-pass filter of {filtering.delay_s:.3g} s" in said.sentence
+
+
+@pytest.mark.parametrize("limited", [True, False])
+def test_a_torque_of_limited_rate_is_no_lag(limited):
+    """Steps of up to 200 N m in 0.2 s: 1,000 N m/s at most, and a limit of 700."""
+    torque = pulses(DURATION_S)
+    time_s = np.arange(len(torque)) * STEP_S
+    follows = sluggish.LimitedTorqueRate(1.0 / 0.7) if limited else TorqueLag(0.05)
+    logs = [
+        noisy(clean(follows.actuate(time_s, torque), 14.0, commanded_nm=torque), seed, 0.3 * SIGMA)
+        for seed in range(3)
+    ]
+    found = find(MODEL, logs[:2], logs[2], exclude=only("torque_lag"))
+    said = sluggish.characterise(found.contest)
+    if limited:
+        assert found.decision.verdict is Verdict.UNKNOWN
+        assert said is not None
+        assert said.subsystem == "powertrain"
+        assert "no more than 7" in said.sentence
+        (effect,) = found.contest.impostor.fitted.candidate.effects(found.contest.impostor.fitted.x)
+        assert effect.s_per_kn_m == pytest.approx(1.0 / 0.7, rel=0.03)
+    else:
+        assert found.decision.verdict is Verdict.IDENTIFIED
+        assert found.decision.winner.ids == ("torque_lag",)
+        assert said is None
+
+
+def test_a_rate_that_no_command_reaches_is_none():
+    torque = pulses(DURATION_S)
+    time_s = np.arange(len(torque)) * STEP_S
+    np.testing.assert_array_equal(sluggish.LimitedTorqueRate(0.9).actuate(time_s, torque), torque)
+    limited = sluggish.LimitedTorqueRate(2.0).actuate(time_s, torque)
+    assert np.abs(np.diff(limited, axis=0)).max() == pytest.approx(500.0 * STEP_S)
+    np.testing.assert_array_equal(sluggish.LimitedTorqueRate(0.0).actuate(time_s, torque), torque)
 
 
 # --- an effect whose work a free curve does as well
