@@ -19,7 +19,7 @@ from sim2real.evidence import drift_of, gather, residuals
 from sim2real.findings import Findings, describe
 from sim2real.gap import measure
 from sim2real.lattice import common_lattice
-from sim2real.law import held_to_curves
+from sim2real.law import held_to_curves, held_to_itself
 from sim2real.logs import resample
 from sim2real.merge import camera_side, counter_side, merge
 from sim2real.noise import RESOLUTION
@@ -172,6 +172,7 @@ def find(
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)
+    decision = held_to_itself(decision, contest, fit_to, held)
     decision = closing(held_to_curves(decision, contest, base, fit_to, held, jobs), base, held)
     return Findings(base, fit_to, held, contest, decision, lattice, order)
 

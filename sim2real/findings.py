@@ -220,6 +220,8 @@ def _cause(
         contra.append(
             f"A free curve ({found.decision.curve}) does its work as well, and one beside it finds more."
         )
+    if entry is found.decision.winner and found.decision.further:
+        contra.append(f"Only what its form adds ({best.candidate.kinds[0].form}) is needed, not what it is.")
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
     for name in at_bound(best):

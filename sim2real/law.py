@@ -1,15 +1,20 @@
-"""Does the effect's law say more than a free curve: else the cause may be another one that looks like it.
+"""Is the effect needed for what it is: else the cause may be another one that looks like it.
 
 An effect is believed since its equation, with one or two values, foretells what a curve of many values in the wrong
 place cannot. Where a free curve over the car's motion does as well in its place, and beside it still finds what is no
 noise, the law is not the car's: a load that the library lacks passes for a torque's gain that way.
+
+A form with a further parameter is believed for its own one. Where that may stay at rest, and the further one does all,
+it is not that effect: torque that moves from axle to axle is no gain, though gains by axle say it.
 """
 
 from __future__ import annotations
 
+from scenarios.effects import FORMS
 from sim2real.contest import Contest
 from sim2real.equations import OF_THE_MOTION, WHOLE_CAR
 from sim2real.evidence import Evidence, all_logs
+from sim2real.fitting import loss
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
 from sim2real.selection import FURTHER_GAIN, Decision, doubted, inflation
@@ -17,8 +22,10 @@ from sim2real.unknown import Term, fit_terms, with_refined
 
 MORE_BESIDE = 0.0075
 """Share of what the effect takes off the loss that a curve beside it takes, too: less is how its form differs [-]."""
+OWN_SHARE = 0.03
+"""Share of what an effect takes off the loss that its own parameter takes, at least [-]."""
 LAWLESS_BELIEF = 0.2
-"""Probability that an effect is the cause though a curve does its work [-]."""
+"""Probability that an effect is the cause though a curve does its work, or only what its form adds is needed [-]."""
 
 
 def held_to_curves(
@@ -47,6 +54,25 @@ def held_to_curves(
     if instead.loss > winner.loss:
         return decision
     return doubted(decision, LAWLESS_BELIEF, curve=f"{instead.equation.key} over {instead.quantity}")
+
+
+def held_to_itself(decision: Decision, contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
+    """The decision, `unknown` where the one effect that it blames is needed for what its form adds alone."""
+    winner = decision.winner
+    if decision.verdict is not Verdict.IDENTIFIED:
+        return decision
+    found = winner.fitted
+    own = len(FORMS[winner.ids[0]][0].parameters())
+    if len(found.candidate.kinds[0].parameters()) == own:
+        return decision
+    at_rest = found.x.copy()
+    at_rest[:own] = found.candidate.neutral[:own]
+    without = found.candidate.model(at_rest)
+    more = sum(loss(e.whitened(e.residuals(without))) for e in (fit_to, holdout)) - winner.loss
+    noise = FURTHER_GAIN * inflation(winner, fit_to, holdout)
+    if more > max(noise, OWN_SHARE * (contest.null.loss - winner.loss)):
+        return decision
+    return doubted(decision, LAWLESS_BELIEF, varied=None, further=True)
 
 
 def _curves(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int) -> list[Term]:

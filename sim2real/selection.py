@@ -202,6 +202,8 @@ class Decision:
         Share of the hold-out's gap that the winner leaves, where that is why it is not blamed, see `sim2real.closure`.
     curve : str
         The free curve that does the winner's work as well, where that is why it is not blamed, see `sim2real.law`.
+    further : bool
+        Whether only what the winner's form adds to its effect is needed, and that is why it is not blamed.
     """
 
     verdict: Verdict
@@ -213,6 +215,7 @@ class Decision:
     varied: Varied | None = None
     left_open: float = 0.0
     curve: str = ""
+    further: bool = False
 
 
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:

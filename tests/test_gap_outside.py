@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 from scenarios.effects import EFFECTS
 from scenarios.effects.shifting import delayed
+from scenarios.effects.torque_gain import TorqueGainOfAxles
 from scenarios.effects.torque_lag import TorqueLag
 from sim2real import closure, law, sluggish
 from sim2real.closure import FLOOR_DOUBT, MOST_LEFT, closing, left_open
@@ -269,3 +270,23 @@ def test_a_sentence_lists_a_few_rivals_and_counts_the_others(mistaken, monkeypat
     )
     found = describe(mistaken, seed=0, jobs=1, progress=silent)
     assert said in verdict_of(decision, found.gap, found.causes)
+
+
+# --- an effect that is needed for what its form adds alone
+
+
+@pytest.mark.parametrize(
+    ("factor", "verdict"), [(1.0, Verdict.UNKNOWN), (1.05, Verdict.IDENTIFIED)], ids=["split", "gain"]
+)
+def test_torque_that_moves_between_the_axles_is_no_gain(factor, verdict):
+    """With every wheel pulling alike the axles' shares are told by slip alone: logs of little noise."""
+    torque = pulses(DURATION_S)
+    time_s = np.arange(len(torque)) * STEP_S
+    true = TorqueGainOfAxles(factor, 0.08).actuate(time_s, torque)
+    logs = [noisy(clean(true, 14.0, commanded_nm=torque), seed, 0.2 * SIGMA) for seed in range(3)]
+    found = find(MODEL, logs[:2], logs[2], exclude=only("torque_gain"))
+    assert found.decision.winner.fitted.x == pytest.approx([factor, 0.08], abs=0.005)
+    assert found.decision.verdict is verdict
+    assert found.decision.further is (factor == 1.0)
+    against = describe(found, seed=0, jobs=1, progress=silent).causes[0].evidence_against
+    assert any("not what it is" in text for text in against) is found.decision.further
