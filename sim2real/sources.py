@@ -11,6 +11,7 @@ from scenarios.files import WHEELS, RoadFile, VehicleFile, load_road, load_vehic
 from sim2real.drive import Drive, awake, grid_step, make_drive
 from sim2real.lattice import find_lattice
 from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
+from sim2real.logs.checks import MIN_DURATION_S
 
 
 @dataclass(frozen=True)
@@ -98,9 +99,15 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     time_s, signals = resample(log, grid_step(log.rate_hz))
     wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
     whole = make_drive(log_path.name, course, time_s, signals, log.derived, find_lattice(log.time_s, wheels))
-    if not whole.moving.any():
-        raise ScenarioError(f"{log_path}: the car never moves; expected a log of driving.")
     drive = awake(whole)
+    if not drive.moving.any():
+        raise ScenarioError(f"{log_path}: the car never moves; expected a log of driving.")
+    told_s = float(drive.time_s[-1] - drive.time_s[0])
+    if told_s < MIN_DURATION_S:
+        raise ScenarioError(
+            f"{log_path}: tells how fast the car is in its last {told_s:.3g} s alone; expected at least "
+            f"{MIN_DURATION_S:g} s."
+        )
     asleep_s = float(drive.time_s[0] - whole.time_s[0])
     if asleep_s > 0.0:
         left_out = f"the first {asleep_s:.3g} s are left out: nothing tells yet how fast the car is."

@@ -366,6 +366,23 @@ def test_what_the_logger_wrote_before_the_sensors_woke_is_left_out_and_said(fold
     assert not any("left out" in text for text in found.holdout.log.warnings)
 
 
+@pytest.mark.parametrize(
+    ("speed_m_s", "known", "said"),
+    [(13.0, 200, r"in its last 1\.59 s alone; expected at least 2 s"), (0.0, 200, "the car never moves")],
+)
+def test_sensors_that_wake_too_late_or_on_a_parked_car_are_refused(folder, tmp_path, speed_m_s, known, said):
+    drive = clean(
+        trace((0, 0), (1, 100), duration_s=3.0) if speed_m_s else trace((0, 0), duration_s=3.0), speed_m_s
+    )
+    measured = drive.measured.copy()
+    measured[:-known] = np.nan
+    write_log(remeasured(drive, measured), tmp_path / "late.csv")
+    with pytest.raises(ScenarioError, match=said):
+        read_sources(
+            folder / "vehicle.yaml", folder / "dry.yaml", [f"{folder}/fit_1.csv"], f"{tmp_path}/late.csv"
+        )
+
+
 def test_a_car_that_never_moves_is_refused(folder, tmp_path):
     standing = clean(trace((0, 0), duration_s=5.0), 0.0)
     write_log(standing, tmp_path / "parked.csv")
