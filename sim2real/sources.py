@@ -96,9 +96,7 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
         problems.append(str(error))
     if course is None or log is None:
         raise ScenarioError("\n".join(problems))
-    time_s, signals = resample(log, grid_step(log.rate_hz))
-    wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
-    whole = make_drive(log_path.name, course, time_s, signals, log.derived, find_lattice(log.time_s, wheels))
+    whole = drive_of(log, course)
     drive = awake(whole)
     if not drive.moving.any():
         raise ScenarioError(f"{log_path}: the car never moves; expected a log of driving.")
@@ -113,6 +111,13 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
         left_out = f"the first {asleep_s:.3g} s are left out: nothing tells yet how fast the car is."
         log = replace(log, warnings=(*log.warnings, left_out))
     return Source(log, course, road_path, drive)
+
+
+def drive_of(log: Log, road: RoadFile) -> Drive:
+    """All of a log on the diagnosis' grid, with what its wheel speeds tell of a counter at their own rate."""
+    time_s, signals = resample(log, grid_step(log.rate_hz))
+    wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
+    return make_drive(log.name, road, time_s, signals, log.derived, find_lattice(log.time_s, wheels))
 
 
 def split(text: str, road: Path | None) -> tuple[Path, Path]:

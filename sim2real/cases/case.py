@@ -11,14 +11,14 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from scenarios.errors import ScenarioError
-from scenarios.files import WHEELS, VehicleFile, load_road, load_vehicle
-from sim2real.drive import Drive, awake, grid_step, make_drive
+from scenarios.files import VehicleFile, load_road, load_vehicle
+from sim2real.drive import Drive, awake
 from sim2real.evidence import Evidence, gather
 from sim2real.gap import measure
-from sim2real.lattice import find_lattice
-from sim2real.logs import load_mapping, read_log, resample
+from sim2real.logs import load_mapping, read_log
 from sim2real.observer import Simulation
 from sim2real.result import Measure
+from sim2real.sources import drive_of
 
 FOLDER = Path(__file__).parent
 MAPPINGS = FOLDER.parent / "mappings"
@@ -117,11 +117,7 @@ def _drive(name: str, mapping: str, window: Window, data: Path) -> Drive:
     own = FOLDER / name / mapping
     columns = load_mapping(own if own.exists() else MAPPINGS / mapping)
     log = read_log(data / window.log, columns).window(window.from_s, window.to_s)
-    time_s, signals = resample(log, grid_step(log.rate_hz))
-    wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
-    lattice = find_lattice(log.time_s, wheels)
-    road = load_road(FOLDER / name / window.road)
-    return awake(make_drive(log.name, road, time_s, signals, log.derived, lattice))
+    return awake(drive_of(log, load_road(FOLDER / name / window.road)))
 
 
 def budget(found: list[Stage]) -> list[Measure]:
