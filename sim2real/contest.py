@@ -174,9 +174,7 @@ def hold_contest(
     progress: Progress = silent,
 ) -> Contest:
     """Every effect alone, fitted to all fit logs from where its first round ended; each in its best form."""
-    null = Entry(
-        (), None, fit_to.whitened(fit_to.residuals(model)), holdout.whitened(holdout.residuals(model))
-    )
+    null = as_it_is(model, fit_to, holdout)
     finalists = list(dict.fromkeys(found.candidate.ids for found in first))[:FINALISTS]
     work = [
         partial(
@@ -190,17 +188,17 @@ def hold_contest(
         for found in first
     ]
     best: dict[tuple[str, ...], Entry] = {}
-    for entry in sorted(
-        run_all(work, jobs, progress, "effects"), key=lambda e: e.loss * (1.0 + PRICE * e.size)
-    ):
+    entries = filter(is_proper, run_all(work, jobs, progress, "effects"))
+    for entry in sorted(entries, key=lambda e: e.loss * (1.0 + PRICE * e.size)):
         best.setdefault(entry.ids, entry)
-    return Contest(null, tuple(entry for entry in best.values() if is_proper(entry)))
+    return Contest(null, tuple(best.values()))
 
 
 def is_proper(entry: Entry) -> bool:
     """Whether every effect of an entry is itself at its values, see `Effect.is_itself`."""
     found = entry.fitted
-    return all(effect.is_itself() for effect in found.candidate.effects(found.x))
+    vehicle = found.candidate.base.vehicle.to_core()
+    return all(effect.is_itself(vehicle) for effect in found.candidate.effects(found.x))
 
 
 def first_round(
@@ -252,6 +250,11 @@ def _beyond(candidate: Candidate, x: Array) -> Array:
     rest = candidate.neutral[len(x) :]
     values = np.unique(np.array([rest, *candidate.starts[:, len(x) :]]), axis=0)
     return np.array([np.concatenate([x, value]) for value in values])
+
+
+def as_it_is(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Entry:
+    """The entry of a model to which nothing is fitted."""
+    return Entry((), None, *(e.whitened(e.residuals(model)) for e in (fit_to, holdout)))
 
 
 def enter(candidate: Candidate, fit_to: Evidence, holdout: Evidence, start: Array, steps: int) -> Entry:

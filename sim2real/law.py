@@ -11,10 +11,9 @@ it is not that effect: torque that moves from axle to axle is no gain, though ga
 from __future__ import annotations
 
 from scenarios.effects import FORMS
-from sim2real.contest import Contest
+from sim2real.contest import Contest, as_it_is
 from sim2real.equations import OF_THE_MOTION, WHOLE_CAR
 from sim2real.evidence import Evidence, all_logs
-from sim2real.fitting import loss
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
 from sim2real.selection import FURTHER_GAIN, Decision, doubted, inflation
@@ -67,8 +66,7 @@ def held_to_itself(decision: Decision, contest: Contest, fit_to: Evidence, holdo
         return decision
     at_rest = found.x.copy()
     at_rest[:own] = found.candidate.neutral[:own]
-    without = found.candidate.model(at_rest)
-    more = sum(loss(e.whitened(e.residuals(without))) for e in (fit_to, holdout)) - winner.loss
+    more = as_it_is(found.candidate.model(at_rest), fit_to, holdout).loss - winner.loss
     noise = FURTHER_GAIN * inflation(winner, fit_to, holdout)
     if more > max(noise, OWN_SHARE * (contest.null.loss - winner.loss)):
         return decision

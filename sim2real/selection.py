@@ -45,11 +45,10 @@ PAIR_LEAVES = 0.5
 ALONE = 0.05
 """Share of what a pair takes off the loss that the better of its effects takes alone, at least [-]."""
 PAIR_LOSS = 0.7
-"""Share of the best effect's loss that a pair may leave where that effect explains all by itself, or the pair only as
-it varies [-]."""
+"""Share of the best effect's loss that a pair may leave in its place [-]."""
 PAIR_MISFIT = 1.4
 """Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
-PAIR_SHARE = 0.02
+PAIR_SHARE = 0.06
 """As `EXPLAINED_SHARE`, for a pair [-]."""
 MAJOR = 0.5
 """An effect that a structural difference stands beside takes alone at least this share of what both take [-]."""
@@ -132,6 +131,11 @@ def probabilities(contest: Contest, entries: list[Entry], fit_to: Evidence, hold
 def explains(after: Fitness, before: Fitness) -> bool:
     """Whether what is left is noise, or small against the gap."""
     return after.misfit <= allowed(before)
+
+
+def pair_explains(after: Fitness, before: Fitness) -> bool:
+    """The same of two effects."""
+    return after.misfit < max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
 
 
 def allowed(before: Fitness) -> float:
@@ -250,11 +254,10 @@ def _decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         shares = probabilities(contest, list(contest.pairs), fit_to, holdout)[1:]
         pair = contest.pairs[int(shares.argmax())]  # of equals, the one that needs fewer parameters
         paired = fitness(pair, fit_to, holdout)
-        enough = paired.misfit < max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
         if (
-            enough
+            pair_explains(paired, before)
             and not _cancel(contest, pair)
-            and _takes_two(best, pair, after, paired, explains(after, before))
+            and takes_two(best, pair, after, paired, explains(after, before))
         ):
             return _compound(contest, pair, shares, before, paired)
     structured = _structured(contest, before, fit_to, holdout)
@@ -357,16 +360,18 @@ def _cancel(contest: Contest, pair: Entry) -> bool:
     return null - alone < ALONE * (null - pair.loss)
 
 
-def _takes_two(best: Entry, pair: Entry, after: Fitness, paired: Fitness, explained: bool) -> bool:
+def takes_two(best: Entry, pair: Entry, after: Fitness, paired: Fitness, explained: bool) -> bool:
     """Whether a pair does so much better than the best single effect that it is taken in its place.
 
-    It halves the misfit, or the loss beyond noise; where one explains all by itself it halves the misfit and takes a
-    fair share of all loss besides, as the second may be no more than how the first differs from the library's form.
+    It halves the misfit, or the loss beyond noise, or takes a fair share of all loss, which may be noise that was read
+    too small; where one explains all by itself it does the first and the last, as the second may be no more than how
+    the first differs from the library's form.
     """
     halves = paired.misfit < PAIR_LEAVES * after.misfit
+    less = pair.loss <= PAIR_LOSS * best.loss
     if explained:
-        return halves and pair.loss <= PAIR_LOSS * best.loss
-    return halves or loss_beyond_noise(pair) <= PAIR_LEAVES * loss_beyond_noise(best)
+        return halves and less
+    return halves or less or loss_beyond_noise(pair) <= PAIR_LEAVES * loss_beyond_noise(best)
 
 
 def loss_beyond_noise(entry: Entry) -> float:

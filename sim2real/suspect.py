@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.contest import Entry
+from sim2real.contest import as_it_is
 from sim2real.drive import SPEED, WHEEL
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, UNLIKE, Equation
 from sim2real.evidence import SETTLING_S, Evidence, all_logs
@@ -51,8 +51,7 @@ def unlike_wheels(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: 
 
 
 def _misfit(model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:
-    z_fit, z_hold = (e.whitened(e.residuals(model)) for e in (fit_to, holdout))
-    return fitness(Entry((), None, z_fit, z_hold), fit_to, holdout).misfit
+    return fitness(as_it_is(model, fit_to, holdout), fit_to, holdout).misfit
 
 
 def _misfit_without(channel: int, model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.signal import StateSpace, lsim
 
+from scenarios.effects import form_of
 from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant import dynamics, simulate
@@ -136,6 +137,37 @@ def test_axles_of_unlike_radius_roll_at_unlike_speeds():
     assert speeds[2] == speeds[3]
     slips = 1.0 - run.speed_m_s[-1] / (speeds[[0, 2]] * [0.303, 0.297])
     assert slips == pytest.approx(0.0, abs=1e-4)
+
+
+def test_each_wheel_rolls_with_its_own_radius():
+    values = {"radius_m": 0.3, "unlike": 0.01, "front_sides": 0.004, "rear_sides": -0.002}
+    form = "each wheel its own"
+    car = car_with({"wheel_radius_offset": form}, wheel_radius_offset=values)
+    levers = np.array([0.3042, 0.3018, 0.2964, 0.2976])
+    run = drive(car, 0.0, 1.0, 20.0)
+    slips = 1.0 - run.speed_m_s[-1] / (run.wheel_speed_rad_s[-1] * levers)
+    assert slips == pytest.approx(0.0, abs=1e-4)
+    expected = (100.0 / levers).sum() / (MASS + (INERTIA / levers**2).sum())
+    assert settled_acceleration(drive(car, 100.0, 1.5, 15.0)) == pytest.approx(expected, rel=2e-3)
+
+
+def test_one_wrong_wheel_is_no_car_on_other_wheels():
+    def of(fl, fr, rl, rr):
+        mean = (fl + fr + rl + rr) / 4.0
+        values = (fl + fr - rl - rr, 2.0 * (fl - fr), 2.0 * (rl - rr))
+        return form_of("wheel_radius_offset", "each wheel its own")(
+            RADIUS * (1.0 + mean), *(v / (4.0 * (1.0 + mean)) for v in values)
+        )
+
+    car = CAR.to_core()
+    assert of(0.01, 0.02, 0.015, 0.005).radii_m() == pytest.approx(
+        RADIUS * np.array([1.01, 1.02, 1.015, 1.005])
+    )
+    assert of(0.01, 0.02, 0.015, 0.005).is_itself(car)
+    assert of(-0.01, -0.02, -0.015, -0.005).is_itself(car)
+    assert not of(0.0, 0.0, 0.02, 0.0).is_itself(car)
+    assert not of(0.02, 0.02, 0.0, 0.0).is_itself(car)
+    assert not of(0.02, 0.02, 0.02, -0.01).is_itself(car)
 
 
 def test_what_rolls_alone_leaves_the_lever():

@@ -30,13 +30,17 @@ from sim2real.selection import (
     EXPLAINED_MISFIT,
     EXPLAINED_MOST,
     EXPLAINED_SHARE,
+    PAIR_MISFIT,
+    PAIR_SHARE,
     Fitness,
     decide,
     explains,
     fitness,
     inflation,
     needs_pairs,
+    pair_explains,
     probabilities,
+    takes_two,
 )
 
 FITTED = [key for key in SEVERITY if key != COUNTER]
@@ -380,6 +384,37 @@ def test_a_small_rest_of_a_large_gap_counts_as_explained():
     assert explains(fit_as(0.9 * EXPLAINED_SHARE * 20.0), fit_as(20.0))
     assert not explains(fit_as(1.1 * EXPLAINED_SHARE * 20.0), fit_as(20.0))
     assert not explains(fit_as(1.01 * EXPLAINED_MOST), fit_as(500.0))
+
+
+def test_two_effects_explain_less_easily_than_one():
+    def fit_as(value):
+        return Fitness(value, {})
+
+    for before in (2.0, 20.0, 500.0):
+        most = max(PAIR_MISFIT, PAIR_SHARE * before)
+        assert pair_explains(fit_as(0.99 * most), fit_as(before))
+        assert not pair_explains(fit_as(1.01 * most), fit_as(before))
+    assert explains(fit_as(2.4), fit_as(20.0))
+    assert not pair_explains(fit_as(2.4), fit_as(20.0))
+
+
+@pytest.mark.parametrize(
+    ("loss", "misfit", "explained", "taken"),
+    [
+        (0.90, 0.45, False, True),  # halves the misfit
+        (0.90, 0.45, True, False),  # which may be how the first differs from its form
+        (0.65, 0.45, True, True),
+        (0.65, 0.60, True, False),
+        (0.65, 0.60, False, True),  # less of a loss that is noise in part
+        (0.75, 0.60, False, False),
+        (0.55, 0.60, False, True),
+    ],
+)
+def test_two_take_the_place_of_one_by_what_they_take_off(loss, misfit, explained, taken):
+    """Of a single effect that leaves ten times the noise's loss: shares of its loss, and of its misfit."""
+    best, pair = (made_up(share * 1e4, share * 1e4, 0) for share in (1.0, loss))
+    fits = (Fitness(2.0, {}), Fitness(2.0 * misfit, {}))
+    assert takes_two(best, pair, *fits, explained) is taken
 
 
 # --- verdicts

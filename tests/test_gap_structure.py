@@ -94,8 +94,8 @@ def test_another_tyre_alone_is_no_effect_of_the_library():
 
 
 def test_sides_of_one_friction_are_no_split():
-    assert not MuSplit(0.9, 0.9).is_itself()
-    assert MuSplit(0.9, 0.95).is_itself()
+    assert not MuSplit(0.9, 0.9).is_itself(MODEL.vehicle.to_core())
+    assert MuSplit(0.9, 0.95).is_itself(MODEL.vehicle.to_core())
     logs = [
         noisy(clean(hard_driving(10.0), v0, ROAD, effects={"friction_offset": {"factor": 0.93}}), seed)
         for seed, v0 in enumerate((9.0, 13.0))

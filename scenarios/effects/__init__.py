@@ -43,6 +43,7 @@ from scenarios.effects.wheel_inertia_offset import WheelInertiaOffset, WheelIner
 from scenarios.effects.wheel_radius_offset import (
     WheelRadiusOffset,
     WheelRadiusOffsetOfAxles,
+    WheelRadiusOffsetOfWheels,
     WheelRadiusOffsetRolling,
 )
 from scenarios.effects.wheel_speed_delay import WheelSpeedDelay
@@ -99,6 +100,7 @@ OTHER_FORMS = (
     MassOffsetPlaced,
     WheelRadiusOffsetRolling,
     WheelRadiusOffsetOfAxles,
+    WheelRadiusOffsetOfWheels,
     WheelInertiaOffsetOfAxles,
     TyreStiffnessOffsetOfAxles,
     TyreStiffnessOffsetWithLoad,

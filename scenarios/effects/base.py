@@ -91,6 +91,18 @@ def share_of_axles(start: float, most: float) -> Any:
     )
 
 
+def share_of_sides(axle: str, start: float, most: float) -> Any:
+    """Declare how unlike the two wheels of an axle are, "front" or "rear", as `share_of_axles` does for axles."""
+    return parameter(
+        "-",
+        f"share of the mean that the {axle} left wheel has more and the {axle} right one less",
+        neutral=0.0,
+        low=-most,
+        high=most,
+        starts=(-start, start),
+    )
+
+
 @dataclass(frozen=True)
 class Effect:
     """Base of all effects: describes itself and leaves every stage as it is."""
@@ -117,8 +129,8 @@ class Effect:
         """The effect with all parameters at their neutral values for this vehicle."""
         return cls(**{p.name: p.neutral_value(vehicle) for p in cls.parameters()})
 
-    def is_itself(self) -> bool:
-        """Whether these values are this effect, not a look-alike of fewer parameters."""
+    def is_itself(self, vehicle: Vehicle) -> bool:
+        """Whether these values are this effect on this vehicle, not a look-alike of fewer parameters."""
         return True
 
     def actuate(self, time_s: Array, torque_nm: Array) -> Array:

@@ -11,6 +11,7 @@ from scenarios.effects.base import Effect, parameter
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import RoadTable
+    from trpac_core.vehicle import Vehicle
 
 LEAST_SPLIT = 0.01
 """Difference of the factors from which the sides differ [-]."""
@@ -48,7 +49,7 @@ class MuSplit(Effect):
         starts=(0.6, 1.0, 1.4),
     )
 
-    def is_itself(self) -> bool:
+    def is_itself(self, vehicle: Vehicle) -> bool:
         """Equal factors are no split."""
         return abs(self.left_factor - self.right_factor) >= LEAST_SPLIT
 

@@ -5,10 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter, share_of_axles
+import numpy as np
+
+from scenarios.effects.base import Effect, parameter, share_of_axles, share_of_sides
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
+    from trpac_core.vehicle import Vehicle
+
+LEAST_OFF = 0.25
+"""Share of the mean offset that each wheel's own is at least: where one is nearly right, not all wheels are off [-]."""
 
 
 @dataclass(frozen=True)
@@ -66,3 +72,44 @@ class WheelRadiusOffsetOfAxles(WheelRadiusOffset):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Each axle has its radius."""
         return parameters._replace(wheel_radius_m=self.radius_m, axle_radius_m=self.unlike * self.radius_m)
+
+
+@dataclass(frozen=True)
+class WheelRadiusOffsetOfWheels(WheelRadiusOffsetOfAxles):
+    """Each tyre has its own wear and pressure; `radius_m` is the mean."""
+
+    form = "each wheel its own"
+    equation = (
+        "R (1 + unlike +- front_sides) in front, R (1 - unlike +- rear_sides) in the rear, + on the left"
+    )
+
+    front_sides: float = share_of_sides("front", start=0.003, most=0.05)
+    rear_sides: float = share_of_sides("rear", start=0.003, most=0.05)
+
+    def is_itself(self, vehicle: Vehicle) -> bool:
+        """Of a single wrong wheel nobody says that the car's wheels are of another size."""
+        off_m = np.array(self.radii_m()) - vehicle.wheel_radius_m
+        return bool(np.all(off_m * np.sign(off_m.mean()) >= LEAST_OFF * abs(off_m.mean())))
+
+    def radii_m(self) -> tuple[float, float, float, float]:
+        """Rolling radii of the wheels fl, fr, rl, rr [m]."""
+        front, rear = 1.0 + self.unlike, 1.0 - self.unlike
+        shares = (
+            front + self.front_sides,
+            front - self.front_sides,
+            rear + self.rear_sides,
+            rear - self.rear_sides,
+        )
+        fl, fr, rl, rr = (self.radius_m * share for share in shares)
+        return fl, fr, rl, rr
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each wheel has its radius."""
+        return (
+            super()
+            .dynamics(parameters)
+            ._replace(
+                front_side_radius_m=self.front_sides * self.radius_m,
+                rear_side_radius_m=self.rear_sides * self.radius_m,
+            )
+        )

@@ -212,13 +212,20 @@ def _of_axle(i: int, mean: float, unlike: float) -> float:
     return mean + unlike if i < 2 else mean - unlike
 
 
+@inlined
+def _rolling_radius(i: int, p: DynamicsParameters) -> float:
+    """A wheel's own [m]; fl, fr, rl, rr."""
+    side_m = p.front_side_radius_m if i < 2 else p.rear_side_radius_m
+    return _of_axle(i, p.wheel_radius_m, p.axle_radius_m) + (side_m if i % 2 == 0 else -side_m)
+
+
 @compiled
 def initial_y(speed_m_s: float, position_m: float, p: DynamicsParameters) -> NDArray:
     """The state of a freely rolling car, shape (18,)."""
     y = np.zeros(STATES)
     y[POSITION], y[SPEED] = position_m, speed_m_s
     for i in range(4):
-        y[WHEEL + i] = speed_m_s / _of_axle(i, p.wheel_radius_m, p.axle_radius_m)
+        y[WHEEL + i] = speed_m_s / _rolling_radius(i, p)
     if p.motor_inertia_kg_m2 > 0.0:
         y[MOTOR : MOTOR + 4] = y[WHEEL : WHEEL + 4]
     return y
@@ -245,7 +252,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
         total_n = 0.0
         total_by_accel = 0.0
         for i in range(4):
-            radius_m = _of_axle(i, p.wheel_radius_m, p.axle_radius_m)
+            radius_m = _rolling_radius(i, p)
             rim = max(y[WHEEL + i], 0.0) * radius_m
             scale = max(rim, speed, FLOOR_SPEED_M_S)
             slip = abs(rim - speed) / scale
@@ -312,7 +319,7 @@ def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParamet
     resistance_n = wheels.force_n[i] + p.rolling_coefficient * wheels.load_n[i]
     inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2) - p.motor_inertia_kg_m2
     drag_nm = _of_axle(i, p.drag_torque_nm, p.axle_drag_torque_nm)
-    lever_m = _of_axle(i, p.wheel_radius_m, p.axle_radius_m) + p.lever_more_m
+    lever_m = _rolling_radius(i, p) + p.lever_more_m
     rate = (torque_nm - resistance_n * lever_m - drag_nm) / inertia
     return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
 
@@ -369,7 +376,7 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
     at = wheels.work
     for i in range(4):
         inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2)
-        lever_m = _of_axle(i, p.wheel_radius_m, p.axle_radius_m) + p.lever_more_m
+        lever_m = _rolling_radius(i, p) + p.lever_more_m
         per_newton = lever_m / inertia
         if p.motor_inertia_kg_m2 > 0.0:
             shaft = gh * (gh * p.shaft_stiffness_nm_rad + p.shaft_damping_nm_s_rad)

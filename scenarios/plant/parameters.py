@@ -70,6 +70,10 @@ class DynamicsParameters(NamedTuple):
     """What the forces' lever about the axle has more than the rolling radius [m]."""
     axle_radius_m: float = 0.0
     """What the front wheels' rolling radius has more than wheel_radius_m, and the rear wheels' less [m]."""
+    front_side_radius_m: float = 0.0
+    """What the front left wheel's rolling radius has more beside it, and the front right wheel's less [m]."""
+    rear_side_radius_m: float = 0.0
+    """The same of the rear wheels [m]."""
     motor_inertia_kg_m2: float = 0.0
     """The part of wheel_inertia_kg_m2 that turns with the motor, behind the shaft; 0: no shaft [kg m^2]."""
 
