@@ -204,3 +204,16 @@ def test_a_blurred_border_goes_straight_from_one_road_to_the_next():
     told = [details.friction(p, 0, at - p.front_arm, 20.0) for at in places]
     assert_allclose(told, [0.9, 0.9, 0.8, 0.7, 0.7, 0.6, 0.5, 0.5, 0.6, 0.8, 0.9], atol=1e-4)
     assert_allclose(details.friction(p, 3, 45.0 + p.rear_arm, 20.0), 0.8)
+
+
+def test_locked_wheels_feel_a_blurred_border_over_its_length():
+    road = Road((0.0, 30.0), (DRY, WET))
+    blurs = OUTSIDES[Family.EIGHTH]["road_borders_blurred"].apply(nominal(CAR, road), {"over_m": 16.0})
+    path = roll(blurs, 30.0, 2.5, -3000.0)[300:]
+    axles = [path[:, X] + CAR.wheelbase_m - CAR.cog_to_rear_axle_m, path[:, X] - CAR.cog_to_rear_axle_m]
+    share = [np.interp(at, [22.0, 38.0], [DRY, WET]) for at in axles]
+    front = CAR.cog_to_rear_axle_m / CAR.wheelbase_m
+    told = -0.79 * 9.81 * (front * share[0] + (1.0 - front) * share[1])
+    assert_allclose(path[:, N], told, rtol=2e-3)
+    assert path[-1, X] > 45.0
+    assert path[0, X] < 15.0

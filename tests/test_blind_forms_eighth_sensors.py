@@ -54,6 +54,7 @@ def test_a_counter_takes_two_windows_of_a_slow_wheel():
         path[:, ANGLE : ANGLE + 4] = np.arange(6001)[:, None] * 1e-3 * speed
         pulses = read(path, slow, at)[:, :4] * 96.0 * 0.02 / (2.0 * np.pi)
         assert_allclose(pulses / step, np.round(pulses / step), atol=1e-6)
+        assert np.any(np.abs(pulses - np.round(pulses)) > 0.4) == (step < 1.0)
         assert pulses.mean() == pytest.approx(speed * 96.0 * 0.02 / (2.0 * np.pi), rel=0.02)
     path[:, ANGLE : ANGLE + 4] = np.arange(6001)[:, None] * 1e-3 * 65.0
     assert_allclose(read(path, slow, at), read(path, fast, at))

@@ -12,7 +12,7 @@ from .world import Effect, Parameters, World
 
 def _unlike_sides(car: Car, rng: Generator) -> Scale:
     sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"left_more": sign * 0.03 * 12.0**severity}
+    return lambda severity: {"left_more": sign * 0.01 * 30.0**severity}
 
 
 def _vectored(world: World, given: Parameters) -> World:
@@ -25,7 +25,7 @@ def _vectored(world: World, given: Parameters) -> World:
 AND_BEYOND: dict[str, Effect] = {
     "torque_vectored": Effect(_unlike_sides, _vectored, ("powertrain",)),
     "road_borders_blurred": Effect(
-        growing("over_m", 3.0, 40.0), lambda w, g: w.moved(border_blur=g["over_m"]), ("road", "tyre")
+        growing("over_m", 1.0, 40.0), lambda w, g: w.moved(border_blur=g["over_m"]), ("road", "tyre")
     ),
     "wheel_speed_dies": Effect(
         growing("least_rad_s", 8.0, 40.0),
