@@ -135,7 +135,7 @@ def test_only_a_blamed_effect_is_right():
 
 
 def test_further_forms_are_told_apart():
-    effect = "load_transfer"
+    effect = "rolling_resistance"  # one that each family has more forms of
     forms = EFFECT_FORMS[effect]
     cases = [result("rich", {effect: {}}, answer("identified", cause(effect, 0.9))) for _ in forms]
     for case, form in zip(cases, forms, strict=True):

@@ -44,6 +44,10 @@ GRAVEL_M, GRAVEL_SHARE = 95.0, 0.2
 """From one stretch of loose gravel to the next [m], and the share of the road that has it."""
 WAKE_S, WEAVE_S = 10.0, 6.0
 """From one car ahead to the next; in which a car goes from side to side of its lane and back."""
+HUNT_S, QUEUE_S = 4.2, 2.6
+"""In which an estimate of a motor's flux goes to and fro once; from a queue that grows to the one that shrinks."""
+LASH_NM = 30.0
+"""Torque about which a motor goes through the play of its gears slowly."""
 MAP_NM = 100.0
 """Over which a torque map's error goes up and down between its points [N m]."""
 GRAIN_M = 78.0
@@ -54,6 +58,8 @@ USUAL_NM = 150.0
 """Torque that a gain is stated at where it changes with the torque [N m]."""
 RUB_RAD_S = 0.1
 """About which a joint's friction turns [rad/s]."""
+LASH_SHARE = 0.5 * np.sqrt(np.pi) * LASH_NM / USUAL_NM
+"""Mean of exp(-(T / `LASH_NM`)^2) over the torques from none to `USUAL_NM` [-]."""
 
 
 @njit(cache=True, inline="always")
@@ -129,6 +135,8 @@ def lag_of(p: Physics, wheel: int, turning: float, told: float, given: float) ->
         lag *= 1.0 + p.lag_rise * np.tanh((abs(told) - abs(given)) / SMALL_TORQUE_NM)
     if p.lag_load != 0.0:
         lag *= 1.0 + p.lag_load * (min(abs(told) / USUAL_NM, 2.0) - 1.0)
+    if p.lag_zero != 0.0:
+        lag *= 1.0 + p.lag_zero * (np.exp(-((given / LASH_NM) ** 2)) - LASH_SHARE)
     return lag
 
 
@@ -163,6 +171,17 @@ def stretched(depth: float, factor: float, at: float) -> float:
 
 
 @njit(cache=True)
+def blurred(p: Physics, mus: Array, at: float, k: int) -> float:
+    """A friction that goes straight from one segment's to the next one's, over a length about the border [-]."""
+    over = p.border_blur
+    if k > 0 and at - p.border[k] < 0.5 * over:
+        return mus[k - 1] + (mus[k] - mus[k - 1]) * (0.5 + (at - p.border[k]) / over)
+    if k < p.border.size - 1 and p.border[k + 1] - at < 0.5 * over:
+        return mus[k] + (mus[k + 1] - mus[k]) * (0.5 - (p.border[k + 1] - at) / over)
+    return mus[k]
+
+
+@njit(cache=True)
 def told_friction(p: Physics, wheel: int, position: float) -> float:
     """The road's friction under a wheel, as its file has it [-]."""
     at = position + (p.front_arm if wheel < 2 else -p.rear_arm)
@@ -180,6 +199,8 @@ def friction(p: Physics, wheel: int, position: float, speed: float, time: float 
     while k > 0 and p.border[k] > at:
         k -= 1
     mu = p.mu_left[k] if wheel % 2 == 0 else p.mu_right[k]
+    if p.border_blur > 0.0:
+        mu = blurred(p, p.mu_left if wheel % 2 == 0 else p.mu_right, at, k)
     factor = p.factor_left if wheel % 2 == 0 else p.factor_right
     if p.patch_depth > 0.0:
         factor = 1.0 + (factor - 1.0) * (1.0 + p.patch_depth * np.sin(2.0 * np.pi * at / PATCH_M))
@@ -195,6 +216,8 @@ def friction(p: Physics, wheel: int, position: float, speed: float, time: float 
         factor = 1.0 + (factor - 1.0) * (1.0 + p.grip_warm * warmth(time))
     if p.grip_sway != 0.0:
         factor = 1.0 + (factor - 1.0) * (1.0 + p.grip_sway * np.sin(2.0 * np.pi * time / WEAVE_S))
+    if p.grip_wet != 0.0:
+        factor = 1.0 + (factor - 1.0) * (1.0 + (p.grip_wet if mu < SLIPPERY else -p.grip_wet))
     if p.wet_fall > 0.0 and mu < SLIPPERY:
         factor *= max(1.0 - p.wet_fall * (speed / USUAL_M_S - 1.0), 0.4)
     return mu * factor
@@ -250,6 +273,15 @@ def stalled(duration: float, heard: float) -> float:
 
 
 @njit(cache=True)
+def queued(jump: float, heard: float, time: float) -> float:
+    """The time of what comes through a queue that now holds less, now more; the more it holds, the later [s]."""
+    cycle = np.floor(time / QUEUE_S)
+    if cycle % 2.0 == 0.0:
+        return heard + jump
+    return heard + max(-jump, cycle * QUEUE_S - time + jump)
+
+
+@njit(cache=True)
 def let_through(p: Physics, torque: float, slip: float) -> float:
     """What a slip controller leaves of a torque that makes a wheel slip [N m]."""
     if torque * slip <= 0.0:
@@ -265,6 +297,8 @@ def shaft_of(p: Physics, wheel: int, twist: float, rate: float) -> float:
         stiffness *= 1.0 + spread(p.shaft_axles, 0.0, wheel)
     if p.shaft_rise != 0.0:
         stiffness *= 1.0 + p.shaft_rise * (np.tanh(stiffness * abs(twist) / USUAL_NM) - 0.5)
+    if p.shaft_sign != 0.0:
+        stiffness *= 1.0 + p.shaft_sign * np.tanh(stiffness * twist / SMALL_TORQUE_NM)
     wound = twist - min(max(twist, -p.shaft_play), p.shaft_play)
     if p.shaft_play > 0.0 and wound == 0.0:
         return 0.0

@@ -14,10 +14,11 @@ from typing import Any
 
 from numpy.random import Generator
 
-from . import forms_fifth, forms_fourth, forms_second, forms_seventh, forms_sixth, forms_third
+from . import forms_eighth, forms_fifth, forms_fourth, forms_second, forms_seventh, forms_sixth, forms_third
 from .forms_second import Foreign
 from .library import LIBRARY
 from .outside import EVEN_FURTHER, FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
+from .outside_eighth import AND_BEYOND
 from .outside_seventh import BEYOND
 from .outside_sixth import LAST_FURTHER
 from .world import Effect
@@ -43,6 +44,8 @@ class Family(StrEnum):
     """The same once more."""
     SEVENTH = "seventh"
     """And again, of nearly everything."""
+    EIGHTH = "eighth"
+    """More of most."""
 
 
 def _joined(aspects: Aspects, more: Aspects) -> Aspects:
@@ -55,6 +58,7 @@ FOURTH: Aspects = _joined(THIRD, forms_fourth.MORE)
 FIFTH: Aspects = _joined(FOURTH, forms_fifth.MORE)
 SIXTH: Aspects = _joined(FIFTH, forms_sixth.MORE)
 SEVENTH: Aspects = _joined(SIXTH, forms_seventh.MORE)
+EIGHTH: Aspects = _joined(SEVENTH, forms_eighth.MORE)
 ASPECTS: dict[Family, Aspects] = {
     Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
     Family.SECOND: forms_second.ASPECTS,
@@ -63,11 +67,12 @@ ASPECTS: dict[Family, Aspects] = {
     Family.FIFTH: FIFTH,
     Family.SIXTH: SIXTH,
     Family.SEVENTH: SEVENTH,
+    Family.EIGHTH: EIGHTH,
 }
 """All that has forms in each family; what a family does not list has the library's form."""
-EFFECT_FORMS: Aspects = {name: forms for name, forms in SEVENTH.items() if name in LIBRARY}
-FOREIGN: dict[str, Foreign] = SEVENTH["foreign_tyre"]
-NOISES, DIGITS, STYLES = SEVENTH["noise"], SEVENTH["digits"], SEVENTH["driver"]
+EFFECT_FORMS: Aspects = {name: forms for name, forms in EIGHTH.items() if name in LIBRARY}
+FOREIGN: dict[str, Foreign] = EIGHTH["foreign_tyre"]
+NOISES, DIGITS, STYLES = EIGHTH["noise"], EIGHTH["digits"], EIGHTH["driver"]
 
 RATES_HZ: dict[Family, dict[float, float]] = {
     Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
@@ -121,6 +126,16 @@ RATES_HZ: dict[Family, dict[float, float]] = {
         850.0: 0.1,
         1000.0: 0.1,
     },
+    Family.EIGHTH: {
+        100.0: 0.15,
+        150.0: 0.1,
+        200.0: 0.2,
+        250.0: 0.1,
+        400.0: 0.15,
+        500.0: 0.1,
+        950.0: 0.1,
+        1000.0: 0.1,
+    },
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
@@ -147,6 +162,16 @@ OUTSIDES: dict[Family, dict[str, Effect]] = {
         **LAST_FURTHER,
         **BEYOND,
     },
+    Family.EIGHTH: {
+        **OUTSIDE,
+        **FURTHER,
+        **STILL_FURTHER,
+        **YET_FURTHER,
+        **EVEN_FURTHER,
+        **LAST_FURTHER,
+        **BEYOND,
+        **AND_BEYOND,
+    },
 }
 """Each family's deviations outside the library."""
 
@@ -161,7 +186,7 @@ def draw_forms(family: Family, rng: Generator) -> Forms:
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDES[Family.SEVENTH]}[name]
+    effect = {**LIBRARY, **OUTSIDES[Family.EIGHTH]}[name]
     return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
 
 

@@ -23,6 +23,7 @@ from .details import (
     SMALL_M_S2,
     SMALL_TORQUE_NM,
     USUAL_M_S,
+    USUAL_NM,
     coarse,
     crossed,
     drag_of,
@@ -161,6 +162,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             radius = radius_at(p, w, speed, y[ANGLE + w])
         if p.radius_warm != 0.0:
             radius += p.radius_warm * warmth(time)
+        if p.radius_load != 0.0:
+            radius += p.radius_load * (min(load / (0.25 * p.mass * GRAVITY), 2.0) - 1.0)
         rim = y[W + w] * radius
         slip = slips = slip_of(rim, speed)
         dy[SLIP + w] = 0.0
@@ -181,11 +184,18 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.falloff_time > 0.0:
             dy[RUB + w] = (rubbing - y[RUB + w]) / p.falloff_time
             rubbing = y[RUB + w]
+        slippery = (
+            told_friction(p, w, y[X]) < SLIPPERY if p.stiffness_wet != 0.0 or p.falloff_wet != 0.0 else False
+        )
+        if slippery:
+            rubbing *= 1.0 + p.falloff_wet
         stiffer = spread(p.stiffness_tilt, p.stiffness_side, w)
         if p.stiffness_warm != 0.0 or p.stiffness_speed != 0.0:
             stiffer += stiffened(p, time, speed)
         if p.stiffness_texture != 0.0:
             stiffer += p.stiffness_texture * coarse(y[X] + (p.front_arm if w < 2 else -p.rear_arm))
+        if slippery:
+            stiffer += p.stiffness_wet
         force = tyre_force(p, slip, rubbing, theta, load, y[HEAT + w], stiffer)
         if p.force_relaxation > 0.0:
             dy[SLIP + w] = (force - y[SLIP + w]) * max(abs(speed), FLOOR_M_S) / p.force_relaxation
@@ -208,6 +218,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             rolling *= rolling_of(p, w, y[X], speed, load / (0.25 * p.mass * GRAVITY))
         if p.roll_warm != 0.0:
             rolling *= 1.0 + p.roll_warm * warmth(time)
+        if p.roll_torque > 0.0:
+            rolling *= 1.0 + p.roll_torque * min((force * radius / USUAL_NM) ** 2, 4.0)
         resisting += rolling
         if p.gravel > 0.0:
             at = y[X] + (p.front_arm if w < 2 else -p.rear_arm)
@@ -229,7 +241,7 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.lag_sign != 0.0:
             lag *= 1.0 + p.lag_sign * np.tanh((told + y[LAG + w]) / SMALL_TORQUE_NM)
         unlike = p.lag_tilt != 0.0 or p.lag_speed != 0.0 or p.lag_side != 0.0
-        if unlike or p.lag_rise != 0.0 or p.lag_load != 0.0:
+        if unlike or p.lag_rise != 0.0 or p.lag_load != 0.0 or p.lag_zero != 0.0:
             lag *= lag_of(p, w, y[W + w], told, y[LAG + w])
         if p.actuator_play > 0.0:
             told -= min(max(told - y[LAG + w], -p.actuator_play), p.actuator_play)
@@ -254,7 +266,7 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.motor_inertia > 0.0:
             dy[TWIST + w] = y[MOTOR + w] - y[W + w]
             shaft = p.shaft_stiffness * y[TWIST + w] + p.shaft_damping * dy[TWIST + w]
-            unlike = p.shaft_tilt != 0.0 or p.shaft_axles != 0.0
+            unlike = p.shaft_tilt != 0.0 or p.shaft_axles != 0.0 or p.shaft_sign != 0.0
             if unlike or p.shaft_play > 0.0 or p.shaft_friction > 0.0 or p.shaft_rise != 0.0:
                 shaft = shaft_of(p, w, y[TWIST + w], dy[TWIST + w])
             dy[MOTOR + w] = (torque - shaft) / p.motor_inertia
@@ -267,6 +279,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         drag *= crossed(p.drag_cross, speed)
     if p.drag_wake > 0.0:
         drag *= in_wake(p.drag_wake, time)
+    if p.drag_power != 0.0:
+        drag *= (max(speed, FLOOR_M_S) / USUAL_M_S) ** p.drag_power
     total -= drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
     if p.gust_drag > 0.0:
         against = speed + on_grid(p.wind, time / COMMAND_STEP_S)

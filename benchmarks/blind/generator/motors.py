@@ -9,7 +9,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .commands import commanded, joined
-from .details import MAP_NM, SMALL_TORQUE_NM, WAIT_S, gain_of, spread, stalled, wait_of, warmth
+from .details import (
+    HUNT_S,
+    MAP_NM,
+    SMALL_TORQUE_NM,
+    WAIT_S,
+    gain_of,
+    queued,
+    spread,
+    stalled,
+    wait_of,
+    warmth,
+)
 from .physics import Physics
 
 Array = NDArray[np.floating[Any]]
@@ -30,6 +41,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         heard -= p.delay_turn * (2.0 * wheel / 3.0 - 1.0)
     if p.delay_sign != 0.0:
         heard += p.delay_sign * np.tanh(commanded(command, wheel, heard) / SMALL_TORQUE_NM)
+    if p.delay_jump > 0.0:
+        heard = queued(p.delay_jump, heard, time)
     if p.beat > 0.0:
         heard -= p.beat * (time / BEAT_S - np.floor(time / BEAT_S) - 0.5)
     if p.wait > 0.0:
@@ -64,6 +77,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_warm * warmth(time))
     if p.gain_map != 0.0:
         gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_map * np.sin(2.0 * np.pi * abs(torque) / MAP_NM))
+    if p.gain_sway != 0.0:
+        gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_sway * np.sin(2.0 * np.pi * time / HUNT_S))
     if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0 or p.gain_load != 0.0:
         return torque * gain_of(gain, p.gain_sign, p.gain_speed, p.pad_rise, p.gain_load, torque, turning)
     return torque * gain

@@ -30,6 +30,7 @@ class Physics(NamedTuple):
     radius_side: float
     radius_sides: float
     radius_warm: float
+    radius_load: float
     out_of_round: float
     lever: float
     inertia: float
@@ -44,6 +45,7 @@ class Physics(NamedTuple):
     stiffness_warm: float
     stiffness_speed: float
     stiffness_texture: float
+    stiffness_wet: float
     factor_left: float
     factor_right: float
     patch_depth: float
@@ -53,11 +55,13 @@ class Physics(NamedTuple):
     grip_speed: float
     grip_warm: float
     grip_sway: float
+    grip_wet: float
     wet_fall: float
     falloff: float
     falloff_floor: float
     falloff_curve: int
     falloff_time: float
+    falloff_wet: float
     relaxation: float
     relaxation_load: bool
     relaxation_shrinks: bool
@@ -79,6 +83,7 @@ class Physics(NamedTuple):
     drag_fast: float
     drag_cross: float
     drag_wake: float
+    drag_power: float
     lift: float
     gust_drag: float
     wind: Array
@@ -92,6 +97,7 @@ class Physics(NamedTuple):
     roll_side: float
     roll_load: float
     roll_warm: float
+    roll_torque: float
     gravel: float
     slush: float
     brake_drag: float
@@ -108,6 +114,7 @@ class Physics(NamedTuple):
     delay_tilt: float
     delay_sign: float
     delay_turn: float
+    delay_jump: float
     message: float
     message_joined: bool
     message_lost: float
@@ -124,6 +131,7 @@ class Physics(NamedTuple):
     lag_speed: float
     lag_load: float
     lag_direct: float
+    lag_zero: float
     actuator_play: float
     slew: float
     gain: Array
@@ -132,6 +140,7 @@ class Physics(NamedTuple):
     gain_load: float
     gain_warm: float
     gain_map: float
+    gain_sway: float
     axle_share: float
     axle_split: float
     axle_viscous: float
@@ -153,9 +162,11 @@ class Physics(NamedTuple):
     shaft_axles: float
     shaft_friction: float
     shaft_rise: float
+    shaft_sign: float
     motor_inertia: float
     slosh_share: float
     slosh_rate: float
     border: Array
+    border_blur: float
     mu_left: Array
     mu_right: Array

@@ -12,6 +12,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from .counting import count
 from .details import GRAIN_M, USUAL_M_S, USUAL_RAD_S, WAIT_S, WARM_S
 from .kernel import ANGLE, COMMAND_STEP_S, MOTOR, RECORD_STEP_S, N, V, W, X
 from .signals import (
@@ -24,6 +25,7 @@ from .signals import (
     mean,
     mean_age,
     paced,
+    played,
     sent,
     slow,
     wait,
@@ -36,8 +38,10 @@ NODDING_S, MOST_NODDING = 0.1, 0.4
 """How late a body pitches, and by how much that changes a scale's deviation at most [-]."""
 MEMORY_S, MEMORY_M_S2 = 1.5, 1.0
 """How long a sensor remembers where it was bent to, and from what acceleration on."""
-SHAKE_HZ = 12.7
-"""Of a wheel that hops on its tyre."""
+AIRED_S = 6.0
+"""In which the air stream's cooling tells on a sensor."""
+TABLE_M_S = 20.0 / 3.6
+"""Over which a calibration's error goes up and down between its points."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,8 @@ class Sensors:
     wheel_beat_s: float = 0.0
     wheel_wait_s: float = 0.0
     wheel_filter_s: float = 0.0
+    wheel_filter_twice: bool = False
+    """The low pass comes twice."""
     wheel_lost: float = 0.0
     wheel_turn_s: float = 0.0
     """By how much the last wheel's reading is older than on average, and the first one's younger."""
@@ -78,6 +84,8 @@ class Sensors:
     """All wheels are counted over the same windows."""
     wheel_window_parts: float = 1
     """How many windows overlap: a new one ends that often in the time of one. A half: every second one is told."""
+    wheel_window_slow: float = 0.0
+    """Share of the usual pulses of a window, below which those of the window before count too."""
     wheel_flanks: float = 0.0
     """By which every second flank comes late [teeth]."""
     wheel_window_jitter: float = 0.0
@@ -88,6 +96,8 @@ class Sensors:
     """By how much the sensor moves along the teeth as the wheel hops [teeth]."""
     wheel_uneven: float = 0.0
     """How far the teeth lie off their places, over a turn [teeth]."""
+    wheel_least_rad_s: float = 0.0
+    """Below which a wheel is told to stand: the sensor's signal is too small."""
     wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     wheel_radius_m: float = 0.0
     """Where a speed is taken from the wheels [m]."""
@@ -124,6 +134,10 @@ class Sensors:
     """By which it differs from one lock to the next [-]."""
     speed_scale_wander: float = 0.0
     """By which it differs over `SLOW_S` [-]."""
+    speed_scale_table: float = 0.0
+    """By which it differs between a calibration's points, `TABLE_M_S` apart [-]."""
+    speed_play_m_s: float = 0.0
+    """How far the speed has to change, either way, before what is told follows."""
     speed_rate_m_s2: float = np.inf
     """As fast as the told speed may change."""
     speed_step_m_s: float = 0.0
@@ -144,6 +158,10 @@ class Sensors:
     """By which the bias differs on a coarse road's stretches [-]."""
     accel_bias_memory: float = 0.0
     """By which the bias differs after the one direction and the other [-]."""
+    accel_bias_aired: float = 0.0
+    """By which the bias is less at double `USUAL_M_S`, after `AIRED_S` [-]."""
+    accel_step_m_s2: float = 0.0
+    """In which the acceleration is told, to the nearest."""
     accel_bend_s2_m: float = 0.0
     """What the reading's square adds to it [1/(m/s^2)]."""
     accel_delay_s: float = 0.0
@@ -213,7 +231,10 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     wheel_phase, speed_phase, *turns = np.random.default_rng([sensors.seed, 12]).uniform(0.0, 1.0, 6)
     waits = np.random.default_rng([sensors.seed, 13]).uniform(-0.5, 0.5, (2, int(record[-1] / WAIT_S) + 2))
     wheel_at: Array = time_s - sensors.wheel_delay_s - beat(time_s, sensors.wheel_beat_s, wheel_phase)
-    wheel_at = wheel_at + mean_age(sensors.wheel_filter_s) - wait(time_s, sensors.wheel_wait_s, waits[0])
+    filters = 2.0 if sensors.wheel_filter_twice else 1.0
+    wheel_at = (
+        wheel_at + filters * mean_age(sensors.wheel_filter_s) - wait(time_s, sensors.wheel_wait_s, waits[0])
+    )
     if sensors.wheel_queue_s > 0.0:
         late = sensors.wheel_queue_s * jumping(time_s, sensors.seed)
         wheel_at = np.maximum.accumulate(wheel_at - late)
@@ -237,9 +258,11 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
             pace = paced(np.interp(time_s, record, path[:, W + w]), USUAL_RAD_S)
             wheel_at = asked - sensors.wheel_paced_s * pace
         if sensors.wheel_window_s > 0.0:
-            wheel = _count(record, path[:, ANGLE + w], sensors, wheel_at, rng, wheel_phase)
+            wheel = count(record, path[:, ANGLE + w], sensors, wheel_at, rng, wheel_phase)
         else:
             turning = lag(path[:, (MOTOR if sensors.wheel_at_motor else W) + w], sensors.wheel_filter_s)
+            if sensors.wheel_filter_twice:
+                turning = lag(turning, sensors.wheel_filter_s)
             turning = hold(turning, sensors.wheel_hold_s, np.random.default_rng([sensors.seed, 17]))
             if sensors.wheel_joined:
                 turning = joined(record, turning, sensors.wheel_message_s, wheel_phase)
@@ -248,12 +271,16 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
             angle = np.interp(wheel_at, record, path[:, ANGLE + w])
             wheel = wheel * (1.0 + sensors.wheel_runout * np.cos(angle + 2.0 * np.pi * turns[w]))
         out[:, w] = wheel * sensors.wheel_scale[w]
+        if sensors.wheel_least_rad_s > 0.0:
+            out[out[:, w] < sensors.wheel_least_rad_s, w] = 0.0
     speed = path[:, V]
     if sensors.speed_rolling > 0.0:
         rolled = path[:, W : W + 4].mean(axis=1) * sensors.wheel_radius_m
         speed = speed + sensors.speed_rolling * (rolled - speed)
     if sensors.speed_ahead_s > 0.0:
         speed = speed + sensors.speed_ahead_s * path[:, N]
+    if sensors.speed_play_m_s > 0.0:
+        speed = played(speed, sensors.speed_play_m_s)
     if np.isfinite(sensors.speed_rate_m_s2):
         speed = limited(speed, sensors.speed_rate_m_s2)
     speed = hold(lag(speed, sensors.speed_lag_s + sensors.speed_filter_s), sensors.speed_hold_s, rng)
@@ -279,10 +306,15 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     if sensors.accel_bias_memory > 0.0:
         bent = lag(np.tanh(path[:, N] / MEMORY_M_S2), MEMORY_S)
         bias = bias * (1.0 + sensors.accel_bias_memory * np.interp(time_s, record, bent))
+    if sensors.accel_bias_aired != 0.0:
+        aired = np.interp(time_s, record, lag(path[:, V], AIRED_S)) / USUAL_M_S - 1.0
+        bias = bias * (1.0 - sensors.accel_bias_aired * aired)
     if sensors.accel_bend_s2_m != 0.0:
         accel = accel + sensors.accel_bend_s2_m * accel * accel
     shown = sensors.accel_scale * np.interp(time_s - sensors.accel_delay_s, record, accel) + bias
     out[:, 5] = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
+    if sensors.accel_step_m_s2 > 0.0:
+        out[:, 5] = np.round(out[:, 5] / sensors.accel_step_m_s2) * sensors.accel_step_m_s2
     return out
 
 
@@ -290,7 +322,7 @@ def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float 
     """Of the vehicle speed, whose deviation may differ with time, speed and pitch [-]."""
     differs = (sensors.speed_sway, sensors.speed_scale_growth, sensors.speed_scale_pitch)
     places = (sensors.speed_scale_grain, sensors.speed_scale_warming, sensors.speed_scale_jumps)
-    if not any((*differs, *places, sensors.speed_scale_wander)):
+    if not any((*differs, *places, sensors.speed_scale_wander, sensors.speed_scale_table)):
         return sensors.speed_scale
     sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
     sway = sway + sensors.speed_scale_growth * (speed / USUAL_M_S - 1.0)
@@ -306,6 +338,8 @@ def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float 
         sway = sway + sensors.speed_scale_jumps * jumping(time_s, sensors.seed)
     if sensors.speed_scale_wander > 0.0:
         sway = sway + sensors.speed_scale_wander * slow(time_s, sensors.seed)
+    if sensors.speed_scale_table > 0.0:
+        sway = sway + sensors.speed_scale_table * np.sin(2.0 * np.pi * speed / TABLE_M_S)
     return 1.0 + (sensors.speed_scale - 1.0) * sway
 
 
@@ -313,41 +347,6 @@ def _coarse(path: Array, time_s: Array) -> Array:
     """1 on a coarse road's stretches and -1 between them [-]."""
     place = np.interp(time_s, np.arange(len(path)) * RECORD_STEP_S, path[:, X])
     return np.asarray(np.tanh(4.0 * np.sin(2.0 * np.pi * place / GRAIN_M)))
-
-
-def _count(
-    record: Array, angle: Array, sensors: Sensors, time_s: Array, rng: Generator, shared: float
-) -> Array:
-    """Speed from the pulses of each finished window [rad/s]; a wheel that was rolling before the record began."""
-    teeth, window = sensors.wheel_teeth, sensors.wheel_window_s
-    phase, first = rng.uniform(0.0, 1.0), rng.uniform(0.0, window)
-    if sensors.wheel_window_shared:
-        first = shared * window
-    every = window / sensors.wheel_window_parts
-    ends = time_s if sensors.wheel_window_runs else np.floor((time_s - first) / every) * every + first
-    begins = ends - window
-    if sensors.wheel_window_jitter > 0.0:
-        sooner = -sensors.wheel_window_jitter * window * rng.uniform(size=int(record[-1] / window) + 4)
-        number = np.round((ends - first) / window).astype(int) + 2
-        begins, ends = begins + sooner[number - 1], ends + sooner[number]
-    scatter = sensors.wheel_scatter * rng.standard_normal(int(teeth)) if sensors.wheel_scatter > 0.0 else None
-    before = np.gradient(angle[:3], RECORD_STEP_S)[0]
-
-    def pulses(at: Array) -> Array:
-        turned = np.interp(at, record, angle) + before * np.minimum(at, 0.0)
-        passed = turned * teeth / (2.0 * np.pi) + phase
-        if sensors.wheel_uneven > 0.0:
-            passed = passed + sensors.wheel_uneven * np.sin(turned + 2.0 * np.pi * phase)
-        if sensors.wheel_shakes > 0.0:
-            passed = passed + sensors.wheel_shakes * np.sin(2.0 * np.pi * (SHAKE_HZ * at + phase))
-        if sensors.wheel_flanks > 0.0:
-            return np.floor(0.5 * passed) + np.floor(0.5 * (passed - 1.0 - sensors.wheel_flanks)) + 1.0
-        if scatter is not None:
-            tooth = np.floor(passed)
-            return tooth + (passed - tooth > 0.5 + scatter[tooth.astype(int) % scatter.size])
-        return np.floor(passed)
-
-    return (pulses(ends) - pulses(begins)) * 2.0 * np.pi / (teeth * window)
 
 
 def noise_of(noise: Noise, time_s: Array, rng: Generator) -> Array:

@@ -108,6 +108,15 @@ def limited(signal: Array, rate: float) -> Array:
     return out
 
 
+@njit(cache=True)
+def played(signal: Array, play: float) -> Array:
+    """A record that follows only when it is `play` behind, either way."""
+    out = signal.copy()
+    for i in range(1, out.size):
+        out[i] = min(max(out[i - 1], signal[i] - play), signal[i] + play)
+    return out
+
+
 def hold(signal: Array, duration_s: float, rng: Generator) -> Array:
     """Dropouts: every second or two the last value stands for `duration_s`."""
     if duration_s == 0.0:

@@ -8,13 +8,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .tyre_eighth import bristles, composite
+
 Array = NDArray[np.floating[Any]]
 
 THETA_GRID = np.linspace(0.02, 1.5, 75)
 MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING, CUBED, HYPERBOLIC_TANGENT = range(
     9
 )
-BLENDED, TWO_LINES, PLAIN_DUGOFF, SINE_RISE, ARCTANGENT = range(9, 14)
+BLENDED, TWO_LINES, PLAIN_DUGOFF, SINE_RISE, ARCTANGENT, BRISTLES, COMPOSITE = range(9, 16)
 """Codes of the foreign curves."""
 
 
@@ -363,6 +365,10 @@ def foreign(curve: int, slip: float, slope: float, peak: float, first: float, se
         return sine_rise(slip, slope, peak, first)
     if curve == ARCTANGENT:
         return arctangent(slip, slope, peak)
+    if curve == BRISTLES:
+        return bristles(slip, slope, peak)
+    if curve == COMPOSITE:
+        return composite(slip, slope, peak, first)
     return magic(slip, slope, peak, first, second)
 
 

@@ -54,7 +54,7 @@ class World:
         wheel = p.radius**2 / lightest + 4.0 / p.mass
         stiffness = max(p.stiffness_drive, p.stiffness_brake) + abs(p.stiffness_load) + abs(p.stiffness_tilt)
         stiffness += abs(p.stiffness_side) + abs(p.stiffness_warm) + abs(p.stiffness_speed)
-        stiffness += abs(p.stiffness_texture)
+        stiffness += abs(p.stiffness_texture) + abs(p.stiffness_wet)
         rate = 1.27 * stiffness * wheel / FLOOR_M_S
         return max(3, int(np.ceil(rate * RECORD_STEP_S / 2.0)))
 
@@ -105,6 +105,7 @@ def nominal(car: Car, road: Road) -> World:
             radius_side=0.0,
             radius_sides=0.0,
             radius_warm=0.0,
+            radius_load=0.0,
             out_of_round=0.0,
             lever=1.0,
             inertia=car.wheel_inertia_kg_m2,
@@ -119,6 +120,7 @@ def nominal(car: Car, road: Road) -> World:
             stiffness_warm=0.0,
             stiffness_speed=0.0,
             stiffness_texture=0.0,
+            stiffness_wet=0.0,
             factor_left=1.0,
             factor_right=1.0,
             patch_depth=0.0,
@@ -128,11 +130,13 @@ def nominal(car: Car, road: Road) -> World:
             grip_speed=0.0,
             grip_warm=0.0,
             grip_sway=0.0,
+            grip_wet=0.0,
             wet_fall=0.0,
             falloff=0.0,
             falloff_floor=1.0,
             falloff_curve=EXPONENTIAL,
             falloff_time=0.0,
+            falloff_wet=0.0,
             relaxation=0.0,
             relaxation_load=False,
             relaxation_shrinks=False,
@@ -154,6 +158,7 @@ def nominal(car: Car, road: Road) -> World:
             drag_fast=0.0,
             drag_cross=0.0,
             drag_wake=0.0,
+            drag_power=0.0,
             lift=0.0,
             gust_drag=0.0,
             wind=np.zeros(2),
@@ -167,6 +172,7 @@ def nominal(car: Car, road: Road) -> World:
             roll_side=0.0,
             roll_load=0.0,
             roll_warm=0.0,
+            roll_torque=0.0,
             gravel=0.0,
             slush=0.0,
             brake_drag=0.0,
@@ -183,6 +189,7 @@ def nominal(car: Car, road: Road) -> World:
             delay_tilt=0.0,
             delay_sign=0.0,
             delay_turn=0.0,
+            delay_jump=0.0,
             message=0.0,
             message_joined=False,
             message_lost=0.0,
@@ -199,6 +206,7 @@ def nominal(car: Car, road: Road) -> World:
             lag_speed=0.0,
             lag_load=0.0,
             lag_direct=0.0,
+            lag_zero=0.0,
             actuator_play=0.0,
             slew=0.0,
             gain=np.ones(4),
@@ -207,6 +215,7 @@ def nominal(car: Car, road: Road) -> World:
             gain_load=0.0,
             gain_warm=0.0,
             gain_map=0.0,
+            gain_sway=0.0,
             axle_share=0.0,
             axle_split=0.0,
             axle_viscous=0.0,
@@ -228,10 +237,12 @@ def nominal(car: Car, road: Road) -> World:
             shaft_axles=0.0,
             shaft_friction=0.0,
             shaft_rise=0.0,
+            shaft_sign=0.0,
             motor_inertia=0.0,
             slosh_share=0.0,
             slosh_rate=1.0,
             border=np.array(road.start_m),
+            border_blur=0.0,
             mu_left=np.array(road.mu),
             mu_right=np.array(road.mu),
         )
