@@ -7,6 +7,7 @@ from gap_drives import BARE, MODEL, SIGMA, STEP_S, clean, noisy, pulses, random_
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip
+from scenarios.effects.wheel_radius_offset import WheelRadiusOffsetOfWheels
 from scenarios.plant import dynamics
 from scenarios.plant.pipeline import make_setup
 from sim2real.contest import first_round, hold_contest
@@ -51,6 +52,27 @@ def test_the_form_that_the_car_has_is_the_one_that_is_told(effect):
     (name,) = (p.name for p in effect.parameters())
     assert x[0] == pytest.approx(getattr(effect, name), rel=0.1)
     assert type(found.added()[0]) is type(effect)
+
+
+@pytest.mark.parametrize(
+    ("shares", "verdict"),
+    [
+        ((0.012, 0.020, 0.008, 0.016), Verdict.IDENTIFIED),
+        ((0.0, 0.0, 0.02, 0.0), Verdict.UNKNOWN),
+    ],
+)
+def test_wheels_of_a_size_each_are_found_and_one_wrong_wheel_is_no_car_on_other_wheels(shares, verdict):
+    radius_m = MODEL.vehicle.wheel_radius_m
+    fl, fr, rl, rr = (1.0 + share for share in shares)
+    mean = (fl + fr + rl + rr) / 4.0
+    sides = ((fl + fr - 2.0 * mean) / (2.0 * mean), (fl - fr) / (2.0 * mean), (rl - rr) / (2.0 * mean))
+    effect = WheelRadiusOffsetOfWheels(radius_m * mean, *sides)
+    logs = [driven_by(effect, pulses(8.0), v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
+    found = find(MODEL, logs[:1], logs[1], exclude=only(effect.id, "vehicle_speed_scale", "mass_offset"))
+    assert found.decision.verdict is verdict
+    if verdict is Verdict.IDENTIFIED:
+        (told,) = found.added()
+        np.testing.assert_allclose(told.radii_m(), effect.radii_m(), rtol=5e-4)
 
 
 def test_each_effect_enters_the_contest_once():
