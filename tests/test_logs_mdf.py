@@ -131,6 +131,33 @@ def test_channels_that_are_no_signal(tmp_path, frame, samples, options, expected
         read_log(path)
 
 
+def converted(path, frame, formula):
+    """A log whose speed is the converted value of a channel that holds half of it."""
+    half = Signal(
+        0.5 * frame["vehicle_speed_m_s"].to_numpy(),
+        frame["time_s"].to_numpy(),
+        name="vehicle_speed_m_s",
+        conversion={"formula": formula},
+    )
+    return save_groups(path, signals(frame, drop=["vehicle_speed_m_s"]), [half])
+
+
+def test_a_formula_of_numbers_is_evaluated(tmp_path, frame):
+    log = read_log(converted(tmp_path / "log.mf4", frame, "2 * X1 + 0 * sqrt(X1)"))
+    assert log.signals["vehicle_speed_m_s"] == pytest.approx(frame["vehicle_speed_m_s"], rel=1e-12)
+
+
+def test_a_formula_is_never_run_as_a_program(tmp_path, capfd, frame):
+    mark = tmp_path / "run"
+    formula = f"__import__('pathlib').Path({str(mark)!r}).touch() or 2 * X1"
+    with pytest.raises(
+        LogError, match=r"log\.mf4: cannot be read as MDF \(the formula .* is not one of numbers"
+    ):
+        read_log(converted(tmp_path / "log.mf4", frame, formula))
+    assert not mark.exists()
+    assert capfd.readouterr().err == ""
+
+
 def test_samples_are_numbered(tmp_path, frame):
     frame.loc[7, "accel_x_m_s2"] = np.inf
     with pytest.raises(LogError, match="column accel_x_m_s2: sample 8 is infinite"):
