@@ -21,7 +21,8 @@ demo: $(READY)   ## build the unit, drive it over the paper's road, write out/de
 	$(BIN)/python build_fmu.py --out dist
 	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo
 
-test: export OPENBLAS_NUM_THREADS = 1  # a worker for each core: their threads would wait for each other's
+# Two workers on two cores: the threads of one's matrix products would wait for the other's.
+test: export OPENBLAS_NUM_THREADS = 1
 test: $(READY) check  ## lint, types and the whole test suite
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
