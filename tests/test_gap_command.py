@@ -1,6 +1,7 @@
 """`trpac gap`: what the commands take, say, write and refuse; and the demonstration's cases."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -311,6 +312,16 @@ class TestDemo:
 
 
 @pytest.mark.e2e
+@pytest.mark.parametrize(("wish", "given"), [(None, "1"), ("3", "3")])
+def test_matrix_products_take_one_thread_unless_the_user_says_otherwise(wish, given):
+    """Said before NumPy is loaded, which reads it once."""
+    code = "import os, sys, trpac_cli; print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules)"
+    rest = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    env = rest | ({"OPENBLAS_NUM_THREADS": wish} if wish else {})
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env)
+    assert said.stdout.split() == [given, "False"]
+
+
 def test_the_demonstration_as_a_newcomer_runs_it(tmp_path):
     """The real command in a process of its own; right first, as all but few seeds are."""
     command = [
