@@ -48,8 +48,8 @@ PAIR_LOSS = 0.7
 """Share of the best effect's loss that a pair may leave in its place [-]."""
 PAIR_MISFIT = 1.4
 """Up to this misfit a pair explains everything: two effects bend to much, so that more is asked of them [-]."""
-PAIR_SHARE = 0.06
-"""As `EXPLAINED_SHARE`, for a pair [-]."""
+PAIR_SHARE, PAIR_MOST = 0.06, 6.0
+"""As `EXPLAINED_SHARE` and `EXPLAINED_MOST`, for a pair: two inexact forms leave more than one [-]."""
 MAJOR = 0.5
 """An effect that a structural difference stands beside takes alone at least this share of what both take [-]."""
 RIVAL = 0.1
@@ -135,7 +135,7 @@ def explains(after: Fitness, before: Fitness) -> bool:
 
 def pair_explains(after: Fitness, before: Fitness) -> bool:
     """The same of two effects."""
-    return after.misfit < max(PAIR_MISFIT, PAIR_SHARE * before.misfit)
+    return after.misfit < max(PAIR_MISFIT, min(PAIR_SHARE * before.misfit, PAIR_MOST))
 
 
 def allowed(before: Fitness) -> float:

@@ -31,6 +31,7 @@ from sim2real.selection import (
     EXPLAINED_MOST,
     EXPLAINED_SHARE,
     PAIR_MISFIT,
+    PAIR_MOST,
     PAIR_SHARE,
     Fitness,
     decide,
@@ -390,8 +391,8 @@ def test_two_effects_explain_less_easily_than_one():
     def fit_as(value):
         return Fitness(value, {})
 
-    for before in (2.0, 20.0, 500.0):
-        most = max(PAIR_MISFIT, PAIR_SHARE * before)
+    for before in (2.0, 50.0, 500.0):
+        most = max(PAIR_MISFIT, min(PAIR_SHARE * before, PAIR_MOST))
         assert pair_explains(fit_as(0.99 * most), fit_as(before))
         assert not pair_explains(fit_as(1.01 * most), fit_as(before))
     assert explains(fit_as(2.4), fit_as(20.0))
