@@ -132,6 +132,8 @@ class Contest:
         The model as it is.
     singles, pairs : tuple of Entry
         See `sim2real.pairs` for the latter.
+    forms : tuple of Entry
+        Single effects in the forms that do worse than the one among `singles`.
     partners : tuple of (float, str)
         What a second effect beside the best single one promises to leave of the fit logs [loss], best first.
     twins : tuple of Entry
@@ -155,6 +157,7 @@ class Contest:
     null: Entry
     singles: tuple[Entry, ...]
     pairs: tuple[Entry, ...] = ()
+    forms: tuple[Entry, ...] = ()
     partners: tuple[tuple[float, str], ...] = ()
     twins: tuple[Entry, ...] = ()
     structured: tuple[Entry, ...] = ()
@@ -189,9 +192,11 @@ def hold_contest(
     ]
     best: dict[tuple[str, ...], Entry] = {}
     entries = filter(is_proper, run_all(work, jobs, progress, "effects"))
-    for entry in sorted(entries, key=lambda e: e.loss * (1.0 + PRICE * e.size)):
+    ranked = sorted(entries, key=lambda e: e.loss * (1.0 + PRICE * e.size))
+    for entry in ranked:
         best.setdefault(entry.ids, entry)
-    return Contest(null, tuple(best.values()))
+    others = (entry for entry in ranked if best[entry.ids] is not entry)
+    return Contest(null, tuple(best.values()), forms=tuple(others))
 
 
 def is_proper(entry: Entry) -> bool:

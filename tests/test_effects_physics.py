@@ -228,10 +228,15 @@ def test_mu_split_gives_each_side_its_own_friction():
     assert used[[1, 3]] == pytest.approx(-LOCKED * 1.1 * 0.3, rel=1e-6)
 
 
-def test_friction_falls_with_sliding_speed_along_a_locked_stop():
-    run = drive(car_with(friction_falloff={"falloff_s_m": 0.1, "floor": 0.4}), -2500.0, 6.0, 20.0)
+@pytest.mark.parametrize(
+    ("form", "share"),
+    [("exponential", lambda fallen: np.exp(-fallen)), ("hyperbolic", lambda fallen: 1.0 / (1.0 + fallen))],
+)
+def test_friction_falls_with_sliding_speed_along_a_locked_stop(form, share):
+    car = car_with({"friction_falloff": form}, friction_falloff={"falloff_s_m": 0.1, "floor": 0.4})
+    run = drive(car, -2500.0, 6.0, 20.0)
     locked = (run.wheel_speed_rad_s == 0.0).all(axis=1) & (run.speed_m_s > 0.1)
-    theta = 0.9 * (0.4 + 0.6 * np.exp(-0.1 * run.speed_m_s[locked]))
+    theta = 0.9 * (0.4 + 0.6 * share(0.1 * run.speed_m_s[locked]))
     assert locked.sum() > 1500
     assert run.accel_x_m_s2[locked] == pytest.approx(-LOCKED * theta * G, rel=1e-6)
     assert np.ptp(theta) > 0.15

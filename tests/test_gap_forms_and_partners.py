@@ -1,8 +1,22 @@
 """Forms of an effect, noise read anew, partners of the best effect, a sensor that stands alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from gap_drives import BARE, MODEL, SIGMA, STEP_S, clean, noisy, pulses, random_drives, remeasured, road_of
+from gap_drives import (
+    BARE,
+    MODEL,
+    SIGMA,
+    STEP_S,
+    clean,
+    noisy,
+    pulses,
+    random_drives,
+    remeasured,
+    road_of,
+    trace,
+)
 
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.rolling_resistance import RollingResistanceForce
@@ -10,10 +24,11 @@ from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip
 from scenarios.effects.wheel_radius_offset import WheelRadiusOffsetOfWheels
 from scenarios.plant import dynamics
 from scenarios.plant.pipeline import make_setup
-from sim2real.contest import first_round, hold_contest
+from sim2real.contest import first_round, hold_contest, silent
 from sim2real.diagnose import diagnose, find
 from sim2real.drive import ACCEL, SPEED, WHEEL
 from sim2real.evidence import Evidence, gather
+from sim2real.findings import _joint, describe
 from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
 from sim2real.pairs import add_pairs, add_partners
@@ -78,12 +93,36 @@ def test_wheels_of_a_size_each_are_found_and_one_wrong_wheel_is_no_car_on_other_
 def test_each_effect_enters_the_contest_once():
     held = gather(MODEL, random_drives({}, count=1, seed=3, duration_s=5.0))
     first = first_round(MODEL, held, only("rolling_resistance", "tyre_relaxation", "mass_offset"))
-    found = hold_contest(MODEL, held, held, first).singles
-    assert sorted(e.ids[0] for e in found) == [
+    contest = hold_contest(MODEL, held, held, first)
+    assert sorted(e.ids[0] for e in contest.singles) == [
         "mass_offset",
         "rolling_resistance",
         "tyre_relaxation",
     ]
+    tried = len({(f.candidate.ids, f.candidate.forms) for f in first})
+    assert len(contest.singles) + len(contest.forms) == tried
+
+
+def test_an_interval_holds_those_of_all_forms_that_do_as_well():
+    """A hard stop tells the fall's two shapes apart; a log that does not is made of one's residuals for both."""
+    fall = {"friction_falloff": {"falloff_s_m": 0.15, "floor": 0.5}}
+    torque = trace((0.0, -1200.0), (0.4, 0.0), (1.0, -1500.0), (1.5, 0.0), duration_s=3.0)
+    logs = [noisy(clean(torque, v0, SLIPPERY, effects=fall), seed) for seed, v0 in enumerate((12.0, 14.0))]
+    found = find(MODEL, logs[:1], logs[1], exclude=only("friction_falloff"))
+    (best,), (other,) = found.contest.singles, found.contest.forms
+    assert best.fitted.candidate.kinds[0].form == "exponential"
+
+    def told(contest):
+        return describe(replace(found, contest=contest), seed=0, jobs=1, progress=silent).causes[0].parameters
+
+    alone, there = ({name: said for (_, name), said in _joint(found, e).items()} for e in (best, other))
+    assert told(found.contest) == alone
+    alike = told(replace(found.contest, forms=(replace(other, z_fit=best.z_fit, z_hold=best.z_hold),)))
+    for name, said in alike.items():
+        assert said.value == alone[name].value
+        assert said.low == min(alone[name].low, there[name].low)
+        assert said.high == max(alone[name].high, there[name].high)
+    assert alike != alone
 
 
 def test_forms_differ_in_name_and_share_id_and_begin_with_the_same_parameters():

@@ -14,7 +14,7 @@ from scenarios.effects.camera_pitch import CameraPitch
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
 from scenarios.effects.driveline_compliance import DrivelineCompliance
 from scenarios.effects.exposure_shift import ExposureShift
-from scenarios.effects.friction_falloff import FrictionFalloff
+from scenarios.effects.friction_falloff import FrictionFalloff, FrictionFalloffHyperbolic
 from scenarios.effects.friction_offset import FrictionOffset
 from scenarios.effects.load_transfer import LoadTransfer
 from scenarios.effects.mass_offset import MassOffset, MassOffsetPlaced
@@ -107,6 +107,7 @@ OTHER_FORMS = (
     TyreRelaxationOfSlip,
     TyreRelaxationWithLoad,
     TyreRelaxationWhileItAdheres,
+    FrictionFalloffHyperbolic,
 )
 FORMS: dict[str, tuple[type[Effect], ...]] = {
     key: (effect, *(other for other in OTHER_FORMS if other.id == key)) for key, effect in EFFECTS.items()

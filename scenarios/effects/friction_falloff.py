@@ -16,6 +16,7 @@ class FrictionFalloff(Effect):
     """Adhesion falls exponentially with the tyre's sliding speed, towards a floor."""
 
     id = "friction_falloff"
+    form = "exponential"
     stage = "dynamics"
     subsystem = "tyre"
     equation = "theta_eff = theta (floor + (1 - floor) exp(-falloff abs(omega R - v)))"
@@ -45,3 +46,18 @@ class FrictionFalloff(Effect):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Each wheel's adhesion falls with its own sliding speed."""
         return parameters._replace(falloff_s_m=self.falloff_s_m, falloff_floor=self.floor)
+
+
+@dataclass(frozen=True)
+class FrictionFalloffHyperbolic(FrictionFalloff):
+    """Adhesion falls as fast at first, and ever more slowly then: the floor is far off."""
+
+    form = "hyperbolic"
+    equation = "theta_eff = theta (floor + (1 - floor) / (1 + falloff abs(omega R - v)))"
+    source = (
+        "after Hess and Soom (1990), Journal of Tribology 112, 147-152, whose fall is of the second power"
+    )
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """The same fall by another function of the sliding speed."""
+        return super().dynamics(parameters)._replace(falloff_hyperbolic=1.0)

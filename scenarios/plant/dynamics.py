@@ -260,7 +260,8 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             more = load_n * per_mean - 1.0
             theta = wheels.theta[i]
             if p.falloff_s_m > 0.0:
-                left = np.exp(-p.falloff_s_m * abs(rim - speed))
+                fallen = p.falloff_s_m * abs(rim - speed)
+                left = 1.0 / (1.0 + fallen) if p.falloff_hyperbolic > 0.0 else np.exp(-fallen)
                 theta *= p.falloff_floor + (1.0 - p.falloff_floor) * left
             acting = slip if rim >= speed else -slip
             if slip_lags:

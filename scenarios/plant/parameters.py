@@ -42,6 +42,8 @@ class DynamicsParameters(NamedTuple):
     """Rate at which adhesion falls with sliding speed; 0: it does not [s/m]."""
     falloff_floor: float = 1.0
     """Share of the adhesion that is left at high sliding speed [-]."""
+    falloff_hyperbolic: float = 0.0
+    """1: the fall is a hyperbola of the sliding speed, else exponential [-]."""
     knee: float = 0.0
     """By how much the tyre's force is off where adhesion begins to give way to sliding [-]."""
     crest: float = 0.0
