@@ -215,8 +215,11 @@ def _of_axle(i: int, mean: float, unlike: float) -> float:
 @inlined
 def _rolling_radius(i: int, p: DynamicsParameters) -> float:
     """A wheel's own [m]; fl, fr, rl, rr."""
+    radius_m = _of_axle(i, p.wheel_radius_m, p.axle_radius_m)
+    if p.front_side_radius_m == 0.0 and p.rear_side_radius_m == 0.0:
+        return radius_m
     side_m = p.front_side_radius_m if i < 2 else p.rear_side_radius_m
-    return _of_axle(i, p.wheel_radius_m, p.axle_radius_m) + (side_m if i % 2 == 0 else -side_m)
+    return radius_m + side_m if i % 2 == 0 else radius_m - side_m
 
 
 @compiled
