@@ -196,7 +196,7 @@ def _cause(
     blamed = [e for e in found.added() if e.id == key] if found.structure() else []
     after = held.residuals(found.model.with_effects(*blamed) if blamed else best.candidate.model(best.x))
     size = measure(held, after).total
-    alone = _over_forms(found, entry, _joint(found, entry))
+    alone = _over_forms(found, entry)
     values = {name: value for (effect, name), value in together.items() if effect == key}
     values = values or {name: value for (_, name), value in alone.items()}
     if found.decision.varied and key in found.decision.winner.ids:
@@ -300,13 +300,11 @@ def _joint(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
     }
 
 
-def _over_forms(
-    found: Findings, entry: Entry, values: dict[tuple[str, str], Interval]
-) -> dict[tuple[str, str], Interval]:
+def _over_forms(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
     """Intervals of a single effect, as wide as those of all its forms that leave about as little: nature has one."""
     others = [e for e in found.contest.forms if e.ids == entry.ids]
     margin = FURTHER_GAIN * inflation(entry, found.fit_to, found.holdout) if others else 0.0
-    out = dict(values)
+    out = _joint(found, entry)
     for other in others:
         if other.loss - entry.loss < margin:
             for name, told in _joint(found, other).items():

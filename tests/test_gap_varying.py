@@ -73,7 +73,7 @@ def test_a_swaying_scale_is_named_with_its_spread(logs):
 def test_two_causes_are_named_though_one_of_them_sways():
     nominal = clean(pulses(DURATION_S), 14.0, effects={"torque_gain": {"factor": 1.12}})
     both = [noisy(swaying(nominal), seed) for seed in range(3)]
-    few = {"vehicle_speed_scale", "torque_gain", "aero_drag"}
+    few = {"vehicle_speed_scale", "torque_gain", "aero_drag", "tyre_stiffness_offset"}
     found = find(MODEL, both[:2], both[2], exclude=set(EFFECTS) - few)
     assert found.decision.verdict is Verdict.COMPOUND
     assert found.decision.winner.ids == ("torque_gain", "vehicle_speed_scale")

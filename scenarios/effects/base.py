@@ -81,25 +81,17 @@ def parameter(
 
 def share_of_axles(start: float, most: float) -> Any:
     """Declare how unlike the axles are, of an effect whose other parameter is the mean of all wheels."""
-    return parameter(
-        "-",
-        "share of the mean that the front axle has more and the rear less",
-        neutral=0.0,
-        low=-most,
-        high=most,
-        starts=(-start, start),
-    )
+    return _share_of_mean("the front axle has more and the rear less", start, most)
 
 
 def share_of_sides(axle: str, start: float, most: float) -> Any:
     """Declare how unlike the two wheels of an axle are, "front" or "rear", as `share_of_axles` does for axles."""
+    return _share_of_mean(f"the {axle} left wheel has more and the {axle} right one less", start, most)
+
+
+def _share_of_mean(who: str, start: float, most: float) -> Any:
     return parameter(
-        "-",
-        f"share of the mean that the {axle} left wheel has more and the {axle} right one less",
-        neutral=0.0,
-        low=-most,
-        high=most,
-        starts=(-start, start),
+        "-", f"share of the mean that {who}", neutral=0.0, low=-most, high=most, starts=(-start, start)
     )
 
 

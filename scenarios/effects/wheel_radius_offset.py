@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.effects.base import Effect, parameter, share_of_axles, share_of_sides
+from scenarios.effects.base import Array, Effect, parameter, share_of_axles, share_of_sides
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
@@ -88,20 +88,14 @@ class WheelRadiusOffsetOfWheels(WheelRadiusOffsetOfAxles):
 
     def is_itself(self, vehicle: Vehicle) -> bool:
         """Of a single wrong wheel nobody says that the car's wheels are of another size."""
-        off_m = np.array(self.radii_m()) - vehicle.wheel_radius_m
+        off_m = self.radii_m() - vehicle.wheel_radius_m
         return bool(np.all(off_m * np.sign(off_m.mean()) >= LEAST_OFF * abs(off_m.mean())))
 
-    def radii_m(self) -> tuple[float, float, float, float]:
-        """Rolling radii of the wheels fl, fr, rl, rr [m]."""
-        front, rear = 1.0 + self.unlike, 1.0 - self.unlike
-        shares = (
-            front + self.front_sides,
-            front - self.front_sides,
-            rear + self.rear_sides,
-            rear - self.rear_sides,
-        )
-        fl, fr, rl, rr = (self.radius_m * share for share in shares)
-        return fl, fr, rl, rr
+    def radii_m(self) -> Array:
+        """Rolling radii of the wheels fl, fr, rl, rr, shape (4,) [m]."""
+        front, rear = self.unlike, -self.unlike
+        sides = np.array([self.front_sides, -self.front_sides, self.rear_sides, -self.rear_sides])
+        return self.radius_m * (1.0 + np.array([front, front, rear, rear]) + sides)
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Each wheel has its radius."""
