@@ -192,11 +192,16 @@ def hold_contest(
     ]
     best: dict[tuple[str, ...], Entry] = {}
     entries = filter(is_proper, run_all(work, jobs, progress, "effects"))
-    ranked = sorted(entries, key=lambda e: e.loss * (1.0 + PRICE * e.size))
+    ranked = sorted(entries, key=priced)
     for entry in ranked:
         best.setdefault(entry.ids, entry)
     others = (entry for entry in ranked if best[entry.ids] is not entry)
     return Contest(null, tuple(best.values()), forms=tuple(others))
+
+
+def priced(entry: Entry) -> float:
+    """Loss of an entry by which the forms of an effect are ranked: a further parameter has to earn its place."""
+    return entry.loss * (1.0 + PRICE * entry.size)
 
 
 def is_proper(entry: Entry) -> bool:

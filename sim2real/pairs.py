@@ -14,13 +14,15 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.effects import EFFECTS
-from sim2real.contest import Contest, Entry, Progress, enter, is_proper, run_all, silent
+from scenarios.effects import EFFECTS, FORMS
+from sim2real.contest import Contest, Entry, Progress, enter, is_proper, priced, run_all, silent
 from sim2real.evidence import Evidence
 from sim2real.fitting import FULL_STEPS, Candidate, robust, robust_weight
 from sim2real.observer import Simulation
 
 Array = NDArray[np.float64]
+Kind = tuple[tuple[str, ...], tuple[int, ...]]
+"""Ids and forms of a pair."""
 
 BEAM = 3
 """Best single effects that pairs are built on."""
@@ -28,6 +30,8 @@ PAIRS_PER_MEMBER = 3
 """Pairs that are fitted per single effect of the beam, the most promising ones."""
 SWAPS_PER_MEMBER = 3
 """Partners that are tried anew for each member of the best pair."""
+REFORMED, REFORMINGS = 3, 2
+"""Best pairs that are fitted with one of their effects in another form, and how often: both may be of another."""
 TWINS = 3
 """Partners of a plain form that are tried against one with a further parameter."""
 LINEAR_PAIRS = 4
@@ -90,8 +94,47 @@ def add_pairs(
     best = min(pairs, key=lambda e: e.loss)
     again = _swapped_pairs(contest, best, {e.ids for e in pairs}, model, fit_to, jobs, progress)
     pairs += fit_pairs(again, "pairs, swapped")
-    proper = [pair for pair in pairs if is_proper(pair)]
-    return replace(contest, pairs=tuple(sorted(proper, key=lambda e: e.loss)))
+    kept = _of_each(pairs)
+    tried = {_kind(pair) for pair in pairs}
+    for _ in range(REFORMINGS):
+        others = [other for pair in kept[:REFORMED] for other in _in_other_forms(pair, tried)]
+        tried |= {(candidate.ids, candidate.forms) for candidate, _ in others}
+        work = [partial(enter, other, fit_to, holdout, start, FULL_STEPS) for other, start in others]
+        kept = _of_each([*kept, *run_all(work, jobs, progress, "pairs, other forms")])
+    return replace(contest, pairs=tuple(kept))
+
+
+def _of_each(pairs: Sequence[Entry]) -> list[Entry]:
+    """Each pair in the best of the forms that it was fitted in, best first."""
+    kept: dict[tuple[str, ...], Entry] = {}
+    for pair in sorted(filter(is_proper, pairs), key=priced):
+        kept.setdefault(pair.ids, pair)
+    return sorted(kept.values(), key=lambda e: e.loss)
+
+
+def _kind(pair: Entry) -> Kind:
+    return pair.ids, pair.fitted.candidate.forms
+
+
+def _in_other_forms(pair: Entry, tried: Collection[Kind]) -> list[tuple[Candidate, Array]]:
+    """A pair with one of its effects in another form that was not tried, and where its fit starts.
+
+    The form that does best alone has bent to what the other effect causes.
+    """
+    found = pair.fitted
+    forms = found.candidate.forms
+    known = {(key, p.name): x for (key, p), x in zip(found.candidate.parameters, found.x, strict=True)}
+    others = [
+        Candidate(found.candidate.base, pair.ids, (*forms[:at], form, *forms[at + 1 :]))
+        for at, key in enumerate(pair.ids)
+        for form in range(len(FORMS[key]))
+    ]
+
+    def start(other: Candidate) -> Array:
+        rest = zip(other.parameters, other.neutral, strict=True)
+        return np.array([known.get((key, p.name), neutral) for (key, p), neutral in rest])
+
+    return [(other, start(other)) for other in others if (other.ids, other.forms) not in tried]
 
 
 def _fit_of_pair(

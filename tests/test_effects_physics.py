@@ -129,6 +129,15 @@ def test_a_payload_that_lies_somewhere_loads_the_axles_by_its_moments(behind_m):
     assert run.vertical_load_n[0].sum() == pytest.approx((MASS + 300.0) * G, rel=1e-12)
 
 
+def test_tyres_that_resist_more_in_front_hold_the_car_by_each_axles_load():
+    values = {"rolling_resistance": {"coefficient": 0.02, "unlike": 0.5}}
+    run = drive(car_with({"rolling_resistance": "axles unlike"}, **values), 0.0, 1.5, 15.0)
+    load_n = run.vertical_load_n[-1]
+    resisting_n = np.array([0.03, 0.03, 0.01, 0.01]) * load_n
+    expected = -resisting_n.sum() / (MASS + 4.0 * INERTIA / RADIUS**2)
+    assert settled_acceleration(run) == pytest.approx(expected, rel=2e-3)
+
+
 def test_axles_of_unlike_radius_roll_at_unlike_speeds():
     values = {"wheel_radius_offset": {"radius_m": 0.3, "unlike": 0.01}}
     run = drive(car_with({"wheel_radius_offset": "axles unlike"}, **values), 0.0, 1.0, 20.0)

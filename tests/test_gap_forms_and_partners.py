@@ -1,6 +1,7 @@
 """Forms of an effect, noise read anew, partners of the best effect, a sensor that stands alone."""
 
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 import pytest
@@ -19,8 +20,10 @@ from gap_drives import (
 )
 
 from scenarios.effects import EFFECTS, FORMS
+from scenarios.effects.mass_offset import MassOffset, MassOffsetPlaced
 from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip
+from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset
 from scenarios.effects.wheel_radius_offset import WheelRadiusOffsetOfWheels
 from scenarios.plant import dynamics
 from scenarios.plant.pipeline import make_setup
@@ -44,10 +47,10 @@ def only(*keys):
 SLIPPERY = road_of(0.9, 0.35, 0.9, 0.35, 0.9, 0.35)
 
 
-def driven_by(effect, torque_nm, speed_m_s, seed=0):
-    """A drive of a car with an effect in a form of it, over ice where its wheels slide."""
+def driven_by(effects, torque_nm, speed_m_s, seed=0):
+    """A drive of a car with effects in forms of theirs, over ice where its wheels slide."""
     setup = make_setup(BARE, SLIPPERY)
-    p = effect.dynamics(setup.parameters)
+    p = reduce(lambda p, effect: effect.dynamics(p), effects, setup.parameters)
     y = dynamics.initial_y(speed_m_s, 0.0, p)
     states, accel, *_ = dynamics.run(y, torque_nm, STEP_S, p, setup.road)
     measured = np.column_stack([states[:, :6], accel])
@@ -59,7 +62,7 @@ def driven_by(effect, torque_nm, speed_m_s, seed=0):
 
 @pytest.mark.parametrize("effect", [RollingResistanceForce(0.03), TyreRelaxationOfSlip(0.5)])
 def test_the_form_that_the_car_has_is_the_one_that_is_told(effect):
-    logs = [driven_by(effect, pulses(8.0) * 1.4, v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
+    logs = [driven_by([effect], pulses(8.0) * 1.4, v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
     found = find(MODEL, logs[:1], logs[1], exclude=only(effect.id, "mass_offset", "road_grade"))
     assert found.decision.winner.ids == (effect.id,)
     candidate, x = found.decision.winner.fit.candidate, found.decision.winner.fit.x
@@ -82,7 +85,7 @@ def test_wheels_of_a_size_each_are_found_and_one_wrong_wheel_is_no_car_on_other_
     mean = (fl + fr + rl + rr) / 4.0
     sides = ((fl + fr - 2.0 * mean) / (2.0 * mean), (fl - fr) / (2.0 * mean), (rl - rr) / (2.0 * mean))
     effect = WheelRadiusOffsetOfWheels(radius_m * mean, *sides)
-    logs = [driven_by(effect, pulses(8.0), v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
+    logs = [driven_by([effect], pulses(8.0), v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
     found = find(MODEL, logs[:1], logs[1], exclude=only(effect.id, "vehicle_speed_scale", "mass_offset"))
     assert found.decision.verdict is verdict
     if verdict is Verdict.IDENTIFIED:
@@ -223,6 +226,23 @@ def test_a_pair_leaves_no_more_than_its_members(two_causes):
     for pair in paired.pairs:
         assert pair.loss_fit <= 1.001 * min(single[key] for key in pair.ids)
     assert decide(paired, fit_to, held).winner.ids == ("aero_drag", "wheel_inertia_offset")
+
+
+def test_a_pair_is_told_in_the_forms_that_it_does_best_in():
+    """A payload behind passes alone for one in the middle beside too soft tyres, and both alone bend to each other."""
+    stiffness_n = 0.8 * MODEL.vehicle.to_core().longitudinal_stiffness_n
+    car = [MassOffsetPlaced(250.0, 1.2), TyreStiffnessOffset(stiffness_n)]
+    logs = [driven_by(car, pulses(8.0) * 2.0, v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
+    fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
+    few = only("mass_offset", "tyre_stiffness_offset", "aero_drag")
+    contest = hold_contest(MODEL, fit_to, held, first_round(MODEL, fit_to, few))
+    every = (*contest.singles, *contest.forms)
+    plain = next(e for e in every if e.fitted.candidate.kinds == (MassOffset,))
+    bent = [plain if e.ids == plain.ids else e for e in contest.singles]
+    paired = add_pairs(add_partners(replace(contest, singles=tuple(bent)), fit_to), MODEL, fit_to, held)
+    assert paired.pairs[0].fitted.candidate.kinds == (MassOffsetPlaced, TyreStiffnessOffset)
+    assert paired.pairs[0].fitted.x == pytest.approx([250.0, 1.2, stiffness_n], rel=0.03)
+    assert len({pair.ids for pair in paired.pairs}) == len(paired.pairs)
 
 
 def test_one_effect_beside_which_much_is_left_is_ambiguous():

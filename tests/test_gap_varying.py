@@ -121,7 +121,14 @@ def test_two_stages_lag_as_long_as_one_and_begin_later():
 
 @pytest.mark.parametrize(
     "key",
-    ["brake_drag", "wheel_inertia_offset", "tyre_stiffness_offset", "torque_gain", "wheel_radius_offset"],
+    [
+        "brake_drag",
+        "rolling_resistance",
+        "wheel_inertia_offset",
+        "tyre_stiffness_offset",
+        "torque_gain",
+        "wheel_radius_offset",
+    ],
 )
 def test_alike_axles_are_the_plain_form(key):
     plain, unlike = FORMS[key][0], next(k for k in FORMS[key] if k.form == "axles unlike")

@@ -21,7 +21,11 @@ from scenarios.effects.mass_offset import MassOffset, MassOffsetPlaced
 from scenarios.effects.motion_blur import MotionBlur
 from scenarios.effects.mu_split import MuSplit
 from scenarios.effects.road_grade import RoadGrade
-from scenarios.effects.rolling_resistance import RollingResistance, RollingResistanceForce
+from scenarios.effects.rolling_resistance import (
+    RollingResistance,
+    RollingResistanceForce,
+    RollingResistanceOfAxles,
+)
 from scenarios.effects.torque_delay import TorqueDelay
 from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles, TorqueGainOfSigns
 from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages, TorqueLagOfRiseAndFall
@@ -96,6 +100,7 @@ OTHER_FORMS = (
     TorqueLagInTwoStages,
     TorqueLagOfRiseAndFall,
     RollingResistanceForce,
+    RollingResistanceOfAxles,
     BrakeDragOfAxles,
     MassOffsetPlaced,
     WheelRadiusOffsetRolling,

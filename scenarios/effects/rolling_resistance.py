@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter
+from scenarios.effects.base import Effect, parameter, share_of_axles
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
@@ -48,3 +48,19 @@ class RollingResistanceForce(RollingResistance):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The force is proportional to all wheels' load; it holds a standing car."""
         return parameters._replace(hub_resistance=self.coefficient)
+
+
+@dataclass(frozen=True)
+class RollingResistanceOfAxles(RollingResistance):
+    """The tyres of one axle roll harder than those of the other, worn or soft ones; `coefficient` is the mean."""
+
+    form = "axles unlike"
+    equation = "c (1 + unlike) in front, c (1 - unlike) in the rear"
+
+    unlike: float = share_of_axles(start=0.3, most=1.0)
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each axle has its coefficient."""
+        return parameters._replace(
+            rolling_coefficient=self.coefficient, axle_rolling_coefficient=self.unlike * self.coefficient
+        )

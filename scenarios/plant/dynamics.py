@@ -320,7 +320,8 @@ def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, fi
 @compiled
 def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Omega' of one wheel [rad/s^2]; a resting wheel that nothing drives forward stays at rest."""
-    resistance_n = wheels.force_n[i] + p.rolling_coefficient * wheels.load_n[i]
+    coefficient = _of_axle(i, p.rolling_coefficient, p.axle_rolling_coefficient)
+    resistance_n = wheels.force_n[i] + coefficient * wheels.load_n[i]
     inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2) - p.motor_inertia_kg_m2
     drag_nm = _of_axle(i, p.drag_torque_nm, p.axle_drag_torque_nm)
     lever_m = _rolling_radius(i, p) + p.lever_more_m

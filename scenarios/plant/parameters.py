@@ -64,6 +64,8 @@ class DynamicsParameters(NamedTuple):
     """What the front wheels' inertia has more than wheel_inertia_kg_m2, and the rear wheels' less [kg m^2]."""
     axle_drag_torque_nm: float = 0.0
     """Likewise beside drag_torque_nm [N m]."""
+    axle_rolling_coefficient: float = 0.0
+    """Likewise beside rolling_coefficient [-]."""
     axle_stiffness_n: float = 0.0
     """Likewise beside longitudinal_stiffness_n [N]."""
     stiffness_by_load: float = 0.0
