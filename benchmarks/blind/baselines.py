@@ -48,9 +48,11 @@ def cosine(case: Case) -> list[str]:
 def _on_grid(log: pd.DataFrame, rows: int) -> tuple[Array, Array]:
     clock = np.arange(rows) * RECORD_STEP_S
     time_s = log["time_s"].to_numpy()
+    time_s = time_s - time_s[0] + np.median(np.diff(time_s))
     filled = log[SIGNALS].interpolate(limit_direction="both").to_numpy()
     shown = np.column_stack([np.interp(clock, time_s, column) for column in filled.T])
-    return shown, np.interp(clock, time_s, log["position_m"].to_numpy())
+    place = log["position_m"].interpolate(limit_direction="both").to_numpy()
+    return shown, np.interp(clock, time_s, place)
 
 
 def _imagined(world: World, base: World, shown: Array, position: Array, command: Array) -> Array:

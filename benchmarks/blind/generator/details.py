@@ -56,6 +56,18 @@ SHUT_M_S = 3.0
 """About a speed within which shutters close [m/s]."""
 USUAL_NM = 150.0
 """Torque that a gain is stated at where it changes with the torque [N m]."""
+BARRIER_M = 134.0
+"""From one stretch of road between walls or woods to the next [m]."""
+BENDS_M = 151.0
+"""From one winding stretch of the road to the next [m]."""
+SEAL_M_S = 8.0
+"""Of a seal whose lip begins to float: speed by which its friction has fallen to a third [m/s]."""
+JACK_M_S2 = 3.0
+"""About which a suspension's links lift or lower the body [m/s^2]."""
+RUBS_M_S, SWEEPS_M_S = 0.3, 2.0
+"""Sliding speed about which a direction begins to count; by which a tyre has swept off what lies on a road [m/s]."""
+FORMING = 0.002
+"""Slip still to come about which a contact forms rather than lets go [-]."""
 RUB_RAD_S = 0.1
 """About which a joint's friction turns [rad/s]."""
 LASH_SHARE = 0.5 * np.sqrt(np.pi) * LASH_NM / USUAL_NM
@@ -85,6 +97,18 @@ def in_wake(share: float, time: float) -> float:
 def drag_of(fast: float, speed: float) -> float:
     """Of a drag that is another before and after `USUAL_M_S` [-]."""
     return 1.0 + fast * np.tanh((speed - USUAL_M_S) / SHUT_M_S)
+
+
+@njit(cache=True)
+def sheltered(share: float, at: float) -> float:
+    """Of a drag that is less between walls or woods, and more where the wind can reach [-]."""
+    return 1.0 - share * np.tanh(4.0 * np.sin(2.0 * np.pi * at / BARRIER_M))
+
+
+@njit(cache=True)
+def winding(at: float) -> float:
+    """1 where a road winds and 0 where it is straight, with clothoids between [-]."""
+    return 0.5 + 0.5 * np.tanh(4.0 * np.sin(2.0 * np.pi * at / BENDS_M))
 
 
 @njit(cache=True)
@@ -191,9 +215,18 @@ def told_friction(p: Physics, wheel: int, position: float) -> float:
     return p.mu_left[k] if wheel % 2 == 0 else p.mu_right[k]
 
 
+@njit(cache=True)
+def gripping(p: Physics, rubbing: float) -> float:
+    """What a friction deviates more by as a tyre drives rather than brakes, and sweeps the road as it slides [-]."""
+    more = p.grip_sign * np.tanh(rubbing / RUBS_M_S)
+    return more + p.grip_slide * (np.tanh(abs(rubbing) / SWEEPS_M_S) - 0.5)
+
+
 @njit(cache=True, inline="always")
-def friction(p: Physics, wheel: int, position: float, speed: float, time: float = 0.0) -> float:
-    """The road's friction under a wheel, as the real road has it [-]."""
+def friction(
+    p: Physics, wheel: int, position: float, speed: float, time: float = 0.0, more: float = 0.0
+) -> float:
+    """The road's friction under a wheel, as the real road has it, its deviation `more` than the road's own [-]."""
     at = position + (p.front_arm if wheel < 2 else -p.rear_arm)
     k = p.border.size - 1
     while k > 0 and p.border[k] > at:
@@ -218,6 +251,8 @@ def friction(p: Physics, wheel: int, position: float, speed: float, time: float 
         factor = 1.0 + (factor - 1.0) * (1.0 + p.grip_sway * np.sin(2.0 * np.pi * time / WEAVE_S))
     if p.grip_wet != 0.0:
         factor = 1.0 + (factor - 1.0) * (1.0 + (p.grip_wet if mu < SLIPPERY else -p.grip_wet))
+    if more != 0.0:
+        factor = 1.0 + (factor - 1.0) * (1.0 + more)
     if p.wet_fall > 0.0 and mu < SLIPPERY:
         factor *= max(1.0 - p.wet_fall * (speed / USUAL_M_S - 1.0), 0.4)
     return mu * factor
@@ -236,6 +271,8 @@ def rolling_of(p: Physics, wheel: int, position: float, speed: float, loaded: fl
         rolling *= 1.0 + in_share(p, p.roll_tilt, wheel)
     if p.roll_side != 0.0:
         rolling *= 1.0 + (p.roll_side if wheel % 2 == 0 else -p.roll_side)
+    if p.roll_slow != 0.0:
+        rolling *= 1.0 + p.roll_slow * (np.exp(-speed / SEAL_M_S) - np.exp(-ROLL_M_S / SEAL_M_S))
     if p.roll_load != 0.0:
         rolling *= max(loaded, 1e-3) ** p.roll_load
     return rolling
@@ -290,11 +327,13 @@ def let_through(p: Physics, torque: float, slip: float) -> float:
 
 
 @njit(cache=True)
-def shaft_of(p: Physics, wheel: int, twist: float, rate: float) -> float:
+def shaft_of(p: Physics, wheel: int, twist: float, rate: float, angle: float = 0.0) -> float:
     """Torque of a shaft whose play is taken up, whose joints may rub, and which may differ from the others [N m]."""
     stiffness = p.shaft_stiffness * (1.0 + (p.shaft_tilt if wheel % 2 == 0 else -p.shaft_tilt))
     if p.shaft_axles != 0.0:
         stiffness *= 1.0 + spread(p.shaft_axles, 0.0, wheel)
+    if p.shaft_turn != 0.0:
+        stiffness *= 1.0 + p.shaft_turn * np.cos(2.0 * angle + 1.1 * wheel)
     if p.shaft_rise != 0.0:
         stiffness *= 1.0 + p.shaft_rise * (np.tanh(stiffness * abs(twist) / USUAL_NM) - 0.5)
     if p.shaft_sign != 0.0:

@@ -14,11 +14,21 @@ from typing import Any
 
 from numpy.random import Generator
 
-from . import forms_eighth, forms_fifth, forms_fourth, forms_second, forms_seventh, forms_sixth, forms_third
+from . import (
+    forms_eighth,
+    forms_fifth,
+    forms_fourth,
+    forms_ninth,
+    forms_second,
+    forms_seventh,
+    forms_sixth,
+    forms_third,
+)
 from .forms_second import Foreign
 from .library import LIBRARY
 from .outside import EVEN_FURTHER, FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
 from .outside_eighth import AND_BEYOND
+from .outside_ninth import STILL_BEYOND
 from .outside_seventh import BEYOND
 from .outside_sixth import LAST_FURTHER
 from .world import Effect
@@ -46,6 +56,8 @@ class Family(StrEnum):
     """And again, of nearly everything."""
     EIGHTH = "eighth"
     """More of most."""
+    NINTH = "ninth"
+    """More of most, once more."""
 
 
 def _joined(aspects: Aspects, more: Aspects) -> Aspects:
@@ -59,6 +71,7 @@ FIFTH: Aspects = _joined(FOURTH, forms_fifth.MORE)
 SIXTH: Aspects = _joined(FIFTH, forms_sixth.MORE)
 SEVENTH: Aspects = _joined(SIXTH, forms_seventh.MORE)
 EIGHTH: Aspects = _joined(SEVENTH, forms_eighth.MORE)
+NINTH: Aspects = _joined(EIGHTH, forms_ninth.MORE)
 ASPECTS: dict[Family, Aspects] = {
     Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
     Family.SECOND: forms_second.ASPECTS,
@@ -68,11 +81,12 @@ ASPECTS: dict[Family, Aspects] = {
     Family.SIXTH: SIXTH,
     Family.SEVENTH: SEVENTH,
     Family.EIGHTH: EIGHTH,
+    Family.NINTH: NINTH,
 }
 """All that has forms in each family; what a family does not list has the library's form."""
-EFFECT_FORMS: Aspects = {name: forms for name, forms in EIGHTH.items() if name in LIBRARY}
-FOREIGN: dict[str, Foreign] = EIGHTH["foreign_tyre"]
-NOISES, DIGITS, STYLES = EIGHTH["noise"], EIGHTH["digits"], EIGHTH["driver"]
+EFFECT_FORMS: Aspects = {name: forms for name, forms in NINTH.items() if name in LIBRARY}
+FOREIGN: dict[str, Foreign] = NINTH["foreign_tyre"]
+NOISES, DIGITS, STYLES = NINTH["noise"], NINTH["digits"], NINTH["driver"]
 
 RATES_HZ: dict[Family, dict[float, float]] = {
     Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
@@ -136,6 +150,17 @@ RATES_HZ: dict[Family, dict[float, float]] = {
         950.0: 0.1,
         1000.0: 0.1,
     },
+    Family.NINTH: {
+        100.0: 0.15,
+        150.0: 0.1,
+        200.0: 0.2,
+        250.0: 0.1,
+        300.0: 0.15,
+        500.0: 0.1,
+        800.0: 0.1,
+        1000.0: 0.05,
+        1100.0: 0.05,
+    },
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
@@ -172,6 +197,17 @@ OUTSIDES: dict[Family, dict[str, Effect]] = {
         **BEYOND,
         **AND_BEYOND,
     },
+    Family.NINTH: {
+        **OUTSIDE,
+        **FURTHER,
+        **STILL_FURTHER,
+        **YET_FURTHER,
+        **EVEN_FURTHER,
+        **LAST_FURTHER,
+        **BEYOND,
+        **AND_BEYOND,
+        **STILL_BEYOND,
+    },
 }
 """Each family's deviations outside the library."""
 
@@ -186,7 +222,7 @@ def draw_forms(family: Family, rng: Generator) -> Forms:
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDES[Family.EIGHTH]}[name]
+    effect = {**LIBRARY, **OUTSIDES[Family.NINTH]}[name]
     return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
 
 

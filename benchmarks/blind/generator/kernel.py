@@ -18,17 +18,21 @@ from numpy.typing import NDArray
 
 from .commands import COMMAND_STEP_S, on_grid
 from .details import (
+    FORMING,
+    JACK_M_S2,
     ROLL_M_S,
     SLIPPERY,
     SMALL_M_S2,
     SMALL_TORQUE_NM,
     USUAL_M_S,
     USUAL_NM,
+    USUAL_RAD_S,
     coarse,
     crossed,
     drag_of,
     friction,
     gravelly,
+    gripping,
     in_wake,
     lag_of,
     let_through,
@@ -37,10 +41,12 @@ from .details import (
     released,
     rolling_of,
     shaft_of,
+    sheltered,
     spread,
     stiffened,
     told_friction,
     warmth,
+    winding,
 )
 from .falling import fallen
 from .motors import motor_torque
@@ -148,14 +154,22 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         shifted += share * (y[BODY] - y[PITCH])
         if p.springs_rub > 0.0:
             shifted = y[BODY] + min(max(y[PITCH] - y[BODY], -p.springs_rub), p.springs_rub)
+    height = p.cog_height
+    if p.height_jack != 0.0:
+        height *= 1.0 + p.height_jack * np.tanh(shifted / JACK_M_S2)
     total = 0.0
     for w in range(4):
         arm = p.rear_arm if w < 2 else p.front_arm
         pitch = -shifted if w < 2 else shifted
         tilt = 0.5 * p.drag * p.drag_height / length
         air = speed * speed * (0.25 * p.lift + (tilt if w < 2 else -tilt))
-        load = max((press * arm + pitch * p.mass * p.cog_height) / (2.0 * length) - air, 0.0)
-        theta = friction(p, w, y[X], speed, time)
+        load = max((press * arm + pitch * p.mass * height) / (2.0 * length) - air, 0.0)
+        if p.load_side != 0.0:
+            load *= 1.0 + (p.load_side if w % 2 == 0 else -p.load_side)
+        more = 0.0
+        if p.grip_sign != 0.0 or p.grip_slide != 0.0:
+            more = gripping(p, y[W + w] * p.radius - speed)
+        theta = friction(p, w, y[X], speed, time, more)
         radius = p.radius
         unlike = p.radius_tilt != 0.0 or p.radius_side != 0.0 or p.radius_sides != 0.0
         if unlike or p.radius_growth != 0.0 or p.out_of_round > 0.0:
@@ -164,6 +178,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             radius += p.radius_warm * warmth(time)
         if p.radius_load != 0.0:
             radius += p.radius_load * (min(load / (0.25 * p.mass * GRAVITY), 2.0) - 1.0)
+        if p.radius_wet != 0.0 and told_friction(p, w, y[X]) < SLIPPERY:
+            radius += p.radius_wet
         rim = y[W + w] * radius
         slip = slips = slip_of(rim, speed)
         dy[SLIP + w] = 0.0
@@ -173,6 +189,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
                 path *= 1.0 + p.relaxation_speed * (speed / USUAL_M_S - 1.0)
             if p.relaxation_warm != 0.0:
                 path *= 1.0 + p.relaxation_warm * warmth(time)
+            if p.relaxation_rise != 0.0:
+                path *= 1.0 + p.relaxation_rise * np.tanh((abs(slip) - abs(y[SLIP + w])) / FORMING)
             if p.relaxation_tilt != 0.0:
                 path *= 1.0 + spread(p.relaxation_tilt, 0.0, w)
             dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / path
@@ -210,11 +228,13 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             resisting *= released(p.brake_release, y[W + w])
         if p.brake_warm != 0.0:
             resisting *= 1.0 + p.brake_warm * warmth(time)
+        if p.brake_wet != 0.0 and told_friction(p, w, y[X]) < SLIPPERY:
+            resisting *= 1.0 + p.brake_wet
         rolling = p.roll_moment * load * p.radius
         if p.roll_growth > 0.0:
             rolling *= 1.0 + p.roll_growth * ((speed / ROLL_M_S) ** 2 - 1.0)
         differs = p.roll_linear > 0.0 or p.roll_tilt != 0.0 or p.roll_side != 0.0 or p.roll_load != 0.0
-        if differs or p.roll_wet > 0.0 or p.roll_texture > 0.0:
+        if differs or p.roll_wet > 0.0 or p.roll_texture > 0.0 or p.roll_slow != 0.0:
             rolling *= rolling_of(p, w, y[X], speed, load / (0.25 * p.mass * GRAVITY))
         if p.roll_warm != 0.0:
             rolling *= 1.0 + p.roll_warm * warmth(time)
@@ -240,6 +260,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         lag = p.lag
         if p.lag_sign != 0.0:
             lag *= 1.0 + p.lag_sign * np.tanh((told + y[LAG + w]) / SMALL_TORQUE_NM)
+        if p.lag_warm != 0.0:
+            lag *= 1.0 + p.lag_warm * warmth(time)
         unlike = p.lag_tilt != 0.0 or p.lag_speed != 0.0 or p.lag_side != 0.0
         if unlike or p.lag_rise != 0.0 or p.lag_load != 0.0 or p.lag_zero != 0.0:
             lag *= lag_of(p, w, y[W + w], told, y[LAG + w])
@@ -262,13 +284,15 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         inertia = p.inertia - p.motor_inertia + spread(-p.inertia_tilt, p.inertia_side, w)
         if p.inertia_sides != 0.0:
             inertia += p.inertia_sides if w % 2 == 0 else -p.inertia_sides
+        if p.inertia_speed != 0.0:
+            inertia += p.inertia_speed * (min(y[W + w] / USUAL_RAD_S, 2.0) - 1.0)
         dy[MOTOR + w] = dy[TWIST + w] = 0.0
         if p.motor_inertia > 0.0:
             dy[TWIST + w] = y[MOTOR + w] - y[W + w]
             shaft = p.shaft_stiffness * y[TWIST + w] + p.shaft_damping * dy[TWIST + w]
-            unlike = p.shaft_tilt != 0.0 or p.shaft_axles != 0.0 or p.shaft_sign != 0.0
+            unlike = p.shaft_tilt != 0.0 or p.shaft_axles != 0.0 or p.shaft_sign != 0.0 or p.shaft_turn != 0.0
             if unlike or p.shaft_play > 0.0 or p.shaft_friction > 0.0 or p.shaft_rise != 0.0:
-                shaft = shaft_of(p, w, y[TWIST + w], dy[TWIST + w])
+                shaft = shaft_of(p, w, y[TWIST + w], dy[TWIST + w], y[ANGLE + w])
             dy[MOTOR + w] = (torque - shaft) / p.motor_inertia
             torque = shaft
         dy[W + w] = (torque - force * radius * p.lever - resisting) / inertia
@@ -281,7 +305,11 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         drag *= in_wake(p.drag_wake, time)
     if p.drag_power != 0.0:
         drag *= (max(speed, FLOOR_M_S) / USUAL_M_S) ** p.drag_power
+    if p.drag_shelter != 0.0:
+        drag *= sheltered(p.drag_shelter, y[X])
     total -= drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
+    if p.bend_drag > 0.0:
+        total -= p.bend_drag * winding(y[X]) * (speed / USUAL_M_S) ** 2
     if p.gust_drag > 0.0:
         against = speed + on_grid(p.wind, time / COMMAND_STEP_S)
         total -= p.gust_drag * (against * abs(against) - speed * speed)

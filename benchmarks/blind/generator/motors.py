@@ -13,6 +13,7 @@ from .details import (
     HUNT_S,
     MAP_NM,
     SMALL_TORQUE_NM,
+    USUAL_RAD_S,
     WAIT_S,
     gain_of,
     queued,
@@ -41,6 +42,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         heard -= p.delay_turn * (2.0 * wheel / 3.0 - 1.0)
     if p.delay_sign != 0.0:
         heard += p.delay_sign * np.tanh(commanded(command, wheel, heard) / SMALL_TORQUE_NM)
+    if p.delay_speed != 0.0:
+        heard -= p.delay_speed * (min(USUAL_RAD_S / max(turning, 1.0), 2.0) - 1.0)
     if p.delay_jump > 0.0:
         heard = queued(p.delay_jump, heard, time)
     if p.beat > 0.0:
@@ -63,6 +66,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         torque *= 1.0 + spread(p.axle_split, 0.0, wheel)
     if p.dead_band > 0.0:
         torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
+    if p.torque_step > 0.0:
+        torque = p.torque_step * np.floor(torque / p.torque_step + 0.5)
     torque = min(max(torque, -p.torque_limit), p.torque_limit)
     if p.power > 0.0:
         torque = min(torque, p.power / max(turning, 1.0))
@@ -79,6 +84,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_map * np.sin(2.0 * np.pi * abs(torque) / MAP_NM))
     if p.gain_sway != 0.0:
         gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_sway * np.sin(2.0 * np.pi * time / HUNT_S))
+    if p.gain_turn != 0.0:
+        gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_turn * np.cos(angle + 1.3 * wheel))
     if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0 or p.gain_load != 0.0:
         return torque * gain_of(gain, p.gain_sign, p.gain_speed, p.pad_rise, p.gain_load, torque, turning)
     return torque * gain

@@ -17,6 +17,7 @@ class Physics(NamedTuple):
     front_arm: float
     rear_arm: float
     cog_height: float
+    height_jack: float
     pitch_time: float
     springs_share: float
     springs_time: float
@@ -24,6 +25,7 @@ class Physics(NamedTuple):
     springs_rub: float
     pitch_sign: float
     body_rate: float
+    load_side: float
     radius: float
     radius_tilt: float
     radius_growth: float
@@ -31,12 +33,14 @@ class Physics(NamedTuple):
     radius_sides: float
     radius_warm: float
     radius_load: float
+    radius_wet: float
     out_of_round: float
     lever: float
     inertia: float
     inertia_tilt: float
     inertia_side: float
     inertia_sides: float
+    inertia_speed: float
     stiffness_drive: float
     stiffness_brake: float
     stiffness_load: float
@@ -56,6 +60,8 @@ class Physics(NamedTuple):
     grip_warm: float
     grip_sway: float
     grip_wet: float
+    grip_sign: float
+    grip_slide: float
     wet_fall: float
     falloff: float
     falloff_floor: float
@@ -69,6 +75,7 @@ class Physics(NamedTuple):
     relaxation_tilt: float
     relaxation_warm: float
     relaxation_direct: float
+    relaxation_rise: float
     force_relaxation: float
     foreign_share: float
     foreign_curve: int
@@ -84,6 +91,8 @@ class Physics(NamedTuple):
     drag_cross: float
     drag_wake: float
     drag_power: float
+    drag_shelter: float
+    bend_drag: float
     lift: float
     gust_drag: float
     wind: Array
@@ -98,6 +107,7 @@ class Physics(NamedTuple):
     roll_load: float
     roll_warm: float
     roll_torque: float
+    roll_slow: float
     gravel: float
     slush: float
     brake_drag: float
@@ -105,6 +115,7 @@ class Physics(NamedTuple):
     brake_pulse: float
     brake_release: float
     brake_warm: float
+    brake_wet: float
     bearing: float
     grade: float
     wave_slope: float
@@ -115,6 +126,7 @@ class Physics(NamedTuple):
     delay_sign: float
     delay_turn: float
     delay_jump: float
+    delay_speed: float
     message: float
     message_joined: bool
     message_lost: float
@@ -132,6 +144,7 @@ class Physics(NamedTuple):
     lag_load: float
     lag_direct: float
     lag_zero: float
+    lag_warm: float
     actuator_play: float
     slew: float
     gain: Array
@@ -141,6 +154,7 @@ class Physics(NamedTuple):
     gain_warm: float
     gain_map: float
     gain_sway: float
+    gain_turn: float
     axle_share: float
     axle_split: float
     axle_viscous: float
@@ -150,6 +164,7 @@ class Physics(NamedTuple):
     slip_allowed: float
     slip_cut: float
     dead_band: float
+    torque_step: float
     torque_limit: float
     power: float
     derating: float
@@ -163,6 +178,7 @@ class Physics(NamedTuple):
     shaft_friction: float
     shaft_rise: float
     shaft_sign: float
+    shaft_turn: float
     motor_inertia: float
     slosh_share: float
     slosh_rate: float

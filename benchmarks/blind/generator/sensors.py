@@ -17,6 +17,7 @@ from .details import GRAIN_M, USUAL_M_S, USUAL_RAD_S, WAIT_S, WARM_S
 from .kernel import ANGLE, COMMAND_STEP_S, MOTOR, RECORD_STEP_S, N, V, W, X
 from .signals import (
     beat,
+    extrapolated,
     hold,
     joined,
     jumping,
@@ -24,10 +25,12 @@ from .signals import (
     limited,
     mean,
     mean_age,
+    middle,
     paced,
     played,
     sent,
     slow,
+    tracked,
     wait,
 )
 
@@ -40,6 +43,10 @@ MEMORY_S, MEMORY_M_S2 = 1.5, 1.0
 """How long a sensor remembers where it was bent to, and from what acceleration on."""
 AIRED_S = 6.0
 """In which the air stream's cooling tells on a sensor."""
+MOUNT_M_S, MOUNT_OVER_M_S = 18.0, 3.0
+"""Speed at which a wheel's turns shake a sensor's bracket, and over what."""
+MOUNT_SHARE = np.sqrt(np.pi) * MOUNT_OVER_M_S / (30.0 - 5.0)
+"""Mean of the shaking over the speeds from 5 to 30 m/s [-]."""
 TABLE_M_S = 20.0 / 3.6
 """Over which a calibration's error goes up and down between its points."""
 
@@ -64,6 +71,8 @@ class Sensors:
     wheel_filter_s: float = 0.0
     wheel_filter_twice: bool = False
     """The low pass comes twice."""
+    wheel_median_s: float = 0.0
+    """Time whose middle value a reading is."""
     wheel_lost: float = 0.0
     wheel_turn_s: float = 0.0
     """By how much the last wheel's reading is older than on average, and the first one's younger."""
@@ -98,6 +107,8 @@ class Sensors:
     """How far the teeth lie off their places, over a turn [teeth]."""
     wheel_least_rad_s: float = 0.0
     """Below which a wheel is told to stand: the sensor's signal is too small."""
+    wheel_offset_rad_s: float = 0.0
+    """Of all wheels' readings."""
     wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     wheel_radius_m: float = 0.0
     """Where a speed is taken from the wheels [m]."""
@@ -109,6 +120,8 @@ class Sensors:
     """The mean is of means over the same time."""
     speed_message_s: float = 0.0
     speed_joined: bool = False
+    speed_extrapolated: bool = False
+    """From each message on the speed goes straight on as from the last one to it."""
     speed_beat_s: float = 0.0
     speed_wait_s: float = 0.0
     speed_filter_s: float = 0.0
@@ -136,6 +149,8 @@ class Sensors:
     """By which it differs over `SLOW_S` [-]."""
     speed_scale_table: float = 0.0
     """By which it differs between a calibration's points, `TABLE_M_S` apart [-]."""
+    speed_scale_mount: float = 0.0
+    """By which it differs where the sensor's bracket shakes, at about `MOUNT_M_S` [-]."""
     speed_play_m_s: float = 0.0
     """How far the speed has to change, either way, before what is told follows."""
     speed_rate_m_s2: float = np.inf
@@ -145,6 +160,8 @@ class Sensors:
     speed_rolling: float = 0.0
     """Share of the speed that is taken from the wheels [-]."""
     speed_offset_m_s: float = 0.0
+    speed_loop_s: float = 0.0
+    """Of a loop that tracks the speed and its rate, one over its frequency [s/rad]."""
     speed_lag_s: float = 0.0
     speed_hold_s: float = 0.0
     accel_bias_m_s2: float = 0.0
@@ -160,10 +177,14 @@ class Sensors:
     """By which the bias differs after the one direction and the other [-]."""
     accel_bias_aired: float = 0.0
     """By which the bias is less at double `USUAL_M_S`, after `AIRED_S` [-]."""
+    accel_bias_jumps: float = 0.0
+    """By which the bias differs from one level to the other [-]."""
     accel_step_m_s2: float = 0.0
     """In which the acceleration is told, to the nearest."""
     accel_bend_s2_m: float = 0.0
     """What the reading's square adds to it [1/(m/s^2)]."""
+    accel_fades_s: float = 0.0
+    """In which a sensor that has no steady reading forgets what it read."""
     accel_delay_s: float = 0.0
     accel_pitch: float = 0.0
     """What gravity adds to the reading as the body pitches, after `NODDING_S` [-]."""
@@ -243,7 +264,7 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     speed_at: Array = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
     speed_at = speed_at - beat(time_s, sensors.speed_beat_s, speed_phase)
     speed_at = speed_at + mean_age(sensors.speed_filter_s) - wait(time_s, sensors.speed_wait_s, waits[1])
-    if not sensors.speed_joined:
+    if not (sensors.speed_joined or sensors.speed_extrapolated):
         speed_at = sent(speed_at, sensors.speed_message_s, speed_phase, sensors.speed_lost, sensors.seed)
     if sensors.speed_paced_s > 0.0:
         pace = paced(np.interp(time_s, record, path[:, V]), USUAL_M_S)
@@ -263,6 +284,7 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
             turning = lag(path[:, (MOTOR if sensors.wheel_at_motor else W) + w], sensors.wheel_filter_s)
             if sensors.wheel_filter_twice:
                 turning = lag(turning, sensors.wheel_filter_s)
+            turning = middle(turning, sensors.wheel_median_s)
             turning = hold(turning, sensors.wheel_hold_s, np.random.default_rng([sensors.seed, 17]))
             if sensors.wheel_joined:
                 turning = joined(record, turning, sensors.wheel_message_s, wheel_phase)
@@ -271,6 +293,8 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
             angle = np.interp(wheel_at, record, path[:, ANGLE + w])
             wheel = wheel * (1.0 + sensors.wheel_runout * np.cos(angle + 2.0 * np.pi * turns[w]))
         out[:, w] = wheel * sensors.wheel_scale[w]
+        if sensors.wheel_offset_rad_s != 0.0:
+            out[:, w] += sensors.wheel_offset_rad_s
         if sensors.wheel_least_rad_s > 0.0:
             out[out[:, w] < sensors.wheel_least_rad_s, w] = 0.0
     speed = path[:, V]
@@ -281,11 +305,15 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
         speed = speed + sensors.speed_ahead_s * path[:, N]
     if sensors.speed_play_m_s > 0.0:
         speed = played(speed, sensors.speed_play_m_s)
+    if sensors.speed_loop_s > 0.0:
+        speed = tracked(speed, sensors.speed_loop_s)
     if np.isfinite(sensors.speed_rate_m_s2):
         speed = limited(speed, sensors.speed_rate_m_s2)
     speed = hold(lag(speed, sensors.speed_lag_s + sensors.speed_filter_s), sensors.speed_hold_s, rng)
     if sensors.speed_joined:
         speed = joined(record, speed, sensors.speed_message_s, speed_phase)
+    if sensors.speed_extrapolated:
+        speed = extrapolated(record, speed, sensors.speed_message_s, speed_phase)
     if sensors.speed_average_twice:
         speed = mean(record, speed, record, sensors.speed_average_s)
     shown_speed = mean(record, speed, speed_at, sensors.speed_average_s)
@@ -293,6 +321,8 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     if sensors.speed_step_m_s > 0.0:
         out[:, 4] = np.floor(out[:, 4] / sensors.speed_step_m_s) * sensors.speed_step_m_s
     accel = lag(path[:, N], sensors.accel_lag_s)
+    if sensors.accel_fades_s > 0.0:
+        accel = accel - lag(accel, sensors.accel_fades_s)
     if sensors.accel_pitch > 0.0:
         accel = accel + sensors.accel_pitch * lag(path[:, N], NODDING_S)
     bias = sensors.accel_bias_m_s2 * (1.0 + sensors.accel_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S)))
@@ -306,6 +336,8 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     if sensors.accel_bias_memory > 0.0:
         bent = lag(np.tanh(path[:, N] / MEMORY_M_S2), MEMORY_S)
         bias = bias * (1.0 + sensors.accel_bias_memory * np.interp(time_s, record, bent))
+    if sensors.accel_bias_jumps > 0.0:
+        bias = bias * (1.0 + sensors.accel_bias_jumps * jumping(time_s, sensors.seed))
     if sensors.accel_bias_aired != 0.0:
         aired = np.interp(time_s, record, lag(path[:, V], AIRED_S)) / USUAL_M_S - 1.0
         bias = bias * (1.0 - sensors.accel_bias_aired * aired)
@@ -322,7 +354,8 @@ def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float 
     """Of the vehicle speed, whose deviation may differ with time, speed and pitch [-]."""
     differs = (sensors.speed_sway, sensors.speed_scale_growth, sensors.speed_scale_pitch)
     places = (sensors.speed_scale_grain, sensors.speed_scale_warming, sensors.speed_scale_jumps)
-    if not any((*differs, *places, sensors.speed_scale_wander, sensors.speed_scale_table)):
+    speeds = (sensors.speed_scale_table, sensors.speed_scale_mount)
+    if not any((*differs, *places, *speeds, sensors.speed_scale_wander)):
         return sensors.speed_scale
     sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
     sway = sway + sensors.speed_scale_growth * (speed / USUAL_M_S - 1.0)
@@ -340,6 +373,9 @@ def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float 
         sway = sway + sensors.speed_scale_wander * slow(time_s, sensors.seed)
     if sensors.speed_scale_table > 0.0:
         sway = sway + sensors.speed_scale_table * np.sin(2.0 * np.pi * speed / TABLE_M_S)
+    if sensors.speed_scale_mount > 0.0:
+        shakes = np.exp(-(((speed - MOUNT_M_S) / MOUNT_OVER_M_S) ** 2))
+        sway = sway + sensors.speed_scale_mount * (shakes - MOUNT_SHARE)
     return 1.0 + (sensors.speed_scale - 1.0) * sway
 
 

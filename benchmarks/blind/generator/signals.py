@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
 from .details import WAIT_S
@@ -20,6 +21,8 @@ SLOW_S = (5.3, 11.0, 17.0)
 """Periods of what a bias wanders by."""
 JUMP_S = 3.5
 """From one jump of a scale to the next."""
+LOOP_DAMPING = 0.5
+"""Of a loop that tracks a speed, over the critical one."""
 MOST_PACED = 3.0
 """How much older than at the usual speed a value that comes with the distance may be."""
 
@@ -66,6 +69,25 @@ def joined(record: Array, signal: Array, message_s: float, phase: float) -> Arra
     return np.interp(record, sent, np.interp(sent, record, signal))
 
 
+def extrapolated(record: Array, signal: Array, message_s: float, phase: float) -> Array:
+    """The signal as each message and the one before it let one expect it until the next."""
+    if message_s == 0.0:
+        return signal
+    sent = np.arange(phase - 2.0, record[-1] / message_s + 1.0) * message_s
+    told = np.interp(sent, record, signal)
+    last = np.searchsorted(sent, record, side="right") - 1
+    rate = (told[last] - told[last - 1]) / message_s
+    return np.asarray(told[last] + rate * (record - sent[last]))
+
+
+def middle(signal: Array, over_s: float) -> Array:
+    """The middle one of all values over `over_s` around each of a record's."""
+    if over_s == 0.0:
+        return signal
+    half = int(0.5 * over_s / RECORD_STEP_S)
+    return np.asarray(median_filter(signal, size=2 * half + 1, mode="nearest"))
+
+
 def sent(at: Array, message_s: float, phase: float, lost: float, seed: int) -> Array:
     """The messages' times nearest to `at` [s]; of a lost one, that of the last that was not."""
     if message_s == 0.0:
@@ -105,6 +127,18 @@ def limited(signal: Array, rate: float) -> Array:
     out, most = signal.copy(), rate * RECORD_STEP_S
     for i in range(1, out.size):
         out[i] = out[i - 1] + min(max(signal[i] - out[i - 1], -most), most)
+    return out
+
+
+@njit(cache=True)
+def tracked(signal: Array, loop_s: float) -> Array:
+    """A record that a loop of second order follows: not late on a ramp, but beyond the mark where one ends."""
+    out, rate, value = signal.copy(), 0.0, signal[0]
+    for i in range(1, out.size):
+        off = signal[i] - value
+        rate += off / loop_s**2 * RECORD_STEP_S
+        value += (rate + 2.0 * LOOP_DAMPING * off / loop_s) * RECORD_STEP_S
+        out[i] = value
     return out
 
 

@@ -88,11 +88,19 @@ EIGHTH_PAIRS = (
 )
 """And more: a busy bus both ways, winter tyres, a load on brakes that stick. From the eighth family on."""
 
+NINTH_PAIRS = (
+    ("rolling_resistance", "friction_offset"),
+    ("vehicle_speed_delay", "vehicle_speed_scale"),
+    ("aero_drag", "wheel_radius_offset"),
+)
+"""And more: saving tyres, a cheap receiver, a kit for rough country. From the ninth family on."""
+
 MORE_PAIRS = {
     Family.FIFTH: FURTHER_PAIRS,
     Family.SIXTH: LAST_PAIRS,
     Family.SEVENTH: SEVENTH_PAIRS,
     Family.EIGHTH: EIGHTH_PAIRS,
+    Family.NINTH: NINTH_PAIRS,
 }
 """What each family adds to those of the one before."""
 
@@ -157,7 +165,8 @@ SIZES: dict[str, Counts] = {
 }
 """Full: 22 x 5 rich, 22 with another tyre, 22 x 2 mild, 75 without a gap, 24 pairs, 22 x 2 removed, and 3 of each
 deviation outside: 15, in the second family 18, in the third 23, in the fourth 28, in the fifth 34 and 5 pairs more, in
-the sixth 42 and 4 pairs more again, in the seventh 48 and 3 pairs more, in the eighth 53 and 3 pairs more."""
+the sixth 42 and 4 pairs more again, in the seventh 48 and 3 pairs more, in the eighth 53 and 3 pairs more,
+in the ninth 58 and 3 pairs more."""
 
 
 def table(size: str, family: Family = Family.FIRST) -> list[Spec]:

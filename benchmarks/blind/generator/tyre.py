@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .tyre_eighth import bristles, composite
+from .tyre_ninth import brush_elliptic, splined
 
 Array = NDArray[np.floating[Any]]
 
@@ -17,6 +18,7 @@ MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING, CUBED
     9
 )
 BLENDED, TWO_LINES, PLAIN_DUGOFF, SINE_RISE, ARCTANGENT, BRISTLES, COMPOSITE = range(9, 16)
+BRUSH_ELLIPTIC, SPLINED = range(16, 18)
 """Codes of the foreign curves."""
 
 
@@ -369,6 +371,10 @@ def foreign(curve: int, slip: float, slope: float, peak: float, first: float, se
         return bristles(slip, slope, peak)
     if curve == COMPOSITE:
         return composite(slip, slope, peak, first)
+    if curve == BRUSH_ELLIPTIC:
+        return brush_elliptic(slip, slope, peak)
+    if curve == SPLINED:
+        return splined(slip, slope, peak, first, second)
     return magic(slip, slope, peak, first, second)
 
 
