@@ -135,9 +135,10 @@ def tracked(signal: Array, loop_s: float) -> Array:
     """A record that a loop of second order follows: not late on a ramp, but beyond the mark where one ends."""
     out, rate, value = signal.copy(), 0.0, signal[0]
     for i in range(1, out.size):
+        value += rate * RECORD_STEP_S
         off = signal[i] - value
+        value += 2.0 * LOOP_DAMPING * off / loop_s * RECORD_STEP_S
         rate += off / loop_s**2 * RECORD_STEP_S
-        value += (rate + 2.0 * LOOP_DAMPING * off / loop_s) * RECORD_STEP_S
         out[i] = value
     return out
 
