@@ -219,8 +219,9 @@ def test_a_bent_shaft_is_stiff_in_the_end(direction):
 
 
 def test_a_torque_is_told_in_whole_steps():
+    """What is below a step is dropped, in driving and in braking."""
     p = by_further("torque_in_steps", step_nm=40.0).physics
-    for told, given in ((100.1, 120.0), (99.0, 80.0), (19.0, 0.0), (-61.0, -80.0)):
+    for told, given in ((120.1, 120.0), (119.0, 80.0), (39.0, 0.0), (-79.0, -40.0)):
         assert kernel.motor_torque(p, np.full((5, 4), told), 3, 0.01, 0.0, 30.0) == pytest.approx(given)
 
 

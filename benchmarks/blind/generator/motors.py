@@ -67,7 +67,7 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
     if p.dead_band > 0.0:
         torque = np.sign(torque) * max(abs(torque) - p.dead_band, 0.0)
     if p.torque_step > 0.0:
-        torque = p.torque_step * np.floor(torque / p.torque_step + 0.5)
+        torque = p.torque_step * np.trunc(torque / p.torque_step)
     torque = min(max(torque, -p.torque_limit), p.torque_limit)
     if p.power > 0.0:
         torque = min(torque, p.power / max(turning, 1.0))

@@ -1,4 +1,7 @@
-"""Deviations outside the library that the ninth family adds."""
+"""Deviations outside the library that the ninth family adds.
+
+Steps of a torque are those of valves that open in pulses: a few bar each.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ def _zero_point(car: Car, rng: Generator) -> Scale:
 
 STILL_BEYOND: dict[str, Effect] = {
     "torque_in_steps": Effect(
-        growing("step_nm", 8.0, 120.0), lambda w, g: w.moved(torque_step=g["step_nm"]), ("powertrain",)
+        growing("step_nm", 3.0, 80.0), lambda w, g: w.moved(torque_step=g["step_nm"]), ("powertrain",)
     ),
     "cornering_drag": Effect(
         growing("force_n", 20.0, 900.0),
