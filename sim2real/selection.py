@@ -363,15 +363,14 @@ def _cancel(contest: Contest, pair: Entry) -> bool:
 def takes_two(best: Entry, pair: Entry, after: Fitness, paired: Fitness, explained: bool) -> bool:
     """Whether a pair does so much better than the best single effect that it is taken in its place.
 
-    It halves the misfit, or the loss beyond noise, or takes a fair share of all loss, which may be noise that was read
-    too small; where one explains all by itself it does the first and the last, as the second may be no more than how
-    the first differs from the library's form.
+    It halves the misfit or the loss beyond noise, or takes a fair share of all loss, which may be noise that was read
+    too small; where one explains all by itself it does both, as the second may be no more than how the first differs
+    from the library's form.
     """
     halves = paired.misfit < PAIR_LEAVES * after.misfit
+    halves |= loss_beyond_noise(pair) <= PAIR_LEAVES * loss_beyond_noise(best)
     less = pair.loss <= PAIR_LOSS * best.loss
-    if explained:
-        return halves and less
-    return halves or less or loss_beyond_noise(pair) <= PAIR_LEAVES * loss_beyond_noise(best)
+    return halves and less if explained else halves or less
 
 
 def loss_beyond_noise(entry: Entry) -> float:

@@ -406,6 +406,7 @@ def test_two_effects_explain_less_easily_than_one():
         (0.90, 0.45, True, False),  # which may be how the first differs from its form
         (0.65, 0.45, True, True),
         (0.65, 0.60, True, False),
+        (0.52, 0.60, True, True),  # less than half of what is more than noise
         (0.65, 0.60, False, True),  # less of a loss that is noise in part
         (0.75, 0.60, False, False),
         (0.55, 0.60, False, True),
