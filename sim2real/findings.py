@@ -101,11 +101,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         progress("equations", 0, 1)
         terms, unexplained = _terms(found, held, jobs)
         progress("equations", 1, 1)
-        if swing and unexplained and (found.only_order or swing.share > unexplained.share):
-            unexplained = swing
-        passes = sluggish.characterise(found.contest)
-        if passes and unexplained and passes.share > unexplained.share:
-            unexplained = passes
+        unexplained = _most_telling(found, unexplained, swing) if unexplained else None
         subsystem = unexplained.subsystem if unexplained else _subsystem(decision, terms)
         taken = loss(held.whitened(before)) - loss(held.whitened(after))
         places, heat = _where(found, held, before, terms, subsystem, taken)
@@ -156,6 +152,14 @@ def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unex
     if not suspect:
         terms = finer(found.model, drives[-1:], noises[-1:], terms, jobs)
     return terms, characterise(terms, suspect)
+
+
+def _most_telling(found: Findings, term: Unexplained, swing: Unexplained | None) -> Unexplained:
+    """Of a free term, what repeats with the wheels' angle and the impostor: what takes most of the gap."""
+    if swing and found.only_order:
+        return swing
+    said = (term, swing, sluggish.characterise(found.contest))
+    return max((each for each in said if each), key=lambda each: each.share)
 
 
 def _swinging(found: Findings) -> Unexplained:

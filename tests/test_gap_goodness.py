@@ -1,0 +1,129 @@
+"""How well an entry does, and what that makes of one effect or two: on made-up residuals."""
+
+import numpy as np
+import pytest
+from gap_drives import MODEL, STEP_S, clean, noisy, pulses
+
+from sim2real.contest import Contest, Entry
+from sim2real.drive import SPEED
+from sim2real.evidence import gather
+from sim2real.fitting import ROBUST_FROM, Candidate, fit
+from sim2real.selection import (
+    EXPLAINED_MISFIT,
+    EXPLAINED_MOST,
+    EXPLAINED_SHARE,
+    PAIR_MISFIT,
+    PAIR_MOST,
+    PAIR_SHARE,
+    Fitness,
+    explains,
+    fitness,
+    inflation,
+    pair_explains,
+    probabilities,
+    takes_two,
+)
+
+
+def made_up(loss_fit, loss_hold, size, count=1000):
+    """An entry with residuals of these losses, all alike."""
+
+    def alike(total):
+        level = total / count
+        size = np.sqrt(level + level**2 / (4.0 * ROBUST_FROM**2))
+        return size * np.random.default_rng(0).choice([-1.0, 1.0], count)
+
+    stub = None
+    if size:
+        ids = ("accelerometer_bias",) if size == 1 else ("mu_split",)
+        stub = fit_of(ids)
+    return Entry(("x",) * bool(size), stub, alike(loss_fit), alike(loss_hold))
+
+
+def fit_of(ids):
+    drive = noisy(clean(pulses(1.5), 12.0))
+    return fit(Candidate(MODEL, ids), gather(MODEL, [drive]), steps=1)
+
+
+@pytest.fixture(scope="module")
+def tiny():
+    """Evidence of one drive of 143 rows, 1001 values."""
+    return gather(MODEL, [noisy(clean(pulses(142 * STEP_S), 12.0))])
+
+
+def test_probabilities_follow_loss_and_pay_for_parameters(tiny):
+    count = tiny.drives[0].measured.size
+    null = made_up(3.0 * count, 3.0 * count, 0, count)
+    good, wordy, bad = (made_up(a * count, a * count, k, count) for a, k in ((1.0, 1), (1.0, 2), (1.5, 1)))
+    shares = probabilities(Contest(null, (), ()), [good, wordy, bad], tiny, tiny)
+    assert shares.sum() == pytest.approx(1.0)
+    none, first, second, third = shares
+    assert first > second > 0.0
+    assert first > third
+    assert none < 1e-6
+
+
+def test_correlated_residuals_carry_less_information(tiny):
+    count = tiny.drives[0].measured.size
+    rng = np.random.default_rng(0)
+    white = Entry((), None, rng.standard_normal(count), rng.standard_normal(count))
+    shape = tiny.drives[0].measured.shape
+    slow = np.repeat(rng.standard_normal((shape[0] // 50 + 1, 7)), 50, axis=0)[: shape[0]].ravel()
+    coloured = Entry((), None, slow, slow)
+    assert inflation(white, tiny, tiny) < 3.0
+    assert inflation(coloured, tiny, tiny) > 10.0
+
+
+def test_fitness_is_one_for_noise_and_grows_with_what_noise_would_average_out(tiny):
+    rng = np.random.default_rng(1)
+    rows = len(tiny.drives[0])
+    noise = rng.standard_normal((rows, 7))
+    off = noise + np.eye(7)[SPEED]
+    flat = fitness(Entry((), None, noise.ravel(), noise.ravel()), tiny, tiny)
+    moved = fitness(Entry((), None, off.ravel(), off.ravel()), tiny, tiny)
+    assert flat.misfit == pytest.approx(1.0, abs=0.25)
+    assert moved.signals["vehicle_speed"] == pytest.approx(5.1, abs=0.6)  # 1 sigma over 25 rows, and noise
+    assert moved.signals["accel_x"] == flat.signals["accel_x"]
+
+
+def test_a_small_rest_of_a_large_gap_counts_as_explained():
+    def fit_as(value):
+        return Fitness(value, {})
+
+    assert explains(fit_as(EXPLAINED_MISFIT), fit_as(3.0))
+    assert not explains(fit_as(1.01 * EXPLAINED_MISFIT), fit_as(3.0))
+    assert explains(fit_as(0.9 * EXPLAINED_SHARE * 20.0), fit_as(20.0))
+    assert not explains(fit_as(1.1 * EXPLAINED_SHARE * 20.0), fit_as(20.0))
+    assert not explains(fit_as(1.01 * EXPLAINED_MOST), fit_as(500.0))
+
+
+def test_two_effects_explain_less_easily_than_one():
+    def fit_as(value):
+        return Fitness(value, {})
+
+    for before in (2.0, 50.0, 500.0):
+        most = max(PAIR_MISFIT, min(PAIR_SHARE * before, PAIR_MOST))
+        assert pair_explains(fit_as(0.99 * most), fit_as(before))
+        assert not pair_explains(fit_as(1.01 * most), fit_as(before))
+    assert explains(fit_as(2.4), fit_as(20.0))
+    assert not pair_explains(fit_as(2.4), fit_as(20.0))
+
+
+@pytest.mark.parametrize(
+    ("loss", "misfit", "explained", "taken"),
+    [
+        (0.90, 0.45, False, True),  # halves the misfit
+        (0.90, 0.45, True, False),  # which may be how the first differs from its form
+        (0.65, 0.45, True, True),
+        (0.65, 0.60, True, False),
+        (0.52, 0.60, True, True),  # less than half of what is more than noise
+        (0.65, 0.60, False, True),  # less of a loss that is noise in part
+        (0.75, 0.60, False, False),
+        (0.55, 0.60, False, True),
+    ],
+)
+def test_two_take_the_place_of_one_by_what_they_take_off(loss, misfit, explained, taken):
+    """Of a single effect that leaves ten times the noise's loss: shares of its loss, and of its misfit."""
+    best, pair = (made_up(share * 1e4, share * 1e4, 0) for share in (1.0, loss))
+    fits = (Fitness(2.0, {}), Fitness(2.0 * misfit, {}))
+    assert takes_two(best, pair, *fits, explained) is taken
