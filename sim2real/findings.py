@@ -202,9 +202,10 @@ def _cause(
     size = measure(held, after).total
     alone = _over_forms(found, entry)
     values = {name: value for (effect, name), value in together.items() if effect == key}
+    told = found.decision.winner if values else entry  # a pair's member may have another form there
     values = values or {name: value for (_, name), value in alone.items()}
     if found.decision.varied and key in found.decision.winner.ids:
-        values = _as_means(values, found.decision.varied, best)
+        values = _as_means(values, found.decision.varied, told.fitted, key)
     excited = _excited(next(iter(alone.values())), float(best.candidate.scale[0]))
     fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
@@ -244,7 +245,7 @@ def _cause(
         evidence_for=tuple(pro),
         evidence_against=tuple(contra),
         excited=excited,
-        form=best.candidate.kinds[0].form,
+        form=told.fitted.candidate.kinds[told.ids.index(key)].form,
     )
 
 
@@ -266,11 +267,13 @@ STRETCH_S = 4.0 * KNOT_S
 """Time after which a varying value has forgotten itself [s]."""
 
 
-def _as_means(values: dict[str, Interval], varied: Varied, found: Fit) -> dict[str, Interval]:
-    """Intervals of what varies along the logs, as of means of finitely many stretches."""
+def _as_means(values: dict[str, Interval], varied: Varied, found: Fit, effect: str) -> dict[str, Interval]:
+    """Intervals of an effect that varies along the logs, as of means of finitely many stretches."""
     low, high = found.candidate.bounds
     out = dict(values)
     for (key, p), least, most in zip(found.candidate.parameters, low, high, strict=True):
+        if key != effect:
+            continue
         value, spread = values[p.name], varied.spread.get((key, p.name), 0.0)
         half = np.hypot(
             0.5 * (value.high - value.low), 1.96 * spread / np.sqrt(max(varied.seconds / STRETCH_S, 1.0))

@@ -19,7 +19,7 @@ from gap_drives import (
     trace,
 )
 
-from scenarios.effects import EFFECTS, FORMS
+from scenarios.effects import EFFECTS, FORMS, form_of
 from scenarios.effects.mass_offset import MassOffset, MassOffsetPlaced
 from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip
@@ -31,13 +31,14 @@ from sim2real.contest import first_round, hold_contest, silent
 from sim2real.diagnose import diagnose, find
 from sim2real.drive import ACCEL, SPEED, WHEEL
 from sim2real.evidence import Evidence, gather
-from sim2real.findings import _joint, describe
+from sim2real.findings import Findings, _joint, describe
 from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
 from sim2real.pairs import add_pairs, add_partners
 from sim2real.result import Verdict
 from sim2real.selection import decide, is_noise, needs_pairs
 from sim2real.suspect import lone_sensor
+from sim2real.varying import vary
 
 
 def only(*keys):
@@ -228,8 +229,9 @@ def test_a_pair_leaves_no_more_than_its_members(two_causes):
     assert decide(paired, fit_to, held).winner.ids == ("aero_drag", "wheel_inertia_offset")
 
 
-def test_a_pair_is_told_in_the_forms_that_it_does_best_in():
-    """A payload behind passes alone for one in the middle beside too soft tyres, and both alone bend to each other."""
+@pytest.fixture(scope="module")
+def a_load_behind_and_soft_tyres():
+    """Contest of two effects, one of which entered it in a form that it does not have, its evidence and the truth."""
     stiffness_n = 0.8 * MODEL.vehicle.to_core().longitudinal_stiffness_n
     car = [MassOffsetPlaced(250.0, 1.2), TyreStiffnessOffset(stiffness_n)]
     logs = [driven_by(car, pulses(8.0) * 2.0, v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
@@ -238,11 +240,34 @@ def test_a_pair_is_told_in_the_forms_that_it_does_best_in():
     contest = hold_contest(MODEL, fit_to, held, first_round(MODEL, fit_to, few))
     every = (*contest.singles, *contest.forms)
     plain = next(e for e in every if e.fitted.candidate.kinds == (MassOffset,))
-    bent = [plain if e.ids == plain.ids else e for e in contest.singles]
-    paired = add_pairs(add_partners(replace(contest, singles=tuple(bent)), fit_to), MODEL, fit_to, held)
+    bent = tuple(plain if e.ids == plain.ids else e for e in contest.singles)
+    paired = add_pairs(add_partners(replace(contest, singles=bent), fit_to), MODEL, fit_to, held)
+    return paired, fit_to, held, {"mass_kg": 250.0, "behind_m": 1.2, "stiffness_n": stiffness_n}
+
+
+def test_a_pair_is_found_in_the_forms_that_it_does_best_in(a_load_behind_and_soft_tyres):
+    paired, _, _, truth = a_load_behind_and_soft_tyres
     assert paired.pairs[0].fitted.candidate.kinds == (MassOffsetPlaced, TyreStiffnessOffset)
-    assert paired.pairs[0].fitted.x == pytest.approx([250.0, 1.2, stiffness_n], rel=0.03)
+    assert paired.pairs[0].fitted.x == pytest.approx(list(truth.values()), rel=0.03)
     assert len({pair.ids for pair in paired.pairs}) == len(paired.pairs)
+
+
+@pytest.mark.parametrize("verdict", [Verdict.COMPOUND, Verdict.UNKNOWN])
+@pytest.mark.parametrize("varies", [False, True])
+def test_causes_are_told_with_the_parameters_of_their_form(a_load_behind_and_soft_tyres, verdict, varies):
+    """Together a pair's in its forms; where it is not blamed each cause in the one that it does best in alone."""
+    paired, fit_to, held, truth = a_load_behind_and_soft_tyres
+    decision = decide(paired, fit_to, held)
+    assert decision.winner is paired.pairs[0]
+    decision = replace(decision, verdict=verdict)
+    if varies:
+        decision = replace(decision, varied=vary(decision.winner, fit_to, held, "time"))
+    said = describe(Findings(MODEL, fit_to, held, paired, decision), seed=0, jobs=1, progress=silent)
+    for cause in said.causes:
+        assert list(cause.parameters) == [p.name for p in form_of(cause.effect, cause.form).parameters()]
+    told = {name: value for cause in said.causes[:2] for name, value in cause.parameters.items()}
+    if verdict is Verdict.COMPOUND:
+        assert all(told[name].low <= value <= told[name].high for name, value in truth.items())
 
 
 def test_one_effect_beside_which_much_is_left_is_ambiguous():
