@@ -32,11 +32,6 @@ from benchmarks.blind.generator.forms import (
 )
 from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, W, integrate
 from benchmarks.blind.generator.library import LIBRARY
-from benchmarks.blind.generator.outside import EVEN_FURTHER, FURTHER, STILL_FURTHER, YET_FURTHER
-from benchmarks.blind.generator.outside_eighth import AND_BEYOND
-from benchmarks.blind.generator.outside_ninth import STILL_BEYOND
-from benchmarks.blind.generator.outside_seventh import BEYOND
-from benchmarks.blind.generator.outside_sixth import LAST_FURTHER
 from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
 from benchmarks.blind.generator.table import Group, table
 from benchmarks.blind.generator.tyre import dugoff
@@ -446,17 +441,8 @@ def by_further(name: str, **given: float) -> World:
 
 SHOWN_IN_DRIVING = tuple(
     n
-    for n in {
-        **FURTHER,
-        **STILL_FURTHER,
-        **YET_FURTHER,
-        **EVEN_FURTHER,
-        **LAST_FURTHER,
-        **BEYOND,
-        **AND_BEYOND,
-        **STILL_BEYOND,
-    }
-    if n not in ("slip_controller", "regeneration_fades", "road_borders_blurred")
+    for n in OUTSIDES[NINTH]
+    if n not in OUTSIDES[FIRST] and n not in ("slip_controller", "regeneration_fades", "road_borders_blurred")
 )
 """Those act where a driven wheel slips, in slow braking and where a border is passed at the limit, as in tests of their
 own and not on this drive."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from enum import StrEnum
+from itertools import accumulate
+from operator import or_
 from typing import Any
 
 from numpy.random import Generator
@@ -164,51 +166,18 @@ RATES_HZ: dict[Family, dict[float, float]] = {
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
-OUTSIDES: dict[Family, dict[str, Effect]] = {
-    Family.FIRST: OUTSIDE,
-    Family.SECOND: {**OUTSIDE, **FURTHER},
-    Family.THIRD: {**OUTSIDE, **FURTHER, **STILL_FURTHER},
-    Family.FOURTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER},
-    Family.FIFTH: {**OUTSIDE, **FURTHER, **STILL_FURTHER, **YET_FURTHER, **EVEN_FURTHER},
-    Family.SIXTH: {
-        **OUTSIDE,
-        **FURTHER,
-        **STILL_FURTHER,
-        **YET_FURTHER,
-        **EVEN_FURTHER,
-        **LAST_FURTHER,
-    },
-    Family.SEVENTH: {
-        **OUTSIDE,
-        **FURTHER,
-        **STILL_FURTHER,
-        **YET_FURTHER,
-        **EVEN_FURTHER,
-        **LAST_FURTHER,
-        **BEYOND,
-    },
-    Family.EIGHTH: {
-        **OUTSIDE,
-        **FURTHER,
-        **STILL_FURTHER,
-        **YET_FURTHER,
-        **EVEN_FURTHER,
-        **LAST_FURTHER,
-        **BEYOND,
-        **AND_BEYOND,
-    },
-    Family.NINTH: {
-        **OUTSIDE,
-        **FURTHER,
-        **STILL_FURTHER,
-        **YET_FURTHER,
-        **EVEN_FURTHER,
-        **LAST_FURTHER,
-        **BEYOND,
-        **AND_BEYOND,
-        **STILL_BEYOND,
-    },
-}
+_ADDED = (
+    OUTSIDE,
+    FURTHER,
+    STILL_FURTHER,
+    YET_FURTHER,
+    EVEN_FURTHER,
+    LAST_FURTHER,
+    BEYOND,
+    AND_BEYOND,
+    STILL_BEYOND,
+)
+OUTSIDES: dict[Family, dict[str, Effect]] = dict(zip(Family, accumulate(_ADDED, or_), strict=True))
 """Each family's deviations outside the library."""
 
 
