@@ -16,6 +16,7 @@ from sim2real.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
 from sim2real.evidence import Evidence, all_logs
 from sim2real.fitting import Fit, loss
 from sim2real.gap import intervals, measure, noise_floor, shrink
+from sim2real.goodness import fitness, inflation
 from sim2real.lattice import Lattice
 from sim2real.next_manoeuvre import propose
 from sim2real.observer import Simulation
@@ -34,7 +35,7 @@ from sim2real.result import (
     Variation,
     Verdict,
 )
-from sim2real.selection import FURTHER_GAIN, Decision, fitness, inflation
+from sim2real.selection import FURTHER_GAIN, Decision
 from sim2real.suspect import lone_sensor
 from sim2real.unknown import Term, characterise, finer, fit_terms, with_refined
 from sim2real.varying import KNOT_S
@@ -217,15 +218,17 @@ def _cause(
         pro.append("What it leaves averages out like noise.")
     else:
         contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
-    if entry is found.decision.winner and found.decision.left_open:
+    winner = found.decision.winner
+    if entry is winner and found.decision.left_open:
         contra.append(
             f"Leaves {100.0 * found.decision.left_open:.0f} % of the gap on the hold-out, as energy."
         )
-    if entry is found.decision.winner and found.decision.curve:
+    if found.decision.curve and key in winner.ids:
+        work = "the work of both" if "+" in winner.name else "its work"
         contra.append(
-            f"A free curve ({found.decision.curve}) does its work as well, and one beside it finds more."
+            f"A free curve ({found.decision.curve}) does {work} as well, and one beside it finds more."
         )
-    if entry is found.decision.winner and found.decision.further:
+    if entry is winner and found.decision.further:
         contra.append(f"Only what its form adds ({best.candidate.kinds[0].form}) is needed, not what it is.")
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")

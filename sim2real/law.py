@@ -14,13 +14,17 @@ from scenarios.effects import FORMS
 from sim2real.contest import Contest, as_it_is
 from sim2real.equations import OF_THE_MOTION, WHOLE_CAR
 from sim2real.evidence import Evidence, all_logs
+from sim2real.goodness import inflation
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
-from sim2real.selection import FURTHER_GAIN, Decision, doubted, inflation
+from sim2real.selection import FURTHER_GAIN, Decision, doubted
 from sim2real.unknown import Term, fit_terms, with_refined
 
 MORE_BESIDE = 0.0075
 """Share of what the effect takes off the loss that a curve beside it takes, too: less is how its form differs [-]."""
+AS_WELL = 4.0
+"""A curve does as well as two effects where it leaves no more than this many times what noise may beyond them: wrong
+pairs were within 2, right ones beyond 20 [-]."""
 OWN_SHARE = 0.03
 """Share of what an effect takes off the loss that its own parameter takes, at least [-]."""
 LAWLESS_BELIEF = 0.2
@@ -35,22 +39,25 @@ def held_to_curves(
     holdout: Evidence,
     jobs: int = 1,
 ) -> Decision:
-    """The decision, `unknown` where free curves do the work of the one effect that it blames, and more.
+    """The decision, `unknown` where free curves do the work of what it blames, and more.
 
-    An effect that varies was held to a curve beside it already, see `sim2real.varying`; two effects together do what no
-    single curve does; where several are named none is blamed alone.
+    Of one effect a curve has to leave less; two together do in several equations what no single curve does, or nearly
+    so, unless they are a third thing that stands in one. An effect that varies was held to a curve beside it already,
+    see `sim2real.varying`; where several are named none is blamed alone.
     """
-    if decision.verdict is not Verdict.IDENTIFIED or decision.varied:
+    paired = decision.verdict is Verdict.COMPOUND
+    if not (paired or decision.verdict is Verdict.IDENTIFIED) or decision.varied:
         return decision
     winner = decision.winner
     found = winner.fitted
     more = winner.loss - _curves(found.candidate.model(found.x), fit_to, holdout, jobs)[0].loss
     noise = FURTHER_GAIN * inflation(winner, fit_to, holdout)
-    if more < max(noise, MORE_BESIDE * (contest.null.loss - winner.loss)):
+    differs = 0.0 if paired else MORE_BESIDE * (contest.null.loss - winner.loss)
+    if more < max(noise, differs):
         return decision
     drives, noises = all_logs(fit_to, holdout)
     instead = with_refined(model, drives, noises, _curves(model, fit_to, holdout, jobs), jobs)[0]
-    if instead.loss > winner.loss:
+    if instead.loss > winner.loss + (AS_WELL * noise if paired else 0.0):
         return decision
     return doubted(decision, LAWLESS_BELIEF, curve=f"{instead.equation.key} over {instead.quantity}")
 

@@ -9,23 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.contest import Contest, Entry, Varied
-from sim2real.drift import block_sums
-from sim2real.drive import BLOCK_S, GROUPS
+from sim2real.drive import BLOCK_S
 from sim2real.evidence import Evidence
-from sim2real.fitting import loss, robust
+from sim2real.fitting import loss
+from sim2real.goodness import Fitness, fitness, gross_share, inflation, loss_beyond_noise
 from sim2real.hum import without_hum
 from sim2real.result import Verdict
 
 Array = NDArray[np.float64]
 
-LONG_BLOCK_S = 1.0
-"""Blocks over which the residuals' sums are taken to see how correlated they are [s]."""
 NO_GAP_MISFIT = 1.4
 """Up to this misfit of the model as it is, what is left is noise [-]."""
 NO_GAP_GAIN = 0.03
 """As long as no effect takes more than this share off the loss [-]."""
 DRIFT_GAIN = 0.2
 """And of the share of the loss that drifting sensors cause, an effect may take this, too [-]."""
+GROSS_BLOCKS = 0.01
+"""Nor where more than this share of the blocks is far beyond noise: what happens rarely, as a wheel locks, hardly moves
+the misfit [-]."""
 NO_GAP_DOUBT = 0.03
 """Probability that something is left of the candidates where the misfit says there is no gap [-]."""
 EXPLAINED_MISFIT = 1.5
@@ -68,54 +69,6 @@ FLOOR_MISFIT = 1.5
 """Above this misfit an entry is worth a second effect's try [-]."""
 
 
-@dataclass(frozen=True)
-class Fitness:
-    """How well an entry does, absolutely.
-
-    Attributes
-    ----------
-    misfit : float
-        Root mean square over the signals of the blocks' means in units of what noise gives: 1 for the true model.
-    signals : dict
-        The same per signal.
-    """
-
-    misfit: float
-    signals: dict[str, float]
-
-
-def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Fitness:
-    """Absolute goodness of fit of an entry on all logs."""
-    squares: dict[str, list[Array]] = {name: [] for name in GROUPS}
-    for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
-        for part, drive, noise in zip(evidence.parts, evidence.drives, evidence.noises, strict=True):
-            rows = z[part].reshape(-1, drive.measured.shape[1])
-            sums = block_sums(rows, drive.rows_in(BLOCK_S)) / np.sqrt(1.0 + noise.slow)
-            for name, channels in GROUPS.items():
-                squares[name].append(sums[:, channels][np.abs(sums[:, channels]) > 0.0] ** 2)
-    signals = {
-        name: float(np.sqrt(np.mean(found)))
-        for name, parts in squares.items()
-        if len(found := np.concatenate(parts))
-    }
-    return Fitness(float(np.sqrt(np.mean(np.square(list(signals.values()))))), signals)
-
-
-def inflation(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
-    """By how much the entry's residuals carry less information than white unit noise: their size times their memory."""
-    losses, counts, sums = 0.0, 0, []
-    for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
-        losses += float(np.sum(robust(z)))
-        counts += int(np.count_nonzero(z))
-        for part, drive in zip(evidence.parts, evidence.drives, strict=True):
-            rows = np.clip(z[part].reshape(-1, drive.measured.shape[1]), -5.0, 5.0)
-            sums.append(block_sums(rows, drive.rows_in(LONG_BLOCK_S)).ravel())
-    size = max(losses / max(counts, 1), 1.0)
-    every = np.concatenate(sums)
-    memory = max(float(np.mean(every[every != 0.0] ** 2)) / size, 1.0) if np.any(every) else 1.0
-    return size * memory
-
-
 def probabilities(contest: Contest, entries: list[Entry], fit_to: Evidence, holdout: Evidence) -> Array:
     """Probability of each entry, the null first: quasi-BIC on the fit logs and quasi-likelihood on the hold-out."""
     everyone = [contest.null, *entries]
@@ -145,9 +98,11 @@ def allowed(before: Fitness) -> float:
 
 def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
-    if fitness(contest.null, fit_to, holdout).misfit > NO_GAP_MISFIT:
-        return False
     null = contest.null
+    if fitness(null, fit_to, holdout).misfit > NO_GAP_MISFIT:
+        return False
+    if gross_share(null, fit_to, holdout) > GROSS_BLOCKS:
+        return False
     most = NO_GAP_GAIN + DRIFT_GAIN * _drifting(fit_to, holdout)
     gaining = [e for e in contest.singles if e.loss < (1.0 - most) * null.loss]
     if not gaining:
@@ -220,11 +175,15 @@ class Decision:
     left_open: float = 0.0
     curve: str = ""
     further: bool = False
+    rare: float = 0.0
 
 
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     """Verdict of a contest; what one wheel alone explains better is no effect of the whole car."""
     said = _decide(contest, fit_to, holdout)
+    share = gross_share(contest.null, fit_to, holdout)
+    if said.before.misfit <= NO_GAP_MISFIT and share > GROSS_BLOCKS:
+        said = replace(said, rare=share)
     if said.verdict in (Verdict.NO_GAP, Verdict.UNKNOWN):
         return said
     margin = FURTHER_GAIN * inflation(said.winner, fit_to, holdout)
@@ -371,11 +330,6 @@ def takes_two(best: Entry, pair: Entry, after: Fitness, paired: Fitness, explain
     halves |= loss_beyond_noise(pair) <= PAIR_LEAVES * loss_beyond_noise(best)
     less = pair.loss <= PAIR_LOSS * best.loss
     return halves and less if explained else halves or less
-
-
-def loss_beyond_noise(entry: Entry) -> float:
-    """What an entry leaves of the loss beyond that of unit noise [-]."""
-    return entry.loss - float(np.count_nonzero(entry.z_fit) + np.count_nonzero(entry.z_hold))
 
 
 def _is_needed(contest: Contest, entry: Entry) -> bool:

@@ -8,8 +8,9 @@ import numpy as np
 
 from scenarios.effects import EFFECTS
 from sim2real.contest import Contest
+from sim2real.goodness import loss_beyond_noise
 from sim2real.result import Cause, Gap, Structure, Variation, Verdict
-from sim2real.selection import Decision, loss_beyond_noise
+from sim2real.selection import Decision
 
 NEAR = 0.8
 """Share of the loss beyond noise from which on what comes nearest to an explanation is worth a sentence [-]."""
@@ -23,6 +24,11 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     size = f"{gap.before.total:.1f} times the noise floor"
     if decision.verdict is Verdict.NO_GAP:
         return "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
+    if decision.verdict is Verdict.UNKNOWN and decision.rare:
+        return (
+            f"On the whole the gap is lost in the noise, but {100.0 * decision.rare:.0f} % of the logs' time lies far "
+            "beyond it, and no effect of the library explains that."
+        )
     if decision.verdict is Verdict.UNKNOWN:
         return f"There is a gap of {size}, and no effect of the library explains it."
     top = causes[0]

@@ -19,8 +19,8 @@ from sim2real.contest import as_it_is
 from sim2real.drive import SPEED, WHEEL
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, UNLIKE, Equation
 from sim2real.evidence import SETTLING_S, Evidence, all_logs
+from sim2real.goodness import fitness
 from sim2real.observer import Simulation
-from sim2real.selection import fitness
 from sim2real.unknown import best_of_each, fit_terms, refined
 
 Array = NDArray[np.float64]

@@ -21,10 +21,11 @@ from sim2real.drive import Drive
 from sim2real.equations import OF_THE_MOTION
 from sim2real.evidence import Evidence, all_logs, rest_of
 from sim2real.fitting import loss, robust_weight
+from sim2real.goodness import fitness, loss_beyond_noise
 from sim2real.noise import Noise
 from sim2real.observer import Simulation, Towards
 from sim2real.probing import sets_apart, windows
-from sim2real.selection import explains, fitness, loss_beyond_noise, two_are_needed
+from sim2real.selection import explains, two_are_needed
 from sim2real.unknown import Term, fit_terms, with_refined
 
 Array = NDArray[np.float64]

@@ -12,9 +12,10 @@ from sim2real.diagnose import find
 from sim2real.drift import DRIFT_S, block_sums, read_drift, with_drift
 from sim2real.drive import BLOCK_S, CHANNELS, WHEEL
 from sim2real.evidence import Evidence, drift_of, gather
+from sim2real.goodness import fitness
 from sim2real.noise import Noise
 from sim2real.result import Verdict
-from sim2real.selection import NO_GAP_MISFIT, fitness
+from sim2real.selection import NO_GAP_MISFIT
 
 DURATION_S = 30.0
 SHARE = 0.4

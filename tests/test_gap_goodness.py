@@ -8,6 +8,7 @@ from sim2real.contest import Contest, Entry
 from sim2real.drive import SPEED
 from sim2real.evidence import gather
 from sim2real.fitting import ROBUST_FROM, Candidate, fit
+from sim2real.goodness import Fitness, fitness, inflation
 from sim2real.selection import (
     EXPLAINED_MISFIT,
     EXPLAINED_MOST,
@@ -15,10 +16,7 @@ from sim2real.selection import (
     PAIR_MISFIT,
     PAIR_MOST,
     PAIR_SHARE,
-    Fitness,
     explains,
-    fitness,
-    inflation,
     pair_explains,
     probabilities,
     takes_two,

@@ -12,9 +12,10 @@ from sim2real.diagnose import diagnose, without_order
 from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, make_drive
 from sim2real.evidence import gather, residuals
 from sim2real.findings import Findings, describe
+from sim2real.goodness import fitness
 from sim2real.orders import read_order
 from sim2real.result import Verdict
-from sim2real.selection import Decision, fitness
+from sim2real.selection import Decision
 
 DURATION_S = 24.0
 AMPLITUDE = 0.15

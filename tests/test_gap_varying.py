@@ -16,10 +16,11 @@ from sim2real.drive import SPEED
 from sim2real.evidence import gather
 from sim2real.findings import describe
 from sim2real.fitting import FULL_STEPS, Candidate
+from sim2real.goodness import fitness
 from sim2real.observer import Towards
 from sim2real.probing import FORGOTTEN_S, sets_apart, windows
 from sim2real.result import Verdict
-from sim2real.selection import decide, fitness
+from sim2real.selection import decide
 from sim2real.varying import vary
 
 DURATION_S = 16.0
