@@ -41,7 +41,7 @@ lock: $(READY)   ## resolve the dependencies anew (needs uv on PATH)
 	  --extra fmu --extra scenarios --extra design --extra conformance --extra gap --extra hil --extra sweep --extra dev pyproject.toml -o requirements/dev.txt
 
 blind: $(READY)  ## the diagnosis on withheld cases, all thresholds (long; BLIND_SEED=n for other cases; newest family of forms)
-	$(BIN)/python -m benchmarks.blind run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --forms ninth --jobs 2
+	$(BIN)/python -m benchmarks.blind run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --forms tenth --jobs 2
 	$(BIN)/python -m benchmarks.blind score --out out/blind-$(BLIND_SEED)
 
 bench: $(READY)  ## step times of estimator and plant, added to benchmarks/history/speed.jsonl (on an idle machine)

@@ -68,7 +68,7 @@ def run_command(
     out: Out,
     cases: Cases = Size.SMALL,
     seed: Seed = 1,
-    forms: Forms = Family.NINTH,
+    forms: Forms = Family.TENTH,
     jobs: Annotated[int, typer.Option(min=1, help="Cases side by side.")] = 2,
     keep: Annotated[bool, typer.Option(help="Keep the cases' logs.")] = False,
 ) -> None:

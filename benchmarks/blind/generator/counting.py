@@ -56,4 +56,8 @@ def count(
     if sensors.wheel_window_slow > 0.0:
         least = sensors.wheel_window_slow * USUAL_RAD_S * teeth * window / (2.0 * np.pi)
         counted = np.where(counted < least, 0.5 * (pulses(ends) - pulses(begins - window)), counted)
+    if sensors.wheel_halves_rad_s > 0.0:
+        most = sensors.wheel_halves_rad_s * teeth * window / (2.0 * np.pi)
+        halves = np.floor(0.5 * pulses(ends)) - np.floor(0.5 * pulses(begins))
+        counted = np.where(counted > most, 2.0 * halves, counted)
     return counted * 2.0 * np.pi / (teeth * window)

@@ -20,8 +20,6 @@ USUAL_M_S = 20.0
 """Speed that a deviation is stated at where it changes with speed [m/s]."""
 WARM_S = 15.0
 """In which what warms up is warm [s]."""
-CROSS_RISE = 3.0
-"""By which a drag grows with the square of the angle that the air comes from [1/rad^2]."""
 STALL_S = 1.6
 """From one message that a controller waits for to the next [s]."""
 USUAL_RAD_S = 65.0
@@ -42,8 +40,8 @@ TEXTURE_M = 66.0
 """From one stretch of coarse asphalt to the next [m]."""
 GRAVEL_M, GRAVEL_SHARE = 95.0, 0.2
 """From one stretch of loose gravel to the next [m], and the share of the road that has it."""
-WAKE_S, WEAVE_S = 10.0, 6.0
-"""From one car ahead to the next; in which a car goes from side to side of its lane and back."""
+WEAVE_S = 6.0
+"""In which a car goes from side to side of its lane and back."""
 HUNT_S, QUEUE_S = 4.2, 2.6
 """In which an estimate of a motor's flux goes to and fro once; from a queue that grows to the one that shrinks."""
 LASH_NM = 30.0
@@ -52,12 +50,8 @@ MAP_NM = 100.0
 """Over which a torque map's error goes up and down between its points [N m]."""
 GRAIN_M = 78.0
 """The same as an optical sensor sees it [m]."""
-SHUT_M_S = 3.0
-"""About a speed within which shutters close [m/s]."""
 USUAL_NM = 150.0
 """Torque that a gain is stated at where it changes with the torque [N m]."""
-BARRIER_M = 134.0
-"""From one stretch of road between walls or woods to the next [m]."""
 BENDS_M = 151.0
 """From one winding stretch of the road to the next [m]."""
 SEAL_M_S = 8.0
@@ -66,6 +60,8 @@ JACK_M_S2 = 3.0
 """About which a suspension's links lift or lower the body [m/s^2]."""
 RUBS_M_S, SWEEPS_M_S = 0.3, 2.0
 """Sliding speed about which a direction begins to count; by which a tyre has swept off what lies on a road [m/s]."""
+STOPS_M_S2 = 4.0
+"""About which a body that pitches comes to its springs' stops [m/s^2]."""
 FORMING = 0.002
 """Slip still to come about which a contact forms rather than lets go [-]."""
 RUB_RAD_S = 0.1
@@ -88,34 +84,9 @@ def in_share(p: Physics, tilt: float, wheel: int) -> float:
 
 
 @njit(cache=True)
-def in_wake(share: float, time: float) -> float:
-    """Of a drag that is less behind others, and more on a free road [-]."""
-    return 1.0 - share * np.tanh(4.0 * np.sin(2.0 * np.pi * time / WAKE_S))
-
-
-@njit(cache=True)
-def drag_of(fast: float, speed: float) -> float:
-    """Of a drag that is another before and after `USUAL_M_S` [-]."""
-    return 1.0 + fast * np.tanh((speed - USUAL_M_S) / SHUT_M_S)
-
-
-@njit(cache=True)
-def sheltered(share: float, at: float) -> float:
-    """Of a drag that is less between walls or woods, and more where the wind can reach [-]."""
-    return 1.0 - share * np.tanh(4.0 * np.sin(2.0 * np.pi * at / BARRIER_M))
-
-
-@njit(cache=True)
 def winding(at: float) -> float:
     """1 where a road winds and 0 where it is straight, with clothoids between [-]."""
     return 0.5 + 0.5 * np.tanh(4.0 * np.sin(2.0 * np.pi * at / BENDS_M))
-
-
-@njit(cache=True)
-def crossed(wind: float, speed: float) -> float:
-    """Of a drag in a wind from the side, over that at `USUAL_M_S`: the air is faster and comes askew [-]."""
-    now, usual = (wind / max(speed, wind)) ** 2, (wind / USUAL_M_S) ** 2
-    return (1.0 + CROSS_RISE * now) * np.sqrt(1.0 + now) / (1.0 + CROSS_RISE * usual) / np.sqrt(1.0 + usual)
 
 
 @njit(cache=True)
@@ -141,6 +112,23 @@ def gravelly(at: float) -> float:
     """1 where loose gravel lies and 0 elsewhere, with short ends [-]."""
     off = abs(at / GRAVEL_M - np.floor(at / GRAVEL_M) - 0.5) * GRAVEL_M
     return 0.5 - 0.5 * np.tanh(off - 0.5 * GRAVEL_SHARE * GRAVEL_M)
+
+
+@njit(cache=True, inline="always")
+def braking(p: Physics, wheel: int, place: float, angle: float, turning: float, time: float) -> float:
+    """What a brake that is not told to brake takes at a wheel [N m]."""
+    drag = p.brake_drag * p.brake_share[wheel]
+    if p.brake_pulse > 0.0:
+        drag *= 1.0 + p.brake_pulse * np.cos(angle + 1.7 * wheel)
+    if p.brake_release > 0.0:
+        drag *= released(p.brake_release, turning)
+    if p.brake_warm != 0.0:
+        drag *= 1.0 + p.brake_warm * warmth(time)
+    if p.brake_wet != 0.0 and told_friction(p, wheel, place) < SLIPPERY:
+        drag *= 1.0 + p.brake_wet
+    if p.brake_texture != 0.0:
+        drag *= 1.0 + p.brake_texture * coarse(place + (p.front_arm if wheel < 2 else -p.rear_arm))
+    return drag
 
 
 @njit(cache=True)
@@ -216,9 +204,14 @@ def told_friction(p: Physics, wheel: int, position: float) -> float:
 
 
 @njit(cache=True)
-def gripping(p: Physics, rubbing: float) -> float:
-    """What a friction deviates more by as a tyre drives rather than brakes, and sweeps the road as it slides [-]."""
+def gripping(p: Physics, rubbing: float, loaded: float = 1.0) -> float:
+    """What a friction deviates more by as a tyre drives rather than brakes, sweeps the road, and is pressed on it [-].
+
+    `loaded` is 1 of a quarter of the weight.
+    """
     more = p.grip_sign * np.tanh(rubbing / RUBS_M_S)
+    if p.grip_load != 0.0:
+        more += p.grip_load * (min(loaded, 2.0) - 1.0)
     return more + p.grip_slide * (np.tanh(abs(rubbing) / SWEEPS_M_S) - 0.5)
 
 
@@ -234,6 +227,8 @@ def friction(
     mu = p.mu_left[k] if wheel % 2 == 0 else p.mu_right[k]
     if p.border_blur > 0.0:
         mu = blurred(p, p.mu_left if wheel % 2 == 0 else p.mu_right, at, k)
+    if p.grip_axles != 0.0:
+        mu *= 1.0 + spread(p.grip_axles, 0.0, wheel)
     factor = p.factor_left if wheel % 2 == 0 else p.factor_right
     if p.patch_depth > 0.0:
         factor = 1.0 + (factor - 1.0) * (1.0 + p.patch_depth * np.sin(2.0 * np.pi * at / PATCH_M))
@@ -327,13 +322,17 @@ def let_through(p: Physics, torque: float, slip: float) -> float:
 
 
 @njit(cache=True)
-def shaft_of(p: Physics, wheel: int, twist: float, rate: float, angle: float = 0.0) -> float:
+def shaft_of(
+    p: Physics, wheel: int, twist: float, rate: float, angle: float = 0.0, time: float = 0.0
+) -> float:
     """Torque of a shaft whose play is taken up, whose joints may rub, and which may differ from the others [N m]."""
     stiffness = p.shaft_stiffness * (1.0 + (p.shaft_tilt if wheel % 2 == 0 else -p.shaft_tilt))
     if p.shaft_axles != 0.0:
         stiffness *= 1.0 + spread(p.shaft_axles, 0.0, wheel)
     if p.shaft_turn != 0.0:
         stiffness *= 1.0 + p.shaft_turn * np.cos(2.0 * angle + 1.1 * wheel)
+    if p.shaft_warm != 0.0:
+        stiffness *= 1.0 + p.shaft_warm * warmth(time)
     if p.shaft_rise != 0.0:
         stiffness *= 1.0 + p.shaft_rise * (np.tanh(stiffness * abs(twist) / USUAL_NM) - 0.5)
     if p.shaft_sign != 0.0:

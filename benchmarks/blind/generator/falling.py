@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER, LOGARITHMIC, ARCTANGENT, TWO_RATES, ROOTED = range(9)
+LINE_AND_TAIL = 9
 """Their codes."""
 
 
@@ -31,4 +32,7 @@ def fallen(curve: int, sliding: float, floor: float) -> float:
         return floor + (1.0 - floor) * 0.5 * (np.exp(-1.7 * sliding) + np.exp(-0.3 * sliding))
     if curve == ROOTED:
         return floor + (1.0 - floor) / (sliding + np.sqrt(1.0 + sliding * sliding))
+    if curve == LINE_AND_TAIL:
+        tail = 0.5 * np.exp(1.0 - 2.0 * sliding)
+        return floor + (1.0 - floor) * (1.0 - sliding if sliding < 0.5 else tail)
     return floor + (1.0 - floor) * np.exp(-sliding)

@@ -24,6 +24,7 @@ from . import (
     forms_second,
     forms_seventh,
     forms_sixth,
+    forms_tenth,
     forms_third,
 )
 from .forms_second import Foreign
@@ -33,6 +34,7 @@ from .outside_eighth import AND_BEYOND
 from .outside_ninth import STILL_BEYOND
 from .outside_seventh import BEYOND
 from .outside_sixth import LAST_FURTHER
+from .outside_tenth import WELL_BEYOND
 from .world import Effect
 
 Forms = dict[str, str]
@@ -60,6 +62,8 @@ class Family(StrEnum):
     """More of most."""
     NINTH = "ninth"
     """More of most, once more."""
+    TENTH = "tenth"
+    """More of nearly everything."""
 
 
 def _joined(aspects: Aspects, more: Aspects) -> Aspects:
@@ -74,6 +78,7 @@ SIXTH: Aspects = _joined(FIFTH, forms_sixth.MORE)
 SEVENTH: Aspects = _joined(SIXTH, forms_seventh.MORE)
 EIGHTH: Aspects = _joined(SEVENTH, forms_eighth.MORE)
 NINTH: Aspects = _joined(EIGHTH, forms_ninth.MORE)
+TENTH: Aspects = _joined(NINTH, forms_tenth.MORE)
 ASPECTS: dict[Family, Aspects] = {
     Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
     Family.SECOND: forms_second.ASPECTS,
@@ -84,11 +89,12 @@ ASPECTS: dict[Family, Aspects] = {
     Family.SEVENTH: SEVENTH,
     Family.EIGHTH: EIGHTH,
     Family.NINTH: NINTH,
+    Family.TENTH: TENTH,
 }
 """All that has forms in each family; what a family does not list has the library's form."""
-EFFECT_FORMS: Aspects = {name: forms for name, forms in NINTH.items() if name in LIBRARY}
-FOREIGN: dict[str, Foreign] = NINTH["foreign_tyre"]
-NOISES, DIGITS, STYLES = NINTH["noise"], NINTH["digits"], NINTH["driver"]
+EFFECT_FORMS: Aspects = {name: forms for name, forms in TENTH.items() if name in LIBRARY}
+FOREIGN: dict[str, Foreign] = TENTH["foreign_tyre"]
+NOISES, DIGITS, STYLES = TENTH["noise"], TENTH["digits"], TENTH["driver"]
 
 RATES_HZ: dict[Family, dict[float, float]] = {
     Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
@@ -163,6 +169,17 @@ RATES_HZ: dict[Family, dict[float, float]] = {
         1000.0: 0.05,
         1100.0: 0.05,
     },
+    Family.TENTH: {
+        100.0: 0.15,
+        150.0: 0.1,
+        200.0: 0.15,
+        250.0: 0.1,
+        350.0: 0.15,
+        500.0: 0.1,
+        600.0: 0.1,
+        1000.0: 0.1,
+        1250.0: 0.05,
+    },
 }
 """Log rates and their odds; at each, every second corner of the command at least falls on a row."""
 
@@ -176,6 +193,7 @@ _ADDED = (
     BEYOND,
     AND_BEYOND,
     STILL_BEYOND,
+    WELL_BEYOND,
 )
 OUTSIDES: dict[Family, dict[str, Effect]] = dict(zip(Family, accumulate(_ADDED, or_), strict=True))
 """Each family's deviations outside the library."""
@@ -191,7 +209,7 @@ def draw_forms(family: Family, rng: Generator) -> Forms:
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDES[Family.NINTH]}[name]
+    effect = {**LIBRARY, **OUTSIDES[Family.TENTH]}[name]
     return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .air import dragging
 from .commands import COMMAND_STEP_S, on_grid
 from .details import (
     FORMING,
@@ -24,24 +25,21 @@ from .details import (
     SLIPPERY,
     SMALL_M_S2,
     SMALL_TORQUE_NM,
+    STOPS_M_S2,
     USUAL_M_S,
     USUAL_NM,
     USUAL_RAD_S,
+    braking,
     coarse,
-    crossed,
-    drag_of,
     friction,
     gravelly,
     gripping,
-    in_wake,
     lag_of,
     let_through,
     profile_at,
     radius_at,
-    released,
     rolling_of,
     shaft_of,
-    sheltered,
     spread,
     stiffened,
     told_friction,
@@ -132,6 +130,8 @@ def lean(p: Physics, y: Array, reading: float, dy: Array) -> None:
     pitch_time = p.pitch_time
     if p.pitch_sign != 0.0:
         pitch_time *= 1.0 + p.pitch_sign * np.tanh((reading - y[PITCH]) / SMALL_M_S2)
+    if p.pitch_stops > 0.0:
+        pitch_time /= 1.0 + p.pitch_stops * np.tanh((y[PITCH] / STOPS_M_S2) ** 2)
     dy[PITCH] = (reading - y[PITCH]) / pitch_time
     dy[BODY] = (reading - y[BODY]) / p.springs_time if p.springs_share > 0.0 else 0.0
 
@@ -167,8 +167,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.load_side != 0.0:
             load *= 1.0 + (p.load_side if w % 2 == 0 else -p.load_side)
         more = 0.0
-        if p.grip_sign != 0.0 or p.grip_slide != 0.0:
-            more = gripping(p, y[W + w] * p.radius - speed)
+        if p.grip_sign != 0.0 or p.grip_slide != 0.0 or p.grip_load != 0.0:
+            more = gripping(p, y[W + w] * p.radius - speed, load / (0.25 * p.mass * GRAVITY))
         theta = friction(p, w, y[X], speed, time, more)
         radius = p.radius
         unlike = p.radius_tilt != 0.0 or p.radius_side != 0.0 or p.radius_sides != 0.0
@@ -191,8 +191,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
                 path *= 1.0 + p.relaxation_warm * warmth(time)
             if p.relaxation_rise != 0.0:
                 path *= 1.0 + p.relaxation_rise * np.tanh((abs(slip) - abs(y[SLIP + w])) / FORMING)
-            if p.relaxation_tilt != 0.0:
-                path *= 1.0 + spread(p.relaxation_tilt, 0.0, w)
+            if p.relaxation_tilt != 0.0 or p.relaxation_side != 0.0:
+                path *= 1.0 + spread(p.relaxation_tilt, p.relaxation_side, w)
             dy[SLIP + w] = (slip - y[SLIP + w]) * max(abs(rim), abs(speed), FLOOR_M_S) / path
             slip = y[SLIP + w]
             if p.relaxation_direct > 0.0:
@@ -208,6 +208,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if slippery:
             rubbing *= 1.0 + p.falloff_wet
         stiffer = spread(p.stiffness_tilt, p.stiffness_side, w)
+        if p.stiffness_sides != 0.0:
+            stiffer += p.stiffness_sides if w % 2 == 0 else -p.stiffness_sides
         if p.stiffness_warm != 0.0 or p.stiffness_speed != 0.0:
             stiffer += stiffened(p, time, speed)
         if p.stiffness_texture != 0.0:
@@ -221,15 +223,7 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         total += force
         dy[HEAT + w] = p.heating * abs(force * (rim - speed)) - p.cooling * y[HEAT + w]
         dy[ANGLE + w] = y[W + w]
-        resisting = p.brake_drag * p.brake_share[w]
-        if p.brake_pulse > 0.0:
-            resisting *= 1.0 + p.brake_pulse * np.cos(y[ANGLE + w] + 1.7 * w)
-        if p.brake_release > 0.0:
-            resisting *= released(p.brake_release, y[W + w])
-        if p.brake_warm != 0.0:
-            resisting *= 1.0 + p.brake_warm * warmth(time)
-        if p.brake_wet != 0.0 and told_friction(p, w, y[X]) < SLIPPERY:
-            resisting *= 1.0 + p.brake_wet
+        resisting = braking(p, w, y[X], y[ANGLE + w], y[W + w], time)
         rolling = p.roll_moment * load * p.radius
         if p.roll_growth > 0.0:
             rolling *= 1.0 + p.roll_growth * ((speed / ROLL_M_S) ** 2 - 1.0)
@@ -240,6 +234,8 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             rolling *= 1.0 + p.roll_warm * warmth(time)
         if p.roll_torque > 0.0:
             rolling *= 1.0 + p.roll_torque * min((force * radius / USUAL_NM) ** 2, 4.0)
+        if p.roll_flat > 0.0:
+            rolling *= 1.0 + p.roll_flat * np.cos(y[ANGLE + w] + 2.9 * w)
         resisting += rolling
         if p.gravel > 0.0:
             at = y[X] + (p.front_arm if w < 2 else -p.rear_arm)
@@ -275,6 +271,9 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
         if p.slew > 0.0:
             dy[LAG + w] = min(max(dy[LAG + w], -p.slew), p.slew)
         torque = y[LAG + w] if follows else told
+        if p.lag_tail > 0.0:
+            dy[STAGE + w] = (told - y[STAGE + w]) / p.lag_slow
+            torque += p.lag_tail * (y[STAGE + w] - torque)
         if p.lag_direct > 0.0 and follows:
             torque += p.lag_direct * (told - torque)
         if p.axle_viscous > 0.0:
@@ -291,22 +290,13 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
             dy[TWIST + w] = y[MOTOR + w] - y[W + w]
             shaft = p.shaft_stiffness * y[TWIST + w] + p.shaft_damping * dy[TWIST + w]
             unlike = p.shaft_tilt != 0.0 or p.shaft_axles != 0.0 or p.shaft_sign != 0.0 or p.shaft_turn != 0.0
-            if unlike or p.shaft_play > 0.0 or p.shaft_friction > 0.0 or p.shaft_rise != 0.0:
-                shaft = shaft_of(p, w, y[TWIST + w], dy[TWIST + w], y[ANGLE + w])
+            unlike = unlike or p.shaft_friction > 0.0 or p.shaft_warm != 0.0
+            if unlike or p.shaft_play > 0.0 or p.shaft_rise != 0.0:
+                shaft = shaft_of(p, w, y[TWIST + w], dy[TWIST + w], y[ANGLE + w], time)
             dy[MOTOR + w] = (torque - shaft) / p.motor_inertia
             torque = shaft
         dy[W + w] = (torque - force * radius * p.lever - resisting) / inertia
-    drag = p.drag
-    if p.drag_fast != 0.0:
-        drag *= drag_of(p.drag_fast, speed)
-    if p.drag_cross > 0.0:
-        drag *= crossed(p.drag_cross, speed)
-    if p.drag_wake > 0.0:
-        drag *= in_wake(p.drag_wake, time)
-    if p.drag_power != 0.0:
-        drag *= (max(speed, FLOOR_M_S) / USUAL_M_S) ** p.drag_power
-    if p.drag_shelter != 0.0:
-        drag *= sheltered(p.drag_shelter, y[X])
+    drag = dragging(p, speed, y[X], time, y[PITCH])
     total -= drag * speed * speed + p.roll_force * press * np.tanh(speed / 0.1)
     if p.bend_drag > 0.0:
         total -= p.bend_drag * winding(y[X]) * (speed / USUAL_M_S) ** 2

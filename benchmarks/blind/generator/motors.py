@@ -13,6 +13,7 @@ from .details import (
     HUNT_S,
     MAP_NM,
     SMALL_TORQUE_NM,
+    USUAL_NM,
     USUAL_RAD_S,
     WAIT_S,
     gain_of,
@@ -30,6 +31,8 @@ BEAT_S = 0.7
 """In which two clocks of nearly the same cycle pass each other once [s]."""
 DERATING_S = 12.0
 """In which a motor gets hot [s]."""
+NOTCH_RAD_S = 7.0
+"""Half of the band of speeds that a motor goes through with less torque [rad/s]."""
 
 
 @njit(cache=True, inline="always")
@@ -44,6 +47,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         heard += p.delay_sign * np.tanh(commanded(command, wheel, heard) / SMALL_TORQUE_NM)
     if p.delay_speed != 0.0:
         heard -= p.delay_speed * (min(USUAL_RAD_S / max(turning, 1.0), 2.0) - 1.0)
+    if p.delay_warm != 0.0:
+        heard -= p.delay_warm * warmth(time)
     if p.delay_jump > 0.0:
         heard = queued(p.delay_jump, heard, time)
     if p.beat > 0.0:
@@ -71,6 +76,8 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
     torque = min(max(torque, -p.torque_limit), p.torque_limit)
     if p.power > 0.0:
         torque = min(torque, p.power / max(turning, 1.0))
+    if p.notch > 0.0:
+        torque *= 1.0 - p.notch * np.exp(-(((turning - p.notch_rad_s) / NOTCH_RAD_S) ** 2))
     if p.derating > 0.0:
         torque *= 1.0 - p.derating * (1.0 - np.exp(-time / DERATING_S))
     if p.ripple > 0.0:
@@ -86,6 +93,9 @@ def motor_torque(p: Physics, command: Array, wheel: int, time: float, angle: flo
         gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_sway * np.sin(2.0 * np.pi * time / HUNT_S))
     if p.gain_turn != 0.0:
         gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_turn * np.cos(angle + 1.3 * wheel))
+    if p.gain_power != 0.0:
+        power = abs(torque) * turning / (USUAL_NM * USUAL_RAD_S)
+        gain = 1.0 + (gain - 1.0) * (1.0 + p.gain_power * (min(power, 2.0) - 1.0))
     if p.gain_sign != 0.0 or p.gain_speed != 0.0 or p.pad_rise > 0.0 or p.gain_load != 0.0:
         return torque * gain_of(gain, p.gain_sign, p.gain_speed, p.pad_rise, p.gain_load, torque, turning)
     return torque * gain

@@ -24,6 +24,7 @@ class Physics(NamedTuple):
     springs_tilt: float
     springs_rub: float
     pitch_sign: float
+    pitch_stops: float
     body_rate: float
     load_side: float
     radius: float
@@ -46,6 +47,7 @@ class Physics(NamedTuple):
     stiffness_load: float
     stiffness_tilt: float
     stiffness_side: float
+    stiffness_sides: float
     stiffness_warm: float
     stiffness_speed: float
     stiffness_texture: float
@@ -62,6 +64,8 @@ class Physics(NamedTuple):
     grip_wet: float
     grip_sign: float
     grip_slide: float
+    grip_load: float
+    grip_axles: float
     wet_fall: float
     falloff: float
     falloff_floor: float
@@ -73,6 +77,7 @@ class Physics(NamedTuple):
     relaxation_shrinks: bool
     relaxation_speed: float
     relaxation_tilt: float
+    relaxation_side: float
     relaxation_warm: float
     relaxation_direct: float
     relaxation_rise: float
@@ -92,6 +97,7 @@ class Physics(NamedTuple):
     drag_wake: float
     drag_power: float
     drag_shelter: float
+    drag_nod: float
     bend_drag: float
     lift: float
     gust_drag: float
@@ -108,6 +114,7 @@ class Physics(NamedTuple):
     roll_warm: float
     roll_torque: float
     roll_slow: float
+    roll_flat: float
     gravel: float
     slush: float
     brake_drag: float
@@ -116,6 +123,7 @@ class Physics(NamedTuple):
     brake_release: float
     brake_warm: float
     brake_wet: float
+    brake_texture: float
     bearing: float
     grade: float
     wave_slope: float
@@ -127,6 +135,7 @@ class Physics(NamedTuple):
     delay_turn: float
     delay_jump: float
     delay_speed: float
+    delay_warm: float
     message: float
     message_joined: bool
     message_lost: float
@@ -145,6 +154,8 @@ class Physics(NamedTuple):
     lag_direct: float
     lag_zero: float
     lag_warm: float
+    lag_tail: float
+    lag_slow: float
     actuator_play: float
     slew: float
     gain: Array
@@ -155,6 +166,7 @@ class Physics(NamedTuple):
     gain_map: float
     gain_sway: float
     gain_turn: float
+    gain_power: float
     axle_share: float
     axle_split: float
     axle_viscous: float
@@ -167,6 +179,8 @@ class Physics(NamedTuple):
     torque_step: float
     torque_limit: float
     power: float
+    notch: float
+    notch_rad_s: float
     derating: float
     ripple: float
     ripple_order: float
@@ -179,6 +193,7 @@ class Physics(NamedTuple):
     shaft_rise: float
     shaft_sign: float
     shaft_turn: float
+    shaft_warm: float
     motor_inertia: float
     slosh_share: float
     slosh_rate: float

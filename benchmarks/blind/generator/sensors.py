@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from .counting import count
-from .details import GRAIN_M, USUAL_M_S, USUAL_RAD_S, WAIT_S, WARM_S
+from .details import USUAL_M_S, USUAL_RAD_S, WAIT_S
 from .kernel import ANGLE, COMMAND_STEP_S, MOTOR, RECORD_STEP_S, N, V, W, X
+from .scales import NODDING_S, bias_of, scale_of
 from .signals import (
     beat,
     extrapolated,
+    fitted,
     hold,
     joined,
     jumping,
@@ -26,29 +28,17 @@ from .signals import (
     mean,
     mean_age,
     middle,
+    mislocked,
     paced,
     played,
+    ringing,
     sent,
-    slow,
     tracked,
     wait,
 )
 
 Array = NDArray[np.floating[Any]]
 WHEELS = ("fl", "fr", "rl", "rr")
-SWAY_S = 9.0
-NODDING_S, MOST_NODDING = 0.1, 0.4
-"""How late a body pitches, and by how much that changes a scale's deviation at most [-]."""
-MEMORY_S, MEMORY_M_S2 = 1.5, 1.0
-"""How long a sensor remembers where it was bent to, and from what acceleration on."""
-AIRED_S = 6.0
-"""In which the air stream's cooling tells on a sensor."""
-MOUNT_M_S, MOUNT_OVER_M_S = 18.0, 3.0
-"""Speed at which a wheel's turns shake a sensor's bracket, and over what."""
-MOUNT_SHARE = np.sqrt(np.pi) * MOUNT_OVER_M_S / (30.0 - 5.0)
-"""Mean of the shaking over the speeds from 5 to 30 m/s [-]."""
-TABLE_M_S = 20.0 / 3.6
-"""Over which a calibration's error goes up and down between its points."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +85,8 @@ class Sensors:
     """How many windows overlap: a new one ends that often in the time of one. A half: every second one is told."""
     wheel_window_slow: float = 0.0
     """Share of the usual pulses of a window, below which those of the window before count too."""
+    wheel_halves_rad_s: float = 0.0
+    """Speed above which the sensor hands on every second pulse only, to spare who counts them."""
     wheel_flanks: float = 0.0
     """By which every second flank comes late [teeth]."""
     wheel_window_jitter: float = 0.0
@@ -109,6 +101,8 @@ class Sensors:
     """Below which a wheel is told to stand: the sensor's signal is too small."""
     wheel_offset_rad_s: float = 0.0
     """Of all wheels' readings."""
+    wheel_blend: float = 0.0
+    """Share of each wheel's reading that is the mean of all [-]."""
     wheel_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     wheel_radius_m: float = 0.0
     """Where a speed is taken from the wheels [m]."""
@@ -122,6 +116,8 @@ class Sensors:
     speed_joined: bool = False
     speed_extrapolated: bool = False
     """From each message on the speed goes straight on as from the last one to it."""
+    speed_fitted_s: float = 0.0
+    """Time of whose places the speed is a line's slope."""
     speed_beat_s: float = 0.0
     speed_wait_s: float = 0.0
     speed_filter_s: float = 0.0
@@ -151,6 +147,10 @@ class Sensors:
     """By which it differs between a calibration's points, `TABLE_M_S` apart [-]."""
     speed_scale_mount: float = 0.0
     """By which it differs where the sensor's bracket shakes, at about `MOUNT_M_S` [-]."""
+    speed_scale_waves: float = 0.0
+    """By which it differs over a road's long waves, `WAVES_M` each [-]."""
+    speed_mislocks: float = 0.0
+    """By which the speed is off while the sensor has locked onto something else [-]."""
     speed_play_m_s: float = 0.0
     """How far the speed has to change, either way, before what is told follows."""
     speed_rate_m_s2: float = np.inf
@@ -179,6 +179,10 @@ class Sensors:
     """By which the bias is less at double `USUAL_M_S`, after `AIRED_S` [-]."""
     accel_bias_jumps: float = 0.0
     """By which the bias differs from one level to the other [-]."""
+    accel_bias_fan: float = 0.0
+    """By which the bias differs as a fan warms and cools the sensor's box in turn [-]."""
+    accel_period_s: float = 0.0
+    """Of a sensor that swings on a soft pad."""
     accel_step_m_s2: float = 0.0
     """In which the acceleration is told, to the nearest."""
     accel_bend_s2_m: float = 0.0
@@ -297,6 +301,8 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
             out[:, w] += sensors.wheel_offset_rad_s
         if sensors.wheel_least_rad_s > 0.0:
             out[out[:, w] < sensors.wheel_least_rad_s, w] = 0.0
+    if sensors.wheel_blend > 0.0:
+        out[:, :4] += sensors.wheel_blend * (out[:, :4].mean(axis=1, keepdims=True) - out[:, :4])
     speed = path[:, V]
     if sensors.speed_rolling > 0.0:
         rolled = path[:, W : W + 4].mean(axis=1) * sensors.wheel_radius_m
@@ -314,75 +320,28 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
         speed = joined(record, speed, sensors.speed_message_s, speed_phase)
     if sensors.speed_extrapolated:
         speed = extrapolated(record, speed, sensors.speed_message_s, speed_phase)
+    speed = fitted(speed, sensors.speed_fitted_s)
     if sensors.speed_average_twice:
         speed = mean(record, speed, record, sensors.speed_average_s)
     shown_speed = mean(record, speed, speed_at, sensors.speed_average_s)
-    out[:, 4] = _scale(path, sensors, time_s, shown_speed) * shown_speed + sensors.speed_offset_m_s
+    out[:, 4] = scale_of(path, sensors, time_s, shown_speed) * shown_speed + sensors.speed_offset_m_s
+    if sensors.speed_mislocks != 0.0:
+        out[:, 4] *= 1.0 + sensors.speed_mislocks * mislocked(time_s, sensors.seed)
     if sensors.speed_step_m_s > 0.0:
         out[:, 4] = np.floor(out[:, 4] / sensors.speed_step_m_s) * sensors.speed_step_m_s
-    accel = lag(path[:, N], sensors.accel_lag_s)
+    accel = ringing(lag(path[:, N], sensors.accel_lag_s), sensors.accel_period_s)
     if sensors.accel_fades_s > 0.0:
         accel = accel - lag(accel, sensors.accel_fades_s)
     if sensors.accel_pitch > 0.0:
         accel = accel + sensors.accel_pitch * lag(path[:, N], NODDING_S)
-    bias = sensors.accel_bias_m_s2 * (1.0 + sensors.accel_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S)))
-    if sensors.accel_bias_growth != 0.0:
-        faster = np.interp(time_s, record, path[:, V]) / USUAL_M_S - 1.0
-        bias = bias * (1.0 + sensors.accel_bias_growth * faster)
-    if sensors.accel_wander > 0.0:
-        bias = bias * (1.0 + sensors.accel_wander * slow(time_s, sensors.seed))
-    if sensors.accel_bias_grain > 0.0:
-        bias = bias * (1.0 + sensors.accel_bias_grain * _coarse(path, time_s))
-    if sensors.accel_bias_memory > 0.0:
-        bent = lag(np.tanh(path[:, N] / MEMORY_M_S2), MEMORY_S)
-        bias = bias * (1.0 + sensors.accel_bias_memory * np.interp(time_s, record, bent))
-    if sensors.accel_bias_jumps > 0.0:
-        bias = bias * (1.0 + sensors.accel_bias_jumps * jumping(time_s, sensors.seed))
-    if sensors.accel_bias_aired != 0.0:
-        aired = np.interp(time_s, record, lag(path[:, V], AIRED_S)) / USUAL_M_S - 1.0
-        bias = bias * (1.0 - sensors.accel_bias_aired * aired)
     if sensors.accel_bend_s2_m != 0.0:
         accel = accel + sensors.accel_bend_s2_m * accel * accel
-    shown = sensors.accel_scale * np.interp(time_s - sensors.accel_delay_s, record, accel) + bias
+    shown = sensors.accel_scale * np.interp(time_s - sensors.accel_delay_s, record, accel)
+    shown = shown + bias_of(path, sensors, time_s)
     out[:, 5] = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
     if sensors.accel_step_m_s2 > 0.0:
         out[:, 5] = np.round(out[:, 5] / sensors.accel_step_m_s2) * sensors.accel_step_m_s2
     return out
-
-
-def _scale(path: Array, sensors: Sensors, time_s: Array, speed: Array) -> float | Array:
-    """Of the vehicle speed, whose deviation may differ with time, speed and pitch [-]."""
-    differs = (sensors.speed_sway, sensors.speed_scale_growth, sensors.speed_scale_pitch)
-    places = (sensors.speed_scale_grain, sensors.speed_scale_warming, sensors.speed_scale_jumps)
-    speeds = (sensors.speed_scale_table, sensors.speed_scale_mount)
-    if not any((*differs, *places, *speeds, sensors.speed_scale_wander)):
-        return sensors.speed_scale
-    sway = 1.0 + sensors.speed_sway * np.sin(2.0 * np.pi * time_s / SWAY_S)
-    sway = sway + sensors.speed_scale_growth * (speed / USUAL_M_S - 1.0)
-    if sensors.speed_scale_pitch != 0.0:
-        record = np.arange(len(path)) * RECORD_STEP_S
-        nod = sensors.speed_scale_pitch * np.interp(time_s, record, lag(path[:, N], NODDING_S))
-        sway = sway + np.clip(nod, -MOST_NODDING, MOST_NODDING)
-    if sensors.speed_scale_grain > 0.0:
-        sway = sway + sensors.speed_scale_grain * _coarse(path, time_s)
-    if sensors.speed_scale_warming > 0.0:
-        sway = sway + sensors.speed_scale_warming * (1.0 - 2.0 * np.exp(-time_s / WARM_S))
-    if sensors.speed_scale_jumps > 0.0:
-        sway = sway + sensors.speed_scale_jumps * jumping(time_s, sensors.seed)
-    if sensors.speed_scale_wander > 0.0:
-        sway = sway + sensors.speed_scale_wander * slow(time_s, sensors.seed)
-    if sensors.speed_scale_table > 0.0:
-        sway = sway + sensors.speed_scale_table * np.sin(2.0 * np.pi * speed / TABLE_M_S)
-    if sensors.speed_scale_mount > 0.0:
-        shakes = np.exp(-(((speed - MOUNT_M_S) / MOUNT_OVER_M_S) ** 2))
-        sway = sway + sensors.speed_scale_mount * (shakes - MOUNT_SHARE)
-    return 1.0 + (sensors.speed_scale - 1.0) * sway
-
-
-def _coarse(path: Array, time_s: Array) -> Array:
-    """1 on a coarse road's stretches and -1 between them [-]."""
-    place = np.interp(time_s, np.arange(len(path)) * RECORD_STEP_S, path[:, X])
-    return np.asarray(np.tanh(4.0 * np.sin(2.0 * np.pi * place / GRAIN_M)))
 
 
 def noise_of(noise: Noise, time_s: Array, rng: Generator) -> Array:

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from .details import WAIT_S
 from .kernel import RECORD_STEP_S
@@ -21,6 +21,12 @@ SLOW_S = (5.3, 11.0, 17.0)
 """Periods of what a bias wanders by."""
 JUMP_S = 3.5
 """From one jump of a scale to the next."""
+FAN_S, COOLING_S = 4.0, 3.0
+"""How long a box's fan runs, and stands; how fast what is in it follows."""
+RELOCK_S, MISLOCK_S = 1.8, 0.25
+"""Of a sensor that locks onto what it sees: in how long it goes wrong once, and how long it takes to notice."""
+PAD_DAMPING = 0.12
+"""Of a sensor on a soft pad, over the critical one."""
 LOOP_DAMPING = 0.5
 """Of a loop that tracks a speed, over the critical one."""
 MOST_PACED = 3.0
@@ -43,6 +49,22 @@ def jumping(time_s: Array, seed: int) -> Array:
     """One of two levels, every `JUMP_S` the other [-]."""
     phase = np.random.default_rng([seed, 16]).uniform(0.0, 2.0)
     return 1.0 - 2.0 * (np.floor(time_s / JUMP_S + phase) % 2.0)
+
+
+def cycling(time_s: Array, seed: int) -> Array:
+    """What warms up and cools down in turn, of size 1 [-]."""
+    half = np.mod(time_s / FAN_S + np.random.default_rng([seed, 18]).uniform(0.0, 2.0), 2.0)
+    most = np.tanh(0.5 * FAN_S / COOLING_S)
+    risen = (1.0 - (1.0 + most) * np.exp(-np.mod(half, 1.0) * FAN_S / COOLING_S)) / most
+    return np.asarray(np.where(half < 1.0, risen, -risen))
+
+
+def mislocked(time_s: Array, seed: int) -> Array:
+    """1 while a sensor has locked onto something else, for `MISLOCK_S` in every `RELOCK_S`, and 0 else [-]."""
+    cycle = np.floor(time_s / RELOCK_S).astype(int)
+    begun = np.random.default_rng([seed, 19]).uniform(0.0, RELOCK_S - MISLOCK_S, cycle.max() + 1)[cycle]
+    since = time_s - cycle * RELOCK_S - begun
+    return np.asarray((since >= 0.0) & (since < MISLOCK_S), dtype=float)
 
 
 def mean_age(filter_s: float) -> float:
@@ -86,6 +108,28 @@ def middle(signal: Array, over_s: float) -> Array:
         return signal
     half = int(0.5 * over_s / RECORD_STEP_S)
     return np.asarray(median_filter(signal, size=2 * half + 1, mode="nearest"))
+
+
+def fitted(signal: Array, over_s: float) -> Array:
+    """The slope of a line through the places of `over_s` around each of a record's values.
+
+    By least squares, so that a speed counts by how far from both ends it was: as a parabola.
+    """
+    if over_s == 0.0:
+        return signal
+    half = int(0.5 * over_s / RECORD_STEP_S)
+    weights = 1.0 - (np.arange(-half, half + 1) / (half + 1.0)) ** 2
+    return np.convolve(np.pad(signal, half, "edge"), weights / weights.sum(), "valid")
+
+
+def ringing(signal: Array, period_s: float) -> Array:
+    """A record as a sensor on a soft pad reads it, which swings with the period."""
+    if period_s == 0.0:
+        return signal
+    rate = 2.0 * np.pi / period_s
+    pad = [rate**2], [1.0, 2.0 * PAD_DAMPING * rate, rate**2]
+    (told,), given, _ = cont2discrete(pad, RECORD_STEP_S, method="foh")
+    return np.asarray(lfilter(told, given, signal, zi=lfilter_zi(told, given) * signal[0])[0])
 
 
 def sent(at: Array, message_s: float, phase: float, lost: float, seed: int) -> Array:

@@ -20,6 +20,11 @@ def clock_of(duration_s: float) -> Array:
     return np.arange(1, round(duration_s / COMMAND_STEP_S) + 1) * COMMAND_STEP_S
 
 
+def limit_of(car: Car) -> float:
+    """Torque per wheel that a dry road just bears [N m]."""
+    return car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
+
+
 def squeezed(*corners: tuple[float, float]) -> Array:
     """Torque through corners of (duration from the corner before [s], torque [N m]), at rest in each."""
     parts, last = [], 0.0

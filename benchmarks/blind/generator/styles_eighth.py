@@ -10,20 +10,14 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import COAST, Piece, Style
-from .kernel import GRAVITY
-from .styles import clock_of, faded, squeezed
+from .styles import clock_of, faded, limit_of, squeezed
 
 Array = NDArray[np.floating[Any]]
 
 
-def _limit(car: Car) -> float:
-    """Torque per wheel that a dry road just bears [N m]."""
-    return car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
-
-
 def _to_the_cones(car: Car, rng: Generator) -> Array:
     """A held speed up to the cones, then all of the brake at once (he lets go when the wheels slide)."""
-    hold, limit = car.motor_peak_torque_nm * rng.uniform(0.02, 0.08), -rng.uniform(1.0, 1.2) * _limit(car)
+    hold, limit = car.motor_peak_torque_nm * rng.uniform(0.02, 0.08), -rng.uniform(1.0, 1.2) * limit_of(car)
     return squeezed(
         (0.3, hold),
         (rng.uniform(0.6, 1.5), hold),
@@ -37,10 +31,10 @@ def _to_the_cones(car: Car, rng: Generator) -> Array:
 
 def _on_the_threshold(car: Car, rng: Generator) -> Array:
     """Up to where the wheels begin to slide, a little back, and up again, as he was told."""
-    corners = [(rng.uniform(0.2, 0.4), -0.7 * _limit(car))]
+    corners = [(rng.uniform(0.2, 0.4), -0.7 * limit_of(car))]
     for _ in range(rng.integers(2, 5)):
-        corners += [(rng.uniform(0.2, 0.4), -rng.uniform(0.9, 1.1) * _limit(car))]
-        corners += [(0.15, -rng.uniform(0.5, 0.75) * _limit(car))]
+        corners += [(rng.uniform(0.2, 0.4), -rng.uniform(0.9, 1.1) * limit_of(car))]
+        corners += [(0.15, -rng.uniform(0.5, 0.75) * limit_of(car))]
     return squeezed(*corners, (0.3, 0.0))
 
 

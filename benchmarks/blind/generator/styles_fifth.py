@@ -10,15 +10,9 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import COAST, Piece, Style
-from .kernel import GRAVITY
-from .styles import clock_of, faded, squeezed
+from .styles import clock_of, faded, limit_of, squeezed
 
 Array = NDArray[np.floating[Any]]
-
-
-def _limit(car: Car) -> float:
-    """Torque per wheel that a dry road just bears [N m]."""
-    return car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
 
 
 def _nothing(car: Car, rng: Generator) -> Array:
@@ -39,7 +33,7 @@ def _many_tones(car: Car, rng: Generator) -> Array:
 
 def _twice(car: Car, rng: Generator) -> Array:
     """A trapezoid up and one down, then the same again."""
-    up, down = car.motor_peak_torque_nm * rng.uniform(0.4, 0.95), -_limit(car) * rng.uniform(0.25, 0.7)
+    up, down = car.motor_peak_torque_nm * rng.uniform(0.4, 0.95), -limit_of(car) * rng.uniform(0.25, 0.7)
     rise, hold = rng.uniform(0.1, 0.4), rng.uniform(0.4, 0.8)
     once = (rise, up), (hold, up), (rise, 0.0), (0.3, 0.0), (rise, down), (0.6 * hold, down), (rise, 0.0)
     return squeezed(*once, (0.3, 0.0), *once)
@@ -47,7 +41,7 @@ def _twice(car: Car, rng: Generator) -> Array:
 
 def _slowly_to_limit(car: Car, rng: Generator) -> Array:
     """A brake that goes down at one rate, and is held there (it lets go when the wheels slide)."""
-    limit, clock = -rng.uniform(1.05, 1.2) * _limit(car), clock_of(rng.uniform(1.0, 2.5))
+    limit, clock = -rng.uniform(1.05, 1.2) * limit_of(car), clock_of(rng.uniform(1.0, 2.5))
     return np.concatenate(
         [limit * clock / clock[-1], np.full(40, limit), np.linspace(limit, 0.0, 12), np.zeros(30)]
     )
@@ -110,7 +104,7 @@ def _bucking(car: Car, rng: Generator) -> Array:
 
 def _startled(car: Car, rng: Generator) -> Array:
     """On the brake with all his weight, off it at once, then half on (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.2) * _limit(car)
+    limit = -rng.uniform(1.0, 1.2) * limit_of(car)
     return squeezed(
         (rng.uniform(0.1, 0.2), limit),
         (rng.uniform(0.2, 0.6), limit),
@@ -138,7 +132,7 @@ def _unsteady(car: Car, rng: Generator) -> Array:
 
 def _late(car: Car, rng: Generator) -> Array:
     """Ever harder as the place where he should stop comes near (he lets go when the wheels slide)."""
-    limit, clock = -rng.uniform(0.9, 1.15) * _limit(car), clock_of(rng.uniform(1.5, 2.5))
+    limit, clock = -rng.uniform(0.9, 1.15) * limit_of(car), clock_of(rng.uniform(1.5, 2.5))
     return np.concatenate([limit * np.expm1(2.5 * clock / clock[-1]) / np.expm1(2.5), np.zeros(30)])
 
 
@@ -177,7 +171,7 @@ def _feeling(car: Car, rng: Generator) -> Array:
     """Dabs of the brake from rolling, each harder, to feel what the road bears (he lets go when the wheels slide)."""
     corners = []
     for share in np.linspace(0.2, rng.uniform(0.9, 1.15), int(rng.integers(4, 6))):
-        level = -share * _limit(car)
+        level = -share * limit_of(car)
         corners += [(0.12, level), (rng.uniform(0.12, 0.3), level), (0.12, 0.0), (rng.uniform(0.2, 0.5), 0.0)]
     return squeezed(*corners)
 
@@ -208,7 +202,7 @@ def _with_care(car: Car, rng: Generator) -> Array:
 
 def _then_all(car: Car, rng: Generator) -> Array:
     """A little, and as the road bears that, all of it (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.2) * _limit(car)
+    limit = -rng.uniform(1.0, 1.2) * limit_of(car)
     return squeezed(
         (0.3, 0.25 * limit),
         (rng.uniform(0.3, 0.7), 0.25 * limit),

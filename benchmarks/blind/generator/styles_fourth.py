@@ -10,15 +10,9 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import COAST, Piece, Style
-from .kernel import GRAVITY
-from .styles import clock_of, faded, squeezed
+from .styles import clock_of, faded, limit_of, squeezed
 
 Array = NDArray[np.floating[Any]]
-
-
-def _limit(car: Car) -> float:
-    """Torque per wheel that a dry road just bears [N m]."""
-    return car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
 
 
 # --- assisted
@@ -26,7 +20,7 @@ def _limit(car: Car) -> float:
 
 def _anti_lock(car: Car, rng: Generator) -> Array:
     """A brake that is let go and applied again, some times a second, by a controller that looks for the limit."""
-    limit, corners = -_limit(car), []
+    limit, corners = -limit_of(car), []
     level = rng.uniform(0.8, 1.1)
     corners.append((rng.uniform(0.2, 0.4), level * limit))
     for _ in range(rng.integers(4, 8)):
@@ -57,7 +51,7 @@ def _follow(car: Car, rng: Generator) -> Array:
 
 def _emergency(car: Car, rng: Generator) -> Array:
     """A warning jerk, half a brake, then all of it (the driver lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.15) * _limit(car)
+    limit = -rng.uniform(1.0, 1.15) * limit_of(car)
     return squeezed(
         (0.1, 0.2 * limit),
         (0.15, 0.0),
@@ -114,7 +108,7 @@ ASSISTED = Style(
 
 def _into_a_bend(car: Car, rng: Generator) -> Array:
     """Hard on the brake late, and off it slowly (he lets go when the wheels slide)."""
-    level = -rng.uniform(0.6, 1.15) * _limit(car)
+    level = -rng.uniform(0.6, 1.15) * limit_of(car)
     return squeezed(
         (rng.uniform(0.12, 0.25), level),
         (rng.uniform(0.2, 0.6), 0.95 * level),

@@ -10,15 +10,9 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import COAST, Piece, Style
-from .kernel import GRAVITY
-from .styles import clock_of, faded, squeezed
+from .styles import clock_of, faded, limit_of, squeezed
 
 Array = NDArray[np.floating[Any]]
-
-
-def _limit(car: Car) -> float:
-    """Torque per wheel that a dry road just bears [N m]."""
-    return car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
 
 
 def _resume(car: Car, rng: Generator) -> Array:
@@ -36,7 +30,7 @@ def _keeping_distance(car: Car, rng: Generator) -> Array:
 
 def _cut_in(car: Car, rng: Generator) -> Array:
     """Someone moves in ahead: a brake in two stages, and its release in one."""
-    soft, hard = -rng.uniform(0.15, 0.3) * _limit(car), -rng.uniform(0.45, 0.75) * _limit(car)
+    soft, hard = -rng.uniform(0.15, 0.3) * limit_of(car), -rng.uniform(0.45, 0.75) * limit_of(car)
     return squeezed(
         (0.25, soft),
         (rng.uniform(0.4, 0.9), soft),
@@ -48,7 +42,7 @@ def _cut_in(car: Car, rng: Generator) -> Array:
 
 def _emergency(car: Car, rng: Generator) -> Array:
     """A jolt that warns, then all of the brake at once (it lets go when the wheels slide)."""
-    jolt, limit = -0.35 * _limit(car), -rng.uniform(1.0, 1.2) * _limit(car)
+    jolt, limit = -0.35 * limit_of(car), -rng.uniform(1.0, 1.2) * limit_of(car)
     return squeezed(
         (0.08, jolt),
         (0.12, jolt),

@@ -10,15 +10,9 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import COAST, Piece, Style
-from .kernel import GRAVITY
-from .styles import clock_of, faded, squeezed
+from .styles import clock_of, faded, limit_of, squeezed
 
 Array = NDArray[np.floating[Any]]
-
-
-def _limit(car: Car) -> float:
-    """Torque per wheel that a dry road just bears [N m]."""
-    return car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
 
 
 def _behind(car: Car, rng: Generator) -> Array:
@@ -41,7 +35,7 @@ def _past(car: Car, rng: Generator) -> Array:
 
 def _given_up(car: Car, rng: Generator) -> Array:
     """Out, something comes: all of the brake, and back in (he lets go when the wheels slide)."""
-    peak, limit = car.motor_peak_torque_nm, -rng.uniform(1.0, 1.15) * _limit(car)
+    peak, limit = car.motor_peak_torque_nm, -rng.uniform(1.0, 1.15) * limit_of(car)
     return squeezed(
         (0.2, 0.8 * peak),
         (rng.uniform(0.3, 0.7), 0.8 * peak),
@@ -55,7 +49,7 @@ def _given_up(car: Car, rng: Generator) -> Array:
 
 def _village(car: Car, rng: Generator) -> Array:
     """Down from what the country road allows, harder towards the sign."""
-    clock, level = clock_of(rng.uniform(1.5, 3.0)), rng.uniform(0.35, 0.75) * _limit(car)
+    clock, level = clock_of(rng.uniform(1.5, 3.0)), rng.uniform(0.35, 0.75) * limit_of(car)
     return np.concatenate([-level * (clock / clock[-1]) ** 1.5, np.linspace(-level, 0.0, 25)])
 
 

@@ -10,15 +10,9 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import COAST, Piece, Style
-from .kernel import GRAVITY
-from .styles import clock_of, faded, squeezed
+from .styles import clock_of, faded, limit_of, squeezed
 
 Array = NDArray[np.floating[Any]]
-
-
-def _limit(car: Car) -> float:
-    """Torque per wheel that a dry road just bears [N m]."""
-    return car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
 
 
 def _nothing(car: Car, rng: Generator) -> Array:
@@ -30,7 +24,7 @@ def _nothing(car: Car, rng: Generator) -> Array:
 
 def _between_doors(car: Car, rng: Generator) -> Array:
     """Up at once, a moment of rolling, and hard on the brake for the next door."""
-    up, down = car.motor_peak_torque_nm * rng.uniform(0.6, 1.0), -_limit(car) * rng.uniform(0.4, 0.8)
+    up, down = car.motor_peak_torque_nm * rng.uniform(0.6, 1.0), -limit_of(car) * rng.uniform(0.4, 0.8)
     return squeezed(
         (0.2, up),
         (rng.uniform(0.8, 1.8), up),
@@ -44,7 +38,7 @@ def _between_doors(car: Car, rng: Generator) -> Array:
 
 def _number_seen_late(car: Car, rng: Generator) -> Array:
     """All of the brake at once, until he is there (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.2) * _limit(car)
+    limit = -rng.uniform(1.0, 1.2) * limit_of(car)
     return squeezed((rng.uniform(0.12, 0.25), limit), (rng.uniform(0.4, 0.9), limit), (0.15, 0.0), (0.4, 0.0))
 
 
@@ -120,7 +114,7 @@ def _merge(car: Car, rng: Generator) -> Array:
 
 def _cut_in(car: Car, rng: Generator) -> Array:
     """Another cuts in: from the motors' brake to all of it (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.15) * _limit(car)
+    limit = -rng.uniform(1.0, 1.15) * limit_of(car)
     return squeezed(
         (0.3, 0.2 * limit),
         (rng.uniform(0.2, 0.5), 0.2 * limit),
@@ -168,7 +162,7 @@ SAVING = Style(
 
 def _both(car: Car, rng: Generator) -> Array:
     """Power, the other foot on the brake as well, then each alone."""
-    up, down = car.motor_peak_torque_nm * rng.uniform(0.4, 0.8), -_limit(car) * rng.uniform(0.2, 0.6)
+    up, down = car.motor_peak_torque_nm * rng.uniform(0.4, 0.8), -limit_of(car) * rng.uniform(0.2, 0.6)
     return squeezed(
         (0.3, up),
         (rng.uniform(0.4, 1.0), up),
@@ -182,7 +176,7 @@ def _both(car: Car, rng: Generator) -> Array:
 
 def _swap(car: Car, rng: Generator) -> Array:
     """From one foot to the other with nothing between, and back."""
-    up, down = car.motor_peak_torque_nm * rng.uniform(0.4, 0.9), -_limit(car) * rng.uniform(0.3, 0.7)
+    up, down = car.motor_peak_torque_nm * rng.uniform(0.4, 0.9), -limit_of(car) * rng.uniform(0.3, 0.7)
     corners = []
     for _ in range(rng.integers(2, 4)):
         corners += [(0.1, up), (rng.uniform(0.3, 0.7), up), (0.12, down), (rng.uniform(0.15, 0.4), down)]
@@ -191,7 +185,7 @@ def _swap(car: Car, rng: Generator) -> Array:
 
 def _left_foot(car: Car, rng: Generator) -> Array:
     """A foot that is used to a clutch: too hard, less, and hard again (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.2) * _limit(car)
+    limit = -rng.uniform(1.0, 1.2) * limit_of(car)
     return squeezed(
         (rng.uniform(0.1, 0.2), 0.9 * limit),
         (0.12, 0.5 * limit),

@@ -10,15 +10,10 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import Piece, Style
-from .kernel import COMMAND_STEP_S, GRAVITY
-from .styles import clock_of, faded, squeezed
+from .kernel import COMMAND_STEP_S
+from .styles import clock_of, faded, limit_of, squeezed
 
 Array = NDArray[np.floating[Any]]
-
-
-def _limit(car: Car) -> float:
-    """Torque per wheel that a dry road just bears [N m]."""
-    return car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
 
 
 # --- one pedal
@@ -47,7 +42,7 @@ def _off(car: Car, rng: Generator) -> Array:
 
 def _tread(car: Car, rng: Generator) -> Array:
     """Off the pedal, then hard on the brake (the driver lets go when the wheels slide)."""
-    off, limit = -car.motor_peak_torque_nm * rng.uniform(0.2, 0.5), -rng.uniform(1.0, 1.15) * _limit(car)
+    off, limit = -car.motor_peak_torque_nm * rng.uniform(0.2, 0.5), -rng.uniform(1.0, 1.15) * limit_of(car)
     return squeezed((0.3, off), (rng.uniform(0.2, 0.5), off), (rng.uniform(0.8, 1.8), limit), (0.2, 0.0))
 
 
@@ -130,7 +125,7 @@ def _swing(car: Car, rng: Generator) -> Array:
 
 def _brake_in_steps(car: Car, rng: Generator) -> Array:
     """Ever harder from one plateau to the next (the driver lets go when the wheels slide)."""
-    limit, steps = -rng.uniform(1.0, 1.15) * _limit(car), int(rng.integers(3, 5))
+    limit, steps = -rng.uniform(1.0, 1.15) * limit_of(car), int(rng.integers(3, 5))
     corners = []
     for n in range(1, steps + 1):
         corners += [(0.15, limit * n / steps), (rng.uniform(0.2, 0.4), limit * n / steps)]
@@ -139,7 +134,7 @@ def _brake_in_steps(car: Car, rng: Generator) -> Array:
 
 def _stop_hard(car: Car, rng: Generator) -> Array:
     """At once as hard as a dry road bears, until the wheels slide."""
-    limit = -rng.uniform(1.0, 1.15) * _limit(car)
+    limit = -rng.uniform(1.0, 1.15) * limit_of(car)
     return squeezed((rng.uniform(0.15, 0.3), limit), (rng.uniform(0.4, 0.9), limit), (0.15, 0.0), (0.3, 0.0))
 
 

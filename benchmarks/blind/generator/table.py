@@ -95,12 +95,20 @@ NINTH_PAIRS = (
 )
 """And more: saving tyres, a cheap receiver, a kit for rough country. From the ninth family on."""
 
+TENTH_PAIRS = (
+    ("friction_falloff", "tyre_stiffness_offset"),
+    ("wheel_inertia_offset", "torque_gain"),
+    ("mass_offset", "wheel_radius_offset"),
+)
+"""And more: tyres that have aged, other motors, a load on soft tyres. From the tenth family on."""
+
 MORE_PAIRS = {
     Family.FIFTH: FURTHER_PAIRS,
     Family.SIXTH: LAST_PAIRS,
     Family.SEVENTH: SEVENTH_PAIRS,
     Family.EIGHTH: EIGHTH_PAIRS,
     Family.NINTH: NINTH_PAIRS,
+    Family.TENTH: TENTH_PAIRS,
 }
 """What each family adds to those of the one before."""
 
@@ -166,7 +174,7 @@ SIZES: dict[str, Counts] = {
 """Full: 22 x 5 rich, 22 with another tyre, 22 x 2 mild, 75 without a gap, 24 pairs, 22 x 2 removed, and 3 of each
 deviation outside: 15, in the second family 18, in the third 23, in the fourth 28, in the fifth 34 and 5 pairs more, in
 the sixth 42 and 4 pairs more again, in the seventh 48 and 3 pairs more, in the eighth 53 and 3 pairs more,
-in the ninth 58 and 3 pairs more."""
+in the ninth 58 and 3 pairs more, in the tenth 63 and 3 pairs more."""
 
 
 def table(size: str, family: Family = Family.FIRST) -> list[Spec]:

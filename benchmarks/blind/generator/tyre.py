@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .tyre_eighth import bristles, composite
 from .tyre_ninth import brush_elliptic, splined
+from .tyre_tenth import humped
 
 Array = NDArray[np.floating[Any]]
 
@@ -18,7 +19,7 @@ MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING, CUBED
     9
 )
 BLENDED, TWO_LINES, PLAIN_DUGOFF, SINE_RISE, ARCTANGENT, BRISTLES, COMPOSITE = range(9, 16)
-BRUSH_ELLIPTIC, SPLINED = range(16, 18)
+BRUSH_ELLIPTIC, SPLINED, HUMPED = range(16, 19)
 """Codes of the foreign curves."""
 
 
@@ -375,6 +376,8 @@ def foreign(curve: int, slip: float, slope: float, peak: float, first: float, se
         return brush_elliptic(slip, slope, peak)
     if curve == SPLINED:
         return splined(slip, slope, peak, first, second)
+    if curve == HUMPED:
+        return humped(slip, slope, peak, first)
     return magic(slip, slope, peak, first, second)
 
 

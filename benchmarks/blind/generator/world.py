@@ -55,7 +55,7 @@ class World:
         wheel = p.radius**2 / lightest + 4.0 / p.mass
         stiffness = max(p.stiffness_drive, p.stiffness_brake) + abs(p.stiffness_load) + abs(p.stiffness_tilt)
         stiffness += abs(p.stiffness_side) + abs(p.stiffness_warm) + abs(p.stiffness_speed)
-        stiffness += abs(p.stiffness_texture) + abs(p.stiffness_wet)
+        stiffness += abs(p.stiffness_texture) + abs(p.stiffness_wet) + abs(p.stiffness_sides)
         rate = 1.27 * stiffness * wheel / FLOOR_M_S
         return max(3, int(np.ceil(rate * RECORD_STEP_S / 2.0)))
 
@@ -100,6 +100,7 @@ def nominal(car: Car, road: Road) -> World:
             springs_tilt=0.0,
             springs_rub=0.0,
             pitch_sign=0.0,
+            pitch_stops=0.0,
             body_rate=0.0,
             load_side=0.0,
             radius=car.wheel_radius_m,
@@ -122,6 +123,7 @@ def nominal(car: Car, road: Road) -> World:
             stiffness_load=0.0,
             stiffness_tilt=0.0,
             stiffness_side=0.0,
+            stiffness_sides=0.0,
             stiffness_warm=0.0,
             stiffness_speed=0.0,
             stiffness_texture=0.0,
@@ -138,6 +140,8 @@ def nominal(car: Car, road: Road) -> World:
             grip_wet=0.0,
             grip_sign=0.0,
             grip_slide=0.0,
+            grip_load=0.0,
+            grip_axles=0.0,
             wet_fall=0.0,
             falloff=0.0,
             falloff_floor=1.0,
@@ -149,6 +153,7 @@ def nominal(car: Car, road: Road) -> World:
             relaxation_shrinks=False,
             relaxation_speed=0.0,
             relaxation_tilt=0.0,
+            relaxation_side=0.0,
             relaxation_warm=0.0,
             relaxation_direct=0.0,
             relaxation_rise=0.0,
@@ -168,6 +173,7 @@ def nominal(car: Car, road: Road) -> World:
             drag_wake=0.0,
             drag_power=0.0,
             drag_shelter=0.0,
+            drag_nod=0.0,
             bend_drag=0.0,
             lift=0.0,
             gust_drag=0.0,
@@ -184,6 +190,7 @@ def nominal(car: Car, road: Road) -> World:
             roll_warm=0.0,
             roll_torque=0.0,
             roll_slow=0.0,
+            roll_flat=0.0,
             gravel=0.0,
             slush=0.0,
             brake_drag=0.0,
@@ -192,6 +199,7 @@ def nominal(car: Car, road: Road) -> World:
             brake_release=0.0,
             brake_warm=0.0,
             brake_wet=0.0,
+            brake_texture=0.0,
             bearing=0.0,
             grade=0.0,
             wave_slope=0.0,
@@ -203,6 +211,7 @@ def nominal(car: Car, road: Road) -> World:
             delay_turn=0.0,
             delay_jump=0.0,
             delay_speed=0.0,
+            delay_warm=0.0,
             message=0.0,
             message_joined=False,
             message_lost=0.0,
@@ -221,6 +230,8 @@ def nominal(car: Car, road: Road) -> World:
             lag_direct=0.0,
             lag_zero=0.0,
             lag_warm=0.0,
+            lag_tail=0.0,
+            lag_slow=1.0,
             actuator_play=0.0,
             slew=0.0,
             gain=np.ones(4),
@@ -231,6 +242,7 @@ def nominal(car: Car, road: Road) -> World:
             gain_map=0.0,
             gain_sway=0.0,
             gain_turn=0.0,
+            gain_power=0.0,
             axle_share=0.0,
             axle_split=0.0,
             axle_viscous=0.0,
@@ -243,6 +255,8 @@ def nominal(car: Car, road: Road) -> World:
             torque_step=0.0,
             torque_limit=1e9,
             power=0.0,
+            notch=0.0,
+            notch_rad_s=1.0,
             derating=0.0,
             ripple=0.0,
             ripple_order=1.0,
@@ -255,6 +269,7 @@ def nominal(car: Car, road: Road) -> World:
             shaft_rise=0.0,
             shaft_sign=0.0,
             shaft_turn=0.0,
+            shaft_warm=0.0,
             motor_inertia=0.0,
             slosh_share=0.0,
             slosh_rate=1.0,
