@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fmu_unit import Unit
 from hypothesis import settings
@@ -117,3 +118,16 @@ def _opener(folder: Path) -> Iterator[Callable[..., Unit]]:
     yield open_one
     for unit in opened:
         unit.free()
+
+
+@pytest.fixture(scope="session")
+def ramp() -> np.ndarray:
+    """Path of a withheld car that speeds up evenly, for its sensors; not to be changed."""
+    from test_blind_plant import CAR, roll
+
+    from benchmarks.blind.generator.car import Road
+    from benchmarks.blind.generator.world import nominal
+
+    path = roll(nominal(CAR, Road()), 10.0, 16.0, 60.0)
+    path.flags.writeable = False
+    return path

@@ -9,9 +9,8 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
-from test_blind_plant import CAR, QUIET, roll
+from test_blind_plant import QUIET
 
-from benchmarks.blind.generator.car import Road
 from benchmarks.blind.generator.kernel import ANGLE, N, V, W, X
 from benchmarks.blind.generator.recording_eighth import (
     BOX_SHARE,
@@ -21,15 +20,9 @@ from benchmarks.blind.generator.recording_eighth import (
     one_box,
     resampled,
 )
-from benchmarks.blind.generator.sensors import AIRED_S, TABLE_M_S, Sensors, read
+from benchmarks.blind.generator.scales import AIRED_S, TABLE_M_S
+from benchmarks.blind.generator.sensors import Sensors, read
 from benchmarks.blind.generator.tyre_eighth import COMPOSITE_AT, COMPOSITE_TOP, bristles, composite
-from benchmarks.blind.generator.world import nominal
-
-
-@pytest.fixture(scope="module")
-def ramp():
-    """Path of a car that speeds up evenly."""
-    return roll(nominal(CAR, Road()), 10.0, 16.0, 60.0)
 
 
 @pytest.mark.parametrize("delay", [0.1, 0.02])

@@ -11,10 +11,10 @@ from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
 from benchmarks.blind.generator import details, forms_fifth, kernel
+from benchmarks.blind.generator.air import SHUT_M_S
 from benchmarks.blind.generator.car import Road
 from benchmarks.blind.generator.details import (
     PROFILE_STEP_M,
-    SHUT_M_S,
     TEXTURE_M,
     USUAL_M_S,
     USUAL_NM,

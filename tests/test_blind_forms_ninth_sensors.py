@@ -9,10 +9,9 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
-from test_blind_plant import CAR, QUIET, roll
+from test_blind_plant import QUIET
 
 from benchmarks.blind.baselines import _on_grid
-from benchmarks.blind.generator.car import Road
 from benchmarks.blind.generator.kernel import N, V, W
 from benchmarks.blind.generator.recording_ninth import (
     BEFORE_S,
@@ -21,16 +20,10 @@ from benchmarks.blind.generator.recording_ninth import (
     slow_place,
     triggered,
 )
-from benchmarks.blind.generator.sensors import MOUNT_M_S, MOUNT_SHARE, read
+from benchmarks.blind.generator.scales import MOUNT_M_S, MOUNT_SHARE
+from benchmarks.blind.generator.sensors import read
 from benchmarks.blind.generator.signals import JUMP_S
 from benchmarks.blind.generator.tyre_ninth import brush_elliptic, splined
-from benchmarks.blind.generator.world import nominal
-
-
-@pytest.fixture(scope="module")
-def ramp():
-    """Path of a car that speeds up evenly."""
-    return roll(nominal(CAR, Road()), 10.0, 16.0, 60.0)
 
 
 @pytest.mark.parametrize("delay", [0.1, 0.02])

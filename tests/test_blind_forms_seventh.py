@@ -10,14 +10,14 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
-from benchmarks.blind.generator import details, forms_seventh, kernel
+from benchmarks.blind.generator import air, details, forms_seventh, kernel
+from benchmarks.blind.generator.air import WAKE_S
 from benchmarks.blind.generator.car import Road
 from benchmarks.blind.generator.details import (
     GRAVEL_M,
     GRAVEL_SHARE,
     PROFILE_STEP_M,
     TEXTURE_M,
-    WAKE_S,
     WARM_S,
     WEAVE_S,
 )
@@ -71,7 +71,7 @@ def _warmth(at_s: float) -> float:
 
 def test_a_drag_in_traffic_has_its_mean():
     clock = np.linspace(0.0, WAKE_S, 2000, endpoint=False)
-    shares = np.array([details.in_wake(0.15, t) for t in clock])
+    shares = np.array([air.in_wake(0.15, t) for t in clock])
     assert shares.mean() == pytest.approx(1.0, abs=1e-9)
     assert_allclose([shares.min(), shares.max()], [0.85, 1.15], atol=1e-3)
     world = with_form("aero_drag", "in_traffic", drag_area_m2=0.8)

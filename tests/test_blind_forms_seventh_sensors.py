@@ -28,12 +28,6 @@ from benchmarks.blind.generator.tyre import arctangent, sine_rise
 from benchmarks.blind.generator.world import nominal
 
 
-@pytest.fixture(scope="module")
-def ramp():
-    """Path of a car that speeds up evenly."""
-    return roll(nominal(CAR, Road()), 10.0, 16.0, 60.0)
-
-
 def test_a_wheel_speed_may_be_the_motors():
     given = {"stiffness_nm_rad": 4000.0, "damping_nm_s_rad": 5.0, "motor_inertia_kg_m2": 0.6}
     world = with_form("driveline_compliance", "read_at_motor", **given)

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
-from benchmarks.blind.generator import details, forms_sixth, kernel
+from benchmarks.blind.generator import air, details, forms_sixth, kernel
 from benchmarks.blind.generator.car import Road
 from benchmarks.blind.generator.details import (
     PROFILE_STEP_M,
@@ -56,13 +56,13 @@ def test_wind_from_the_side_adds_to_the_drag_the_more_the_slower():
     def force(speed: float) -> float:
         """Along the car: drag of the whole air's speed and askew, by its angle."""
         angle = np.arctan2(3.5, speed)
-        return (1.0 + details.CROSS_RISE * np.tan(angle) ** 2) * (speed**2 + 3.5**2) * np.cos(angle)
+        return (1.0 + air.CROSS_RISE * np.tan(angle) ** 2) * (speed**2 + 3.5**2) * np.cos(angle)
 
     for speed in (10.0, USUAL_M_S, 28.0):
         path = roll(world, speed, 0.4)
         told = 0.5 * 1.225 * 0.8 * USUAL_M_S**2 * force(path[200, V]) / force(USUAL_M_S)
         assert (path[100, V] - path[300, V]) / 0.2 == pytest.approx(told / carried(CAR), rel=2e-3)
-    assert details.crossed(3.5, 10.0) < 1.5
+    assert air.crossed(3.5, 10.0) < 1.5
 
 
 def test_a_tyre_on_the_drum_resists_by_speed_and_a_little_less_by_load():

@@ -24,7 +24,8 @@ from benchmarks.blind.generator.recording import (
     repeating,
 )
 from benchmarks.blind.generator.recording_fourth import DIGITS_FOURTH, NOISES_FOURTH
-from benchmarks.blind.generator.sensors import SWAY_S, Noise, Sensors, read
+from benchmarks.blind.generator.scales import SWAY_S
+from benchmarks.blind.generator.sensors import Noise, Sensors, read
 from benchmarks.blind.generator.world import nominal
 
 LOCKED = 0.79 * 0.9 * 9.81
