@@ -16,7 +16,7 @@ from sim2real.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
 from sim2real.evidence import Evidence, all_logs
 from sim2real.fitting import Fit, loss
 from sim2real.gap import intervals, measure, noise_floor, shrink
-from sim2real.goodness import fitness, inflation
+from sim2real.goodness import fitness, noise_margin
 from sim2real.lattice import Lattice
 from sim2real.next_manoeuvre import propose
 from sim2real.observer import Simulation
@@ -35,7 +35,7 @@ from sim2real.result import (
     Variation,
     Verdict,
 )
-from sim2real.selection import FURTHER_GAIN, Decision
+from sim2real.selection import Decision
 from sim2real.suspect import lone_sensor
 from sim2real.unknown import Term, characterise, finer, fit_terms, with_refined
 from sim2real.varying import KNOT_S
@@ -313,7 +313,7 @@ def _joint(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
 def _over_forms(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
     """Intervals of a single effect, as wide as those of all its forms that leave about as little: nature has one."""
     others = [e for e in found.contest.forms if e.ids == entry.ids]
-    margin = FURTHER_GAIN * inflation(entry, found.fit_to, found.holdout) if others else 0.0
+    margin = noise_margin(entry, found.fit_to, found.holdout) if others else 0.0
     out = _joint(found, entry)
     for other in others:
         if other.loss - entry.loss < margin:

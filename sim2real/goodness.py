@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +10,9 @@ from numpy.typing import NDArray
 
 from sim2real.contest import Entry
 from sim2real.drift import block_sums
-from sim2real.drive import BLOCK_S, GROUPS
+from sim2real.drive import BLOCK_S, GROUPS, Drive
 from sim2real.evidence import Evidence
-from sim2real.fitting import robust
+from sim2real.noise import Noise
 
 Array = NDArray[np.float64]
 
@@ -19,6 +20,8 @@ LONG_BLOCK_S = 1.0
 """Blocks over which the residuals' sums are taken to see how correlated they are [s]."""
 GROSS = 8.0
 """A block's sum beyond this many standard deviations is no noise [-]."""
+FURTHER_GAIN = 100.0
+"""With more than this to gain from a further effect, in units of what noise leaves, an entry may not be all [-]."""
 
 
 @dataclass(frozen=True)
@@ -55,29 +58,43 @@ def gross_share(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
 
 def _blocks(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Array:
     """Sums over blocks of what an entry leaves on all logs, shape (blocks, 7), in units of what noise gives."""
-    sums = []
+    sums = [
+        block_sums(rows, drive.rows_in(BLOCK_S)) / np.sqrt(1.0 + noise.slow)
+        for rows, drive, noise in _logs(entry, fit_to, holdout)
+    ]
+    return np.concatenate(sums)
+
+
+def _logs(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Iterator[tuple[Array, Drive, Noise]]:
+    """Whitened residuals of each log, shape (n, 7), with its drive and noise."""
     for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
         for part, drive, noise in zip(evidence.parts, evidence.drives, evidence.noises, strict=True):
-            rows = z[part].reshape(-1, drive.measured.shape[1])
-            sums.append(block_sums(rows, drive.rows_in(BLOCK_S)) / np.sqrt(1.0 + noise.slow))
-    return np.concatenate(sums)
+            yield z[part].reshape(-1, drive.measured.shape[1]), drive, noise
 
 
 def inflation(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
     """By how much the entry's residuals carry less information than white unit noise: their size times their memory."""
-    losses, counts, sums = 0.0, 0, []
-    for z, evidence in ((entry.z_fit, fit_to), (entry.z_hold, holdout)):
-        losses += float(np.sum(robust(z)))
-        counts += int(np.count_nonzero(z))
-        for part, drive in zip(evidence.parts, evidence.drives, strict=True):
-            rows = np.clip(z[part].reshape(-1, drive.measured.shape[1]), -5.0, 5.0)
-            sums.append(block_sums(rows, drive.rows_in(LONG_BLOCK_S)).ravel())
-    size = max(losses / max(counts, 1), 1.0)
-    every = np.concatenate(sums)
+    every = np.concatenate(
+        [
+            block_sums(np.clip(rows, -5.0, 5.0), drive.rows_in(LONG_BLOCK_S)).ravel()
+            for rows, drive, _ in _logs(entry, fit_to, holdout)
+        ]
+    )
+    size = max(entry.loss / max(_count(entry), 1), 1.0)
     memory = max(float(np.mean(every[every != 0.0] ** 2)) / size, 1.0) if np.any(every) else 1.0
     return size * memory
 
 
+def noise_margin(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
+    """Loss that noise alone may take off an entry, or put on it, when something is added or changed [-]."""
+    return FURTHER_GAIN * inflation(entry, fit_to, holdout)
+
+
 def loss_beyond_noise(entry: Entry) -> float:
     """What an entry leaves of the loss beyond that of unit noise [-]."""
-    return entry.loss - float(np.count_nonzero(entry.z_fit) + np.count_nonzero(entry.z_hold))
+    return entry.loss - _count(entry)
+
+
+def _count(entry: Entry) -> int:
+    """Residuals that count."""
+    return int(np.count_nonzero(entry.z_fit) + np.count_nonzero(entry.z_hold))

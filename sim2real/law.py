@@ -14,10 +14,10 @@ from scenarios.effects import FORMS
 from sim2real.contest import Contest, as_it_is
 from sim2real.equations import OF_THE_MOTION, WHOLE_CAR
 from sim2real.evidence import Evidence, all_logs
-from sim2real.goodness import inflation
+from sim2real.goodness import noise_margin
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
-from sim2real.selection import FURTHER_GAIN, Decision, doubted
+from sim2real.selection import Decision, doubted
 from sim2real.unknown import Term, fit_terms, with_refined
 
 MORE_BESIDE = 0.0075
@@ -51,7 +51,7 @@ def held_to_curves(
     winner = decision.winner
     found = winner.fitted
     more = winner.loss - _curves(found.candidate.model(found.x), fit_to, holdout, jobs)[0].loss
-    noise = FURTHER_GAIN * inflation(winner, fit_to, holdout)
+    noise = noise_margin(winner, fit_to, holdout)
     differs = 0.0 if paired else MORE_BESIDE * (contest.null.loss - winner.loss)
     if more < max(noise, differs):
         return decision
@@ -74,7 +74,7 @@ def held_to_itself(decision: Decision, contest: Contest, fit_to: Evidence, holdo
     at_rest = found.x.copy()
     at_rest[:own] = found.candidate.neutral[:own]
     more = as_it_is(found.candidate.model(at_rest), fit_to, holdout).loss - winner.loss
-    noise = FURTHER_GAIN * inflation(winner, fit_to, holdout)
+    noise = noise_margin(winner, fit_to, holdout)
     if more > max(noise, OWN_SHARE * (contest.null.loss - winner.loss)):
         return decision
     return doubted(decision, LAWLESS_BELIEF, varied=None, further=True)

@@ -12,7 +12,7 @@ from sim2real.contest import Contest, Entry, Varied
 from sim2real.drive import BLOCK_S
 from sim2real.evidence import Evidence
 from sim2real.fitting import loss
-from sim2real.goodness import Fitness, fitness, gross_share, inflation, loss_beyond_noise
+from sim2real.goodness import Fitness, fitness, gross_share, inflation, loss_beyond_noise, noise_margin
 from sim2real.hum import without_hum
 from sim2real.result import Verdict
 
@@ -35,8 +35,6 @@ EXPLAINED_SHARE = 0.125
 """Where the gap is large, an entry explains it if it leaves this share of the misfit: no form is exact [-]."""
 EXPLAINED_MOST = 3.0
 """Beyond this misfit nothing is explained, whatever the gap was [-]."""
-FURTHER_GAIN = 100.0
-"""With more than this to gain from a second effect, in units of what noise leaves, one effect may not be all [-]."""
 FURTHER_BELIEF = 0.8
 """Probability that one effect is the cause though something beside it is left [-]."""
 LIBRARY_BELIEF = 0.93
@@ -99,9 +97,7 @@ def allowed(before: Fitness) -> float:
 def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
     null = contest.null
-    if fitness(null, fit_to, holdout).misfit > NO_GAP_MISFIT:
-        return False
-    if gross_share(null, fit_to, holdout) > GROSS_BLOCKS:
+    if fitness(null, fit_to, holdout).misfit > NO_GAP_MISFIT or rare_share(null, fit_to, holdout):
         return False
     most = NO_GAP_GAIN + DRIFT_GAIN * _drifting(fit_to, holdout)
     gaining = [e for e in contest.singles if e.loss < (1.0 - most) * null.loss]
@@ -109,6 +105,12 @@ def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
         return True
     floor = (1.0 - most) * _quiet_loss(null, null, fit_to, holdout)
     return all(_quiet_loss(e, null, fit_to, holdout) >= floor for e in gaining)
+
+
+def rare_share(null: Entry, fit_to: Evidence, holdout: Evidence) -> float:
+    """Share of the blocks that are far beyond noise, 0 where so few are that it may be chance [-]."""
+    share = gross_share(null, fit_to, holdout)
+    return share if share > GROSS_BLOCKS else 0.0
 
 
 def _quiet_loss(entry: Entry, null: Entry, fit_to: Evidence, holdout: Evidence) -> float:
@@ -136,7 +138,7 @@ def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     if fitness(best, fit_to, holdout).misfit > FLOOR_MISFIT:
         return True
     least = min((loss for loss, _ in contest.partners), default=best.loss_fit)
-    return best.loss_fit - least > FURTHER_GAIN * inflation(best, fit_to, holdout)
+    return best.loss_fit - least > noise_margin(best, fit_to, holdout)
 
 
 @dataclass(frozen=True)
@@ -181,12 +183,11 @@ class Decision:
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     """Verdict of a contest; what one wheel alone explains better is no effect of the whole car."""
     said = _decide(contest, fit_to, holdout)
-    share = gross_share(contest.null, fit_to, holdout)
-    if said.before.misfit <= NO_GAP_MISFIT and share > GROSS_BLOCKS:
-        said = replace(said, rare=share)
+    if said.before.misfit <= NO_GAP_MISFIT:
+        said = replace(said, rare=rare_share(contest.null, fit_to, holdout))
     if said.verdict in (Verdict.NO_GAP, Verdict.UNKNOWN):
         return said
-    margin = FURTHER_GAIN * inflation(said.winner, fit_to, holdout)
+    margin = noise_margin(said.winner, fit_to, holdout)
     if contest.lone > said.winner.loss - margin:
         return said
     return doubted(said, LONE_BELIEF)
@@ -241,7 +242,7 @@ def _further(contest: Contest, best: Entry, fit_to: Evidence, holdout: Evidence)
 
     One that fits so much better, or ones of its plain form that fit about as well as its form with a further parameter.
     """
-    margin = FURTHER_GAIN * inflation(best, fit_to, holdout)
+    margin = noise_margin(best, fit_to, holdout)
     better = [pair for pair in contest.pairs[:1] if best.loss - pair.loss > margin]
     return better + [pair for pair in contest.twins if pair.loss - best.loss < margin]
 
@@ -256,7 +257,7 @@ def _structured(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Ev
     best = max(contest.structured, key=lambda e: of[e.ids])
     beside = fitness(best, fit_to, holdout)
     alone = next(e for e in contest.singles if e.ids[0] == best.ids[0])
-    needed = alone.loss - best.loss > FURTHER_GAIN * inflation(best, fit_to, holdout)
+    needed = alone.loss - best.loss > noise_margin(best, fit_to, holdout)
     among = sum(of[e.ids] for e in contest.structured)  # 0 where pairs fit better beyond measure
     outdone = any(of[e.ids] * RIVAL > of[best.ids] and two_are_needed(contest, e) for e in contest.pairs)
     if not (among and needed and _is_needed(contest, best) and explains(beside, before)) or outdone:

@@ -1,4 +1,4 @@
-"""What is blamed on no effect: a hum, a slow sensor, a limited rate of torque, a gap that the cause leaves open."""
+"""What is blamed on no effect: a hum, a slow sensor, a limited rate, rare faults, laws of another, gaps left open."""
 
 from dataclasses import replace
 
@@ -174,7 +174,7 @@ def test_a_rate_that_no_command_reaches_is_none():
     np.testing.assert_array_equal(sluggish.LimitedTorqueRate(0.0).actuate(time_s, torque), torque)
 
 
-# --- an effect whose work a free curve does as well
+# --- what is rare but far beyond noise
 
 
 @pytest.mark.parametrize(
@@ -196,6 +196,9 @@ def test_what_is_rare_but_far_beyond_noise_is_a_gap(nominal, faults, verdict):
     assert (found.decision.rare > 0.0) is (verdict is Verdict.UNKNOWN)
     sentence = describe(found, seed=0, jobs=1, progress=silent).sentence
     assert ("% of the logs' time" in sentence) is (verdict is Verdict.UNKNOWN)
+
+
+# --- an effect whose work a free curve does as well
 
 
 def three_logs(effects):
