@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from fmu_unit import Unit
 from hypothesis import settings
@@ -131,3 +132,14 @@ def ramp() -> np.ndarray:
     path = roll(nominal(CAR, Road()), 10.0, 16.0, 60.0)
     path.flags.writeable = False
     return path
+
+
+@pytest.fixture(scope="session")
+def log() -> pd.DataFrame:
+    """Log of noise with all that a withheld car's has, for its loggers; not to be changed."""
+    rng = np.random.default_rng(3)
+    wheels = [f"wheel_speed_{place}_rad_s" for place in ("fl", "fr", "rl", "rr")]
+    columns = ["wheel_torque_fl_nm", *wheels, "vehicle_speed_m_s", "accel_x_m_s2"]
+    made = pd.DataFrame(rng.normal(20.0, 9.0, (6000, len(columns))), columns=columns)
+    made.insert(0, "time_s", np.arange(1, 6001) / 250.0)
+    return made.assign(position_m=20.0 * made["time_s"])

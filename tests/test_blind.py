@@ -18,8 +18,9 @@ from numpy.testing import assert_allclose
 from benchmarks.blind.generator import kernel, severity
 from benchmarks.blind.generator.car import Car, Road
 from benchmarks.blind.generator.cases import make_case
+from benchmarks.blind.generator.details import FLOOR_M_S
 from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, begin, integrate
+from benchmarks.blind.generator.kernel import N, V, begin, integrate
 from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, noise_of, read
 from benchmarks.blind.generator.table import SIZES, Group, Spec, table
 from benchmarks.blind.generator.world import nominal

@@ -15,7 +15,7 @@ from test_blind_plant import CAR, NEUTRAL, QUIET, LimitDrive, carried, roll
 from benchmarks.blind.generator import kernel
 from benchmarks.blind.generator.car import Car, Road
 from benchmarks.blind.generator.cases import make_case
-from benchmarks.blind.generator.details import ROLL_M_S
+from benchmarks.blind.generator.details import FLOOR_M_S, ROLL_M_S
 from benchmarks.blind.generator.driver import drive
 from benchmarks.blind.generator.falling import fallen
 from benchmarks.blind.generator.forms import (
@@ -25,15 +25,16 @@ from benchmarks.blind.generator.forms import (
     FOREIGN,
     NOISES,
     OUTSIDES,
+    RATES_HZ,
     STYLES,
     Family,
     draw_forms,
     effect_in,
 )
-from benchmarks.blind.generator.kernel import FLOOR_M_S, N, V, W, integrate
+from benchmarks.blind.generator.kernel import N, V, W, integrate
 from benchmarks.blind.generator.library import LIBRARY
 from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
-from benchmarks.blind.generator.table import Group, table
+from benchmarks.blind.generator.table import MORE_PAIRS, PAIRS, Group, table
 from benchmarks.blind.generator.tyre import dugoff
 from benchmarks.blind.generator.world import World, nominal
 
@@ -227,6 +228,26 @@ def test_each_family_holds_the_one_before():
         assert all(list(ASPECTS[more][a])[: len(f)] == list(f) for a, f in ASPECTS[less].items())
         assert list(OUTSIDES[more])[: len(OUTSIDES[less])] == list(OUTSIDES[less])
         assert {s.name for s in table("full", less)} <= {s.name for s in table("full", more)}
+
+
+@pytest.mark.parametrize(
+    ("family", "forms", "effects", "outside", "pairs"),
+    [(EIGHTH, 25, 18, 5, [36, 39]), (NINTH, 25, 18, 5, [39, 42]), (TENTH, 25, 19, 5, [42, 45])],
+)
+def test_what_a_family_adds_is_what_the_page_says(family, forms, effects, outside, pairs):
+    families = list(Family)
+    last = families[families.index(family) - 1]
+    before, now = ASPECTS[last], ASPECTS[family]
+    assert set(before) == set(now)
+    assert sum(len(now[aspect]) - len(had) for aspect, had in before.items()) == forms
+    assert sum(len(now[effect]) > len(before[effect]) for effect in LIBRARY) == effects
+    assert len(OUTSIDES[family]) - len(OUTSIDES[last]) == outside
+    assert [[s.group for s in table("full", f)].count(Group.PAIR) for f in (last, family)] == pairs
+    every = [set(pair) for pair in (*PAIRS, *(pair for more in MORE_PAIRS.values() for pair in more))]
+    assert all(set(pair) < set(LIBRARY) and every.count(set(pair)) == 1 for pair in MORE_PAIRS[family])
+    rates = RATES_HZ[family]
+    assert sum(rates.values()) == pytest.approx(1.0)
+    assert all(rate % 50.0 == 0.0 and 50.0 <= rate <= 2000.0 for rate in rates)
 
 
 def test_what_had_no_form_begins_with_the_librarys():

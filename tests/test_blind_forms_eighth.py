@@ -12,12 +12,10 @@ from benchmarks.blind.generator import details, kernel
 from benchmarks.blind.generator.car import Road
 from benchmarks.blind.generator.details import HUNT_S, LASH_NM, QUEUE_S
 from benchmarks.blind.generator.falling import EXPONENTIAL, fallen
-from benchmarks.blind.generator.forms import ASPECTS, OUTSIDES, RATES_HZ, Family, is_further
+from benchmarks.blind.generator.forms import OUTSIDES, Family, is_further
 from benchmarks.blind.generator.forms_eighth import CIRCUIT, SETTLED, SLAB_M
 from benchmarks.blind.generator.kernel import LAG, N, V, W, X
-from benchmarks.blind.generator.library import LIBRARY
 from benchmarks.blind.generator.physics import Physics
-from benchmarks.blind.generator.table import EIGHTH_PAIRS, MORE_PAIRS, PAIRS, Group, table
 from benchmarks.blind.generator.world import nominal
 
 NO_COMMAND = np.zeros((2, 4))
@@ -30,21 +28,6 @@ def moving(p: Physics, slip: float = 0.0, speed: float = 20.0) -> tuple[np.ndarr
     y[W : W + 4] = speed / p.radius / (1.0 - slip)
     dy = np.zeros(N)
     return y, dy, kernel.slope(p, y, 0.0, NO_COMMAND, dy)
-
-
-def test_what_the_family_adds_is_what_the_page_says():
-    seventh, eighth = ASPECTS[Family.SEVENTH], ASPECTS[Family.EIGHTH]
-    assert set(seventh) == set(eighth)
-    assert sum(len(eighth[aspect]) - len(forms) for aspect, forms in seventh.items()) == 25
-    assert sum(len(eighth[effect]) > len(seventh[effect]) for effect in LIBRARY) == 18
-    assert len(OUTSIDES[Family.EIGHTH]) - len(OUTSIDES[Family.SEVENTH]) == 5
-    counts = [[s.group for s in table("full", f)].count(Group.PAIR) for f in list(Family)[3:8]]
-    assert counts == [24, 29, 33, 36, 39]
-    pairs = [set(pair) for pair in (*PAIRS, *(pair for more in MORE_PAIRS.values() for pair in more))]
-    assert all(set(pair) < set(LIBRARY) and pairs.count(set(pair)) == 1 for pair in EIGHTH_PAIRS)
-    rates = RATES_HZ[Family.EIGHTH]
-    assert sum(rates.values()) == pytest.approx(1.0)
-    assert all(rate % 50.0 == 0.0 and 50.0 <= rate <= 2000.0 for rate in rates)
 
 
 def test_what_the_seventh_family_lacks():

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
@@ -112,16 +111,6 @@ def test_noise_has_its_kind():
     rates = bends.mean(axis=0) / 2e-3 / 2.0
     assert np.all((rates > 57.0) & (rates < 123.0))
     assert len(set(np.round(rates))) > 3
-
-
-@pytest.fixture(scope="module")
-def log():
-    rng = np.random.default_rng(3)
-    wheels = [f"wheel_speed_{place}_rad_s" for place in ("fl", "fr", "rl", "rr")]
-    columns = ["wheel_torque_fl_nm", *wheels, "vehicle_speed_m_s", "accel_x_m_s2"]
-    made = pd.DataFrame(rng.normal(20.0, 9.0, (6000, len(columns))), columns=columns)
-    made.insert(0, "time_s", np.arange(1, 6001) / 250.0)
-    return made
 
 
 def test_what_was_lost_is_a_straight_line(log):

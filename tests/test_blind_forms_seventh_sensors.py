@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
@@ -113,16 +112,6 @@ def test_noise_has_its_kind():
     ratios = thirds[-1] / thirds[0]
     least, most = ((1.0 + 0.45 * more) / (1.0 - 0.45 * more) for more in LOUDER)
     assert np.all((ratios > 0.95 * least) & (ratios < 1.05 * most))
-
-
-@pytest.fixture(scope="module")
-def log():
-    rng = np.random.default_rng(3)
-    wheels = [f"wheel_speed_{place}_rad_s" for place in ("fl", "fr", "rl", "rr")]
-    columns = ["wheel_torque_fl_nm", *wheels, "vehicle_speed_m_s", "accel_x_m_s2"]
-    made = pd.DataFrame(rng.normal(20.0, 9.0, (6000, len(columns))), columns=columns)
-    made.insert(0, "time_s", np.arange(1, 6001) / 250.0)
-    return made
 
 
 def test_axles_come_in_turn(log):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, with_form
-from test_blind_forms_ninth import DRY, LOCKED, NO_COMMAND, moving
+from test_blind_forms_ninth import DRY, LOCKED, moving
 from test_blind_plant import CAR, LimitDrive, roll
 
 from benchmarks.blind.generator import details, kernel
@@ -14,41 +14,12 @@ from benchmarks.blind.generator.air import NOD_M_S2
 from benchmarks.blind.generator.car import Road
 from benchmarks.blind.generator.details import STOPS_M_S2, TEXTURE_M, WARM_S
 from benchmarks.blind.generator.falling import LINE_AND_TAIL, fallen
-from benchmarks.blind.generator.forms import ASPECTS, OUTSIDES, RATES_HZ, Family, is_further
+from benchmarks.blind.generator.forms import Family, is_further
 from benchmarks.blind.generator.kernel import LAG, PITCH, SLIP, STAGE, N, V, W
-from benchmarks.blind.generator.library import LIBRARY
 from benchmarks.blind.generator.motors import NOTCH_RAD_S
-from benchmarks.blind.generator.physics import Physics
-from benchmarks.blind.generator.table import MORE_PAIRS, PAIRS, TENTH_PAIRS, Group, table
 from benchmarks.blind.generator.world import nominal
 
 HALF_WARM_S = WARM_S * np.log(2.0)
-
-
-def rates_of(p: Physics, speed: float = 20.0, time: float = 0.0, **state: float) -> np.ndarray:
-    """Derivative of a car that rolls, with these states of all wheels or of the body."""
-    y = kernel.begin(p, 0.0, speed, np.full(4, speed / p.radius), time, NO_COMMAND)
-    for name, value in state.items():
-        first = getattr(kernel, name)
-        y[first : first + (1 if name == "PITCH" else 4)] = value
-    dy = np.zeros(N)
-    kernel.slope(p, y, time, NO_COMMAND, dy)
-    return dy
-
-
-def test_what_the_family_adds_is_what_the_page_says():
-    ninth, tenth = ASPECTS[Family.NINTH], ASPECTS[Family.TENTH]
-    assert set(ninth) == set(tenth)
-    assert sum(len(tenth[aspect]) - len(forms) for aspect, forms in ninth.items()) == 25
-    assert sum(len(tenth[effect]) > len(ninth[effect]) for effect in LIBRARY) == 19
-    assert len(OUTSIDES[Family.TENTH]) - len(OUTSIDES[Family.NINTH]) == 5
-    counts = [[s.group for s in table("full", f)].count(Group.PAIR) for f in list(Family)[8:10]]
-    assert counts == [42, 45]
-    pairs = [set(pair) for pair in (*PAIRS, *(pair for more in MORE_PAIRS.values() for pair in more))]
-    assert all(set(pair) < set(LIBRARY) and pairs.count(set(pair)) == 1 for pair in TENTH_PAIRS)
-    rates = RATES_HZ[Family.TENTH]
-    assert sum(rates.values()) == pytest.approx(1.0)
-    assert all(rate % 50.0 == 0.0 and 50.0 <= rate <= 2000.0 for rate in rates)
 
 
 def test_what_the_ninth_family_lacks():
@@ -74,16 +45,16 @@ def test_a_drag_is_more_of_a_car_that_squats(pushed):
     p = with_form("aero_drag", "nodding", drag_area_m2=0.8).physics
     share = 1.0 + 0.1 * np.tanh(pushed / NOD_M_S2)
     told = -share * 0.5 * 1.225 * 0.8 * 20.0**2 / CAR.mass_kg
-    assert rates_of(p, PITCH=pushed)[V] == pytest.approx(told, rel=1e-9)
+    assert moving(p, PITCH=pushed)[0][V] == pytest.approx(told, rel=1e-9)
 
 
 def test_a_flat_spot_resists_once_a_turn():
     p = with_form("rolling_resistance", "flat_spots", coefficient=0.012).physics
     told = 0.012 * 0.25 * CAR.mass_kg * 9.81 * 0.29
     angles = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
-    lost = np.array([-np.mean(rates_of(p, ANGLE=angle)[W : W + 4]) for angle in angles]) * 1.2
+    lost = np.array([-np.mean(moving(p, ANGLE=angle)[0][W : W + 4]) for angle in angles]) * 1.2
     assert lost.mean() == pytest.approx(told, rel=1e-6)
-    front = np.array([-rates_of(p, ANGLE=angle)[W] for angle in (0.0, np.pi)]) * 1.2
+    front = np.array([-moving(p, ANGLE=angle)[0][W] for angle in (0.0, np.pi)]) * 1.2
     assert front[0] / front[1] == pytest.approx(1.3 / 0.7, rel=1e-6)
 
 
@@ -107,7 +78,7 @@ def test_springs_come_to_their_stops(pitch, off):
 
 def test_each_tyre_relaxes_over_a_length_of_its_own():
     p = with_form("tyre_relaxation", "each_its_own", length_m=0.5).physics
-    lengths = -0.01 * 20.0 / rates_of(p, SLIP=0.01)[SLIP : SLIP + 4]
+    lengths = -0.01 * 20.0 / moving(p, SLIP=0.01)[0][SLIP : SLIP + 4]
     assert_allclose(lengths, [0.6, 0.4, 0.4, 0.6], rtol=1e-9)
     assert lengths.mean() == pytest.approx(0.5)
 
@@ -163,10 +134,10 @@ def test_a_slippery_side_thaws(time, share):
 def test_a_part_of_the_torque_comes_slowly():
     """Three quarters with two thirds of the lag and the rest with twice of it: a ramp is late by the lag."""
     p = with_form("torque_lag", "slow_tail", time_constant_s=0.1).physics
-    dy = rates_of(p, LAG=30.0, STAGE=20.0)
+    dy = moving(p, LAG=30.0, STAGE=20.0)[0]
     assert_allclose(dy[LAG : LAG + 4], -30.0 / (0.1 * 2.0 / 3.0))
     assert_allclose(dy[STAGE : STAGE + 4], -20.0 / 0.2)
-    given = dy[W : W + 4] - rates_of(p)[W : W + 4]
+    given = dy[W : W + 4] - moving(p)[0][W : W + 4]
     assert_allclose(given * 1.2, 0.75 * 30.0 + 0.25 * 20.0)
     ramp = np.maximum(np.arange(301) - 100.0, 0.0)[:, None] * np.ones(4)
     later = np.vstack([np.zeros((10, 4)), ramp[:-10]])
@@ -215,7 +186,7 @@ def test_a_shaft_with_rubber_softens(time, share):
     p = with_form("driveline_compliance", "warming_rubber", **given).physics
     assert details.shaft_of(p, 1, 0.03, 0.0, 0.0, time) == pytest.approx(150.0 * share, rel=1e-4)
     assert details.shaft_of(p, 1, 0.0, 2.0, 0.0, time) == pytest.approx(8.0)
-    assert rates_of(p, time=time, TWIST=0.03)[kernel.MOTOR] * 0.5 == pytest.approx(-150.0 * share, rel=1e-4)
+    assert moving(p, time=time, TWIST=0.03)[0][kernel.MOTOR] * 0.5 == pytest.approx(-150.0 * share, rel=1e-4)
 
 
 @pytest.mark.parametrize("direction", [-100.0, 100.0])

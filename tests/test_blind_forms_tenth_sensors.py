@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
@@ -122,16 +121,6 @@ def test_noise_has_its_kind():
     assert np.all((stands > 1.0 - 141.0 / 500.0) & (stands < 1.0 - 69.0 / 500.0))
     sparse = standing(white, np.arange(50_000) * 0.02, rng)
     assert_allclose([np.corrcoef(c[1:], c[:-1])[0, 1] for c in sparse.T], 0.0, atol=0.03)
-
-
-@pytest.fixture(scope="module")
-def log():
-    rng = np.random.default_rng(3)
-    wheels = [f"wheel_speed_{place}_rad_s" for place in ("fl", "fr", "rl", "rr")]
-    columns = ["wheel_torque_fl_nm", *wheels, "vehicle_speed_m_s", "accel_x_m_s2"]
-    made = pd.DataFrame(rng.normal(20.0, 9.0, (6000, len(columns))), columns=columns)
-    made.insert(0, "time_s", np.arange(1, 6001) / 250.0)
-    return made.assign(position_m=20.0 * made["time_s"])
 
 
 def test_wheels_come_with_every_second_row(log):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .details import USUAL_M_S
+from .details import FLOOR_M_S, USUAL_M_S
 from .physics import Physics
 
 CROSS_RISE = 3.0
@@ -14,8 +14,6 @@ SHUT_M_S = 3.0
 """About a speed within which shutters close [m/s]."""
 WAKE_S, BARRIER_M = 10.0, 134.0
 """From one car ahead to the next [s]; from one stretch of road between walls or woods to the next [m]."""
-LEAST_M_S = 1.5
-"""Below which a drag coefficient goes no further with the speed [m/s]."""
 NOD_M_S2 = 3.0
 """About which a body that squats or dives has turned as far as its springs let it [m/s^2]."""
 
@@ -56,7 +54,7 @@ def dragging(p: Physics, speed: float, place: float, time: float, pushed: float)
     if p.drag_wake > 0.0:
         drag *= in_wake(p.drag_wake, time)
     if p.drag_power != 0.0:
-        drag *= (max(speed, LEAST_M_S) / USUAL_M_S) ** p.drag_power
+        drag *= (max(speed, FLOOR_M_S) / USUAL_M_S) ** p.drag_power
     if p.drag_shelter != 0.0:
         drag *= sheltered(p.drag_shelter, place)
     if p.drag_nod != 0.0:

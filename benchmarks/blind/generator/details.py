@@ -16,6 +16,8 @@ PATCH_M = 23.0
 """From one patch of the road to the next [m]."""
 ROLL_M_S = 17.0
 """Speed that a rolling resistance is stated at where it grows with speed [m/s]."""
+FLOOR_M_S = 1.5
+"""Below which the drives do not go: the least speed that a slip or a drag coefficient goes by [m/s]."""
 USUAL_M_S = 20.0
 """Speed that a deviation is stated at where it changes with speed [m/s]."""
 WARM_S = 15.0

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .forms_second import Apply, Foreign
+from .forms_second import Apply, Foreign, with_more
 from .library import LIBRARY
 from .recording_eighth import DIGITS_EIGHTH, NOISES_EIGHTH
 from .styles_eighth import TRAINING
@@ -51,11 +51,6 @@ def _first(effect: str) -> Apply:
     return LIBRARY[effect].apply
 
 
-def _more(effect: str, **how: Any) -> Apply:
-    """The library's, with some physics more."""
-    return lambda world, given: _first(effect)(world, given).moved(**how)
-
-
 def _slabs(world: World, given: Parameters) -> World:
     return world.moved(grade=given["grade"], wave_slope=SETTLED * given["grade"], wave_length=SLAB_M)
 
@@ -89,24 +84,24 @@ def _joined_epochs(world: World, given: Parameters) -> World:
 
 
 EFFECTS: dict[str, dict[str, Apply]] = {
-    "aero_drag": {"less_when_fast": _more("aero_drag", drag_power=DRAG_POWER)},
+    "aero_drag": {"less_when_fast": with_more("aero_drag", drag_power=DRAG_POWER)},
     "rolling_resistance": {
         "more_under_torque": lambda w, g: w.moved(roll_moment=g["coefficient"], roll_torque=ROLL_TORQUE),
     },
     "road_grade": {"settled_slabs": _slabs},
     "wheel_radius_offset": {"deflecting": _deflecting},
     "tyre_stiffness_offset": {"less_when_wet": _stiffness},
-    "friction_falloff": {"sooner_when_wet": _more("friction_falloff", falloff_wet=FALLOFF_WET)},
-    "friction_offset": {"more_when_wet": _more("friction_offset", grip_wet=GRIP_WET)},
-    "torque_lag": {"gentle_about_zero": _more("torque_lag", lag_zero=LAG_ZERO)},
+    "friction_falloff": {"sooner_when_wet": with_more("friction_falloff", falloff_wet=FALLOFF_WET)},
+    "friction_offset": {"more_when_wet": with_more("friction_offset", grip_wet=GRIP_WET)},
+    "torque_lag": {"gentle_about_zero": with_more("torque_lag", lag_zero=LAG_ZERO)},
     "torque_delay": {
         "queue": lambda w, g: w.moved(delay=g["delay_s"], delay_jump=DELAY_QUEUE * g["delay_s"]),
     },
-    "torque_gain": {"hunting": _more("torque_gain", gain_sway=GAIN_HUNTS)},
+    "torque_gain": {"hunting": with_more("torque_gain", gain_sway=GAIN_HUNTS)},
     "brake_drag": {
         "one_circuit": lambda w, g: w.moved(brake_drag=g["torque_nm"], brake_share=CIRCUIT),
     },
-    "driveline_compliance": {"softer_in_braking": _more("driveline_compliance", shaft_sign=SHAFT_SIGN)},
+    "driveline_compliance": {"softer_in_braking": with_more("driveline_compliance", shaft_sign=SHAFT_SIGN)},
     "wheel_speed_delay": {"smoothed_twice": _smoothed_twice},
     "wheel_speed_quantisation": {"longer_when_slow": _longer_when_slow},
     "vehicle_speed_delay": {"joined_epochs": _joined_epochs},
@@ -116,7 +111,7 @@ EFFECTS: dict[str, dict[str, Apply]] = {
     "accelerometer_bias": {
         "aired": lambda w, g: w.sensed(accel_bias_m_s2=g["bias_m_s2"], accel_bias_aired=AIRED),
     },
-    "mu_split": {"more_when_wet": _more("mu_split", grip_wet=GRIP_WET)},
+    "mu_split": {"more_when_wet": with_more("mu_split", grip_wet=GRIP_WET)},
 }
 
 FOREIGN: dict[str, Foreign] = {

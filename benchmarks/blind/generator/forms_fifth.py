@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from .details import PROFILE_STEP_M, USUAL_RAD_S
 from .falling import ARCTANGENT
-from .forms_second import Apply, Foreign, falling, payload
+from .forms_second import Apply, Foreign, falling, payload, with_more
 from .kernel import COMMAND_STEP_S, GRAVITY
 from .library import LIBRARY
 from .outside import WIND_S
@@ -208,11 +208,6 @@ def _late_task(world: World, given: Parameters) -> World:
     return _pulses(wheel_window_jitter=min(ENDS_SOONER, 1.0 / max(pulses, 1.0)))(world, given)
 
 
-def _more(effect: str, **how: Any) -> Apply:
-    """The library's, with some physics more."""
-    return lambda world, given: _first(effect)(world, given).moved(**how)
-
-
 def _tilted(world: World, given: Parameters) -> World:
     """A bias that is gravity's: the sensor is mounted askew, and reads a little less of all else."""
     lean = min(abs(given["bias_m_s2"]) / GRAVITY, 1.0)
@@ -237,7 +232,7 @@ EFFECTS: dict[str, dict[str, Apply]] = {
             cog_height=g["cog_height_m"], pitch_time=SPRINGS_S, pitch_sign=DIVING
         ),
     },
-    "tyre_relaxation": {"unlike_axles": _more("tyre_relaxation", relaxation_tilt=RELAXATION_TILT)},
+    "tyre_relaxation": {"unlike_axles": with_more("tyre_relaxation", relaxation_tilt=RELAXATION_TILT)},
     "tyre_stiffness_offset": {
         "unlike_in_braking": _stiffness(STIFFNESS_SIGN, 0.0),
         "each_its_own": _stiffness(0.0, STIFFNESS_SIDE),
@@ -245,8 +240,8 @@ EFFECTS: dict[str, dict[str, Apply]] = {
     "friction_falloff": {"arctangent": falling(ARCTANGENT)},
     "friction_offset": _grip("friction_offset"),
     "torque_lag": {
-        "unlike_axles": _more("torque_lag", lag_tilt=LAG_TILT),
-        "slower_at_speed": _more("torque_lag", lag_speed=LAG_SPEED),
+        "unlike_axles": with_more("torque_lag", lag_tilt=LAG_TILT),
+        "slower_at_speed": with_more("torque_lag", lag_speed=LAG_SPEED),
     },
     "torque_delay": {
         "unlike_axles": lambda w, g: w.moved(delay=g["delay_s"], delay_tilt=DELAY_TILT * g["delay_s"]),
@@ -254,12 +249,12 @@ EFFECTS: dict[str, dict[str, Apply]] = {
     },
     "torque_gain": {
         "unlike_sides": lambda w, g: w.moved(gain=1.0 + (g["factor"] - 1.0) * GAIN_SIDES),
-        "saturating": _more("torque_gain", gain_load=GAIN_LOAD),
+        "saturating": with_more("torque_gain", gain_load=GAIN_LOAD),
     },
-    "brake_drag": {"knocked_back": _more("brake_drag", brake_release=RELEASE)},
+    "brake_drag": {"knocked_back": with_more("brake_drag", brake_release=RELEASE)},
     "driveline_compliance": {
-        "rubbing_joints": _more("driveline_compliance", shaft_friction=RUBBING_NM),
-        "unlike_axles": _more("driveline_compliance", shaft_axles=SHAFT_AXLES),
+        "rubbing_joints": with_more("driveline_compliance", shaft_friction=RUBBING_NM),
+        "unlike_axles": with_more("driveline_compliance", shaft_axles=SHAFT_AXLES),
     },
     "wheel_speed_delay": {"in_turn": _in_turn, "losing_messages": _sensor_losing("wheel")},
     "wheel_speed_quantisation": {

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .forms_second import Apply, Foreign, payload
-from .library import LIBRARY
+from .forms_second import Apply, Foreign, payload, with_more
 from .recording_ninth import DIGITS_NINTH, NOISES_NINTH
 from .styles_ninth import CRUISE_CONTROL
 from .tyre import BRUSH_ELLIPTIC, SPLINED
@@ -47,11 +46,6 @@ JUMPS = 0.2
 """Of a bias, by which a sensor's beam goes from one stress to another and back."""
 
 
-def _more(effect: str, **how: Any) -> Apply:
-    """The library's, with some physics more."""
-    return lambda world, given: LIBRARY[effect].apply(world, given).moved(**how)
-
-
 def _on_one_side(world: World, given: Parameters) -> World:
     """On the seats of the driver's side: the left tyres carry more of it."""
     loaded = payload(SEATS)(world, given)
@@ -79,23 +73,23 @@ def _extrapolated(world: World, given: Parameters) -> World:
 
 
 EFFECTS: dict[str, dict[str, Apply]] = {
-    "aero_drag": {"sheltered_stretches": _more("aero_drag", drag_shelter=SHELTER)},
+    "aero_drag": {"sheltered_stretches": with_more("aero_drag", drag_shelter=SHELTER)},
     "rolling_resistance": {
         "seals_when_slow": lambda w, g: w.moved(roll_moment=g["coefficient"], roll_slow=ROLL_SLOW),
     },
     "mass_offset": {"on_one_side": _on_one_side},
     "wheel_radius_offset": {"less_when_wet": _radius},
     "wheel_inertia_offset": {"more_at_speed": _inertia},
-    "load_transfer": {"jacking_links": _more("load_transfer", height_jack=HEIGHT_JACK)},
-    "tyre_relaxation": {"let_go_sooner": _more("tyre_relaxation", relaxation_rise=RELAXATION_RISE)},
-    "friction_offset": {"more_in_braking": _more("friction_offset", grip_sign=GRIP_SIGN)},
-    "torque_lag": {"less_when_warm": _more("torque_lag", lag_warm=LAG_WARM)},
+    "load_transfer": {"jacking_links": with_more("load_transfer", height_jack=HEIGHT_JACK)},
+    "tyre_relaxation": {"let_go_sooner": with_more("tyre_relaxation", relaxation_rise=RELAXATION_RISE)},
+    "friction_offset": {"more_in_braking": with_more("friction_offset", grip_sign=GRIP_SIGN)},
+    "torque_lag": {"less_when_warm": with_more("torque_lag", lag_warm=LAG_WARM)},
     "torque_delay": {
         "older_when_slow": lambda w, g: w.moved(delay=g["delay_s"], delay_speed=DELAY_PACED * g["delay_s"]),
     },
-    "torque_gain": {"over_a_turn": _more("torque_gain", gain_turn=GAIN_TURN)},
-    "brake_drag": {"less_when_wet": _more("brake_drag", brake_wet=BRAKE_WET)},
-    "driveline_compliance": {"bent_joints": _more("driveline_compliance", shaft_turn=SHAFT_TURN)},
+    "torque_gain": {"over_a_turn": with_more("torque_gain", gain_turn=GAIN_TURN)},
+    "brake_drag": {"less_when_wet": with_more("brake_drag", brake_wet=BRAKE_WET)},
+    "driveline_compliance": {"bent_joints": with_more("driveline_compliance", shaft_turn=SHAFT_TURN)},
     "wheel_speed_delay": {"median": _median},
     "vehicle_speed_delay": {"extrapolated_epochs": _extrapolated},
     "vehicle_speed_scale": {
@@ -104,7 +98,7 @@ EFFECTS: dict[str, dict[str, Apply]] = {
     "accelerometer_bias": {
         "in_jumps": lambda w, g: w.sensed(accel_bias_m_s2=g["bias_m_s2"], accel_bias_jumps=JUMPS),
     },
-    "mu_split": {"swept_away": _more("mu_split", grip_slide=GRIP_SLIDE)},
+    "mu_split": {"swept_away": with_more("mu_split", grip_slide=GRIP_SLIDE)},
 }
 
 FOREIGN: dict[str, Foreign] = {

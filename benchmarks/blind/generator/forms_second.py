@@ -50,6 +50,11 @@ FOREIGN: dict[str, Foreign] = {
 """Curves with the slope and the peak of the simulation's tyre."""
 
 
+def with_more(effect: str, **how: Any) -> Apply:
+    """The library's, with some physics more."""
+    return lambda world, given: LIBRARY[effect].apply(world, given).moved(**how)
+
+
 def message_of(delay_s: float) -> float:
     return min(MESSAGE_S, 2.0 * delay_s)
 

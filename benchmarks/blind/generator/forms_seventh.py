@@ -11,7 +11,7 @@ import numpy as np
 
 from .details import PROFILE_STEP_M
 from .falling import ROOTED
-from .forms_second import AVERAGE_S, Apply, Foreign, falling, payload
+from .forms_second import AVERAGE_S, Apply, Foreign, falling, payload, with_more
 from .library import LIBRARY
 from .recording_seventh import DIGITS_SEVENTH, NOISES_SEVENTH
 from .styles_seventh import OVERTAKING
@@ -58,11 +58,6 @@ WANDER, MEMORY = 0.2, 0.2
 
 def _first(effect: str) -> Apply:
     return LIBRARY[effect].apply
-
-
-def _more(effect: str, **how: Any) -> Apply:
-    """The library's, with some physics more."""
-    return lambda world, given: _first(effect)(world, given).moved(**how)
 
 
 def _hill(world: World, given: Parameters) -> World:
@@ -138,7 +133,7 @@ def _averaged_twice(world: World, given: Parameters) -> World:
 
 
 EFFECTS: dict[str, dict[str, Apply]] = {
-    "aero_drag": {"in_traffic": _more("aero_drag", drag_wake=WAKE)},
+    "aero_drag": {"in_traffic": with_more("aero_drag", drag_wake=WAKE)},
     "rolling_resistance": {
         "warming": lambda w, g: w.moved(roll_moment=g["coefficient"], roll_warm=ROLL_WARM),
     },
@@ -147,19 +142,19 @@ EFFECTS: dict[str, dict[str, Apply]] = {
     "wheel_radius_offset": {"warming": _radius_warming},
     "wheel_inertia_offset": {"spare_wheel": _spare},
     "load_transfer": {"sticking_dampers": _sticking},
-    "tyre_relaxation": {"warming": _more("tyre_relaxation", relaxation_warm=RELAXATION_WARM)},
+    "tyre_relaxation": {"warming": with_more("tyre_relaxation", relaxation_warm=RELAXATION_WARM)},
     "tyre_stiffness_offset": {"on_coarse_stretches": _texture},
     "friction_falloff": {"rooted": falling(ROOTED)},
-    "friction_offset": {"drying": _more("friction_offset", grip_warm=DRYING)},
+    "friction_offset": {"drying": with_more("friction_offset", grip_warm=DRYING)},
     "torque_lag": {
-        "longer_for_much": _more("torque_lag", lag_load=LAG_LOAD),
+        "longer_for_much": with_more("torque_lag", lag_load=LAG_LOAD),
         "partly_at_once": _partly_at_once,
     },
     "torque_delay": {
         "in_turn": lambda w, g: w.moved(delay=g["delay_s"], delay_turn=min(TURN_S, g["delay_s"])),
     },
-    "torque_gain": {"by_map": _more("torque_gain", gain_map=GAIN_MAP)},
-    "brake_drag": {"warming": _more("brake_drag", brake_warm=BRAKE_WARM)},
+    "torque_gain": {"by_map": with_more("torque_gain", gain_map=GAIN_MAP)},
+    "brake_drag": {"warming": with_more("brake_drag", brake_warm=BRAKE_WARM)},
     "driveline_compliance": {"read_at_motor": _at_motor},
     "wheel_speed_delay": {"queue": _queue},
     "wheel_speed_quantisation": {"shaking_sensor": _shaking},
@@ -170,7 +165,7 @@ EFFECTS: dict[str, dict[str, Apply]] = {
     "accelerometer_bias": {
         "remembering": lambda w, g: w.sensed(accel_bias_m_s2=g["bias_m_s2"], accel_bias_memory=MEMORY),
     },
-    "mu_split": {"weaving": _more("mu_split", grip_sway=WEAVING)},
+    "mu_split": {"weaving": with_more("mu_split", grip_sway=WEAVING)},
 }
 
 FOREIGN: dict[str, Foreign] = {

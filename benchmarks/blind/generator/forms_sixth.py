@@ -11,7 +11,7 @@ import numpy as np
 
 from .details import PROFILE_STEP_M
 from .falling import TWO_RATES
-from .forms_second import Apply, Foreign, falling, payload
+from .forms_second import Apply, Foreign, falling, payload, with_more
 from .library import LIBRARY
 from .recording_sixth import DIGITS_SIXTH, NOISES_SIXTH
 from .styles_sixth import DELIVERY, SAVING, TWO_FEET
@@ -82,11 +82,6 @@ def _first(effect: str) -> Apply:
     return LIBRARY[effect].apply
 
 
-def _more(effect: str, **how: Any) -> Apply:
-    """The library's, with some physics more."""
-    return lambda world, given: _first(effect)(world, given).moved(**how)
-
-
 def _front_lift(world: World, given: Parameters) -> World:
     """All of a lift at the front is a lift in the middle and as much of a moment."""
     p, drag = world.physics, 0.5 * AIR_KG_M3 * given["drag_area_m2"]
@@ -155,8 +150,8 @@ def _repaired() -> Array:
 def _grip(effect: str) -> dict[str, Apply]:
     """Another on repairs; more at speed."""
     return {
-        "repairs": _more(effect, blotches=_repaired()),
-        "more_at_speed": _more(effect, grip_speed=GRIP_SPEED),
+        "repairs": with_more(effect, blotches=_repaired()),
+        "more_at_speed": with_more(effect, grip_speed=GRIP_SPEED),
     }
 
 
@@ -199,7 +194,7 @@ def _every_second(world: World, given: Parameters) -> World:
 EFFECTS: dict[str, dict[str, Apply]] = {
     "aero_drag": {
         "front_lift": _front_lift,
-        "cross_wind": _more("aero_drag", drag_cross=CROSS_WIND_M_S),
+        "cross_wind": with_more("aero_drag", drag_cross=CROSS_WIND_M_S),
     },
     "rolling_resistance": {
         "as_on_the_drum": _rolling(roll_linear=ROLL_LINEAR, roll_growth=ROLL_GROWTH, roll_load=ROLL_LOAD),
@@ -219,17 +214,17 @@ EFFECTS: dict[str, dict[str, Apply]] = {
     "friction_falloff": {"two_rates": falling(TWO_RATES)},
     "friction_offset": _grip("friction_offset"),
     "torque_lag": {
-        "let_go_sooner": _more("torque_lag", lag_rise=LAG_RISE),
-        "each_its_own": _more("torque_lag", lag_side=LAG_SIDE),
+        "let_go_sooner": with_more("torque_lag", lag_rise=LAG_RISE),
+        "each_its_own": with_more("torque_lag", lag_side=LAG_SIDE),
         "in_a_task": _in_a_task,
     },
     "torque_delay": {"longer_in_braking": _longer_in_braking, "smoothed": _smoothed},
     "torque_gain": {
         "each_its_own": lambda w, g: w.moved(gain=1.0 + (g["factor"] - 1.0) * GAINS),
-        "warming": _more("torque_gain", gain_warm=GAIN_WARM),
+        "warming": with_more("torque_gain", gain_warm=GAIN_WARM),
     },
     "brake_drag": {"hand_brake": lambda w, g: w.moved(brake_drag=g["torque_nm"], brake_share=HAND_BRAKE)},
-    "driveline_compliance": {"rubber_joints": _more("driveline_compliance", shaft_rise=SHAFT_RISE)},
+    "driveline_compliance": {"rubber_joints": with_more("driveline_compliance", shaft_rise=SHAFT_RISE)},
     "wheel_speed_delay": {"unlike_axles": _wheel_axles, "older_when_slow": _paced("wheel")},
     "wheel_speed_quantisation": {"every_second_window": _every_second},
     "vehicle_speed_delay": {"older_when_slow": _paced("speed")},

@@ -6,7 +6,7 @@ from typing import Any
 
 from .details import USUAL_RAD_S
 from .falling import LINE_AND_TAIL
-from .forms_second import Apply, Foreign, falling
+from .forms_second import Apply, Foreign, falling, with_more
 from .library import LIBRARY
 from .recording_tenth import DIGITS_TENTH, NOISES_TENTH
 from .styles_tenth import COMMUTER
@@ -49,11 +49,6 @@ FAN = 0.2
 """Of a bias, by which it is more and less as a fan in its box stands and runs."""
 
 
-def _more(effect: str, **how: Any) -> Apply:
-    """The library's, with some physics more."""
-    return lambda world, given: LIBRARY[effect].apply(world, given).moved(**how)
-
-
 def _one_other(world: World, given: Parameters) -> World:
     """The right rear wheel is the one with a quarter of the deviation."""
     part = ONE_OTHER * (given["radius_m"] - world.physics.radius)
@@ -92,25 +87,25 @@ def _fitted(world: World, given: Parameters) -> World:
 
 
 EFFECTS: dict[str, dict[str, Apply]] = {
-    "aero_drag": {"nodding": _more("aero_drag", drag_nod=NOD)},
+    "aero_drag": {"nodding": with_more("aero_drag", drag_nod=NOD)},
     "rolling_resistance": {
         "flat_spots": lambda w, g: w.moved(roll_moment=g["coefficient"], roll_flat=FLAT),
     },
     "wheel_radius_offset": {"one_other": _one_other},
     "load_transfer": {
-        "springs_with_stops": _more("load_transfer", pitch_time=SPRINGS_S, pitch_stops=STOPS),
+        "springs_with_stops": with_more("load_transfer", pitch_time=SPRINGS_S, pitch_stops=STOPS),
     },
-    "tyre_relaxation": {"each_its_own": _more("tyre_relaxation", relaxation_side=RELAXATION_SIDE)},
+    "tyre_relaxation": {"each_its_own": with_more("tyre_relaxation", relaxation_side=RELAXATION_SIDE)},
     "tyre_stiffness_offset": {"unlike_sides": _stiffness},
     "friction_falloff": {"line_and_tail": falling(LINE_AND_TAIL)},
-    "friction_offset": {"less_under_load": _more("friction_offset", grip_load=GRIP_LOAD)},
+    "friction_offset": {"less_under_load": with_more("friction_offset", grip_load=GRIP_LOAD)},
     "torque_lag": {"slow_tail": _slow_tail},
     "torque_delay": {
         "ever_later": lambda w, g: w.moved(delay=g["delay_s"], delay_warm=DELAY_WARM * g["delay_s"]),
     },
-    "torque_gain": {"with_power": _more("torque_gain", gain_power=GAIN_POWER)},
-    "brake_drag": {"shaken_free": _more("brake_drag", brake_texture=SHAKEN)},
-    "driveline_compliance": {"warming_rubber": _more("driveline_compliance", shaft_warm=SHAFT_WARM)},
+    "torque_gain": {"with_power": with_more("torque_gain", gain_power=GAIN_POWER)},
+    "brake_drag": {"shaken_free": with_more("brake_drag", brake_texture=SHAKEN)},
+    "driveline_compliance": {"warming_rubber": with_more("driveline_compliance", shaft_warm=SHAFT_WARM)},
     "wheel_speed_delay": {"means": _means},
     "wheel_speed_quantisation": {"halved_when_fast": _halved},
     "vehicle_speed_delay": {"fitted_line": _fitted},
@@ -120,7 +115,7 @@ EFFECTS: dict[str, dict[str, Apply]] = {
     "accelerometer_bias": {
         "with_a_fan": lambda w, g: w.sensed(accel_bias_m_s2=g["bias_m_s2"], accel_bias_fan=FAN),
     },
-    "mu_split": {"thawing": _more("mu_split", grip_warm=THAWING)},
+    "mu_split": {"thawing": with_more("mu_split", grip_warm=THAWING)},
 }
 
 FOREIGN: dict[str, Foreign] = {

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from .air import dragging
 from .commands import COMMAND_STEP_S, on_grid
 from .details import (
+    FLOOR_M_S,
     FORMING,
     JACK_M_S2,
     ROLL_M_S,
@@ -54,7 +55,6 @@ from .tyre import THETA_GRID, dugoff, foreign
 Array = NDArray[np.floating[Any]]
 
 GRAVITY = 9.81
-FLOOR_M_S = 1.5
 RECORD_STEP_S = 0.001
 LEAST_LAG_S = 0.001
 """Of a motor whose torque rises at a limited rate: how closely it follows below the limit."""

@@ -22,8 +22,12 @@ def growing(name: str, least: float, most: float) -> Callable[[Car, Generator], 
     return lambda car, rng: lambda severity: {name: least * (most / least) ** severity}
 
 
+def _none(car: Car) -> float:
+    return 0.0
+
+
 def signed(
-    name: str, least: float, most: float, base: Callable[[Car], float]
+    name: str, least: float, most: float, base: Callable[[Car], float] = _none
 ) -> Callable[[Car, Generator], Scale]:
     """`base (1 + or - x)` with x growing from `least` to `most`; where base is 0, plus or minus x itself."""
 
@@ -111,10 +115,6 @@ def _of(name: str) -> Callable[[Car], float]:
     return lambda car: float(getattr(car, name))
 
 
-def _none(car: Car) -> float:
-    return 0.0
-
-
 def _one(car: Car) -> float:
     return 1.0
 
@@ -127,7 +127,7 @@ LIBRARY: dict[str, Effect] = {
     ),
     "rolling_resistance": Effect(growing("coefficient", 0.003, 0.04), _rolling, ("wheel", "vehicle", "road")),
     "road_grade": Effect(
-        signed("grade", 0.003, 0.06, _none), lambda w, g: w.moved(grade=g["grade"]), ("road", "vehicle")
+        signed("grade", 0.003, 0.06), lambda w, g: w.moved(grade=g["grade"]), ("road", "vehicle")
     ),
     "mass_offset": Effect(_mass, lambda w, g: w.moved(mass=w.physics.mass + g["mass_kg"]), ("vehicle",)),
     "wheel_radius_offset": Effect(
@@ -199,7 +199,7 @@ LIBRARY: dict[str, Effect] = {
         ("vehicle_speed_sensor",),
     ),
     "accelerometer_bias": Effect(
-        signed("bias_m_s2", 0.02, 0.8, _none),
+        signed("bias_m_s2", 0.02, 0.8),
         lambda w, g: w.sensed(accel_bias_m_s2=g["bias_m_s2"]),
         ("accelerometer",),
     ),

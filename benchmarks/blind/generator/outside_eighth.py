@@ -3,16 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.random import Generator
 
-from .car import Car
-from .library import Scale, growing
+from .library import growing, signed
 from .world import Effect, Parameters, World
-
-
-def _unlike_sides(car: Car, rng: Generator) -> Scale:
-    sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"left_more": sign * 0.01 * 30.0**severity}
 
 
 def _vectored(world: World, given: Parameters) -> World:
@@ -23,7 +16,7 @@ def _vectored(world: World, given: Parameters) -> World:
 
 
 AND_BEYOND: dict[str, Effect] = {
-    "torque_vectored": Effect(_unlike_sides, _vectored, ("powertrain",)),
+    "torque_vectored": Effect(signed("left_more", 0.01, 0.3), _vectored, ("powertrain",)),
     "road_borders_blurred": Effect(
         growing("over_m", 1.0, 40.0), lambda w, g: w.moved(border_blur=g["over_m"]), ("road", "tyre")
     ),

@@ -5,18 +5,8 @@ Steps of a torque are those of valves that open in pulses: a few bar each.
 
 from __future__ import annotations
 
-from numpy.random import Generator
-
-from .car import Car
-from .library import Scale, growing
+from .library import growing, signed
 from .world import Effect
-
-
-def _zero_point(car: Car, rng: Generator) -> Scale:
-    """Of a converter from pulses to a voltage, which the wheels share."""
-    sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"offset_rad_s": sign * 0.05 * 50.0**severity}
-
 
 STILL_BEYOND: dict[str, Effect] = {
     "torque_in_steps": Effect(
@@ -27,8 +17,9 @@ STILL_BEYOND: dict[str, Effect] = {
         lambda w, g: w.moved(bend_drag=g["force_n"]),
         ("vehicle", "tyre", "road"),
     ),
+    # Of a converter from pulses to a voltage, which the wheels share.
     "wheel_speed_offset": Effect(
-        _zero_point,
+        signed("offset_rad_s", 0.05, 2.5),
         lambda w, g: w.sensed(wheel_offset_rad_s=g["offset_rad_s"]),
         ("wheel_speed_sensor",),
     ),

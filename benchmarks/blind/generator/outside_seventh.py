@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.random import Generator
 
 from .car import Car
-from .library import Scale, growing
+from .library import Scale, growing, signed
 from .world import Effect, Parameters, World
 
 
@@ -26,26 +26,18 @@ def _flat(world: World, given: Parameters) -> World:
     )
 
 
-def _unlike_axles(car: Car, rng: Generator) -> Scale:
-    sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"front_more": sign * 0.03 * 12.0**severity}
-
-
-def _bending(car: Car, rng: Generator) -> Scale:
-    sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"per_m_s2": sign * 0.003 * 20.0**severity}
-
-
 BEYOND: dict[str, Effect] = {
     "one_tyre_flat": Effect(_one_tyre, _flat, ("tyre", "wheel", "wheel_speed_sensor")),
     "torque_split_shifted": Effect(
-        _unlike_axles, lambda w, g: w.moved(axle_split=g["front_more"]), ("powertrain",)
+        signed("front_more", 0.03, 0.36), lambda w, g: w.moved(axle_split=g["front_more"]), ("powertrain",)
     ),
     "axles_coupled": Effect(
         growing("nm_s_rad", 1.0, 80.0), lambda w, g: w.moved(axle_viscous=g["nm_s_rad"]), ("powertrain",)
     ),
     "accelerometer_bends": Effect(
-        _bending, lambda w, g: w.sensed(accel_bend_s2_m=g["per_m_s2"]), ("accelerometer",)
+        signed("per_m_s2", 0.003, 0.06),
+        lambda w, g: w.sensed(accel_bend_s2_m=g["per_m_s2"]),
+        ("accelerometer",),
     ),
     "speed_rate_limited": Effect(
         growing("limit_m_s2", 9.0, 1.0),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator
 
 from .car import Car
-from .library import Scale, growing
+from .library import Scale, growing, signed
 from .world import AIR_KG_M3, Effect, Parameters, World
 
 
@@ -19,16 +19,6 @@ def _blows(world: World, given: Parameters) -> World:
     """Steadily against the car, or with it; the drag in still air is another effect's."""
     drag = 0.5 * AIR_KG_M3 * given["drag_area_m2"]
     return world.moved(gust_drag=drag, wind=np.full(2, given["wind_m_s"]))
-
-
-def _elsewhere(car: Car, rng: Generator) -> Scale:
-    sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"shift_m": sign * 0.5 * 50.0**severity}
-
-
-def _unlike_axles(car: Car, rng: Generator) -> Scale:
-    sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"front_more": sign * 0.04 * 12.0**severity}
 
 
 def _mixed_tyres(world: World, given: Parameters) -> World:
@@ -65,8 +55,10 @@ LAST_FURTHER: dict[str, Effect] = {
     ),
     "head_wind": Effect(_head_wind, _blows, ("vehicle",)),
     "road_map_shifted": Effect(
-        _elsewhere, lambda w, g: w.moved(border=w.physics.border + g["shift_m"]), ("road", "tyre")
+        signed("shift_m", 0.5, 25.0),
+        lambda w, g: w.moved(border=w.physics.border + g["shift_m"]),
+        ("road", "tyre"),
     ),
-    "unlike_tyres_by_axle": Effect(_unlike_axles, _mixed_tyres, ("tyre",)),
+    "unlike_tyres_by_axle": Effect(signed("front_more", 0.04, 0.48), _mixed_tyres, ("tyre",)),
 }
 """From the sixth family on."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.random import Generator
 
 from .car import Car
-from .library import Scale, growing
+from .library import Scale, growing, signed
 from .world import Effect
 
 
@@ -15,32 +15,24 @@ def _notch(car: Car, rng: Generator) -> Scale:
     return lambda severity: {"at_rad_s": at, "share": 0.01 * 80.0**severity}
 
 
-def _unlike_axles(car: Car, rng: Generator) -> Scale:
-    """New tyres on one axle and worn ones on the other."""
-    sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"front_more": sign * 0.005 * 60.0**severity}
-
-
-def _off_the_mark(car: Car, rng: Generator) -> Scale:
-    """Of a sensor that now and then follows its own echo, or another car."""
-    sign = float(rng.choice([-1.0, 1.0]))
-    return lambda severity: {"share": sign * 0.005 * 60.0**severity}
-
-
 WELL_BEYOND: dict[str, Effect] = {
     "torque_notch": Effect(
         _notch, lambda w, g: w.moved(notch=g["share"], notch_rad_s=g["at_rad_s"]), ("powertrain",)
     ),
+    # New tyres on one axle and worn ones on the other.
     "unlike_grip_by_axle": Effect(
-        _unlike_axles, lambda w, g: w.moved(grip_axles=g["front_more"]), ("tyre", "road")
+        signed("front_more", 0.005, 0.3), lambda w, g: w.moved(grip_axles=g["front_more"]), ("tyre", "road")
     ),
     "wheel_speeds_blended": Effect(
         growing("share", 0.02, 0.9),
         lambda w, g: w.sensed(wheel_blend=g["share"]),
         ("wheel_speed_sensor",),
     ),
+    # Of a sensor that now and then follows its own echo, or another car.
     "speed_mislocks": Effect(
-        _off_the_mark, lambda w, g: w.sensed(speed_mislocks=g["share"]), ("vehicle_speed_sensor",)
+        signed("share", 0.005, 0.3),
+        lambda w, g: w.sensed(speed_mislocks=g["share"]),
+        ("vehicle_speed_sensor",),
     ),
     "accelerometer_on_soft_pad": Effect(
         growing("period_s", 0.015, 0.35),

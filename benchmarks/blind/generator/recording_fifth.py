@@ -11,6 +11,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from .recording import every_second
 from .sensors import Noise, noise_of
 
 Array = NDArray[np.floating[Any]]
@@ -33,7 +34,7 @@ RANGES = {
 BITS = 14
 CHANGES = {"wheel_speed": 0.01, "vehicle_speed": 0.005, "accel": 0.015, "position": 0.005}
 """Less than which a recorder does not write anew: half of the best sensor's noise."""
-SLOW_COLUMN, EVERY = "vehicle_speed_m_s", 2
+SLOW_COLUMN = "vehicle_speed_m_s"
 """Of a receiver that is slower than the log."""
 
 
@@ -107,8 +108,7 @@ def _standing(values: Array, least: float) -> Array:
 
 def slow_receiver(log: pd.DataFrame) -> pd.DataFrame:
     """A vehicle speed that comes with every second row; the log has no value between."""
-    between = np.arange(len(log)) % EVERY != 0
-    return log.assign(**{SLOW_COLUMN: log[SLOW_COLUMN].mask(between)})
+    return every_second(log, SLOW_COLUMN)
 
 
 NOISES_FIFTH: dict[str, Callable[[Noise, Array, Generator], Array]] = {

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from .recording import every_second
 from .sensors import Noise, noise_of
 
 Array = NDArray[np.floating[Any]]
@@ -18,8 +19,6 @@ TONES_SHARE, TONES_HZ, BEAT_HZ = 0.25, (18.0, 40.0), (0.2, 1.2)
 """Of the variance: two tones of nearly one frequency, as of two pumps or fans; their frequency and its difference."""
 SPAN_S = (0.004, 0.025)
 """Over which a sensor takes the mean of what it samples, before it tells it."""
-EVERY = 2
-"""Of a receiver whose place is slower than the log."""
 BEFORE_S = (2.0, 9.0)
 """What a triggered recorder keeps of the time before its trigger, which is its zero."""
 
@@ -46,8 +45,7 @@ def meaned(noise: Noise, time_s: Array, rng: Generator) -> Array:
 
 def slow_place(log: pd.DataFrame) -> pd.DataFrame:
     """A position that comes with every second row; the log has no value between."""
-    between = np.arange(len(log)) % EVERY != 0
-    return log.assign(position_m=log["position_m"].mask(between))
+    return every_second(log, "position_m")
 
 
 def triggered(log: pd.DataFrame) -> pd.DataFrame:

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from .recording import every_second
 from .sensors import Noise, noise_of
 
 Array = NDArray[np.floating[Any]]
@@ -32,7 +33,7 @@ DIGITS_KEPT = {"torque": 4, "wheel_speed": 4, "vehicle_speed": 4, "accel": 3, "p
 FRAMES = ("wheel_speed", "vehicle_speed", "accel")
 FRAME_LOST = 0.004
 """Messages on the bus, each with its readings; share of them that is lost."""
-SPARSE_COLUMN, EVERY = "accel_x_m_s2", 2
+SPARSE_COLUMN = "accel_x_m_s2"
 """Of a sensor that is slower than the log."""
 
 
@@ -108,8 +109,7 @@ def losing_frames(log: pd.DataFrame) -> pd.DataFrame:
 
 def slow_accelerometer(log: pd.DataFrame) -> pd.DataFrame:
     """An accelerometer that comes with every second row; the log has no value between."""
-    between = np.arange(len(log)) % EVERY != 0
-    return log.assign(**{SPARSE_COLUMN: log[SPARSE_COLUMN].mask(between)})
+    return every_second(log, SPARSE_COLUMN)
 
 
 NOISES_SIXTH: dict[str, Callable[[Noise, Array, Generator], Array]] = {

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from .recording import every_second
 from .sensors import Noise, noise_of
 
 Array = NDArray[np.floating[Any]]
@@ -18,8 +19,6 @@ KEPT_SHARE = 0.2
 """Of a reading's variance: what a converter still holds of the channel that it read before."""
 OWN_HZ = (70.0, 140.0)
 """Of sensors whose last sample stands until the next."""
-WHEELS, EVERY = "wheel_speed", 2
-"""Of wheel speeds that are slower than the log."""
 CLOCK_OFF = 2e-4
 """By which a logger's clock may be fast or slow, over the true time."""
 
@@ -42,9 +41,7 @@ def standing(noise: Noise, time_s: Array, rng: Generator) -> Array:
 
 def slow_wheels(log: pd.DataFrame) -> pd.DataFrame:
     """Wheel speeds that come with every second row; the log has no value between."""
-    between = np.arange(len(log)) % EVERY != 0
-    columns = [str(c) for c in log if str(c).startswith(WHEELS)]
-    return log.assign(**{column: log[column].mask(between) for column in columns})
+    return every_second(log, *(str(c) for c in log if str(c).startswith("wheel_speed")))
 
 
 def own_clock(log: pd.DataFrame) -> pd.DataFrame:

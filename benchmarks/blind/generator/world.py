@@ -11,9 +11,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .car import Car, Road
-from .details import spread
+from .details import FLOOR_M_S, spread
 from .falling import EXPONENTIAL
-from .kernel import FLOOR_M_S, GRAVITY, RECORD_STEP_S
+from .kernel import GRAVITY, RECORD_STEP_S
 from .physics import Physics
 from .sensors import Sensors
 from .tyre import MAGIC, THETA_GRID, peaks
