@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from plant_oracle import reference
 from scipy.optimize import brentq
 
+from scenarios.effects.driveline_compliance import DrivelineComplianceOfAxles
 from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip, TyreRelaxationWhileItAdheres
 from scenarios.errors import ScenarioError
@@ -247,6 +248,26 @@ def test_other_forms_agree_with_the_independent_solver(load_transfer_m, by_slope
     assert error[WHEEL:FORCE].max() < 2.5e-2
     # Where a relaxation is down to a tenth of its length, the slip follows ten times as fast.
     assert error[FORCE:TWIST].max() < (2.5e-3 if by_slope else 1e-3)
+
+
+def test_shafts_that_are_unlike_agree_with_the_independent_solver():
+    knots = ((0.0, 0.0), (0.05, 250.0), (0.6, 250.0), (0.65, -150.0), (1.2, -150.0), (1.25, 0.0), (1.6, 0.0))
+    segments = [(0.0, 0.9, 0.9), (8.0, 0.4, 0.4)]
+    setup = make_setup(NOMINAL, make_road(*segments))
+    p = DrivelineComplianceOfAxles(4000.0, 5.0, 0.5, 0.4).dynamics(setup.parameters)
+    times, torques = zip(*knots, strict=True)
+    time_s = np.arange(1601) * 1e-3
+    shafts = {"shaft_stiffness": 4000.0 * np.array([1.4, 1.4, 0.6, 0.6]), "shaft_damping": 5.0}
+    truth = reference(
+        {**oracle_car({}), **shafts, "motor_inertia": 0.5},
+        segments, lambda t: np.interp(t, times, torques) * np.ones(4), times, time_s, 6.0, 0.0, FLOOR_SPEED_M_S,
+    )  # fmt: skip
+    y = dynamics.run(dynamics.initial_y(6.0, 0.0, p), profile(knots, 1.6, 1e-3), 1e-3, p, setup.road)[0]
+    error = np.abs(y - truth[:, : y.shape[1]]).max(axis=0)
+    assert error[SPEED] < 1e-4
+    assert error[WHEEL:FORCE].max() < 6e-3
+    assert error[TWIST:MOTOR].max() < 1e-3
+    assert error[MOTOR:].max() < 2e-2
 
 
 def test_standing_start_follows_the_closed_form():

@@ -12,7 +12,7 @@ from scenarios.effects.brake_drag import BrakeDrag, BrakeDragOfAxles
 from scenarios.effects.camera_latency import CameraLatency
 from scenarios.effects.camera_pitch import CameraPitch
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
-from scenarios.effects.driveline_compliance import DrivelineCompliance
+from scenarios.effects.driveline_compliance import DrivelineCompliance, DrivelineComplianceOfAxles
 from scenarios.effects.exposure_shift import ExposureShift
 from scenarios.effects.friction_falloff import FrictionFalloff, FrictionFalloffHyperbolic
 from scenarios.effects.friction_offset import FrictionOffset
@@ -107,6 +107,7 @@ OTHER_FORMS = (
     WheelRadiusOffsetOfAxles,
     WheelRadiusOffsetOfWheels,
     WheelInertiaOffsetOfAxles,
+    DrivelineComplianceOfAxles,
     TyreStiffnessOffsetOfAxles,
     TyreStiffnessOffsetWithLoad,
     TyreRelaxationOfSlip,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter
+from scenarios.effects.base import Effect, parameter, share_of_axles
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
@@ -25,6 +25,7 @@ class DrivelineCompliance(Effect):
     """
 
     id = "driveline_compliance"
+    form = "all shafts alike"
     stage = "dynamics"
     subsystem = "powertrain"
     equation = (
@@ -63,4 +64,20 @@ class DrivelineCompliance(Effect):
             shaft_stiffness_nm_rad=self.stiffness_nm_rad,
             shaft_damping_nm_s_rad=self.damping_nm_s_rad,
             motor_inertia_kg_m2=motor if motor >= LEAST_MOTOR_SHARE * parameters.wheel_inertia_kg_m2 else 0.0,
+        )
+
+
+@dataclass(frozen=True)
+class DrivelineComplianceOfAxles(DrivelineCompliance):
+    """The shafts of one axle are the longer or thinner ones; `stiffness_nm_rad` is the mean."""
+
+    form = "axles unlike"
+    equation = "k (1 + unlike) in front, k (1 - unlike) in the rear"
+
+    unlike: float = share_of_axles(start=0.2, most=0.6)
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each axle has its stiffness."""
+        return DrivelineCompliance.dynamics(self, parameters)._replace(
+            axle_shaft_stiffness_nm_rad=self.unlike * self.stiffness_nm_rad
         )

@@ -353,7 +353,8 @@ def _fill_rates(
         torque = torque_nm[i] + (next_nm[i] - torque_nm[i]) * part
         if p.motor_inertia_kg_m2 > 0.0:
             spread = y[MOTOR + i] - y[WHEEL + i]
-            shaft_nm = p.shaft_stiffness_nm_rad * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
+            stiffness = _of_axle(i, p.shaft_stiffness_nm_rad, p.axle_shaft_stiffness_nm_rad)
+            shaft_nm = stiffness * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
             motor_nm, wheels.work[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
             wheels.rates[TWIST - WHEEL + i] = spread
             wheels.rates[MOTOR - WHEEL + i] = (motor_nm - shaft_nm) / p.motor_inertia_kg_m2
@@ -367,6 +368,13 @@ def _fill_rates(
         total_n += wheels.force_n[i]
     held_n = p.mass_kg * (p.slope_m_s2 + p.hub_resistance * p.gravity_m_s2)
     wheels.free[4] = 0.0 if y[SPEED] <= 0.0 and total_n < held_n else 1.0
+
+
+@inlined
+def _shaft(i: int, gh: float, p: DynamicsParameters) -> tuple[float, float]:
+    """What a shaft's twist, and its motor's speed beside the wheel's, add to its torque within gh [N m/(rad/s)]."""
+    stiffness = gh * _of_axle(i, p.shaft_stiffness_nm_rad, p.axle_shaft_stiffness_nm_rad)
+    return stiffness, gh * (stiffness + p.shaft_damping_nm_s_rad)
 
 
 @inlined
@@ -384,7 +392,7 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
         lever_m = _rolling_radius(i, p) + p.lever_more_m
         per_newton = lever_m / inertia
         if p.motor_inertia_kg_m2 > 0.0:
-            shaft = gh * (gh * p.shaft_stiffness_nm_rad + p.shaft_damping_nm_s_rad)
+            _, shaft = _shaft(i, gh, p)
             motor = at[_MOTOR, i] = p.motor_inertia_kg_m2 + gh * at[_BRAKE, i]
             inertia = inertia - p.motor_inertia_kg_m2 + motor / (motor + shaft) * shaft
             per_newton = lever_m / inertia
@@ -407,10 +415,9 @@ def _solve(
     gh = _GAMMA * h
     at = wheels.work
     has_shaft = p.motor_inertia_kg_m2 > 0.0
-    stiffness = gh * p.shaft_stiffness_nm_rad
-    shaft = gh * (stiffness + p.shaft_damping_nm_s_rad)
     rhs = speed_rhs
     for i in range(4):
+        stiffness, shaft = _shaft(i, gh, p)
         inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2) - p.motor_inertia_kg_m2
         if has_shaft:
             k[MOTOR - WHEEL + i] *= p.motor_inertia_kg_m2 / at[_MOTOR, i]
@@ -426,6 +433,7 @@ def _solve(
         rhs += at[_SHARE, i] * k[i]
     k_speed = rhs / pivot if wheels.free[4] > 0.0 else speed_rhs
     for i in range(4):
+        stiffness, shaft = _shaft(i, gh, p)
         k[i] = (k[i] - at[_GAIN, i] * at[_BY_SPEED, i] * k_speed) / at[_OWN, i]
         if p.relaxation_m > 0.0:
             k[FORCE - WHEEL + i] += (at[_BY_WHEEL, i] * k[i] + at[_BY_SPEED, i] * k_speed) / at[_PER_STATE, i]

@@ -66,6 +66,8 @@ class DynamicsParameters(NamedTuple):
     """Likewise beside drag_torque_nm [N m]."""
     axle_rolling_coefficient: float = 0.0
     """Likewise beside rolling_coefficient [-]."""
+    axle_shaft_stiffness_nm_rad: float = 0.0
+    """Likewise beside shaft_stiffness_nm_rad [N m/rad]."""
     axle_stiffness_n: float = 0.0
     """Likewise beside longitudinal_stiffness_n [N]."""
     stiffness_by_load: float = 0.0
