@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.training.data import MANIFEST, DataFolderError, Picture, of_split, read_manifest
-from models.training.patches import PatchSet, judged_patches
+from models.training.patches import judged_patches
+from models.training.scene_set import SceneSet, scenes_of_pictures
 from models.training.scores import picture_verdicts, wilson_interval
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.networks import SurfaceClassifier
@@ -42,9 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def rows(name: str, pictures: Sequence[Picture], networks: Sequence[SurfaceClassifier]) -> list[str]:
     """A set's lines of the table: accuracy, then the recall of each class that it holds."""
-    patches = judged_patches(pictures)
+    seen = scenes_of_pictures(judged_patches(pictures), pictures)
     labels = np.array([int(picture.surface) for picture in pictures])
-    right = np.array([_right(network, patches) for network in networks])
+    right = np.array([_right(network, seen) for network in networks])
     scores = {"accuracy": np.ones(len(labels), np.bool_)}
     scores |= {f"recall {surface.label}": labels == surface for surface in Surface}
     return [
@@ -79,9 +80,9 @@ def interval(right: Hits, seed: int = 0) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _right(network: SurfaceClassifier, patches: PatchSet) -> Hits:
+def _right(network: SurfaceClassifier, seen: SceneSet) -> Hits:
     """Whether each picture's class is found."""
-    true, found = picture_verdicts(network.verdicts(patches.patches).logits, patches, network.temperature)
+    true, found = picture_verdicts(seen.logits(network), seen.patches, network.temperature)
     return true == found
 
 

@@ -19,6 +19,7 @@ from trpac_core.vision.ife import LEAST_CONTRAST, LEAST_READABLE, usable_road
 from trpac_core.vision.images import ImageError, decode_image
 from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier, calibrated_probabilities
 from trpac_core.vision.regions import cut_box
+from trpac_core.vision.scene import scene_of
 
 CLASSIFY_COLUMNS = ("file", "class", "confidence", "p_dry", "p_wet", "p_snow_ice")
 PICTURE_ENDINGS = frozenset((".jpg", ".jpeg", ".png", ".bmp", ".gif", ".heic", ".tif", ".tiff", ".webp"))
@@ -126,7 +127,7 @@ def picture_probabilities(
         raise ImageError(
             f"{name}: one even colour where the road should be. Is the lens covered, or the picture dark?"
         )
-    verdicts = classifier.verdicts(patches)
+    verdicts = classifier.verdicts(patches, scene_of(image))
     if verdicts.readable[contrast].max() < LEAST_ROAD:
         raise ImageError(
             f"{name}: no road that could be read where it should be, the lower centre. Is it a picture of a road, in "

@@ -22,6 +22,7 @@ from trpac_core.vision.evidence import EvidenceState, WeightLaw
 from trpac_core.vision.ife import Ife, IfeConfig, IfeState
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import PatchVerdicts, RoadMasks, Segmenter, SurfaceClassifier
+from trpac_core.vision.scene import scene_of
 from trpac_core.vision.trajectory import Motion
 from trpac_core.vision.voting import Voting, VotingConfig
 
@@ -50,10 +51,10 @@ class Middle:
 
     def __init__(self, temperature=1.0, certainty=3.0):
         self.temperature, self.certainty = temperature, certainty
-        self.patches = np.empty((0, 64, 96, 3), np.uint8)
+        self.patches, self.scene = np.empty((0, 64, 96, 3), np.uint8), None
 
-    def verdicts(self, patches):
-        self.patches = patches
+    def verdicts(self, patches, scene=None):
+        self.patches, self.scene = patches, scene
         grey = patches[:, 30:34, 46:50].mean(axis=(1, 2, 3))
         logits = self.certainty * np.eye(3)[np.abs(grey[:, None] - PAINT).argmin(axis=1)]
         return PatchVerdicts(logits, self.readable(grey))
@@ -346,6 +347,15 @@ def test_distorted_lens():
 def test_wrong_settings_are_reported_together():
     with pytest.raises(ValueError, match=r"side must be.*0 < k1 < k2.*sigma"):
         IfeConfig(side="middle", k1=1.0, weight_law=WeightLaw(sigma=2.0))
+
+
+def test_patches_are_judged_in_the_scene_of_their_picture_unless_left_out():
+    picture, classifier = plain(WET), Middle()
+    for config, seen in ((IfeConfig(), scene_of(picture)), (IfeConfig(use_scene=False), None)):
+        Ife(config, Masks(), classifier).process(IfeState(), picture, Motion(5.0))
+        assert np.array_equal(classifier.scene, seen)
+    Voting(VotingConfig(), Masks(), classifier).process(0, picture)
+    assert np.array_equal(classifier.scene, scene_of(picture))
 
 
 def test_vote_counts_the_whole_drivable_area_with_its_shadow():

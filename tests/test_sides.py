@@ -24,9 +24,9 @@ class Counting(Middle):
 
     runs = 0
 
-    def verdicts(self, patches):
+    def verdicts(self, patches, scene=None):
         self.runs += 1
-        return super().verdicts(patches)
+        return super().verdicts(patches, scene)
 
 
 def test_each_side_gets_its_own_surface_from_one_segmentation_and_one_run():

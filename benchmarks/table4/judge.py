@@ -28,6 +28,7 @@ VARIANTS: dict[str, Changes] = {
     "not calibrated": {"calibrate": False},
     "equal weights": {"weight_evidence": False},
     "several widths": {"roi_spread": 1.7},
+    "patches alone": {"use_scene": False},
 }
 VOTING = "voting"
 DISTURBANCE_SEED = 5_000_000
@@ -42,16 +43,17 @@ class Kept:
     classifier: SurfaceClassifier
 
     def __post_init__(self) -> None:
-        self._patches = np.empty((0, 0, 0, 0), np.uint8)
+        self._asked = (np.empty(0, np.uint8), np.empty(0, np.uint8))
         self._verdicts = PatchVerdicts(np.empty((0, 3)), np.empty(0))
 
     @property
     def temperature(self) -> float:
         return self.classifier.temperature
 
-    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
-        if not np.array_equal(patches, self._patches):
-            self._patches, self._verdicts = patches, self.classifier.verdicts(patches)
+    def verdicts(self, patches: NDArray[np.uint8], scene: NDArray[np.uint8] | None = None) -> PatchVerdicts:
+        asked = (patches, np.empty(0, np.uint8) if scene is None else scene)
+        if not all(map(np.array_equal, asked, self._asked)):
+            self._asked, self._verdicts = asked, self.classifier.verdicts(patches, scene)
         return self._verdicts
 
 

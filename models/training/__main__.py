@@ -27,7 +27,10 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--seed", type=int, default=1, help="seed of every random choice (default: 1)")
     parser.add_argument(
-        "--only", choices=("segmenter", "surface"), help="train one of the two networks; the other file stays"
+        "--only",
+        choices=("segmenter", "surface", "scene"),
+        help="train one of the two networks, the other file stays; or only what a scene adds to the surface network "
+        "that lies with its card in --out",
     )
     parser.add_argument(
         "--effort", type=float, default=1.0, help="share of the usual steps and rendered worlds (default: 1)"

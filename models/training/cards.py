@@ -5,23 +5,30 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from trpac_core.vision.classes import Surface
+from trpac_core.vision.scene import NUMBERS, SceneHead
 
 from .data import Picture
 from .patches import CAMERA_SPREAD, RENDERED_SPREAD
+from .rendered import FIRST_SCENE_WORLD, SEED_RANGES
 from .scores import ClassScore, wilson_interval
-from .train_segmenter import SegmentationScore
 
 if TYPE_CHECKING:
+    from .calibrate import Reliability
+    from .scene_run import Judged
     from .surface_run import Outcome
+    from .train_segmenter import SegmentationScore
 
 CLASSES = [surface.label for surface in Surface]
 PACKAGES = ("torch", "onnx", "onnxruntime", "numpy", "opencv-python-headless", "albumentations")
+
+SCENE_BEGIN, SCENE_END = "<!-- scene: begin -->", "<!-- scene: end -->"
+"""Between them the card tells of the scene."""
 
 LICENCE_TEXT = """\
 ## Licences of the pictures
@@ -115,6 +122,22 @@ def class_table(scores: dict[str, ClassScore]) -> str:
     )
 
 
+def calibration_table(
+    reliabilities: Mapping[str, tuple[Reliability, Reliability]], temperature: float
+) -> str:
+    """Errors of the confidence per set, at T = 1 and at T."""
+    header = ["ECE, T = 1", f"ECE, T = {temperature:.3f}", "MCE, T = 1", f"MCE, T = {temperature:.3f}"]
+    rows = [
+        [
+            name,
+            str(int(before.count.sum())),
+            *(f"{x:.3f}" for x in (before.ece, after.ece, before.mce, after.mce)),
+        ]
+        for name, (before, after) in reliabilities.items()
+    ]
+    return table(["patches", "n", *header], rows)
+
+
 def surface_card(
     facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: float, train_patches: int
 ) -> str:
@@ -127,24 +150,7 @@ def surface_card(
         ["patches", "share taken for readable road"],
         [[name, f"{share:.3f}"] for name, share in outcome.readings.items()],
     )
-    calibration = table(
-        [
-            "patches",
-            "n",
-            "ECE, T = 1",
-            f"ECE, T = {temperature:.3f}",
-            "MCE, T = 1",
-            f"MCE, T = {temperature:.3f}",
-        ],
-        [
-            [
-                name,
-                str(int(before.count.sum())),
-                *(f"{x:.3f}" for x in (before.ece, after.ece, before.mce, after.mce)),
-            ]
-            for name, (before, after) in reliabilities.items()
-        ],
-    )
+    calibration = calibration_table(reliabilities, temperature)
     teacher = (
         "No teacher was used."
         if facts.teacher is None
@@ -168,7 +174,8 @@ feed one linear layer.
 - Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).
 - Output `readable`: float32 (N,), probability that a patch shows road that can be read at all.
-- Metadata: `temperature` = {temperature:.6f}, `classes` = dry,wet,snow_ice.
+- Metadata: `temperature` = {temperature:.6f}, `classes` = dry,wet,snow_ice, `scene`: what the picture around a patch
+  adds to its logits, [below](#the-scene).
 
 ## Training
 
@@ -188,14 +195,14 @@ disturbed, against drawn walls, boards, cloth, plants, sky, bodywork, facades, l
 road), sky, trees and houses of the upper part of the training pictures (a quarter), and noise, clouds, stripes, and
 roads that are too dark, too bright or far out of focus to be read (a quarter).
 
-## Scores on pictures
+## Scores on pictures, patches alone
 
 A real picture is judged by fixed patches of its road box (or mask): largest mean log probability. Recall columns give
 the number of pictures of the class. Every rendered view is one picture.
 
 {class_table(picture_scores)}
 
-## Scores on single patches
+## Scores on single patches, alone
 
 {class_table(patch_scores)}
 
@@ -210,12 +217,18 @@ clear is surer. d, within {outcome.net.MOST_DISTURBED:g} to both sides, is the l
 clear training patches from the same ones disturbed; it has seen no class. The slope is learned like T, on the
 validation patches.
 
-T = {temperature:.3f} minimises the cross-entropy of the validation patches, undisturbed and disturbed (motion blur on
-all, brightness and contrast on 70 %, abnormal exposure and shadow on 30 % each), from {entropies[0]:.3f} to
-{entropies[1]:.3f} nat. The class never changes. {len(reliabilities)} sets, 15 bins; MCE is the worst bin however few
-patches it holds. The diagram `reliability.png` is the validation set's, undisturbed and disturbed together.
+Of patches alone, T = {temperature:.3f} minimises the cross-entropy of the validation patches, undisturbed and
+disturbed (motion blur on all, brightness and contrast on 70 %, abnormal exposure and shadow on 30 % each), from
+{entropies[0]:.3f} to {entropies[1]:.3f} nat. The class never changes. {len(reliabilities)} sets, 15 bins; MCE is the
+worst bin however few patches it holds.
 
 {calibration}
+
+## The scene
+
+{SCENE_BEGIN}
+
+{SCENE_END}
 
 ## Limits
 
@@ -237,6 +250,46 @@ are used only where no text, path dots or bonnet cover the road.
 
 {LICENCE_TEXT}
 """
+
+
+def scene_section(
+    judged: Mapping[str, Judged],
+    reliabilities: Mapping[str, tuple[Reliability, Reliability]],
+    head: SceneHead,
+    *,
+    temperature: float,
+    patches: int,
+) -> str:
+    """What the card of surface.onnx tells of the scene."""
+    weights = table(
+        ["number", *(f"{name} [logit]" for name in CLASSES)],
+        [[name, *(f"{w:+.2f}" for w in row)] for name, row in zip(NUMBERS, head.weights, strict=True)],
+    )
+    rows = [
+        [name, *class_rows(kind, score)]
+        for name, both in judged.items()
+        for kind, score in (("alone", both.alone), ("in its scene", both.in_scene))
+    ]
+    header = ["set", "patches", "n", "accuracy [95 %]", *(f"recall {name} (n)" for name in CLASSES)]
+    return f"""\
+A patch is grey, but the road is packed snow where its verge is as grey. {len(NUMBERS)} numbers of the picture around
+a patch (`trpac_core/vision/scene.py`) times a matrix are added to its logits; whoever judges patches without their
+picture leaves it out. Learned last, the rest fixed, by multinomial regression with a ridge: {patches} patches of web
+and Udacity stills and of rendered worlds that the network had not seen (seeds from
+{SEED_RANGES["train"].start + FIRST_SCENE_WORLD}), each with its picture as two undisturbed cameras would show both.
+The other real sources are few cameras, whose tint would pass for a surface: nothing is learned from them here. Logits
+per standard deviation:
+
+{weights}
+
+A picture's class as above:
+
+{table([*header, "confusion, rows true"], rows)}
+
+In the scene, T = {temperature:.3f}, learned like that of patches alone, and the one in the metadata; scene and patch
+are disturbed alike. The diagram `reliability.png` is the validation set's, undisturbed and disturbed together.
+
+{calibration_table(reliabilities, temperature)}"""
 
 
 def segmentation_table(scores: dict[str, dict[str, SegmentationScore]]) -> str:

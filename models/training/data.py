@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -205,6 +205,20 @@ def of_split(pictures: Iterable[Picture], split: str, *, masked: bool | None = N
         for picture in pictures
         if picture.split == split and (masked is None or (picture.mask is not None) == masked)
     ]
+
+
+def judged_groups(pictures: Sequence[Picture]) -> dict[str, list[Picture]]:
+    """Validation and test pictures by the set that they are judged in; test pictures of other cameras apart."""
+    validation, test = of_split(pictures, "val"), of_split(pictures, "test")
+    groups = {
+        f"real val: {source}": [p for p in validation if p.source == source]
+        for source in sorted({picture.source for picture in validation})
+    }
+    groups["real test: stills, same search"] = [p for p in test if p.source == "condition_web"]
+    groups["real test: other cameras"] = [p for p in test if p.source.startswith("other_cameras/")]
+    known = {id(picture) for group in groups.values() for picture in group}
+    groups["real test: other"] = [p for p in test if id(p) not in known]
+    return {name: group for name, group in groups.items() if group}
 
 
 def check_trainable(pictures: list[Picture]) -> None:

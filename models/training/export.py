@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 import torch
@@ -10,6 +9,7 @@ from torch import Tensor, nn
 
 from trpac_core.vision.classes import Surface
 
+from .annotate import annotate
 from .nets import Segmenter, SurfaceNet
 
 OPSET = 18
@@ -31,7 +31,8 @@ def export_segmenter(net: Segmenter, path: Path) -> None:
     """Write segmenter.onnx: `image` uint8 (1, 160, 256, 3) BGR to `drivable`, `shadow` (1, 160, 256)."""
     example = torch.zeros((1, 160, 256, 3), dtype=torch.uint8)
     _export(_SegmenterGraph(net), example, path, "image", ["drivable", "shadow"], None)
-    _annotate(path, {"task": "drivable area and road shadow"})
+    _tidy(path)
+    annotate(path, {"task": "drivable area and road shadow"})
 
 
 def export_surface(net: SurfaceNet, temperature: float, path: Path) -> None:
@@ -42,12 +43,8 @@ def export_surface(net: SurfaceNet, temperature: float, path: Path) -> None:
     example = torch.zeros((2, 64, 96, 3), dtype=torch.uint8)
     _export(net, example, path, "patches", ["logits", "readable"], {"patches": {0: "n"}})
     classes = ",".join(surface.label for surface in Surface)
-    _annotate(path, {"temperature": f"{temperature:.6f}", "classes": classes})
-
-
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    _tidy(path)
+    annotate(path, {"temperature": f"{temperature:.6f}", "classes": classes})
 
 
 def _export(
@@ -67,12 +64,11 @@ def _export(
     program.save(str(path), external_data=False)
 
 
-def _annotate(path: Path, properties: dict[str, str]) -> None:
-    """Set the metadata of an ONNX file and drop the exporter's notes on nodes."""
+def _tidy(path: Path) -> None:
+    """Drop the exporter's notes on nodes from an ONNX file."""
     import onnx
 
     model = onnx.load(str(path))
-    onnx.helper.set_model_props(model, properties)
     for part in (*model.graph.node, *model.graph.value_info, *model.graph.input, *model.graph.output):
         part.ClearField("metadata_props")
         part.ClearField("doc_string")

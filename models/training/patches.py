@@ -14,6 +14,9 @@ from trpac_core.vision.regions import cut_box, cut_patch
 from .augment import camera_look
 from .data import Image, Picture, family_of, pixel_box
 
+CALIBRATION_PER_SOURCE = 240
+"""Most validation patches that one source gives to the calibration, lest one drive decide T."""
+
 ASPECTS = (1.5, 3.0)
 """Width over height of a training patch on the road, squeezed to 3:2 in the end: narrow and wide looks [-]."""
 JUDGED_ASPECT = 1.5
@@ -220,6 +223,13 @@ def training_patches(pictures: Iterable[Picture], seed: int) -> PatchSet:
 def judged_patches(pictures: Iterable[Picture]) -> PatchSet:
     """The fixed patches of validation or test pictures."""
     return patch_set((fixed_patches(picture), int(picture.surface), picture.source) for picture in pictures)
+
+
+def thinned(count: int, seed: int) -> NDArray[np.bool_]:
+    """Which of a source's `count` validation patches calibrate."""
+    keep = np.zeros(count, np.bool_)
+    keep[np.random.default_rng(seed).permutation(count)[:CALIBRATION_PER_SOURCE]] = True
+    return keep
 
 
 def draw_weights(patches: PatchSet) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from scenarios.camera.scene import RenderedFrame, SceneLook, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.regions import roi_box, roi_width_px
+from trpac_core.vision.scene import scene_of
 
 from .data import IGNORE, Image
 from .patches import ASPECTS, PatchSet, patch_set, reduced
@@ -28,6 +29,12 @@ SEED_RANGES = {
     "test": range(3_000_000, 4_000_000),
 }
 """Seeds of the looks of each split: disjoint, so no world is seen in two splits."""
+
+PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
+
+FIRST_SCENE_WORLD = 500_000
+"""From this one of the training range on worlds teach what a scene adds: the network has not seen them, it is too sure
+of those that it has."""
 
 STORED_WIDTH_PX = 384
 """Width at which whole pictures are kept for the segmenter [px]."""
@@ -51,6 +58,10 @@ DRIVEN_M, DRIVEN_ASIDE_M, DRIVEN_WIDTHS_M = (2.5, 12.0), 1.8, (0.9, 2.4)
 """Their way ahead, their reach to both sides, and the width of road that they show [m]."""
 DRIVEN_PURE_SHARE = 0.7
 """Least share of one surface in them: a car's regions reach over borders and verges too [-]."""
+
+
+Cut = list[tuple[Image, int]]
+"""Patches of one view, each with its class index."""
 
 
 @dataclass(frozen=True)
@@ -105,38 +116,45 @@ def draw_worlds(
 ) -> tuple[list[Sample], PatchSet]:
     """Whole pictures and patches of the first `count` worlds of a split; `report` is called after each world."""
     samples: list[Sample] = []
-    cut: list[list[tuple[Image, int]]] = []
-    for number, seed in enumerate(SEED_RANGES[split][:count]):
-        scale = FULL_SCALE if number % 4 == 0 else REDUCED_SCALE
-        for view in world_views(seed, scale):
-            samples.append(view_sample(view))
-            cut.append(view_patches(view, patches_per_view))
-        report()
+    cut: list[Cut] = []
+    for view in split_views(split, count, report):
+        samples.append(view_sample(view))
+        cut.append(view_patches(view, patches_per_view))
     return samples, rendered_patches(cut)
+
+
+def split_views(split: str, count: int, report: Callable[[], None]) -> Iterator[View]:
+    """Views of the first `count` worlds of a split, each world by a camera of its own."""
+    for number, seed in enumerate(SEED_RANGES[split][:count]):
+        yield from world_views(seed, FULL_SCALE if number % 4 == 0 else REDUCED_SCALE)
+        report()
 
 
 def draw_further_worlds(
     seeds: Sequence[int], patches_per_view: int, processes: int, report: Callable[[], None]
-) -> PatchSet:
-    """Patches alone of further worlds, at the reduced scale; the result does not depend on `processes`."""
-    draw = partial(_patches_of_worlds, patches_per_view=patches_per_view)
+) -> list[tuple[Image, Cut]]:
+    """Scene and patches of each view of further worlds, at the reduced scale; independent of `processes`."""
+    draw = partial(_seen_in_worlds, patches_per_view=patches_per_view)
     sharing = [seeds[first : first + WORLDS_PER_CAMERA] for first in range(0, len(seeds), WORLDS_PER_CAMERA)]
-    cut: list[list[tuple[Image, int]]] = []
+    seen: list[tuple[Image, Cut]] = []
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
         for some, views in zip(sharing, pool.map(draw, sharing), strict=True):
-            cut += views
+            seen += views
             for _ in some:
                 report()
-    return rendered_patches(cut)
+    return seen
 
 
-def _patches_of_worlds(seeds: Sequence[int], patches_per_view: int) -> list[list[tuple[Image, int]]]:
-    """Patches of each view of worlds seen by one camera, most of them cut as a driving car does."""
+def _seen_in_worlds(seeds: Sequence[int], patches_per_view: int) -> list[tuple[Image, Cut]]:
+    """Scene and patches of each view of worlds seen by one camera, most patches cut as a driving car does."""
     cv2.setNumThreads(1)
     camera = random_camera(np.random.default_rng([seeds[0], 2]), REDUCED_SCALE)
     driven = round(DRIVEN_SHARE * patches_per_view)
     return [
-        driven_patches(view, driven) + view_patches(view, patches_per_view - driven)
+        (
+            scene_of(view.frame.image),
+            driven_patches(view, driven) + view_patches(view, patches_per_view - driven),
+        )
         for seed in seeds
         for view in world_views(seed, REDUCED_SCALE, camera)
     ]
@@ -155,11 +173,11 @@ def view_sample(view: View) -> Sample:
     return Sample(image, drivable, shadow, "rendered")
 
 
-def view_patches(view: View, count: int) -> list[tuple[Image, int]]:
+def view_patches(view: View, count: int) -> Cut:
     """Patches on the road of a view with their class index; mixed and shadowed places are left out."""
     rng = np.random.default_rng(view.patch_seed)
     frame, camera = view.frame, view.camera
-    cut: list[tuple[Image, int]] = []
+    cut: Cut = []
     for _ in range(16 * count):
         if len(cut) == count:
             break
@@ -183,14 +201,14 @@ def view_patches(view: View, count: int) -> list[tuple[Image, int]]:
     return cut
 
 
-def driven_patches(view: View, count: int) -> list[tuple[Image, int]]:
+def driven_patches(view: View, count: int) -> Cut:
     """Patches with their class index at the places and widths of a driving car's regions.
 
     The class is that of the centre. Shadowed places are left out, some verge or another surface is not.
     """
     rng = np.random.default_rng([view.patch_seed, 1])
     frame, camera = view.frame, view.camera
-    cut: list[tuple[Image, int]] = []
+    cut: Cut = []
     for _ in range(16 * count):
         if len(cut) == count:
             break
@@ -210,7 +228,7 @@ def driven_patches(view: View, count: int) -> list[tuple[Image, int]]:
     return cut
 
 
-def rendered_patches(found: list[list[tuple[Image, int]]]) -> PatchSet:
+def rendered_patches(found: Sequence[Cut]) -> PatchSet:
     """The patches of several views as one set; each view is one picture."""
     groups = []
     for cut in found:

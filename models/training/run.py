@@ -23,24 +23,27 @@ from rich.progress import (
 )
 
 from . import cards
-from .data import check_trainable, of_split, read_manifest
-from .export import export_segmenter, sha256_of
+from .annotate import sha256_of
+from .data import Picture, check_trainable, of_split, read_manifest
+from .export import export_segmenter
 from .patches import PatchSet
 from .rendered import (
+    PATCHES_PER_VIEW,
     SEED_RANGES,
     draw_further_worlds,
     draw_worlds,
     load_patches,
     load_worlds,
+    rendered_patches,
     save_patches,
     save_worlds,
 )
+from .scene_run import ship_scene
 from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
-from .surface_run import train_and_ship
+from .surface_run import Steps, train_and_ship
 from .train_segmenter import score_segmenter, train_segmenter
 
 WORLDS = {"train": 480, "val": 36, "test": 60}
-PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
 FURTHER_WORLDS, FURTHER_PATCHES_PER_VIEW = 2520, 6
 """Worlds after the first training ones, for the surface classifier alone: many looks, few patches of each."""
 SEGMENTER_STEPS = 1300
@@ -67,6 +70,10 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
     torch.use_deterministic_algorithms(mode=True)
     with _progress() as progress:
         worlds = {split: max(3, round(given.effort * count)) for split, count in WORLDS.items()}
+        steps = partial(_steps, progress)
+        if given.only == "scene":
+            _scene(progress, given, pictures, worlds, steps)
+            return
         further = max(3, round(given.effort * FURTHER_WORLDS))
         start = time.monotonic()
         rendered = _render(progress, worlds, given.worlds)
@@ -90,7 +97,21 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
         if given.only != "surface":
             _segmenter(progress, given, facts, rendered)
         if given.only != "segmenter":
-            train_and_ship(given, facts, patches, progress, partial(_steps, progress))
+            train_and_ship(given, facts, patches, progress, steps)
+            _scene(progress, given, pictures, worlds, steps)
+
+
+def _scene(
+    progress: Progress,
+    given: argparse.Namespace,
+    pictures: Sequence[Picture],
+    worlds: dict[str, int],
+    steps: Steps,
+) -> None:
+    """What the scene adds, into the surface network and the card that lie in the folder."""
+    found = ship_scene(given.out / "surface.onnx", given, pictures, worlds, steps)
+    shown = {name: both.in_scene for name, both in found.items()}
+    progress.console.print(cards.class_table(shown), markup=False)
 
 
 def _keep_memory() -> None:
@@ -124,12 +145,13 @@ def _render_further(progress: Progress, first: int, count: int, given: argparse.
     if file and file.is_file():
         return load_patches(file)
     task = progress.add_task("rendering further worlds", total=count, note="")
-    patches = draw_further_worlds(
+    seen = draw_further_worlds(
         SEED_RANGES["train"][first : first + count],
         FURTHER_PATCHES_PER_VIEW,
         given.threads,
         lambda: progress.advance(task),
     )
+    patches = rendered_patches([cut for _, cut in seen])
     if file:
         save_patches(file, patches)
     return patches

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 from . import calibrate, cards, scores
-from .data import Image, Picture, family_of, of_split
-from .export import export_surface, sha256_of
+from .annotate import sha256_of
+from .data import Image, Picture, family_of, judged_groups, of_split
+from .export import export_surface
 from .nets import SurfaceNet
 from .outliers import outlier_patches
-from .patches import PatchSet, joined, judged_patches, training_patches
+from .patches import PatchSet, joined, judged_patches, thinned, training_patches
 from .teacher import TeacherError, TeacherFeatures, teacher_features
 from .train_surface import (
     Report,
@@ -45,9 +46,6 @@ OUTLIERS = {"train": 12000, "val": 1600}
 LOOKS, READ_LOOKS = {"": 1500}, {"": 1500, "condition_web": 7500, "rendered": 5500}
 """Most patches of each source ("" stands for all others) for the head that tells disturbed patches, and for the one
 that tells readable road, which must know many roads."""
-CALIBRATION_PER_SOURCE = 240
-"""Most validation patches that one source gives to the calibration, lest one drive decide T."""
-
 Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 
@@ -200,7 +198,9 @@ def _looks(patches: PatchSet, seed: int, most: dict[str, int]) -> Image:
 
 def judge(net: SurfaceNet, judged: dict[str, PatchSet], outliers: Image, seed: int) -> Outcome:
     """Calibration on the validation sets, then scores of all sets."""
-    validation = joined([_thinned(seed, part) for name, part in judged.items() if " val" in name])
+    validation = joined(
+        [part.where(thinned(len(part), seed)) for name, part in judged.items() if " val" in name]
+    )
     noised = calibrate.noised(validation.patches, seed)
     labels = np.tile(validation.labels, 2)
     net.softening.data = learn_softening(net, np.concatenate([validation.patches, noised]), labels)
@@ -241,21 +241,6 @@ def _share_read(net: SurfaceNet, patches: Image) -> float:
 
 
 def _judged_sets(pictures: Sequence[Picture], rendered: dict[str, PatchSet]) -> dict[str, PatchSet]:
-    """Validation and test sets by name; test pictures of other cameras apart from the stills."""
-    validation, test = of_split(pictures, "val"), of_split(pictures, "test")
-    sets = {
-        f"real val: {source}": [p for p in validation if p.source == source]
-        for source in sorted({picture.source for picture in validation})
-    }
-    sets["real test: stills, same search"] = [p for p in test if p.source == "condition_web"]
-    sets["real test: other cameras"] = [p for p in test if p.source.startswith("other_cameras/")]
-    known = {id(picture) for group in sets.values() for picture in group}
-    sets["real test: other"] = [p for p in test if id(p) not in known]
-    judged = {name: judged_patches(group) for name, group in sets.items() if group}
+    """Validation and test sets by name."""
+    judged = {name: judged_patches(group) for name, group in judged_groups(pictures).items()}
     return {**judged, "rendered val": rendered["val"], "rendered test": rendered["test"]}
-
-
-def _thinned(seed: int, patches: PatchSet) -> PatchSet:
-    keep = np.zeros(len(patches), np.bool_)
-    keep[np.random.default_rng(seed).permutation(len(patches))[:CALIBRATION_PER_SOURCE]] = True
-    return patches.where(keep)

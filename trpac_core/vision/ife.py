@@ -27,6 +27,7 @@ from .regions import (
     sample,
 )
 from .results import FrameResult, FrameView, GroupResult, GroupView
+from .scene import scene_of
 from .trajectory import Ellipses, Motion, reckon
 
 GROUP_NAMES = ("near", "middle", "far")
@@ -92,9 +93,10 @@ class IfeConfig:
     groups_looked_at : int
         How many groups from the near one on. The verdict is the near group's, so 1 gives the same verdicts in less
         time, bit by bit; the others are for those who look at the road further ahead.
-    use_trajectory, remove_shadow, calibrate, weight_evidence : bool
+    use_trajectory, remove_shadow, calibrate, weight_evidence, use_scene : bool
         Each False leaves that part of the method out, to measure what it is worth: the whole drivable strip
-        ahead in place of the ellipses; shadow kept; T = 1; equal evidence weights in Eq. (8).
+        ahead in place of the ellipses; shadow kept; T = 1; equal evidence weights in Eq. (8); patches judged
+        without the picture around them.
     """
 
     camera: Camera = field(default_factory=Camera)
@@ -120,6 +122,7 @@ class IfeConfig:
     remove_shadow: bool = True
     calibrate: bool = True
     weight_evidence: bool = True
+    use_scene: bool = True
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict themselves, all at once; raises ValueError."""
@@ -266,7 +269,7 @@ class Ife:
         usable = usable_road(masks, self.config.remove_shadow)
         looked_at = self.config.groups_looked_at
         regions = self.look(state, image, motion, camera, masks, usable, looked_at)
-        regions = self.classify(regions)
+        regions = self.classify(regions, image)
         state, result = self.judge(state, regions)
         if with_view:
             result = replace(result, view=_view(camera, masks, usable, regions))
@@ -337,13 +340,17 @@ class Ife:
             for sign in SIDES[config.side]
         ]
 
-    def classify(self, regions: list[Region]) -> list[Region]:
-        """The regions with what their readable patches show, all in one run of the network; others are left out."""
+    def classify(self, regions: list[Region], image: NDArray[np.uint8]) -> list[Region]:
+        """The regions with what their readable patches show, all in one run of the network; others are left out.
+
+        `image` is the picture that they were cut from.
+        """
         patches = [patch for region in regions for patch in region.patches]
         if not patches:
             return regions
         temperature = self._classifier.temperature if self.config.calibrate else 1.0
-        verdicts = self._classifier.verdicts(np.stack(patches))
+        scene = scene_of(image) if self.config.use_scene else None
+        verdicts = self._classifier.verdicts(np.stack(patches), scene)
         probabilities = calibrated_probabilities(verdicts.logits, temperature)
         readable = verdicts.readable >= LEAST_READABLE
         ends = np.cumsum([len(region.patches) for region in regions])[:-1]

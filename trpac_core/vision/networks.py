@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .classes import Surface
 from .onnx_runtime import ort, ort_errors
 from .regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
+from .scene import SceneHead
 
 MASK_WIDTH_PX = 256
 MASK_HEIGHT_PX = 160
@@ -80,8 +81,8 @@ class PatchClassifier(Protocol):
         """T of the temperature scaling [-]."""
         ...
 
-    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
-        """What BGR patches (n, 64, 96, 3) show."""
+    def verdicts(self, patches: NDArray[np.uint8], scene: NDArray[np.uint8] | None = None) -> PatchVerdicts:
+        """What BGR patches (n, 64, 96, 3) show, alone or in the scene that they were cut from, see `scene_of`."""
         ...
 
 
@@ -127,14 +128,28 @@ class SurfaceClassifier:
         _check_input(self._session, path, "patches", [None, PATCH_HEIGHT_PX, PATCH_WIDTH_PX, 3])
         _check_outputs(self._session, path, VERDICTS)
         self._temperature = _read_temperature(self._session, path)
+        self._head = _read_scene_head(self._session, path)
 
     @property
     def temperature(self) -> float:
         """T of the temperature scaling [-]."""
         return self._temperature
 
-    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
-        """Verdicts on BGR patches (n, 64, 96, 3) in one run; raises ModelError if they are not finite."""
+    @property
+    def scene_head(self) -> SceneHead | None:
+        """What a scene adds to the logits; None where the file knows patches alone."""
+        return self._head
+
+    def verdicts(self, patches: NDArray[np.uint8], scene: NDArray[np.uint8] | None = None) -> PatchVerdicts:
+        """Verdicts on BGR patches in one run; raises ModelError if they are not finite.
+
+        Parameters
+        ----------
+        patches : uint8, shape (n, 64, 96, 3)
+            BGR.
+        scene : uint8, shape (20, 32, 3) or (n, 20, 32, 3), optional
+            The picture that they were cut from, or the picture of each, by `scene_of`; None judges patches alone.
+        """
         logits, readable = _run(self._session, self._path, VERDICTS, {"patches": patches})
         if logits.shape != (len(patches), len(Surface)) or not np.isfinite(logits).all():
             raise ModelError(
@@ -146,7 +161,10 @@ class SurfaceClassifier:
                 f"{self._path}: expected 'readable' of shape {(len(patches),)} within [0, 1], got shape "
                 f"{readable.shape}. Export or train the network again."
             )
-        return PatchVerdicts(logits.astype(np.float64), readable.astype(np.float64).clip(0.0, 1.0))
+        seen = logits.astype(np.float64)
+        if scene is not None and self._head is not None:
+            seen = seen + self._head.logits(patches, scene)
+        return PatchVerdicts(seen, readable.astype(np.float64).clip(0.0, 1.0))
 
 
 def _load(path: str | Path, threads: int) -> ort.InferenceSession:
@@ -225,3 +243,16 @@ def _read_temperature(session: ort.InferenceSession, path: str | Path) -> float:
             f"{path}: wrong metadata: {'; '.join(problems)}. Export the network with its calibration."
         )
     return temperature
+
+
+def _read_scene_head(session: ort.InferenceSession, path: str | Path) -> SceneHead | None:
+    """The head of a file that holds one."""
+    text = session.get_modelmeta().custom_metadata_map.get("scene")
+    if text is None:
+        return None
+    try:
+        return SceneHead.from_text(text)
+    except ValueError as error:
+        raise ModelError(
+            f"{path}: wrong metadata 'scene': {error}. Export the network with its calibration."
+        ) from error

@@ -77,7 +77,7 @@ class SidesIfe:
         usable = usable_road(masks, self.config.remove_shadow)
         left = self._left.look(state.left, image, motion, camera, masks, usable, GROUPS_USED)
         right = self._right.look(state.right, image, motion, camera, masks, usable, GROUPS_USED)
-        read = self._left.classify([*left, *right])
+        read = self._left.classify([*left, *right], image)
         after_left, seen_left = self._left.judge(state.left, read[: len(left)])
         after_right, seen_right = self._right.judge(state.right, read[len(left) :])
         return SidesState(after_left, after_right), seen_left, seen_right

@@ -15,6 +15,7 @@ from .classes import Surface
 from .ife import MASK_THRESHOLD, fit_camera
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter
 from .regions import cut_patch, roi_widths_px
+from .scene import scene_of
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Voting:
         drawn = generator.choice(len(pixels), min(self.config.n_roi, len(pixels)), replace=False)
         widths = roi_widths_px(camera, ground_m[drawn], self.config.roi_width_m)
         patches = [cut_patch(image, pixel, width) for pixel, width in zip(pixels[drawn], widths, strict=True)]
-        classes = self._classifier.verdicts(np.stack(patches)).logits.argmax(axis=1)
+        classes = self._classifier.verdicts(np.stack(patches), scene_of(image)).logits.argmax(axis=1)
         votes = np.bincount(classes, minlength=len(Surface))
         return VotingResult(Surface(int(votes.argmax())), float(votes.max() / votes.sum()), int(votes.sum()))
 

@@ -1,0 +1,108 @@
+"""How the scene's head is learned: patches and pictures seen alike, the regression, the card."""
+
+import numpy as np
+import pytest
+from scipy.special import softmax
+from tiny_onnx import write_classifier
+
+from models.training import scene_run
+from models.training.cards import SCENE_BEGIN, SCENE_END
+from models.training.patches import PatchSet
+from models.training.scene_set import SceneSet, all_of, apart, scenes_of_views
+from trpac_core.vision.networks import SurfaceClassifier
+from trpac_core.vision.scene import NUMBERS
+
+
+def scene_set(levels, scene_levels, labels=None, source="rendered"):
+    n = len(levels)
+    patches = np.repeat(np.array(levels, np.uint8), 64 * 96 * 3).reshape(n, 64, 96, 3)
+    scenes = np.repeat(np.array(scene_levels, np.uint8), 20 * 32 * 3).reshape(n, 20, 32, 3)
+    labels = np.zeros(n, np.int64) if labels is None else np.asarray(labels, np.int64)
+    return SceneSet(PatchSet(patches, labels, np.full(n, source), np.arange(n)), scenes)
+
+
+def test_a_scene_and_its_patch_as_one_picture_come_apart_again():
+    rng = np.random.default_rng(0)
+    one = scene_set([10, 20], [30, 40])
+    one = SceneSet(one.patches, rng.integers(0, 255, one.scenes.shape).astype(np.uint8))
+    patches, scenes = apart(one.as_one())
+    assert np.array_equal(patches, one.patches.patches)
+    assert np.array_equal(scenes, one.scenes)
+
+
+def test_other_cameras_and_disturbances_change_both_alike():
+    """Of one level before, they are of one level afterwards; shadows may fall on the lower part alone."""
+    levels = [60, 90, 120, 150] * 10
+    same = scene_set(levels, levels)
+    other = same.by_other_cameras(np.random.default_rng(1))
+    assert np.abs(other.patches.patches[:, 0, 0].astype(int) - other.scenes[:, 0, 0]).max() == 0
+    assert np.abs(other.scenes[:, 0, 0, 1].astype(int) - levels).max() > 5
+    disturbed = same.disturbed(3)
+    apart_by = np.abs(disturbed.patches.patches[:, 5, 48].astype(int) - disturbed.scenes[:, 8, 16]).max(
+        axis=1
+    )
+    assert np.median(apart_by) <= 1
+    assert np.abs(disturbed.scenes[:, 8, 16, 1].astype(int) - levels).max() > 10
+
+
+def test_views_keep_their_scene_with_each_patch():
+    patch = np.zeros((64, 96, 3), np.uint8)
+    views = [(np.full((20, 32, 3), level, np.uint8), [(patch, c) for c in cut])
+             for level, cut in ((10, (0, 2, 0)), (20, ()), (30, (1,)))]  # fmt: skip
+    found = scenes_of_views(views)
+    assert found.patches.labels.tolist() == [0, 0, 2, 1]
+    assert found.scenes[:, 0, 0, 0].tolist() == [10, 10, 10, 30]
+    assert len(set(found.patches.pictures[:3])) == 2  # a view's two classes are two pictures
+    assert len(all_of([found, found])) == 8
+
+
+def test_regression_stands_where_the_loss_is_least():
+    """The gradient by finite differences of the loss written down anew vanishes, and the known law is found."""
+    rng = np.random.default_rng(2)
+    n, m = 4000, 3
+    x, logits = rng.standard_normal((n, m)), rng.standard_normal((n, 3))
+    law = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 0.0, 0.0]])
+    chance = softmax(logits + x @ law, axis=1)
+    labels = (rng.random(n)[:, None] > chance.cumsum(axis=1)).sum(axis=1)
+    shares = np.full(n, 1.0 / n)
+    weights, bias = scene_run.regression(x, labels, shares, logits)
+    assert weights - weights.mean(axis=1, keepdims=True) == pytest.approx(law, abs=0.2)
+
+    def loss(w, b):
+        p = softmax(logits + x @ w + b, axis=1)[np.arange(n), labels]
+        return -np.mean(np.log(p)) + 0.5 * scene_run.RIDGE * np.sum(w**2)
+
+    for i in range(m):
+        for k in range(3):
+            step = np.zeros((m, 3))
+            step[i, k] = 1e-4
+            slope = (loss(weights + step, bias) - loss(weights - step, bias)) / 2e-4
+            assert slope == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_head_tells_what_the_patch_alone_does_not(tmp_path):
+    """Grey patches of three classes that differ by nothing but how bright their picture is."""
+    rng = np.random.default_rng(4)
+    labels = rng.integers(0, 3, 90)
+    grey = scene_set(rng.integers(90, 110, 90), np.array([60, 110, 190])[labels], labels)
+    classifier = SurfaceClassifier(write_classifier(tmp_path / "surface.onnx"))
+    head = scene_run.learn_head(classifier, grey, seed=1)
+    alone = grey.logits(classifier, alone=True)
+    assert head.weights.shape == (len(NUMBERS), 3)
+    beside = alone + head.logits(grey.patches.patches, grey.scenes)
+    assert (beside.argmax(axis=1) == labels).mean() > 0.95
+    assert (alone.argmax(axis=1) == labels).mean() < 0.6
+
+
+def test_a_card_gets_its_section_hash_and_temperature_anew():
+    card = (
+        f"# surface.onnx\n\nsha256: `{'0' * 64}`\n\n- Metadata: `temperature` = 1.060797, `classes` = a.\n\n"
+        f"## The scene\n\n{SCENE_BEGIN}\n\nold words\n\n{SCENE_END}\n\n## Limits\n"
+    )
+    told = scene_run.with_section(card, "new words", "f" * 64, 1.25)
+    assert f"sha256: `{'f' * 64}`" in told
+    assert "`temperature` = 1.250000, `classes` = a." in told
+    assert "new words" in told
+    assert "old words" not in told
+    assert told.count(SCENE_BEGIN) == told.count(SCENE_END) == told.count("## Limits") == 1
+    assert scene_run.with_section(told, "new words", "f" * 64, 1.25) == told
