@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tiny_onnx import write_classifier
 
 from trpac_core.vision.networks import ModelError, SurfaceClassifier
-from trpac_core.vision.scene import DARK, LIMIT, NUMBERS, SceneHead, scene_numbers, scene_of
+from trpac_core.vision.scene import DARK, FLAT, LIMIT, NUMBERS, SceneHead, scene_numbers, scene_of
 
 CLASSES = {"temperature": "1.5", "classes": "dry,wet,snow_ice"}
 PATCH = np.full((1, 64, 96, 3), 100, np.uint8)
@@ -56,38 +56,47 @@ def test_numbers_of_a_scene_of_known_parts():
     scene[10:, :6] = scene[10:, -6:] = 120
     scene[8:10, :6] = scene[8:10, -6:] = 120
     found = dict(zip(NUMBERS, scene_numbers(PATCH, scene)[0], strict=True))
-    patch = 100 / 255
     upper = (200 * (320 - 24) + 120 * 24) / 320 / 255
-    assert found["patch_brightness"] == pytest.approx(patch)
-    assert found["patch_deviation"] == pytest.approx(0.0, abs=1e-12)
-    assert found["upper_brightness"] == pytest.approx(upper)
-    assert found["side_brightness"] == pytest.approx(120 / 255)
-    assert found["log_patch_per_side"] == pytest.approx(np.log((patch + DARK) / (120 / 255 + DARK)))
-    assert found["log_patch_per_upper"] == pytest.approx(np.log((patch + DARK) / (upper + DARK)))
-    assert found["scene_deviation"] == pytest.approx(scene[..., 0].std() / 255)
+    spread = scene[..., 0].std() / 255 + FLAT
+    assert found["patch_brightness"] == pytest.approx(100 / 255)
+    assert found["scene_deviation"] == pytest.approx(spread - FLAT)
+    assert found["patch_beyond_upper"] == pytest.approx((100 / 255 - upper) / spread)
+    assert found["patch_beyond_sides"] == pytest.approx(-20 / 255 / spread)
+    assert found["patch_contrast"] == pytest.approx(0.0, abs=1e-12)
     assert [found[k] for k in ("patch_blue", "patch_red", "scene_blue", "scene_red")] == pytest.approx(
         [0.0] * 4
     )
 
 
-def test_tints_are_beyond_the_mean_of_the_channels():
+def test_contrast_is_the_patchs_deviation_in_those_of_its_scene():
+    rng = np.random.default_rng(1)
+    patch, scene = rng.integers(0, 255, (1, 64, 96, 1)), rng.integers(100, 140, (20, 32, 1))
+    grey = [np.repeat(image, 3, axis=-1).astype(np.uint8) for image in (patch, scene)]
+    assert number("patch_contrast", *grey) == pytest.approx(patch.std() / 255 / (scene.std() / 255 + FLAT))
+
+
+def test_tints_are_beyond_the_mean_of_the_channels_and_over_it():
     blue = PATCH.copy()
     blue[..., 0] += 30  # BGR: 130, 100, 100
-    assert number("patch_blue", blue, PATCH[0, :20, :32]) == pytest.approx(20 / 255)
-    assert number("patch_red", blue, PATCH[0, :20, :32]) == pytest.approx(-10 / 255)
-    assert number("scene_blue", PATCH, blue[0, :20, :32]) == pytest.approx(20 / 255)
+    mean = 110 / 255 + DARK
+    assert number("patch_blue", blue, PATCH[0, :20, :32]) == pytest.approx(20 / 255 / mean)
+    assert number("patch_red", blue, PATCH[0, :20, :32]) == pytest.approx(-10 / 255 / mean)
+    assert number("scene_blue", PATCH, blue[0, :20, :32]) == pytest.approx(20 / 255 / mean)
     assert number("scene_blue", blue, PATCH[0, :20, :32]) == pytest.approx(0.0)
 
 
 @settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10_000), gain=st.floats(0.6, 1.6))
-def test_a_cameras_gain_hardly_moves_what_a_patch_is_beside_its_scene(seed, gain):
+@given(seed=st.integers(0, 10_000), gain=st.floats(0.7, 1.15), offset=st.integers(-20, 12))
+def test_gain_and_offset_of_a_camera_hardly_move_what_a_patch_is_beside_its_scene(seed, gain, offset):
     rng = np.random.default_rng(seed)
     patches, scene = rng.integers(40, 150, (3, 64, 96, 3)), rng.integers(40, 150, (20, 32, 3))
+    scene[:10] += 60
     plain = scene_numbers(patches.astype(np.uint8), scene.astype(np.uint8))
-    other = scene_numbers((gain * patches).astype(np.uint8), (gain * scene).astype(np.uint8))
-    ratios = [NUMBERS.index(name) for name in ("log_patch_per_upper", "log_patch_per_side")]
-    assert other[:, ratios] == pytest.approx(plain[:, ratios], abs=0.02)
+    looks = [np.clip(gain * image + offset, 0, 255).astype(np.uint8) for image in (patches, scene)]
+    other = scene_numbers(*looks)
+    beside = [NUMBERS.index(name) for name in ("patch_beyond_upper", "patch_beyond_sides", "patch_contrast")]
+    # what is left is FLAT beside a deviation of some 0.15 times the gain, and what clips
+    assert other[:, beside] == pytest.approx(plain[:, beside], rel=0.15, abs=0.08)
     assert np.isfinite(other).all()
     mirrored = scene_numbers(patches.astype(np.uint8), scene[:, ::-1].astype(np.uint8))
     assert mirrored == pytest.approx(plain)

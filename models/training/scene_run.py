@@ -38,7 +38,7 @@ surface; on all others it is judged as on cameras never seen."""
 WORLDS, PATCHES_PER_WORLD_VIEW = 480, 6
 LOOKS = 2
 """Cameras that each patch and its scene are seen by."""
-RIDGE = 3e-3
+RIDGE = 6e-3
 """Half of the square of the weights counts so much in the loss [nat]."""
 CUTTING_SEED = 21
 

@@ -28,25 +28,25 @@ SIDE_ROWS, SIDE_COLUMNS = 8, 6
 """Row from which, and columns from the left and right edge within which, the verges are taken to be."""
 GREY_OF_BGR = np.array([0.114, 0.587, 0.299]) / 255.0
 """Luma of a BGR pixel of eight bits (ITU-R BT.601), in [0, 1]."""
-DARK = 0.03
-"""Added to a brightness before its logarithm: below it there is no ratio worth telling [-]."""
+DARK, FLAT = 0.03, 0.05
+"""Added to what a brightness, and what a picture's deviation, is divided by: below it there is nothing to tell [-]."""
 LIMIT = 4.0
 """A number counts up to so many standard deviations of the training scenes [-]."""
 
 NUMBERS = (
     "patch_brightness",
-    "patch_deviation",
-    "upper_brightness",
-    "side_brightness",
     "scene_deviation",
+    "patch_beyond_upper",
+    "patch_beyond_sides",
+    "patch_contrast",
     "patch_blue",
     "patch_red",
     "scene_blue",
     "scene_red",
-    "log_patch_per_upper",
-    "log_patch_per_side",
 )
-"""What a scene tells of a patch: brightness in [0, 1]; blue and red beyond the mean of the three channels."""
+"""What a scene tells of a patch [-]: its brightness in [0, 1] and the picture's deviation of it; in units of the latter
+how much brighter it is than the upper half and than the sides, and its own deviation; blue and red beyond the mean of
+the three channels, over it. But for the first two a camera's gain does not move them, nor exposure by much."""
 
 
 def scene_of(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -70,34 +70,30 @@ def scene_numbers(patches: NDArray[np.uint8], scenes: NDArray[np.uint8]) -> NDAr
 
     Returns
     -------
-    array, shape (n, 11)
+    array, shape (n, 9)
     """
     scenes = scenes if scenes.ndim == 4 else scenes[None]
     patch, scene = patches @ GREY_OF_BGR, scenes @ GREY_OF_BGR
-    patch_mean, patch_deviation = patch.mean(axis=(1, 2)), patch.std(axis=(1, 2))
-    upper = scene[:, :UPPER_ROWS].mean(axis=(1, 2))
+    brightness, deviation = patch.mean(axis=(1, 2)), scene.std(axis=(1, 2))
     verges = scene[:, SIDE_ROWS:]
-    sides = 0.5 * (verges[:, :, :SIDE_COLUMNS] + verges[:, :, -SIDE_COLUMNS:]).mean(axis=(1, 2))
-    patch_tint, scene_tint = _tint(patches), _tint(scenes)
+    sides = 0.5 * (verges[:, :, :SIDE_COLUMNS] + verges[:, :, -SIDE_COLUMNS:])
     columns = [
-        patch_mean,
-        patch_deviation,
-        upper,
-        sides,
-        scene.std(axis=(1, 2)),
-        *patch_tint,
-        *scene_tint,
-        np.log((patch_mean + DARK) / (upper + DARK)),
-        np.log((patch_mean + DARK) / (sides + DARK)),
+        brightness,
+        deviation,
+        (brightness - scene[:, :UPPER_ROWS].mean(axis=(1, 2))) / (deviation + FLAT),
+        (brightness - sides.mean(axis=(1, 2))) / (deviation + FLAT),
+        patch.std(axis=(1, 2)) / (deviation + FLAT),
+        *_tint(patches),
+        *_tint(scenes),
     ]
     return np.column_stack([np.broadcast_to(column, len(patches)) for column in columns])
 
 
 def _tint(images: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Blue and red beyond the mean of the three channels, of each image [-]."""
+    """Blue and red beyond the mean of the three channels, over it, of each image [-]."""
     channels = images.mean(axis=(1, 2)) / 255.0
-    beyond = channels - channels.mean(axis=1, keepdims=True)
-    return beyond[:, 0], beyond[:, 2]
+    mean = channels.mean(axis=1)
+    return (channels[:, 0] - mean) / (mean + DARK), (channels[:, 2] - mean) / (mean + DARK)
 
 
 @dataclass(frozen=True)
@@ -106,9 +102,9 @@ class SceneHead:
 
     Attributes
     ----------
-    mean, deviation : array, shape (11,)
+    mean, deviation : array, shape (9,)
         Of the numbers, in training.
-    weights : array, shape (11, 3)
+    weights : array, shape (9, 3)
         Logits per standard deviation.
     bias : array, shape (3,)
         Logits at the mean.
