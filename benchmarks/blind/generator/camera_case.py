@@ -1,0 +1,206 @@
+"""A case of the camera: the car is its simulation's, and what is hidden lies in its camera's chain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.random import Generator
+
+from .camera_chain import Chain, Fault, columns, draw_chain, results
+from .camera_forms import draw_camera_forms
+from .camera_gap import Stage, crossings, gap_of
+from .camera_library import CAMERA_EFFECTS, Scene
+from .camera_reference import reference
+from .camera_road import ALL_SPEEDS, CLASS_FRICTION, CameraRoad, Passage, draw_camera_road, passage_of
+from .car import Car, draw_car
+from .cases import LOGS, MUST_SHOW, SHOWS, Case, Truth, first_drivable, generator_of
+from .driver import Drive, Style, UndrivableError, drive
+from .forms import DIGITS, NOISES, RATES_HZ, STYLES, Family, draw_forms
+from .sensors import draw_noise, make_log
+from .severity import find_severity, residual, size_of
+from .table import Spec
+from .world import Parameters, nominal
+
+LEAST_BORDERS = {True: 8, False: 2}
+"""Of each log, rich or not."""
+FASTER = 1.5
+"""Fastest border over the slowest one, when rich [-]."""
+DRIVEN_M = 8.0
+"""Least distance on a class that counts as driven on."""
+UNSEEN_GAP = 1.1
+"""Gap of the car's own signals up to which nothing in a drive contradicts the friction that road.yaml tells."""
+
+
+@dataclass(frozen=True)
+class CameraCase(Case):
+    """A case with what its camera is."""
+
+    camera_forms: dict[str, str]
+    chain: Chain
+
+    @property
+    def subsystems(self) -> set[str]:
+        """Right answers to where."""
+        return {s for effect in self.truth.effects for s in CAMERA_EFFECTS[effect].subsystems}
+
+    def seal(self) -> dict[str, Any]:
+        """As a car's; `effects` hold what can be found without pictures, `camera` all that is hidden, and the chain."""
+        effects = {
+            effect: {name: given[name] for name in CAMERA_EFFECTS[effect].found}
+            for effect, given in self.truth.effects.items()
+        }
+        camera = {"hidden": self.truth.effects, "forms": self.camera_forms, "chain": asdict(self.chain)}
+        return super().seal() | {"effects": effects, "camera": camera}
+
+
+def make_camera_case(spec: Spec, seed: int, family: Family) -> CameraCase:
+    """Draw a case of the camera; `family` is that of whatever is not the camera's.
+
+    Raises
+    ------
+    UndrivableError
+        No draw gives a car that can be driven and a deviation that shows.
+    """
+    return first_drivable(spec, lambda key: _draw(spec, seed, key, family))
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What a case's logs are driven with."""
+
+    spec: Spec
+    car: Car
+    style: Style
+    durations: dict[str, float]
+    seeds: tuple[int, str]
+
+    def drive(self, name: str, road: CameraRoad) -> tuple[Drive, Generator]:
+        own = generator_of(*self.seeds, name)
+        world = nominal(self.car, road)
+        return drive(self.car, world, self.spec.rich, self.durations[name], own, self.style), own
+
+
+def _draw(spec: Spec, seed: int, key: str, family: Family) -> CameraCase:
+    rng, forms = generator_of(seed, key, "camera"), draw_forms(family, generator_of(seed, key, "forms"))
+    camera_forms = draw_camera_forms(generator_of(seed, key, "camera forms"))
+    car = draw_car(rng, ())
+    few = not spec.rich and rng.random() < 0.5
+    style = STYLES[forms["driver"]] if (rng.random() < 0.4 if spec.rich else few) else ALL_SPEEDS
+    road, elsewhere = (draw_camera_road(rng, "few" if few else "usual") for _ in range(2))
+    hold = elsewhere if rng.random() < 0.25 else road
+    roads = {"fit_1": road, "fit_2": road, "holdout": hold, "fresh": hold}
+    ground = _Ground(spec, car, style, {n: float(rng.uniform(24.0, 60.0)) for n in LOGS}, (seed, key))
+    driven = {name: ground.drive(name, roads[name]) for name in LOGS}
+    passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
+    for name in LOGS:
+        _check_borders(passages[name], roads[name], spec.rich)
+    chain, noise = draw_chain(rng, camera_forms), draw_noise(rng)
+    if "class_friction_offset" in spec.effects and chain.reference_noise is None:
+        raise UndrivableError("nothing measures the friction")
+    rates = RATES_HZ[family]
+    rate = float(rng.choice(list(rates), p=list(rates.values())))
+    stage = Stage(chain, passages["holdout"], hold, "holdout")
+    scene = Scene(chain, tuple(c for c in range(3) if all(_driven(passages[n], roads[n], c) for n in LOGS)))
+    parts, alone, fault = _deviations(spec, stage, scene, rng)
+    real = {name: roads[name].with_friction(fault.friction) for name in LOGS}
+    if real != roads:  # friction that is otherwise makes another drive
+        driven = {name: ground.drive(name, real[name]) for name in LOGS}
+    told = {name: _told(chain, real[name], fault) for name in LOGS}
+    base, logs, drives = {}, {}, {}
+    for name in LOGS:
+        drives[name], own = driven[name]
+        base[name] = nominal(car, told[name])
+        log = make_log(
+            drives[name].path,
+            drives[name].command,
+            base[name].sensors,
+            noise,
+            rate,
+            own,
+            NOISES[forms["noise"]],
+        )
+        log = _with_camera(log, chain, passage_of(drives[name].path, car), real[name], fault, name)
+        logs[name] = DIGITS[forms["digits"]](log)
+    if camera_forms["told"] == "class_friction" and fault.friction != CLASS_FRICTION:
+        plain = {name: road.with_friction(CLASS_FRICTION) for name, road in told.items()}
+        simulated = {name: nominal(car, road) for name, road in plain.items()}
+        sizes = [size_of(residual(nominal(car, real[n]), simulated[n], drives[n]), noise).total for n in LOGS]
+        if max(sizes) < UNSEEN_GAP:
+            told, base = plain, simulated
+    final = Stage(chain, passage_of(drives["holdout"].path, car), real["holdout"], "holdout")
+    gap = gap_of(final, fault, told["holdout"])
+    if spec.group in MUST_SHOW and spec.effects and gap.total < SHOWS:
+        raise UndrivableError("the deviations cancel")
+    truth = Truth(parts, {}, gap, alone)
+    return CameraCase(
+        spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, camera_forms, chain
+    )
+
+
+def _check_borders(passage: Passage, road: CameraRoad, rich: bool) -> None:
+    """Enough of them, and when rich at speeds that tell a time from a distance."""
+    there = crossings(passage, road)
+    if there.size < LEAST_BORDERS[rich]:
+        raise UndrivableError("too few borders")
+    speeds = np.interp(there, passage.front_m, passage.speed_m_s)
+    if rich and speeds.max() < FASTER * speeds.min():
+        raise UndrivableError("one speed at all borders")
+
+
+def _driven(passage: Passage, road: CameraRoad, surface: int) -> bool:
+    """Whether a drive tells anything of a class."""
+    step = np.diff(passage.front_m, append=passage.front_m[-1])
+    return bool(step[road.class_at(passage.front_m) == surface].sum() > DRIVEN_M)
+
+
+def _told(chain: Chain, road: CameraRoad, fault: Fault) -> CameraRoad:
+    """road.yaml of a road: as it is, but for borders that a bad map has elsewhere."""
+    if fault.map_m == 0.0:
+        return road
+    borders = road.borders
+    room = 0.4 * np.diff(np.concatenate([[0.0], borders, [borders[-1] + 50.0]]))
+    off = fault.map_m * chain.rng(str(borders.size), 14).standard_normal(borders.size)
+    return road.with_borders(borders + np.clip(off, -room[:-1], room[1:]))
+
+
+def _with_camera(
+    log: pd.DataFrame, chain: Chain, passage: Passage, road: CameraRoad, fault: Fault, name: str
+) -> pd.DataFrame:
+    """The log with the perception columns, and the friction's reference where there is one."""
+    time_s = log["time_s"].to_numpy()
+    seen = columns(chain, results(chain, passage, road, fault, name), time_s)
+    measured = reference(chain, passage, road, fault, time_s, name)
+    if fault.odometer != 0.0:
+        log = log.assign(position_m=np.round(log["position_m"] * (1.0 + fault.odometer), 4))
+    if measured is not None:
+        log = log.assign(mu_reference=measured)
+    return pd.concat([log, seen], axis=1)
+
+
+def _deviations(
+    spec: Spec, stage: Stage, scene: Scene, rng: Generator
+) -> tuple[dict[str, Parameters], dict[str, float], Fault]:
+    """Parameters of each effect at the wanted gap, that gap, and all of them in one chain."""
+    chosen = {effect: CAMERA_EFFECTS[effect].at(scene, rng) for effect in spec.effects}
+
+    def gap_with(effect: str) -> Callable[[float], float]:
+        def gap(severity: float) -> float:
+            fault = CAMERA_EFFECTS[effect].apply(Fault(), chosen[effect](severity))
+            return gap_of(stage, fault, _told(stage.chain, stage.road, fault)).total
+
+        return lru_cache(gap)
+
+    gaps = {effect: gap_with(effect) for effect in spec.effects}
+    if spec.group in MUST_SHOW and any(gap(1.0) < SHOWS for gap in gaps.values()):
+        raise UndrivableError("nothing in the drive shows the deviation")
+    severities = {effect: find_severity(gap, spec.target) for effect, gap in gaps.items()}
+    parts = {effect: chosen[effect](severity) for effect, severity in severities.items()}
+    fault = Fault()
+    for effect, given in parts.items():
+        fault = CAMERA_EFFECTS[effect].apply(fault, given)
+    return parts, {effect: gaps[effect](severity) for effect, severity in severities.items()}, fault
