@@ -22,7 +22,7 @@ from .cases import LOGS, MUST_SHOW, SHOWS, Case, Truth, first_drivable, generato
 from .driver import Drive, Style, UndrivableError, drive
 from .forms import DIGITS, NOISES, RATES_HZ, STYLES, Family, draw_forms
 from .sensors import draw_noise, make_log
-from .severity import find_severity, residual, size_of
+from .severity import find_severity
 from .table import Spec
 from .world import Parameters, nominal
 
@@ -32,15 +32,12 @@ FASTER = 1.5
 """Fastest border over the slowest one, when rich [-]."""
 DRIVEN_M = 8.0
 """Least distance on a class that counts as driven on."""
-UNSEEN_GAP = 1.1
-"""Gap of the car's own signals up to which nothing in a drive contradicts the friction that road.yaml tells."""
 
 
 @dataclass(frozen=True)
 class CameraCase(Case):
     """A case with what its camera is."""
 
-    camera_forms: dict[str, str]
     chain: Chain
 
     @property
@@ -54,7 +51,7 @@ class CameraCase(Case):
             effect: {name: given[name] for name in CAMERA_EFFECTS[effect].found}
             for effect, given in self.truth.effects.items()
         }
-        camera = {"hidden": self.truth.effects, "forms": self.camera_forms, "chain": asdict(self.chain)}
+        camera = {"hidden": self.truth.effects, "chain": asdict(self.chain)}
         return super().seal() | {"effects": effects, "camera": camera}
 
 
@@ -71,75 +68,71 @@ def make_camera_case(spec: Spec, seed: int, family: Family) -> CameraCase:
 
 @dataclass(frozen=True)
 class _Ground:
-    """What a case's logs are driven with."""
+    """What a case's logs are driven with, and on."""
 
     spec: Spec
     car: Car
     style: Style
+    roads: dict[str, CameraRoad]
     durations: dict[str, float]
     seeds: tuple[int, str]
 
-    def drive(self, name: str, road: CameraRoad) -> tuple[Drive, Generator]:
-        own = generator_of(*self.seeds, name)
-        world = nominal(self.car, road)
-        return drive(self.car, world, self.spec.rich, self.durations[name], own, self.style), own
+    def drive(self, roads: dict[str, CameraRoad]) -> dict[str, tuple[Drive, Generator]]:
+        """All logs' drives, each with the generator that its sensors go on with."""
+        driven = {}
+        for name, road in roads.items():
+            own, world = generator_of(*self.seeds, name), nominal(self.car, road)
+            rich, duration = self.spec.rich, self.durations[name]
+            driven[name] = (drive(self.car, world, rich, duration, own, self.style), own)
+        return driven
+
+
+def _ground(spec: Spec, key: str, seed: int, driver: str, chain: Chain, rng: Generator) -> _Ground:
+    few = not spec.rich and rng.random() < 0.5
+    style = STYLES[driver] if (rng.random() < 0.4 if spec.rich else few) else ALL_SPEEDS
+    road, elsewhere = (draw_camera_road(rng, "few" if few else "usual") for _ in range(2))
+    if chain.reference_noise is None:  # else what is measured would not be the class's value
+        own = tuple(float(value) for value in np.round(CLASS_FRICTION * rng.uniform(0.85, 1.15, 3), 2))
+        road, elsewhere = road.with_friction(own), elsewhere.with_friction(own)
+    hold = elsewhere if rng.random() < 0.25 else road
+    roads = {"fit_1": road, "fit_2": road, "holdout": hold, "fresh": hold}
+    durations = {name: float(rng.uniform(24.0, 60.0)) for name in LOGS}
+    return _Ground(spec, draw_car(rng, ()), style, roads, durations, (seed, key))
 
 
 def _draw(spec: Spec, seed: int, key: str, family: Family) -> CameraCase:
     rng, forms = generator_of(seed, key, "camera"), draw_forms(family, generator_of(seed, key, "forms"))
-    camera_forms = draw_camera_forms(generator_of(seed, key, "camera forms"))
-    car = draw_car(rng, ())
-    few = not spec.rich and rng.random() < 0.5
-    style = STYLES[forms["driver"]] if (rng.random() < 0.4 if spec.rich else few) else ALL_SPEEDS
-    road, elsewhere = (draw_camera_road(rng, "few" if few else "usual") for _ in range(2))
-    hold = elsewhere if rng.random() < 0.25 else road
-    roads = {"fit_1": road, "fit_2": road, "holdout": hold, "fresh": hold}
-    ground = _Ground(spec, car, style, {n: float(rng.uniform(24.0, 60.0)) for n in LOGS}, (seed, key))
-    driven = {name: ground.drive(name, roads[name]) for name in LOGS}
+    chain = draw_chain(rng, draw_camera_forms(generator_of(seed, key, "camera forms")))
+    if "class_friction_offset" in spec.effects and chain.reference_noise is None:
+        raise UndrivableError("nothing measures the friction")
+    ground = _ground(spec, key, seed, forms["driver"], chain, rng)
+    car, roads, noise = ground.car, ground.roads, draw_noise(rng)
+    rate = float(rng.choice(list(RATES_HZ[family]), p=list(RATES_HZ[family].values())))
+    driven = ground.drive(roads)
     passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
     for name in LOGS:
         _check_borders(passages[name], roads[name], spec.rich)
-    chain, noise = draw_chain(rng, camera_forms), draw_noise(rng)
-    if "class_friction_offset" in spec.effects and chain.reference_noise is None:
-        raise UndrivableError("nothing measures the friction")
-    rates = RATES_HZ[family]
-    rate = float(rng.choice(list(rates), p=list(rates.values())))
-    stage = Stage(chain, passages["holdout"], hold, "holdout")
     scene = Scene(chain, tuple(c for c in range(3) if all(_driven(passages[n], roads[n], c) for n in LOGS)))
+    stage = Stage(chain, passages["holdout"], roads["holdout"], "holdout")
     parts, alone, fault = _deviations(spec, stage, scene, rng)
-    real = {name: roads[name].with_friction(fault.friction) for name in LOGS}
-    if real != roads:  # friction that is otherwise makes another drive
-        driven = {name: ground.drive(name, real[name]) for name in LOGS}
-    told = {name: _told(chain, real[name], fault) for name in LOGS}
-    base, logs, drives = {}, {}, {}
-    for name in LOGS:
-        drives[name], own = driven[name]
-        base[name] = nominal(car, told[name])
-        log = make_log(
-            drives[name].path,
-            drives[name].command,
-            base[name].sensors,
-            noise,
-            rate,
-            own,
-            NOISES[forms["noise"]],
-        )
-        log = _with_camera(log, chain, passage_of(drives[name].path, car), real[name], fault, name)
+    if fault.friction != CLASS_FRICTION:  # road.yaml tells the friction that is there, so the car has no gap
+        roads = {name: road.with_friction(fault.friction) for name, road in roads.items()}
+        driven = ground.drive(roads)
+        passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
+    told = {name: _told(chain, road, fault) for name, road in roads.items()}
+    logs = {}
+    for name, (done, own) in driven.items():
+        sensors = nominal(car, told[name]).sensors
+        log = make_log(done.path, done.command, sensors, noise, rate, own, NOISES[forms["noise"]])
+        log = _with_camera(log, chain, passages[name], roads[name], fault, name)
         logs[name] = DIGITS[forms["digits"]](log)
-    if camera_forms["told"] == "class_friction" and fault.friction != CLASS_FRICTION:
-        plain = {name: road.with_friction(CLASS_FRICTION) for name, road in told.items()}
-        simulated = {name: nominal(car, road) for name, road in plain.items()}
-        sizes = [size_of(residual(nominal(car, real[n]), simulated[n], drives[n]), noise).total for n in LOGS]
-        if max(sizes) < UNSEEN_GAP:
-            told, base = plain, simulated
-    final = Stage(chain, passage_of(drives["holdout"].path, car), real["holdout"], "holdout")
-    gap = gap_of(final, fault, told["holdout"])
+    gap = gap_of(Stage(chain, passages["holdout"], roads["holdout"], "holdout"), fault, told["holdout"])
     if spec.group in MUST_SHOW and spec.effects and gap.total < SHOWS:
         raise UndrivableError("the deviations cancel")
+    drives = {name: done for name, (done, _) in driven.items()}
+    base = {name: nominal(car, road) for name, road in told.items()}
     truth = Truth(parts, {}, gap, alone)
-    return CameraCase(
-        spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, camera_forms, chain
-    )
+    return CameraCase(spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, chain)
 
 
 def _check_borders(passage: Passage, road: CameraRoad, rich: bool) -> None:

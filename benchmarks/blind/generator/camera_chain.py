@@ -184,7 +184,7 @@ def results(chain: Chain, passage: Passage, road: CameraRoad, fault: Fault, log:
     """All results of a drive; `road` is as it really is."""
     taken, ready = _timing(chain, passage.end_s, log)
     n, forms = taken.size, chain.forms
-    at, speed = passage.at(taken), passage.speed(taken)
+    at = passage.at(taken)
     length = _length(chain, passage, taken, ready)
     shown = _shown_s(chain, fault, taken, log)
     pitch = fault.pitch_rad * np.ones(n)
@@ -310,7 +310,7 @@ def _confidence(
 
 
 def columns(chain: Chain, said: Results, time_s: Array) -> pd.DataFrame:
-    """Perception columns at the rows: each result stands from when it is ready to the next; before the first is none."""
+    """Perception columns at the rows: each result stands from when it is ready to the next one; none is before."""
     last = np.searchsorted(said.ready_s, time_s, side="right") - 1
     there = last >= 0
     return pd.DataFrame(

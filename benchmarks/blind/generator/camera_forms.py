@@ -175,7 +175,6 @@ CAMERA_FORMS: dict[str, dict[str, Callable[..., Any] | None]] = {
     "reference": {"white": white, "slow": slow, "drifting": drifting},
     "reference_filter": {"none": None, "low_pass": None},
     "reference_lost": {"none": None, "samples": None, "runs": None},
-    "told": {"true_friction": None, "class_friction": None},
 }
 """All that a camera's chain has forms of; those without a function are choices in `camera_chain.py`."""
 

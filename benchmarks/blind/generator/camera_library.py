@@ -1,4 +1,4 @@
-"""The contract's effects of the camera, and deviations that the library does not hold: how large, and what they change."""
+"""The contract's effects of the camera, and deviations that its library lacks: how large, and what they change."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _friction(scene: Scene, rng: Generator) -> Scale:
         values = {}
         for surface, name in enumerate(SURFACES):
             by = signs[surface] * shares[surface] * share * most[signs[surface]][surface]
-            values[name] = round(CLASS_FRICTION[surface] * (1.0 + by * (surface in off)), 4)
+            values[name] = round(CLASS_FRICTION[surface] * (1.0 + float(by) * (surface in off)), 4)
         return values
 
     return parameters
