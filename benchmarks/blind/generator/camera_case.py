@@ -78,12 +78,13 @@ class _Ground:
     seeds: tuple[int, str]
 
     def drive(self, roads: dict[str, CameraRoad]) -> dict[str, tuple[Drive, Generator]]:
-        """All logs' drives, each with the generator that its sensors go on with."""
+        """All logs' drives, each with the generator that its sensors go on with; the hold-out, which decides, first."""
         driven = {}
-        for name, road in roads.items():
-            own, world = generator_of(*self.seeds, name), nominal(self.car, road)
-            rich, duration = self.spec.rich, self.durations[name]
-            driven[name] = (drive(self.car, world, rich, duration, own, self.style), own)
+        for name in sorted(LOGS, key="holdout".__ne__):
+            own, world = generator_of(*self.seeds, name), nominal(self.car, roads[name])
+            done = drive(self.car, world, self.spec.rich, self.durations[name], own, self.style)
+            _check_borders(passage_of(done.path, self.car), roads[name], self.spec.rich)
+            driven[name] = (done, own)
         return driven
 
 
@@ -110,8 +111,6 @@ def _draw(spec: Spec, seed: int, key: str, family: Family) -> CameraCase:
     rate = float(rng.choice(list(RATES_HZ[family]), p=list(RATES_HZ[family].values())))
     driven = ground.drive(roads)
     passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
-    for name in LOGS:
-        _check_borders(passages[name], roads[name], spec.rich)
     scene = Scene(chain, tuple(c for c in range(3) if all(_driven(passages[n], roads[n], c) for n in LOGS)))
     stage = Stage(chain, passages["holdout"], roads["holdout"], "holdout")
     parts, alone, fault = _deviations(spec, stage, scene, rng)
@@ -121,7 +120,8 @@ def _draw(spec: Spec, seed: int, key: str, family: Family) -> CameraCase:
         passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
     told = {name: _told(chain, road, fault) for name, road in roads.items()}
     logs = {}
-    for name, (done, own) in driven.items():
+    for name in LOGS:
+        done, own = driven[name]
         sensors = nominal(car, told[name]).sensors
         log = make_log(done.path, done.command, sensors, noise, rate, own, NOISES[forms["noise"]])
         log = _with_camera(log, chain, passages[name], roads[name], fault, name)
