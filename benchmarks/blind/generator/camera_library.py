@@ -91,16 +91,16 @@ CAMERA_LIBRARY: dict[str, CameraEffect] = {
         _pitch, lambda f, g: replace(f, pitch_rad=g["pitch_rad"]), ("camera",), ("pitch_rad",)
     ),
     "exposure_shift": CameraEffect(_stops, lambda f, g: replace(f, stops=g["stops"]), ("camera",)),
-    "motion_blur": CameraEffect(
-        _growing("exposure_s", 0.001, 0.06),
-        lambda f, g: replace(f, exposure_s=g["exposure_s"]),
-        ("camera",),
-    ),
     "class_friction_offset": CameraEffect(
         _friction,
         lambda f, g: replace(f, friction=(g["dry"], g["wet"], g["snow_ice"])),
         ("camera", "road"),
         SURFACES,
+    ),
+    "motion_blur": CameraEffect(
+        _growing("exposure_s", 0.001, 0.06),
+        lambda f, g: replace(f, exposure_s=g["exposure_s"]),
+        ("camera",),
     ),
 }
 """The five effects of the contract's perception chain."""
