@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from numpy.random import Generator
 from numpy.testing import assert_allclose
 
-from benchmarks.blind.generator import camera_gap
+from benchmarks.blind import runner
+from benchmarks.blind.generator import camera_case, camera_gap
 from benchmarks.blind.generator.camera_chain import Chain, Fault, columns, draw_chain, results
 from benchmarks.blind.generator.camera_forms import CAMERA_FORMS, draw_camera_forms
-from benchmarks.blind.generator.camera_library import CAMERA_EFFECTS, CAMERA_LIBRARY, Scene
+from benchmarks.blind.generator.camera_library import CAMERA_EFFECTS, Scene
 from benchmarks.blind.generator.camera_reference import reference
 from benchmarks.blind.generator.camera_road import (
     CLASS_FRICTION,
@@ -24,9 +28,13 @@ from benchmarks.blind.generator.camera_road import (
     Passage,
     draw_camera_road,
 )
+from benchmarks.blind.generator.car import Car
+from benchmarks.blind.generator.driver import Drive, Style
 from benchmarks.blind.generator.forms import Family
+from benchmarks.blind.generator.kernel import N, V, W, X
 from benchmarks.blind.generator.making import make_case
 from benchmarks.blind.generator.table import Group, table
+from benchmarks.blind.generator.world import World
 from benchmarks.blind.outcome import outcome_of
 from benchmarks.blind.scorer import score_run
 
@@ -256,31 +264,54 @@ def case(name: str):
     return make_case(CASES[name], 1, TENTH)
 
 
+def rolled(car: Car, world: World, rich: bool, duration_s: float, rng: Generator, style: Style) -> Drive:
+    """A drive without forces, in no time: the files of a case do not depend on how the car is moved."""
+    clock = np.arange(round(1000 * duration_s) + 1) * 1e-3
+    speed = 15.0 + rng.uniform(4.0, 6.0) * np.sin(0.5 * clock + rng.uniform(0.0, 6.0))
+    path = np.zeros((clock.size, N + 1))
+    path[:, X], path[:, V] = rng.uniform(0.0, 20.0) + np.cumsum(speed) * 1e-3, speed
+    path[:, W : W + 4] = speed[:, None] / world.physics.radius
+    return Drive(path, np.zeros((round(100 * duration_s) + 1, 4)))
+
+
 @pytest.mark.parametrize("name", [spec.name for spec in table("camera_small")])
-def test_files_keep_the_contract_and_the_secret(name, tmp_path):
-    case(name).write(tmp_path)
-    road = yaml.safe_load((tmp_path / "road.yaml").read_text(encoding="utf-8"))
-    assert {s["surface"] for s in road["segments"]} <= {"dry", "wet", "snow_ice"}
-    log = pd.read_csv(tmp_path / "fit_1.csv")
+def test_files_keep_the_contract_and_the_secret(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(camera_case, "drive", rolled)
+    made = make_case(CASES[name], 1, TENTH)
+    made.write(tmp_path)
+    seal = json.loads(json.dumps(made.seal()))
+    assert list(seal["effects"]) == list(CASES[name].effects)
+    assert "camera" in seal["subsystems"] or not seal["effects"]
+    check_log(pd.read_csv(tmp_path / "fit_1.csv"))
+    check_road(tmp_path, seal)
+    for path in tmp_path.iterdir():
+        assert not [e for e in CAMERA_EFFECTS if e in path.read_text(encoding="utf-8")]
+
+
+def check_log(log: pd.DataFrame) -> None:
     assert np.all(np.diff(log["time_s"]) > 0.0)
     assert set(log["image_class"]) <= {-1, 0, 1, 2}
     there = log[log["image_class"] >= 0]
     assert len(there) > 0.9 * len(log)
     assert there["image_confidence"].between(0.0, 1.0).all()
     assert (there["image_to_m"] > there["image_from_m"]).all()
-    assert (np.diff(log["frame_id"]) >= 0).all()
-    new = np.diff(log["frame_id"]) > 0
-    stands = log.filter(like="image").iloc[1:][~new].reset_index(drop=True)
-    pd.testing.assert_frame_equal(stands, log.filter(like="image").iloc[:-1][~new].reset_index(drop=True))
-    for path in tmp_path.iterdir():
-        assert not [e for e in CAMERA_LIBRARY if e in path.read_text(encoding="utf-8")]
-    seal = json.loads(json.dumps(case(name).seal()))
-    assert list(seal["effects"]) == list(CASES[name].effects)
-    if "mu_reference" in log:
-        friction = dict(zip(SURFACES, CLASS_FRICTION, strict=True))
-        friction |= seal["effects"].get("class_friction_offset", {})
-        assert all(s["mu_left"] == s["mu_right"] == friction[s["surface"]] for s in road["segments"])
-    assert "mu_reference" in log or "class_friction_offset" not in seal["effects"]
+    step = np.diff(log["frame_id"])
+    assert (step >= 0).all()
+    seen = log.filter(like="image")
+    before, after = (part[step == 0].reset_index(drop=True) for part in (seen.iloc[:-1], seen.iloc[1:]))
+    pd.testing.assert_frame_equal(before, after)
+
+
+def check_road(folder: Path, seal: dict[str, Any]) -> None:
+    """With a reference, road.yaml has the friction that it reads; it is the class's, but where that is hidden."""
+    road = yaml.safe_load((folder / "road.yaml").read_text(encoding="utf-8"))
+    friction = dict(zip(SURFACES, CLASS_FRICTION, strict=True))
+    friction |= seal["effects"].get("class_friction_offset", {})
+    measured = "mu_reference" in pd.read_csv(folder / "fit_1.csv", nrows=1)
+    assert measured or "class_friction_offset" not in seal["effects"]
+    for segment in road["segments"]:
+        assert segment["mu_left"] == segment["mu_right"]
+        assert not measured or segment["mu_left"] == friction[segment["surface"]]
 
 
 def test_a_rich_case_has_borders_at_many_speeds_and_its_gap():
@@ -294,11 +325,15 @@ def test_a_rich_case_has_borders_at_many_speeds_and_its_gap():
         assert speed.max() > 1.4 * speed.min()
 
 
-def test_a_case_repeats_and_a_removed_one_has_the_same_logs():
+def test_a_case_repeats_and_a_removed_one_has_the_same_logs(monkeypatch):
+    monkeypatch.setattr(camera_case, "drive", rolled)
     rich = CASES["rich-camera_latency-0"]
+    first, again, other = (make_case(rich, seed, TENTH) for seed in (1, 1, 2))
     removed = make_case(replace(rich, name="removed", group=Group.REMOVED), 1, TENTH)
-    for name, log in case(rich.name).logs.items():
+    for name, log in first.logs.items():
+        pd.testing.assert_frame_equal(log, again.logs[name])
         pd.testing.assert_frame_equal(log, removed.logs[name])
+    assert first.seal() == again.seal() != other.seal()
     assert removed.spec.exclude == ("camera_latency",)
 
 
@@ -342,8 +377,6 @@ def test_scores_count_the_cameras_effects_as_candidates(tmp_path):
     assert outcome.closure == outcome.bic == ("camera_latency",)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "x.json").write_text(json.dumps(result), encoding="utf-8")
-    from benchmarks.blind import runner
-
     runner.seal_run(tmp_path, "camera", 1, TENTH)
     scores = score_run(tmp_path)
     assert scores.baselines["random"]["first"] == pytest.approx(1 / 27)

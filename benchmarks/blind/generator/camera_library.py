@@ -38,10 +38,10 @@ def _growing(name: str, least: float, most: float) -> Callable[[Scene, Generator
 
 
 def _pitch(scene: Scene, rng: Generator) -> Scale:
-    """Either way, and never so far up that the road's end comes into the stretch."""
+    """Either way, but never so far up that the stretch comes near the horizon."""
     sign = float(rng.choice([-1.0, 1.0]))
     far = np.arctan(HEIGHT_M / (scene.chain.preview_m + BEHIND_M + 6.0))
-    most = min(0.1, 0.45 * float(far))
+    most = 0.12 if sign > 0.0 else min(0.12, 0.45 * float(far))
     return lambda severity: {"pitch_rad": sign * 0.002 * (most / 0.002) ** severity}
 
 
