@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -35,8 +36,8 @@ from benchmarks.blind.generator.kernel import N, V, W, X
 from benchmarks.blind.generator.making import make_case
 from benchmarks.blind.generator.table import Group, table
 from benchmarks.blind.generator.world import World
-from benchmarks.blind.outcome import outcome_of
 from benchmarks.blind.scorer import score_run
+from benchmarks.blind.show import draw_confusion
 
 TENTH = Family.TENTH
 CASES = {spec.name: spec for size in ("camera", "camera_small") for spec in table(size)}
@@ -259,11 +260,6 @@ def test_gap_of_a_delay_is_its_way_over_the_spread_of_a_border():
 # --- cases
 
 
-@cache
-def case(name: str):
-    return make_case(CASES[name], 1, TENTH)
-
-
 def rolled(car: Car, world: World, rich: bool, duration_s: float, rng: Generator, style: Style) -> Drive:
     """A drive without forces, in no time: the files of a case do not depend on how the car is moved."""
     clock = np.arange(round(1000 * duration_s) + 1) * 1e-3
@@ -315,7 +311,7 @@ def check_road(folder: Path, seal: dict[str, Any]) -> None:
 
 
 def test_a_rich_case_has_borders_at_many_speeds_and_its_gap():
-    drawn = case("rich-camera_latency-0")
+    drawn = make_case(CASES["rich-camera_latency-0"], 1, TENTH)
     assert drawn.truth.gap.total == pytest.approx(drawn.spec.target, rel=0.15)
     for name, log in drawn.logs.items():
         place = log["position_m"].to_numpy()
@@ -362,22 +358,28 @@ def test_roads_have_every_surface_and_uneven_borders():
     assert steps.std() > 8.0
 
 
-def test_scores_count_the_cameras_effects_as_candidates(tmp_path):
-    cause = {
-        "effect": "camera_latency",
-        "probability": 0.9,
-        "parameters": {},
-        "gap_after": 1.0,
-        "fit_bic": 1.0,
-    }
-    said = {"verdict": "identified", "causes": [cause], "ambiguous_with": []}
-    result = {"case": "x", "seal": case("rich-camera_latency-0").seal(), "diagnosis": said, "error": None}
-    outcome = outcome_of(result)
-    assert outcome.right_within(1)
-    assert outcome.closure == outcome.bic == ("camera_latency",)
-    (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "x.json").write_text(json.dumps(result), encoding="utf-8")
-    runner.seal_run(tmp_path, "camera", 1, TENTH)
+class Said:
+    """A diagnosis that always blames the camera's delay."""
+
+    def to_json(self) -> dict[str, Any]:
+        cause = {"effect": "camera_latency", "probability": 0.9, "parameters": {}, "gap_after": 1.0}
+        return {"verdict": "identified", "causes": [cause | {"fit_bic": 1.0}], "ambiguous_with": []}
+
+
+def test_a_run_is_made_and_scored_with_the_cameras_effects_as_candidates(tmp_path, monkeypatch):
+    fake = ModuleType("sim2real.diagnose")
+    fake.diagnose_files, fake.shrink_on = lambda *files, **options: Said(), lambda *files: 80.0
+    monkeypatch.setitem(sys.modules, "sim2real.diagnose", fake)
+    monkeypatch.setattr(camera_case, "drive", rolled)
+    runner.seal_run(tmp_path, "camera_small", 1, TENTH)
+    for name in ("rich-camera_latency-0", "no_gap-0-rich"):
+        runner.run_case(CASES[name], 1, TENTH, tmp_path, keep=False)
     scores = score_run(tmp_path)
+    assert len(scores.pending) == 8
+    hits = {line.name: (line.hits, line.n) for line in scores.lines}
+    assert hits["right_first"] == hits["false_alarm"] == (1, 1)
     assert scores.baselines["random"]["first"] == pytest.approx(1 / 27)
-    assert scores.confusion == {"camera_latency": {"camera_latency": 1}}
+    assert scores.baselines["closure only"]["first"] == scores.baselines["in-sample BIC"]["first"] == 1.0
+    assert scores.baselines["cosine"]["n"] == 0
+    assert scores.confusion["camera_latency"] == {"camera_latency": 1}
+    draw_confusion(scores, tmp_path / "confusion.png")
