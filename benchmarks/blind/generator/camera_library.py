@@ -10,9 +10,13 @@ from numpy.random import Generator
 
 from .camera_chain import BEHIND_M, HEIGHT_M, Chain, Fault
 from .camera_road import CLASS_FRICTION, SURFACES
+from .details import USUAL_M_S
 from .world import Parameters
 
 Scale = Callable[[float], Parameters]
+
+MOST_BLUR = 1.6
+"""Over the amount that tells, at `USUAL_M_S` [-]."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,12 @@ def _pitch(scene: Scene, rng: Generator) -> Scale:
 def _stops(scene: Scene, rng: Generator) -> Scale:
     sign = float(rng.choice([-1.0, 1.0]))
     return lambda severity: {"stops": sign * 0.3 * (4.5 / 0.3) ** severity}
+
+
+def _blur(scene: Scene, rng: Generator) -> Scale:
+    """As far as more speed still takes more of the confidence, else it would be no other than a wrong exposure."""
+    most = MOST_BLUR * scene.chain.blur_m / USUAL_M_S
+    return lambda severity: {"exposure_s": 0.05 * most * 20.0**severity}
 
 
 def _friction(scene: Scene, rng: Generator) -> Scale:
@@ -98,7 +108,7 @@ CAMERA_LIBRARY: dict[str, CameraEffect] = {
         SURFACES,
     ),
     "motion_blur": CameraEffect(
-        _growing("exposure_s", 0.001, 0.06),
+        _blur,
         lambda f, g: replace(f, exposure_s=g["exposure_s"]),
         ("camera",),
     ),
