@@ -18,8 +18,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from .generator.cases import make_case
 from .generator.forms import Family
+from .generator.making import make_case
 from .generator.table import table
 from .outcome import ResultError
 from .runner import RunError, pending, run, seal_run, write_case
@@ -37,10 +37,14 @@ class Size(StrEnum):
     SMALL = "small"
     MEDIUM = "medium"
     FULL = "full"
+    CAMERA = "camera"
+    CAMERA_SMALL = "camera_small"
 
 
 Out = Annotated[Path, typer.Option(help="Folder of the run.")]
-Cases = Annotated[Size, typer.Option(help="How many: a handful, a few of each kind, or all.")]
+Cases = Annotated[
+    Size, typer.Option(help="How many: a handful, a few of each kind, or all; or the camera's.")
+]
 Seed = Annotated[
     int, typer.Option(min=0, help="1 is for development; a seal wants one that nobody has looked at.")
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Any
 
 import numpy as np
@@ -74,16 +74,16 @@ def _signature(residual: Array, sigmas: Array) -> Array:
     return blocks / size if size > 0.0 else blocks
 
 
-def in_sample_bic(diagnosis: Mapping[str, Any]) -> list[str]:
-    """Effects by the Bayesian information criterion on the logs that they were fitted to."""
-    return _by(diagnosis, "fit_bic")
+def in_sample_bic(diagnosis: Mapping[str, Any], known: Container[str] = LIBRARY) -> list[str]:
+    """Effects, of those `known`, by the Bayesian information criterion on the logs that they were fitted to."""
+    return _by(diagnosis, "fit_bic", known)
 
 
-def closure(diagnosis: Mapping[str, Any]) -> list[str]:
-    """Effects by the gap that they leave on the hold-out."""
-    return _by(diagnosis, "gap_after")
+def closure(diagnosis: Mapping[str, Any], known: Container[str] = LIBRARY) -> list[str]:
+    """Effects, of those `known`, by the gap that they leave on the hold-out."""
+    return _by(diagnosis, "gap_after", known)
 
 
-def _by(diagnosis: Mapping[str, Any], key: str) -> list[str]:
-    causes = [c for c in diagnosis["causes"] if c["effect"] in LIBRARY and c.get(key) is not None]
+def _by(diagnosis: Mapping[str, Any], key: str, known: Container[str]) -> list[str]:
+    causes = [c for c in diagnosis["causes"] if c["effect"] in known and c.get(key) is not None]
     return [c["effect"] for c in sorted(causes, key=lambda c: float(c[key]))]

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from .baselines import closure, in_sample_bic
+from .generator.camera_library import CAMERA_LIBRARY
 from .generator.forms import Family, is_further
+from .generator.library import LIBRARY
 from .generator.table import Group
 
 NONE = "none of these"
@@ -39,6 +41,8 @@ class Outcome:
         "error" where the diagnosis failed.
     causes : tuple of (str, float)
         Effects and their probabilities as ranked; a cause of several effects gives them in a row.
+    camera : bool
+        The logs have a camera, so that its effects are candidates too.
     """
 
     name: str
@@ -61,6 +65,7 @@ class Outcome:
     bic: tuple[str, ...]
     closure: tuple[str, ...]
     error: str | None
+    camera: bool = False
 
     @property
     def blames(self) -> bool:
@@ -144,6 +149,8 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
     first = said["causes"][0] if said["causes"] else {"parameters": {}}
     unexplained = said.get("unexplained")
     usage = result.get("usage", {})
+    camera = "camera" in seal
+    known = {**LIBRARY, **CAMERA_LIBRARY} if camera else LIBRARY
     return Outcome(
         name=result["case"],
         group=Group(seal["group"]),
@@ -166,9 +173,10 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         seconds=_number(usage.get("seconds", result.get("wall_s"))),
         memory_gib=_number(usage.get("peak_bytes")) / 2**30,
         cosine=tuple(result.get("cosine") or ()),
-        bic=tuple(in_sample_bic(said)),
-        closure=tuple(closure(said)),
+        bic=tuple(in_sample_bic(said, known)),
+        closure=tuple(closure(said, known)),
         error=result["error"],
+        camera=camera,
     )
 
 

@@ -22,14 +22,15 @@ from joblib import Parallel, delayed, parallel_config
 
 from .baselines import cosine
 from .command import arguments, watch
-from .generator.cases import Case, make_case
+from .generator.cases import Case
 from .generator.forms import Family
+from .generator.making import make_case
 from .generator.table import Group, Spec, table
 
 HERE = Path(__file__).resolve().parent
 THRESHOLDS = HERE / "thresholds.yaml"
 COSINE_CASE = "-0"
-"""Cases of the cosine baseline, one per effect: it simulates every effect anew, longer than a diagnosis takes."""
+"""Cases of the cosine baseline, one per effect of the car: it simulates each anew, longer than a diagnosis takes."""
 
 
 class RunError(ValueError):
@@ -106,11 +107,8 @@ def run_case(spec: Spec, seed: int, family: Family, out: Path, keep: bool) -> di
     case = make_case(spec, seed, family)
     folder = write_case(case, seed, out)
     said = _timed(folder) if spec.group is Group.TIMING else _in_process(case, folder, seed)
-    result = {
-        "case": spec.name,
-        **said,
-        "cosine": cosine(case) if spec.group is Group.RICH and spec.name.endswith(COSINE_CASE) else None,
-    }
+    ranked = spec.group is Group.RICH and spec.name.endswith(COSINE_CASE) and not spec.camera
+    result = {"case": spec.name, **said, "cosine": cosine(case) if ranked else None}
     _write(result_path(out, spec), result | {"seal": case.seal()})
     if not keep:
         shutil.rmtree(folder)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from .generator.camera_library import CAMERA_LIBRARY
 from .generator.forms import Family
 from .generator.library import LIBRARY
 from .generator.table import Group, table
@@ -290,9 +291,8 @@ def _baselines(rich: Sequence[Outcome]) -> dict[str, dict[str, float]]:
         "in-sample BIC": lambda o: o.bic,
         "closure only": lambda o: o.closure,
     }
-    shares: dict[str, dict[str, float]] = {
-        "random": {"first": 1 / len(LIBRARY), "two": 2 / len(LIBRARY), "n": len(rich)}
-    }
+    known = len(LIBRARY) + len(CAMERA_LIBRARY) * any(o.camera for o in rich)
+    shares: dict[str, dict[str, float]] = {"random": {"first": 1 / known, "two": 2 / known, "n": len(rich)}}
     for name, rank in ranks.items():
         answered = [o for o in rich if rank(o)]
         n = len(answered)

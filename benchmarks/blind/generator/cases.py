@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -61,6 +61,11 @@ class Case:
     base: dict[str, World]
     """The simulation's world on each log's road."""
 
+    @property
+    def subsystems(self) -> set[str]:
+        """Right answers to where."""
+        return {s for effect in self.truth.effects for s in effect_in(self.forms, effect).subsystems}
+
     def seal(self) -> dict[str, Any]:
         """What was hidden, as plain data."""
         truth = self.truth
@@ -68,7 +73,7 @@ class Case:
             "case": self.spec.name,
             "group": str(self.spec.group),
             "effects": truth.effects,
-            "subsystems": sorted({s for e in truth.effects for s in effect_in(self.forms, e).subsystems}),
+            "subsystems": sorted(self.subsystems),
             "forms": self.forms,
             "tyre": truth.tyre,
             "target": self.spec.target,
@@ -90,6 +95,9 @@ class Case:
             log.to_csv(folder / f"{name}.csv", index=False)
 
 
+AnyCase = TypeVar("AnyCase", bound=Case)
+
+
 def generator_of(seed: int, *names: str) -> Generator:
     """Independent of every other name's, and of the order in which cases are made."""
     return np.random.default_rng([seed, *(zlib.crc32(name.encode()) for name in names)])
@@ -103,10 +111,15 @@ def make_case(spec: Spec, seed: int, family: Family = Family.FIRST) -> Case:
     UndrivableError
         None of `TRIES` draws gives a car that can be driven.
     """
+    return first_drivable(spec, lambda key: _draw(spec, seed, key, family))
+
+
+def first_drivable(spec: Spec, draw: Callable[[str], AnyCase]) -> AnyCase:
+    """What the first of `TRIES` keys gives that does not raise UndrivableError; that error where all do."""
     problems = []
     for attempt in range(TRIES):
         try:
-            return _draw(spec, seed, f"{spec.data}/{attempt}", family)
+            return draw(f"{spec.data}/{attempt}")
         except UndrivableError as problem:
             problems.append(str(problem))
     raise UndrivableError(f"{spec.name}: no drivable car in {TRIES} draws; the last: {problems[-1]}")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from .camera_library import CAMERA_LIBRARY, CAMERA_OUTSIDE, CAMERA_PAIRS
 from .forms import OUTSIDES, Family
 from .library import LIBRARY
 
@@ -131,6 +132,8 @@ class Spec:
         Wanted gap of each effect [noise floors].
     data : str
         Name of the case whose logs these are, its own but for `REMOVED`.
+    camera : bool
+        Whether the logs have a camera, which is then where the deviation lies.
     """
 
     name: str
@@ -138,6 +141,7 @@ class Spec:
     effects: tuple[str, ...]
     target: float
     data: str
+    camera: bool = False
 
     @property
     def rich(self) -> bool:
@@ -152,7 +156,7 @@ class Spec:
 
 @dataclass(frozen=True)
 class Counts:
-    """Cases per item of each group; `every` takes each n-th effect only."""
+    """Cases per item of each group; `every` takes each n-th effect only, `camera` those of the camera."""
 
     rich: int
     tyre: int
@@ -163,6 +167,7 @@ class Counts:
     removed: int
     timing: int
     every: int = 1
+    camera: bool = False
 
 
 SIZES: dict[str, Counts] = {
@@ -170,28 +175,30 @@ SIZES: dict[str, Counts] = {
     "small": Counts(rich=1, tyre=1, mild=1, no_gap=3, pairs=1, outside=1, removed=1, timing=0, every=5),
     "medium": Counts(rich=2, tyre=1, mild=1, no_gap=50, pairs=1, outside=1, removed=1, timing=1),
     "full": Counts(rich=5, tyre=1, mild=2, no_gap=75, pairs=1, outside=3, removed=2, timing=1),
+    "camera": Counts(rich=6, tyre=0, mild=3, no_gap=25, pairs=2, outside=2, removed=2, timing=0, camera=True),
+    "camera_small": Counts(
+        rich=1, tyre=0, mild=1, no_gap=2, pairs=1, outside=1, removed=0, timing=0, every=3, camera=True
+    ),
 }
 """Full: 22 x 5 rich, 22 with another tyre, 22 x 2 mild, 75 without a gap, 24 pairs, 22 x 2 removed, and 3 of each
 deviation outside: 15, in the second family 18, in the third 23, in the fourth 28, in the fifth 34 and 5 pairs more, in
 the sixth 42 and 4 pairs more again, in the seventh 48 and 3 pairs more, in the eighth 53 and 3 pairs more,
-in the ninth 58 and 3 pairs more, in the tenth 63 and 3 pairs more."""
+in the ninth 58 and 3 pairs more, in the tenth 63 and 3 pairs more. Camera: 5 x 6 rich, 5 x 3 mild, 25 without a gap,
+5 x 2 pairs, 6 x 2 outside and 5 x 2 removed; the family is that of what is not the camera's."""
 
 
 def table(size: str, family: Family = Family.FIRST) -> list[Spec]:
     """All cases of a size, in a fixed order."""
     counts = SIZES[size]
-    inside, outside = list(LIBRARY)[:: counts.every], list(OUTSIDES[family])[:: counts.every]
+    library, beyond = (CAMERA_LIBRARY, CAMERA_OUTSIDE) if counts.camera else (LIBRARY, OUTSIDES[family])
+    inside, outside = list(library)[:: counts.every], list(beyond)[:: counts.every]
     specs = [_single(Group.RICH, e, i) for e in inside for i in range(counts.rich)]
     specs += [_single(Group.TYRE, e, i + 1) for e in inside for i in range(counts.tyre)]
     specs += [_single(Group.MILD, e, i + 1) for e in inside for i in range(counts.mild)]
     for i in range(counts.no_gap):
         name = f"no_gap-{i}-{'calm' if i % 3 == 2 else 'rich'}"
         specs.append(Spec(name, Group.NO_GAP, (), 1.0, name))
-    pairs = PAIRS[:: counts.every]
-    known = list(Family)[: list(Family).index(family) + 1]
-    for more in [MORE_PAIRS[since] for since in known if since in MORE_PAIRS]:
-        pairs += more[:: counts.every]
-    for pair in pairs:
+    for pair in _pairs(counts, family):
         for i in range(counts.pairs):
             name = f"pair-{pair[0]}-{pair[1]}-{i}"
             specs.append(Spec(name, Group.PAIR, pair, 10.0, name))
@@ -203,7 +210,17 @@ def table(size: str, family: Family = Family.FIRST) -> list[Spec]:
             )
     for i in range(counts.timing):
         specs.append(Spec(f"timing-{i}", Group.TIMING, ("torque_lag",), 10.0, f"timing-{i}"))
-    return specs
+    return [replace(spec, camera=True) for spec in specs] if counts.camera else specs
+
+
+def _pairs(counts: Counts, family: Family) -> tuple[tuple[str, str], ...]:
+    if counts.camera:
+        return CAMERA_PAIRS[:: counts.every]
+    pairs = PAIRS[:: counts.every]
+    known = list(Family)[: list(Family).index(family) + 1]
+    for more in [MORE_PAIRS[since] for since in known if since in MORE_PAIRS]:
+        pairs += more[:: counts.every]
+    return pairs
 
 
 def _single(group: Group, effect: str, i: int) -> Spec:

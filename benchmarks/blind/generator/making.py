@@ -1,0 +1,14 @@
+"""One door to every kind of case."""
+
+from __future__ import annotations
+
+from .camera_case import make_camera_case
+from .cases import Case
+from .cases import make_case as make_car_case
+from .forms import Family
+from .table import Spec
+
+
+def make_case(spec: Spec, seed: int, family: Family) -> Case:
+    """Draw a case: of a car, or of the camera on one; as `cases.make_case`."""
+    return make_camera_case(spec, seed, family) if spec.camera else make_car_case(spec, seed, family)
