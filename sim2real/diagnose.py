@@ -222,7 +222,9 @@ def _file(path: Path) -> dict[str, str]:
 
 
 def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
-    """By how much what a diagnosis found shrinks the gap of a log that it has never seen [%].
+    """By how much what a diagnosis found shrinks the car's gap of a log that it has never seen [%].
+
+    NaN where all that it found lies in the camera chain.
 
     Parameters
     ----------
@@ -233,10 +235,11 @@ def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
     """
     model = Simulation(load_vehicle(diagnosis.provenance["vehicle"]["path"]))
     named = diagnosis.causes[: 2 if diagnosis.verdict is Verdict.COMPOUND else 1]
+    of_car = [c for c in named if EFFECTS[c.effect].stage != "perception"]
+    if named and not of_car:
+        return float("nan")
     effects = [
-        form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()})
-        for c in named
-        if EFFECTS[c.effect].stage != "perception"
+        form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()}) for c in of_car
     ]
     added = model.with_effects(*effects)
     held = gather(added, [read_source(str(log), road).drive])

@@ -62,7 +62,7 @@ def test_no_gap_raises_no_alarm_in_sixty_drives():
             speeds=SPEEDS[seed % 5],
             duration_s=20.0,
             reference=("class", "road", "peak", None)[seed % 4],
-            mu=(CLASS_FRICTION, (0.9, 0.5, 0.3))[seed % 4 in (1, 2)],
+            mu=(CLASS_FRICTION, (0.9, 0.5, 0.3))[seed % 4 == 0],
         )
         if finding.verdict is not Verdict.NO_GAP:
             alarms.append((seed, finding.verdict, finding.causes, finding.unexplained))
@@ -83,16 +83,30 @@ def test_pictures_that_fall_alike_on_every_border_are_no_shift():
         assert diagnose_perception(logs[:2], logs[2], [even] * 3, BARE).verdict is Verdict.NO_GAP
 
 
-def test_a_reference_that_follows_road_yaml_is_no_gap_whatever_the_classes_say():
+@pytest.mark.parametrize("follows", ["road", "peak"])
+def test_a_reference_that_follows_road_yaml_says_that_the_classes_values_are_wrong_for_it(follows):
+    """The contract: with a camera the simulation predicts the class's value, whatever friction road.yaml has."""
+    finding = diagnose(Camera(), reference=follows, mu=(0.9, 0.5, 0.3))
+    assert (finding.verdict, finding.causes) == (Verdict.IDENTIFIED, ("class_friction_offset",))
+    estimate = candidate(finding, "class_friction_offset").parameters
+    off = np.array([0.1, -0.1, 0.1]) + (0.04 * np.array([0.9, 0.5, 0.3]) if follows == "peak" else 0.0)
+    assert [estimate[name].value for name in NAMES] == pytest.approx(off, abs=0.01)
+
+
+def test_without_a_camera_a_reference_that_follows_road_yaml_is_no_gap_whatever_the_classes_say():
     for follows in ("road", "peak"):
-        finding = diagnose(Camera(), reference=follows, mu=(0.9, 0.5, 0.3))
+        finding = diagnose(
+            Camera(), reference=follows, mu=(0.9, 0.5, 0.3), damage=lambda log: changed(log, **BLIND)
+        )
         assert finding.verdict is Verdict.NO_GAP
         assert candidate(finding, "class_friction_offset").score < 0.0
 
 
+BLIND = dict.fromkeys(("frame_id", "image_class", "image_confidence", "image_from_m", "image_to_m"))
+
+
 def test_without_perception_columns_or_reference_nothing_is_said():
-    bare = [changed(drive(road(), reference=None), frame_id=None, image_class=None, image_confidence=None,
-                    image_from_m=None, image_to_m=None) for _ in range(2)]  # fmt: skip
+    bare = [changed(drive(road(), reference=None), **BLIND) for _ in range(2)]
     assert diagnose_perception(bare[:1], bare[1], [road()] * 2, BARE) is None
 
 

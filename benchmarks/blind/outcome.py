@@ -155,7 +155,7 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         name=result["case"],
         group=Group(seal["group"]),
         truth=truth,
-        parameters=seal["effects"][truth[0]] if truth else {},
+        parameters=_as_the_library_has_them(truth[0], seal["effects"][truth[0]]) if truth else {},
         further=frozenset(
             family
             for family in Family
@@ -178,6 +178,16 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         error=result["error"],
         camera=camera,
     )
+
+
+CLASS_VALUES = {"dry": 0.8, "wet": 0.6, "snow_ice": 0.2}
+
+
+def _as_the_library_has_them(effect: str, parameters: dict[str, float]) -> dict[str, float]:
+    """A seal's parameters; the contract leaves open whether a class's friction is its value or how far that is off."""
+    if effect != "class_friction_offset":
+        return parameters
+    return {name: value - CLASS_VALUES[name] for name, value in parameters.items()}
 
 
 def _single(causes: Iterable[Mapping[str, Any]]) -> Iterable[tuple[str, float]]:

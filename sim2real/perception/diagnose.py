@@ -179,7 +179,15 @@ def diagnose_perception(
     judged = (
         shift_chain(results, held_out, modelled, camera.height_m, exclude),
         confidence_chain(results, held_out, (light, light_unseen), modelled, exclude),
-        friction_chain((logs_fit, roads[:-1]), (log_holdout, roads[-1]), vehicle, modelled, exclude, found),
+        friction_chain(
+            (logs_fit, roads[:-1]),
+            (log_holdout, roads[-1]),
+            vehicle,
+            modelled,
+            exclude,
+            found,
+            camera=bool(results) or held_out is not None,
+        ),
     )
     chains = [chain for chain in judged if chain is not None]
     return _conclude(chains, tuple(warnings), seed) if chains else None

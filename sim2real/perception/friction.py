@@ -1,8 +1,9 @@
 """The class's friction value against a friction reference, stretch by stretch of road.
 
-The simulation predicts mu_reference as the class's value; a reference that follows road.yaml's own friction, or the
-tyre's peak there, is no gap of the simulation either, which has that friction. Nor is one that follows the friction
-that the dynamics were found to show. A stretch of one segment is one
+The simulation of a car with a camera predicts mu_reference as the class's value: one that follows road.yaml's own
+friction instead says that the class's value is wrong for this road. Without camera results nothing is said of classes,
+and road.yaml's friction, or the tyre's peak there, is what the simulation has. With or without, a reference that
+follows the friction that the dynamics were found to show is no gap of the camera. A stretch of one segment is one
 observation.
 """
 
@@ -21,7 +22,7 @@ from scenarios.effects.class_friction_offset import ClassFrictionOffset
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant.pipeline import make_setup
 from sim2real.logs import Log
-from sim2real.perception.chain import Account, Chain, price
+from sim2real.perception.chain import DECISIVE, Account, Chain, price
 from sim2real.perception.frames import Modelled
 from sim2real.result import Interval, Place
 from trpac_core.tyre import peak_friction
@@ -45,7 +46,9 @@ SIMULATED = (
     "the friction that the dynamics show",
     "the tyre's peak on the friction that the dynamics show",
 )
-"""Frictions that the simulation has already: a reference that follows one of them is no gap of the camera chain."""
+"""Frictions that the simulation has already."""
+OF_ROAD_FILE = 2
+"""The first of them are those that it has without the dynamics' findings."""
 SIGNAL, OFFSET = "mu_reference", "class_friction_offset"
 NEXT_STEP = (
     "Brake to the limit on each surface: the tyres show the road's friction, and whose value is wrong."
@@ -193,11 +196,15 @@ def _simulated(road: RoadFile, vehicle: VehicleFile, found: Sequence[Effect]) ->
     return np.column_stack(columns)
 
 
-def as_simulated(stretches: Stretches, offset: Array) -> FrictionFit:
+def as_simulated(stretches: Stretches, offset: Array, camera: bool) -> FrictionFit:
     """The best of the accounts that mean no gap: class values (with the offsets modelled already), road, tyre."""
     fits = [FrictionFit((), 0, lambda s: s.class_value + offset[s.classes], {}, "the class's value")]
     for column, what in enumerate(SIMULATED):
-        fits.append(FrictionFit((), 0, partial(_column, column), {}, what))
+        is_found = not np.array_equal(
+            stretches.simulated[:, column], stretches.simulated[:, column % OF_ROAD_FILE]
+        )
+        if is_found or not camera:
+            fits.append(FrictionFit((), 0, partial(_column, column), {}, what))
     return max(fits, key=lambda f: f.log_likelihood(stretches))
 
 
@@ -237,6 +244,13 @@ def with_road_factor(stretches: Stretches) -> FrictionFit:
     return FrictionFit(("friction_offset",), 1, predict, interval, "one factor on road.yaml's friction")
 
 
+def _follows_road(stretches: Stretches, factor: FrictionFit) -> bool:
+    """Whether road.yaml's friction, or the tyre's peak on it, does as well as a factor on it: then there is none."""
+    plain = [FrictionFit((), 0, partial(_column, column), {}, "") for column in range(OF_ROAD_FILE)]
+    best = max(fit.log_likelihood(stretches) for fit in plain)
+    return factor.log_likelihood(stretches) - best < DECISIVE
+
+
 def _location(values: Array, deviation: Array) -> tuple[float, float]:
     """Weighted mean without regard to outliers, and half the width of its 95 % interval."""
     weight = 1.0 / deviation**2
@@ -256,10 +270,12 @@ def friction_chain(
     modelled: Modelled,
     exclude: Collection[str],
     found: Sequence[Effect] = (),
+    camera: bool = True,
 ) -> Chain | None:
     """The friction reference's account; None where no log has one.
 
-    Beside class_friction_offset it holds an account of friction_offset, which the dynamics judge too.
+    Beside class_friction_offset it holds an account of friction_offset, which the dynamics judge too. `camera` says
+    whether the logs have a camera's results.
     """
     known = find_stretches(*fitted, vehicle, found)
     unseen = find_stretches([held_out[0]], [held_out[1]], vehicle, found)
@@ -270,12 +286,11 @@ def friction_chain(
     if not len(known):
         why = "mu_reference covers no stretch of one surface on the fit logs."
         return Chain.silent(SIGNAL, rows, [OFFSET], why)
-    plain = as_simulated(known, np.array(modelled.class_offset))
-    fits = [
-        fit
-        for fit in (with_class_offsets(known), with_road_factor(known))
-        if not set(fit.effects) & set(exclude)
-    ]
+    plain = as_simulated(known, np.array(modelled.class_offset), camera)
+    fits = [with_class_offsets(known), with_road_factor(known)]
+    if _follows_road(known, fits[1]):
+        fits = fits[:1]
+    fits = [fit for fit in fits if not set(fit.effects) & set(exclude)]
     accounts = [_account(fit, plain, known, unseen) for fit in (plain, *fits)]
     return Chain(
         SIGNAL,
