@@ -274,11 +274,10 @@ def scene_section(
     return f"""\
 A patch is grey, but the road is packed snow where its verge is as grey. {len(NUMBERS)} numbers of the picture around
 a patch (`trpac_core/vision/scene.py`) times a matrix are added to its logits; whoever judges patches without their
-picture leaves it out. Learned last, the rest fixed, by multinomial regression with a ridge: {patches} patches of web
-and Udacity stills and of rendered worlds that the network had not seen (seeds from
-{SEED_RANGES["train"].start + FIRST_SCENE_WORLD}), each with its picture as two undisturbed cameras would show both.
-The other real sources are few cameras, whose tint would pass for a surface: nothing is learned from them here. Logits
-per standard deviation:
+picture leaves it out. Learned last, the rest fixed, by multinomial regression with a ridge: {patches} patches of the
+real training pictures and of rendered worlds that the network had not seen (seeds from
+{SEED_RANGES["train"].start + FIRST_SCENE_WORLD}), each with its picture as two undisturbed cameras would show both,
+drawn by the same shares. Logits per standard deviation:
 
 {weights}
 

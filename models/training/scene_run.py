@@ -32,13 +32,10 @@ from .rendered import (
 )
 from .scene_set import SceneSet, all_of, scenes_of_pictures, scenes_of_views
 
-SOURCES = ("condition_web", "dry_udacity")
-"""Real sources that it learns from, beside rendered worlds: of many cameras, lest a camera's own tint pass for a
-surface; on all others it is judged as on cameras never seen."""
 WORLDS, PATCHES_PER_WORLD_VIEW = 480, 6
 LOOKS = 2
 """Cameras that each patch and its scene are seen by."""
-RIDGE = 6e-3
+RIDGE = 3e-3
 """Half of the square of the weights counts so much in the loss [nat]."""
 CUTTING_SEED = 21
 
@@ -78,7 +75,7 @@ def ship_scene(
 
 
 def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps) -> SceneSet:
-    """What it learns from: patches of pictures of many cameras, and of worlds that the network has not seen."""
+    """What it learns from: patches of the training pictures, and of worlds that the network has not seen."""
     count = max(6, round(given.effort * WORLDS))
     first = SEED_RANGES["train"].start + FIRST_SCENE_WORLD
     with steps("rendering worlds for the scene", count) as report:
@@ -89,11 +86,9 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
             given.threads,
             lambda: report(next(done), np.nan),
         )
-    real = [p for p in of_split(pictures, "train") if p.family in SOURCES and p.family not in given.without]
-    rendered = scenes_of_views(views)
-    if not real:
-        return rendered
-    return all_of([scenes_of_pictures(training_patches(real, CUTTING_SEED), real), rendered])
+    real = [picture for picture in of_split(pictures, "train") if picture.family not in given.without]
+    cut = training_patches(real, CUTTING_SEED)
+    return all_of([scenes_of_pictures(cut, real), scenes_of_views(views)])
 
 
 def learn_head(classifier: SurfaceClassifier, train: SceneSet, seed: int) -> SceneHead:
