@@ -106,7 +106,8 @@ def _estimate(findings: Findings, sources: Sources) -> TrpacError | None:
     drive = sources.holdout.drive
     reference = None
     if "mu_reference" in sources.holdout.log.signals:
-        reference = resample(sources.holdout.log, drive.step_s)[1]["mu_reference"]
+        # of a drive that begins where its sensors wake, the log's last rows
+        reference = resample(sources.holdout.log, drive.step_s)[1]["mu_reference"][-len(drive) :]
     return trpac_error(sources.vehicle, drive, findings.added(), reference)
 
 

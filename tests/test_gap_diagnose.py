@@ -366,6 +366,30 @@ def test_what_the_logger_wrote_before_the_sensors_woke_is_left_out_and_said(fold
     assert not any("left out" in text for text in found.holdout.log.warnings)
 
 
+def test_the_estimate_is_held_to_the_reference_of_its_own_rows_where_sensors_wake_late(
+    folder, tmp_path, monkeypatch
+):
+    drive = noisy(clean(pulses(9.0), 13.0, ICY, PAYLOAD), 2)
+    measured = drive.measured.copy()
+    measured[:125] = np.nan
+    reference = 0.5 + 0.01 * drive.time_s
+    write_log(remeasured(drive, measured), tmp_path / "waking.csv", mu_reference=reference)
+    asked = []
+    monkeypatch.setattr(
+        "sim2real.diagnose.trpac_error", lambda car, drive, added, mu: asked.append((drive.time_s, mu))
+    )
+    diagnose_files(
+        folder / "vehicle.yaml",
+        folder / "icy.yaml",
+        [f"{folder}/fit_2.csv"],
+        f"{tmp_path}/waking.csv",
+        exclude=EXCLUDE,
+    )
+    ((time_s, mu),) = asked
+    assert time_s[0] == pytest.approx(1.0)
+    assert mu == pytest.approx(0.5 + 0.01 * time_s, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("speed_m_s", "known", "said"),
     [(13.0, 200, r"in its last 1\.59 s alone; expected at least 2 s"), (0.0, 200, "the car never moves")],
