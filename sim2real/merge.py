@@ -14,6 +14,8 @@ from sim2real.lattice import Lattice
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Unexplained, Verdict
 
+NO_GAP_DOUBT = 0.1
+"""Probability that is left to the effects of data that show no gap: some of them would hardly show [-]."""
 CERTAIN = 0.97
 """Probability of what a mark that nothing else leaves has shown [-]."""
 
@@ -194,7 +196,7 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         main_causes = [replace(c, probability=0.5 * c.probability) for c in main_causes]
         side_causes = [replace(c, probability=0.5 * c.probability) for c in side_causes]
     elif side.verdict is Verdict.NO_GAP:
-        left = max(0.0, 1.0 - sum(c.probability for c in main_causes))
+        left = min(max(0.0, 1.0 - sum(c.probability for c in main_causes)), NO_GAP_DOUBT)
         total = max(sum(c.probability for c in side_causes), 1e-12)
         side_causes = [replace(c, probability=c.probability * min(1.0, left / total)) for c in side_causes]
     else:

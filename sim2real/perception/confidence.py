@@ -17,6 +17,7 @@ from scipy.stats import t as student
 from scenarios.effects.exposure_shift import TOLERATED_STOPS
 from scenarios.effects.motion_blur import TOLERATED_SMEAR_M
 from sim2real.perception.blocks import Blocks
+from sim2real.perception.chain import DECISIVE
 from sim2real.perception.pictures import Light
 from sim2real.result import Interval
 
@@ -38,6 +39,8 @@ LAW_SPREAD = 0.4
 MOST_LOG_FACTOR = 5.0
 """Intervals of an exposure time reach no farther than by this factor's logarithm [-]."""
 STOPS = np.linspace(-6.0, 6.0, 241)
+POWERS = (1.0, 2.0)
+"""Confidence falls with the smear or with its square: chains that live on coarse looks lose little at first."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,11 @@ class ConfidenceFit:
     log_likelihood : float
         Of the blocks (and pictures) it was fitted to [nats].
     per_speed, level : float
-        Loss per speed, and at all speeds [s/m], [-].
+        Loss per speed to its power, and at all speeds [(s/m)^power], [-].
     exposure_s, stops : Interval
         Estimates; without width where the candidate does not move them.
+    power : float
+        Out of `POWERS`.
     """
 
     effects: tuple[str, ...]
@@ -62,6 +67,7 @@ class ConfidenceFit:
     level: float
     exposure_s: Interval
     stops: Interval
+    power: float = 1.0
 
     @property
     def size(self) -> int:
@@ -70,7 +76,7 @@ class ConfidenceFit:
 
     def loss(self, blocks: Blocks) -> Array:
         """Loss that it adds to the normal one, shape (n,) [-]."""
-        return self.per_speed * blocks.speed_m_s + self.level
+        return self.per_speed * blocks.speed_m_s**self.power + self.level
 
 
 @dataclass(frozen=True)
@@ -114,12 +120,12 @@ class ConfidenceModel:
         rest = blocks.loss - loss + np.log(NORMAL_CONFIDENCE)
         return float(-0.5 * rest @ cho_solve(cho_factor(self._covariance(blocks)), rest))
 
-    def weigh(self, blocks: Blocks) -> Array:
-        """Inner products of loss, speed and one under the blocks' inverse covariance, shape (3, 3)."""
+    def weigh(self, blocks: Blocks, power: float) -> Array:
+        """Inner products of loss, speed to a power and one under the blocks' inverse covariance, shape (3, 3)."""
         if not len(blocks):
             return np.zeros((3, 3))
         columns = np.column_stack(
-            [blocks.loss + np.log(NORMAL_CONFIDENCE), blocks.speed_m_s, np.ones(len(blocks))]
+            [blocks.loss + np.log(NORMAL_CONFIDENCE), blocks.speed_m_s**power, np.ones(len(blocks))]
         )
         return columns.T @ cho_solve(cho_factor(self._covariance(blocks)), columns)
 
@@ -130,19 +136,26 @@ class ConfidenceModel:
 
 
 def read_model(blocks: Blocks) -> ConfidenceModel:
-    """Deviation and memory of the blocks about a level per class and a slope over speed."""
+    """Deviation and memory of the blocks about a level per class and a slope over speed to the power that suits."""
     if not len(blocks):
         return ConfidenceModel(LEAST_DEVIATION, 1.0)
-    design = np.column_stack([blocks.speed_m_s, *(blocks.classes == c for c in np.unique(blocks.classes))])
-    solution, *_ = np.linalg.lstsq(design, blocks.loss, rcond=None)
-    rest = blocks.loss - design @ solution
-    free = max(len(blocks) - int(np.linalg.matrix_rank(design)), 3)
+    rest, free = min(
+        (_about_lines(blocks, power) for power in POWERS), key=lambda found: float(found[0] @ found[0])
+    )
     # few blocks do not tell their own deviation well: the variance of Student's t
     deviation = max(float(np.sqrt(rest @ rest / (free - 2))), LEAST_DEVIATION)
     neighbours = blocks.log[1:] == blocks.log[:-1]
     products = (rest[1:] * rest[:-1])[neighbours]
     echo = float(np.clip(products.mean() / max(rest.var(), 1e-12), 0.0, 0.9)) if len(products) else 0.0
     return ConfidenceModel(deviation, (1.0 + echo) / (1.0 - echo))
+
+
+def _about_lines(blocks: Blocks, power: float) -> tuple[Array, int]:
+    """What a level per class and a slope over speed to a power leave, and the blocks that are free beside them."""
+    levels = [blocks.classes == c for c in np.unique(blocks.classes)]
+    design = np.column_stack([blocks.speed_m_s**power, *levels])
+    solution, *_ = np.linalg.lstsq(design, blocks.loss, rcond=None)
+    return blocks.loss - design @ solution, max(len(blocks) - int(np.linalg.matrix_rank(design)), 3)
 
 
 def fit_confidence(
@@ -153,7 +166,7 @@ def fit_confidence(
     exposure_s: float,
     stops: float,
 ) -> ConfidenceFit:
-    """The best blur, exposure, or both.
+    """The best blur, exposure, or both, by the law of blur that suits best.
 
     Parameters
     ----------
@@ -168,34 +181,53 @@ def fit_confidence(
     exposure_s, stops : float
         What the simulation models already [s], [stops].
     """
-    products = model.weigh(blocks)
+    powers = POWERS if "motion_blur" in effects else POWERS[:1]
+    first, *others = [_fit_by_law(blocks, signs, model, effects, exposure_s, stops, p) for p in powers]
+    return next((f for f in others if f.log_likelihood - first.log_likelihood > DECISIVE), first)
+
+
+def _fit_by_law(
+    blocks: Blocks,
+    signs: Signs,
+    model: ConfidenceModel,
+    effects: tuple[str, ...],
+    exposure_s: float,
+    stops: float,
+    power: float,
+) -> ConfidenceFit:
+    products = model.weigh(blocks, power)
     errors = STOPS if "exposure_shift" in effects else np.array([stops])
     levels = (errors**2 - stops**2) / TOLERATED_STOPS**2
     slopes = np.zeros(len(levels))
     if "motion_blur" in effects:
-        least = -exposure_s / TOLERATED_SMEAR_M
+        least = -exposure_s / TOLERATED_SMEAR_M if power == 1.0 else 0.0
         slopes = np.maximum((products[0, 1] - levels * products[1, 2]) / max(products[1, 1], 1e-12), least)
     ways = np.stack([np.ones(len(levels)), -slopes, -levels])
     profile = -0.5 * np.einsum("ig,ij,jg->g", ways, products, ways)
-    speed = float(blocks.speed_m_s.mean()) if len(blocks) else 0.0
+    speed = float((blocks.speed_m_s**power).mean()) if len(blocks) else 0.0
     profile = profile + signs.log_likelihood(levels + slopes * speed, errors)
     best = int(np.argmax(profile))
     quantile = float(student.ppf(0.975, max(len(blocks) / model.memory - 2.0, 1.0)))
     blur = Interval(exposure_s, exposure_s, exposure_s, "s")
     if "motion_blur" in effects:
-        blur = _exposure_time(exposure_s, float(slopes[best]), quantile / np.sqrt(max(products[1, 1], 1e-12)))
+        half = quantile / np.sqrt(max(products[1, 1], 1e-12))
+        blur = _exposure_time(exposure_s, float(slopes[best]), float(half), power)
     wrong = Interval(stops, stops, stops, "stops")
     if "exposure_shift" in effects:
         wrong = _exposure_error(profile, signed=signs.light is not None)
-    return ConfidenceFit(effects, float(profile[best]), float(slopes[best]), float(levels[best]), blur, wrong)
+    return ConfidenceFit(
+        effects, float(profile[best]), float(slopes[best]), float(levels[best]), blur, wrong, power
+    )
 
 
-def _exposure_time(modelled_s: float, slope: float, half: float) -> Interval:
+def _exposure_time(modelled_s: float, slope: float, half: float, power: float) -> Interval:
     """Exposure time, with the uncertainty of the slope and of the law together."""
-    added = slope * TOLERATED_SMEAR_M
     if slope <= 0.0:
-        return Interval(modelled_s + added, 0.0, modelled_s + half * TOLERATED_SMEAR_M, "s")
-    factor = float(np.exp(min(np.hypot(half / slope, 1.96 * LAW_SPREAD), MOST_LOG_FACTOR)))
+        added = slope * TOLERATED_SMEAR_M
+        return Interval(modelled_s + added, 0.0, modelled_s + half ** (1.0 / power) * TOLERATED_SMEAR_M, "s")
+    added = slope ** (1.0 / power) * TOLERATED_SMEAR_M
+    spread = np.hypot(half / slope / power, 1.96 * LAW_SPREAD)
+    factor = float(np.exp(min(spread, MOST_LOG_FACTOR)))
     return Interval(modelled_s + added, modelled_s + added / factor, modelled_s + added * factor, "s")
 
 

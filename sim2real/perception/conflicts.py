@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ Array = NDArray[np.float64]
 MARGIN_M = 5.0
 """Way after and before a border that is left out: there a shift shows, not a conflict [m]."""
 FEWEST = 5
+MANY, SEVERAL_LOGS = 3, 2
+"""Conflicts, and logs that have them, from which on they are a gap: chance mistakes in streaks make one or two."""
 MOSTLY = 0.7
 """Share of a segment's results that name one other class, from which on they are no chance mistakes."""
 
@@ -40,19 +43,41 @@ def class_error(results: Sequence[Results]) -> float:
     return float(every.mean()) if len(every) else float("nan")
 
 
-def class_conflicts(results: Sequence[Results]) -> tuple[str, ...]:
-    """One sentence per segment on which most results name one other class than road.yaml."""
-    sentences = []
+@dataclass(frozen=True)
+class Conflict:
+    """A segment of a log on which most results name one other class than road.yaml, in a sentence."""
+
+    log: str
+    sentence: str
+
+
+def class_conflicts(results: Sequence[Results]) -> tuple[Conflict, ...]:
+    """All of them, results laid over the road as they fit best."""
+    age_s, way_m = rough_shift(results) if results else (0.0, 0.0)
+    found = []
     for one in results:
-        for segment, inside in _inside(one, 0.5 * (one.from_m + one.to_m)):
+        late_m = one.driven_m(one.time_s, np.array([age_s]))[:, 0] + way_m
+        for segment, inside in _inside(one, 0.5 * (one.from_m + one.to_m) - late_m):
             other = _other_class(one, segment, inside)
             if other is not None and inside.sum() >= FEWEST:
                 share = (one.classes[inside] == other).mean()
-                sentences.append(
+                sentence = (
                     f"{one.log}: from {segment.start_m:g} m on the camera sees {other.label} in {100.0 * share:.0f} % "
                     f"of its results where road.yaml has {segment.surface}."
                 )
-    return tuple(sentences)
+                found.append(Conflict(one.log, sentence))
+    return tuple(found)
+
+
+def conflicts_in_words(conflicts: Sequence[Conflict]) -> str:
+    """The gap that conflicts are, in a sentence; empty where they may be chance, or road.yaml's own slip."""
+    logs = {conflict.log for conflict in conflicts}
+    if len(conflicts) < MANY or len(logs) < SEVERAL_LOGS:
+        return ""
+    return (
+        f"The camera keeps seeing another class than road.yaml on {len(conflicts)} stretches in {len(logs)} logs: does "
+        f"it repeat old results, or take one surface for another? {conflicts[0].sentence}"
+    )
 
 
 def _other_class(one: Results, segment: RoadSegment, inside: NDArray[np.bool_]) -> Surface | None:

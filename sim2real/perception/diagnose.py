@@ -17,7 +17,7 @@ from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
 from sim2real.perception.chain import Account, Chain
 from sim2real.perception.confidence_chain import confidence_chain
-from sim2real.perception.conflicts import class_conflicts
+from sim2real.perception.conflicts import class_conflicts, conflicts_in_words
 from sim2real.perception.frames import Modelled, read_results
 from sim2real.perception.friction import friction_chain
 from sim2real.perception.pictures import read_light
@@ -29,6 +29,8 @@ NOISE_FLOOR = 1.0
 """Size of the gap that noise alone leaves, per signal and in total [-]."""
 UNEXPLAINED = 2.5
 """Rest of a signal, in standard deviations, from which on its best account does not explain it [-]."""
+MAKE_CLASSES_ERR = {"exposure_shift", "motion_blur"}
+"""Effects under which classes may be wrong for whole stretches."""
 TYPICAL = 0.75
 """Quantile that is taken for it: a few odd borders or stretches depend on nothing, a whole class of road does."""
 BOOTSTRAP = 400
@@ -171,11 +173,8 @@ def diagnose_perception(
     light_unseen, yet_more = read_light(
         [] if held_out is None else [held_out], [log_holdout.image_folder][: held_out is not None]
     )
-    warnings += [
-        *more,
-        *yet_more,
-        *class_conflicts([*results, *([held_out] if held_out is not None else [])]),
-    ]
+    conflicts = class_conflicts([*results, *([held_out] if held_out is not None else [])])
+    warnings += [*more, *yet_more, *(conflict.sentence for conflict in conflicts)]
     judged = (
         shift_chain(results, held_out, modelled, camera.height_m, exclude),
         confidence_chain(results, held_out, (light, light_unseen), modelled, exclude),
@@ -190,11 +189,13 @@ def diagnose_perception(
         ),
     )
     chains = [chain for chain in judged if chain is not None]
-    return _conclude(chains, tuple(warnings), seed) if chains else None
+    return _conclude(chains, conflicts_in_words(conflicts), tuple(warnings), seed) if chains else None
 
 
-def _conclude(chains: Sequence[Chain], warnings: tuple[str, ...], seed: int) -> PerceptionFinding:
-    """Each signal's best account, and what they make together."""
+def _conclude(
+    chains: Sequence[Chain], conflict: str, warnings: tuple[str, ...], seed: int
+) -> PerceptionFinding:
+    """Each signal's best account, and what they make together; `conflict` is what classes say against road.yaml."""
     best = [chain.best() for chain in chains]
     rivals = [chain.rivals() for chain in chains]
     nothing = [chain.nothing for chain in chains]
@@ -202,6 +203,8 @@ def _conclude(chains: Sequence[Chain], warnings: tuple[str, ...], seed: int) -> 
         text for chain, account in zip(chains, best, strict=True) if (text := _unexplained(chain, account))
     )
     causes = tuple(dict.fromkeys(effect for account in best for effect in account.effects))
+    if conflict and not set(causes) & MAKE_CLASSES_ERR:
+        unexplained = (*unexplained, conflict)
     ambiguous = tuple(
         dict.fromkeys(
             tuple(dict.fromkeys((*account.effects, *(e for r in others for e in r.effects))))

@@ -9,15 +9,16 @@ uncertain, and so is the scale of the errors: each candidate takes what suits it
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from sim2real.perception.chain import Account, Chain, price
+from sim2real.perception.chain import DECISIVE, Account, Chain, price
 from sim2real.perception.crossings import Crossings, find_crossings
 from sim2real.perception.frames import Modelled, Results
+from sim2real.perception.scatter import scatter_in_words
 from sim2real.result import Interval, Place
 
 Array = NDArray[np.float64]
@@ -42,10 +43,10 @@ SAME_SPEED_M_S = 2.0
 """Crossings within this range of speeds count as one speed [m/s]."""
 NOTABLE = 3.0
 MOST_PLACES = 4
+MOSTLY = 0.5
+"""An account that leaves no more than this share of the gap explains it, though the rest shows a pattern [-]."""
 AROUND_S = 0.2
 """Time about a crossing that is shown [s]."""
-SCATTERED_M, FEWEST_SCATTERED = 0.7, 4
-"""Scale of the crossings' errors, and number of crossings, from which on scatter is a gap of its own [m], [-]."""
 
 
 @dataclass(frozen=True)
@@ -86,12 +87,17 @@ class ShiftFit:
         age, pitch = np.array([self.delay_s.value]), np.array([self.pitch_rad.value])
         return float((_profiles(crossings, age, pitch, height_m) - _price(self.effects)).max())
 
+    def rest_m(self, crossings: Crossings, height_m: float) -> Array:
+        """Brackets' middles beyond the candidate's, shape (k,) [m]."""
+        low, high = crossings.bracket(self.share)
+        return 0.5 * (low + high) - self.shift(crossings, height_m)
+
     def z(self, crossings: Crossings, height_m: float, scale: float) -> Array:
         """Brackets' middles beyond the candidate's, in standard deviations, shape (k,); noise alone gives about 1."""
         low, high = crossings.bracket(self.share)
         width, length = high - low, 0.5 * (crossings.low_length_m + crossings.high_length_m)
         deviation = np.sqrt((scale * ERROR_M) ** 2 + (width**2 + length**2) / 12.0)
-        return (0.5 * (low + high) - self.shift(crossings, height_m)) / deviation
+        return self.rest_m(crossings, height_m) / deviation
 
 
 def fit_shift(
@@ -198,6 +204,7 @@ def shift_chain(
     known, unseen = find_crossings(fitted), find_crossings([] if held_out is None else [held_out])
     pictures = sum(map(len, fitted)) + (0 if held_out is None else len(held_out))
     choices = [c for c in CHOICES if not set(c) & set(exclude)]
+    outside = [c for c in CHOICES if set(c) & set(exclude)]
     if not len(known):
         why = "No border between two surfaces shows in the camera's classes on the fit logs."
         return Chain.silent(SIGNAL, pictures, {effect for choice in choices for effect in choice}, why)
@@ -206,9 +213,11 @@ def shift_chain(
         return fit_shift(known, effects, height_m, modelled.delay_s, modelled.pitch_rad)
 
     plain, fits = fit(()), [fit(choice) for choice in choices]
-    scale = min(f.scale for f in (plain, *fits))
+    every = known.joined(unseen)
+    closest = min((plain, *fits), key=lambda f: f.scale)
+    scale = closest.scale
     accounts = [_account(f, plain, unseen, height_m, scale, known) for f in (plain, *fits)]
-    return Chain(
+    chain = Chain(
         SIGNAL,
         pictures,
         float(len(known) + len(unseen)),
@@ -216,8 +225,23 @@ def shift_chain(
         tuple(accounts[1:]),
         places=_places(accounts[0], unseen),
         next_step=NEXT_STEP,
-        unexplained=_scatter(scale, known),
     )
+    for choice in outside:
+        other = _account(fit(choice), plain, unseen, height_m, scale, known)
+        if chain.best().effects and other.score > chain.best().score + DECISIVE:
+            return replace(chain, unexplained=_another_law(chain.best(), choice))
+    if chain.best().left() <= MOSTLY * accounts[0].left():
+        return chain
+    scatter = scatter_in_words(scale * ERROR_M, closest.rest_m(every, height_m), every)
+    return replace(chain, unexplained=scatter)
+
+
+def _another_law(best: Account, choice: tuple[str, ...]) -> str:
+    """What a shift is that goes with speed in a way that no effect of the library has."""
+    laws = {"camera_latency": "goes with speed", "camera_pitch": "does not depend on speed"}
+    law = " and partly ".join(laws[effect] for effect in choice)
+    blamed = " and ".join(best.effects)
+    return f"The changes of class are shifted along the road by what {law}, not as {blamed} would have it."
 
 
 def _account(
@@ -288,15 +312,4 @@ def _places(nothing: Account, unseen: Crossings) -> tuple[Place, ...]:
             str(unseen.log[k]),
         )
         for k in worst
-    )
-
-
-def _scatter(scale: float, known: Crossings) -> str:
-    low, high = known.bracket(0.5)
-    coarse_m = float(np.median(high - low + known.low_length_m))
-    if scale * ERROR_M < max(SCATTERED_M, 0.5 * coarse_m) or len(known) < FEWEST_SCATTERED:
-        return ""
-    return (
-        f"The changes of class lie about {scale * ERROR_M:.1f} m beside road.yaml's borders, with no common shift or "
-        "delay: are the borders where road.yaml has them, and does position_m drift?"
     )
