@@ -24,10 +24,19 @@ def car_with(**effects):
 BARE = car_with()
 
 
-def diagnose(camera, seed=0, vehicle=BARE, spacing_m=40.0, mu=CLASS_FRICTION, damage=lambda log: log, **kw):
+def diagnose(
+    camera,
+    seed=0,
+    vehicle=BARE,
+    spacing_m=40.0,
+    mu=CLASS_FRICTION,
+    damage=lambda log: log,
+    exclude=(),
+    **kw,
+):
     roads = [road(spacing_m, seed=3 * seed + i, mu=mu) for i in range(3)]
     logs = [damage(drive(r, camera, seed=10 * seed + i, **kw)) for i, r in enumerate(roads)]
-    return diagnose_perception(logs[:2], logs[2], roads, vehicle)
+    return diagnose_perception(logs[:2], logs[2], roads, vehicle, exclude=exclude)
 
 
 def candidate(finding, *effects):
@@ -553,3 +562,91 @@ def test_each_effect_of_the_plant_is_found_in_its_logs(effect, values):
             for name, truth in values.items():
                 estimate = candidate(finding, effect).parameters[name]
                 assert estimate.low <= truth <= estimate.high
+
+
+# what comes again, and what does not
+
+
+def moved(road_file, by_m, seed):
+    rng = np.random.default_rng(seed)
+    segments = [
+        s.model_copy(update={"start_m": s.start_m + by_m * (i > 0) * rng.uniform(-1.0, 1.0)})
+        for i, s in enumerate(road_file.segments)
+    ]
+    return road_file.model_copy(update={"segments": segments})
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_careless_chains_scatter_is_no_gap(seed):
+    finding = diagnose(Camera(fps=12.0, flicker_m=1.5, wrong=0.08), seed, duration_s=60.0)
+    assert finding.verdict is Verdict.NO_GAP, finding.unexplained
+
+
+def test_borders_that_lie_elsewhere_are_so_each_time():
+    same = road(seed=3)
+    logs = [drive(same, Camera(), seed=i, duration_s=60.0) for i in range(3)]
+    finding = diagnose_perception(logs[:2], logs[2], [moved(same, 2.5, 1)] * 3, BARE)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert "the same each time that a border is passed" in finding.unexplained[0]
+
+
+def test_a_position_that_drifts_puts_neighbouring_borders_off_alike():
+    def drifting(log):
+        drift_m = 2.5 * np.sin(2.0 * np.pi * log.time_s / 60.0)
+        names = ("position_m", "image_from_m", "image_to_m")
+        return changed(log, **{name: log.signals[name] + drift_m for name in names})
+
+    finding = diagnose(Camera(), 1, damage=drifting, duration_s=60.0, reference=None)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert "neighbours alike" in finding.unexplained[0]
+
+
+def test_blur_that_costs_little_at_first_is_blur():
+    def squared(log):
+        speed, sure = log.signals["vehicle_speed_m_s"], log.signals["image_confidence"]
+        return changed(log, image_confidence=sure * np.exp(-((speed * 0.15 / 4.0) ** 2)))
+
+    finding = diagnose(Camera(), damage=squared, speeds=(5.0, 15.0, 8.0, 25.0))
+    assert (finding.verdict, finding.causes) == (Verdict.IDENTIFIED, ("motion_blur",))
+    exposure = candidate(finding, "motion_blur").parameters["exposure_s"]
+    assert exposure.value == pytest.approx(0.15, rel=0.1)
+    assert finding.after.signals["image_confidence"] < 1.5
+
+
+def test_a_confidence_that_comes_and_goes_is_no_exposure():
+    def blinded(log):
+        seen = np.where((log.time_s // 4.0) % 2.0 == 0.0, 1.0, 0.35)
+        return changed(log, image_confidence=seen * log.signals["image_confidence"])
+
+    finding = diagnose(Camera(), damage=blinded)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("comes and goes by a factor of" in text for text in finding.unexplained)
+
+
+def test_classes_that_keep_contradicting_road_yaml_are_a_gap_and_one_that_does_is_a_warning():
+    def confused(most):
+        def damage(log):
+            classes = log.signals["image_class"]
+            far = (log.signals["image_from_m"] > 100.0) & (log.signals["image_from_m"] < most)
+            return changed(log, image_class=np.where(far & (classes == 1.0), 0.0, classes))
+
+        return damage
+
+    finding = diagnose(Camera(wrong=0.0), 2, damage=confused(500.0))
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("keeps seeing another class than road.yaml" in text for text in finding.unexplained)
+    one = diagnose(Camera(wrong=0.0), 2, damage=confused(170.0))
+    assert one.verdict is Verdict.NO_GAP
+    assert any("road.yaml has wet" in text for text in one.warnings)
+
+
+@pytest.mark.parametrize(
+    ("faults", "law"),
+    [({"delay_s": 0.25}, "goes with speed"), ({"distance_m": 2.0}, "does not depend on speed")],
+)
+def test_a_twin_is_not_blamed_for_a_law_that_is_not_its_own(faults, law):
+    true = {"delay_s": "camera_latency", "distance_m": "camera_pitch"}[next(iter(faults))]
+    finding = diagnose(Camera(**faults), exclude=(true,), speeds=SLOW_AND_FAST)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert all(true not in c.effects for c in finding.candidates)
+    assert law in finding.unexplained[0]
