@@ -97,6 +97,8 @@ class Chain:
         What would tell its look-alikes apart.
     unexplained : str
         What no account explains, in a sentence; empty where nothing.
+    quiet : bool
+        Whether the hold-out shows no gap at all: what the fit logs happen to have is blamed on nothing.
     """
 
     signal: str
@@ -108,6 +110,7 @@ class Chain:
     unexcited: dict[str, str] = field(default_factory=dict)
     next_step: str = ""
     unexplained: str = ""
+    quiet: bool = False
 
     @classmethod
     def silent(cls, signal: str, observations: int, effects: Collection[str], why: str) -> Chain:
@@ -116,8 +119,10 @@ class Chain:
         return cls(signal, observations, 0.0, nothing, (), unexcited=dict.fromkeys(effects, why))
 
     def best(self) -> Account:
-        """The account that stands: with more effects only where that is decisive."""
+        """The account that stands: with more effects only where that is decisive, and none where all is quiet."""
         best = self.nothing
+        if self.quiet:
+            return best
         for account in sorted(self.accounts, key=lambda a: (len(a.effects), -a.score)):
             margin = DECISIVE if len(account.effects) > len(best.effects) else 0.0
             if account.score > best.score + margin:

@@ -213,7 +213,10 @@ def _column(column: int, stretches: Stretches) -> Array:
 
 
 def with_class_offsets(stretches: Stretches) -> FrictionFit:
-    """The class's value plus an offset per class; classes that were not driven on are left open."""
+    """The class's value plus an offset per class; classes that were not driven on are left open.
+
+    Intervals hold what a reference's calibration may be off, which no number of stretches averages out.
+    """
     values = np.zeros(len(CLASSES))
     parameters = {}
     for c, name in enumerate(CLASSES):
@@ -223,6 +226,7 @@ def with_class_offsets(stretches: Stretches) -> FrictionFit:
             continue
         off = (stretches.reference - stretches.class_value)[here]
         values[c], half = _location(off, stretches.deviation[here])
+        half = float(np.hypot(half, 1.96 * calibration_error(stretches.class_value[here])[0]))
         parameters[name] = Interval(float(values[c]), float(values[c] - half), float(values[c] + half))
 
     def predict(s: Stretches) -> Array:

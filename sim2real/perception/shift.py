@@ -43,6 +43,8 @@ SAME_SPEED_M_S = 2.0
 """Crossings within this range of speeds count as one speed [m/s]."""
 NOTABLE = 3.0
 MOST_PLACES = 4
+FEWEST_UNSEEN = 4
+"""Borders passed on the hold-out that can say that there is no shift."""
 MOSTLY = 0.5
 """An account that leaves no more than this share of the gap explains it, though the rest shows a pattern [-]."""
 AROUND_S = 0.2
@@ -225,6 +227,7 @@ def shift_chain(
         tuple(accounts[1:]),
         places=_places(accounts[0], unseen),
         next_step=NEXT_STEP,
+        quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
     )
     for choice in outside:
         other = _account(fit(choice), plain, unseen, height_m, scale, known)
