@@ -1,14 +1,17 @@
 """How well an entry does, and what that makes of one effect or two: on made-up residuals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_drives import MODEL, STEP_S, clean, noisy, pulses
 
 from sim2real.contest import Contest, Entry
-from sim2real.drive import SPEED
+from sim2real.drive import SPEED, WHEEL
 from sim2real.evidence import gather
 from sim2real.fitting import ROBUST_FROM, Candidate, fit
-from sim2real.goodness import Fitness, fitness, inflation
+from sim2real.goodness import Fitness, fitness, gross_share, inflation
+from sim2real.lattice import Lattice
 from sim2real.selection import (
     EXPLAINED_MISFIT,
     EXPLAINED_MOST,
@@ -21,6 +24,8 @@ from sim2real.selection import (
     probabilities,
     takes_two,
 )
+
+COUNTER = Lattice(quantum_rad_s=0.1, window_s=0.02, sigma_rad_s=0.01, step_s=STEP_S)
 
 
 def made_up(loss_fit, loss_hold, size, count=1000):
@@ -125,3 +130,13 @@ def test_two_take_the_place_of_one_by_what_they_take_off(loss, misfit, explained
     best, pair = (made_up(share * 1e4, share * 1e4, 0) for share in (1.0, loss))
     fits = (Fitness(2.0, {}), Fitness(2.0 * misfit, {}))
     assert takes_two(best, pair, *fits, explained) is taken
+
+
+@pytest.mark.parametrize(("channel", "counted"), [(WHEEL, 0.0), (SPEED, 0.2)])
+def test_a_counters_flanks_are_no_rare_gap_and_what_other_sensors_have_is_one(tiny, channel, counted):
+    rows = np.zeros((len(tiny.drives[0]), 7))
+    rows[: len(rows) // 5, channel] = 30.0
+    entry = Entry((), None, rows.ravel(), rows.ravel())
+    pulse_counted = replace(tiny, drives=(replace(tiny.drives[0], lattice=COUNTER),))
+    assert gross_share(entry, tiny, tiny) == pytest.approx(0.2, abs=0.05)
+    assert gross_share(entry, pulse_counted, pulse_counted) == pytest.approx(counted, abs=0.05)
