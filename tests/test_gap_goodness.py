@@ -135,7 +135,7 @@ def test_two_take_the_place_of_one_by_what_they_take_off(loss, misfit, explained
 @pytest.mark.parametrize(("channel", "counted"), [(WHEEL, 0.0), (SPEED, 0.2)])
 def test_a_counters_flanks_are_no_rare_gap_and_what_other_sensors_have_is_one(tiny, channel, counted):
     rows = np.zeros((len(tiny.drives[0]), 7))
-    rows[: len(rows) // 5, channel] = 30.0
+    rows[:20, channel] = 30.0  # within the first of five blocks
     entry = Entry((), None, rows.ravel(), rows.ravel())
     pulse_counted = replace(tiny, drives=(replace(tiny.drives[0], lattice=COUNTER),))
     assert gross_share(entry, tiny, tiny) == pytest.approx(0.2, abs=0.05)
