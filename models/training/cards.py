@@ -277,7 +277,7 @@ a patch (`trpac_core/vision/scene.py`) times a matrix are added to its logits; w
 picture leaves it out. Learned last, the rest fixed, by multinomial regression with a ridge: {patches} patches of the
 real training pictures and of rendered worlds that the network had not seen (seeds from
 {SEED_RANGES["train"].start + FIRST_SCENE_WORLD}), each with its picture as two undisturbed cameras would show both,
-drawn by the same shares. Logits per standard deviation:
+drawn by the same shares (`python -m models.training --only scene` does this again). Logits per standard deviation:
 
 {weights}
 
