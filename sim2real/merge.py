@@ -16,6 +16,8 @@ from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Une
 
 NO_GAP_DOUBT = 0.1
 """Probability that is left to the effects of data that show no gap: some of them would hardly show [-]."""
+UNKNOWN_BELIEF = 0.2
+"""Share of the camera's effects in the belief where what they leave says that it is none of them, or not all [-]."""
 CERTAIN = 0.97
 """Probability of what a mark that nothing else leaves has shown [-]."""
 
@@ -104,10 +106,11 @@ def _shares(found: PerceptionFinding) -> dict[str, float]:
     scores = np.array([0.0, *(c.score for c in found.candidates)])
     weight = np.exp(scores - scores.max())
     weight /= weight.sum()
+    belief = UNKNOWN_BELIEF if found.verdict is Verdict.UNKNOWN else CERTAIN
     share: dict[str, float] = {}
     for candidate, w in zip(found.candidates, weight[1:], strict=True):
         for effect in candidate.effects:
-            share[effect] = share.get(effect, 0.0) + CERTAIN * float(w) / len(candidate.effects)
+            share[effect] = share.get(effect, 0.0) + belief * float(w) / len(candidate.effects)
     return share
 
 

@@ -17,6 +17,7 @@ from benchmarks.blind.__main__ import Size
 from benchmarks.blind.baselines import cosine
 from benchmarks.blind.command import watch
 from benchmarks.blind.generator.cases import make_case
+from benchmarks.blind.generator.driver import UndrivableError
 from benchmarks.blind.generator.forms import ASPECTS, EFFECT_FORMS, Family
 from benchmarks.blind.generator.table import SIZES, Group, Spec, table
 from benchmarks.blind.outcome import ResultError, outcome_of, read_outcomes
@@ -332,6 +333,15 @@ def test_a_diagnosis_that_fails_is_counted_and_not_repeated(tmp_path, fake_diagn
     assert runner.pending(tmp_path, "small", FIRST)[0] == [s for s in waiting if s != spec]
     assert len(waiting) == total
     assert counted(score(read_outcomes(tmp_path), LIMITS), "false_alarm") == (1, 1)
+
+
+def test_a_case_that_cannot_be_made_stays_pending_and_stops_no_run(tmp_path, monkeypatch):
+    def nothing_shows(spec, seed, family):
+        raise UndrivableError("nothing in the drive shows the deviation")
+
+    monkeypatch.setattr(runner, "make_case", nothing_shows)
+    assert "not made: nothing in the drive" in runner.run_case(BIAS, 1, FIRST, tmp_path, keep=False)["error"]
+    assert not list(tmp_path.iterdir())
 
 
 def test_scores_tell_what_is_pending_and_are_drawn(tmp_path, fake_diagnose):

@@ -10,6 +10,7 @@ from scenarios.effects import make_effect
 from scenarios.files import VehicleFile
 from scenarios.perception import perceive
 from scenarios.plant import make_log, simulate
+from sim2real.merge import UNKNOWN_BELIEF, camera_side
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Verdict
 
@@ -650,3 +651,11 @@ def test_a_twin_is_not_blamed_for_a_law_that_is_not_its_own(faults, law):
     assert finding.verdict is Verdict.UNKNOWN
     assert all(true not in c.effects for c in finding.candidates)
     assert law in finding.unexplained[0]
+
+
+def test_an_unknown_finding_does_not_believe_in_its_best_effect():
+    blamed = diagnose(Camera(delay_s=0.25), speeds=SLOW_AND_FAST)
+    unknown = diagnose(Camera(delay_s=0.25), exclude=("camera_latency",), speeds=SLOW_AND_FAST)
+    assert unknown.verdict is Verdict.UNKNOWN
+    assert sum(c.probability for c in camera_side(unknown).causes) <= UNKNOWN_BELIEF + 1e-9
+    assert camera_side(blamed).causes[0].probability > 0.8

@@ -22,7 +22,7 @@ from joblib import Parallel, delayed, parallel_config
 
 from .baselines import cosine
 from .command import arguments, watch
-from .generator.cases import Case
+from .generator.cases import Case, UndrivableError
 from .generator.forms import Family
 from .generator.making import make_case
 from .generator.table import Group, Spec, table
@@ -103,8 +103,11 @@ def run(out: Path, size: str, seed: int, family: Family, jobs: int, keep: bool) 
 
 
 def run_case(spec: Spec, seed: int, family: Family, out: Path, keep: bool) -> dict[str, Any]:
-    """Make one case, have it diagnosed, write the result."""
-    case = make_case(spec, seed, family)
+    """Make one case, have it diagnosed, write the result; a case that cannot be made stays pending."""
+    try:
+        case = make_case(spec, seed, family)
+    except UndrivableError as problem:
+        return {"case": spec.name, "error": f"not made: {problem}"}
     folder = write_case(case, seed, out)
     said = _timed(folder) if spec.group is Group.TIMING else _in_process(case, folder, seed)
     ranked = spec.group is Group.RICH and spec.name.endswith(COSINE_CASE) and not spec.camera
