@@ -96,8 +96,23 @@ def camera_side(found: PerceptionFinding) -> Side:
         cannot_rule_out=tuple(found.cannot_rule_out),
         places=found.places,
         unexplained=term,
-        sentence=found.next_step,
+        sentence=f"{_in_numbers(found)} {found.next_step}".strip(),
         warnings=(*found.warnings, *found.unexplained),
+    )
+
+
+def _in_numbers(found: PerceptionFinding) -> str:
+    """What the causes do to the camera's gap, and at which values; empty where nothing is blamed."""
+    blamed = next((c for c in found.candidates if set(c.effects) == set(found.causes)), None)
+    if blamed is None or found.verdict is Verdict.UNKNOWN:
+        return ""
+    values = ", ".join(
+        f"{name} {value.value:.3g} {value.unit}".removesuffix(" -")
+        for name, value in blamed.parameters.items()
+    )
+    return (
+        f"with {values} the camera's gap goes from {found.before.total:.1f} to {found.after.total:.1f} times the noise "
+        "floor."
     )
 
 

@@ -1,4 +1,5 @@
 import json
+import re
 from dataclasses import replace
 
 import cv2
@@ -659,3 +660,11 @@ def test_an_unknown_finding_does_not_believe_in_its_best_effect():
     assert unknown.verdict is Verdict.UNKNOWN
     assert sum(c.probability for c in camera_side(unknown).causes) <= UNKNOWN_BELIEF + 1e-9
     assert camera_side(blamed).causes[0].probability > 0.8
+
+
+def test_a_blamed_effect_is_told_with_its_values_and_what_it_does():
+    told = camera_side(diagnose(Camera(delay_s=0.25), speeds=SLOW_AND_FAST)).sentence
+    assert re.match(
+        r"with delay_s 0\.2\d+ s the camera's gap goes from \d+\.\d to 1\.\d times the noise floor\.", told
+    )
+    assert camera_side(diagnose(Camera(), speeds=SLOW_AND_FAST)).sentence == ""
