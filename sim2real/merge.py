@@ -14,7 +14,7 @@ from sim2real.lattice import Lattice
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Unexplained, Verdict
 
-NO_GAP_DOUBT = 0.1
+QUIET_SIDE_DOUBT = 0.1
 """Probability that is left to the effects of data that show no gap: some of them would hardly show [-]."""
 UNKNOWN_BELIEF = 0.2
 """Share of the camera's effects in the belief where what they leave says that it is none of them, or not all [-]."""
@@ -214,7 +214,7 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         main_causes = [replace(c, probability=0.5 * c.probability) for c in main_causes]
         side_causes = [replace(c, probability=0.5 * c.probability) for c in side_causes]
     elif side.verdict is Verdict.NO_GAP:
-        left = min(max(0.0, 1.0 - sum(c.probability for c in main_causes)), NO_GAP_DOUBT)
+        left = min(max(0.0, 1.0 - sum(c.probability for c in main_causes)), QUIET_SIDE_DOUBT)
         total = max(sum(c.probability for c in side_causes), 1e-12)
         side_causes = [replace(c, probability=c.probability * min(1.0, left / total)) for c in side_causes]
     else:

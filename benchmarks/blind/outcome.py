@@ -11,6 +11,7 @@ from typing import Any
 
 from .baselines import closure, in_sample_bic
 from .generator.camera_library import CAMERA_LIBRARY
+from .generator.camera_road import CLASS_FRICTION, SURFACES
 from .generator.forms import Family, is_further
 from .generator.library import LIBRARY
 from .generator.table import Group
@@ -180,14 +181,12 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
     )
 
 
-CLASS_VALUES = {"dry": 0.8, "wet": 0.6, "snow_ice": 0.2}
-
-
 def _as_the_library_has_them(effect: str, parameters: dict[str, float]) -> dict[str, float]:
     """A seal's parameters; the contract leaves open whether a class's friction is its value or how far that is off."""
     if effect != "class_friction_offset":
         return parameters
-    return {name: value - CLASS_VALUES[name] for name, value in parameters.items()}
+    usual = dict(zip(SURFACES, CLASS_FRICTION, strict=True))
+    return {name: value - usual[name] for name, value in parameters.items()}
 
 
 def _single(causes: Iterable[Mapping[str, Any]]) -> Iterable[tuple[str, float]]:

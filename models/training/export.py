@@ -31,7 +31,6 @@ def export_segmenter(net: Segmenter, path: Path) -> None:
     """Write segmenter.onnx: `image` uint8 (1, 160, 256, 3) BGR to `drivable`, `shadow` (1, 160, 256)."""
     example = torch.zeros((1, 160, 256, 3), dtype=torch.uint8)
     _export(_SegmenterGraph(net), example, path, "image", ["drivable", "shadow"], None)
-    _tidy(path)
     annotate(path, {"task": "drivable area and road shadow"})
 
 
@@ -43,7 +42,6 @@ def export_surface(net: SurfaceNet, temperature: float, path: Path) -> None:
     example = torch.zeros((2, 64, 96, 3), dtype=torch.uint8)
     _export(net, example, path, "patches", ["logits", "readable"], {"patches": {0: "n"}})
     classes = ",".join(surface.label for surface in Surface)
-    _tidy(path)
     annotate(path, {"temperature": f"{temperature:.6f}", "classes": classes})
 
 
@@ -62,6 +60,7 @@ def _export(
             f"{path}: torch exported no ONNX program; check the versions in requirements/train.txt"
         )
     program.save(str(path), external_data=False)
+    _tidy(path)
 
 
 def _tidy(path: Path) -> None:

@@ -46,6 +46,7 @@ OUTLIERS = {"train": 12000, "val": 1600}
 LOOKS, READ_LOOKS = {"": 1500}, {"": 1500, "condition_web": 7500, "rendered": 5500}
 """Most patches of each source ("" stands for all others) for the head that tells disturbed patches, and for the one
 that tells readable road, which must know many roads."""
+
 Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 

@@ -35,10 +35,10 @@ NOTABLE, MOST_PLACES = 2.0, 4
 NORMAL_RANGE = 2.0
 """Standard deviations of a normal level, of usual mistakes and of usual light together that are no gap [-]."""
 FEWEST_BLOCKS = 8
+"""With fewer blocks nothing is said of confidence."""
 RESTLESS = 0.25
 """Standard deviation of the logarithm of confidence, from second to second on one class at one speed, from which on it
 is a gap of its own: chains that nothing disturbs were within 0.15, one that the sun blinds at times beyond 0.4 [-]."""
-"""With fewer blocks nothing is said of confidence."""
 
 
 @dataclass(frozen=True)

@@ -30,15 +30,10 @@ def class_error(results: Sequence[Results]) -> float:
     Results are laid over the road as they fit best, so that a late camera's are not wrong ones. Segments that mostly
     show one other class are left out: there the road differs, not the picture.
     """
-    if not results:
-        return float("nan")
-    age_s, way_m = rough_shift(results)
     wrong = [np.empty(0, dtype=np.bool_)]
-    for one in results:
-        late_m = one.driven_m(one.time_s, np.array([age_s]))[:, 0] + way_m
-        for segment, inside in _inside(one, 0.5 * (one.from_m + one.to_m) - late_m):
-            if _other_class(one, segment, inside) is None:
-                wrong.append(one.classes[inside] != segment.surface_class)
+    for one, segment, inside in _laid_over(results):
+        if _other_class(one, segment, inside) is None:
+            wrong.append(one.classes[inside] != segment.surface_class)
     every = np.concatenate(wrong)
     return float(every.mean()) if len(every) else float("nan")
 
@@ -53,19 +48,16 @@ class Conflict:
 
 def class_conflicts(results: Sequence[Results]) -> tuple[Conflict, ...]:
     """All of them, results laid over the road as they fit best."""
-    age_s, way_m = rough_shift(results) if results else (0.0, 0.0)
     found = []
-    for one in results:
-        late_m = one.driven_m(one.time_s, np.array([age_s]))[:, 0] + way_m
-        for segment, inside in _inside(one, 0.5 * (one.from_m + one.to_m) - late_m):
-            other = _other_class(one, segment, inside)
-            if other is not None and inside.sum() >= FEWEST:
-                share = (one.classes[inside] == other).mean()
-                sentence = (
-                    f"{one.log}: from {segment.start_m:g} m on the camera sees {other.label} in {100.0 * share:.0f} % "
-                    f"of its results where road.yaml has {segment.surface}."
-                )
-                found.append(Conflict(one.log, sentence))
+    for one, segment, inside in _laid_over(results):
+        other = _other_class(one, segment, inside)
+        if other is not None and inside.sum() >= FEWEST:
+            share = (one.classes[inside] == other).mean()
+            sentence = (
+                f"{one.log}: from {segment.start_m:g} m on the camera sees {other.label} in {100.0 * share:.0f} % "
+                f"of its results where road.yaml has {segment.surface}."
+            )
+            found.append(Conflict(one.log, sentence))
     return tuple(found)
 
 
@@ -85,6 +77,17 @@ def _other_class(one: Results, segment: RoadSegment, inside: NDArray[np.bool_]) 
     seen = np.bincount(one.classes[inside], minlength=len(Surface))
     most = Surface(int(seen.argmax()))
     return most if most != segment.surface_class and seen[most] >= MOSTLY * seen.sum() else None
+
+
+def _laid_over(results: Sequence[Results]) -> Iterator[tuple[Results, RoadSegment, NDArray[np.bool_]]]:
+    """Results over the road as they fit best: each log, each segment, and which of its results lie well within."""
+    if not results:
+        return
+    age_s, way_m = rough_shift(results)
+    for one in results:
+        late_m = one.driven_m(one.time_s, np.array([age_s]))[:, 0] + way_m
+        for segment, inside in _inside(one, 0.5 * (one.from_m + one.to_m) - late_m):
+            yield one, segment, inside
 
 
 def _inside(one: Results, place_m: Array) -> Iterator[tuple[RoadSegment, NDArray[np.bool_]]]:

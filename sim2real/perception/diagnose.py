@@ -29,10 +29,10 @@ NOISE_FLOOR = 1.0
 """Size of the gap that noise alone leaves, per signal and in total [-]."""
 UNEXPLAINED = 2.5
 """Rest of a signal, in standard deviations, from which on its best account does not explain it [-]."""
-MAKE_CLASSES_ERR = {"exposure_shift", "motion_blur"}
-"""Effects under which classes may be wrong for whole stretches."""
 TYPICAL = 0.75
 """Quantile that is taken for it: a few odd borders or stretches depend on nothing, a whole class of road does."""
+MAKE_CLASSES_ERR = {"exposure_shift", "motion_blur"}
+"""Effects under which classes may be wrong for whole stretches."""
 BOOTSTRAP = 400
 QUANTILES = (0.025, 0.975)
 

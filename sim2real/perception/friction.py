@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,12 +203,13 @@ def as_simulated(stretches: Stretches, offset: Array, camera: bool) -> FrictionF
             stretches.simulated[:, column], stretches.simulated[:, column % OF_ROAD_FILE]
         )
         if is_found or not camera:
-            fits.append(FrictionFit((), 0, partial(_column, column), {}, what))
+            fits.append(_of_column(column, what))
     return max(fits, key=lambda f: f.log_likelihood(stretches))
 
 
-def _column(column: int, stretches: Stretches) -> Array:
-    return stretches.simulated[:, column]
+def _of_column(column: int, what: str) -> FrictionFit:
+    """One of the frictions that the simulation has, taken as it is."""
+    return FrictionFit((), 0, lambda s: s.simulated[:, column], {}, what)
 
 
 def with_class_offsets(stretches: Stretches) -> FrictionFit:
@@ -250,7 +250,7 @@ def with_road_factor(stretches: Stretches) -> FrictionFit:
 
 def _follows_road(stretches: Stretches, factor: FrictionFit) -> bool:
     """Whether road.yaml's friction, or the tyre's peak on it, does as well as a factor on it: then there is none."""
-    plain = [FrictionFit((), 0, partial(_column, column), {}, "") for column in range(OF_ROAD_FILE)]
+    plain = [_of_column(column, what) for column, what in enumerate(SIMULATED[:OF_ROAD_FILE])]
     best = max(fit.log_likelihood(stretches) for fit in plain)
     return factor.log_likelihood(stretches) - best < DECISIVE
 
