@@ -32,6 +32,8 @@ STAGES = {
     "fuse": ["update_weights", "basic_probability", "combine"],
 }
 WARM_UP = 5
+STEP_M = 0.5
+"""Way from frame to frame: enough for the middle group to be looked at in each [m]."""
 
 
 class Stopwatch:
@@ -71,7 +73,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--side", choices=["left", "right", "both"], default="both")
     parser.add_argument(
-        "--groups", type=int, choices=[1, 2, 3], default=1, help="the units look at the near one"
+        "--groups", type=int, choices=[1, 2, 3], default=1, help="with a verdict: in the units the near one"
     )
     options = parser.parse_args()
 
@@ -92,7 +94,8 @@ def main() -> None:
     state, n_roi, decode_ms = IfeState(), 0, []
     for frame in range(WARM_UP + options.frames):
         begin = time.perf_counter()
-        state, result = estimator.process(state, pictures[frame % len(pictures)], Motion(10.0))
+        motion = Motion(10.0, way_m=STEP_M * frame)
+        state, result = estimator.process(state, pictures[frame % len(pictures)], motion)
         watch.end_frame(time.perf_counter() - begin)
         n_roi += sum(group.n_roi for group in result.groups)
         begin = time.perf_counter()

@@ -98,7 +98,9 @@ def draw_looks(
         progress(place + 1, max(chosen) + 1)
         image = decode_image(Path(frame["path"]))
         row = run.table.iloc[int(frame["row"])]
-        motion = Motion(float(row["vehicle_speed_m_s"]), float(row["accel_x_m_s2"]))
+        motion = Motion(
+            float(row["vehicle_speed_m_s"]), float(row["accel_x_m_s2"]), way_m=float(frame["front_axle_m"])
+        )
         state, result = ife.process(state, image, motion, with_view=place in chosen)
         if place in chosen:
             caption = f"t {frame['time_s']:.2f} s, front axle at {frame['front_axle_m']:.1f} m"

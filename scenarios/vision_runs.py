@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -156,6 +156,7 @@ def run_frames(
         segmenter,
         Ife(IfeConfig(camera=camera), segmenter, classifier),
         Voting(VotingConfig(camera=camera), segmenter, classifier),
+        speed_m_s / fps,
         Motion(speed_m_s),
     )
     with scratch_for(out) as scratch:
@@ -164,7 +165,7 @@ def run_frames(
         for number, (name, image) in enumerate(frames):
             caption = f"{name}  {number / fps:.2f} s"
             try:
-                row, shown = watcher.look(name, image, caption)
+                row, shown = watcher.look(number, name, image, caption)
             except ImageError as error:
                 unreadable.append({"frame": name, "reason": str(error)})
                 row, shown = (name, "", None, None, None, 0, "", None), dark(film.size, caption)
@@ -206,12 +207,13 @@ def _nothing_usable(frames: Frames, unreadable: Sequence[dict[str, str]]) -> str
 class _Watcher:
     """Both estimators over successive frames; the memory of the image estimator lies here."""
 
-    def __init__(self, segmenter: Segmenter, ife: Ife, voting: Voting, motion: Motion) -> None:
-        self._segmenter, self._ife, self._voting, self._motion = segmenter, ife, voting, motion
+    def __init__(self, segmenter: Segmenter, ife: Ife, voting: Voting, step_m: float, motion: Motion) -> None:
+        self._segmenter, self._ife, self._voting = segmenter, ife, voting
+        self._step_m, self._motion = step_m, motion
         self._state = IfeState()
 
     def look(
-        self, name: str, image: NDArray[np.uint8] | ImageError, caption: str
+        self, number: int, name: str, image: NDArray[np.uint8] | ImageError, caption: str
     ) -> tuple[tuple[Any, ...], NDArray[np.uint8]]:
         """Row of the table and annotated picture; raises ImageError, and then nothing is remembered."""
         if isinstance(image, ImageError):
@@ -219,9 +221,10 @@ class _Watcher:
         if not self._state.frame_count:
             # The networks' first run sets up their memory: it says nothing of a frame's time.
             self._ife.process(self._state, image, self._motion)
+        motion = replace(self._motion, way_m=number * self._step_m)
         start = time.perf_counter()
         masks = self._segmenter.segment(image)
-        after, result = self._ife.process(self._state, image, self._motion, masks=masks, with_view=True)
+        after, result = self._ife.process(self._state, image, motion, masks=masks, with_view=True)
         ms = 1e3 * (time.perf_counter() - start)
         vote = self._voting.process(self._state.frame_count, image, masks=masks)
         self._state = after

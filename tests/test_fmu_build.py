@@ -174,6 +174,7 @@ NOT_OFFERED = {
     "vision.remove_shadow",
     "vision.calibrate",
     "vision.weight_evidence",
+    "vision.use_foresight",
     "vision.use_scene",
     "elastic.coasting",
     "elastic.gentle",

@@ -98,7 +98,11 @@ def _judged(
     if ife is None:
         raise TypeError("A picture came, but the estimator was made without an image estimator.")
     motion = Motion(
-        sensors.vehicle_speed_m_s, acceleration_m_s2, sensors.steering_angle_rad, sensors.yaw_rate_rad_s
+        sensors.vehicle_speed_m_s,
+        acceleration_m_s2,
+        sensors.steering_angle_rad,
+        sensors.yaw_rate_rad_s,
+        state.position_m,
     )
     state.ife, result = ife.process(state.ife, frame, motion)
     return Outcome(result.surface, result.Q_v, result.flag, state.time_s)

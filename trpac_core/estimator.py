@@ -110,6 +110,11 @@ class TrpacEstimator:
         """The estimate of the step before."""
         return self._last
 
+    @property
+    def way_m(self) -> float:
+        """Way of the front wheel of this side since the start [m]."""
+        return self._state.position_m
+
     def step(
         self,
         step_s: float,
@@ -374,9 +379,8 @@ class TrpacEstimator:
         state = self._state
         passed_s = step_s if 0.0 < step_s <= LONGEST_STEP_S else 0.0
         if step_s > LONGEST_STEP_S:
-            state.preview = (
-                PreviewState()
-            )  # the car may be anywhere: what was seen ahead is not under the wheel
+            # The car may be anywhere: what was seen ahead is not under the wheel.
+            state.preview, state.ife = PreviewState(), state.ife.elsewhere()
         if not implausible(sensors, MOTION):
             if frame is not None or frame_failed:
                 acceleration = state.acceleration_m_s2

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .car_friction import car_friction
 from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
-from .readings import PLAUSIBLE, Sensors
+from .readings import LONGEST_STEP_S, PLAUSIBLE, Sensors
 from .vision.results import FrameResult
 from .vision.sides import SidesIfe, SidesState
 from .vision.trajectory import Motion
@@ -156,6 +156,8 @@ class FourWheels:
         ImageError
             If the picture does not fit the camera; nothing has changed then.
         """
+        if step_s > LONGEST_STEP_S:
+            self._camera = self._camera.elsewhere()
         left, right = (None, None) if frame is None else self._verdicts(sensors, frame)
         omega, torque, speed, _, steering, accel, _, yaw = sensors
         speeds_m_s = (speed, speed, speed, speed)
@@ -217,6 +219,7 @@ class FourWheels:
             accel if accel is not None and abs(accel) <= _STEEPEST else 0.0,
             sensors.steering_angle_rad,
             sensors.yaw_rate_rad_s,
+            0.5 * (self._wheels[0].way_m + self._wheels[1].way_m),
         )
         self._camera, left, right = self._ife.process(self._camera, frame, motion)
         return self._as_class(left), self._as_class(right)

@@ -26,6 +26,8 @@ from trpac_hil.shared import Numbers, Ring
 MODELS = Path(__file__).parent.parent / "models"
 FAILED = -1.0
 """In the place of a class: the picture could not be used."""
+MOTION = ("speed_m_s", "acceleration_m_s2", "steering_angle_rad", "yaw_rate_rad_s", "way_m")
+"""What the loop shares of the car's motion; the yaw rate is NaN where it is not measured."""
 HEAD = 5
 """Numbers of a result before the verdicts: picture, time taken, time ready [ns], pictures left out, work [ms]."""
 RESULTS_KEPT = 64
@@ -121,9 +123,9 @@ class Eyes:
 
 
 def motion_of(numbers: Sequence[float]) -> Motion:
-    """Motion from what the loop shares: speed, acceleration, steering angle, yaw rate (NaN: none)."""
-    speed, acceleration, steering, yaw = numbers
-    return Motion(speed, acceleration, steering, None if math.isnan(yaw) else yaw)
+    """Motion from the numbers `MOTION` that the loop shares."""
+    speed, acceleration, steering, yaw, way = numbers
+    return Motion(speed, acceleration, steering, None if math.isnan(yaw) else yaw, way)
 
 
 def watch(job: CameraJob, motion: Numbers, results: Ring, control: Control) -> None:

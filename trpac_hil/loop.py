@@ -180,7 +180,7 @@ class Loop:
         values = self._snapshot(began_ns)
         self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
         sight = self._sight
-        sight.share_motion(self.odometer.speed_m_s, values)
+        sight.share_motion(self.odometer, values)
         heard = self._inputs.heard["RoadClass"]
         if sight.news(heard, "RoadClass" in fresh, self.odometer, began_ns, self._events.say):
             self._unit.give_class(sight.classes, sight.number)

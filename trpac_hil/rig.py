@@ -23,7 +23,7 @@ from trpac_core.vehicle import Vehicle
 from trpac_core.vision.ife import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.bus import BusSettings, Link
-from trpac_hil.camera import RESULTS_KEPT, CameraJob, Folder, result_columns, watch
+from trpac_hil.camera import MOTION, RESULTS_KEPT, CameraJob, Folder, result_columns, watch
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, load_codec
 from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock
 from trpac_hil.delays import Delays, ThreadAccounts
@@ -234,7 +234,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
     placing = Placing(preview, 1.0 / settings.fps, IfeConfig.flag_threshold, sides)
     sight = Sight(placing, stale_ns, unit.wiring.side_names)
     if seen is not None:
-        results, motion = Ring(result_columns(sides), RESULTS_KEPT), Numbers(4)
+        results, motion = Ring(result_columns(sides), RESULTS_KEPT), Numbers(len(MOTION))
         sight = Sight(placing, stale_ns, unit.wiring.side_names, results, motion)
         rig.add("camera", watch, seen, motion, results, ...)
     over = threading.Event()

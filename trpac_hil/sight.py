@@ -58,16 +58,17 @@ class Sight:
         self._told: tuple[Outcome | None, ...] = (None,) * len(side_names)
         self._number_by_bus = math.nan
 
-    def share_motion(self, speed_m_s: float, values: Mapping[str, float]) -> None:
+    def share_motion(self, odometer: Odometer, values: Mapping[str, float]) -> None:
         """Let the camera's process know how the car moves; what is lost counts as 0, the yaw rate as not measured."""
         if self._motion is not None:
             accel, steering = values["AccelX"], values["SteeringAngle"]
             self._motion.set(
                 (
-                    speed_m_s,
+                    odometer.speed_m_s,
                     accel if math.isfinite(accel) else 0.0,
                     steering if abs(steering) < STEEPEST_RAD else 0.0,
                     values["YawRate"],
+                    odometer.position_m,
                 )
             )
 

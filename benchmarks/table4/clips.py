@@ -42,6 +42,7 @@ class AssumedSource(BaseModel):
     usable: list[list[int]] = []
     speed_m_s: float
     consecutive: bool
+    interval_s: float | None = None
 
     def camera(self) -> Camera:
         """The assumed camera of the cropped picture: what the rows below the crop showed is no part of it."""
@@ -56,6 +57,10 @@ class AssumedSource(BaseModel):
             height_m=self.height_m,
             pitch_rad=float(np.arctan((middle - self.horizon_row) / self.fx_px)),
         )
+
+    def step_m(self) -> float | None:
+        """Way from frame to frame in the camera's scale, in which regions are `roi_scale` as wide [m]."""
+        return None if self.interval_s is None else self.roi_scale * self.speed_m_s * self.interval_s
 
     def usable_shares(self) -> tuple[Box, ...]:
         """Parts that may be judged, as shares of the cropped picture."""
@@ -98,6 +103,7 @@ def _clips(pictures: Iterable[Picture], assumed: Iterable[AssumedSource]) -> Ite
                 roi_scale=source.roi_scale,
                 cropped_rows=source.cropped_rows or 0,
                 consecutive=source.consecutive,
+                step_m=source.step_m(),
             )
 
 

@@ -143,4 +143,5 @@ def _sequence(drawn: Plan, folder: Path) -> Sequence:
         camera=drawn.camera,
         motion=Motion(drawn.speed_m_s),
         frames=tuple(Frame(folder / f"{n:03d}.jpg", truth(n)) for n in range(FRAMES)),
+        step_m=STEP_M,
     )

@@ -29,6 +29,7 @@ VARIANTS: dict[str, Changes] = {
     "equal weights": {"weight_evidence": False},
     "several widths": {"roi_spread": 1.7},
     "patches alone": {"use_scene": False},
+    "no foresight": {"use_foresight": False},
 }
 VOTING = "voting"
 DISTURBANCE_SEED = 5_000_000
@@ -113,7 +114,7 @@ def judged(
         truth, share = majority(frame.truth(corners_m))
         common = (sequence.name, sequence.source, frame.part, number, scenario)
         for name, ife in estimators.items():
-            states[name], result = ife.process(states[name], image, sequence.motion, masks=masks)
+            states[name], result = ife.process(states[name], image, sequence.motion_at(number), masks=masks)
             verdict = (int(result.surface), result.flag, result.Q_v, result.near.m_0)
             rows.append((*common, name, int(truth), share, *verdict))
         vote = voting.process(number, image, masks=masks)
@@ -150,7 +151,7 @@ def near_corners(config: IfeConfig, networks: Networks, sequence: Sequence) -> N
     masks = RoadMasks(np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32))
     ife = Ife(config, networks.segmenter, networks.classifier)
     camera = fit_camera(config.camera, blank)
-    (near,) = ife.look(IfeState(), blank, sequence.motion, camera, masks, usable_road(masks, True), 1)
+    (near,) = ife.look(IfeState(), blank, sequence.motion, camera, masks, usable_road(masks, True))
     return near.corners.ground_m
 
 

@@ -54,6 +54,8 @@ class Sequence:
         False for stills: each is a drive of its own.
     consecutive : bool
         Whether the pictures follow each other at a frame rate.
+    step_m : float, optional
+        Way from frame to frame, of assumed cameras as guessed as their speed [m].
     """
 
     name: str
@@ -67,11 +69,16 @@ class Sequence:
     cropped_rows: int = 0
     memory: bool = True
     consecutive: bool = True
+    step_m: float | None = None
     notes: dict[str, str] = field(default_factory=dict)
 
     def validation_part(self) -> Sequence:
         """The frames of the split's part 'val': networks that learned from the source have not seen them."""
         return replace(self, frames=tuple(frame for frame in self.frames if frame.part == "val"))
+
+    def motion_at(self, number: int) -> Motion:
+        """The car's motion at a frame."""
+        return self.motion if self.step_m is None else replace(self.motion, way_m=number * self.step_m)
 
     def picture(self, frame: Frame) -> Image:
         """The picture as the estimator gets it, BGR; raises OSError."""

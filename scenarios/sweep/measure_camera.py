@@ -78,7 +78,7 @@ def verdicts(scenario: Scenario) -> Iterator[Verdict]:
         _, packed = cv2.imencode(".jpg", image, quality)
         began = time.perf_counter()
         decoded = np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), dtype=np.uint8)
-        state, result = ife.process(state, decoded, Motion(SPEED_M_S))
+        state, result = ife.process(state, decoded, Motion(SPEED_M_S, way_m=float(place)))
         passed = time.perf_counter() - began
         ends = [scenario.road.segment_at(float(place) + ahead).surface_class for ahead in (near_m, far_m)]
         middle = scenario.road.segment_at(float(place) + 0.5 * (near_m + far_m)).surface_class

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .classes import Surface
 from .evidence import EvidenceState, WeightLaw, basic_probability, combine, update_weights, visual_confidence
+from .foresight import Look, due, recalled, within_reach
 from .images import ImageError
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
 from .regions import (
@@ -40,6 +41,9 @@ lowest of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
 
 LEAST_READABLE = 0.5
 """Probability of readable road below which a patch is left out [-]."""
+
+PATCHES_AHEAD = 3
+"""Patches of a look that is remembered: about ten looks pass through the near group's ground [-]."""
 
 SIDES = {"left": (1.0,), "right": (-1.0,), "both": (1.0, -1.0)}
 """Front wheels whose tracks are looked at, as the sign of their lateral position."""
@@ -91,12 +95,12 @@ class IfeConfig:
     seed : int
         Of the drawing of patches.
     groups_looked_at : int
-        How many groups from the near one on. The verdict is the near group's, so 1 gives the same verdicts in less
-        time, bit by bit; the others are for those who look at the road further ahead.
-    use_trajectory, remove_shadow, calibrate, weight_evidence, use_scene : bool
+        How many groups from the near one on have a verdict. The frame's is the near group's, so 1 gives the same in
+        less time, bit by bit; the others are for those who look at the road further ahead.
+    use_trajectory, remove_shadow, calibrate, weight_evidence, use_scene, use_foresight : bool
         Each False leaves that part of the method out, to measure what it is worth: the whole drivable strip
         ahead in place of the ellipses; shadow kept; T = 1; equal evidence weights in Eq. (8); patches judged
-        without the picture around them.
+        without the picture around them; no memory of what the middle group showed of road that is near now.
     """
 
     camera: Camera = field(default_factory=Camera)
@@ -123,6 +127,7 @@ class IfeConfig:
     calibrate: bool = True
     weight_evidence: bool = True
     use_scene: bool = True
+    use_foresight: bool = True
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict themselves, all at once; raises ValueError."""
@@ -169,20 +174,29 @@ class IfeConfig:
 
 @dataclass(frozen=True)
 class IfeState:
-    """What the estimator remembers: evidence weights per group, and the number of frames seen."""
+    """What the estimator remembers: evidence weights per group, frames seen, looks at road that was not near yet."""
 
     evidence: tuple[EvidenceState, ...] = (EvidenceState(),) * len(GROUP_NAMES)
     frame_count: int = 0
+    looks: tuple[Look, ...] = ()
+
+    def elsewhere(self) -> IfeState:
+        """The state of a car that may be anywhere by now: no road ahead is known."""
+        return replace(self, looks=())
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
-        return {"weights": [list(group.weights) for group in self.evidence], "frame_count": self.frame_count}
+        return {
+            "weights": [list(group.weights) for group in self.evidence],
+            "frame_count": self.frame_count,
+            "looks": [look.to_json() for look in self.looks],
+        }
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> IfeState:
         """The state that `to_json` wrote."""
         evidence = tuple(EvidenceState((dry, wet, snow_ice)) for dry, wet, snow_ice in data["weights"])
-        return cls(evidence, int(data["frame_count"]))
+        return cls(evidence, int(data["frame_count"]), tuple(Look.from_json(look) for look in data["looks"]))
 
 
 @dataclass(frozen=True)
@@ -191,6 +205,7 @@ class Region:
 
     corners: Corners
     centres_px: NDArray[np.float64]
+    ahead_m: NDArray[np.float64]
     widths_px: NDArray[np.float64]
     ellipses: tuple[Ellipses, ...]
     drawn: int
@@ -211,6 +226,7 @@ class Region:
         return replace(
             self,
             centres_px=self.centres_px[kept],
+            ahead_m=self.ahead_m[kept],
             widths_px=self.widths_px[kept],
             patches=tuple(patch for patch, keep in zip(self.patches, kept, strict=True) if keep),
         )
@@ -267,12 +283,11 @@ class Ife:
         camera = fit_camera(self.config.camera, image)
         masks = self._segmenter.segment(image) if masks is None else masks
         usable = usable_road(masks, self.config.remove_shadow)
-        looked_at = self.config.groups_looked_at
-        regions = self.look(state, image, motion, camera, masks, usable, looked_at)
+        regions = self.look(state, image, motion, camera, masks, usable)
         regions = self.classify(regions, image)
-        state, result = self.judge(state, regions)
+        state, result = self.judge(state, motion, regions)
         if with_view:
-            result = replace(result, view=_view(camera, masks, usable, regions))
+            result = replace(result, view=_view(camera, masks, usable, regions[: len(result.groups)]))
         return state, result
 
     def look(
@@ -283,26 +298,48 @@ class Ife:
         camera: Camera,
         masks: RoadMasks,
         usable: NDArray[np.bool_],
-        groups: int = len(GROUP_NAMES),
     ) -> list[Region]:
-        """The nearest groups' corners and patches in a picture of this camera's size."""
-        tracks = self._tracks(motion) if self.config.use_trajectory else []
+        """Corners and patches in a picture of this camera's size.
+
+        One region for each group that has a verdict, and a last one of the middle group's range where a look at it is
+        to be remembered.
+        """
+        groups, ahead = self.config.groups_looked_at, self._remembers(state, motion)
+        tracks = self._tracks(motion, max(groups, 1 + ahead)) if self.config.use_trajectory else []
+        wanted = [(index, index, self.config.b[index]) for index in range(groups)]
+        wanted += [(1, len(GROUP_NAMES), PATCHES_AHEAD)] * ahead
         return [
-            self._region(index, state.frame_count, tracks, camera, masks, usable).seen_in(image)
-            for index in range(groups)
+            self._region(index, (state.frame_count, draw), count, tracks, camera, masks, usable).seen_in(
+                image
+            )
+            for index, draw, count in wanted
         ]
 
-    def judge(self, state: IfeState, regions: list[Region]) -> tuple[IfeState, FrameResult]:
-        """The state after a frame and its verdict, from the classified regions."""
-        verdicts = [self._fuse(index, state.evidence[index], region) for index, region in enumerate(regions)]
+    def judge(self, state: IfeState, motion: Motion, regions: list[Region]) -> tuple[IfeState, FrameResult]:
+        """The state after a frame and its verdict, from the classified regions of `look`."""
+        near_m, at_m = self.config.ranges_m[0], motion.way_m
+        looks = state.looks if self.config.use_foresight and at_m is not None else ()
+        before = recalled(looks, at_m or 0.0, near_m)
+        verdicts = [
+            self._fuse(index, state.evidence[index], region, before if index == 0 else before[:0])
+            for index, region in enumerate(regions[: self.config.groups_looked_at])
+        ]
+        if at_m is not None and self._remembers(state, motion):
+            looks = (*looks, Look.of(at_m, regions[-1].ahead_m, regions[-1].probabilities))
+        looks = within_reach(looks, at_m or 0.0, (near_m[0], self.config.ranges_m[1][1]))
         after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
         result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)
-        return IfeState(after, state.frame_count + 1), result
+        return IfeState(after, state.frame_count + 1, looks), result
+
+    def _remembers(self, state: IfeState, motion: Motion) -> bool:
+        """Whether what the middle group shows in this frame is to be remembered."""
+        return self.config.use_foresight and motion.way_m is not None and due(state.looks, motion.way_m)
 
     def _region(
         self,
         index: int,
-        frame: int,
+        draw: tuple[int, int],
+        count: int,
         tracks: list[Ellipses],
         camera: Camera,
         masks: RoadMasks,
@@ -318,20 +355,21 @@ class Ife:
             # Without ellipses the group is the drivable road: what lies beside it is no loss of usable area.
             road = classify_corners(ground, camera, masks.drivable > MASK_THRESHOLD)
             corners = classify_corners(road.ground_m[road.usable], camera, usable)
-        key = (config.seed, frame, index, list(SIDES).index(config.side))
-        drawn = sample(corners, config.b[index], key)
+        key = (config.seed, *draw, list(SIDES).index(config.side))
+        drawn = sample(corners, count, key)
+        ground_m = corners.ground_m[drawn]
         widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, len(drawn))
-        widths = roi_widths_px(camera, corners.ground_m[drawn], widths_m)
-        return Region(corners, corners.pixel[drawn], widths, ellipses, len(drawn))
+        widths = roi_widths_px(camera, ground_m, widths_m)
+        return Region(corners, corners.pixel[drawn], ground_m[:, 0], widths, ellipses, len(drawn))
 
-    def _tracks(self, motion: Motion) -> list[Ellipses]:
+    def _tracks(self, motion: Motion, groups: int) -> list[Ellipses]:
         config = self.config
         return [
             reckon(
                 motion,
                 wheelbase_m=config.wheelbase_m,
                 lateral_m=sign * config.track_m / 2.0,
-                horizon_m=max(high for _, high in config.ranges_m[: config.groups_looked_at]),
+                horizon_m=max(high for _, high in config.ranges_m[:groups]),
                 step_m=config.step_m,
                 k1=config.k1,
                 k2=config.k2,
@@ -361,10 +399,16 @@ class Ife:
             )
         ]
 
-    def _fuse(self, index: int, before: EvidenceState, region: Region) -> tuple[EvidenceState, GroupResult]:
-        """Evidence weights and verdict of one group, Eqs. (7) to (10)."""
-        config, corners, probabilities = self.config, region.corners, region.probabilities
-        n_roi = len(probabilities)
+    def _fuse(
+        self, index: int, before: EvidenceState, region: Region, seen_before: NDArray[np.float64]
+    ) -> tuple[EvidenceState, GroupResult]:
+        """Evidence weights and verdict of one group, Eqs. (7) to (10).
+
+        Patches that were seen before have their say in the weights and the mass, but Eq. (7) combines no more bodies
+        of evidence for them: they show the same road again.
+        """
+        config, corners, n_roi = self.config, region.corners, len(region.probabilities)
+        probabilities = np.concatenate((region.probabilities, seen_before))
         if n_roi > 1:
             after = update_weights(before, probabilities.argmax(axis=1), config.weight_law)
             weights = after.weights if config.weight_evidence else EvidenceState().weights

@@ -14,9 +14,6 @@ from .networks import PatchClassifier, RoadSegmenter
 from .results import FrameResult
 from .trajectory import Motion
 
-GROUPS_USED = 1
-"""Only the near group's verdict reaches a wheel (section 3.4): the others are not looked at."""
-
 
 @dataclass(frozen=True)
 class SidesState:
@@ -24,6 +21,10 @@ class SidesState:
 
     left: IfeState = field(default_factory=IfeState)
     right: IfeState = field(default_factory=IfeState)
+
+    def elsewhere(self) -> SidesState:
+        """The state of a car that may be anywhere by now: no road ahead is known."""
+        return SidesState(self.left.elsewhere(), self.right.elsewhere())
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
@@ -45,8 +46,9 @@ class SidesIfe:
     def __init__(self, config: IfeConfig, segmenter: RoadSegmenter, classifier: PatchClassifier) -> None:
         self.config = config
         self._segmenter = segmenter
-        self._left = Ife(replace(config, side="left"), segmenter, classifier)
-        self._right = Ife(replace(config, side="right"), segmenter, classifier)
+        # Only the near group's verdict reaches a wheel (section 3.4).
+        self._left = Ife(replace(config, side="left", groups_looked_at=1), segmenter, classifier)
+        self._right = Ife(replace(config, side="right", groups_looked_at=1), segmenter, classifier)
 
     def process(
         self, state: SidesState, image: NDArray[np.uint8], motion: Motion
@@ -75,9 +77,9 @@ class SidesIfe:
         camera = fit_camera(self.config.camera, image)
         masks = self._segmenter.segment(image)
         usable = usable_road(masks, self.config.remove_shadow)
-        left = self._left.look(state.left, image, motion, camera, masks, usable, GROUPS_USED)
-        right = self._right.look(state.right, image, motion, camera, masks, usable, GROUPS_USED)
+        left = self._left.look(state.left, image, motion, camera, masks, usable)
+        right = self._right.look(state.right, image, motion, camera, masks, usable)
         read = self._left.classify([*left, *right], image)
-        after_left, seen_left = self._left.judge(state.left, read[: len(left)])
-        after_right, seen_right = self._right.judge(state.right, read[len(left) :])
+        after_left, seen_left = self._left.judge(state.left, motion, read[: len(left)])
+        after_right, seen_right = self._right.judge(state.right, motion, read[len(left) :])
         return SidesState(after_left, after_right), seen_left, seen_right

@@ -32,13 +32,15 @@ class Motion:
     """How the car moves when the picture is taken.
 
     `yaw_rate_rad_s` (positive to the left) takes the place of the steering angle (front wheels, positive to
-    the left) where it is given and the car is faster than the floor speed.
+    the left) where it is given and the car is faster than the floor speed. `way_m` is the way of the front wheels since
+    any start [m]; where it is not given, no road is recognised from frame to frame.
     """
 
     speed_m_s: float
     longitudinal_acceleration_m_s2: float = 0.0
     steering_angle_rad: float = 0.0
     yaw_rate_rad_s: float | None = None
+    way_m: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no car does; raises ValueError."""
@@ -47,6 +49,7 @@ class Motion:
             self.longitudinal_acceleration_m_s2,
             self.steering_angle_rad,
             self.yaw_rate_rad_s or 0.0,
+            self.way_m or 0.0,
         )
         if not all(np.isfinite(values)):
             raise ValueError(f"Motion {values}: every value must be finite.")

@@ -1,0 +1,147 @@
+"""Road seen before it is near: remembered by its place, and by nothing else."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from test_ife import CAMERA, DRY, SNOW, WET, Masks, Middle, paint
+
+from trpac_core.vision.foresight import LOOK_EVERY_M, Look, due, recalled, within_reach
+from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.sides import SidesIfe, SidesState
+from trpac_core.vision.trajectory import Motion
+
+NEAR_M, REACH_M = (2.5, 4.5), (2.5, 7.5)
+CONFIG = IfeConfig(camera=CAMERA, groups_looked_at=1)
+ONE = np.array([[0.7, 0.2, 0.1]])
+
+
+def at(way_m: float | None) -> Motion:
+    return Motion(10.0, way_m=way_m)
+
+
+def road(border_m: float, before=DRY, beyond=SNOW):
+    """A picture with a border across the road, so far ahead of the front axle."""
+    return paint(lambda x, y: np.where(x < border_m, before, beyond))
+
+
+def test_a_patch_is_recalled_while_its_ground_is_near_and_never_else():
+    look = Look.of(10.0, np.array([5.0]), ONE)
+    for way_m, near in (
+        (10.0, False),
+        (10.4, False),
+        (10.6, True),
+        (12.4, True),
+        (12.6, False),
+        (9.0, False),
+    ):
+        assert len(recalled([look], way_m, NEAR_M)) == near, way_m
+    assert_allclose(recalled([look], 11.0, NEAR_M), ONE)
+    assert within_reach([look], 12.4, REACH_M) == (look,)
+    assert within_reach([look], 12.6, REACH_M) == ()
+    assert within_reach([look], 7.4, REACH_M) == (), "a car that has rolled back forgets what is far ahead"
+
+
+@given(st.lists(st.floats(-3.0, 3.0), max_size=200))
+def test_what_is_remembered_stays_bounded_however_the_car_moves(steps_m):
+    looks: tuple[Look, ...] = ()
+    way_m = 0.0
+    for step_m in steps_m:
+        way_m += step_m
+        if due(looks, way_m):
+            looks = (*looks, Look.of(way_m, np.array([4.5, 6.0, 7.5]), np.repeat(ONE, 3, axis=0)))
+        looks = within_reach(looks, way_m, REACH_M)
+        places = sorted(look.at_m for look in looks)
+        assert all(b - a >= LOOK_EVERY_M for a, b in pairwise(places))
+        assert len(looks) <= 1 + (REACH_M[1] - REACH_M[0] + 3.0) / LOOK_EVERY_M
+
+
+class Grazing(Middle):
+    """Takes wet road for dry where a patch comes from the four of the near group, as a network may."""
+
+    def verdicts(self, patches, scene=None):
+        found = super().verdicts(patches, scene)
+        logits = found.logits.copy()
+        near = np.arange(len(logits)) < 4
+        logits[near & (logits.argmax(axis=1) == int(WET))] = (0.6, 0.4, 0.0)
+        return replace(found, logits=logits)
+
+
+def drive(config, classifier, ways_m, border_m=100.0, before=WET):
+    ife, state, results = Ife(config, Masks(), classifier), IfeState(), []
+    for way_m in ways_m:
+        state, result = ife.process(state, road(border_m - way_m, before), at(way_m))
+        results.append(result)
+    return state, results
+
+
+def test_what_was_plain_from_afar_mends_a_verdict_from_near():
+    _, results = drive(CONFIG, Grazing(), np.arange(0.0, 6.0, 0.5))
+    assert results[0].surface is DRY, "nothing has been seen before"
+    assert [r.surface for r in results[-6:]] == [WET] * 6
+    assert [r.near.n_roi for r in results] == [4] * len(results), "no more bodies of evidence"
+    _, without = drive(replace(CONFIG, use_foresight=False), Grazing(), np.arange(0.0, 6.0, 0.5))
+    assert {r.surface for r in without} == {DRY}
+
+
+def test_a_border_stays_where_it_is():
+    """Looks at snow beyond a border must not make the dry road before it snow, nor the other way round."""
+    ways = np.arange(0.0, 12.0, 0.5)
+    _, seen = drive(CONFIG, Middle(), ways, border_m=10.0, before=DRY)
+    _, alone = drive(replace(CONFIG, use_foresight=False), Middle(), ways, border_m=10.0, before=DRY)
+    for way_m, one, other in zip(ways, seen, alone, strict=True):
+        if way_m + NEAR_M[1] < 9.5 or way_m + NEAR_M[0] > 10.5:
+            assert one.surface == other.surface == (DRY if way_m < 6.0 else SNOW), way_m
+
+
+def test_a_car_that_stands_or_whose_way_is_unknown_remembers_no_more():
+    ife = Ife(CONFIG, Masks(), Middle())
+    state, first = ife.process(IfeState(), road(100.0), at(3.0))
+    assert len(state.looks) == 1
+    again, _ = ife.process(state, road(100.0), at(3.1))
+    assert again.looks == state.looks
+    unknown, result = ife.process(state, road(100.0), at(None))
+    assert unknown.looks == ()
+    assert result.surface == first.surface
+    assert state.elsewhere().looks == ()
+    assert state.elsewhere().evidence == state.evidence
+
+
+def test_verdicts_do_not_depend_on_how_many_groups_have_one():
+    ways = np.arange(0.0, 5.0, 0.7)
+    _, near = drive(CONFIG, Grazing(), ways)
+    near_state, _ = drive(CONFIG, Grazing(), ways)
+    all_state, everything = drive(replace(CONFIG, groups_looked_at=3), Grazing(), ways)
+    assert [r.near for r in near] == [r.near for r in everything]
+    assert [len(r.groups) for r in (near[0], everything[0])] == [1, 3]
+    assert near_state.looks == all_state.looks
+
+
+def test_memory_survives_json_and_goes_on_alike():
+    state, _ = drive(CONFIG, Middle(), (0.0, 0.5, 1.0))
+    restored = IfeState.from_json(json.loads(json.dumps(state.to_json())))
+    assert restored == state
+    assert len(state.looks) == 3
+    ife = Ife(CONFIG, Masks(), Middle())
+    assert ife.process(restored, road(5.0), at(1.5)) == ife.process(state, road(5.0), at(1.5))
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_each_side_remembers_its_own_track(side):
+    split = paint(lambda x, y: np.where(y > 0.0, SNOW, DRY))
+    sides, state = SidesIfe(CONFIG, Masks(), Middle()), SidesState()
+    own, own_state = Ife(replace(CONFIG, side=side), Masks(), Middle()), IfeState()
+    for way_m in np.arange(0.0, 4.0, 0.5):
+        state, *results = sides.process(state, split, at(way_m))
+        own_state, alone = own.process(own_state, split, at(way_m))
+        assert results[side == "right"].near == alone.near
+    assert getattr(state, side) == own_state
+    shown = np.argmax([p for look in own_state.looks for p in look.probabilities], axis=1)
+    assert_array_equal(shown, int(SNOW if side == "left" else DRY))

@@ -1,0 +1,77 @@
+"""Road seen before it is near: patches of the middle group count once more when their ground comes into the near group.
+
+Water shows in what it mirrors, and the flatter the look, the more it mirrors: from 6 m a wet road is told from a dry
+one more surely than from 3 m. The way driven says where the ground of an earlier look is by now.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .classes import Surface
+
+LOOK_EVERY_M = 0.4
+"""Way between the looks that are remembered: closer ones show the same, and a car that stands must not add any [m]."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What one frame showed of road that was not near yet.
+
+    Attributes
+    ----------
+    at_m : float
+        Way of the front wheels at the frame [m].
+    ways_m : tuple of n floats
+        Way at which the front wheels reach each patch [m].
+    probabilities : tuple of n triples
+        Calibrated probabilities of dry, wet, snow and ice [-].
+    """
+
+    at_m: float
+    ways_m: tuple[float, ...]
+    probabilities: tuple[tuple[float, float, float], ...]
+
+    @classmethod
+    def of(cls, at_m: float, ahead_m: NDArray[np.float64], probabilities: NDArray[np.float64]) -> Look:
+        """A look at patches so far ahead of the front wheels, shapes (n,) and (n, 3)."""
+        triples = tuple((dry, wet, snow_ice) for dry, wet, snow_ice in probabilities.tolist())
+        return cls(at_m, tuple((at_m + ahead_m).tolist()), triples)
+
+    def to_json(self) -> list[Any]:
+        """The look as JSON-able values, exact."""
+        return [self.at_m, list(self.ways_m), [list(triple) for triple in self.probabilities]]
+
+    @classmethod
+    def from_json(cls, data: Sequence[Any]) -> Look:
+        """The look that `to_json` wrote."""
+        at_m, ways_m, triples = data
+        return cls(at_m, tuple(ways_m), tuple((dry, wet, snow_ice) for dry, wet, snow_ice in triples))
+
+
+def due(looks: Sequence[Look], at_m: float) -> bool:
+    """Whether a frame at a way is far enough from all that are remembered to be remembered too."""
+    return all(abs(look.at_m - at_m) >= LOOK_EVERY_M for look in looks)
+
+
+def recalled(looks: Sequence[Look], at_m: float, range_m: tuple[float, float]) -> NDArray[np.float64]:
+    """Probabilities of the remembered patches that lie in [from, to) ahead of the front wheels now, shape (n, 3)."""
+    low, high = range_m
+    found = [
+        triple
+        for look in looks
+        for way_m, triple in zip(look.ways_m, look.probabilities, strict=True)
+        if low <= way_m - at_m < high
+    ]
+    return np.array(found) if found else np.empty((0, len(Surface)))
+
+
+def within_reach(looks: Sequence[Look], at_m: float, reach_m: tuple[float, float]) -> tuple[Look, ...]:
+    """The looks of which a patch lies in [from, to) ahead of the front wheels now: the others will not be near."""
+    low, high = reach_m
+    return tuple(look for look in looks if any(low <= way_m - at_m < high for way_m in look.ways_m))
