@@ -668,3 +668,40 @@ def test_a_blamed_effect_is_told_with_its_values_and_what_it_does():
         r"with delay_s 0\.2\d+ s the camera's gap goes from \d+\.\d to 1\.\d times the noise floor\.", told
     )
     assert camera_side(diagnose(Camera(), speeds=SLOW_AND_FAST)).sentence == ""
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_scatter_on_the_hold_out_alone_is_no_gap(seed):
+    roads = [road(seed=3 * seed + i) for i in range(3)]
+    careful, careless = Camera(fps=40.0), Camera(fps=40.0, flicker_m=1.5, wrong=0.05)
+    cameras = (careful, careful, careless)
+    logs = [drive(r, c, seed=10 * seed + i) for i, (r, c) in enumerate(zip(roads, cameras, strict=True))]
+    finding = diagnose_perception(logs[:2], logs[2], roads, BARE)
+    assert finding.verdict is Verdict.NO_GAP, finding.unexplained
+
+
+def test_results_repeated_to_the_last_digit_are_a_gap():
+    def frozen(log):
+        """Results of every tenth second are repeated for half a second."""
+        held = (log.time_s % 10.0) < 0.5
+        first = np.flatnonzero(held & ~np.roll(held, 1))
+        signals = {}
+        for name in ("image_class", "image_confidence"):
+            column = log.signals[name].copy()
+            for start in first:
+                column[start : start + 50] = column[start]
+            signals[name] = column
+        return changed(log, **signals)
+
+    finding = diagnose(Camera(fps=40.0, roughness=0.05), 2, damage=frozen)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("repeats a result to the last digit" in text for text in finding.unexplained)
+
+
+@pytest.mark.parametrize("digits", [1, 2])
+def test_rounded_or_saturated_confidence_is_no_repeated_result(digits):
+    def rounded(log):
+        sure = np.minimum(np.round(log.signals["image_confidence"], digits), 0.9)
+        return changed(log, image_confidence=sure)
+
+    assert diagnose(Camera(fps=40.0, roughness=0.05), 2, damage=rounded).verdict is Verdict.NO_GAP

@@ -22,6 +22,7 @@ from sim2real.perception.frames import Modelled, read_results
 from sim2real.perception.friction import friction_chain
 from sim2real.perception.pictures import read_light
 from sim2real.perception.shift import shift_chain
+from sim2real.perception.stuck import stuck_in_words
 from sim2real.result import Interval, Measure, Place, Verdict
 from trpac_core.vision.camera import Camera
 
@@ -173,7 +174,8 @@ def diagnose_perception(
     light_unseen, yet_more = read_light(
         [] if held_out is None else [held_out], [log_holdout.image_folder][: held_out is not None]
     )
-    conflicts = class_conflicts([*results, *([held_out] if held_out is not None else [])])
+    every = [*results, *([held_out] if held_out is not None else [])]
+    conflicts = class_conflicts(every)
     warnings += [*more, *yet_more, *(conflict.sentence for conflict in conflicts)]
     judged = (
         shift_chain(results, held_out, modelled, camera.height_m, exclude),
@@ -189,13 +191,18 @@ def diagnose_perception(
         ),
     )
     chains = [chain for chain in judged if chain is not None]
-    return _conclude(chains, conflicts_in_words(conflicts), tuple(warnings), seed) if chains else None
+    if not chains:
+        return None
+    return _conclude(chains, conflicts_in_words(conflicts), stuck_in_words(every), tuple(warnings), seed)
 
 
 def _conclude(
-    chains: Sequence[Chain], conflict: str, warnings: tuple[str, ...], seed: int
+    chains: Sequence[Chain], conflict: str, stuck: str, warnings: tuple[str, ...], seed: int
 ) -> PerceptionFinding:
-    """Each signal's best account, and what they make together; `conflict` is what classes say against road.yaml."""
+    """Each signal's best account, and what they make together.
+
+    `conflict` is what classes say against road.yaml, `stuck` what repeated results say; both may be empty.
+    """
     best = [chain.best() for chain in chains]
     rivals = [chain.rivals() for chain in chains]
     nothing = [chain.nothing for chain in chains]
@@ -205,6 +212,7 @@ def _conclude(
     causes = tuple(dict.fromkeys(effect for account in best for effect in account.effects))
     if conflict and not set(causes) & MAKE_CLASSES_ERR:
         unexplained = (*unexplained, conflict)
+    unexplained = (*unexplained, stuck) if stuck else unexplained
     ambiguous = tuple(
         dict.fromkeys(
             tuple(dict.fromkeys((*account.effects, *(e for r in others for e in r.effects))))

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 ERROR_M = 0.1
 """Least scale of a crossing's error: borders are no lines, positions wander [m]."""
-SCALES = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 20.0, 40.0])
+SCALES = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 20.0, 40.0, 80.0])
 """Scales of the crossings' errors that are tried [-]."""
 SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 """Share of its stamp that a class is for [-]."""
@@ -88,6 +88,12 @@ class ShiftFit:
         """Of any crossings at its delay and pitch, share and scale at their best [nats]."""
         age, pitch = np.array([self.delay_s.value]), np.array([self.pitch_rad.value])
         return float((_profiles(crossings, age, pitch, height_m) - _price(self.effects)).max())
+
+    def scale_of(self, crossings: Crossings, height_m: float) -> float:
+        """Scale of any crossings' errors at its delay, pitch and share; the least where there are none [-]."""
+        shift = self.shift(crossings, height_m)
+        bracket = crossings.bracket(self.share)
+        return float(SCALES[np.argmax([_log_likelihood(shift, *bracket, scale) for scale in SCALES])])
 
     def rest_m(self, crossings: Crossings, height_m: float) -> Array:
         """Brackets' middles beyond the candidate's, shape (k,) [m]."""
@@ -217,7 +223,8 @@ def shift_chain(
     plain, fits = fit(()), [fit(choice) for choice in choices]
     every = known.joined(unseen)
     closest = min((plain, *fits), key=lambda f: f.scale)
-    scale = closest.scale
+    # A chain that errs in streaks may do so on the hold-out alone: scatter is no shift there either.
+    scale = max(closest.scale, closest.scale_of(unseen, height_m))
     accounts = [_account(f, plain, unseen, height_m, scale, known) for f in (plain, *fits)]
     chain = Chain(
         SIGNAL,
