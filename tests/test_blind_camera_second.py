@@ -166,7 +166,9 @@ def test_the_nominal_chain_tells_the_road_in_every_form(aspect, name):
     assert not plain.mistaken.any()
     assert plain.confidence.min() > 0.7
     assert np.all(np.diff(plain.ready_s) >= 0.0)
-    sided = {"near": 0.14, "far": 0.14, "most_slippery": 0.12}.get(name, 0.0)  # by what is stamped of a stretch
+    sided = {"near": 0.14, "far": 0.14, "most_slippery": 0.12}.get(
+        name, 0.0
+    )  # by what is stamped of a stretch
     assert abs(moved_m(plain).mean()) < 0.12 + sided
 
 

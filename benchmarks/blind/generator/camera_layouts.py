@@ -54,7 +54,7 @@ def _clustered(rng: Generator) -> Stretches:
     """Much the same for long, and then many on end."""
     surface = int(rng.choice(3, p=ODDS))
     while True:
-        for length in (rng.uniform(70.0, 130.0), *rng.uniform(8.0, 22.0, rng.integers(4, 8))):
+        for length in (rng.uniform(45.0, 80.0), *rng.uniform(8.0, 25.0, rng.integers(4, 8))):
             yield float(length), surface
             surface = _other(rng, surface)
 
@@ -82,61 +82,50 @@ def draw_laid_road(rng: Generator, layout: str) -> CameraRoad:
 
 
 def _off(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.2, 0.4)
-    return squeezed((0.4, level), (rng.uniform(0.8, 2.0), level), (0.4, 0.0))
+    level = car.motor_peak_torque_nm * rng.uniform(0.3, 0.5)
+    return squeezed((0.4, level), (rng.uniform(2.0, 4.0), level), (0.4, 0.0))
 
 
 def _towards_a_light(car: Car, rng: Generator) -> Array:
-    level = -car.motor_peak_torque_nm * rng.uniform(0.15, 0.3)
-    return squeezed((0.6, level), (rng.uniform(0.8, 1.8), level), (0.6, 0.0))
+    level = -car.motor_peak_torque_nm * rng.uniform(0.25, 0.45)
+    return squeezed((0.6, level), (rng.uniform(1.5, 3.5), level), (0.6, 0.0))
 
 
 def _along(car: Car, rng: Generator) -> Array:
-    return faded(car.motor_peak_torque_nm * np.full(round(rng.uniform(200, 500)), rng.uniform(0.01, 0.04)))
+    return faded(car.motor_peak_torque_nm * np.full(round(rng.uniform(150, 350)), rng.uniform(0.01, 0.04)))
 
 
 def _surge(car: Car, rng: Generator) -> Array:
     """Past another car, and back to its speed."""
-    up, down = (car.motor_peak_torque_nm * rng.uniform(0.3, 0.55) for _ in range(2))
-    return squeezed(
-        (0.5, up),
-        (rng.uniform(2.0, 4.0), up),
-        (0.8, 0.0),
-        (0.8, -down),
-        (rng.uniform(1.5, 3.0), -down),
-        (0.5, 0),
-    )
+    up, down = (car.motor_peak_torque_nm * rng.uniform(0.35, 0.55) for _ in range(2))
+    there, back = rng.uniform(3.0, 5.0), rng.uniform(2.5, 4.5)
+    return squeezed((0.5, up), (there, up), (0.8, 0.0), (0.8, -down), (back, -down), (0.5, 0.0))
 
 
 def _wave(car: Car, rng: Generator) -> Array:
     """Up hill and down dale."""
-    clock, period = clock_of(rng.uniform(8.0, 14.0)), rng.uniform(5.0, 9.0)
-    wave = rng.uniform(0.2, 0.4) * np.sin(2.0 * np.pi * clock / period) + 0.02
+    period = rng.uniform(7.0, 11.0)
+    clock = clock_of(rng.uniform(1.0, 1.5) * period)
+    wave = rng.uniform(0.35, 0.55) * np.sin(2.0 * np.pi * clock / period) + 0.02
     return faded(car.motor_peak_torque_nm * wave)
 
 
 _ALONG = Piece(5.0, 99.0, _along)
 TOWN = Style(
-    rich=(Piece(0.0, 11.0, _off), _ALONG, Piece(9.5, 99.0, _towards_a_light), Piece(0.0, 13.0, _off), _ALONG),
+    rich=(Piece(0.0, 9.0, _off), _ALONG, Piece(9.5, 99.0, _towards_a_light)),
     mild=(_ALONG,),
     drive_front=(0.5,),
     brake_front=0.62,
 )
 SURGING = Style(
-    rich=(
-        _ALONG,
-        Piece(7.0, 20.0, _surge),
-        COAST,
-        Piece(0.0, 18.0, _off),
-        Piece(15.0, 99.0, _towards_a_light),
-    ),
-    mild=(_ALONG, Piece(8.0, 16.0, _wave)),
+    rich=(Piece(7.0, 16.0, _surge), _ALONG, Piece(16.0, 99.0, _towards_a_light), Piece(0.0, 12.0, _off)),
+    mild=(_ALONG, COAST),
     drive_front=(0.4, 0.6),
     brake_front=0.6,
 )
 IN_WAVES = Style(
-    rich=(Piece(8.0, 24.0, _wave), Piece(0.0, 14.0, _off), Piece(16.0, 99.0, _towards_a_light)),
-    mild=(_ALONG, COAST),
+    rich=(Piece(7.0, 20.0, _wave), Piece(0.0, 12.0, _off), Piece(15.0, 99.0, _towards_a_light)),
+    mild=(_ALONG, COAST, _ALONG),
     drive_front=(0.5, 0.55),
     brake_front=0.65,
 )
