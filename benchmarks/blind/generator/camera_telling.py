@@ -42,7 +42,7 @@ SURER = 0.25
 """What an overconfident system leaves of its doubt."""
 DIP, RECOVERS_S = 0.12, 0.5
 """What a change of the class takes of the confidence, and how long it takes to come back."""
-LOWER = 0.05
+LOWER = 0.03
 """What the hard class's confidence is less."""
 LOST_ROWS = 0.02
 STEPS_M = {"fine": 0.0, "decimetres": 0.1, "quarters": 0.25}
