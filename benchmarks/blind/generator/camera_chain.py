@@ -16,11 +16,9 @@ from scipy.signal import lfilter
 from .camera_family import form
 from .camera_faults import courses, jumps_m, kept_of, nod_of, outside_kept, pitch_of, shown_s
 from .camera_road import CameraRoad, Passage, Whole
-from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault, Results, draw_chain
-from .camera_telling import classified, columns, confidence_of, odds_of, voted
+from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault, Results
+from .camera_telling import classified, confidence_of, odds_of, voted
 from .camera_timing import delivered, numbers, timing
-
-__all__ = ["POINTS", "Chain", "Fault", "Results", "columns", "draw_chain", "results", "seen_at"]
 
 Array = NDArray[np.floating[Any]]
 
