@@ -7,6 +7,9 @@ from dataclasses import replace
 from .camera_family import CameraFamily
 from .camera_library import CAMERA_LIBRARY, CAMERA_OUTSIDE, CAMERA_PAIRS, CameraEffect, growing
 
+SLOW_S = 0.6
+"""Least lateness of a friction's reference that is more than a filter's [s]."""
+
 FURTHER_OUTSIDE: dict[str, CameraEffect] = {
     "wet_told_as_snow": CameraEffect(
         growing("share", 0.03, 1.0), lambda f, g: replace(f, swapped=g["share"]), ("camera", "road")
@@ -30,7 +33,7 @@ FURTHER_OUTSIDE: dict[str, CameraEffect] = {
         growing("share", 0.04, 0.9), lambda f, g: replace(f, unsure=g["share"]), ("camera", "road")
     ),
     "reference_late": CameraEffect(
-        growing("delay_s", 0.05, 4.0),
+        growing("delay_s", SLOW_S, 4.0),
         lambda f, g: replace(f, measured_late_s=g["delay_s"]),
         ("road", "camera"),
     ),
