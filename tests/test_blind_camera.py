@@ -18,8 +18,9 @@ from numpy.testing import assert_allclose
 
 from benchmarks.blind import runner
 from benchmarks.blind.generator import camera_case, camera_gap
-from benchmarks.blind.generator.camera_chain import Chain, Fault, columns, draw_chain, results
-from benchmarks.blind.generator.camera_forms import CAMERA_FORMS, draw_camera_forms
+from benchmarks.blind.generator.camera_chain import results
+from benchmarks.blind.generator.camera_family import CameraFamily, draw_forms_of
+from benchmarks.blind.generator.camera_forms import CAMERA_FORMS
 from benchmarks.blind.generator.camera_library import CAMERA_EFFECTS, Scene
 from benchmarks.blind.generator.camera_reference import reference
 from benchmarks.blind.generator.camera_road import (
@@ -29,6 +30,8 @@ from benchmarks.blind.generator.camera_road import (
     Passage,
     draw_camera_road,
 )
+from benchmarks.blind.generator.camera_system import Chain, Fault, draw_chain
+from benchmarks.blind.generator.camera_telling import columns
 from benchmarks.blind.generator.car import Car
 from benchmarks.blind.generator.driver import Drive, Style
 from benchmarks.blind.generator.forms import Family
@@ -40,6 +43,7 @@ from benchmarks.blind.scorer import score_run
 from benchmarks.blind.show import draw_confusion
 
 TENTH = Family.TENTH
+FIRST = CameraFamily.FIRST
 CASES = {spec.name: spec for size in ("camera", "camera_small") for spec in table(size)}
 PLAIN = {
     "captures": "even",
@@ -63,7 +67,7 @@ ROAD = CameraRoad(
 def chain_of(seed: int = 0, **forms: str) -> Chain:
     """Drawn, with forms of one's own, and neither errors nor noise."""
     rng = np.random.default_rng(seed)
-    chain = draw_chain(rng, {**draw_camera_forms(rng), **PLAIN, **forms})
+    chain = draw_chain(rng, {**draw_forms_of(FIRST, rng), **PLAIN, **forms})
     return replace(
         chain, rate_hz=50.0, work_s=0.03, dropped=0.0, errors=0.0, none=0.0, spread=0.0, border_dip=0.0
     )
@@ -93,7 +97,7 @@ def shown(chain: Chain, passage: Passage, fault: Fault) -> pd.DataFrame:
 @pytest.mark.parametrize("seed", range(12))
 def test_the_nominal_chain_is_the_roads(seed):
     rng = np.random.default_rng(seed)
-    chain = draw_chain(rng, draw_camera_forms(rng))
+    chain = draw_chain(rng, draw_forms_of(FIRST, rng))
     said = results(chain, uneven(), ROAD, Fault(), "fit_1")
     assert_allclose(said.shift_m, 0.0, atol=1e-12)
     assert np.all(said.kept == 1.0)
@@ -132,7 +136,7 @@ def test_a_neutral_value_leaves_the_nominal_columns(effect):
 def test_no_effect_draws_anew_what_is_not_its_own(effect, seed):
     """A vanishing deviation takes the way of a real one, and all that is random stays."""
     rng = np.random.default_rng(seed)
-    chain = draw_chain(rng, {**draw_camera_forms(rng), "lateness": "constant"})
+    chain = draw_chain(rng, {**draw_forms_of(FIRST, rng), "lateness": "constant"})
     nominal, tiny = (
         results(chain, uneven(), ROAD, fault, "fit_1")
         for fault in (Fault(), CAMERA_EFFECTS[effect].apply(Fault(), TINY[effect]))

@@ -336,7 +336,7 @@ def test_a_diagnosis_that_fails_is_counted_and_not_repeated(tmp_path, fake_diagn
 
 
 def test_a_case_that_cannot_be_made_stays_pending_and_stops_no_run(tmp_path, monkeypatch):
-    def nothing_shows(spec, seed, family):
+    def nothing_shows(*what):
         raise UndrivableError("nothing in the drive shows the deviation")
 
     monkeypatch.setattr(runner, "make_case", nothing_shows)

@@ -18,6 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from .generator.camera_family import CameraFamily
 from .generator.forms import Family
 from .generator.making import make_case
 from .generator.table import table
@@ -52,16 +53,23 @@ Forms = Annotated[
     Family,
     typer.Option(help="What is drawn from: one form of everything, or several that no development has seen."),
 ]
+CameraForms = Annotated[CameraFamily, typer.Option(help="The same of the camera's forms, in its cases.")]
 
 
 @app.command("cases")
-def cases_command(out: Out, cases: Cases = Size.DEV, seed: Seed = 1, forms: Forms = Family.FIRST) -> None:
+def cases_command(
+    out: Out,
+    cases: Cases = Size.DEV,
+    seed: Seed = 1,
+    forms: Forms = Family.FIRST,
+    camera_forms: CameraForms = CameraFamily.FIRST,
+) -> None:
     """Only write the cases' files, with their seals beside, to look at."""
     with _progress() as progress:
-        specs = table(cases.value, forms)
+        specs = table(cases.value, forms, camera_forms)
         task = progress.add_task("cases", total=len(specs))
         for spec in specs:
-            case = make_case(spec, seed, forms)
+            case = make_case(spec, seed, forms, camera_forms)
             folder = write_case(case, seed, out)
             folder.with_suffix(".seal.json").write_text(json.dumps(case.seal(), indent=1), encoding="utf-8")
             progress.advance(task)
@@ -73,16 +81,17 @@ def run_command(
     cases: Cases = Size.SMALL,
     seed: Seed = 1,
     forms: Forms = Family.TENTH,
+    camera_forms: CameraForms = CameraFamily.SECOND,
     jobs: Annotated[int, typer.Option(min=1, help="Cases side by side.")] = 2,
     keep: Annotated[bool, typer.Option(help="Keep the cases' logs.")] = False,
 ) -> None:
     """Make the cases and have each diagnosed; a stopped run goes on where it stopped."""
-    seal_run(out, cases.value, seed, forms)
-    waiting, total = pending(out, cases.value, forms)
+    seal_run(out, cases.value, seed, forms, camera_forms)
+    waiting, total = pending(out, cases.value, forms, camera_forms)
     failed = 0
     with _progress() as progress:
         task = progress.add_task("diagnoses", total=total, completed=total - len(waiting))
-        for result in run(out, cases.value, seed, forms, jobs, keep):
+        for result in run(out, cases.value, seed, forms, jobs, keep, camera_forms):
             failed += result["error"] is not None
             progress.update(
                 task, advance=1, description=f"diagnoses, {failed} failed" if failed else "diagnoses"

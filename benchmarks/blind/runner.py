@@ -22,6 +22,7 @@ from joblib import Parallel, delayed, parallel_config
 
 from .baselines import cosine
 from .command import arguments, watch
+from .generator.camera_family import CameraFamily
 from .generator.cases import Case, UndrivableError
 from .generator.forms import Family
 from .generator.making import make_case
@@ -45,13 +46,15 @@ def digest(*paths: Path) -> str:
     return total.hexdigest()
 
 
-def seal_run(out: Path, size: str, seed: int, family: Family) -> None:
+def seal_run(
+    out: Path, size: str, seed: int, family: Family, camera: CameraFamily = CameraFamily.FIRST
+) -> None:
     """Write what the run is before any case is made; refuse a folder that holds another one.
 
     Raises
     ------
     RunError
-        `out` holds a run of another seed, size, family of forms, generator or thresholds.
+        `out` holds a run of another seed, size, family of forms or of the camera's, generator or thresholds.
     """
     commit = subprocess.run(
         ["git", "rev-parse", "HEAD"], cwd=HERE, capture_output=True, text=True, check=False
@@ -60,6 +63,7 @@ def seal_run(out: Path, size: str, seed: int, family: Family) -> None:
         "seed": seed,
         "size": size,
         "forms": family.value,
+        "camera_forms": camera.value,
         "generator_sha256": digest(*(HERE / "generator").glob("*.py")),
         "thresholds_sha256": digest(THRESHOLDS),
     }
@@ -76,10 +80,13 @@ def seal_run(out: Path, size: str, seed: int, family: Family) -> None:
     _write(path, run | {"commit": commit.stdout.strip() or None})
 
 
-def pending(out: Path, size: str, family: Family) -> tuple[list[Spec], int]:
+def pending(
+    out: Path, size: str, family: Family, camera: CameraFamily = CameraFamily.FIRST
+) -> tuple[list[Spec], int]:
     """Cases without a result, and how many there are in all; in mixed order, so that a stopped run is a fair sample."""
     specs = sorted(
-        table(size, family), key=lambda spec: (spec.group is Group.TIMING, zlib.crc32(spec.name.encode()))
+        table(size, family, camera),
+        key=lambda spec: (spec.group is Group.TIMING, zlib.crc32(spec.name.encode())),
     )
     return [spec for spec in specs if not result_path(out, spec).exists()], len(specs)
 
@@ -89,23 +96,38 @@ def result_path(out: Path, spec: Spec) -> Path:
     return out / "results" / f"{spec.name}.json"
 
 
-def run(out: Path, size: str, seed: int, family: Family, jobs: int, keep: bool) -> Iterator[dict[str, Any]]:
+def run(
+    out: Path,
+    size: str,
+    seed: int,
+    family: Family,
+    jobs: int,
+    keep: bool,
+    camera: CameraFamily = CameraFamily.FIRST,
+) -> Iterator[dict[str, Any]]:
     """Run what is pending; results come as they are done, the timed cases last and alone."""
-    specs, _ = pending(out, size, family)
+    specs, _ = pending(out, size, family, camera)
     side_by_side = [spec for spec in specs if spec.group is not Group.TIMING]
     with parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
         yield from Parallel(return_as="generator_unordered")(
-            delayed(run_case)(spec, seed, family, out, keep) for spec in side_by_side
+            delayed(run_case)(spec, seed, family, out, keep, camera) for spec in side_by_side
         )
     for spec in specs:
         if spec.group is Group.TIMING:
-            yield run_case(spec, seed, family, out, keep)
+            yield run_case(spec, seed, family, out, keep, camera)
 
 
-def run_case(spec: Spec, seed: int, family: Family, out: Path, keep: bool) -> dict[str, Any]:
+def run_case(
+    spec: Spec,
+    seed: int,
+    family: Family,
+    out: Path,
+    keep: bool,
+    camera: CameraFamily = CameraFamily.FIRST,
+) -> dict[str, Any]:
     """Make one case, have it diagnosed, write the result; a case that cannot be made stays pending."""
     try:
-        case = make_case(spec, seed, family)
+        case = make_case(spec, seed, family, camera)
     except UndrivableError as problem:
         return {"case": spec.name, "error": f"not made: {problem}"}
     folder = write_case(case, seed, out)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from .generator.camera_family import CameraFamily
 from .generator.camera_library import CAMERA_LIBRARY
 from .generator.forms import Family
 from .generator.library import LIBRARY
@@ -94,7 +95,8 @@ def score_run(folder: Path) -> Scores:
     limits = load_thresholds(folder)
     outcomes = read_outcomes(folder)
     run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    specs = table(run["size"], Family(run.get("forms", Family.FIRST)))
+    camera = CameraFamily(run.get("camera_forms", CameraFamily.FIRST))
+    specs = table(run["size"], Family(run.get("forms", Family.FIRST)), camera)
     done = {o.name for o in outcomes}
     return score(outcomes, limits, [spec.name for spec in specs if spec.name not in done])
 
@@ -237,6 +239,11 @@ def _asides(
             [o for o in rich if family in o.further],
             lambda o: o.right_within(1),
         )
+    aside(
+        "rich, a form that the camera's first family lacks: right first",
+        [o for o in rich if o.new_to_camera],
+        lambda o: o.right_within(1),
+    )
     aside("rich: ranked first, whatever the verdict", rich, lambda o: o.ranked_within(1))
     aside("rich: ranked first or second, whatever the verdict", rich, lambda o: o.ranked_within(2))
     aside("rich: called compound though one effect", rich, lambda o: o.verdict == "compound")

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.random import Generator
+from numpy.typing import NDArray
 
-from .camera_chain import Chain, Fault, columns, draw_chain, results
-from .camera_forms import draw_camera_forms
+from .camera_chain import results
+from .camera_family import CameraFamily, draw_forms_of, form
+from .camera_faults import jumps_m
+from .camera_further import ALL_EFFECTS
 from .camera_gap import Stage, crossings, gap_of
-from .camera_library import CAMERA_EFFECTS, Scene
-from .camera_reference import reference
-from .camera_road import ALL_SPEEDS, CLASS_FRICTION, CameraRoad, Passage, draw_camera_road, passage_of
+from .camera_layouts import SPEEDS, draw_laid_road
+from .camera_library import Scene
+from .camera_reference import friction_of, measured_at, reference
+from .camera_road import CLASS_FRICTION, CameraRoad, Passage, draw_camera_road, passage_of
+from .camera_system import Chain, Fault, draw_chain
+from .camera_telling import columns
 from .car import Car, draw_car
 from .cases import LOGS, MUST_SHOW, SHOWS, Case, Truth, first_drivable, generator_of
 from .driver import Drive, Style, UndrivableError, drive
 from .forms import DIGITS, NOISES, RATES_HZ, STYLES, Family, draw_forms
+from .kernel import RECORD_STEP_S
 from .sensors import draw_noise, make_log
 from .severity import find_severity
 from .table import Spec
 from .world import Parameters, nominal
+
+Array = NDArray[np.floating[Any]]
 
 LEAST_BORDERS = {True: 8, False: 2}
 """Of each log, rich or not."""
@@ -32,6 +41,8 @@ FASTER = 1.5
 """Fastest border over the slowest one, when rich [-]."""
 DRIVEN_M = 8.0
 """Least distance on a class that counts as driven on."""
+POSITION_STEP_M, POSITIONS_LOST = 0.05, 0.01
+"""Of a coarse odometer; share of samples without a position."""
 
 
 @dataclass(frozen=True)
@@ -39,31 +50,38 @@ class CameraCase(Case):
     """A case with what its camera is."""
 
     chain: Chain
+    family: CameraFamily
 
     @property
     def subsystems(self) -> set[str]:
         """Right answers to where."""
-        return {s for effect in self.truth.effects for s in CAMERA_EFFECTS[effect].subsystems}
+        return {s for effect in self.truth.effects for s in ALL_EFFECTS[effect].subsystems}
 
     def seal(self) -> dict[str, Any]:
         """As a car's; `effects` hold what can be found without pictures, `camera` all that is hidden, and the chain."""
         effects = {
-            effect: {name: given[name] for name in CAMERA_EFFECTS[effect].found}
+            effect: {name: given[name] for name in ALL_EFFECTS[effect].found}
             for effect, given in self.truth.effects.items()
         }
-        camera = {"hidden": self.truth.effects, "chain": asdict(self.chain)}
+        camera = {
+            "family": self.family.value,
+            "hidden": self.truth.effects,
+            "chain": asdict(self.chain),
+        }
         return super().seal() | {"effects": effects, "camera": camera}
 
 
-def make_camera_case(spec: Spec, seed: int, family: Family) -> CameraCase:
-    """Draw a case of the camera; `family` is that of whatever is not the camera's.
+def make_camera_case(
+    spec: Spec, seed: int, family: Family, camera: CameraFamily = CameraFamily.FIRST
+) -> CameraCase:
+    """Draw a case of the camera, with forms of the `camera`'s family; `family` is that of all else.
 
     Raises
     ------
     UndrivableError
         No draw gives a car that can be driven and a deviation that shows.
     """
-    return first_drivable(spec, lambda key: _draw(spec, seed, key, family))
+    return first_drivable(spec, lambda key: _draw(spec, seed, key, family, camera))
 
 
 @dataclass(frozen=True)
@@ -90,8 +108,13 @@ class _Ground:
 
 def _ground(spec: Spec, key: str, seed: int, driver: str, chain: Chain, rng: Generator) -> _Ground:
     few = not spec.rich and rng.random() < 0.5
-    style = STYLES[driver] if (rng.random() < 0.4 if spec.rich else few) else ALL_SPEEDS
+    speeds = SPEEDS[form(chain.forms, "speeds")]
+    style = STYLES[driver] if (rng.random() < 0.4 if spec.rich else few) else speeds
     road, elsewhere = (draw_camera_road(rng, "few" if few else "usual") for _ in range(2))
+    layout = form(chain.forms, "layout")
+    if layout != "usual" and not few:
+        laid = generator_of(seed, key, "camera layout")
+        road, elsewhere = (draw_laid_road(laid, layout) for _ in range(2))
     if chain.reference_noise is None:  # else what is measured would not be the class's value
         own = tuple(float(value) for value in np.round(CLASS_FRICTION * rng.uniform(0.85, 1.15, 3), 2))
         road, elsewhere = road.with_friction(own), elsewhere.with_friction(own)
@@ -101,9 +124,9 @@ def _ground(spec: Spec, key: str, seed: int, driver: str, chain: Chain, rng: Gen
     return _Ground(spec, draw_car(rng, ()), style, roads, durations, (seed, key))
 
 
-def _draw(spec: Spec, seed: int, key: str, family: Family) -> CameraCase:
+def _draw(spec: Spec, seed: int, key: str, family: Family, camera: CameraFamily) -> CameraCase:
     rng, forms = generator_of(seed, key, "camera"), draw_forms(family, generator_of(seed, key, "forms"))
-    chain = draw_chain(rng, draw_camera_forms(generator_of(seed, key, "camera forms")))
+    chain = draw_chain(rng, draw_forms_of(camera, generator_of(seed, key, "camera forms")))
     if "class_friction_offset" in spec.effects and chain.reference_noise is None:
         raise UndrivableError("nothing measures the friction")
     ground = _ground(spec, key, seed, forms["driver"], chain, rng)
@@ -111,11 +134,14 @@ def _draw(spec: Spec, seed: int, key: str, family: Family) -> CameraCase:
     rate = float(rng.choice(list(RATES_HZ[family]), p=list(RATES_HZ[family].values())))
     driven = ground.drive(roads)
     passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
-    scene = Scene(chain, tuple(c for c in range(3) if all(_driven(passages[n], roads[n], c) for n in LOGS)))
+    driven_on = (c for c in range(3) if all(_driven(chain, passages[n], roads[n], n, c) for n in LOGS))
+    scene = Scene(chain, tuple(driven_on))
+    if "class_friction_offset" in spec.effects and not scene.driven:
+        raise UndrivableError("no class is measured in every log")
     stage = Stage(chain, passages["holdout"], roads["holdout"], "holdout")
     parts, alone, fault = _deviations(spec, stage, scene, rng)
     if fault.friction != CLASS_FRICTION:  # road.yaml tells the friction that is there, so the car has no gap
-        roads = {name: road.with_friction(fault.friction) for name, road in roads.items()}
+        roads = {name: road.with_mu(friction_of(chain, road, fault)) for name, road in roads.items()}
         driven = ground.drive(roads)
         passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
     told = {name: _told(chain, road, fault) for name, road in roads.items()}
@@ -132,7 +158,7 @@ def _draw(spec: Spec, seed: int, key: str, family: Family) -> CameraCase:
     drives = {name: done for name, (done, _) in driven.items()}
     base = {name: nominal(car, road) for name, road in told.items()}
     truth = Truth(parts, {}, gap, alone)
-    return CameraCase(spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, chain)
+    return CameraCase(spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, chain, camera)
 
 
 def _check_borders(passage: Passage, road: CameraRoad, rich: bool) -> None:
@@ -145,14 +171,20 @@ def _check_borders(passage: Passage, road: CameraRoad, rich: bool) -> None:
         raise UndrivableError("one speed at all borders")
 
 
-def _driven(passage: Passage, road: CameraRoad, surface: int) -> bool:
-    """Whether a drive tells anything of a class."""
+def _driven(chain: Chain, passage: Passage, road: CameraRoad, log: str, surface: int) -> bool:
+    """Whether a drive tells anything of a class: how far it goes on it where there is a reference."""
     step = np.diff(passage.front_m, append=passage.front_m[-1])
-    return bool(step[road.class_at(passage.front_m) == surface].sum() > DRIVEN_M)
+    measured = measured_at(chain, passage, np.arange(step.size) * RECORD_STEP_S, log)
+    return bool(step[(road.class_at(passage.front_m) == surface) & measured].sum() > DRIVEN_M)
 
 
 def _told(chain: Chain, road: CameraRoad, fault: Fault) -> CameraRoad:
-    """road.yaml of a road: as it is, but for borders that a bad map has elsewhere."""
+    """road.yaml of a road: as it is, but for borders that a bad map has elsewhere, or surfaces that it has wrong."""
+    if fault.relabelled > 0.0:
+        rng, surface = chain.rng(str(len(road.surface)), 31), np.array(road.surface)
+        old = rng.random(surface.size) < fault.relabelled
+        other = (surface + rng.integers(1, 3, surface.size)) % 3
+        return replace(road, surface=tuple(int(s) for s in np.where(old, other, surface)))
     if fault.map_m == 0.0:
         return road
     borders = road.borders
@@ -166,24 +198,41 @@ def _with_camera(
 ) -> pd.DataFrame:
     """The log with the perception columns, and the friction's reference where there is one."""
     time_s = log["time_s"].to_numpy()
-    seen = columns(chain, results(chain, passage, road, fault, name), time_s)
+    seen = columns(chain, results(chain, passage, road, fault, name), time_s, name)
     measured = reference(chain, passage, road, fault, time_s, name)
-    if fault.odometer != 0.0:
-        log = log.assign(position_m=np.round(log["position_m"] * (1.0 + fault.odometer), 4))
+    log = log.assign(
+        position_m=_position(chain, log["position_m"].to_numpy(), fault, time_s, passage.end_s, name)
+    )
     if measured is not None:
         log = log.assign(mu_reference=measured)
     return pd.concat([log, seen], axis=1)
+
+
+def _position(chain: Chain, position_m: Array, fault: Fault, time_s: Array, end_s: float, name: str) -> Array:
+    """As the log has it [m]."""
+    if fault.odometer != 0.0:
+        position_m = np.round(position_m * (1.0 + fault.odometer), 4)
+    if fault.jumped_m != 0.0:
+        position_m = np.round(position_m + jumps_m(chain, fault, time_s, end_s, name), 4)
+    kind = form(chain.forms, "position")
+    if kind == "steps":
+        position_m = np.round(np.round(position_m / POSITION_STEP_M) * POSITION_STEP_M, 4)
+    elif kind == "lost_samples":
+        position_m = np.where(
+            chain.rng(name, 38).random(position_m.size) < POSITIONS_LOST, np.nan, position_m
+        )
+    return position_m
 
 
 def _deviations(
     spec: Spec, stage: Stage, scene: Scene, rng: Generator
 ) -> tuple[dict[str, Parameters], dict[str, float], Fault]:
     """Parameters of each effect at the wanted gap, that gap, and all of them in one chain."""
-    chosen = {effect: CAMERA_EFFECTS[effect].at(scene, rng) for effect in spec.effects}
+    chosen = {effect: ALL_EFFECTS[effect].at(scene, rng) for effect in spec.effects}
 
     def gap_with(effect: str) -> Callable[[float], float]:
         def gap(severity: float) -> float:
-            fault = CAMERA_EFFECTS[effect].apply(Fault(), chosen[effect](severity))
+            fault = ALL_EFFECTS[effect].apply(Fault(), chosen[effect](severity))
             return gap_of(stage, fault, _told(stage.chain, stage.road, fault)).total
 
         return lru_cache(gap)
@@ -195,5 +244,5 @@ def _deviations(
     parts = {effect: chosen[effect](severity) for effect, severity in severities.items()}
     fault = Fault()
     for effect, given in parts.items():
-        fault = CAMERA_EFFECTS[effect].apply(fault, given)
+        fault = ALL_EFFECTS[effect].apply(fault, given)
     return parts, {effect: gaps[effect](severity) for effect, severity in severities.items()}, fault

@@ -176,9 +176,4 @@ CAMERA_FORMS: dict[str, dict[str, Callable[..., Any] | None]] = {
     "reference_filter": {"none": None, "low_pass": None},
     "reference_lost": {"none": None, "samples": None, "runs": None},
 }
-"""All that a camera's chain has forms of; those without a function are choices in `camera_chain.py`."""
-
-
-def draw_camera_forms(rng: Generator) -> dict[str, str]:
-    """A form of each, all equally likely."""
-    return {aspect: str(rng.choice(list(forms))) for aspect, forms in CAMERA_FORMS.items()}
+"""All that a camera's chain has forms of in the first family; those without a function are choices beside its parts."""

@@ -6,15 +6,16 @@ alike, neither hide nor feign it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera_chain import POINTS, Chain, Fault, Results, results
-from .camera_reference import friction_shift
+from .camera_chain import POINTS, results
+from .camera_reference import friction_shift, measured_at
 from .camera_road import CameraRoad, Passage
+from .camera_system import Chain, Fault, Results
 from .severity import Size
 
 Array = NDArray[np.floating[Any]]
@@ -28,6 +29,10 @@ REFERENCE = 0.012
 WRONG = 0.08
 """Least spread of a second's share of wrong classes [-]."""
 BLOCK_S = 1.0
+SLOW = {"white": 0.1, "slow": 0.5, "drifting": 0.25, "heavy_tailed": 0.1, "standing": 0.32}
+"""Share of a reference's noise that is left in a second's mean [-]."""
+SLIPPERIER = 0.4
+"""How far from its middle a class begins and ends where the most slippery surface counts [stretches]."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +55,23 @@ def gap_of(stage: Stage, fault: Fault, told: CameraRoad | None = None) -> Size:
     said = results(chain, passage, road, fault, log)
     inside = plain.ready_s > 0.0
     moved = said.shift_m - plain.shift_m
+    other = told if told is not None and fault.relabelled else None
+    elsewhere = None if other else told
     parts = {
-        "place": _place(stage, plain, moved, told or road),
+        "place": _place(stage, plain, moved, elsewhere or road),
         "confidence": _confidence(plain, said, inside),
-        "class": _classes(plain, said, inside),
-        "friction": _friction(stage, fault),
+        "class": _classes(plain, _mislabelled(said, road, other), inside),
+        "friction": _friction(stage, fault, other),
     }
     return Size(float(np.sqrt(1.0 + sum(part**2 for part in parts.values()))), parts)
+
+
+def _mislabelled(said: Results, road: CameraRoad, told: CameraRoad | None) -> Results:
+    """With the results on stretches that road.yaml has another surface of as mistaken too."""
+    if told is None:
+        return said
+    middle = 0.5 * (said.from_m + said.to_m)
+    return replace(said, mistaken=said.mistaken | (road.class_at(middle) != told.class_at(middle)))
 
 
 def crossings(passage: Passage, road: CameraRoad) -> Array:
@@ -78,6 +93,8 @@ def _place(stage: Stage, plain: Results, moved: Array, told: CameraRoad) -> floa
     apart = (0.5 - np.mean(POINTS[chain.forms["belongs"]])) * np.interp(
         there, middle, plain.to_m - plain.from_m
     )
+    if chain.forms["belongs"] == "most_slippery":
+        apart = SLIPPERIER * np.interp(there, middle, plain.to_m - plain.from_m)
     odds = np.interp(there, middle, plain.odds)
     spread = np.sqrt(step**2 / 12.0 + apart**2 + step**2 * odds + PLACE_M**2)
     return float(np.sqrt(np.mean((shift / spread) ** 2)))
@@ -94,7 +111,7 @@ def _blocks(time_s: Array, values: Array) -> Array:
 def _confidence(plain: Results, said: Results, inside: NDArray[np.bool_]) -> float:
     """Of the log confidence: root mean square over the seconds."""
     time_s = plain.ready_s[inside]
-    usual = _blocks(time_s, np.log(np.maximum(plain.confidence[inside], 0.05)))
+    usual = _blocks(time_s, np.log(np.maximum(np.nan_to_num(plain.confidence[inside]), 0.05)))
     lost = _blocks(time_s, np.log(np.maximum(said.kept[inside], 0.02)))
     return float(np.sqrt(np.mean(lost**2)) / np.hypot(np.std(usual), LEVEL))
 
@@ -108,12 +125,16 @@ def _classes(plain: Results, said: Results, inside: NDArray[np.bool_]) -> float:
     return float(np.sqrt(np.mean(wrong**2)) / spread)
 
 
-def _friction(stage: Stage, fault: Fault) -> float:
-    """Of the friction's reference: root mean square over the seconds."""
+def _friction(stage: Stage, fault: Fault, told: CameraRoad | None) -> float:
+    """Of the friction's reference: root mean square over the seconds that have one."""
     chain = stage.chain
     if chain.reference_noise is None:
         return 0.0
     time_s = np.arange(0.0, stage.passage.end_s, 0.02)
-    shift = _blocks(time_s, friction_shift(chain, stage.passage, stage.road, fault, time_s))
-    slow = {"white": 0.1, "slow": 0.5, "drifting": 0.25}[chain.forms["reference"]]
-    return float(np.sqrt(np.mean(shift**2)) / np.hypot(slow * chain.reference_noise, REFERENCE))
+    shift = friction_shift(chain, stage.passage, stage.road, fault, time_s, told)
+    measured = measured_at(chain, stage.passage, time_s, stage.log)
+    if not measured.any():
+        return 0.0
+    blocks = _blocks(time_s[measured], shift[measured])
+    noise = SLOW[chain.forms["reference"]] * chain.reference_noise
+    return float(np.sqrt(np.mean(blocks**2)) / np.hypot(noise, REFERENCE))

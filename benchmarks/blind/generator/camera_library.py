@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from .camera_chain import BEHIND_M, HEIGHT_M, Chain, Fault
+from .camera_family import form
 from .camera_road import CLASS_FRICTION, SURFACES
+from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault
 from .details import USUAL_M_S
 from .world import Parameters
 
@@ -37,7 +38,7 @@ class CameraEffect:
     found: tuple[str, ...] = ()
 
 
-def _growing(name: str, least: float, most: float) -> Callable[[Scene, Generator], Scale]:
+def growing(name: str, least: float, most: float) -> Callable[[Scene, Generator], Scale]:
     return lambda scene, rng: lambda severity: {name: least * (most / least) ** severity}
 
 
@@ -61,9 +62,14 @@ def _blur(scene: Scene, rng: Generator) -> Scale:
 
 
 def _friction(scene: Scene, rng: Generator) -> Scale:
-    """One class, two or all that are driven on; each its own way, and none beyond what roads have."""
+    """One class, two or all that are driven on; each its own way or all alike, and none beyond what roads have."""
     off = rng.permutation(scene.driven)[: rng.integers(1, len(scene.driven) + 1)]
     signs, shares = rng.choice([-1.0, 1.0], 3, p=[0.6, 0.4]), rng.uniform(0.6, 1.0, 3)
+    kind = form(scene.chain.forms, "friction_off")
+    if kind == "one_only":
+        off = off[:1]
+    elif kind == "all_alike":  # cold tyres, or a road that was never like the others
+        off, signs, shares = np.array(scene.driven), signs[[0, 0, 0]], shares[[0, 0, 0]]
     most = {1.0: np.array([0.4, 0.5, 1.5]), -1.0: np.array([0.45, 0.5, 0.5])}
 
     def parameters(severity: float) -> Parameters:
@@ -92,7 +98,7 @@ def _signed(name: str, least: float, most: float) -> Callable[[Scene, Generator]
 
 CAMERA_LIBRARY: dict[str, CameraEffect] = {
     "camera_latency": CameraEffect(
-        _growing("delay_s", 0.01, 0.6),
+        growing("delay_s", 0.01, 0.6),
         lambda f, g: replace(f, delay_s=g["delay_s"]),
         ("camera",),
         ("delay_s",),
@@ -129,10 +135,10 @@ CAMERA_OUTSIDE: dict[str, CameraEffect] = {
         _signed("share", 0.001, 0.03), lambda f, g: replace(f, odometer=g["share"]), ("camera", "road")
     ),
     "map_borders_off": CameraEffect(
-        _growing("spread_m", 0.3, 6.0), lambda f, g: replace(f, map_m=g["spread_m"]), ("road", "camera")
+        growing("spread_m", 0.3, 6.0), lambda f, g: replace(f, map_m=g["spread_m"]), ("road", "camera")
     ),
     "sun_glare": CameraEffect(
-        _growing("share", 0.05, 0.9), lambda f, g: replace(f, glare=g["share"]), ("camera", "road")
+        growing("share", 0.05, 0.9), lambda f, g: replace(f, glare=g["share"]), ("camera", "road")
     ),
     "stretch_confused": CameraEffect(
         _confusion,
@@ -140,10 +146,10 @@ CAMERA_OUTSIDE: dict[str, CameraEffect] = {
         ("camera", "road"),
     ),
     "camera_clock_fast": CameraEffect(
-        _growing("share", 0.0005, 0.03), lambda f, g: replace(f, clock=g["share"]), ("camera",)
+        growing("share", 0.0005, 0.03), lambda f, g: replace(f, clock=g["share"]), ("camera",)
     ),
     "camera_freezes": CameraEffect(
-        _growing("hold_s", 0.1, 2.5), lambda f, g: replace(f, frozen_s=g["hold_s"]), ("camera",)
+        growing("hold_s", 0.1, 2.5), lambda f, g: replace(f, frozen_s=g["hold_s"]), ("camera",)
     ),
 }
 """What the library lacks; any of the subsystems is a right answer."""

@@ -59,6 +59,10 @@ class CameraRoad(Road):
         """The same road with other friction for each surface."""
         return replace(self, mu=tuple(values[surface] for surface in self.surface))
 
+    def with_mu(self, mu: Array) -> CameraRoad:
+        """The same road with other friction for each stretch."""
+        return replace(self, mu=tuple(float(value) for value in mu))
+
     def with_borders(self, borders: Array) -> CameraRoad:
         """The same surfaces with other borders."""
         return replace(self, start_m=(0.0, *(round(float(border), 2) for border in borders)))

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from .camera_library import CAMERA_LIBRARY, CAMERA_OUTSIDE, CAMERA_PAIRS
+from .camera_family import CameraFamily
+from .camera_further import CAMERA_OUTSIDES, PAIRS_OF
+from .camera_library import CAMERA_LIBRARY
 from .forms import OUTSIDES, Family
 from .library import LIBRARY
 
@@ -184,13 +186,16 @@ SIZES: dict[str, Counts] = {
 deviation outside: 15, in the second family 18, in the third 23, in the fourth 28, in the fifth 34 and 5 pairs more, in
 the sixth 42 and 4 pairs more again, in the seventh 48 and 3 pairs more, in the eighth 53 and 3 pairs more,
 in the ninth 58 and 3 pairs more, in the tenth 63 and 3 pairs more. Camera: 5 x 6 rich, 5 x 3 mild, 25 without a gap,
-5 x 2 pairs, 6 x 2 outside and 5 x 2 removed; the family is that of what is not the camera's."""
+5 x 2 pairs, 6 x 2 outside and 5 x 2 removed, and in the camera's second family 8 x 2 pairs and 15 x 2 outside; the
+other family is that of what is not the camera's."""
 
 
-def table(size: str, family: Family = Family.FIRST) -> list[Spec]:
+def table(size: str, family: Family = Family.FIRST, camera: CameraFamily = CameraFamily.FIRST) -> list[Spec]:
     """All cases of a size, in a fixed order."""
     counts = SIZES[size]
-    library, beyond = (CAMERA_LIBRARY, CAMERA_OUTSIDE) if counts.camera else (LIBRARY, OUTSIDES[family])
+    library, beyond = (
+        (CAMERA_LIBRARY, CAMERA_OUTSIDES[camera]) if counts.camera else (LIBRARY, OUTSIDES[family])
+    )
     inside, outside = list(library)[:: counts.every], list(beyond)[:: counts.every]
     specs = [_single(Group.RICH, e, i) for e in inside for i in range(counts.rich)]
     specs += [_single(Group.TYRE, e, i + 1) for e in inside for i in range(counts.tyre)]
@@ -198,7 +203,7 @@ def table(size: str, family: Family = Family.FIRST) -> list[Spec]:
     for i in range(counts.no_gap):
         name = f"no_gap-{i}-{'calm' if i % 3 == 2 else 'rich'}"
         specs.append(Spec(name, Group.NO_GAP, (), 1.0, name))
-    for pair in _pairs(counts, family):
+    for pair in _pairs(counts, family, camera):
         for i in range(counts.pairs):
             name = f"pair-{pair[0]}-{pair[1]}-{i}"
             specs.append(Spec(name, Group.PAIR, pair, 10.0, name))
@@ -213,9 +218,9 @@ def table(size: str, family: Family = Family.FIRST) -> list[Spec]:
     return [replace(spec, camera=True) for spec in specs] if counts.camera else specs
 
 
-def _pairs(counts: Counts, family: Family) -> tuple[tuple[str, str], ...]:
+def _pairs(counts: Counts, family: Family, camera: CameraFamily) -> tuple[tuple[str, str], ...]:
     if counts.camera:
-        return CAMERA_PAIRS[:: counts.every]
+        return tuple(pair for added in PAIRS_OF[camera] for pair in added[:: counts.every])
     pairs = PAIRS[:: counts.every]
     known = list(Family)[: list(Family).index(family) + 1]
     for more in [MORE_PAIRS[since] for since in known if since in MORE_PAIRS]:

@@ -1,0 +1,167 @@
+"""Cases of the camera with the second family's forms: their files and seals; and that the first's stay as they were."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.random import Generator
+
+from benchmarks.blind import runner
+from benchmarks.blind.generator import camera_case
+from benchmarks.blind.generator.camera_family import (
+    SECOND,
+    CameraFamily,
+    is_new,
+)
+from benchmarks.blind.generator.camera_further import ALL_EFFECTS
+from benchmarks.blind.generator.car import Car
+from benchmarks.blind.generator.cases import SHOWS
+from benchmarks.blind.generator.driver import Drive, Style
+from benchmarks.blind.generator.forms import Family
+from benchmarks.blind.generator.kernel import N, V, W, X
+from benchmarks.blind.generator.making import make_case
+from benchmarks.blind.generator.table import Group, table
+from benchmarks.blind.generator.world import World
+from benchmarks.blind.scorer import score_run
+
+TENTH = Family.TENTH
+FIRST_CASES = {spec.name: spec for spec in table("camera")}
+
+
+def rolled(car: Car, world: World, rich: bool, duration_s: float, rng: Generator, style: Style) -> Drive:
+    """A drive without forces, in no time: the files of a case do not depend on how the car is moved."""
+    clock = np.arange(round(1000 * duration_s) + 1) * 1e-3
+    speed = 15.0 + rng.uniform(4.0, 6.0) * np.sin(0.5 * clock + rng.uniform(0.0, 6.0))
+    path = np.zeros((clock.size, N + 1))
+    path[:, X], path[:, V] = rng.uniform(0.0, 20.0) + np.cumsum(speed) * 1e-3, speed
+    path[:, W : W + 4] = speed[:, None] / world.physics.radius
+    return Drive(path, np.zeros((round(100 * duration_s) + 1, 4)))
+
+
+SECOND_CASES = {spec.name: spec for spec in table("camera", TENTH, CameraFamily.SECOND)}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rich-camera_latency-0",
+        "rich-class_friction_offset-1",
+        "mild-motion_blur-1",
+        "no_gap-1-rich",
+        "no_gap-2-calm",
+        "outside-map_labels_old-0",
+        "outside-position_jumps-1",
+        "pair-camera_pitch-class_friction_offset-0",
+    ],
+)
+def test_files_keep_the_contract_and_the_secret(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(camera_case, "drive", rolled)
+    made = make_case(SECOND_CASES[name], 1, TENTH, CameraFamily.SECOND)
+    made.write(tmp_path)
+    seal = json.loads(json.dumps(made.seal()))
+    assert seal["camera"]["family"] == "second"
+    assert set(seal["camera"]["chain"]["forms"]) == set(SECOND)
+    assert made.truth.gap.total >= SHOWS or made.spec.group in (Group.MILD, Group.NO_GAP)
+    for log in ("fit_1", "holdout"):
+        check_log(pd.read_csv(tmp_path / f"{log}.csv"))
+    for path in tmp_path.iterdir():
+        text = path.read_text(encoding="utf-8")
+        assert not [e for e in ALL_EFFECTS if e in text]
+
+
+def check_log(log: pd.DataFrame) -> None:
+    """Columns of the contract; a result's stay the same as long as its number does."""
+    assert np.all(np.diff(log["time_s"]) > 0.0)
+    seen = log.filter(regex="^(image|frame)").dropna(how="all")
+    assert set(seen["image_class"]) <= {-1, 0, 1, 2}
+    told = seen[seen["image_class"] >= 0]
+    assert len(told) > 0.6 * len(seen)
+    assert told["image_confidence"].between(0.0, 1.0).all()
+    assert (told["image_to_m"] > told["image_from_m"]).all()
+    same = np.diff(seen["frame_id"]) == 0.0
+    before, after = (part[same].reset_index(drop=True) for part in (seen.iloc[:-1], seen.iloc[1:]))
+    pd.testing.assert_frame_equal(before, after)
+
+
+def test_a_case_repeats_and_a_removed_one_has_the_same_logs(monkeypatch):
+    monkeypatch.setattr(camera_case, "drive", rolled)
+    rich = SECOND_CASES["rich-exposure_shift-1"]
+    first, again = (make_case(rich, 1, TENTH, CameraFamily.SECOND) for _ in range(2))
+    removed = make_case(SECOND_CASES["removed-exposure_shift-1"], 1, TENTH, CameraFamily.SECOND)
+    for name, log in first.logs.items():
+        pd.testing.assert_frame_equal(log, again.logs[name])
+        pd.testing.assert_frame_equal(log, removed.logs[name])
+    assert first.seal() == again.seal()
+
+
+def test_a_folder_keeps_to_one_family_of_the_cameras_forms(tmp_path):
+    runner.seal_run(tmp_path, "camera_small", 1, TENTH, CameraFamily.SECOND)
+    runner.seal_run(tmp_path, "camera_small", 1, TENTH, CameraFamily.SECOND)
+    assert json.loads((tmp_path / "run.json").read_text())["camera_forms"] == "second"
+    with pytest.raises(runner.RunError, match="camera_forms: second there, first now"):
+        runner.seal_run(tmp_path, "camera_small", 1, TENTH, CameraFamily.FIRST)
+
+
+class Said:
+    """A diagnosis that always blames the camera's delay."""
+
+    def to_json(self) -> dict[str, Any]:
+        cause = {"effect": "camera_latency", "probability": 0.9, "parameters": {}, "gap_after": 1.0}
+        return {"verdict": "identified", "causes": [cause | {"fit_bic": 1.0}], "ambiguous_with": []}
+
+
+def test_a_run_is_scored_with_a_line_on_new_forms(tmp_path, monkeypatch):
+    fake = ModuleType("sim2real.diagnose")
+    fake.diagnose_files, fake.shrink_on = lambda *files, **options: Said(), lambda *files: 80.0
+    monkeypatch.setitem(sys.modules, "sim2real.diagnose", fake)
+    monkeypatch.setattr(camera_case, "drive", rolled)
+    runner.seal_run(tmp_path, "camera_small", 1, TENTH, CameraFamily.SECOND)
+    spec = SECOND_CASES["rich-camera_latency-0"]
+    assert runner.run_case(spec, 1, TENTH, tmp_path, False, CameraFamily.SECOND)["error"] is None
+    scores = score_run(tmp_path)
+    assert len(scores.pending) == len(table("camera_small", TENTH, CameraFamily.SECOND)) - 1
+    seal = json.loads((tmp_path / "results" / f"{spec.name}.json").read_text())["seal"]
+    line = next(line for line in scores.asides if "camera's first family" in line.text)
+    assert line.n == is_new(seal["camera"]["chain"]["forms"], "camera_latency")
+
+
+# --- the first family stays as it was
+
+FIRST_DIGESTS = {
+    "rich-camera_latency-0": "843a379aded2ad5b",
+    "rich-camera_pitch-1": "5e92482348cb049d",
+    "rich-exposure_shift-2": "ff7a32c8657a361e",
+    "rich-motion_blur-0": "9f5321b415de037d",
+    "rich-class_friction_offset-0": "5f801c27e2f6ee53",
+    "no_gap-0-rich": "f0d302cf0a469ebc",
+    "no_gap-2-calm": "cf63a8c7d29629fc",
+    "pair-camera_latency-class_friction_offset-0": "3fe6b0a068d2dcd2",
+    "outside-map_borders_off-0": "de450599c4fd59cd",
+    "outside-camera_freezes-1": "57cb0a71d4316b2e",
+}
+"""SHA-256 over the files and the seal of cases, as the first family made them before there was a second."""
+
+
+def digest_of(name: str, folder: Path) -> str:
+    case = make_case(FIRST_CASES[name], 1, TENTH)
+    case.write(folder)
+    seal = json.loads(json.dumps(case.seal()), parse_float=lambda x: f"{float(x):.6g}")
+    seal["camera"].pop("family", None)
+    total = hashlib.sha256(json.dumps(seal, sort_keys=True).encode())
+    for path in sorted(folder.iterdir()):
+        total.update(path.name.encode() + path.read_bytes())
+    return total.hexdigest()[:16]
+
+
+@pytest.mark.parametrize("name", FIRST_DIGESTS)
+def test_the_first_familys_cases_stay_what_they_were(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(camera_case, "drive", rolled)
+    assert digest_of(name, tmp_path) == FIRST_DIGESTS[name]
