@@ -20,7 +20,8 @@ from scenarios.camera.scene import SceneLook, SurfaceSegment
 from trpac_core.vision import ife as ife_module
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import decode_image
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.trajectory import Motion

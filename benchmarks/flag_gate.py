@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 from rich.progress import Progress
 
-from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.ife_config import IfeConfig
 
 from .patch_width import ROOT, development_sequences
 from .table4.judge import SCENARIOS, Networks, judged

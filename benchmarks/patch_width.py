@@ -16,7 +16,7 @@ import cv2
 import pandas as pd
 from rich.progress import Progress
 
-from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.ife_config import IfeConfig
 
 from .table4.clips import real_sequences
 from .table4.drives import rendered_drives

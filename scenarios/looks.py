@@ -13,7 +13,8 @@ from scenarios.camera.files import load_camera
 from scenarios.files import Scenario
 from scenarios.runner import Run
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import decode_image
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.results import FrameResult

@@ -23,7 +23,8 @@ from scenarios.film import Film, Strip, dark, shown
 from scenarios.looks import MODELS
 from scenarios.stills import PICTURE_ENDINGS, Progress, pictures_in, scratch_for, silent
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError, decode_image
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.trajectory import Motion

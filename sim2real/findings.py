@@ -324,7 +324,7 @@ def _over_forms(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval
     return out
 
 
-EXCITED_SHARE = 1.0
+EXCITED_SHARE = 4.0 / 3.0
 """A parameter is seen when its interval's half width is below this many noticeable changes of it [-]."""
 
 

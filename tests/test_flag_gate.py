@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import flag_gate
 from benchmarks.table4.judge import COLUMNS
-from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.ife_config import IfeConfig
 
 
 def verdicts(source: str, wrong: list[float], right: list[float], Q_v: float = 0.9) -> pd.DataFrame:

@@ -14,7 +14,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from test_ife import CAMERA, DRY, SNOW, WET, Masks, Middle, paint
 
 from trpac_core.vision.foresight import LOOK_EVERY_M, Look, due, recalled, within_reach
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.sides import SidesIfe, SidesState
 from trpac_core.vision.trajectory import Motion
 

@@ -23,7 +23,7 @@ from trpac_core.four_wheels import (
 from trpac_core.readings import Sensors
 from trpac_core.tyre import force
 from trpac_core.vehicle import Vehicle
-from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.sides import SidesIfe
 
 STEP_S = 0.001

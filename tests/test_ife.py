@@ -19,7 +19,8 @@ from scenarios.camera.scene import SceneLook, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.evidence import EvidenceState, WeightLaw
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import PatchVerdicts, RoadMasks, Segmenter, SurfaceClassifier
 from trpac_core.vision.scene import scene_of

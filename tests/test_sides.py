@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from test_ife import CAMERA, DRY, SNOW, Masks, Middle, paint
 
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.sides import SidesIfe, SidesState
 from trpac_core.vision.trajectory import Motion
 

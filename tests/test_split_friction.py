@@ -18,7 +18,7 @@ from scenarios.split_figure import draw_split
 from scenarios.split_friction import ROAD, run
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.sides import SidesIfe, SidesState
 from trpac_core.vision.trajectory import Motion

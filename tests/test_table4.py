@@ -23,7 +23,7 @@ from scenarios.files import load_strict
 from scenarios.looks import MODELS
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.networks import RoadMasks
 from trpac_core.vision.regions import LEAST_ROI_WIDTH_PX, cut_patch, project
 from trpac_core.vision.trajectory import Motion

@@ -21,7 +21,8 @@ from scenarios.vision_runs import FRAME_COLUMNS, Frames, run_frames
 from trpac_cli.main import app
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError, decode_image
 from trpac_core.vision.networks import (
     PatchVerdicts,
@@ -269,6 +270,20 @@ def test_what_cannot_be_read_does_not_count_and_alone_is_refused():
 # --- run ---
 
 
+def as_the_estimator_says(folder, table):
+    """Hold rows to the estimator's own verdicts; the car drives on half a metre from row to row."""
+    networks = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
+    ife, state = Ife(IfeConfig(camera=SMALL), *networks), IfeState()
+    for number, row in table.iterrows():
+        motion = Motion(10.0, way_m=0.5 * number)
+        state, expected = ife.process(state, decode_image(folder / row["frame"]), motion)
+        found = (row["P_fusion"], row["p_util"], row["Q_v"], row["flag"])
+        assert [float(x) for x in found] == pytest.approx(
+            [expected.P_fusion, expected.p_util, expected.Q_v, int(expected.flag)], 1e-5
+        )
+    assert state.looks
+
+
 def test_a_folder_of_frames_gives_what_the_estimator_gives_frame_by_frame(folder, camera_file, tmp_path):
     out = tmp_path / "out"
     result = drive(folder, camera_file, out)
@@ -277,15 +292,8 @@ def test_a_folder_of_frames_gives_what_the_estimator_gives_frame_by_frame(folder
     assert tuple(table.columns) == FRAME_COLUMNS
     assert list(table["frame"]) == [f"f_{number}.png" for number in range(8, 14)]
     assert list(table["class"]) == list(table["voting_class"]) == ["dry"] * 3 + ["snow_ice"] * 3
-    networks = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
-    ife, state = Ife(IfeConfig(camera=SMALL), *networks), IfeState()
-    for _, row in table.iterrows():
-        state, expected = ife.process(state, decode_image(folder / row["frame"]), Motion(10.0))
-        found = (row["P_fusion"], row["p_util"], row["Q_v"], row["flag"])
-        assert found == pytest.approx(
-            (expected.P_fusion, expected.p_util, expected.Q_v, int(expected.flag)), 1e-5
-        )
-        assert 0.0 < row["ms"] < 5000.0
+    as_the_estimator_says(folder, table)
+    assert table["ms"].between(0.0, 5000.0, inclusive="neither").all()
     summary = json.loads((out / "summary.json").read_text())
     assert summary["frames"] == 6
     assert summary["unreadable"] == []
@@ -307,25 +315,18 @@ def test_a_folder_of_frames_gives_what_the_estimator_gives_frame_by_frame(folder
 
 
 def test_an_unusable_frame_is_listed_and_leaves_the_memory_alone(folder, camera_file, tmp_path, pictures):
-    assert drive(folder, camera_file, tmp_path / "whole").exit_code == 0
     (folder / "f_1.jpg").write_bytes(BROKEN)
     cv2.imwrite(str(folder / "f_11_cropped.png"), pictures[0][:200])
     result = drive(folder, camera_file, tmp_path / "holed")
     assert result.exit_code == 1
     assert "2 of 8 frames could not be used" in result.stderr
     assert "480 x 200" in result.stderr
-    whole, holed = (
-        pd.read_csv(tmp_path / name / "frames.csv", keep_default_na=False) for name in ("whole", "holed")
-    )
+    holed = pd.read_csv(tmp_path / "holed" / "frames.csv", keep_default_na=False)
     bad = holed["frame"].isin(["f_1.jpg", "f_11_cropped.png"])
     assert list(holed[bad].index) == [0, 5]
     for column, empty in zip(FRAME_COLUMNS[1:], ("", "", "", "", 0, "", ""), strict=True):
         assert list(holed[bad][column]) == [empty] * 2, column
-    left = holed[~bad].drop(columns="ms").astype(str).reset_index(drop=True)
-    numbers = ["P_fusion", "p_util", "Q_v"]
-    right = whole.drop(columns="ms").astype(str)
-    pd.testing.assert_frame_equal(left.drop(columns=numbers), right.drop(columns=numbers))
-    np.testing.assert_allclose(left[numbers].astype(float), right[numbers].astype(float))
+    as_the_estimator_says(folder, holed[~bad])
     summary = json.loads((tmp_path / "holed" / "summary.json").read_text())
     assert [entry["frame"] for entry in summary["unreadable"]] == ["f_1.jpg", "f_11_cropped.png"]
     assert summary["class_share"]["dry"] == 0.5

@@ -24,7 +24,8 @@ from .steady import Steady
 from .tyre import peak_friction
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface
-from .vision.ife import IfeConfig, IfeState
+from .vision.ife import IfeState
+from .vision.ife_config import IfeConfig
 from .vision.preview import PreviewConfig, PreviewState
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trpac_core.vision.camera import Camera
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError, decode_image
 from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
 from trpac_core.vision.results import FrameResult

@@ -20,7 +20,7 @@ from scenarios.camera.files import load_camera
 from scenarios.files import load_scenario, load_vehicle
 from scenarios.unit_client import car_parameters
 from trpac_core.vehicle import Vehicle
-from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.bus import BusSettings, Link
 from trpac_hil.camera import MOTION, RESULTS_KEPT, CameraJob, Folder, result_columns, watch

@@ -12,7 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from scenarios.camera.disturbances import NONE, PAPER, Disturbance, disturb
-from trpac_core.vision.ife import Ife, IfeConfig, IfeState, fit_camera, usable_road
+from trpac_core.vision.ife import Ife, IfeState, fit_camera, usable_road
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.networks import PatchVerdicts, RoadMasks, Segmenter, SurfaceClassifier
 from trpac_core.vision.voting import Voting, VotingConfig
 

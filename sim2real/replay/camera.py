@@ -15,7 +15,7 @@ from sim2real.replay.inputs import ANY_ROAD, Inputs
 from trpac_core.estimator import EstimatorConfig, RoadClass
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import IfeConfig
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError, decode_image
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.preview import PreviewConfig

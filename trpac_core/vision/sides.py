@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .ife import Ife, IfeConfig, IfeState, fit_camera, usable_road
+from .ife import Ife, IfeState, fit_camera, usable_road
+from .ife_config import IfeConfig
 from .networks import PatchClassifier, RoadSegmenter
 from .results import FrameResult
 from .trajectory import Motion
