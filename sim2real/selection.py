@@ -22,6 +22,9 @@ NO_GAP_MISFIT = 1.4
 """Up to this misfit of the model as it is, what is left is noise [-]."""
 NO_GAP_GAIN = 0.03
 """As long as no effect takes more than this share off the loss [-]."""
+QUIET_MISFIT, QUIET_GAIN = 1.0, 0.06
+"""And twice as much where the misfit is no more than noise alone gives: noise that was read too large, as of a signal
+that is held, leaves room for small ages [-]."""
 DRIFT_GAIN = 0.2
 """And of the share of the loss that drifting sensors cause, an effect may take this, too [-]."""
 GROSS_BLOCKS = 0.01
@@ -97,9 +100,10 @@ def allowed(before: Fitness) -> float:
 def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
     null = contest.null
-    if fitness(null, fit_to, holdout).misfit > NO_GAP_MISFIT or rare_share(null, fit_to, holdout):
+    misfit = fitness(null, fit_to, holdout).misfit
+    if misfit > NO_GAP_MISFIT or rare_share(null, fit_to, holdout):
         return False
-    most = NO_GAP_GAIN + DRIFT_GAIN * _drifting(fit_to, holdout)
+    most = (QUIET_GAIN if misfit <= QUIET_MISFIT else NO_GAP_GAIN) + DRIFT_GAIN * _drifting(fit_to, holdout)
     gaining = [e for e in contest.singles if e.loss < (1.0 - most) * null.loss]
     if not gaining:
         return True

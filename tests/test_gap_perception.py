@@ -705,3 +705,21 @@ def test_rounded_or_saturated_confidence_is_no_repeated_result(digits):
         return changed(log, image_confidence=sure)
 
     assert diagnose(Camera(fps=40.0, roughness=0.05), 2, damage=rounded).verdict is Verdict.NO_GAP
+
+
+@pytest.mark.parametrize(
+    ("faults", "effect", "words"),
+    [
+        ({"offset": (0.2, 0.0, 0.0)}, "class_friction_offset", "explains mu_reference"),
+        ({"blur_s": 0.03}, "motion_blur", "how the confidence goes with speed"),
+        ({"dimmed": 0.4}, "exposure_shift", "how low the confidence is"),
+    ],
+)
+def test_what_only_an_effect_that_is_left_out_explains_is_unknown(faults, effect, words):
+    camera = replace(Camera(confidence=0.9), **faults)
+    assert diagnose(camera, 4).causes == (effect,)
+    finding = diagnose(camera, 4, exclude=(effect,))
+    assert finding.verdict is Verdict.UNKNOWN
+    assert effect not in finding.causes
+    assert any(words in text for text in finding.unexplained), finding.unexplained
+    assert diagnose(Camera(), 4, exclude=(effect,)).verdict is Verdict.NO_GAP

@@ -42,6 +42,7 @@ CUTTING_SEED = 1
 FURTHER_CUTS = 2
 """How often real pictures are cut anew, at other places, for the second stage: the teacher is not asked about these."""
 
+READING_STEPS = 2000
 OUTLIERS = {"train": 12000, "val": 1600}
 LOOKS, READ_LOOKS = {"": 1500}, {"": 1500, "condition_web": 7500, "rendered": 5500}
 """Most patches of each source ("" stands for all others) for the head that tells disturbed patches, and for the one
@@ -89,7 +90,7 @@ def train_and_ship(
             trunk, material.patches, material.teacher, steps=count, seed=given.seed, report=report
         )
     net = taught.net
-    learn_heads(net, material, given.seed)
+    learn_heads(net, material, given.seed, given.effort)
     train_s = time.monotonic() - start
     outcome = judge(net, _judged_sets(facts.pictures, rendered), material.outliers["val"], given.seed)
     path = given.out / "surface.onnx"
@@ -114,14 +115,16 @@ def gather(
     every = of_split(pictures, "train")
     patches = joined([training_patches(every, CUTTING_SEED), rendered["train"]])
     teacher = _ask_teacher(given, patches, steps) if given.teacher else None
-    further = [training_patches(every, CUTTING_SEED + 1 + number) for number in range(FURTHER_CUTS)]
+    cuts = round(min(given.effort, 1.0) * FURTHER_CUTS)
+    further = [training_patches(every, CUTTING_SEED + 1 + number) for number in range(cuts)]
     patches = joined([patches, *further, *([rendered["further"]] if "further" in rendered else [])])
     kept = np.array([family_of(str(source)) not in given.without for source in patches.sources])
     rng = np.random.default_rng(CUTTING_SEED)
     seen = [picture for picture in every if picture.family not in given.without]
+    count = {split: max(80, round(min(given.effort, 1.0) * most)) for split, most in OUTLIERS.items()}
     outliers = {
-        "train": outlier_patches(rng, seen, patches.patches[kept], OUTLIERS["train"]),
-        "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, OUTLIERS["val"]),
+        "train": outlier_patches(rng, seen, patches.patches[kept], count["train"]),
+        "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, count["val"]),
     }
     if teacher is not None:
         teacher = teacher.where(kept[: len(teacher)])
@@ -176,21 +179,23 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
     return trunk
 
 
-def learn_heads(net: SurfaceNet, material: Material, seed: int) -> None:
+def learn_heads(net: SurfaceNet, material: Material, seed: int, effort: float) -> None:
     """Teach the heads that tell readable road and disturbed patches; the rest of the net stays."""
-    roads = _looks(material.patches, seed, READ_LOOKS)
+    roads = _looks(material.patches, seed, READ_LOOKS, effort)
     readable = np.concatenate([roads, calibrate.noised(roads, seed + 1)])
-    learn_reading(net, readable, material.outliers["train"], seed=seed)
-    clear = _looks(material.patches, seed, LOOKS)[::2]
+    steps = max(2, round(effort * READING_STEPS))
+    learn_reading(net, readable, material.outliers["train"], steps=steps, seed=seed)
+    clear = _looks(material.patches, seed, LOOKS, effort)[::2]
     learn_disturbed(net, clear, calibrate.noised(clear, seed), seed=seed)
 
 
-def _looks(patches: PatchSet, seed: int, most: dict[str, int]) -> Image:
+def _looks(patches: PatchSet, seed: int, most: dict[str, int], effort: float) -> Image:
     """Undisturbed patches of all sources, at most so many of each: for heads that tell no class."""
     rng = np.random.default_rng(seed)
+    count = {source: max(8, round(min(effort, 1.0) * looks)) for source, looks in most.items()}
     keep = np.concatenate(
         [
-            rng.permutation(np.flatnonzero(patches.sources == source))[: most.get(str(source), most[""])]
+            rng.permutation(np.flatnonzero(patches.sources == source))[: count.get(str(source), count[""])]
             for source in np.unique(patches.sources)
         ]
     )

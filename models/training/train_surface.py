@@ -37,7 +37,7 @@ FIRST_LAYERS_UNTIL = 0.5
 """Share of the second stage after which the first layers stay as they are; a quarter of a step's time is saved then."""
 AHEAD = 3
 """Batches drawn while the net still learns from earlier ones."""
-READING_STEPS, READING_RATE = 2000, 2e-3
+READING_RATE = 2e-3
 DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3, 0.5, 0.5
 """The head that tells disturbed patches must hold on roads never seen, so it is kept weak."""
 
@@ -202,10 +202,11 @@ def _loss(student: Taught, batch: Batch, hint: float, classes: float) -> Tensor:
     return loss
 
 
-def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, seed: int) -> None:
+def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, steps: int, seed: int) -> None:
     """Teach the reading head to tell readable road from all else; the rest of the net stays as it is.
 
-    `readable` and `outliers` are patches (n, 64, 96, 3); disturbed road counts as readable.
+    `readable` and `outliers` are patches (n, 64, 96, 3); disturbed road counts as readable. `steps` is that of the
+    optimiser.
     """
     torch.manual_seed(seed)
     features = torch.cat([embeddings(net, readable), embeddings(net, outliers)])
@@ -213,8 +214,8 @@ def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, seed: in
     weights = torch.where(labels > 0, 0.5 / len(readable), 0.5 / len(outliers))
     head = nn.ModuleList([net.reading_norm, net.reading]).train()
     optimiser = torch.optim.AdamW(head.parameters(), lr=READING_RATE, weight_decay=WEIGHT_DECAY)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, READING_STEPS)
-    for chosen in torch.multinomial(weights, READING_STEPS * 512, replacement=True).view(READING_STEPS, 512):
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
+    for chosen in torch.multinomial(weights, steps * 512, replacement=True).view(steps, 512):
         loss = functional.binary_cross_entropy_with_logits(net.readable(features[chosen]), labels[chosen])
         optimiser.zero_grad(set_to_none=True)
         loss.backward()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.perception.blocks import BLOCK_S, Blocks, make_blocks
-from sim2real.perception.chain import Account, Chain, price
+from sim2real.perception.chain import DECISIVE, Account, Chain, price
 from sim2real.perception.confidence import (
     NORMAL_CONFIDENCE,
     NORMAL_SPREAD,
@@ -101,7 +101,9 @@ def confidence_chain(
 
     plain, fits = fit(()), [fit(choice) for choice in choices]
     accounts = [_account(f, plain, seen, model) for f in (plain, *fits)]
-    return Chain(
+    left_out = [c for c in CHOICES if set(c) & set(exclude)] if len(known) else []
+    outside = [_account(fit(choice), plain, seen, model) for choice in left_out]
+    chain = Chain(
         SIGNAL,
         pictures,
         (len(known) + len(unseen)) / model.memory,
@@ -112,6 +114,20 @@ def confidence_chain(
         next_step=NEXT_STEP,
         unexplained=_restless(model),
     )
+    needed = [account for account in outside if account.score > chain.best().score + DECISIVE]
+    if needed and not chain.unexplained:
+        return replace(chain, unexplained=_of_no_effect(max(needed, key=lambda account: account.score)))
+    return chain
+
+
+def _of_no_effect(needed: Account) -> str:
+    """What the confidence does that no effect of the library has it do."""
+    what = (
+        "how the confidence goes with speed"
+        if "motion_blur" in needed.effects
+        else "how low the confidence is"
+    )
+    return f"No effect of the library explains {what}. {needed.evidence_for[0]}"
 
 
 def _restless(model: ConfidenceModel) -> str:

@@ -10,7 +10,7 @@ observation.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -294,9 +294,10 @@ def friction_chain(
     fits = [with_class_offsets(known), with_road_factor(known)]
     if _follows_road(known, fits[1]):
         fits = fits[:1]
-    fits = [fit for fit in fits if not set(fit.effects) & set(exclude)]
     accounts = [_account(fit, plain, known, unseen) for fit in (plain, *fits)]
-    return Chain(
+    outside = [account for account in accounts if set(account.effects) & set(exclude)]
+    accounts = [account for account in accounts if account not in outside]
+    chain = Chain(
         SIGNAL,
         rows,
         float(len(known) + len(unseen)),
@@ -306,6 +307,12 @@ def friction_chain(
         unexcited=_undriven(known),
         next_step=NEXT_STEP,
     )
+    # Values per class, and a factor on all, are free curves too: where only they do, no effect of the library does.
+    if any(account.score > chain.best().score + DECISIVE for account in outside):
+        return replace(
+            chain, unexplained=f"No effect of the library explains {SIGNAL}. {outside[0].evidence_for[0]}"
+        )
+    return chain
 
 
 def _account(fit: FrictionFit, nothing: FrictionFit, known: Stretches, unseen: Stretches) -> Account:
