@@ -25,6 +25,12 @@ NO_GAP_GAIN = 0.03
 QUIET_MISFIT, QUIET_GAIN = 1.0, 0.06
 """And twice as much where the misfit is no more than noise alone gives: noise that was read too large, as of a signal
 that is held, leaves room for small ages [-]."""
+LONE_MISFIT, LONE_GAIN = 1.6, 0.015
+"""And up to this misfit where no effect takes even this share: sensors that wander by themselves, for nothing of the
+library moves with them [-]."""
+NEGLIGIBLE = 0.02
+"""An effect of no more than this share of a noticeable change is none, whatever it takes: no interval is much narrower
+[-]."""
 DRIFT_GAIN = 0.2
 """And of the share of the loss that drifting sensors cause, an effect may take this, too [-]."""
 GROSS_BLOCKS = 0.01
@@ -101,14 +107,24 @@ def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
     null = contest.null
     misfit = fitness(null, fit_to, holdout).misfit
-    if misfit > NO_GAP_MISFIT or rare_share(null, fit_to, holdout):
+    if misfit > LONE_MISFIT or rare_share(null, fit_to, holdout):
         return False
+    real = [e for e in contest.singles if not _negligible(e)]
+    if misfit > NO_GAP_MISFIT:
+        return all(e.loss >= (1.0 - LONE_GAIN) * null.loss for e in real)
     most = (QUIET_GAIN if misfit <= QUIET_MISFIT else NO_GAP_GAIN) + DRIFT_GAIN * _drifting(fit_to, holdout)
-    gaining = [e for e in contest.singles if e.loss < (1.0 - most) * null.loss]
+    gaining = [e for e in real if e.loss < (1.0 - most) * null.loss]
     if not gaining:
         return True
     floor = (1.0 - most) * _quiet_loss(null, null, fit_to, holdout)
     return all(_quiet_loss(e, null, fit_to, holdout) >= floor for e in gaining)
+
+
+def _negligible(entry: Entry) -> bool:
+    """Whether an effect is next to none at its best."""
+    candidate = entry.fitted.candidate
+    off = np.abs(entry.fitted.x - candidate.neutral) / candidate.scale
+    return bool(np.all(off < NEGLIGIBLE))
 
 
 def rare_share(null: Entry, fit_to: Evidence, holdout: Evidence) -> float:

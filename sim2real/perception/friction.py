@@ -161,15 +161,18 @@ def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile, found: Sequence[Effe
         if np.count_nonzero(inside) < FEWEST_ROWS:
             continue
         values = log.signals["mu_reference"][inside]
-        wander = float(values.std() / np.sqrt(min(len(values), 10)))
+        # A reference is filtered, or late: at first it still tells of the stretch before.
+        settled, newest = values[len(values) // 2 :], values[3 * len(values) // 4 :]
+        wander = float(settled.std() / np.sqrt(min(len(settled), 10)))
+        moving = abs(float(np.median(newest) - np.median(settled)))
         rows.append(
             (
                 log.name,
                 log.time_s[inside][0],
                 log.time_s[inside][-1],
                 int(segment.surface_class),
-                float(np.median(values)),
-                float(np.hypot(TOLERANCE, wander)),
+                float(np.median(settled)),
+                float(np.hypot(TOLERANCE, np.hypot(wander, moving))),
                 friction,
             )
         )

@@ -221,8 +221,10 @@ def shift_chain(
         return fit_shift(known, effects, height_m, modelled.delay_s, modelled.pitch_rad)
 
     plain, fits = fit(()), [fit(choice) for choice in choices]
+    free = [fit(choice) for choice in outside]
     every = known.joined(unseen)
-    closest = min((plain, *fits), key=lambda f: f.scale)
+    # What a shift takes is no scatter, whether or not the library has an effect for it.
+    closest = min((plain, *fits, *free), key=lambda f: f.scale)
     # A chain that errs in streaks may do so on the hold-out alone: scatter is no shift there either.
     scale = max(closest.scale, closest.scale_of(unseen, height_m))
     accounts = [_account(f, plain, unseen, height_m, scale, known) for f in (plain, *fits)]
@@ -236,9 +238,9 @@ def shift_chain(
         next_step=NEXT_STEP,
         quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
     )
-    for choice in outside:
-        other = _account(fit(choice), plain, unseen, height_m, scale, known)
-        if chain.best().effects and other.score > chain.best().score + DECISIVE:
+    for choice, shifted in zip(outside, free, strict=True):
+        other = _account(shifted, plain, unseen, height_m, scale, known)
+        if other.score > chain.best().score + DECISIVE and not chain.quiet:
             return replace(chain, unexplained=_another_law(chain.best(), choice))
     if chain.best().left() <= MOSTLY * accounts[0].left():
         return chain
@@ -250,7 +252,7 @@ def _another_law(best: Account, choice: tuple[str, ...]) -> str:
     """What a shift is that goes with speed in a way that no effect of the library has."""
     laws = {"camera_latency": "goes with speed", "camera_pitch": "does not depend on speed"}
     law = " and partly ".join(laws[effect] for effect in choice)
-    blamed = " and ".join(best.effects)
+    blamed = " and ".join(best.effects) or "no effect of the library"
     return f"The changes of class are shifted along the road by what {law}, not as {blamed} would have it."
 
 
