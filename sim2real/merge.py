@@ -16,7 +16,7 @@ from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Une
 
 QUIET_SIDE_DOUBT = 0.1
 """Probability that is left to the effects of data that show no gap: some of them would hardly show [-]."""
-UNKNOWN_BELIEF = 0.2
+UNKNOWN_BELIEF = 0.1
 """Share of the camera's effects in the belief where what they leave says that it is none of them, or not all [-]."""
 CERTAIN = 0.97
 """Probability of what a mark that nothing else leaves has shown [-]."""

@@ -723,3 +723,25 @@ def test_what_only_an_effect_that_is_left_out_explains_is_unknown(faults, effect
     assert effect not in finding.causes
     assert any(words in text for text in finding.unexplained), finding.unexplained
     assert diagnose(Camera(), 4, exclude=(effect,)).verdict is Verdict.NO_GAP
+
+
+def test_a_reference_that_goes_with_speed_is_no_offset_of_the_classes():
+    def with_speed(log):
+        lower = 0.012 * (log.signals["vehicle_speed_m_s"] - 17.0)
+        return changed(log, mu_reference=log.signals["mu_reference"] - lower)
+
+    finding = diagnose(Camera(), 5, damage=with_speed, spacing_m=25.0)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("mu_reference" in text for text in finding.unexplained)
+
+
+def test_a_reference_that_is_filtered_is_no_gap():
+    """A moving mean over 0.6 s: on short stretches it tells of the one before for most of the way."""
+
+    def filtered(log):
+        values = log.signals["mu_reference"]
+        sums = np.cumsum(np.concatenate((np.full(60, values[0]), values)))
+        return changed(log, mu_reference=(sums[60:] - sums[:-60]) / 60.0)
+
+    finding = diagnose(Camera(), 6, damage=filtered, spacing_m=25.0)
+    assert finding.verdict is Verdict.NO_GAP, (finding.causes, finding.unexplained)

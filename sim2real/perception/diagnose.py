@@ -19,6 +19,7 @@ from sim2real.perception.chain import Account, Chain
 from sim2real.perception.confidence_chain import confidence_chain
 from sim2real.perception.conflicts import class_conflicts, conflicts_in_words
 from sim2real.perception.frames import Modelled, read_results
+from sim2real.perception.friction import SIGNAL as REFERENCE
 from sim2real.perception.friction import friction_chain
 from sim2real.perception.pictures import read_light
 from sim2real.perception.shift import shift_chain
@@ -28,8 +29,9 @@ from trpac_core.vision.camera import Camera
 
 NOISE_FLOOR = 1.0
 """Size of the gap that noise alone leaves, per signal and in total [-]."""
-UNEXPLAINED = 2.5
-"""Rest of a signal, in standard deviations, from which on its best account does not explain it [-]."""
+UNEXPLAINED, UNEXPLAINED_REFERENCE = 2.5, 1.5
+"""Rest of a signal, in standard deviations, from which on its best account does not explain it; less of the friction
+reference, whose deviations hold what all stretches may be off by together [-]."""
 TYPICAL = 0.75
 """Quantile that is taken for it: a few odd borders or stretches depend on nothing, a whole class of road does."""
 MAKE_CLASSES_ERR = {"exposure_shift", "motion_blur"}
@@ -255,7 +257,7 @@ def _unexplained(chain: Chain, account: Account) -> str:
     if not len(account.z):
         return ""
     typical = float(np.hypot(np.quantile(np.abs(account.z), TYPICAL), np.sqrt(account.excess)))
-    if typical < UNEXPLAINED:
+    if typical < (UNEXPLAINED_REFERENCE if chain.signal == REFERENCE else UNEXPLAINED):
         return ""
     named = " and ".join(account.effects) or "the simulation as it is"
     return f"{chain.signal}: {named} leaves {typical:.1f} times the noise on the hold-out."
