@@ -736,12 +736,12 @@ def test_a_reference_that_goes_with_speed_is_no_offset_of_the_classes():
 
 
 def test_a_reference_that_is_filtered_is_no_gap():
-    """A moving mean over 0.6 s: on short stretches it tells of the one before for most of the way."""
+    """A moving mean over 0.9 s: on short stretches it tells of the one before for most of the way."""
 
     def filtered(log):
         values = log.signals["mu_reference"]
-        sums = np.cumsum(np.concatenate((np.full(60, values[0]), values)))
-        return changed(log, mu_reference=(sums[60:] - sums[:-60]) / 60.0)
+        sums = np.cumsum(np.concatenate((np.full(90, values[0]), values)))
+        return changed(log, mu_reference=(sums[90:] - sums[:-90]) / 90.0)
 
     finding = diagnose(Camera(), 6, damage=filtered, spacing_m=25.0)
     assert finding.verdict is Verdict.NO_GAP, (finding.causes, finding.unexplained)
