@@ -133,7 +133,7 @@ def test_a_step_beyond_the_bounds_stays_on_them():
 
 # --- fits
 
-OFF = 1.5
+OFF = 1.125
 """Half widths of its interval that a parameter may be off: of two dozen 95 % intervals one may miss its value, and the
 hidden car, run at 1 kHz and averaged to 125 Hz, is not quite the model's."""
 
