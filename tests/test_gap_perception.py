@@ -745,3 +745,18 @@ def test_a_reference_that_is_filtered_is_no_gap():
 
     finding = diagnose(Camera(), 6, damage=filtered, spacing_m=25.0)
     assert finding.verdict is Verdict.NO_GAP, (finding.causes, finding.unexplained)
+
+
+def test_streaks_of_errors_longer_than_the_scatter_excuse_it():
+    """A camera that errs for some ten metres at a time, at borders as elsewhere; borders are passed once."""
+
+    def streaky(log):
+        rng = np.random.default_rng(len(log.name) + int(log.time_s[-1]))
+        begin, classes = log.signals["image_from_m"], log.signals["image_class"].copy()
+        for start in np.arange(20.0, np.nanmax(begin), 30.0) + rng.uniform(0.0, 15.0):
+            inside = (begin > start) & (begin < start + rng.uniform(6.0, 14.0)) & (classes >= 0.0)
+            classes[inside] = (classes[inside] + 1.0) % 3.0
+        return changed(log, image_class=classes)
+
+    finding = diagnose(Camera(fps=20.0, wrong=0.0), 7, damage=streaky, spacing_m=60.0)
+    assert not any("beside road.yaml's borders" in text for text in finding.unexplained)

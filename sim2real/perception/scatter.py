@@ -32,7 +32,7 @@ CLIPPED = 3.0
 """Errors count up to so many times their median size: one misread border is no pattern [-]."""
 
 
-def scatter_in_words(scale_m: float, rest_m: Array, crossings: Crossings) -> str:
+def scatter_in_words(scale_m: float, rest_m: Array, crossings: Crossings, streak_m: float) -> str:
     """The gap that scatter is, in a sentence; empty where it is none.
 
     Parameters
@@ -43,6 +43,8 @@ def scatter_in_words(scale_m: float, rest_m: Array, crossings: Crossings) -> str
         By how far each lies beside its border, shifted as fits best [m].
     crossings : Crossings
         k of them.
+    streak_m : float
+        Way over which the camera errs at a stretch: it moves borders by as much [m].
     """
     low, high = crossings.bracket(0.5)
     if len(crossings) < FEWEST:
@@ -58,7 +60,7 @@ def scatter_in_words(scale_m: float, rest_m: Array, crossings: Crossings) -> str
         )
     if _alike(rest_m, along) > STANDS_OUT:
         return f"{lies}, and neighbours alike: does position_m drift, or does the delay?"
-    if len(again) < FEWEST_PAIRS and scale_m >= max(SCATTERED_ALONE_M, open_m):
+    if len(again) < FEWEST_PAIRS and scale_m >= max(SCATTERED_ALONE_M, open_m, streak_m):
         return f"{lies}: are the borders where road.yaml has them, and does position_m drift?"
     return ""
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from sim2real.perception.chain import DECISIVE, Account, Chain, price
-from sim2real.perception.crossings import Crossings, find_crossings
+from sim2real.perception.crossings import Crossings, find_crossings, streak_m
 from sim2real.perception.frames import Modelled, Results
 from sim2real.perception.scatter import scatter_in_words
 from sim2real.result import Interval, Place
@@ -244,7 +244,8 @@ def shift_chain(
             return replace(chain, unexplained=_another_law(chain.best(), choice))
     if chain.best().left() <= MOSTLY * accounts[0].left():
         return chain
-    scatter = scatter_in_words(scale * ERROR_M, closest.rest_m(every, height_m), every)
+    seen = [*fitted, *([] if held_out is None else [held_out])]
+    scatter = scatter_in_words(scale * ERROR_M, closest.rest_m(every, height_m), every, streak_m(seen))
     return replace(chain, unexplained=scatter)
 
 
