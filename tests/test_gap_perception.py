@@ -760,3 +760,19 @@ def test_streaks_of_errors_longer_than_the_scatter_excuse_it():
 
     finding = diagnose(Camera(fps=20.0, wrong=0.0), 7, damage=streaky, spacing_m=60.0)
     assert not any("beside road.yaml's borders" in text for text in finding.unexplained)
+
+
+@pytest.mark.parametrize(("speeds", "creeps"), [((10.0, 25.0, 10.0, 25.0), True), ((10.0, 25.0), False)])
+def test_a_confidence_that_falls_over_every_log_is_no_effect_of_the_library(speeds, creeps):
+    """But one that falls as the car gets faster over the log is blur."""
+
+    def fogging(log):
+        share = log.time_s / log.time_s[-1]
+        return changed(log, image_confidence=log.signals["image_confidence"] * np.exp(-0.4 * share))
+
+    if not creeps:
+        assert diagnose(Camera(blur_s=0.05), 8, speeds=speeds).causes == ("motion_blur",)
+        return
+    finding = diagnose(Camera(roughness=0.03), 8, speeds=speeds, damage=fogging)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("falls over every log" in text for text in finding.unexplained), finding.unexplained

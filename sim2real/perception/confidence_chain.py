@@ -36,9 +36,14 @@ NORMAL_RANGE = 2.0
 """Standard deviations of a normal level, of usual mistakes and of usual light together that are no gap [-]."""
 FEWEST_BLOCKS = 8
 """With fewer blocks nothing is said of confidence."""
-RESTLESS = 0.25
+RESTLESS = 0.2
 """Standard deviation of the logarithm of confidence, from second to second on one class at one speed, from which on it
-is a gap of its own: chains that nothing disturbs were within 0.15, one that the sun blinds at times beyond 0.4 [-]."""
+is a gap of its own: chains that nothing disturbs were within 0.15, those that sun or shaking do beyond 0.21 [-]."""
+CREEPS, CREEPS_BY = 0.6, 0.2
+"""Correlation of the confidence's logarithm with time in every log, and its change over a log, from which on it creeps:
+chains that nothing disturbs were within 0.3 and 0.07 [-]."""
+FEWEST_CREEPING = 10
+"""Blocks of a log that can tell."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +119,36 @@ def confidence_chain(
         next_step=NEXT_STEP,
         unexplained=_restless(model),
     )
+    by_effects = {f.effects: f for f in (plain, *fits)}
+    creeping = _creeping(seen.together, by_effects[chain.best().effects])
+    if creeping and not chain.unexplained:
+        return replace(chain, unexplained=creeping)
     needed = [account for account in outside if account.score > chain.best().score + DECISIVE]
     if needed and not chain.unexplained:
         return replace(chain, unexplained=_of_no_effect(max(needed, key=lambda account: account.score)))
     return chain
+
+
+def _creeping(blocks: Blocks, f: ConfidenceFit) -> str:
+    """The gap that a confidence is which goes with time in every log, in a sentence; empty where it does not."""
+    rest = blocks.loss - f.loss(blocks)
+    for c in np.unique(blocks.classes):
+        rest[blocks.classes == c] -= rest[blocks.classes == c].mean()
+    changes = []
+    for log in np.unique(blocks.log):
+        time_s, loss = blocks.time_s[blocks.log == log], rest[blocks.log == log]
+        if len(loss) < FEWEST_CREEPING or not loss.std():
+            return ""
+        slope, correlation = np.polyfit(time_s, loss, 1)[0], np.corrcoef(time_s, loss)[0, 1]
+        if abs(correlation) < CREEPS:
+            return ""
+        changes.append(slope * np.ptp(time_s))
+    if len(changes) < 2 or np.ptp(np.sign(changes)) or np.min(np.abs(changes)) < CREEPS_BY:
+        return ""
+    return (
+        f"The confidence {'falls' if changes[0] > 0.0 else 'rises'} over every log, by a factor of "
+        f"{np.exp(np.median(np.abs(changes))):.1f}, at one speed and on one class: does the lens fog, or the light go?"
+    )
 
 
 def _of_no_effect(needed: Account) -> str:
