@@ -134,14 +134,14 @@ def test_left_out_sources_are_absent_from_patches_and_outliers(made_up, monkeypa
 
     from models.training import surface_run
 
-    monkeypatch.setattr(surface_run, "OUTLIERS", {"train": 12, "val": 4})
+    monkeypatch.setattr(surface_run, "OUTLIERS", {"train": 160, "val": 80})
     rendered_part = patches.patch_set([([np.full((64, 96, 3), GREY, np.uint8)], 0, "rendered")])
-    given = argparse.Namespace(teacher=None, without=("seq_extreme",), worlds=None)
+    given = argparse.Namespace(teacher=None, without=("seq_extreme",), worlds=None, effort=0.5)
     material = surface_run.gather(
         given, data.read_manifest(made_up), {"train": rendered_part, "val": rendered_part}, None
     )
     assert set(material.patches.sources) == {"condition_web", "drivable_camvid/train", "rendered"}
-    assert material.outliers["train"].shape == (12, 64, 96, 3)
+    assert {split: len(part) for split, part in material.outliers.items()} == {"train": 80, "val": 80}
 
 
 def test_outliers_repeat_by_seed_and_differ_from_one_another(made_up):
