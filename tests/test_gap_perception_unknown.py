@@ -1,0 +1,121 @@
+"""What of the camera chain is no gap after all, and what is one that no effect of the library explains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from camera_drives import Camera, changed, drive, road
+from test_gap_perception import BARE, diagnose
+
+from sim2real.perception.diagnose import diagnose_perception
+from sim2real.result import Verdict
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_scatter_on_the_hold_out_alone_is_no_gap(seed):
+    roads = [road(seed=3 * seed + i) for i in range(3)]
+    careful, careless = Camera(fps=40.0), Camera(fps=40.0, flicker_m=1.5, wrong=0.05)
+    cameras = (careful, careful, careless)
+    logs = [drive(r, c, seed=10 * seed + i) for i, (r, c) in enumerate(zip(roads, cameras, strict=True))]
+    finding = diagnose_perception(logs[:2], logs[2], roads, BARE)
+    assert finding.verdict is Verdict.NO_GAP, finding.unexplained
+
+
+def test_results_repeated_to_the_last_digit_are_a_gap():
+    def frozen(log):
+        """Results of every tenth second are repeated for half a second."""
+        held = (log.time_s % 10.0) < 0.5
+        first = np.flatnonzero(held & ~np.roll(held, 1))
+        signals = {}
+        for name in ("image_class", "image_confidence"):
+            column = log.signals[name].copy()
+            for start in first:
+                column[start : start + 50] = column[start]
+            signals[name] = column
+        return changed(log, **signals)
+
+    finding = diagnose(Camera(fps=40.0, roughness=0.05), 2, damage=frozen)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("repeats a result to the last digit" in text for text in finding.unexplained)
+
+
+@pytest.mark.parametrize("digits", [1, 2])
+def test_rounded_or_saturated_confidence_is_no_repeated_result(digits):
+    def rounded(log):
+        sure = np.minimum(np.round(log.signals["image_confidence"], digits), 0.9)
+        return changed(log, image_confidence=sure)
+
+    assert diagnose(Camera(fps=40.0, roughness=0.05), 2, damage=rounded).verdict is Verdict.NO_GAP
+
+
+@pytest.mark.parametrize(
+    ("faults", "effect", "words"),
+    [
+        ({"offset": (0.2, 0.0, 0.0)}, "class_friction_offset", "explains mu_reference"),
+        ({"blur_s": 0.03}, "motion_blur", "how the confidence goes with speed"),
+        ({"dimmed": 0.4}, "exposure_shift", "how low the confidence is"),
+    ],
+)
+def test_what_only_an_effect_that_is_left_out_explains_is_unknown(faults, effect, words):
+    camera = replace(Camera(confidence=0.9), **faults)
+    assert diagnose(camera, 4).causes == (effect,)
+    finding = diagnose(camera, 4, exclude=(effect,))
+    assert finding.verdict is Verdict.UNKNOWN
+    assert effect not in finding.causes
+    assert any(words in text for text in finding.unexplained), finding.unexplained
+    assert diagnose(Camera(), 4, exclude=(effect,)).verdict is Verdict.NO_GAP
+
+
+def test_a_reference_that_goes_with_speed_is_no_offset_of_the_classes():
+    def with_speed(log):
+        lower = 0.012 * (log.signals["vehicle_speed_m_s"] - 17.0)
+        return changed(log, mu_reference=log.signals["mu_reference"] - lower)
+
+    finding = diagnose(Camera(), 5, damage=with_speed, spacing_m=25.0)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("mu_reference" in text for text in finding.unexplained)
+
+
+def test_a_reference_that_is_filtered_is_no_gap():
+    """A moving mean over 0.9 s: on short stretches it tells of the one before for most of the way."""
+
+    def filtered(log):
+        values = log.signals["mu_reference"]
+        sums = np.cumsum(np.concatenate((np.full(90, values[0]), values)))
+        return changed(log, mu_reference=(sums[90:] - sums[:-90]) / 90.0)
+
+    finding = diagnose(Camera(), 6, damage=filtered, spacing_m=25.0)
+    assert finding.verdict is Verdict.NO_GAP, (finding.causes, finding.unexplained)
+
+
+def test_streaks_of_errors_longer_than_the_scatter_excuse_it():
+    """A camera that errs for some ten metres at a time, at borders as elsewhere; borders are passed once."""
+
+    def streaky(log):
+        rng = np.random.default_rng(len(log.name) + int(log.time_s[-1]))
+        begin, classes = log.signals["image_from_m"], log.signals["image_class"].copy()
+        for start in np.arange(20.0, np.nanmax(begin), 30.0) + rng.uniform(0.0, 15.0):
+            inside = (begin > start) & (begin < start + rng.uniform(6.0, 14.0)) & (classes >= 0.0)
+            classes[inside] = (classes[inside] + 1.0) % 3.0
+        return changed(log, image_class=classes)
+
+    finding = diagnose(Camera(fps=20.0, wrong=0.0), 7, damage=streaky, spacing_m=60.0)
+    assert not any("beside road.yaml's borders" in text for text in finding.unexplained)
+
+
+@pytest.mark.parametrize(("speeds", "creeps"), [((10.0, 25.0, 10.0, 25.0), True), ((10.0, 25.0), False)])
+def test_a_confidence_that_falls_over_every_log_is_no_effect_of_the_library(speeds, creeps):
+    """But one that falls as the car gets faster over the log is blur."""
+
+    def fogging(log):
+        share = log.time_s / log.time_s[-1]
+        return changed(log, image_confidence=log.signals["image_confidence"] * np.exp(-0.4 * share))
+
+    if not creeps:
+        assert diagnose(Camera(blur_s=0.05), 8, speeds=speeds).causes == ("motion_blur",)
+        return
+    finding = diagnose(Camera(roughness=0.03), 8, speeds=speeds, damage=fogging)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("falls over every log" in text for text in finding.unexplained), finding.unexplained
