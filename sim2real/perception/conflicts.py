@@ -38,6 +38,18 @@ def class_error(results: Sequence[Results]) -> float:
     return float(every.mean()) if len(every) else float("nan")
 
 
+def streak_m(results: Sequence[Results]) -> float:
+    """Way over which a camera that errs goes on doing so, the mean away from borders; 0 where it never errs [m]."""
+    wrong_m, runs = 0.0, 0
+    for one, place_m in _places(results):
+        wrong = np.zeros(len(one), dtype=np.bool_)
+        for segment, inside in _inside(one, place_m):
+            wrong |= inside & (one.classes != segment.surface_class)
+        wrong_m += float(np.abs(np.gradient(place_m))[wrong].sum()) if len(one) > 1 else 0.0
+        runs += int(wrong[0]) + int((wrong[1:] & ~wrong[:-1]).sum())
+    return wrong_m / runs if runs else 0.0
+
+
 @dataclass(frozen=True)
 class Conflict:
     """A segment of a log on which most results name one other class than road.yaml, in a sentence."""
@@ -81,13 +93,19 @@ def _other_class(one: Results, segment: RoadSegment, inside: NDArray[np.bool_]) 
 
 def _laid_over(results: Sequence[Results]) -> Iterator[tuple[Results, RoadSegment, NDArray[np.bool_]]]:
     """Results over the road as they fit best: each log, each segment, and which of its results lie well within."""
+    for one, place_m in _places(results):
+        for segment, inside in _inside(one, place_m):
+            yield one, segment, inside
+
+
+def _places(results: Sequence[Results]) -> Iterator[tuple[Results, Array]]:
+    """Each log, and where its results lie on the road as they fit best together [m]."""
     if not results:
         return
     age_s, way_m = rough_shift(results)
     for one in results:
         late_m = one.driven_m(one.time_s, np.array([age_s]))[:, 0] + way_m
-        for segment, inside in _inside(one, 0.5 * (one.from_m + one.to_m) - late_m):
-            yield one, segment, inside
+        yield one, 0.5 * (one.from_m + one.to_m) - late_m
 
 
 def _inside(one: Results, place_m: Array) -> Iterator[tuple[RoadSegment, NDArray[np.bool_]]]:

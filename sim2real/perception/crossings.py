@@ -32,8 +32,6 @@ MOST_WRONG = 0.3
 """Share of pictures about a border that may contradict it."""
 LEAST_ERROR = 0.02
 """Share of pictures that are taken to be wrong even where none contradicts."""
-CLEAR_M = 5.0
-"""From a border on so far away another class is an error, and no sign of where the border lies [m]."""
 LIKELY_NATS = 2.0
 """Splits less likely than the best one by no more than this are in the bracket [nats]."""
 
@@ -123,20 +121,6 @@ def rough_shift(results: Sequence[Results]) -> tuple[float, float]:
             cost[i] += MISMATCH_NATS * wrong.sum(axis=1)
     best = np.unravel_index(int(np.argmin(cost)), cost.shape)
     return float(age[best]), float(way[best])
-
-
-def streak_m(results: Sequence[Results]) -> float:
-    """Way over which a camera that errs goes on doing so, the mean away from borders; 0 where it never errs [m]."""
-    age_s, way_m = rough_shift(results)
-    wrong_m, runs = 0.0, 0
-    for one in results:
-        place_m = 0.5 * (one.from_m + one.to_m) - one.driven_m(one.time_s, np.array([age_s]))[:, 0] - way_m
-        borders_m = np.array([segment.start_m for segment in one.road.segments[1:]])
-        clear = np.abs(place_m[:, None] - borders_m).min(axis=1, initial=np.inf) > CLEAR_M
-        wrong = clear & (surfaces_at(one.road, place_m) != one.classes)
-        wrong_m += float(np.abs(np.gradient(place_m))[wrong].sum()) if len(place_m) > 1 else 0.0
-        runs += int(wrong[0]) + int((wrong[1:] & ~wrong[:-1]).sum())
-    return wrong_m / runs if runs else 0.0
 
 
 def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:

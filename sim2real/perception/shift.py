@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from sim2real.perception.chain import DECISIVE, Account, Chain, price
-from sim2real.perception.crossings import Crossings, find_crossings, streak_m
+from sim2real.perception.conflicts import streak_m
+from sim2real.perception.crossings import Crossings, find_crossings
 from sim2real.perception.frames import Modelled, Results
 from sim2real.perception.scatter import scatter_in_words
 from sim2real.result import Interval, Place
