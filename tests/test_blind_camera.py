@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from numpy.random import Generator
+from camera_stand_ins import PLAIN, blaming, rolled
 from numpy.testing import assert_allclose
 
 from benchmarks.blind import runner
@@ -32,30 +30,15 @@ from benchmarks.blind.generator.camera_road import (
 )
 from benchmarks.blind.generator.camera_system import Chain, Fault, draw_chain
 from benchmarks.blind.generator.camera_telling import columns
-from benchmarks.blind.generator.car import Car
-from benchmarks.blind.generator.driver import Drive, Style
 from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.kernel import N, V, W, X
 from benchmarks.blind.generator.making import make_case
 from benchmarks.blind.generator.table import Group, table
-from benchmarks.blind.generator.world import World
 from benchmarks.blind.scorer import score_run
 from benchmarks.blind.show import draw_confusion
 
 TENTH = Family.TENTH
 FIRST = CameraFamily.FIRST
 CASES = {spec.name: spec for size in ("camera", "camera_small") for spec in table(size)}
-PLAIN = {
-    "captures": "even",
-    "work": "steady",
-    "lateness": "constant",
-    "mounting": "firm",
-    "stamp": "window",
-    "belongs": "centre",
-    "kept": "to_nothing",
-    "reference_filter": "none",
-    "reference_lost": "none",
-}
 ROAD = CameraRoad(
     (0.0, *(45.0 + 31.7 * np.arange(30))),
     tuple(CLASS_FRICTION[i % 3] for i in range(31)),
@@ -264,16 +247,6 @@ def test_gap_of_a_delay_is_its_way_over_the_spread_of_a_border():
 # --- cases
 
 
-def rolled(car: Car, world: World, rich: bool, duration_s: float, rng: Generator, style: Style) -> Drive:
-    """A drive without forces, in no time: the files of a case do not depend on how the car is moved."""
-    clock = np.arange(round(1000 * duration_s) + 1) * 1e-3
-    speed = 15.0 + rng.uniform(4.0, 6.0) * np.sin(0.5 * clock + rng.uniform(0.0, 6.0))
-    path = np.zeros((clock.size, N + 1))
-    path[:, X], path[:, V] = rng.uniform(0.0, 20.0) + np.cumsum(speed) * 1e-3, speed
-    path[:, W : W + 4] = speed[:, None] / world.physics.radius
-    return Drive(path, np.zeros((round(100 * duration_s) + 1, 4)))
-
-
 @pytest.mark.parametrize("name", [spec.name for spec in table("camera_small")])
 def test_files_keep_the_contract_and_the_secret(name, tmp_path, monkeypatch):
     monkeypatch.setattr(camera_case, "drive", rolled)
@@ -362,18 +335,8 @@ def test_roads_have_every_surface_and_uneven_borders():
     assert steps.std() > 8.0
 
 
-class Said:
-    """A diagnosis that always blames the camera's delay."""
-
-    def to_json(self) -> dict[str, Any]:
-        cause = {"effect": "camera_latency", "probability": 0.9, "parameters": {}, "gap_after": 1.0}
-        return {"verdict": "identified", "causes": [cause | {"fit_bic": 1.0}], "ambiguous_with": []}
-
-
 def test_a_run_is_made_and_scored_with_the_cameras_effects_as_candidates(tmp_path, monkeypatch):
-    fake = ModuleType("sim2real.diagnose")
-    fake.diagnose_files, fake.shrink_on = lambda *files, **options: Said(), lambda *files: 80.0
-    monkeypatch.setitem(sys.modules, "sim2real.diagnose", fake)
+    blaming(monkeypatch)
     monkeypatch.setattr(camera_case, "drive", rolled)
     runner.seal_run(tmp_path, "camera_small", 1, TENTH)
     for name in ("rich-camera_latency-0", "no_gap-0-rich"):

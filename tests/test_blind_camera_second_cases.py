@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.random import Generator
+from camera_stand_ins import blaming, rolled
 
 from benchmarks.blind import runner
 from benchmarks.blind.generator import camera_case
@@ -22,28 +19,14 @@ from benchmarks.blind.generator.camera_family import (
     is_new,
 )
 from benchmarks.blind.generator.camera_further import ALL_EFFECTS
-from benchmarks.blind.generator.car import Car
 from benchmarks.blind.generator.cases import SHOWS
-from benchmarks.blind.generator.driver import Drive, Style
 from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.kernel import N, V, W, X
 from benchmarks.blind.generator.making import make_case
 from benchmarks.blind.generator.table import Group, table
-from benchmarks.blind.generator.world import World
 from benchmarks.blind.scorer import score_run
 
 TENTH = Family.TENTH
 FIRST_CASES = {spec.name: spec for spec in table("camera")}
-
-
-def rolled(car: Car, world: World, rich: bool, duration_s: float, rng: Generator, style: Style) -> Drive:
-    """A drive without forces, in no time: the files of a case do not depend on how the car is moved."""
-    clock = np.arange(round(1000 * duration_s) + 1) * 1e-3
-    speed = 15.0 + rng.uniform(4.0, 6.0) * np.sin(0.5 * clock + rng.uniform(0.0, 6.0))
-    path = np.zeros((clock.size, N + 1))
-    path[:, X], path[:, V] = rng.uniform(0.0, 20.0) + np.cumsum(speed) * 1e-3, speed
-    path[:, W : W + 4] = speed[:, None] / world.physics.radius
-    return Drive(path, np.zeros((round(100 * duration_s) + 1, 4)))
 
 
 SECOND_CASES = {spec.name: spec for spec in table("camera", TENTH, CameraFamily.SECOND)}
@@ -110,18 +93,8 @@ def test_a_folder_keeps_to_one_family_of_the_cameras_forms(tmp_path):
         runner.seal_run(tmp_path, "camera_small", 1, TENTH, CameraFamily.FIRST)
 
 
-class Said:
-    """A diagnosis that always blames the camera's delay."""
-
-    def to_json(self) -> dict[str, Any]:
-        cause = {"effect": "camera_latency", "probability": 0.9, "parameters": {}, "gap_after": 1.0}
-        return {"verdict": "identified", "causes": [cause | {"fit_bic": 1.0}], "ambiguous_with": []}
-
-
 def test_a_run_is_scored_with_a_line_on_new_forms(tmp_path, monkeypatch):
-    fake = ModuleType("sim2real.diagnose")
-    fake.diagnose_files, fake.shrink_on = lambda *files, **options: Said(), lambda *files: 80.0
-    monkeypatch.setitem(sys.modules, "sim2real.diagnose", fake)
+    blaming(monkeypatch)
     monkeypatch.setattr(camera_case, "drive", rolled)
     runner.seal_run(tmp_path, "camera_small", 1, TENTH, CameraFamily.SECOND)
     spec = SECOND_CASES["rich-camera_latency-0"]
