@@ -12,6 +12,7 @@ import numpy as np
 
 from sim2real.lattice import Lattice
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
+from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Unexplained, Verdict
 
 QUIET_SIDE_DOUBT = 0.1
@@ -76,7 +77,7 @@ def camera_side(found: PerceptionFinding) -> Side:
     if found.verdict is Verdict.UNKNOWN and found.unexplained:
         term = Unexplained(
             "camera",
-            "image_place",
+            found.odd_signal,
             "place",
             "-",
             "",
@@ -96,7 +97,7 @@ def camera_side(found: PerceptionFinding) -> Side:
         cannot_rule_out=tuple(found.cannot_rule_out),
         places=found.places,
         unexplained=term,
-        sentence=f"{_in_numbers(found)} {found.next_step}".strip(),
+        sentence=f"{_in_numbers(found)} {found.next_step}".strip() if term is None else found.unexplained[0],
         warnings=(*found.warnings, *found.unexplained),
     )
 
@@ -104,7 +105,7 @@ def camera_side(found: PerceptionFinding) -> Side:
 def _in_numbers(found: PerceptionFinding) -> str:
     """What the causes do to the camera's gap, and at which values; empty where nothing is blamed."""
     blamed = next((c for c in found.candidates if set(c.effects) == set(found.causes)), None)
-    if blamed is None or found.verdict is Verdict.UNKNOWN:
+    if blamed is None:
         return ""
     values = ", ".join(
         f"{name} {value.value:.3g} {value.unit}".removesuffix(" -")
@@ -222,9 +223,11 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         total = max(sum(c.probability for c in main_causes), 1e-12)
         main_causes = [replace(c, probability=c.probability * min(1.0, left / total)) for c in main_causes]
     causes = _ranked(main, side, main_causes, side_causes, verdict)
+    misplaced = side.unexplained is not None and side.unexplained.signal == PLACE
     sentence = main.sentence
     if side.verdict is not Verdict.NO_GAP:
-        told = f"{' and '.join(side.named) or 'Something unknown'}: {side.sentence}".strip(": ")
+        blamed = "" if side.unexplained else " and ".join(side.named)
+        told = f"{blamed or 'Something unknown'}: {side.sentence}".strip(": ")
         sentence = told if main.verdict is Verdict.NO_GAP else f"{main.sentence} Beside it, {told}"
     return replace(
         main,
@@ -235,7 +238,8 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         causes=causes,
         ambiguous_with=(*main.ambiguous_with, *side.ambiguous_with),
         cannot_rule_out=tuple(dict.fromkeys((*main.cannot_rule_out, *side.cannot_rule_out))),
-        unexplained=main.unexplained or side.unexplained,
+        # A road that lies elsewhere than simulated disturbs the car's equations too, and not the other way round.
+        unexplained=side.unexplained if misplaced else main.unexplained or side.unexplained,
         warnings=(*main.warnings, *side.warnings),
     )
 

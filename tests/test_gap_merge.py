@@ -279,6 +279,7 @@ def finding(verdict, *candidates, causes=(), **more):
         "places": (),
         "next_step": "",
         "unexplained": (),
+        "odd_signal": "",
         "warnings": (),
     }
     return PerceptionFinding(verdict=verdict, causes=causes, candidates=candidates, **{**values, **more})

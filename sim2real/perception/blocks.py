@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -28,8 +28,8 @@ class Blocks:
     ----------
     log : array of str, shape (n,)
         Where.
-    time_s, speed_m_s : array, shape (n,)
-        When they begin, and mean speed [s], [m/s].
+    time_s, speed_m_s, accel_m_s2 : array, shape (n,)
+        Mean time and speed, and how the speed changes meanwhile [s], [m/s], [m/s²].
     loss : array, shape (n,)
         Minus the mean logarithm of Q_v [-].
     classes : array of int, shape (n,)
@@ -39,6 +39,7 @@ class Blocks:
     log: NDArray[np.str_]
     time_s: Array
     speed_m_s: Array
+    accel_m_s2: Array
     loss: Array
     classes: NDArray[np.intp]
 
@@ -48,12 +49,12 @@ class Blocks:
     def less(self, exposure_s: float, stops: float) -> Blocks:
         """The blocks without the loss that the simulation models already."""
         modelled = self.speed_m_s * exposure_s / TOLERATED_SMEAR_M + (stops / TOLERATED_STOPS) ** 2
-        return Blocks(self.log, self.time_s, self.speed_m_s, self.loss - modelled, self.classes)
+        return replace(self, loss=self.loss - modelled)
 
 
 def make_blocks(results: Sequence[Results]) -> Blocks:
     """Blocks of the results of some drives."""
-    parts = [pd.DataFrame(columns=["log", "time_s", "speed", "loss", "class"]).astype({"log": str})]
+    parts = [pd.DataFrame(columns=["log", "time_s", "speed", "accel", "loss", "class"]).astype({"log": str})]
     for one in results:
         table = pd.DataFrame(
             {
@@ -66,11 +67,18 @@ def make_blocks(results: Sequence[Results]) -> Blocks:
         ).dropna()
         # a block's lone pictures of another class are mistakes, and borders
         main = table.groupby("block")["class"].transform(lambda c: c.mode().iloc[0])
-        means = table[table["class"] == main].groupby("block").mean()
-        parts.append(means.assign(log=one.log))
+        grouped = table[table["class"] == main].groupby("block")
+        accel = grouped[["time_s", "speed"]].apply(_slope)
+        parts.append(grouped.mean().assign(accel=accel, log=one.log))
     every = pd.concat([p for p in parts if len(p)] or parts, ignore_index=True)
-    numbers = every[["time_s", "speed", "loss"]].to_numpy(dtype=np.float64)
-    names = every["log"].to_numpy().astype(np.str_)
-    return Blocks(
-        names, numbers[:, 0], numbers[:, 1], numbers[:, 2], every["class"].to_numpy().astype(np.intp)
-    )
+    numbers = every[["time_s", "speed", "accel", "loss"]].to_numpy(dtype=np.float64)
+    names, classes = every["log"].to_numpy().astype(np.str_), every["class"].to_numpy().astype(np.intp)
+    return Blocks(names, numbers[:, 0], numbers[:, 1], numbers[:, 2], numbers[:, 3], classes)
+
+
+def _slope(rows: pd.DataFrame) -> float:
+    """By which the speed changes; 0 where one result does not tell [m/s²]."""
+    columns = rows.to_numpy(dtype=np.float64)
+    time_s, speed = columns[:, 0] - columns[:, 0].mean(), columns[:, 1]
+    square = float(time_s @ time_s)
+    return float(time_s @ speed) / square if square > 0.0 else 0.0

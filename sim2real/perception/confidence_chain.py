@@ -21,6 +21,7 @@ from sim2real.perception.confidence import (
 )
 from sim2real.perception.conflicts import class_error
 from sim2real.perception.frames import Modelled, Results
+from sim2real.perception.patterns import pattern_in_words
 from sim2real.perception.pictures import NORMAL_LIGHT_EV, Light
 from sim2real.result import Place
 
@@ -36,14 +37,6 @@ NORMAL_RANGE = 2.0
 """Standard deviations of a normal level, of usual mistakes and of usual light together that are no gap [-]."""
 FEWEST_BLOCKS = 8
 """With fewer blocks nothing is said of confidence."""
-RESTLESS = 0.2
-"""Standard deviation of the logarithm of confidence, from second to second on one class at one speed, from which on it
-is a gap of its own: chains that nothing disturbs were within 0.15, those that sun or shaking do beyond 0.21 [-]."""
-CREEPS, CREEPS_BY = 0.6, 0.2
-"""Correlation of the confidence's logarithm with time in every log, and its change over a log, from which on it creeps:
-chains that nothing disturbs were within 0.3 and 0.07 [-]."""
-FEWEST_CREEPING = 10
-"""Blocks of a log that can tell."""
 
 
 @dataclass(frozen=True)
@@ -117,38 +110,13 @@ def confidence_chain(
         places=_places(accounts[0], unseen),
         unexcited=_unexcited(seen, choices),
         next_step=NEXT_STEP,
-        unexplained=_restless(model),
     )
-    by_effects = {f.effects: f for f in (plain, *fits)}
-    creeping = _creeping(seen.together, by_effects[chain.best().effects])
-    if creeping and not chain.unexplained:
-        return replace(chain, unexplained=creeping)
+    stands = next(f for f in (plain, *fits) if f.effects == chain.best().effects)
+    pattern = pattern_in_words(seen.together, stands, model)
     needed = [account for account in outside if account.score > chain.best().score + DECISIVE]
-    if needed and not chain.unexplained:
-        return replace(chain, unexplained=_of_no_effect(max(needed, key=lambda account: account.score)))
-    return chain
-
-
-def _creeping(blocks: Blocks, f: ConfidenceFit) -> str:
-    """The gap that a confidence is which goes with time in every log, in a sentence; empty where it does not."""
-    rest = blocks.loss - f.loss(blocks)
-    for c in np.unique(blocks.classes):
-        rest[blocks.classes == c] -= rest[blocks.classes == c].mean()
-    changes = []
-    for log in np.unique(blocks.log):
-        time_s, loss = blocks.time_s[blocks.log == log], rest[blocks.log == log]
-        if len(loss) < FEWEST_CREEPING or not loss.std():
-            return ""
-        slope, correlation = np.polyfit(time_s, loss, 1)[0], np.corrcoef(time_s, loss)[0, 1]
-        if abs(correlation) < CREEPS:
-            return ""
-        changes.append(slope * np.ptp(time_s))
-    if len(changes) < 2 or np.ptp(np.sign(changes)) or np.min(np.abs(changes)) < CREEPS_BY:
-        return ""
-    return (
-        f"The confidence {'falls' if changes[0] > 0.0 else 'rises'} over every log, by a factor of "
-        f"{np.exp(np.median(np.abs(changes))):.1f}, at one speed and on one class: does the lens fog, or the light go?"
-    )
+    if needed and not pattern:
+        pattern = _of_no_effect(max(needed, key=lambda account: account.score))
+    return replace(chain, unexplained=pattern)
 
 
 def _of_no_effect(needed: Account) -> str:
@@ -159,16 +127,6 @@ def _of_no_effect(needed: Account) -> str:
         else "how low the confidence is"
     )
     return f"No effect of the library explains {what}. {needed.evidence_for[0]}"
-
-
-def _restless(model: ConfidenceModel) -> str:
-    """The gap that a confidence is which comes and goes, in a sentence; empty where it is steady."""
-    if model.deviation < RESTLESS:
-        return ""
-    return (
-        f"The confidence comes and goes by a factor of {np.exp(model.deviation):.1f} from second to second, on one "
-        "class at one speed: what stands in the camera's way at times, or shines into it?"
-    )
 
 
 def _account(f: ConfidenceFit, nothing: ConfidenceFit, seen: Seen, model: ConfidenceModel) -> Account:
@@ -265,8 +223,8 @@ def _places(nothing: Account, unseen: Blocks) -> tuple[Place, ...]:
             SIGNAL,
             "camera",
             f"at {unseen.speed_m_s[k]:.0f} m/s",
-            float(unseen.time_s[k]),
-            float(unseen.time_s[k] + BLOCK_S),
+            float(unseen.time_s[k] - 0.5 * BLOCK_S),
+            float(unseen.time_s[k] + 0.5 * BLOCK_S),
             float(share[k]),
             str(unseen.log[k]),
         )

@@ -34,6 +34,8 @@ LEAST_ERROR = 0.02
 """Share of pictures that are taken to be wrong even where none contradicts."""
 LIKELY_NATS = 2.0
 """Splits less likely than the best one by no more than this are in the bracket [nats]."""
+WAYS = 9
+"""Column of the crossings' numbers that is a table."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class Crossings:
         Where it was seen.
     time_s, speed_m_s, border_m : array, shape (k,)
         When and how fast it was passed in the stamps, and where road.yaml has it [s], [m/s], [m].
+    since_s, since_m : array, shape (k,)
+        Time and way since the log's begin [s], [m].
     low_m, high_m : array, shape (k,)
         Begin of the stamps of the last old and the first new picture, minus the border [m].
     low_length_m, high_length_m : array, shape (k,)
@@ -63,6 +67,8 @@ class Crossings:
     time_s: Array
     speed_m_s: Array
     border_m: Array
+    since_s: Array
+    since_m: Array
     low_m: Array
     high_m: Array
     low_length_m: Array
@@ -98,14 +104,10 @@ def find_crossings(results: Sequence[Results]) -> Crossings:
     """All borders between surfaces that the results of some drives show."""
     age_s, way_m = rough_shift(results)
     rows = [row for one in results for row in _of_one(one, age_s, way_m)]
-    columns = list(zip(*rows, strict=True)) if rows else [()] * 9
-    names, numbers = columns[0], [np.array(c, dtype=np.float64) for c in columns[1:8]]
-    ways = np.array(columns[8], dtype=np.float64).reshape(len(rows), len(AGES_S))
-    time_s, speed, border, low, high, low_length, high_length = numbers
-    ahead = np.array([row[9] for row in rows], dtype=np.float64)
-    return Crossings(
-        np.array(names, dtype=np.str_), time_s, speed, border, low, high, low_length, high_length, ways, ahead
-    )
+    names, *columns = zip(*rows, strict=True) if rows else [()] * len(fields(Crossings))
+    numbers = [np.array(column, dtype=np.float64) for column in columns]
+    numbers[WAYS] = numbers[WAYS].reshape(len(rows), len(AGES_S))
+    return Crossings(np.array(names, dtype=np.str_), *numbers)
 
 
 def rough_shift(results: Sequence[Results]) -> tuple[float, float]:
@@ -151,6 +153,8 @@ def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:
                 one.time_s[at],
                 one.speed_m_s[at],
                 border,
+                one.time_s[at] - one.begin_s,
+                border - one.begin_m,
                 one.from_m[i] - border,
                 one.from_m[j] - border,
                 one.to_m[i] - one.from_m[i],

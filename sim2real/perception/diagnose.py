@@ -22,6 +22,7 @@ from sim2real.perception.frames import Modelled, read_results
 from sim2real.perception.friction import SIGNAL as REFERENCE
 from sim2real.perception.friction import friction_chain
 from sim2real.perception.pictures import read_light
+from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.perception.shift import shift_chain
 from sim2real.perception.stuck import stuck_in_words
 from sim2real.result import Interval, Measure, Place, Verdict
@@ -112,6 +113,8 @@ class PerceptionFinding:
         What to drive to tell apart what is ambiguous; empty where nothing is.
     unexplained : tuple of str
         What no effect of the library explains.
+    odd_signal : str
+        Which signal the first of these is about; empty where all is explained.
     warnings : tuple of str
         Damage of the columns, and conflicts of class with road.yaml.
     """
@@ -126,6 +129,7 @@ class PerceptionFinding:
     places: tuple[Place, ...]
     next_step: str
     unexplained: tuple[str, ...]
+    odd_signal: str
     warnings: tuple[str, ...]
 
 
@@ -208,13 +212,16 @@ def _conclude(
     best = [chain.best() for chain in chains]
     rivals = [chain.rivals() for chain in chains]
     nothing = [chain.nothing for chain in chains]
-    unexplained = tuple(
-        text for chain, account in zip(chains, best, strict=True) if (text := _unexplained(chain, account))
-    )
+    odd = [
+        (chain.signal, text)
+        for chain, account in zip(chains, best, strict=True)
+        if (text := _unexplained(chain, account))
+    ]
     causes = tuple(dict.fromkeys(effect for account in best for effect in account.effects))
     if conflict and not set(causes) & MAKE_CLASSES_ERR:
-        unexplained = (*unexplained, conflict)
-    unexplained = (*unexplained, stuck) if stuck else unexplained
+        odd.append((PLACE, conflict))
+    if stuck:
+        odd.append((PLACE, stuck))
     ambiguous = tuple(
         dict.fromkeys(
             tuple(dict.fromkeys((*account.effects, *(e for r in others for e in r.effects))))
@@ -226,7 +233,7 @@ def _conclude(
         effect: why for chain in chains for effect, why in chain.unexcited.items() if effect not in causes
     }
     return PerceptionFinding(
-        verdict=_verdict(causes, bool(ambiguous), bool(unexplained)),
+        verdict=_verdict(causes, bool(ambiguous), bool(odd)),
         causes=causes,
         candidates=_candidates(chains, best, unexcited, seed),
         before=_measure(chains, nothing),
@@ -235,7 +242,8 @@ def _conclude(
         cannot_rule_out=unexcited,
         places=_places(chains, best),
         next_step=" ".join(chain.next_step for chain, others in zip(chains, rivals, strict=True) if others),
-        unexplained=unexplained,
+        unexplained=tuple(text for _, text in odd),
+        odd_signal=odd[0][0] if odd else "",
         warnings=warnings,
     )
 

@@ -96,6 +96,16 @@ class Results:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    @property
+    def begin_s(self) -> float:
+        """When the log begins [s]."""
+        return float(self.drive_time_s[0] + RUN_UP_S)
+
+    @property
+    def begin_m(self) -> float:
+        """Where the log begins [m]."""
+        return float(np.interp(self.begin_s, self.drive_time_s, self.drive_position_m))
+
     def driven_m(self, time_s: Array, age_s: Array) -> Array:
         """Way driven during ages before times, shape (len(time_s), len(age_s)) [m]."""
         then = np.interp(time_s[:, None] - age_s, self.drive_time_s, self.drive_position_m)

@@ -23,6 +23,7 @@ from scenarios.plant.pipeline import make_setup
 from sim2real.logs import Log
 from sim2real.perception.chain import DECISIVE, Account, Chain, price
 from sim2real.perception.frames import Modelled
+from sim2real.perception.late_reference import lateness_in_words
 from sim2real.result import Interval, Place
 from trpac_core.tyre import peak_friction
 from trpac_core.vision.classes import CLASS_THETA, Surface
@@ -310,6 +311,9 @@ def friction_chain(
         unexcited=_undriven(known),
         next_step=NEXT_STEP,
     )
+    late = lateness_in_words((*fitted[0], held_out[0]), (*fitted[1], held_out[1]), vehicle)
+    if late:
+        return replace(chain, unexplained=late)
     # Values per class, and a factor on all, are free curves too: where only they do, no effect of the library does.
     if any(account.score > chain.best().score + DECISIVE for account in outside):
         return replace(

@@ -1,9 +1,8 @@
 """Late results or a wrong mounting angle: by how much the classes' changes lie beyond the road's borders.
 
-A crossing is one observation, however many pictures show it: neighbouring pictures err together. A candidate's shift
-is to put the border into the crossing's bracket, but for an error under Student's t with four degrees of freedom, so
-that a border in another place than road.yaml has it does not decide. Where within its stamp a class belongs is
-uncertain, and so is the scale of the errors: each candidate takes what suits it best, at a price.
+A crossing is one observation, however many pictures show it: neighbouring pictures err together. How likely one is
+under a candidate's shift says `likelihood`; each candidate takes the share of the stamp and the scale of the errors
+that suit it best, at a price.
 """
 
 from __future__ import annotations
@@ -18,22 +17,22 @@ from scipy.stats import t as student
 from sim2real.perception.chain import DECISIVE, Account, Chain, price
 from sim2real.perception.conflicts import streak_m
 from sim2real.perception.crossings import Crossings, find_crossings
+from sim2real.perception.drifting import drift_in_words
 from sim2real.perception.frames import Modelled, Results
+from sim2real.perception.likelihood import (
+    ERROR_M,
+    SCALES,
+    SHARES,
+    likeliest,
+    log_likelihood,
+    profiles,
+    share_price,
+)
 from sim2real.perception.scatter import scatter_in_words
 from sim2real.result import Interval, Place
 
 Array = NDArray[np.float64]
 
-ERROR_M = 0.1
-"""Least scale of a crossing's error: borders are no lines, positions wander [m]."""
-SCALES = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 20.0, 40.0, 80.0])
-"""Scales of the crossings' errors that are tried [-]."""
-SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-"""Share of its stamp that a class is for [-]."""
-SHARE_SPREAD, SHARE_SPREAD_SIMULATED = 0.2, 0.3
-"""Standard deviation of it: the middle is the plain reading, its ends are possible. As simulated a class is right where
-the road has it anywhere in the stretch, so that any share is nearly as good [-]."""
-LEAST_WIDTH_M = 0.02
 DELAYS_S, PITCHES_RAD = (0.0, 1.0), (-0.4, 0.4)
 GRID, GRID_OF_TWO, ZOOMS = 41, 25, 3
 """Points per axis of the search over one parameter, and over two; how often it is drawn closer about what matters."""
@@ -46,8 +45,9 @@ NOTABLE = 3.0
 MOST_PLACES = 4
 FEWEST_UNSEEN = 4
 """Borders passed on the hold-out that can say that there is no shift."""
-MOSTLY = 0.5
-"""An account that leaves no more than this share of the gap explains it, though the rest shows a pattern [-]."""
+MOSTLY = 0.25
+"""An account that leaves no more than this share of the gap's square beyond noise explains it, though the rest shows a
+pattern [-]."""
 AROUND_S = 0.2
 """Time about a crossing that is shown [s]."""
 
@@ -87,14 +87,14 @@ class ShiftFit:
 
     def log_likelihood_of(self, crossings: Crossings, height_m: float) -> float:
         """Of any crossings at its delay and pitch, share and scale at their best [nats]."""
-        age, pitch = np.array([self.delay_s.value]), np.array([self.pitch_rad.value])
-        return float((_profiles(crossings, age, pitch, height_m) - _price(self.effects)).max())
+        shift = self.shift(crossings, height_m)
+        return float(likeliest(crossings, shift, shifted=bool(self.effects)))
 
     def scale_of(self, crossings: Crossings, height_m: float) -> float:
         """Scale of any crossings' errors at its delay, pitch and share; the least where there are none [-]."""
         shift = self.shift(crossings, height_m)
         bracket = crossings.bracket(self.share)
-        return float(SCALES[np.argmax([_log_likelihood(shift, *bracket, scale) for scale in SCALES])])
+        return float(SCALES[np.argmax([log_likelihood(shift, *bracket, scale) for scale in SCALES])])
 
     def rest_m(self, crossings: Crossings, height_m: float) -> Array:
         """Brackets' middles beyond the candidate's, shape (k,) [m]."""
@@ -130,11 +130,11 @@ def fit_shift(
     pitches = np.linspace(*PITCHES_RAD, grid) if "camera_pitch" in effects else np.array([pitch_rad])
     allowance = 0.5 * student.ppf(0.975, max(len(crossings) - 1, 1)) ** 2
     for _ in range(ZOOMS):
-        profile = _profiles(crossings, delays, pitches, height_m).max(axis=(0, 1))
+        profile = profiles(crossings, _shifts(crossings, delays, pitches, height_m)).max(axis=(0, 1))
         delays = _about(delays, profile.max(axis=1), allowance)
         pitches = _about(pitches, profile.max(axis=0), allowance)
-    table = _profiles(crossings, delays, pitches, height_m)
-    priced = table - _price(effects)
+    table = profiles(crossings, _shifts(crossings, delays, pitches, height_m))
+    priced = table - share_price(shifted=bool(effects))[:, None, None, None]
     share, scale, _, _ = np.unravel_index(int(np.argmax(priced)), table.shape)
     # the estimate is the plain reading's, the interval holds the others' too
     at_share, profile = table[share].max(axis=0), table.max(axis=(0, 1))
@@ -148,38 +148,9 @@ def fit_shift(
     )
 
 
-def _price(effects: tuple[str, ...]) -> Array:
-    """What a share of the stamp costs an account, shape (shares, 1, 1, 1) [nats]."""
-    spread = SHARE_SPREAD if effects else SHARE_SPREAD_SIMULATED
-    return (0.5 * ((SHARES - 0.5) / spread) ** 2)[:, None, None, None]
-
-
-def _profiles(crossings: Crossings, delays: Array, pitches: Array, height_m: float) -> Array:
-    """Log-likelihood, shape (shares, scales, delays, pitches) [nats]."""
-    shift = crossings.shift_by_age(delays)[:, None] + crossings.shift_by_pitch(pitches, height_m)[None]
-    return np.array(
-        [[_log_likelihood(shift, *crossings.bracket(share), scale) for scale in SCALES] for share in SHARES]
-    )
-
-
-def _log_likelihood(shift: Array, low: Array, high: Array, scale: float) -> Array:
-    """Of crossings with these brackets under shifts, shape (..., k), summed over the crossings [nats].
-
-    The probability that an error under Student's t moves the border's shifted place into the bracket, per width: flat
-    within the bracket, so that crossings whose pictures happen to fall alike do not add up to a shift.
-    """
-    width = np.maximum(high - low, LEAST_WIDTH_M)
-    beyond = np.abs(shift - 0.5 * (low + high))
-    share = _student((0.5 * width - beyond) / (scale * ERROR_M)) - _student(
-        (-0.5 * width - beyond) / (scale * ERROR_M)
-    )
-    return np.log(np.maximum(share, 1e-30) / width).sum(axis=-1)
-
-
-def _student(t: Array) -> Array:
-    """Distribution function of Student's t with four degrees of freedom, in closed form."""
-    square = 1.0 + 0.25 * t * t
-    return 0.5 + 0.375 * t / np.sqrt(square) * (1.0 - t * t / (12.0 * square))
+def _shifts(crossings: Crossings, delays: Array, pitches: Array, height_m: float) -> Array:
+    """Of every delay with every pitch, shape (delays, pitches, k) [m]."""
+    return crossings.shift_by_age(delays)[:, None] + crossings.shift_by_pitch(pitches, height_m)[None]
 
 
 def _about(grid: Array, profile: Array, allowance: float) -> Array:
@@ -239,11 +210,16 @@ def shift_chain(
         next_step=NEXT_STEP,
         quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
     )
-    for choice, shifted in zip(outside, free, strict=True):
-        other = _account(shifted, plain, unseen, height_m, scale, known)
+    others = [_account(shifted, plain, unseen, height_m, scale, known) for shifted in free]
+    best = max(account.score for account in (*accounts, *others))
+    drift = drift_in_words(known, unseen, plain.log_likelihood_of(every, height_m), best)
+    if drift:
+        return replace(chain, unexplained=drift)
+    for choice, other in zip(outside, others, strict=True):
         if other.score > chain.best().score + DECISIVE and not chain.quiet:
             return replace(chain, unexplained=_another_law(chain.best(), choice))
-    if chain.best().left() <= MOSTLY * accounts[0].left():
+    stands = chain.best()
+    if stands.effects and stands.left() ** 2 - 1.0 <= MOSTLY * (accounts[0].left() ** 2 - 1.0):
         return chain
     seen = [*fitted, *([] if held_out is None else [held_out])]
     scatter = scatter_in_words(scale * ERROR_M, closest.rest_m(every, height_m), every, streak_m(seen))

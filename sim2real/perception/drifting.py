@@ -1,0 +1,104 @@
+"""Changes of class that lie farther and farther off while a log lasts: no effect of the library has them do so.
+
+A wrong scale of position_m puts borders off by a share of the way since the log's begin, a clock that runs fast by the
+way driven in a delay that grows with time. Each law is a constant shift or delay and its growth, fitted and scored like
+the library's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.perception.chain import price
+from sim2real.perception.crossings import Crossings
+from sim2real.perception.likelihood import likeliest
+
+Array = NDArray[np.float64]
+
+FEWEST = 6
+"""Crossings on the fit logs from which on a growth is looked for."""
+CLEARLY, MOSTLY = 10.0, 1.5
+"""By so much, and so many times, a growing shift must beat every effect of the library [nats], [-]: a mounting that
+settles, or a delay that wanders, is still an angle, or a delay, and takes most of it."""
+LEAST_GROWTH_M = 0.7
+"""Change of the shift over a log from which on it is a gap [m]."""
+GRID, ZOOMS = 41, 4
+"""Points per axis of the search, and how often it is drawn closer about the best."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A constant shift and one that grows.
+
+    Attributes
+    ----------
+    basis : callable
+        Crossings to the shift by a unit of the constant and of the growth, two arrays of shape (k,) [m].
+    most : tuple of float
+        Largest constant and growth that are looked for.
+    words : str
+        What it says, with the growth in it.
+    """
+
+    basis: Callable[[Crossings], tuple[Array, Array]]
+    most: tuple[float, float]
+    words: str
+
+
+BY_WAY = Law(
+    lambda c: (np.ones(len(c)), c.since_m),
+    (5.0, 0.05),
+    "The changes of class lie beside road.yaml's borders by {rate:+.1%} of the way since the log's begin: is the scale "
+    "of position_m wrong?",
+)
+BY_TIME = Law(
+    lambda c: (c.speed_m_s, c.speed_m_s * c.since_s),
+    (1.0, 0.05),
+    "The changes of class come late by {rate:+.2%} of the time since the log's begin: does the camera's clock run at "
+    "another rate than the logger's?",
+)
+
+
+def drift_in_words(known: Crossings, unseen: Crossings, plain: float, best: float) -> str:
+    """The gap that a growing shift is, in a sentence; empty where there is none.
+
+    Parameters
+    ----------
+    known, unseen : Crossings
+        Of the fit logs and of the hold-out.
+    plain, best : float
+        Log-likelihood of both together as simulated, and the score of the library's best account [nats].
+    """
+    if len(known) < FEWEST or not len(unseen):
+        return ""
+    every = known.joined(unseen)
+    found = []
+    for law in (BY_WAY, BY_TIME):
+        constant, rate = _fit(law, known)
+        score = float(likeliest(every, _shift(law, every, constant, rate), shifted=True)) - plain
+        grown_m = np.ptp(rate * law.basis(every)[1])
+        if grown_m >= LEAST_GROWTH_M:
+            found.append((score - price(len(every), len(every)), law.words.format(rate=rate)))
+    score, words = max(found, default=(-np.inf, ""))
+    return words if score > max(best + CLEARLY, MOSTLY * best) else ""
+
+
+def _shift(law: Law, crossings: Crossings, constant: Array | float, rate: Array | float) -> Array:
+    base, growth = law.basis(crossings)
+    return np.asarray(constant)[..., None] * base + np.asarray(rate)[..., None] * growth
+
+
+def _fit(law: Law, crossings: Crossings) -> tuple[float, float]:
+    """Constant and rate that are likeliest: the best of a grid, drawn closer about it."""
+    centre, half = np.zeros(2), np.array(law.most)
+    for _ in range(ZOOMS):
+        axes = [np.linspace(m - h, m + h, GRID) for m, h in zip(centre, half, strict=True)]
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"))
+        likely = likeliest(crossings, _shift(law, crossings, grid[0], grid[1]), shifted=True)
+        i, j = np.unravel_index(int(np.argmax(likely)), likely.shape)
+        centre, half = grid[:, i, j], half * 4.0 / GRID
+    return float(centre[0]), float(centre[1])

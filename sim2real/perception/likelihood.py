@@ -1,0 +1,66 @@
+"""How likely crossings are under a shift of the classes along the road.
+
+A shift is to put the border into the crossing's bracket, but for an error under Student's t with four degrees of
+freedom, so that a border in another place than road.yaml has it does not decide. Where within its stamp a class
+belongs is uncertain, and so is the scale of the errors.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.perception.crossings import Crossings
+
+Array = NDArray[np.float64]
+
+ERROR_M = 0.1
+"""Least scale of a crossing's error: borders are no lines, positions wander [m]."""
+SCALES = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 20.0, 40.0, 80.0])
+"""Scales of the crossings' errors that are tried [-]."""
+SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+"""Share of its stamp that a class is for [-]."""
+SHARE_SPREAD, SHARE_SPREAD_SIMULATED = 0.2, 0.3
+"""Standard deviation of it: the middle is the plain reading, its ends are possible. As simulated a class is right where
+the road has it anywhere in the stretch, so that any share is nearly as good [-]."""
+LEAST_WIDTH_M = 0.02
+
+
+def share_price(*, shifted: bool) -> Array:
+    """What a share of the stamp costs an account, shape (shares,) [nats]."""
+    spread = SHARE_SPREAD if shifted else SHARE_SPREAD_SIMULATED
+    return 0.5 * ((SHARES - 0.5) / spread) ** 2
+
+
+def profiles(crossings: Crossings, shift: Array) -> Array:
+    """Log-likelihood of shifts, shape (..., k), over shares and scales: shape (shares, scales, ...) [nats]."""
+    return np.array(
+        [[log_likelihood(shift, *crossings.bracket(share), scale) for scale in SCALES] for share in SHARES]
+    )
+
+
+def likeliest(crossings: Crossings, shift: Array, *, shifted: bool) -> Array:
+    """Log-likelihood of shifts at the best share and scale, less the share's price, shape (...) [nats]."""
+    table = profiles(crossings, shift)
+    price = share_price(shifted=shifted).reshape(-1, *[1] * (table.ndim - 1))
+    return np.asarray((table - price).max(axis=(0, 1)))
+
+
+def log_likelihood(shift: Array, low: Array, high: Array, scale: float) -> Array:
+    """Of crossings with these brackets under shifts, shape (..., k), summed over the crossings [nats].
+
+    The probability that an error under Student's t moves the border's shifted place into the bracket, per width: flat
+    within the bracket, so that crossings whose pictures happen to fall alike do not add up to a shift.
+    """
+    width = np.maximum(high - low, LEAST_WIDTH_M)
+    beyond = np.abs(shift - 0.5 * (low + high))
+    share = _student((0.5 * width - beyond) / (scale * ERROR_M)) - _student(
+        (-0.5 * width - beyond) / (scale * ERROR_M)
+    )
+    return np.log(np.maximum(share, 1e-30) / width).sum(axis=-1)
+
+
+def _student(t: Array) -> Array:
+    """Distribution function of Student's t with four degrees of freedom, in closed form."""
+    square = 1.0 + 0.25 * t * t
+    return 0.5 + 0.375 * t / np.sqrt(square) * (1.0 - t * t / (12.0 * square))

@@ -1,0 +1,120 @@
+"""What a confidence does that neither blur nor exposure does: it shakes, shuns a class, creeps, or is restless."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.perception.blocks import Blocks
+from sim2real.perception.confidence import NORMAL_CONFIDENCE, ConfidenceFit, ConfidenceModel
+from trpac_core.vision.classes import Surface
+
+Array = NDArray[np.float64]
+
+SHAKEN_SHARE, SHAKEN_BY = 0.3, 0.15
+"""Share of the variance of what blur and exposure leave that goes with acceleration, and the fall of the confidence's
+logarithm in the hardest twentieth of driving, from which on it does: others were within 0.1 [-]."""
+SHUNNED_BY, SHUNNED_SHARE = 0.3, 0.15
+"""Fall of the logarithm on one class against another, and of the confidence itself, from which on the class is shunned:
+nominal chains had up to 0.25, and little of a confidence that is low everywhere [-]."""
+FEWEST_OF_CLASS = 5
+"""Blocks of a class that can tell."""
+CREEPS, CREEPS_BY = 0.6, 0.2
+"""Correlation of the confidence's logarithm with time in every log, and its change over a log, from which on it creeps:
+chains that nothing disturbs were within 0.3 and 0.07 [-]."""
+FEWEST_CREEPING = 10
+"""Blocks of a log that can tell."""
+RESTLESS = 0.155
+"""Standard deviation of the confidence from second to second on one class at one speed, in shares of a normal one, from
+which on it is a gap of its own: chains that nothing disturbs were within 0.15 [-]."""
+
+
+def pattern_in_words(blocks: Blocks, fit: ConfidenceFit, model: ConfidenceModel) -> str:
+    """The gap that a confidence is which goes with what no effect has it go, in a sentence; empty where it does not.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        Of all logs.
+    fit : ConfidenceFit
+        What blur and exposure take of them.
+    model : ConfidenceModel
+        What is usual between them.
+    """
+    loss = blocks.loss - fit.loss(blocks)
+    rest = loss - _levels(loss, blocks)
+    return (
+        _shaken(rest, blocks) or _shunned(loss, blocks) or _creeping(rest, blocks) or _restless(blocks, model)
+    )
+
+
+def _levels(loss: Array, blocks: Blocks) -> Array:
+    """Mean of each block's class."""
+    level = np.zeros(len(blocks))
+    for c in np.unique(blocks.classes):
+        level[blocks.classes == c] = loss[blocks.classes == c].mean()
+    return level
+
+
+def _shaken(rest: Array, blocks: Blocks) -> str:
+    """Whether it falls where the car brakes or pulls, for those look alike from within the car."""
+    accel = blocks.accel_m_s2
+    if len(blocks) < FEWEST_CREEPING or not rest.std() or not accel.std():
+        return ""
+    design = np.column_stack([np.ones(len(blocks)), np.maximum(accel, 0.0), np.maximum(-accel, 0.0)])
+    solution, *_ = np.linalg.lstsq(design, rest, rcond=None)
+    share = 1.0 - np.var(rest - design @ solution) / np.var(rest)
+    hard = float(np.quantile(np.abs(accel), 0.95))
+    pulling, braking = hard * solution[1:]
+    if share < SHAKEN_SHARE or max(pulling, braking) < SHAKEN_BY:
+        return ""
+    return (
+        f"The confidence falls with acceleration, by a factor of {np.exp(max(pulling, braking)):.1f} at {hard:.1f} "
+        f"m/s²; that is {100.0 * share:.0f} % of what it does beside speed and class: is the camera's bracket loose?"
+    )
+
+
+def _shunned(loss: Array, blocks: Blocks) -> str:
+    level = {
+        int(c): float(loss[blocks.classes == c].mean())
+        for c in np.unique(blocks.classes)
+        if (blocks.classes == c).sum() >= FEWEST_OF_CLASS
+    }
+    if len(level) < 2:
+        return ""
+    worst, best = max(level, key=lambda c: level[c]), min(level, key=lambda c: level[c])
+    low, high = np.exp(-level[worst]), np.exp(-level[best])
+    if level[worst] - level[best] < SHUNNED_BY or high - low < SHUNNED_SHARE:
+        return ""
+    names = {int(s): s.label for s in Surface}
+    return (
+        f"The confidence is {low:.2f} on {names[worst]} and {high:.2f} on {names[best]}, at one speed: what dazzles or "
+        "covers the camera there?"
+    )
+
+
+def _creeping(rest: Array, blocks: Blocks) -> str:
+    changes = []
+    for log in np.unique(blocks.log):
+        time_s, loss = blocks.time_s[blocks.log == log], rest[blocks.log == log]
+        if len(loss) < FEWEST_CREEPING or not loss.std():
+            return ""
+        slope, correlation = np.polyfit(time_s, loss, 1)[0], np.corrcoef(time_s, loss)[0, 1]
+        if abs(correlation) < CREEPS:
+            return ""
+        changes.append(slope * np.ptp(time_s))
+    if len(changes) < 2 or np.ptp(np.sign(changes)) or np.min(np.abs(changes)) < CREEPS_BY:
+        return ""
+    return (
+        f"The confidence {'falls' if changes[0] > 0.0 else 'rises'} over every log, by a factor of "
+        f"{np.exp(np.median(np.abs(changes))):.1f}, at one speed and on one class: does the lens fog, or the light go?"
+    )
+
+
+def _restless(blocks: Blocks, model: ConfidenceModel) -> str:
+    if not len(blocks) or model.deviation * np.exp(-blocks.loss.mean()) < RESTLESS * NORMAL_CONFIDENCE:
+        return ""
+    return (
+        f"The confidence comes and goes by a factor of {np.exp(model.deviation):.1f} from second to second, on one "
+        "class at one speed: what stands in the camera's way at times, or shines into it?"
+    )
