@@ -594,7 +594,7 @@ def test_borders_that_lie_elsewhere_are_so_each_time():
 
 def test_a_position_that_drifts_puts_neighbouring_borders_off_alike():
     def drifting(log):
-        drift_m = 2.5 * np.sin(2.0 * np.pi * log.time_s / 60.0)
+        drift_m = 2.5 * np.sin(2.0 * np.pi * log.time_s / 20.0)
         names = ("position_m", "image_from_m", "image_to_m")
         return changed(log, **{name: log.signals[name] + drift_m for name in names})
 

@@ -65,6 +65,8 @@ def make_blocks(results: Sequence[Results]) -> Blocks:
                 "loss": -np.log(np.maximum(one.confidence, LEAST_CONFIDENCE)),
             }
         ).dropna()
+        if table.empty:
+            continue
         # a block's lone pictures of another class are mistakes, and borders
         main = table.groupby("block")["class"].transform(lambda c: c.mode().iloc[0])
         grouped = table[table["class"] == main].groupby("block")

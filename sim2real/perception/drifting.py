@@ -52,14 +52,14 @@ class Law:
 BY_WAY = Law(
     lambda c: (np.ones(len(c)), c.since_m),
     (5.0, 0.05),
-    "The changes of class lie beside road.yaml's borders by {rate:+.1%} of the way since the log's begin: is the scale "
-    "of position_m wrong?",
+    "The changes of class lie beside road.yaml's borders by about {rate:+.1%} of the way since the log's begin: is the "
+    "scale of position_m wrong, or does it drift?",
 )
 BY_TIME = Law(
     lambda c: (c.speed_m_s, c.speed_m_s * c.since_s),
     (1.0, 0.05),
-    "The changes of class come late by {rate:+.2%} of the time since the log's begin: does the camera's clock run at "
-    "another rate than the logger's?",
+    "The changes of class come late by about {rate:+.2%} of the time since the log's begin: does the camera's clock "
+    "run at another rate than the logger's?",
 )
 
 
