@@ -81,7 +81,7 @@ def run_command(
     cases: Cases = Size.SMALL,
     seed: Seed = 1,
     forms: Forms = Family.TENTH,
-    camera_forms: CameraForms = CameraFamily.SECOND,
+    camera_forms: CameraForms = CameraFamily.THIRD,
     jobs: Annotated[int, typer.Option(min=1, help="Cases side by side.")] = 2,
     keep: Annotated[bool, typer.Option(help="Keep the cases' logs.")] = False,
 ) -> None:

@@ -23,6 +23,7 @@ from .camera_reference import friction_of, measured_at, reference
 from .camera_road import CLASS_FRICTION, CameraRoad, Passage, draw_camera_road, passage_of
 from .camera_system import Chain, Fault, draw_chain
 from .camera_telling import columns
+from .camera_third_faults import shrunk
 from .car import Car, draw_car
 from .cases import LOGS, MUST_SHOW, SHOWS, Case, Truth, first_drivable, generator_of
 from .driver import Drive, Style, UndrivableError, drive
@@ -41,8 +42,8 @@ FASTER = 1.5
 """Fastest border over the slowest one, when rich [-]."""
 DRIVEN_M = 8.0
 """Least distance on a class that counts as driven on."""
-POSITION_STEP_M, POSITIONS_LOST = 0.05, 0.01
-"""Of a coarse odometer; share of samples without a position."""
+POSITION_STEP_M, POSITIONS_LOST, POSITION_NOISE_M = 0.05, 0.01, 0.03
+"""Of a coarse odometer; share of samples without a position; of a receiver's."""
 
 
 @dataclass(frozen=True)
@@ -185,6 +186,8 @@ def _told(chain: Chain, road: CameraRoad, fault: Fault) -> CameraRoad:
         old = rng.random(surface.size) < fault.relabelled
         other = (surface + rng.integers(1, 3, surface.size)) % 3
         return replace(road, surface=tuple(int(s) for s in np.where(old, other, surface)))
+    if fault.shrunk_m > 0.0:
+        return shrunk(road, fault.shrunk_m)
     if fault.map_m == 0.0:
         return road
     borders = road.borders
@@ -217,6 +220,9 @@ def _position(chain: Chain, position_m: Array, fault: Fault, time_s: Array, end_
     kind = form(chain.forms, "position")
     if kind == "steps":
         position_m = np.round(np.round(position_m / POSITION_STEP_M) * POSITION_STEP_M, 4)
+    elif kind == "noisy":
+        noise = POSITION_NOISE_M * chain.rng(name, 38).standard_normal(position_m.size)
+        position_m = np.round(position_m + noise, 4)
     elif kind == "lost_samples":
         position_m = np.where(
             chain.rng(name, 38).random(position_m.size) < POSITIONS_LOST, np.nan, position_m

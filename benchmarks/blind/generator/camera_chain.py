@@ -18,6 +18,7 @@ from .camera_faults import courses, jumps_m, kept_of, nod_of, outside_kept, pitc
 from .camera_road import CameraRoad, Passage, Whole
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault, Results
 from .camera_telling import classified, confidence_of, odds_of, voted
+from .camera_third_faults import extrapolated_m, rained_on
 from .camera_timing import delivered, numbers, timing
 
 Array = NDArray[np.floating[Any]]
@@ -28,8 +29,9 @@ POINTS = {
     "majority": (0.1, 0.3, 0.5, 0.7, 0.9),
     "far": (2.0 / 3.0,),
     "most_slippery": (0.1, 0.5, 0.9),
+    "wider": (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25),
 }
-"""Shares of the stamped stretch whose surface a result has."""
+"""Shares of the stamped stretch whose surface a result has; some look beyond it."""
 OVERLAP, BOUNDS_M, LEAST_M = 1.5, (0.4, 2.0), 0.01
 """Of stretches that overlap, over the way of a cycle; of bounded ones, and of any."""
 STAMP_M, WANDER_M, WANDER_S = 0.04, 0.06, 3.0
@@ -58,7 +60,7 @@ def results(chain: Chain, passage: Passage, road: CameraRoad, fault: Fault, log:
     true, mistaken = _as_mistaken(chain, fault, (really, honest), middle, taken, log)
     by = courses(chain, fault, really, middle, taken, log)
     kept = kept_of(chain, fault, passage.speed(shown), by)
-    kept = kept * outside_kept(chain, fault, passage, taken, middle, really)
+    kept = kept * outside_kept(chain, fault, passage, taken, middle, really, log)
     border = _shows_border(chain, road, at, length, places)
     odds = odds_of(chain, border, really, middle, taken, log)
     surface, wrong, none = classified(chain, fault, true, odds, kept, log)
@@ -70,6 +72,9 @@ def results(chain: Chain, passage: Passage, road: CameraRoad, fault: Fault, log:
     if fault.jumped_m != 0.0:
         moved = jumps_m(chain, fault, taken, passage.end_s, log)
         at, shift = at + moved, shift + moved
+    if fault.stamp_age_s > 0.0:
+        off = extrapolated_m(passage, taken, fault.stamp_age_s)
+        at, shift = at + off, shift + off
     begin = at + chain.preview_m + _stamp_noise(chain, taken.size, log)
     which, there = delivered(chain, taken.size, log)
     told = Results(
@@ -151,6 +156,9 @@ def _as_mistaken(
         begins = np.searchsorted(taken, taken - fault.sticky_s)
         stuck = np.array([true[b : i + 1].max() for i, b in enumerate(begins)])
         true, mistaken = stuck, mistaken | (stuck != true)
+    if fault.rained > 0.0:
+        true, rained = rained_on(chain, fault, true, taken, log)
+        mistaken = mistaken | rained
     return true, mistaken
 
 

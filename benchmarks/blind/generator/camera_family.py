@@ -10,6 +10,7 @@ from numpy.random import Generator
 
 from .camera_forms import CAMERA_FORMS
 from .camera_second import MORE, NEW, Aspects
+from .camera_third import FURTHER
 
 
 class CameraFamily(StrEnum):
@@ -19,12 +20,19 @@ class CameraFamily(StrEnum):
     """Several of most aspects."""
     SECOND = "second"
     """More of nearly every aspect, more aspects, deviations outside the library, and pairs."""
+    THIRD = "third"
+    """More of most aspects, deviations outside the library, and pairs."""
 
 
 SECOND: Aspects = {
     name: {**CAMERA_FORMS.get(name, {}), **MORE.get(name, {})} for name in {**CAMERA_FORMS, **MORE}
 }
-ASPECTS: dict[CameraFamily, Aspects] = {CameraFamily.FIRST: CAMERA_FORMS, CameraFamily.SECOND: SECOND}
+THIRD: Aspects = {name: {**forms, **FURTHER.get(name, {})} for name, forms in SECOND.items()}
+ASPECTS: dict[CameraFamily, Aspects] = {
+    CameraFamily.FIRST: CAMERA_FORMS,
+    CameraFamily.SECOND: SECOND,
+    CameraFamily.THIRD: THIRD,
+}
 """All that has forms in each family."""
 ONLY = {aspect: next(iter(forms)) for aspect, forms in NEW.items()}
 """What the first family has of the second's new aspects."""
@@ -51,12 +59,13 @@ def form(forms: Mapping[str, str], aspect: str) -> str:
 
 def function(forms: Mapping[str, str], aspect: str) -> Callable[..., Any]:
     """That of a form that has one."""
-    found = SECOND[aspect][form(forms, aspect)]
+    found = THIRD[aspect][form(forms, aspect)]
     assert found is not None
     return found
 
 
-def is_new(forms: Mapping[str, str], effect: str) -> bool:
-    """Whether an effect has a form that the first family lacks."""
-    known = {aspect: list(CAMERA_FORMS.get(aspect) or [ONLY[aspect]]) for aspect in OF_EFFECT.get(effect, ())}
+def is_new(forms: Mapping[str, str], effect: str, family: CameraFamily = CameraFamily.FIRST) -> bool:
+    """Whether an effect has a form that the `family` lacks."""
+    listed = ASPECTS[family]
+    known = {aspect: list(listed.get(aspect) or [ONLY[aspect]]) for aspect in OF_EFFECT.get(effect, ())}
     return any(form(forms, aspect) not in those for aspect, those in known.items())

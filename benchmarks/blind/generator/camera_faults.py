@@ -11,6 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from .camera_family import form, function
 from .camera_road import Passage, Whole
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault
+from .camera_third_faults import crest_rad, set_clock_s, weather_kept
 
 Array = NDArray[np.floating[Any]]
 
@@ -30,10 +31,14 @@ TURNS = 0.2
 """By which it is turned more and less as its bracket creeps or sways [-]."""
 RATTLES, RATTLE_S = 0.15, 0.8
 """The same where it rattles, and how long it stays in the mean."""
+BOUNCE_HZ = (1.0, 1.6)
+"""Of a body on its springs."""
 NOD_RAD, NOD_M, HARD_M_S2 = 9e-4, 0.1, 4.0
 """Nose down for each m/s^2 of braking, at most as much as moves a place by `NOD_M` in hard braking."""
 COURSE, LIGHT_M, HUNT_S = 0.25, (120.0, 260.0), (3.0, 8.0)
 """By which an exposure is off more and less; from one dark stretch to the next, and the time of a control's swing."""
+SHADE_M = (60.0, 160.0)
+"""From one row of houses to the next."""
 BY_CLASS = {"over": (0.85, 1.0, 1.15), "under": (1.15, 1.0, 0.85), "blur": (1.1, 1.05, 0.85)}
 """What each surface has of it: snow is bright, asphalt dark."""
 LOOSE_M_S2 = 3.0
@@ -63,6 +68,8 @@ def shown_s(chain: Chain, fault: Fault, passage: Passage, taken: Array, log: str
             held = (taken >= at) & (taken < at + fault.frozen_s)
             shown[held] = shown[held][:1]
             at += fault.frozen_s
+    if fault.clock_set_s > 0.0:
+        shown = shown - set_clock_s(chain, fault, taken, log)
     return np.asarray(shown)
 
 
@@ -87,6 +94,10 @@ def pitch_of(chain: Chain, fault: Fault, passage: Passage, taken: Array, log: st
         pitch *= 1.0 + RATTLES * (turned - turned.mean())
     elif kind == "swaying":
         pitch *= 1.0 + TURNS * _swing(taken, rng.uniform(2.0, 5.0), rng.random())
+    elif kind == "bouncing":
+        pitch *= 1.0 + TURNS * _swing(taken, 1.0 / rng.uniform(*BOUNCE_HZ), rng.random())
+    if fault.crest_1_m > 0.0:
+        pitch = pitch + crest_rad(chain, fault, passage, taken)
     return pitch
 
 
@@ -139,6 +150,12 @@ def _course(
     if kind == "hunting":
         rng = chain.rng(log, 27)
         return 1.0 + COURSE * _swing(taken, rng.uniform(*HUNT_S), rng.random())
+    if kind == "in_shade":
+        rng = chain.rng("", 26)
+        return 1.0 + COURSE * np.where(_swing(place_m, rng.uniform(*SHADE_M), rng.random()) > 0.0, 1.0, -1.0)
+    if kind == "stepped":
+        rng = chain.rng(log, 27)
+        return 1.0 + COURSE * np.where(_swing(taken, rng.uniform(*HUNT_S), rng.random()) > 0.0, 1.0, -1.0)
     if kind == "scattered":
         return 1.0 + 0.2 * np.clip(chain.rng(log, 28).standard_normal(taken.size), -2.5, 2.5)
     if kind == "by_class":
@@ -147,7 +164,7 @@ def _course(
 
 
 def outside_kept(
-    chain: Chain, fault: Fault, passage: Passage, taken: Array, place_m: Array, surface: Whole
+    chain: Chain, fault: Fault, passage: Passage, taken: Array, place_m: Array, surface: Whole, log: str
 ) -> Array | float:
     """What deviations that the library lacks leave of the confidence [-]."""
     kept: Array | float = 1.0 - fault.glare * _sunny(chain, place_m)
@@ -158,7 +175,7 @@ def outside_kept(
         kept = kept * (1.0 - fault.loose * push)
     if fault.unsure > 0.0:
         kept = kept * (1.0 - fault.unsure * (surface == 1))
-    return kept
+    return kept * weather_kept(chain, fault, passage, taken, log)
 
 
 def _sunny(chain: Chain, place_m: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Deviations that the library lacks, and pairs, that the second family of the camera's cases adds."""
+"""Deviations that the library lacks, and pairs: what the second family of the camera's cases adds, and each has."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from .camera_family import CameraFamily
 from .camera_library import CAMERA_LIBRARY, CAMERA_OUTSIDE, CAMERA_PAIRS, CameraEffect, growing
+from .camera_third_outside import THIRD_OUTSIDE, THIRD_PAIRS
 
 SLOW_S = 0.6
 """Least lateness of a friction's reference that is more than a filter's [s]."""
@@ -53,10 +54,15 @@ FURTHER_PAIRS = (
 CAMERA_OUTSIDES = {
     CameraFamily.FIRST: CAMERA_OUTSIDE,
     CameraFamily.SECOND: {**CAMERA_OUTSIDE, **FURTHER_OUTSIDE},
+    CameraFamily.THIRD: {**CAMERA_OUTSIDE, **FURTHER_OUTSIDE, **THIRD_OUTSIDE},
 }
 """Each family's deviations outside the library."""
-PAIRS_OF = {CameraFamily.FIRST: (CAMERA_PAIRS,), CameraFamily.SECOND: (CAMERA_PAIRS, FURTHER_PAIRS)}
+PAIRS_OF = {
+    CameraFamily.FIRST: (CAMERA_PAIRS,),
+    CameraFamily.SECOND: (CAMERA_PAIRS, FURTHER_PAIRS),
+    CameraFamily.THIRD: (CAMERA_PAIRS, FURTHER_PAIRS, THIRD_PAIRS),
+}
 """Each family's pairs: those of the one before, and what it adds."""
 
-ALL_EFFECTS = {**CAMERA_LIBRARY, **CAMERA_OUTSIDES[CameraFamily.SECOND]}
+ALL_EFFECTS = {**CAMERA_LIBRARY, **CAMERA_OUTSIDES[CameraFamily.THIRD]}
 """All that can be hidden."""

@@ -29,7 +29,15 @@ REFERENCE = 0.012
 WRONG = 0.08
 """Least spread of a second's share of wrong classes [-]."""
 BLOCK_S = 1.0
-SLOW = {"white": 0.1, "slow": 0.5, "drifting": 0.25, "heavy_tailed": 0.1, "standing": 0.32}
+SLOW = {
+    "white": 0.1,
+    "slow": 0.5,
+    "drifting": 0.25,
+    "heavy_tailed": 0.1,
+    "standing": 0.32,
+    "vibrating": 0.1,
+    "by_stretch": 0.32,
+}
 """Share of a reference's noise that is left in a second's mean [-]."""
 SLIPPERIER = 0.4
 """How far from its middle a class begins and ends where the most slippery surface counts [stretches]."""

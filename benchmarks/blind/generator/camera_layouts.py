@@ -1,4 +1,4 @@
-"""Further roads, and further drivers that every surface bears: what the second family of the camera's forms adds."""
+"""Further roads, and further drivers that every surface bears: what the camera's second and third family add."""
 
 from __future__ import annotations
 
@@ -59,11 +59,33 @@ def _clustered(rng: Generator) -> Stretches:
             surface = _other(rng, surface)
 
 
+def _through_wet(rng: Generator) -> Stretches:
+    """What is not dry is wet at its edges, and some of it snow within."""
+    while True:
+        yield float(rng.uniform(18.0, 50.0)), 0
+        if rng.random() < 0.3:
+            yield float(rng.uniform(15.0, 40.0)), 1
+            continue
+        yield float(rng.uniform(8.0, 16.0)), 1
+        yield float(rng.uniform(15.0, 45.0)), 2
+        yield float(rng.uniform(8.0, 16.0)), 1
+
+
+def _repeated(rng: Generator) -> Stretches:
+    """Lanes of a proving ground, laid one after the other and driven round and round."""
+    lanes = [float(length) for length in rng.uniform(14.0, 50.0, rng.integers(2, 4) * 3)]
+    order = [int(surface) for surface in rng.permutation(3)]
+    while True:
+        yield from zip(lanes, order * (len(lanes) // 3), strict=True)
+
+
 LAYOUTS = {
     "two_classes": _two_classes,
     "patches": _patches,
     "very_uneven": _very_uneven,
     "clustered": _clustered,
+    "through_wet": _through_wet,
+    "repeated": _repeated,
 }
 
 
@@ -102,6 +124,16 @@ def _surge(car: Car, rng: Generator) -> Array:
     return squeezed((0.5, up), (there, up), (0.8, 0.0), (0.8, -down), (back, -down), (0.5, 0.0))
 
 
+def _step_up(car: Car, rng: Generator) -> Array:
+    level = car.motor_peak_torque_nm * rng.uniform(0.3, 0.45)
+    return squeezed((0.6, level), (rng.uniform(1.5, 3.5), level), (0.6, 0.0))
+
+
+def _step_down(car: Car, rng: Generator) -> Array:
+    level = -car.motor_peak_torque_nm * rng.uniform(0.25, 0.4)
+    return squeezed((0.6, level), (rng.uniform(1.0, 2.5), level), (0.6, 0.0))
+
+
 def _wave(car: Car, rng: Generator) -> Array:
     """Up hill and down dale."""
     period = rng.uniform(7.0, 11.0)
@@ -129,5 +161,25 @@ IN_WAVES = Style(
     drive_front=(0.5, 0.55),
     brake_front=0.65,
 )
+PLATEAUS = Style(
+    rich=(
+        Piece(0.0, 20.0, _step_up),
+        _ALONG,
+        Piece(0.0, 14.0, _step_up),
+        _ALONG,
+        Piece(12.0, 99.0, _step_down),
+        _ALONG,
+    ),
+    mild=(_ALONG,),
+    drive_front=(0.5,),
+    brake_front=0.6,
+)
+"""One set speed after the other."""
 
-SPEEDS = {"all_speeds": ALL_SPEEDS, "town": TOWN, "surging": SURGING, "in_waves": IN_WAVES}
+SPEEDS = {
+    "all_speeds": ALL_SPEEDS,
+    "town": TOWN,
+    "surging": SURGING,
+    "in_waves": IN_WAVES,
+    "plateaus": PLATEAUS,
+}

@@ -68,6 +68,8 @@ def _friction(scene: Scene, rng: Generator) -> Scale:
     kind = form(scene.chain.forms, "friction_off")
     if kind == "one_only":
         off = off[:1]
+    elif kind == "slippery_only":  # the dry value is the one that is known best
+        off = np.array([surface for surface in scene.driven if surface > 0] or scene.driven)
     elif kind == "all_alike":  # cold tyres, or a road that was never like the others
         off, signs, shares = np.array(scene.driven), signs[[0, 0, 0]], shares[[0, 0, 0]]
     most = {1.0: np.array([0.4, 0.5, 1.5]), -1.0: np.array([0.45, 0.5, 0.5])}

@@ -60,6 +60,22 @@ class Fault:
     """How late the friction's reference is."""
     measured_speed: float = 0.0
     """Share by which the friction is less at double the mean speed."""
+    stamp_age_s: float = 0.0
+    """How old the place and the speed are that a stamp goes on from."""
+    rained: float = 0.0
+    """Share of the results that are told as wet while drops stand on the glass."""
+    clock_set_s: float = 0.0
+    """By how much the camera's clock is set, back and forth."""
+    spray: float = 0.0
+    """Share of the confidence that is gone while others throw up water."""
+    shrunk_m: float = 0.0
+    """By how much road.yaml's more slippery stretches reach too far at each end."""
+    crest_1_m: float = 0.0
+    """Curvature of the road at its crests and in its dips [1/m]."""
+    slow_unsure: float = 0.0
+    """Share of the confidence that is gone at a standstill."""
+    measured_push: float = 0.0
+    """Share by which the friction is less in hard acceleration, and more in hard braking."""
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,12 @@ PATCH_M, PATCHES, ON_PATCH = 2.5, 0.1, (6.0, 0.44)
 """Length and share of the patches that look like something else, and errors on and beside them over the mean."""
 SPELL_S, SPELLS, IN_SPELL = 0.7, 0.15, (4.0, 0.47)
 """The same of spells of time."""
-COARSE = {"coarse": 20.0, "bytes": 255.0}
+SHADE_M, SHADED, IN_SHADE = 35.0, 0.35, (4.0, 0.6)
+"""From one row of trees to the next, the share of the road in their shadow, and errors on dry road there and elsewhere
+over the mean."""
+HELD = 0.5
+"""Share of the usual errors of poor pictures in place of which a system tells the last class again."""
+COARSE = {"coarse": 20.0, "bytes": 255.0, "three_bits": 7.0}
 """Steps of the confidence from 0 to 1."""
 SMOOTH = 0.3
 """Share of the newest result in a running mean."""
@@ -44,6 +49,8 @@ DIP, RECOVERS_S = 0.12, 0.5
 """What a change of the class takes of the confidence, and how long it takes to come back."""
 LOWER = 0.03
 """What the hard class's confidence is less."""
+WANDERS_S = (15.0, 40.0)
+"""Over which a level goes up and down by as much."""
 LOST_ROWS = 0.02
 STEPS_M = {"fine": 0.0, "decimetres": 0.1, "quarters": 0.25}
 
@@ -60,6 +67,9 @@ def odds_of(chain: Chain, border: Flags, surface: Whole, place_m: Array, taken: 
     elif kind == "at_times":
         bad = chain.rng(log, 29).random(200) < SPELLS
         odds = odds * np.where(bad[np.clip(taken / SPELL_S, 0, bad.size - 1).astype(int)], *IN_SPELL)
+    elif kind == "in_shadows":
+        shade = (place_m / SHADE_M + chain.rng("", 25).random()) % 1.0 < SHADED
+        odds = odds * np.where(shade & (surface == 0), *IN_SHADE)
     return np.clip(odds, 0.0, MOST_ODDS)
 
 
@@ -82,6 +92,12 @@ def classified(
         wrong = wrong & (taken_for != true)
     elif kind == "say_none":
         none = none | (chain.rng(log, 23).random(n) < SILENT * poor)
+    elif kind == "hold_last":
+        held = chain.rng(log, 23).random(n) < HELD * poor
+        held[:1] = False
+        last = np.maximum.accumulate(np.where(held, 0, np.arange(n)))
+        said = np.where(wrong, taken_for, true)[last]
+        return said, said != true, none
     return np.where(wrong, taken_for, true), wrong, none
 
 
@@ -93,7 +109,13 @@ def confidence_of(
     level, kind = np.array(chain.level), form(chain.forms, "told_confidence")
     if form(chain.forms, "levels") == "one_lower":
         level = level - LOWER * (np.arange(3) == chain.rng("", 24).integers(3))
-    values = level[true] * (1.0 - chain.border_dip * border) * (1.0 - chain.wrong_dip * wrong)
+    values = level[true]
+    if form(chain.forms, "levels") == "wandering":
+        rng = chain.rng(log, 43)
+        values = values * (
+            1.0 + LOWER * np.sin(2.0 * np.pi * (taken / rng.uniform(*WANDERS_S) + rng.random()))
+        )
+    values = values * (1.0 - chain.border_dip * border) * (1.0 - chain.wrong_dip * wrong)
     if form(chain.forms, "border_memory") == "recovers":
         changed = np.flatnonzero(np.diff(true, prepend=true[:1]))
         last = np.searchsorted(changed, np.arange(true.size), side="right") - 1
@@ -112,10 +134,12 @@ def confidence_of(
 
 
 def voted(chain: Chain, surface: Whole, ready: Array) -> tuple[Whole, Array]:
-    """What neighbours agree on, told one result later and stamped as before."""
+    """What neighbours agree on, told one result later, or two, and stamped as before."""
     kind = form(chain.forms, "voted")
     if kind == "each":
         return surface, ready
+    if kind == "of_five":
+        return _of_five(chain, surface, ready)
     later = np.append(ready[1:], ready[-1] + 1.0 / chain.rate_hz)
     before, after = np.append(surface[:1], surface[:-1]), np.append(surface[1:], surface[-1:])
     if kind == "of_three":
@@ -124,6 +148,15 @@ def voted(chain: Chain, surface: Whole, ready: Array) -> tuple[Whole, Array]:
     for i in range(1, said.size):
         said[i] = surface[i] if surface[i] == after[i] else said[i - 1]
     return said, later
+
+
+def _of_five(chain: Chain, surface: Whole, ready: Array) -> tuple[Whole, Array]:
+    """The class that three of five have, else one's own."""
+    n, around = surface.size, np.pad(surface, 2, mode="edge")
+    votes = np.array([sum(around[i : i + n] == s for i in range(5)) for s in range(3)])
+    most = votes.argmax(axis=0)
+    last = ready[-1:] + np.array([1.0, 2.0]) / chain.rate_hz
+    return np.where(votes.max(axis=0) >= 3, most, surface), np.append(ready, last)[2:]
 
 
 def columns(chain: Chain, said: Results, time_s: Array, log: str = "") -> pd.DataFrame:
@@ -140,10 +173,10 @@ def columns(chain: Chain, said: Results, time_s: Array, log: str = "") -> pd.Dat
             "image_to_m": np.where(there, np.round(end[last], chain.digits), np.nan),
         }
     )
-    return _logged(chain, seen, log)
+    return _logged(chain, seen, np.diff(last, prepend=-1) > 0, log)
 
 
-def _logged(chain: Chain, seen: pd.DataFrame, log: str) -> pd.DataFrame:
+def _logged(chain: Chain, seen: pd.DataFrame, fresh: Flags, log: str) -> pd.DataFrame:
     """With the samples that the logger has; all columns of a result come in one message."""
     kind = form(chain.forms, "rows")
     if kind == "each":
@@ -151,6 +184,8 @@ def _logged(chain: Chain, seen: pd.DataFrame, log: str) -> pd.DataFrame:
     gone = np.arange(len(seen)) % 2 == 1
     if kind == "lost_samples":
         gone = chain.rng(log, 34).random(len(seen)) < LOST_ROWS
+    elif kind == "on_arrival":
+        gone = ~fresh
     return pd.DataFrame({name: values.mask(gone) for name, values in seen.items()})
 
 

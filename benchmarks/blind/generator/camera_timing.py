@@ -24,6 +24,10 @@ PAUSE_S, PAUSE_EVERY_S = (0.6, 2.0), 15.0
 """Duration of a pause, and from one to the next in the mean."""
 RUN = (3, 9)
 """Results of a run of lost ones, at the ends of which others are told."""
+GATEWAY_S = 0.006
+"""Mean time that a gateway adds."""
+SLOW_M_S, SLOW_SHARE = (1.5, 4.0), 0.5
+"""Speeds below which a system may not work, at most that share of a drive's mean speed."""
 LEAST_LOST = 0.03
 """Share of results lost where that is the point [-]."""
 
@@ -43,7 +47,9 @@ def timing(chain: Chain, passage: Passage, log: str) -> tuple[Array, Array]:
     if form(chain.forms, "sent") == "on_a_bus":
         message = chain.rng("", 20).choice(BUS_S)
         ready = np.ceil(ready / message) * message
-    there = (taken < end_s) & _awake(chain, taken, end_s, log)
+    elif form(chain.forms, "sent") == "through_gateway":
+        ready = np.maximum.accumulate(ready + chain.rng(log, 40).gamma(2.0, GATEWAY_S / 2.0, ready.size))
+    there = (taken < end_s) & _awake(chain, passage, taken, log)
     return taken[there], ready[there]
 
 
@@ -55,11 +61,16 @@ def _by_way(chain: Chain, passage: Passage, begins: float, phase: float) -> Arra
     return np.interp(np.arange(1, int(count[-1]) + 1), count, clock)
 
 
-def _awake(chain: Chain, taken: Array, end_s: float, log: str) -> Flags:
+def _awake(chain: Chain, passage: Passage, taken: Array, log: str) -> Flags:
     """Whether the camera runs; a short log has no time for it to be late."""
-    awake = np.ones(taken.size, bool)
+    awake, end_s = np.ones(taken.size, bool), passage.end_s
     if chain.forms["begins"] == "late":
         awake &= taken >= chain.rng(log, 21).uniform(*LATE_S)
+    elif chain.forms["begins"] == "ends_early":
+        awake &= taken < end_s - chain.rng(log, 21).uniform(*LATE_S)
+    if form(chain.forms, "pauses") == "when_slow":
+        least = min(chain.rng("", 41).uniform(*SLOW_M_S), SLOW_SHARE * float(passage.speed_m_s.mean()))
+        awake &= passage.speed(taken) >= least
     if form(chain.forms, "pauses") == "some":
         rng, at = chain.rng(log, 22), 0.0
         while (at := at + rng.exponential(PAUSE_EVERY_S)) < end_s - PAUSE_S[1]:
@@ -89,6 +100,8 @@ def numbers(chain: Chain, taken: Array, there: Flags) -> NDArray[np.integer[Any]
     kind, counted = form(chain.forms, "numbering"), chain.first_id + np.arange(taken.size)
     if kind == "dense":
         return chain.first_id + np.arange(np.count_nonzero(there))
+    if kind == "four_bits":  # of a message, not of a picture
+        return (chain.first_id + np.arange(np.count_nonzero(there))) % 16
     if kind == "strided":
         return (chain.first_id + 3 * np.arange(taken.size))[there]
     if kind == "wraps":

@@ -186,8 +186,8 @@ SIZES: dict[str, Counts] = {
 deviation outside: 15, in the second family 18, in the third 23, in the fourth 28, in the fifth 34 and 5 pairs more, in
 the sixth 42 and 4 pairs more again, in the seventh 48 and 3 pairs more, in the eighth 53 and 3 pairs more,
 in the ninth 58 and 3 pairs more, in the tenth 63 and 3 pairs more. Camera: 5 x 6 rich, 5 x 3 mild, 25 without a gap,
-5 x 2 pairs, 6 x 2 outside and 5 x 2 removed, and in the camera's second family 8 x 2 pairs and 15 x 2 outside; the
-other family is that of what is not the camera's."""
+5 x 2 pairs, 6 x 2 outside and 5 x 2 removed, in the camera's second family 8 x 2 pairs and 15 x 2 outside, in its
+third 10 x 2 pairs and 23 x 2 outside; the other family is that of what is not the camera's."""
 
 
 def table(size: str, family: Family = Family.FIRST, camera: CameraFamily = CameraFamily.FIRST) -> list[Spec]:
