@@ -104,7 +104,8 @@ def test_table_has_the_stated_counts():
         Group.OUTSIDE: 30,
         Group.REMOVED: 10,
     }
-    first, second = ({s.name for s in table("camera_small", TENTH, family)} for family in CameraFamily)
+    small = ({s.name for s in table("camera_small", TENTH, family)} for family in CameraFamily)
+    first, second, *_ = small
     assert first < second
 
 

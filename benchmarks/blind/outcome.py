@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .baselines import closure, in_sample_bic
-from .generator.camera_family import is_new
+from .generator.camera_family import CameraFamily, is_new
 from .generator.camera_library import CAMERA_LIBRARY
 from .generator.camera_road import CLASS_FRICTION, SURFACES
 from .generator.forms import Family, is_further
@@ -45,8 +45,8 @@ class Outcome:
         Effects and their probabilities as ranked; a cause of several effects gives them in a row.
     camera : bool
         The logs have a camera, so that its effects are candidates too.
-    new_to_camera : bool
-        One of them has a form that the camera's first family lacks.
+    new_to_camera : frozenset of CameraFamily
+        The camera's families that lack the form that one of them has.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Outcome:
     closure: tuple[str, ...]
     error: str | None
     camera: bool = False
-    new_to_camera: bool = False
+    new_to_camera: frozenset[CameraFamily] = frozenset()
 
     @property
     def blames(self) -> bool:
@@ -182,7 +182,11 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         closure=tuple(closure(said, known)),
         error=result["error"],
         camera=camera,
-        new_to_camera=camera and any(is_new(seal["camera"]["chain"]["forms"], effect) for effect in truth),
+        new_to_camera=frozenset(
+            family
+            for family in CameraFamily
+            if camera and any(is_new(seal["camera"]["chain"]["forms"], effect, family) for effect in truth)
+        ),
     )
 
 

@@ -239,11 +239,12 @@ def _asides(
             [o for o in rich if family in o.further],
             lambda o: o.right_within(1),
         )
-    aside(
-        "rich, a form that the camera's first family lacks: right first",
-        [o for o in rich if o.new_to_camera],
-        lambda o: o.right_within(1),
-    )
+    for camera in list(CameraFamily)[:-1]:
+        aside(
+            f"rich, a form that the camera's {camera} family lacks: right first",
+            [o for o in rich if camera in o.new_to_camera],
+            lambda o: o.right_within(1),
+        )
     aside("rich: ranked first, whatever the verdict", rich, lambda o: o.ranked_within(1))
     aside("rich: ranked first or second, whatever the verdict", rich, lambda o: o.ranked_within(2))
     aside("rich: called compound though one effect", rich, lambda o: o.verdict == "compound")

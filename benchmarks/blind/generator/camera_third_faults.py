@@ -19,8 +19,8 @@ SPRAY_S, CLEAR_S = (1.5, 4.0), (2.5, 7.0)
 """How long a car ahead throws up water, and until the next does."""
 RAIN_S, DRY_S = (2.0, 5.0), (2.0, 5.0)
 """How long drops stand on the glass, and until the next do."""
-SURE_M_S = 8.0
-"""Speed at which half of what slow pictures lack is there."""
+SURE_M_S, SURER = 7.0, 4
+"""Speed at which half of what slow pictures lack is there, and the power of the speed that it goes with."""
 PUSH_M_S2, MOST_PUSH = 3.0, 1.5
 """Acceleration that a friction's reference is off by the stated share at, and the most that counts over it."""
 ROOM = 0.4
@@ -81,7 +81,7 @@ def weather_kept(chain: Chain, fault: Fault, passage: Passage, taken: Array, log
     if fault.spray > 0.0:
         kept = kept * (1.0 - fault.spray * in_spells(chain, taken, log, 54, SPRAY_S, CLEAR_S))
     if fault.slow_unsure > 0.0:
-        kept = kept * (1.0 - fault.slow_unsure / (1.0 + (passage.speed(taken) / SURE_M_S) ** 2))
+        kept = kept * (1.0 - fault.slow_unsure / (1.0 + (passage.speed(taken) / SURE_M_S) ** SURER))
     return kept
 
 
