@@ -164,7 +164,7 @@ NEUTRAL = {
     "clock_set_anew": {"step_s": 0.0},
     "spray_of_others": {"share": 0.0},
     "stretches_shrunk": {"by_m": 0.0},
-    "road_undulates": {"curvature_1_m": 0.0},
+    "position_wanders": {"amplitude_m": 0.0},
     "unsure_when_slow": {"share": 0.0},
     "reference_with_push": {"share": 0.0},
 }
@@ -177,7 +177,7 @@ TINY = {
     "rain_told_as_wet": {"share": 1e-12},
     "clock_set_anew": {"step_s": 1e-9},
     "spray_of_others": {"share": 1e-9},
-    "road_undulates": {"curvature_1_m": 1e-9},
+    "position_wanders": {"amplitude_m": 1e-9},
     "unsure_when_slow": {"share": 1e-9},
 }
 
@@ -379,9 +379,7 @@ def test_a_laid_road_is_long_and_changes_at_every_border(layout):
 # --- deviations outside the library
 
 
-STAGE = Stage(
-    replace(chain_of(), preview_m=8.0, reference_noise=0.01), uneven(), ROAD, "holdout"
-)  # far, so that crests tell
+STAGE = Stage(replace(chain_of(), reference_noise=0.01), uneven(), ROAD, "holdout")
 
 
 def fault_at(name: str, severity: float) -> Fault:

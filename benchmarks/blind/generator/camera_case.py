@@ -23,7 +23,7 @@ from .camera_reference import friction_of, measured_at, reference
 from .camera_road import CLASS_FRICTION, CameraRoad, Passage, draw_camera_road, passage_of
 from .camera_system import Chain, Fault, draw_chain
 from .camera_telling import columns
-from .camera_third_faults import shrunk
+from .camera_third_faults import shrunk, wandered_m
 from .car import Car, draw_car
 from .cases import LOGS, MUST_SHOW, SHOWS, Case, Truth, first_drivable, generator_of
 from .driver import Drive, Style, UndrivableError, drive
@@ -217,6 +217,8 @@ def _position(chain: Chain, position_m: Array, fault: Fault, time_s: Array, end_
         position_m = np.round(position_m * (1.0 + fault.odometer), 4)
     if fault.jumped_m != 0.0:
         position_m = np.round(position_m + jumps_m(chain, fault, time_s, end_s, name), 4)
+    if fault.wandered_m != 0.0:
+        position_m = np.round(position_m + wandered_m(chain, fault, time_s, name), 4)
     kind = form(chain.forms, "position")
     if kind == "steps":
         position_m = np.round(np.round(position_m / POSITION_STEP_M) * POSITION_STEP_M, 4)

@@ -18,7 +18,7 @@ from .camera_faults import courses, jumps_m, kept_of, nod_of, outside_kept, pitc
 from .camera_road import CameraRoad, Passage, Whole
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault, Results
 from .camera_telling import classified, confidence_of, odds_of, voted
-from .camera_third_faults import extrapolated_m, rained_on
+from .camera_third_faults import extrapolated_m, rained_on, wandered_m
 from .camera_timing import delivered, numbers, timing
 
 Array = NDArray[np.floating[Any]]
@@ -72,6 +72,9 @@ def results(chain: Chain, passage: Passage, road: CameraRoad, fault: Fault, log:
     if fault.jumped_m != 0.0:
         moved = jumps_m(chain, fault, taken, passage.end_s, log)
         at, shift = at + moved, shift + moved
+    if fault.wandered_m != 0.0:
+        off = wandered_m(chain, fault, taken, log)
+        at, shift = at + off, shift + off
     if fault.stamp_age_s > 0.0:
         off = extrapolated_m(passage, taken, fault.stamp_age_s)
         at, shift = at + off, shift + off

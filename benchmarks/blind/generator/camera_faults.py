@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from .camera_family import form, function
 from .camera_road import Passage, Whole
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault
-from .camera_third_faults import crest_rad, set_clock_s, weather_kept
+from .camera_third_faults import set_clock_s, weather_kept
 
 Array = NDArray[np.floating[Any]]
 
@@ -96,8 +96,6 @@ def pitch_of(chain: Chain, fault: Fault, passage: Passage, taken: Array, log: st
         pitch *= 1.0 + TURNS * _swing(taken, rng.uniform(2.0, 5.0), rng.random())
     elif kind == "bouncing":
         pitch *= 1.0 + TURNS * _swing(taken, 1.0 / rng.uniform(*BOUNCE_HZ), rng.random())
-    if fault.crest_1_m > 0.0:
-        pitch = pitch + crest_rad(chain, fault, passage, taken)
     return pitch
 
 

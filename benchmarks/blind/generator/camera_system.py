@@ -70,8 +70,8 @@ class Fault:
     """Share of the confidence that is gone while others throw up water."""
     shrunk_m: float = 0.0
     """By how much road.yaml's more slippery stretches reach too far at each end."""
-    crest_1_m: float = 0.0
-    """Curvature of the road at its crests and in its dips [1/m]."""
+    wandered_m: float = 0.0
+    """By how much the position swings to and fro, fast and slowly."""
     slow_unsure: float = 0.0
     """Share of the confidence that is gone at a standstill."""
     measured_push: float = 0.0

@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera_road import CameraRoad, Passage, Whole
-from .camera_system import BEHIND_M, Chain, Fault
+from .camera_system import Chain, Fault
 
 Array = NDArray[np.floating[Any]]
 Flags = NDArray[np.bool_]
 
-CREST_M = (70.0, 160.0)
-"""From one crest of an uneven road to the next."""
+SWINGS_S = ((9.0, 14.0), (18.0, 30.0))
+"""Periods of a receiver's error, a faster and a slower one."""
 SPRAY_S, CLEAR_S = (1.5, 4.0), (2.5, 7.0)
 """How long a car ahead throws up water, and until the next does."""
 RAIN_S, DRY_S = (2.0, 5.0), (2.0, 5.0)
 """How long drops stand on the glass, and until the next do."""
-SURE_M_S, SURER = 7.0, 4
+SURE_M_S, SURER = 10.0, 4
 """Speed at which half of what slow pictures lack is there, and the power of the speed that it goes with."""
 PUSH_M_S2, MOST_PUSH = 3.0, 1.5
 """Acceleration that a friction's reference is off by the stated share at, and the most that counts over it."""
@@ -60,12 +60,11 @@ def extrapolated_m(passage: Passage, taken: Array, age_s: float) -> Array:
     return np.asarray(passage.at(old) + passage.speed(old) * age_s - passage.at(taken))
 
 
-def crest_rad(chain: Chain, fault: Fault, passage: Passage, taken: Array) -> Array:
-    """Nose down over what is seen: the road falls away at a crest and rises in a dip [rad]."""
-    distance = chain.preview_m + BEHIND_M + 0.5 * chain.window_m
-    rng, place = chain.rng("", 51), passage.at(taken) + distance
-    bend = np.cos(2.0 * np.pi * (place / rng.uniform(*CREST_M) + rng.random()))
-    return np.asarray(-0.5 * distance * fault.crest_1_m * bend)
+def wandered_m(chain: Chain, fault: Fault, time_s: Array, log: str) -> Array:
+    """By how far positions are off at a time, as satellites rise and houses pass, about none in the mean [m]."""
+    rng = chain.rng(log, 51)
+    swings = (np.sin(2.0 * np.pi * (time_s / rng.uniform(*period) + rng.random())) for period in SWINGS_S)
+    return np.asarray(fault.wandered_m * sum(swings))
 
 
 def rained_on(chain: Chain, fault: Fault, true: Whole, taken: Array, log: str) -> tuple[Whole, Flags]:

@@ -4,23 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.random import Generator
-
-from .camera_library import CameraEffect, Scale, Scene, growing
-from .camera_system import BEHIND_M, HEIGHT_M
-
-SHARPEST_1_M = 1.0 / 60.0
-"""Most curvature of a road's crests and dips, those of a ramp."""
-TO_HORIZON = 0.4
-"""Share of the way to the horizon that a crest may take what is seen."""
-
-
-def _crest(scene: Scene, rng: Generator) -> Scale:
-    distance = scene.chain.preview_m + BEHIND_M + 6.0
-    most = min(SHARPEST_1_M, 2.0 * TO_HORIZON * float(np.arctan(HEIGHT_M / distance)) / distance)
-    return lambda severity: {"curvature_1_m": 0.0003 * (most / 0.0003) ** severity}
-
+from .camera_library import CameraEffect, growing
 
 THIRD_OUTSIDE: dict[str, CameraEffect] = {
     "stamp_extrapolated": CameraEffect(
@@ -38,8 +22,10 @@ THIRD_OUTSIDE: dict[str, CameraEffect] = {
     "stretches_shrunk": CameraEffect(
         growing("by_m", 0.15, 5.0), lambda f, g: replace(f, shrunk_m=g["by_m"]), ("road", "camera")
     ),
-    "road_undulates": CameraEffect(
-        _crest, lambda f, g: replace(f, crest_1_m=g["curvature_1_m"]), ("road", "camera")
+    "position_wanders": CameraEffect(
+        growing("amplitude_m", 0.15, 6.0),
+        lambda f, g: replace(f, wandered_m=g["amplitude_m"]),
+        ("camera", "road"),
     ),
     "unsure_when_slow": CameraEffect(
         growing("share", 0.06, 0.97), lambda f, g: replace(f, slow_unsure=g["share"]), ("camera",)
@@ -48,7 +34,7 @@ THIRD_OUTSIDE: dict[str, CameraEffect] = {
         growing("share", 0.01, 0.6), lambda f, g: replace(f, measured_push=g["share"]), ("road", "camera")
     ),
 }
-"""Stamps that go on from an old place, drops on the glass, spray, a clock that is set, crests, and such."""
+"""Stamps that go on from an old place, drops on the glass, spray, a clock that is set, satellites, and such."""
 
 THIRD_PAIRS = (
     ("camera_pitch", "exposure_shift"),
