@@ -21,8 +21,8 @@ AGAIN, AGAIN_TIMES = 0.2, 1.7
 """Share of results whose message has to be sent again, and their delay over the mean [-]."""
 WIPES_S, WIPED = (0.8, 1.6), 0.12
 """From one wipe to the next, and the share of it that the blade is in the picture."""
-AXLE_HZ = (9.0, 14.0)
-"""An axle's own frequency."""
+AXLE_HZ = (11.2, 13.8)
+"""An axle's own frequency, none that would beat with a reference that has a rate of its own."""
 BOX, BOX_MOST = 0.4, 0.9
 """Cycles of a texture that is told by over which an amount of blur of 1 smears, and where it stays [-]."""
 

@@ -1,0 +1,194 @@
+"""Cases of the camera with the third family's forms: their files and seals; and that the second's stay as they were."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from benchmarks.blind import runner
+from benchmarks.blind.generator import driver
+from benchmarks.blind.generator.camera_family import ASPECTS, CameraFamily, form
+from benchmarks.blind.generator.camera_further import ALL_EFFECTS
+from benchmarks.blind.generator.camera_road import CLASS_FRICTION, SURFACES
+from benchmarks.blind.generator.camera_third_outside import THIRD_OUTSIDE
+from benchmarks.blind.generator.cases import SHOWS
+from benchmarks.blind.generator.forms import Family
+from benchmarks.blind.generator.kernel import ANGLE, RECORD_STEP_S, N, V, W, X
+from benchmarks.blind.generator.making import make_case
+from benchmarks.blind.generator.table import Group, table
+from benchmarks.blind.outcome import outcome_of
+
+TENTH = Family.TENTH
+THIRD = CameraFamily.THIRD
+CASES = {spec.name: spec for spec in table("camera", TENTH, THIRD)}
+HARDEST_M_S2 = 4.0
+"""Of a car that has no wheels to slide on."""
+
+
+def glide(
+    physics: Any, y: np.ndarray, start: int, rows: int, split: int, command: np.ndarray, out: np.ndarray
+) -> None:
+    """In place of `kernel.integrate`: a mass that its motors push, on wheels that roll."""
+    first, steps = start // driver.ROWS_PER_COMMAND, rows // driver.ROWS_PER_COMMAND
+    pushed = command[first : first + steps + 1].sum(axis=1) / (physics.radius * physics.mass)
+    along = np.arange(1, rows + 1) / driver.ROWS_PER_COMMAND
+    accel = np.clip(np.interp(along, np.arange(steps + 1), pushed), -HARDEST_M_S2, HARDEST_M_S2)
+    speed = np.maximum(y[V] + RECORD_STEP_S * np.cumsum(accel), 0.0)
+    place = y[X] + RECORD_STEP_S * np.cumsum(speed)
+    there = out[start + 1 : start + 1 + rows]
+    there[:, V], there[:, X], there[:, N] = speed, place, accel
+    there[:, W : W + 4] = (speed / physics.radius)[:, None]
+    there[:, ANGLE : ANGLE + 4] = (place / physics.radius)[:, None]
+    y[:] = there[-1, :N]
+
+
+@pytest.fixture(autouse=True)
+def _gliding(monkeypatch):
+    monkeypatch.setattr(driver, "integrate", glide)
+
+
+NAMES = [
+    "rich-camera_latency-0",
+    "rich-camera_pitch-3",
+    "rich-exposure_shift-1",
+    "rich-motion_blur-3",
+    "rich-class_friction_offset-1",
+    "mild-class_friction_offset-1",
+    "no_gap-0-rich",
+    "no_gap-2-calm",
+    "no_gap-6-rich",
+    "pair-motion_blur-class_friction_offset-0",
+    *(f"outside-{name}-0" for name in THIRD_OUTSIDE),
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_files_keep_the_contract_and_the_secret(name, tmp_path):
+    made = make_case(CASES[name], 1, TENTH, THIRD)
+    made.write(tmp_path)
+    seal = json.loads(json.dumps(made.seal()))
+    assert seal["camera"]["family"] == "third"
+    assert set(seal["camera"]["chain"]["forms"]) == set(ASPECTS[THIRD])
+    assert list(seal["effects"]) == list(seal["camera"]["hidden"]) == list(CASES[name].effects)
+    if made.spec.group is Group.NO_GAP:
+        assert made.truth.gap.total == 1.0
+        assert not seal["subsystems"]
+    else:
+        assert made.truth.gap.total >= SHOWS or made.spec.group is Group.MILD
+        assert set(seal["subsystems"]) <= {"camera", "road"}
+    for log in ("fit_1", "holdout"):
+        check_log(pd.read_csv(tmp_path / f"{log}.csv"))
+    check_road(tmp_path, seal)
+    for path in tmp_path.iterdir():
+        text = path.read_text(encoding="utf-8")
+        assert not [e for e in ALL_EFFECTS if e in text]
+
+
+def check_log(log: pd.DataFrame) -> None:
+    """Columns of the contract; a result's stay the same as long as its number does."""
+    assert np.all(np.diff(log["time_s"]) > 0.0)
+    seen = log.filter(regex="^(image|frame)").dropna(how="all")
+    assert set(seen["image_class"]) <= {-1, 0, 1, 2}
+    told = seen[seen["image_class"] >= 0]
+    assert len(told) > 0.6 * len(seen)
+    assert told["image_confidence"].between(0.0, 1.0).all()
+    assert (told["image_to_m"] > told["image_from_m"]).all()
+    same = np.diff(seen["frame_id"]) == 0.0
+    before, after = (part[same].reset_index(drop=True) for part in (seen.iloc[:-1], seen.iloc[1:]))
+    pd.testing.assert_frame_equal(before, after)
+
+
+def check_road(folder: Path, seal: dict[str, Any]) -> None:
+    """With a reference, road.yaml has the friction that is there, in the mean of each class over its stretches."""
+    if "mu_reference" not in pd.read_csv(folder / "fit_1.csv", nrows=1):
+        return
+    segments = yaml.safe_load((folder / "road.yaml").read_text(encoding="utf-8"))["segments"]
+    friction = dict(zip(SURFACES, CLASS_FRICTION, strict=True))
+    friction |= seal["effects"].get("class_friction_offset", {})
+    for surface in {segment["surface"] for segment in segments}:
+        values = [s["mu_left"] for s in segments if s["surface"] == surface]
+        assert np.mean(values) == pytest.approx(friction[surface], abs=0.02)
+
+
+def test_where_nothing_is_hidden_classes_change_at_the_borders():
+    """Over all such cases the median border is where road.yaml has it, to less than what a picture is apart."""
+    for name in ("no_gap-0-rich", "no_gap-1-rich", "no_gap-3-rich", "no_gap-4-rich"):
+        made = make_case(CASES[name], 1, TENTH, THIRD)
+        log, borders = made.logs["holdout"], np.array(made.roads["holdout"].start_m[1:])
+        seen = log[log["frame_id"].diff().fillna(1.0) != 0.0].dropna(subset=["image_class", "image_from_m"])
+        middle = 0.5 * (seen["image_from_m"] + seen["image_to_m"]).to_numpy()
+        changes = np.flatnonzero(np.diff(seen["image_class"].to_numpy()))
+        there = 0.5 * (middle[changes] + middle[changes + 1])
+        off = there - borders[np.argmin(np.abs(borders - there[:, None]), axis=1)]
+        apart = np.median(np.diff(middle)[np.diff(middle) > 0.0])
+        near = off[np.abs(off) < 2.0 * apart + 0.5]
+        assert abs(np.median(near)) < 0.5 * apart + 0.25, name
+
+
+def test_a_case_repeats_and_a_removed_one_has_the_same_logs():
+    rich = CASES["rich-exposure_shift-1"]
+    first, again = (make_case(rich, 1, TENTH, THIRD) for _ in range(2))
+    removed = make_case(CASES["removed-exposure_shift-1"], 1, TENTH, THIRD)
+    for name, log in first.logs.items():
+        pd.testing.assert_frame_equal(log, again.logs[name])
+        pd.testing.assert_frame_equal(log, removed.logs[name])
+    assert first.seal() == again.seal()
+
+
+def test_a_folder_keeps_to_the_third_family(tmp_path):
+    runner.seal_run(tmp_path, "camera_small", 1, TENTH, THIRD)
+    assert json.loads((tmp_path / "run.json").read_text())["camera_forms"] == "third"
+    with pytest.raises(runner.RunError, match="camera_forms: third there, second now"):
+        runner.seal_run(tmp_path, "camera_small", 1, TENTH, CameraFamily.SECOND)
+
+
+def test_an_outcome_knows_which_families_lack_its_form():
+    seal = make_case(CASES["rich-camera_latency-0"], 1, TENTH, THIRD).seal()
+    forms = seal["camera"]["chain"]["forms"]
+    result = {"case": "a", "seal": seal, "diagnosis": None, "error": "none was asked for"}
+    for lateness, lacking in (("constant", 0), ("warming", 1), ("sent_again", 2)):
+        forms["lateness"] = lateness
+        assert outcome_of(result).new_to_camera == frozenset(list(CameraFamily)[:lacking])
+    assert form(forms, "lateness") == "sent_again"
+
+
+# --- the second family stays as it was
+
+SECOND_DIGESTS = {
+    "rich-camera_latency-0": "3e19062cc67bd8bb",
+    "rich-camera_pitch-1": "781ab48d06d2ec3c",
+    "rich-exposure_shift-2": "eb8983db9ae454a9",
+    "rich-motion_blur-0": "2c826becf012cd0e",
+    "rich-class_friction_offset-1": "4cd6c57c72316349",
+    "mild-motion_blur-1": "b032f6316f48785f",
+    "no_gap-0-rich": "cb6e6f5876bbae7a",
+    "no_gap-2-calm": "c29f86d7bf2da8d2",
+    "pair-camera_pitch-class_friction_offset-0": "f0c5dfe3a00fbbc7",
+    "outside-map_labels_old-0": "4e475aee1791c5cd",
+    "outside-reference_late-1": "848be992d2f0ef7c",
+    "outside-position_jumps-1": "1ccf82377d2813c0",
+}
+"""SHA-256 over the files and the seal of cases, as the second family made them before there was a third."""
+
+
+def digest_of(name: str, folder: Path) -> str:
+    spec = {spec.name: spec for spec in table("camera", TENTH, CameraFamily.SECOND)}[name]
+    case = make_case(spec, 1, TENTH, CameraFamily.SECOND)
+    case.write(folder)
+    seal = json.loads(json.dumps(case.seal()), parse_float=lambda x: f"{float(x):.6g}")
+    total = hashlib.sha256(json.dumps(seal, sort_keys=True).encode())
+    for path in sorted(folder.iterdir()):
+        total.update(path.name.encode() + path.read_bytes())
+    return total.hexdigest()[:16]
+
+
+@pytest.mark.parametrize("name", SECOND_DIGESTS)
+def test_the_second_familys_cases_stay_what_they_were(name, tmp_path):
+    assert digest_of(name, tmp_path) == SECOND_DIGESTS[name]
