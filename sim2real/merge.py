@@ -228,7 +228,10 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
     if side.verdict is not Verdict.NO_GAP:
         blamed = "" if side.unexplained else " and ".join(side.named)
         told = f"{blamed or 'Something unknown'}: {side.sentence}".strip(": ")
-        sentence = told if main.verdict is Verdict.NO_GAP else f"{main.sentence} Beside it, {told}"
+        beside = f"{main.sentence} Beside it, {told}"
+        if misplaced:
+            beside = f"{told} The car's equations show a gap too, which a road out of place may cause: {main.sentence}"
+        sentence = told if main.verdict is Verdict.NO_GAP else beside
     return replace(
         main,
         verdict=verdict,

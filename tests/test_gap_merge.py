@@ -318,3 +318,20 @@ def test_what_the_camera_cannot_explain_is_told():
 def test_reasons_of_what_cannot_be_ruled_out_are_kept_by_effect():
     side = camera_side(finding(Verdict.NO_GAP, LATE, cannot_rule_out={"motion_blur": "always slow"}))
     assert side.cannot_rule_out == ("motion_blur",)
+
+
+@pytest.mark.parametrize(("signal", "first"), [("image_place", "camera"), ("image_confidence", "tyre")])
+def test_a_road_out_of_place_speaks_before_the_cars_equations(signal, first):
+    """It disturbs them, while a dim picture does not."""
+    term = Unexplained(
+        "tyre", "wheel_speed", "slip", "-", "", "", 0.5, np.array([]), np.array([]), "More slip."
+    )
+    main = replace(main_of(Verdict.UNKNOWN), unexplained=term, sentence="More slip.")
+    odd = finding(Verdict.UNKNOWN, TILTED, unexplained=("Odd pictures.",), odd_signal=signal)
+    both = merge(main, camera_side(odd))
+    assert both.verdict is Verdict.UNKNOWN
+    assert both.unexplained is not None
+    assert both.unexplained.subsystem == first
+    assert both.sentence.startswith("Something unknown: Odd pictures." if first == "camera" else "More slip.")
+    assert "Odd pictures." in both.sentence
+    assert "More slip." in both.sentence
