@@ -26,7 +26,7 @@ from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
 from sim2real.orders import Order, counts, read_order, without_swing
 from sim2real.pairs import add_pairs, add_partners, add_twins
-from sim2real.perception.diagnose import diagnose_perception
+from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, is_noise, needs_pairs
 from sim2real.sluggish import impostor
@@ -223,9 +223,9 @@ def _file(path: Path) -> dict[str, str]:
 
 
 def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
-    """By how much what a diagnosis found shrinks the car's gap of a log that it has never seen [%].
+    """By how much what a diagnosis found shrinks the gap of a log that it has never seen [%].
 
-    NaN where all that it found lies in the camera chain.
+    The car's gap, or the camera's where all that it found lies in the camera chain.
 
     Parameters
     ----------
@@ -234,15 +234,18 @@ def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
     log, road : Path
         The further log, and where it was driven.
     """
-    model = Simulation(load_vehicle(diagnosis.provenance["vehicle"]["path"]))
+    vehicle = load_vehicle(diagnosis.provenance["vehicle"]["path"])
     named = diagnosis.causes[: 2 if diagnosis.verdict is Verdict.COMPOUND else 1]
     of_car = [c for c in named if EFFECTS[c.effect].stage != "perception"]
+    source = read_source(str(log), road)
     if named and not of_car:
-        return float("nan")
+        added = {c.effect: {name: v.value for name, v in c.parameters.items()} for c in named}
+        return camera_shrink(source.log, source.road, vehicle, added)
+    model = Simulation(vehicle)
     effects = [
         form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()}) for c in of_car
     ]
-    added = model.with_effects(*effects)
-    held = gather(added, [read_source(str(log), road).drive])
-    before, after = measure(held, held.residuals(model)), measure(held, held.residuals(added))
+    with_them = model.with_effects(*effects)
+    held = gather(with_them, [source.drive])
+    before, after = measure(held, held.residuals(model)), measure(held, held.residuals(with_them))
     return 100.0 * (1.0 - after.total / before.total)

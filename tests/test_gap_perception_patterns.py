@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from camera_drives import Camera, changed
-from test_gap_perception import diagnose
+from camera_drives import Camera, changed, drive, road
+from test_gap_perception import BARE, diagnose
 
 from sim2real.perception.crossings import Crossings
+from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.perception.drifting import drift_in_words
 from sim2real.perception.late_reference import DEAD_TIMES_S, FILTERS_S, Course, _left
 from sim2real.perception.likelihood import likeliest
@@ -162,3 +163,31 @@ def test_dead_time_and_filter_are_told_apart(dead_s, lag_s):
     found = Course(course, np.eye(3)[kind])
     left = {(d, f): _left([found], d, f) for d in DEAD_TIMES_S for f in FILTERS_S}
     assert min(left, key=lambda key: left[key]) == pytest.approx((dead_s, lag_s))
+
+
+@pytest.mark.parametrize(
+    ("camera", "added"),
+    [
+        (Camera(delay_s=0.2), {"camera_latency": {"delay_s": 0.2}}),
+        (Camera(blur_s=0.1), {"motion_blur": {"exposure_s": 0.1}}),
+        (
+            Camera(offset=(0.0, 0.15, 0.0)),
+            {"class_friction_offset": {"dry": 0.0, "wet": 0.15, "snow_ice": 0.0}},
+        ),
+    ],
+)
+def test_an_effect_in_the_vehicle_file_takes_the_gap_off_a_further_log(camera, added):
+    """As far as the floor; the wrong one by as much takes nothing off, and a log without a gap has none to take."""
+    track = road(seed=21)
+    log, quiet = (drive(track, one, speeds=UP_AND_DOWN, seed=21) for one in (camera, Camera()))
+    left = diagnose_perception([log], log, [track, track], BARE).before.total
+    assert camera_shrink(log, track, BARE, added) == pytest.approx(100.0 * (1.0 - 1.0 / left), abs=6.0)
+    assert left > 1.5
+    assert camera_shrink(log, track, BARE, {"camera_pitch": {"pitch_rad": -0.1}}) < 5.0
+    assert camera_shrink(quiet, track, BARE, added) < 0.0
+
+
+def test_without_a_camera_there_is_no_shrink():
+    track = road(seed=21)
+    bare = changed(drive(track, reference=None), image_class=None, image_from_m=None, image_to_m=None)
+    assert np.isnan(camera_shrink(bare, track, BARE, {"camera_latency": {"delay_s": 0.2}}))

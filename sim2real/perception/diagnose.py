@@ -6,7 +6,7 @@ sure the camera is (`perception_confidence`), and what a friction reference says
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -200,6 +200,27 @@ def diagnose_perception(
     if not chains:
         return None
     return _conclude(chains, conflicts_in_words(conflicts), stuck_in_words(every), tuple(warnings), seed)
+
+
+def camera_shrink(
+    log: Log, road: RoadFile, vehicle: VehicleFile, added: Mapping[str, Mapping[str, float]]
+) -> float:
+    """By how much effects, once they are in vehicle.yaml, shrink the camera's gap of a log [%]; NaN without a camera.
+
+    Parameters
+    ----------
+    log, road : Log, RoadFile
+        The log, and where it was driven.
+    vehicle : VehicleFile
+        The car as simulated so far.
+    added : mapping
+        Effects of the camera chain with their parameters, as in vehicle.yaml.
+    """
+    with_them = vehicle.model_copy(update={"effects": {**vehicle.effects, **added}})
+    before, after = (diagnose_perception([log], log, [road, road], v) for v in (vehicle, with_them))
+    if before is None or after is None:
+        return float("nan")
+    return 100.0 * (1.0 - after.before.total / before.before.total)
 
 
 def _conclude(
