@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenarios.effects import EFFECTS
+from scenarios.effects.base import Parameter
 from sim2real.lattice import Lattice
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.perception.shift import SIGNAL as PLACE
@@ -131,12 +133,19 @@ def _shares(found: PerceptionFinding) -> dict[str, float]:
 
 
 def _own(effect: str, candidate: CameraCandidate) -> dict[str, Interval]:
-    if len(candidate.effects) == 1:
-        return candidate.parameters
-    from scenarios.effects import EFFECTS
+    """Its own of a candidate's parameters, within what vehicle.yaml takes."""
+    return {
+        p.name: _within(candidate.parameters[p.name], p)
+        for p in EFFECTS[effect].parameters()
+        if p.name in candidate.parameters
+    }
 
-    names = {p.name for p in EFFECTS[effect].parameters()}
-    return {name: value for name, value in candidate.parameters.items() if name in names}
+
+def _within(estimate: Interval, parameter: Parameter) -> Interval:
+    if callable(parameter.low) or callable(parameter.high):
+        return estimate
+    value, low, high = np.clip((estimate.value, estimate.low, estimate.high), parameter.low, parameter.high)
+    return Interval(float(value), float(low), float(high), estimate.unit)
 
 
 def counter_side(lattice: Lattice, before: Measure, after: Measure, excluded: bool) -> Side:

@@ -315,6 +315,12 @@ def test_what_the_camera_cannot_explain_is_told():
     assert "Beside it." in known.warnings
 
 
+def test_an_estimate_stays_within_what_a_vehicle_file_takes():
+    wide = candidate(("motion_blur",), 30.0, exposure_s=Interval(0.21, 0.1, 0.5, "s"))
+    side = camera_side(finding(Verdict.IDENTIFIED, wide, causes=("motion_blur",)))
+    assert side.causes[0].parameters == {"exposure_s": Interval(0.2, 0.1, 0.2, "s")}
+
+
 def test_reasons_of_what_cannot_be_ruled_out_are_kept_by_effect():
     side = camera_side(finding(Verdict.NO_GAP, LATE, cannot_rule_out={"motion_blur": "always slow"}))
     assert side.cannot_rule_out == ("motion_blur",)
