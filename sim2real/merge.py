@@ -17,9 +17,9 @@ from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Unexplained, Verdict
 
-QUIET_SIDE_DOUBT = 0.1
+QUIET_SIDE_DOUBT = 0.06
 """Probability that is left to the effects of data that show no gap: some of them would hardly show [-]."""
-UNKNOWN_BELIEF = 0.1
+UNKNOWN_BELIEF = 0.05
 """Share of the camera's effects in the belief where what they leave says that it is none of them, or not all [-]."""
 CERTAIN = 0.97
 """Probability of what a mark that nothing else leaves has shown [-]."""

@@ -9,8 +9,11 @@ import pytest
 from camera_drives import Camera, changed, drive, road
 from test_gap_perception import BARE, diagnose
 
+from sim2real.perception.blocks import Blocks
+from sim2real.perception.confidence import ConfidenceFit, ConfidenceModel
+from sim2real.perception.confidence_chain import rest_of
 from sim2real.perception.diagnose import diagnose_perception
-from sim2real.result import Verdict
+from sim2real.result import Interval, Verdict
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -119,3 +122,29 @@ def test_a_confidence_that_falls_over_every_log_is_no_effect_of_the_library(spee
     finding = diagnose(Camera(roughness=0.03), 8, speeds=speeds, damage=fogging)
     assert finding.verdict is Verdict.UNKNOWN
     assert any("falls over every log" in text for text in finding.unexplained), finding.unexplained
+
+
+def blocks_of(classes, loss) -> Blocks:
+    """Seconds of one log at one speed."""
+    count = len(classes)
+    steady = np.full(count, 15.0)
+    names = np.full(count, "a.csv")
+    return Blocks(names, np.arange(count) * 1.0, steady, 0.0 * steady, np.array(loss), np.array(classes))
+
+
+def test_a_class_that_the_fit_logs_lack_sets_its_own_level():
+    learnt = blocks_of([0] * 10, [0.1] * 10)
+    seen = blocks_of([0] * 5 + [1] * 5, [0.1] * 5 + [0.25] * 5)
+    plain = ConfidenceFit((), 0.0, 0.0, 0.0, Interval(0.0, 0.0, 0.0), Interval(0.0, 0.0, 0.0))
+    z, _ = rest_of(seen, learnt, plain, ConfidenceModel(0.03, 1.0))
+    assert z == pytest.approx(np.zeros(10), abs=1e-9)
+    lower, _ = rest_of(blocks_of([0] * 5, [0.25] * 5), learnt, plain, ConfidenceModel(0.03, 1.0))
+    assert lower == pytest.approx(np.full(5, 5.0))
+
+
+def test_what_the_hold_out_does_not_show_is_no_blur():
+    """4 ms, which the fit logs alone would call blur."""
+    roads = [road(seed=50 + i) for i in range(3)]
+    cameras = (Camera(blur_s=0.004), Camera(blur_s=0.004), Camera())
+    logs = [drive(r, c, seed=50 + i) for i, (r, c) in enumerate(zip(roads, cameras, strict=True))]
+    assert diagnose_perception(logs[:2], logs[2], roads, BARE).verdict is Verdict.NO_GAP

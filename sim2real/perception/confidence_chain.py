@@ -37,6 +37,8 @@ NORMAL_RANGE = 2.0
 """Standard deviations of a normal level, of usual mistakes and of usual light together that are no gap [-]."""
 FEWEST_BLOCKS = 8
 """With fewer blocks nothing is said of confidence."""
+QUIET = 0.97
+"""Share of the hold-out's gap that an effect has to get below, else it is none [-]."""
 
 
 @dataclass(frozen=True)
@@ -111,9 +113,12 @@ def confidence_chain(
         unexcited=_unexcited(seen, choices),
         next_step=NEXT_STEP,
     )
+    shrunk = min((account.left() for account in (*chain.accounts, *outside)), default=0.0)
+    if len(unseen) >= FEWEST_BLOCKS and shrunk > QUIET * chain.nothing.left():
+        chain = replace(chain, quiet=True)
     stands = next(f for f in (plain, *fits) if f.effects == chain.best().effects)
     pattern = pattern_in_words(seen.together, stands, model)
-    needed = [account for account in outside if account.score > chain.best().score + DECISIVE]
+    needed = [a for a in outside if a.score > chain.best().score + DECISIVE and not chain.quiet]
     if needed and not pattern:
         pattern = _of_no_effect(max(needed, key=lambda account: account.score))
     return replace(chain, unexplained=pattern)
@@ -164,9 +169,11 @@ def rest_of(
     if not len(learnt):
         return np.empty(0), 0.0
     rest, known = blocks.loss - fit.loss(blocks), learnt.loss - fit.loss(learnt)
-    level = np.full(len(blocks), known.mean())
-    for c in np.unique(learnt.classes):
-        level[blocks.classes == c] = known[learnt.classes == c].mean()
+    level = np.zeros(len(blocks))
+    for c in np.unique(blocks.classes):
+        # what a class's level is where it was not learnt, the blocks themselves have to say
+        learnt_of = known[learnt.classes == c] if (learnt.classes == c).any() else rest[blocks.classes == c]
+        level[blocks.classes == c] = learnt_of.mean()
     off = (known.mean() + np.log(NORMAL_CONFIDENCE)) / NORMAL_SPREAD
     return (rest - level) / model.deviation, float(off)
 

@@ -41,7 +41,9 @@ def pattern_in_words(blocks: Blocks, fit: ConfidenceFit, model: ConfidenceModel)
     model : ConfidenceModel
         What is usual between them.
     """
-    loss = blocks.loss - fit.loss(blocks)
+    taken = fit.loss(blocks)
+    # at one speed, but as low as blur and exposure leave it
+    loss = blocks.loss - taken + (taken.mean() if len(blocks) else 0.0)
     rest = loss - _levels(loss, blocks)
     return (
         _shaken(rest, blocks) or _shunned(loss, blocks) or _creeping(rest, blocks) or _restless(blocks, model)
