@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from camera_drives import Camera, changed, drive, road
@@ -53,6 +55,29 @@ def test_a_clock_that_runs_away_is_named():
 
     finding = diagnose(Camera(), 3, speeds=UP_AND_DOWN, damage=damage)
     assert says(finding, "does the camera's clock"), finding.unexplained
+
+
+def test_stamps_that_are_carried_on_at_the_last_speed_are_named():
+    """From a second before: they miss what the car has gained or lost meanwhile."""
+
+    def damage(log):
+        speed, position = log.signals["vehicle_speed_m_s"], log.signals["position_m"]
+        before = np.maximum(log.time_s - 1.0, 0.0)
+        carried = np.interp(before, log.time_s, position) + np.interp(before, log.time_s, speed) * 1.0
+        off = np.where(log.time_s > 1.0, carried - position, 0.0)
+        return changed(log, **{n: log.signals[n] + off for n in ("image_from_m", "image_to_m")})
+
+    speeds = (12.0, 12.0, 25.0, 25.0, 12.0, 20.0, 20.0, 10.0)
+    finding = diagnose(Camera(), 3, speeds=speeds, damage=damage, spacing_m=25.0)
+    assert says(finding, "carried on at the last speed"), finding.unexplained
+    assert any("-0.5" in text or "-0.4" in text for text in finding.unexplained), finding.unexplained
+
+
+def test_a_crossings_acceleration_is_that_of_the_way_driven():
+    ages = np.linspace(0.0, 1.0, 201)
+    made = crossings(3, np.zeros(3))
+    pushed = replace(made, way_m=np.tile(15.0 * ages - 0.5 * 3.2 * ages**2, (3, 1)))
+    assert pushed.accel_m_s2 == pytest.approx(np.full(3, 3.2))
 
 
 @pytest.mark.parametrize("faults", [{"delay_s": 0.15}, {"distance_m": 1.5}])
@@ -109,6 +134,15 @@ def test_a_camera_that_shakes_when_the_car_brakes_or_pulls():
     finding = diagnose(QUIET, 5, speeds=speeds, damage=damage)
     assert says(finding, "falls with acceleration"), finding.unexplained
     assert diagnose(QUIET, 5, speeds=speeds).verdict is Verdict.NO_GAP
+
+
+def test_a_camera_that_is_unsure_when_the_car_is_slow():
+    def damage(log):
+        speed = log.signals["vehicle_speed_m_s"]
+        return changed(log, image_confidence=log.signals["image_confidence"] * np.exp(-0.03 * (25.0 - speed)))
+
+    finding = diagnose(QUIET, 9, speeds=UP_AND_DOWN, damage=damage)
+    assert says(finding, "the reverse of blur"), finding.unexplained
 
 
 @pytest.mark.parametrize(("factor", "shunned"), [(0.6, True), (0.85, False)])

@@ -95,6 +95,12 @@ class Crossings:
         """How far stamps lie beyond what a pitched camera saw, shape (len(pitch_rad), k) [m]."""
         return self.ahead_m - seen_distance_m(self.ahead_m, height_m, pitch_rad[:, None])
 
+    @property
+    def accel_m_s2(self) -> Array:
+        """Acceleration over the second before, from the way driven in it and in its later half, shape (k,) [m/s²]."""
+        half = len(AGES_S) // 2
+        return np.asarray((2.0 * self.way_m[:, half] - self.way_m[:, -1]) / AGES_S[half] ** 2)
+
     def bracket(self, share: float) -> tuple[Array, Array]:
         """Where the border was seen to lie beyond its place, if a class is for this share of its stamp [m]."""
         return self.low_m + share * self.low_length_m, self.high_m + share * self.high_length_m

@@ -1,8 +1,8 @@
-"""Changes of class that lie farther and farther off while a log lasts: no effect of the library has them do so.
+"""Changes of class that lie beside the borders by a law that no effect of the library has.
 
 A wrong scale of position_m puts borders off by a share of the way since the log's begin, a clock that runs fast by the
-way driven in a delay that grows with time. Each law is a constant shift or delay and its growth, fitted and scored like
-the library's own.
+way driven in a delay that grows with time, stamps that are carried on at the last speed by what the car accelerates.
+Each law is a constant shift or delay and what it varies with, fitted and scored like the library's own.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ from sim2real.perception.likelihood import likeliest
 Array = NDArray[np.float64]
 
 FEWEST = 6
-"""Crossings on the fit logs from which on a growth is looked for."""
+"""Crossings on the fit logs from which on such a law is looked for."""
 CLEARLY, MOSTLY = 10.0, 1.5
-"""By so much, and so many times, a growing shift must beat every effect of the library [nats], [-]: a mounting that
+"""By so much, and so many times, a varying shift must beat every effect of the library [nats], [-]: a mounting that
 settles, or a delay that wanders, is still an angle, or a delay, and takes most of it."""
-LEAST_GROWTH_M = 0.7
-"""Change of the shift over a log from which on it is a gap [m]."""
+LEAST_CHANGE_M = 0.7
+"""Change of the shift over the crossings from which on it is a gap [m]."""
 GRID, ZOOMS = 41, 4
 """Points per axis of the search, and how often it is drawn closer about the best."""
 
 
 @dataclass(frozen=True)
 class Law:
-    """A constant shift and one that grows.
+    """A constant shift and one that varies.
 
     Attributes
     ----------
     basis : callable
-        Crossings to the shift by a unit of the constant and of the growth, two arrays of shape (k,) [m].
+        Crossings to the shift by a unit of the constant and of what varies, two arrays of shape (k,) [m].
     most : tuple of float
-        Largest constant and growth that are looked for.
+        Largest constant and rate that are looked for.
     words : str
-        What it says, with the growth in it.
+        What it says, with the rate in it.
     """
 
     basis: Callable[[Crossings], tuple[Array, Array]]
@@ -61,10 +61,16 @@ BY_TIME = Law(
     "The changes of class come late by about {rate:+.2%} of the time since the log's begin: does the camera's clock "
     "run at another rate than the logger's?",
 )
+BY_PUSH = Law(
+    lambda c: (np.ones(len(c)), c.accel_m_s2),
+    (5.0, 2.0),
+    "The changes of class lie beside road.yaml's borders by about {rate:+.2f} m for each m/s² of acceleration: are the "
+    "stamps carried on at the last speed?",
+)
 
 
 def drift_in_words(known: Crossings, unseen: Crossings, plain: float, best: float) -> str:
-    """The gap that a growing shift is, in a sentence; empty where there is none.
+    """The gap that a varying shift is, in a sentence; empty where there is none.
 
     Parameters
     ----------
@@ -77,19 +83,19 @@ def drift_in_words(known: Crossings, unseen: Crossings, plain: float, best: floa
         return ""
     every = known.joined(unseen)
     found = []
-    for law in (BY_WAY, BY_TIME):
+    for law in (BY_WAY, BY_TIME, BY_PUSH):
         constant, rate = _fit(law, known)
         score = float(likeliest(every, _shift(law, every, constant, rate), shifted=True)) - plain
-        grown_m = np.ptp(rate * law.basis(every)[1])
-        if grown_m >= LEAST_GROWTH_M:
+        changes_m = np.ptp(rate * law.basis(every)[1])
+        if changes_m >= LEAST_CHANGE_M:
             found.append((score - price(len(every), len(every)), law.words.format(rate=rate)))
     score, words = max(found, default=(-np.inf, ""))
     return words if score > max(best + CLEARLY, MOSTLY * best) else ""
 
 
 def _shift(law: Law, crossings: Crossings, constant: Array | float, rate: Array | float) -> Array:
-    base, growth = law.basis(crossings)
-    return np.asarray(constant)[..., None] * base + np.asarray(rate)[..., None] * growth
+    base, varying = law.basis(crossings)
+    return np.asarray(constant)[..., None] * base + np.asarray(rate)[..., None] * varying
 
 
 def _fit(law: Law, crossings: Crossings) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""What a confidence does that neither blur nor exposure does: it shakes, shuns a class, creeps, or is restless."""
+"""What a confidence does that neither blur nor exposure has it do, in words."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 SHAKEN_SHARE, SHAKEN_BY = 0.3, 0.15
 """Share of the variance of what blur and exposure leave that goes with acceleration, and the fall of the confidence's
 logarithm in the hardest twentieth of driving, from which on it does: others were within 0.1 [-]."""
+SLOW_SHARE, SLOW_BY = 0.3, 0.15
+"""Share of that variance that goes against speed, and the fall of the logarithm from the fastest to the slowest tenth,
+from which on the camera is unsure when it is slow [-]."""
 SHUNNED_BY, SHUNNED_SHARE = 0.3, 0.15
 """Fall of the logarithm on one class against another, and of the confidence itself, from which on the class is shunned:
 nominal chains had up to 0.25, and little of a confidence that is low everywhere [-]."""
@@ -46,7 +49,11 @@ def pattern_in_words(blocks: Blocks, fit: ConfidenceFit, model: ConfidenceModel)
     loss = blocks.loss - taken + (taken.mean() if len(blocks) else 0.0)
     rest = loss - _levels(loss, blocks)
     return (
-        _shaken(rest, blocks) or _shunned(loss, blocks) or _creeping(rest, blocks) or _restless(blocks, model)
+        _shaken(rest, blocks)
+        or _unsure_when_slow(rest, blocks)
+        or _shunned(loss, blocks)
+        or _creeping(rest, blocks)
+        or _restless(blocks, model)
     )
 
 
@@ -73,6 +80,22 @@ def _shaken(rest: Array, blocks: Blocks) -> str:
     return (
         f"The confidence falls with acceleration, by a factor of {np.exp(max(pulling, braking)):.1f} at {hard:.1f} "
         f"m/s²; that is {100.0 * share:.0f} % of what it does beside speed and class: is the camera's bracket loose?"
+    )
+
+
+def _unsure_when_slow(rest: Array, blocks: Blocks) -> str:
+    """Whether it falls where the car is slow, which is the reverse of blur."""
+    speed = blocks.speed_m_s
+    if len(blocks) < FEWEST_CREEPING or not rest.std() or not speed.std():
+        return ""
+    slope, share = np.polyfit(speed, rest, 1)[0], np.corrcoef(speed, rest)[0, 1] ** 2
+    slow, fast = np.quantile(speed, (0.1, 0.9))
+    falls_by = -slope * (fast - slow)
+    if share < SLOW_SHARE or falls_by < SLOW_BY:
+        return ""
+    return (
+        f"The confidence is less by a factor of {np.exp(falls_by):.1f} at {slow:.0f} m/s than at {fast:.0f} m/s, the "
+        "reverse of blur: what does the camera need the speed for?"
     )
 
 
