@@ -5,7 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from camera_drives import CAR, CLASS_FRICTION, NAMES, Camera, changed, drive, log_of, road
+from camera_drives import CAR, CLASS_FRICTION, FRONT_M, NAMES, Camera, changed, drive, log_of, road
 
 from scenarios.effects import make_effect
 from scenarios.files import VehicleFile
@@ -178,6 +178,26 @@ def test_pitch_is_found_with_its_angle():
         assert estimate.value == pytest.approx(pitch, abs=0.05)
     assert np.mean(found) >= 0.9
     assert np.mean(inside) >= 0.9
+
+
+@pytest.mark.parametrize("arrives_s", [0.0, 0.15])
+def test_results_that_arrive_late_with_the_right_stamp_leave_the_angle_alone(arrives_s):
+    """The car has come nearer to the stamp by then; the angle is one at the distance when the picture was taken."""
+
+    def late(log):
+        then = np.round(np.interp(log.time_s - arrives_s, log.time_s, np.arange(len(log.time_s)))).astype(int)
+        names = ("frame_id", "image_class", "image_confidence", "image_from_m", "image_to_m")
+        return changed(log, **{name: log.signals[name][then] for name in names})
+
+    ahead_m, pitch = 8.0, 0.05
+    distance = ahead_m - 1.4 / np.tan(np.arctan(1.4 / ahead_m) + pitch)
+    camera = Camera(distance_m=distance, preview_m=ahead_m + FRONT_M - 0.4)
+    finding = diagnose(camera, 3, damage=late)
+    assert finding.causes == ("camera_pitch",)
+    estimate = candidate(finding, "camera_pitch").parameters["pitch_rad"]
+    assert estimate.low <= pitch <= estimate.high
+    assert estimate.value == pytest.approx(pitch, abs=0.006)
+    assert diagnose(Camera(preview_m=ahead_m), 3, damage=late).verdict is Verdict.NO_GAP
 
 
 def test_a_delay_and_an_angle_together_are_a_compound():

@@ -37,6 +37,8 @@ NORMAL_RANGE = 2.0
 """Standard deviations of a normal level, of usual mistakes and of usual light together that are no gap [-]."""
 FEWEST_BLOCKS = 8
 """With fewer blocks nothing is said of confidence."""
+NOTICED = 0.1
+"""Change of the confidence's logarithm below which it is no gap, however steady the camera is otherwise [-]."""
 QUIET = 0.97
 """Share of the hold-out's gap that an effect has to get below, else it is none [-]."""
 
@@ -112,6 +114,7 @@ def confidence_chain(
         places=_places(accounts[0], unseen),
         unexcited=_unexcited(seen, choices),
         next_step=NEXT_STEP,
+        noticed=NOTICED / model.deviation,
     )
     shrunk = min((account.left() for account in (*chain.accounts, *outside)), default=0.0)
     if len(unseen) >= FEWEST_BLOCKS and shrunk > QUIET * chain.nothing.left():

@@ -286,7 +286,8 @@ def _unexplained(chain: Chain, account: Account) -> str:
     if not len(account.z):
         return ""
     typical = float(np.hypot(np.quantile(np.abs(account.z), TYPICAL), np.sqrt(account.excess)))
-    if typical < (UNEXPLAINED_REFERENCE if chain.signal == REFERENCE else UNEXPLAINED):
+    least = UNEXPLAINED_REFERENCE if chain.signal == REFERENCE else UNEXPLAINED
+    if typical < max(least, chain.noticed):
         return ""
     named = " and ".join(account.effects) or "the simulation as it is"
     return f"{chain.signal}: {named} leaves {typical:.1f} times the noise on the hold-out."

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.stats import theilslopes
 
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
@@ -26,6 +27,12 @@ USUAL_AHEAD_M = 2.9
 """Distance then assumed: the preview distance of 2.5 m with the lens 0.4 m behind the front axle [m]."""
 RUN_UP_S = 2.0
 """Time before the log's begin for which its first speed is assumed: late results look back there [s]."""
+MOST_STAMPS = 400
+"""Stamps out of a log that tell how long results take to arrive."""
+LEAST_SPEED_SPREAD_M_S = 1.0
+"""Standard deviation of speed from which on they can tell [m/s]."""
+LONGEST_WORK_S = 0.5
+"""No result is taken to arrive later than this after its picture, if it is stamped right [s]."""
 STUCK_RESULTS = 3
 """With fewer different frame_id while stamps go on, frame_id is taken for stuck."""
 
@@ -69,7 +76,7 @@ class Results:
     from_m, to_m : array, shape (n,)
         Its stamp [m].
     ahead_m : float
-        Distance of the stamps' near end from the lens by the camera file, the median [m].
+        Distance of the stamps' near end from the lens by the camera file when the picture was taken, the median [m].
     classes : array, shape (n,)
         Class index.
     confidence : array, shape (n,)
@@ -140,7 +147,8 @@ def read_results(
     clock, speed = _finite(log.time_s, log.signals["vehicle_speed_m_s"])
     speed_m_s = np.interp(time_s, clock, speed)
     lens_m = vehicle.to_core().cog_to_front_axle_m + camera.x_from_front_axle_m
-    ahead_m = float(np.median(table["from"] - np.interp(time_s, drive_time_s, position_m))) - lens_m
+    beyond_m = table["from"].to_numpy() - np.interp(time_s, drive_time_s, position_m)
+    ahead_m = _ahead_when_taken(beyond_m, speed_m_s) - lens_m
     if ahead_m < LEAST_AHEAD_M:
         warnings.append(
             f"{log.name}: stamps begin {ahead_m:.1f} m ahead of the lens; the pitch is reckoned for "
@@ -162,6 +170,20 @@ def read_results(
         drive_position_m=np.concatenate(([position_m[0] - RUN_UP_S * speed[0]], position_m)),
     )
     return results, tuple(warnings)
+
+
+def _ahead_when_taken(beyond_m: Array, speed_m_s: Array) -> float:
+    """How far beyond the car stamps begin when their pictures are taken [m].
+
+    A result arrives some time after its picture, and the car has come nearer to the stamp by then, the more the faster
+    it is: how the distance falls with speed is that time.
+    """
+    few = np.linspace(0, len(beyond_m) - 1, min(len(beyond_m), MOST_STAMPS)).astype(np.intp)
+    worked_s = 0.0
+    if speed_m_s[few].std() >= LEAST_SPEED_SPREAD_M_S:
+        slope = float(theilslopes(beyond_m[few], speed_m_s[few]).slope)
+        worked_s = min(max(-slope, 0.0), LONGEST_WORK_S)
+    return float(np.median(beyond_m + worked_s * speed_m_s))
 
 
 def _one_row_per_result(log: Log) -> tuple[pd.DataFrame, list[str]]:
