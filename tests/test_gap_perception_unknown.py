@@ -132,8 +132,8 @@ def blocks_of(classes, loss) -> Blocks:
     return Blocks(names, np.arange(count) * 1.0, steady, 0.0 * steady, np.array(loss), np.array(classes))
 
 
-def test_a_class_that_the_fit_logs_lack_sets_its_own_level():
-    learnt = blocks_of([0] * 10, [0.1] * 10)
+def test_a_class_that_the_fit_logs_hardly_have_sets_its_own_level():
+    learnt = blocks_of([0] * 10 + [1], [0.1] * 10 + [0.6])
     seen = blocks_of([0] * 5 + [1] * 5, [0.1] * 5 + [0.25] * 5)
     plain = ConfidenceFit((), 0.0, 0.0, 0.0, Interval(0.0, 0.0, 0.0), Interval(0.0, 0.0, 0.0))
     z, _ = rest_of(seen, learnt, plain, ConfidenceModel(0.03, 1.0))

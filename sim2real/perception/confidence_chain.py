@@ -21,7 +21,7 @@ from sim2real.perception.confidence import (
 )
 from sim2real.perception.conflicts import class_error
 from sim2real.perception.frames import Modelled, Results
-from sim2real.perception.patterns import pattern_in_words
+from sim2real.perception.patterns import FEWEST_OF_CLASS, pattern_in_words
 from sim2real.perception.pictures import NORMAL_LIGHT_EV, Light
 from sim2real.result import Place
 
@@ -174,9 +174,11 @@ def rest_of(
     rest, known = blocks.loss - fit.loss(blocks), learnt.loss - fit.loss(learnt)
     level = np.zeros(len(blocks))
     for c in np.unique(blocks.classes):
-        # what a class's level is where it was not learnt, the blocks themselves have to say
-        learnt_of = known[learnt.classes == c] if (learnt.classes == c).any() else rest[blocks.classes == c]
-        level[blocks.classes == c] = learnt_of.mean()
+        # what a class's level is where few blocks were learnt from, the blocks themselves have to say
+        learnt_of = known[learnt.classes == c]
+        level[blocks.classes == c] = (
+            learnt_of if len(learnt_of) >= FEWEST_OF_CLASS else rest[blocks.classes == c]
+        ).mean()
     off = (known.mean() + np.log(NORMAL_CONFIDENCE)) / NORMAL_SPREAD
     return (rest - level) / model.deviation, float(off)
 
