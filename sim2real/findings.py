@@ -37,7 +37,7 @@ from sim2real.result import (
 )
 from sim2real.selection import Decision
 from sim2real.suspect import lone_sensor
-from sim2real.unknown import Term, characterise, finer, fit_terms, with_refined
+from sim2real.unknown import Term, characterise, finer, fit_terms, seen_alone, with_refined
 from sim2real.varying import KNOT_S
 
 Array = NDArray[np.float64]
@@ -94,15 +94,15 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     variation = _variation(decision)
     causes = _causes(found, held, before, seed)
     swing = _swinging(found) if found.order else None
-    terms: list[Term] = []
-    unexplained = None
+    terms, unexplained = list[Term](), None
     places: tuple[Place, ...] = ()
     heat: dict[str, dict[str, float]] = {}
     if decision.verdict is not Verdict.NO_GAP:
         progress("equations", 0, 1)
         terms, unexplained = _terms(found, held, jobs)
         progress("equations", 1, 1)
-        unexplained = _most_telling(found, unexplained, swing) if unexplained else None
+        if unexplained:
+            unexplained = seen_alone(_most_telling(found, unexplained, swing), gap.before)
         subsystem = unexplained.subsystem if unexplained else _subsystem(decision, terms)
         taken = loss(held.whitened(before)) - loss(held.whitened(after))
         places, heat = _where(found, held, before, terms, subsystem, taken)

@@ -24,7 +24,7 @@ from sim2real.fitting import robust, robust_weight
 from sim2real.noise import Noise
 from sim2real.observer import Prediction, Simulation
 from sim2real.probing import sets_apart, windows
-from sim2real.result import Unexplained
+from sim2real.result import Measure, Unexplained
 
 Array = NDArray[Any]
 Slopes: TypeAlias = Array | csc_array
@@ -42,6 +42,14 @@ PRICE_PER_DRIVE = 1.4
 """By how much more such a curve has to explain: it tells less than one over the car's own motion [-]."""
 LITTLE = 0.5
 """Below this share of the loss the best term tells little [-]."""
+SLIGHT, ALONE = 0.15, 20.0
+"""Share of the misfit below which no term explains it, and how many times the others' squares beyond noise one kind of
+sensor's must be for the gap to be its own [-]."""
+SENSOR_OF = {
+    "wheel_speed": "wheel_speed_sensor",
+    "vehicle_speed": "vehicle_speed_sensor",
+    "accel_x": "accelerometer",
+}
 REFINED = 4
 """Equations whose best terms are held to what the model really does with them."""
 RIDGE = 1e-6
@@ -334,6 +342,26 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
         best.y,
         sentence,
     )
+
+
+def seen_alone(term: Unexplained, before: Measure) -> Unexplained:
+    """A gap that one kind of sensor alone shows, and that no term explains, is that sensor's: a force moves the car.
+
+    `before` is the gap as simulated [noise floors].
+    """
+    if term.share >= SLIGHT:
+        return term
+    excess = {signal: max(before.signals.get(signal, 1.0) ** 2 - 1.0, 0.0) for signal in SENSOR_OF}
+    signal = max(excess, key=lambda name: excess[name])
+    others = sum(size for name, size in excess.items() if name != signal)
+    if excess[signal] < max(ALONE * others, 1.0):
+        return term
+    sensor = SENSOR_OF[signal]
+    sentence = (
+        f"{signal} alone shows it ({before.signals[signal]:.1f} times the noise), and no term takes more than "
+        f"{100.0 * term.share:.0f} % of it: look at the {sensor.replace('_', ' ')}."
+    )
+    return replace(term, subsystem=sensor, signal=signal, sentence=sentence)
 
 
 def sign_of(term: Term) -> str:

@@ -1,5 +1,7 @@
 """What no effect explains: free terms name the equation, the quantity, the sign and the shape."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of
@@ -9,6 +11,7 @@ from sim2real import unknown
 from sim2real.drive import ACCEL, SPEED, WHEEL
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, PER_DRIVE, QUANTITIES
 from sim2real.evidence import gather
+from sim2real.result import Measure
 from sim2real.unknown import (
     Term,
     characterise,
@@ -17,6 +20,7 @@ from sim2real.unknown import (
     fit_terms,
     refined,
     score,
+    seen_alone,
     shape_of,
     sign_of,
     with_refined,
@@ -253,6 +257,31 @@ def test_a_characterised_term_keeps_its_curve():
     np.testing.assert_array_equal(found.y, 2.0 * X)
     assert found.share == pytest.approx(0.9)
     assert "90 %" in found.sentence
+
+
+def small_term(taken: float):
+    """A tyre's term that takes so much of the misfit."""
+    told = curve("slip", [0.0, 0.1], [0.0, 0.1], "tyre")
+    return characterise([replace(told, loss=100.0 * (1.0 - taken))])
+
+
+@pytest.mark.parametrize(
+    ("sizes", "taken", "subsystem"),
+    [
+        ((3.3, 1.0, 1.0), 0.01, "wheel_speed_sensor"),
+        ((36.0, 1.3, 2.3), 0.02, "wheel_speed_sensor"),
+        ((1.0, 8.0, 1.1), 0.02, "vehicle_speed_sensor"),
+        ((0.9, 1.0, 5.0), 0.02, "accelerometer"),
+        ((3.3, 1.0, 1.0), 0.4, "tyre"),
+        ((2.2, 1.1, 1.3), 0.02, "tyre"),
+        ((1.3, 1.0, 1.0), 0.02, "tyre"),
+    ],
+)
+def test_what_one_sensor_alone_shows_and_no_term_explains_is_that_sensors(sizes, taken, subsystem):
+    before = Measure(0.0, dict(zip(("wheel_speed", "vehicle_speed", "accel_x"), sizes, strict=True)))
+    told = seen_alone(small_term(taken), before)
+    assert told.subsystem == subsystem
+    assert ("alone shows it" in told.sentence) is (subsystem != "tyre")
 
 
 def test_every_quantity_has_a_unit_and_every_equation_asks_for_known_ones():
