@@ -315,10 +315,10 @@ def friction_chain(
     if late:
         return replace(chain, unexplained=late)
     # Values per class, and a factor on all, are free curves too: where only they do, no effect of the library does.
-    if any(account.score > chain.best().score + DECISIVE for account in outside):
-        return replace(
-            chain, unexplained=f"No effect of the library explains {SIGNAL}. {outside[0].evidence_for[0]}"
-        )
+    needed = [account for account in outside if account.score > chain.best().score + DECISIVE]
+    if needed:
+        told = max(needed, key=lambda account: account.score).evidence_for[0]
+        return replace(chain, unexplained=f"No effect of the library explains {SIGNAL}. {told}")
     return chain
 
 
