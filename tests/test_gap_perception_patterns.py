@@ -11,7 +11,7 @@ from test_gap_perception import BARE, diagnose
 
 from sim2real.perception.crossings import Crossings
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
-from sim2real.perception.drifting import drift_in_words
+from sim2real.perception.drifting import find_drift
 from sim2real.perception.late_reference import DEAD_TIMES_S, FILTERS_S, Course, _left
 from sim2real.perception.likelihood import likeliest
 from sim2real.result import Verdict
@@ -46,6 +46,7 @@ def test_an_odometer_with_a_wrong_scale_is_named(share):
     assert says(finding, "is the scale of position_m wrong"), finding.unexplained
     assert any(f"{share:+.1%}"[:4] in text for text in finding.unexplained), finding.unexplained
     assert finding.odd_signal == "image_place"
+    assert finding.before.signals["image_place"] > 3.0
 
 
 def test_a_clock_that_runs_away_is_named():
@@ -108,20 +109,23 @@ def crossings(count: int, shift_m: np.ndarray) -> Crossings:
 def test_the_rate_of_a_growing_shift_is_found():
     known, unseen = (crossings(n, 0.01 * 30.0 * np.arange(1.0, n + 1.0)) for n in (20, 12))
     plain = float(likeliest(known.joined(unseen), np.zeros(32), shifted=False))
-    assert "+1.0% of the way" in drift_in_words(known, unseen, plain, 0.0)
+    found = find_drift(known, unseen, plain, 0.0)
+    assert found is not None
+    assert "+1.0% of the way" in found.words
+    assert found.scale == 1.0
 
 
 def test_a_library_effect_that_takes_most_of_it_stands():
     known, unseen = (crossings(n, 0.01 * 30.0 * np.arange(1.0, n + 1.0)) for n in (20, 12))
     plain = float(likeliest(known.joined(unseen), np.zeros(32), shifted=False))
-    assert not drift_in_words(known, unseen, plain, 1000.0)
+    assert not find_drift(known, unseen, plain, 1000.0)
 
 
 def test_few_borders_or_a_slight_growth_are_no_drift():
     plain = -1000.0
-    assert not drift_in_words(crossings(5, np.arange(5.0)), crossings(5, np.arange(5.0)), plain, 0.0)
+    assert not find_drift(crossings(5, np.arange(5.0)), crossings(5, np.arange(5.0)), plain, 0.0)
     slight = [crossings(n, 5e-4 * 30.0 * np.arange(1.0, n + 1.0)) for n in (20, 12)]
-    assert not drift_in_words(*slight, plain, 0.0)
+    assert not find_drift(*slight, plain, 0.0)
 
 
 def test_a_camera_that_shakes_when_the_car_brakes_or_pulls():

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sim2real.perception.chain import price
 from sim2real.perception.crossings import Crossings
-from sim2real.perception.likelihood import likeliest
+from sim2real.perception.likelihood import likeliest, scale_under
 
 Array = NDArray[np.float64]
 
@@ -69,8 +69,16 @@ BY_PUSH = Law(
 )
 
 
-def drift_in_words(known: Crossings, unseen: Crossings, plain: float, best: float) -> str:
-    """The gap that a varying shift is, in a sentence; empty where there is none.
+@dataclass(frozen=True)
+class Drift:
+    """A shift by another law: what it says, and the scale of the errors that it leaves [-]."""
+
+    words: str
+    scale: float
+
+
+def find_drift(known: Crossings, unseen: Crossings, plain: float, best: float) -> Drift | None:
+    """The gap that a varying shift is; None where there is none.
 
     Parameters
     ----------
@@ -80,17 +88,18 @@ def drift_in_words(known: Crossings, unseen: Crossings, plain: float, best: floa
         Log-likelihood of both together as simulated, and the score of the library's best account [nats].
     """
     if len(known) < FEWEST or not len(unseen):
-        return ""
+        return None
     every = known.joined(unseen)
-    found = []
+    least = max(best + CLEARLY, MOSTLY * best)
+    found: Drift | None = None
     for law in (BY_WAY, BY_TIME, BY_PUSH):
         constant, rate = _fit(law, known)
-        score = float(likeliest(every, _shift(law, every, constant, rate), shifted=True)) - plain
+        shift = _shift(law, every, constant, rate)
+        score = float(likeliest(every, shift, shifted=True)) - plain - price(len(every), len(every))
         changes_m = np.ptp(rate * law.basis(every)[1])
-        if changes_m >= LEAST_CHANGE_M:
-            found.append((score - price(len(every), len(every)), law.words.format(rate=rate)))
-    score, words = max(found, default=(-np.inf, ""))
-    return words if score > max(best + CLEARLY, MOSTLY * best) else ""
+        if changes_m >= LEAST_CHANGE_M and score > least:
+            found, least = Drift(law.words.format(rate=rate), scale_under(every, shift)), score
+    return found
 
 
 def _shift(law: Law, crossings: Crossings, constant: Array | float, rate: Array | float) -> Array:

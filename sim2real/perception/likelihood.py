@@ -46,6 +46,12 @@ def likeliest(crossings: Crossings, shift: Array, *, shifted: bool) -> Array:
     return np.asarray((table - price).max(axis=(0, 1)))
 
 
+def scale_under(crossings: Crossings, shift: Array) -> float:
+    """Scale of the errors that suits one shift, shape (k,), at the share that suits it best [-]."""
+    table = profiles(crossings, shift) - share_price(shifted=True)[:, None]
+    return float(SCALES[np.unravel_index(int(np.argmax(table)), table.shape)[1]])
+
+
 def log_likelihood(shift: Array, low: Array, high: Array, scale: float) -> Array:
     """Of crossings with these brackets under shifts, shape (..., k), summed over the crossings [nats].
 

@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from sim2real.perception.chain import DECISIVE, Account, Chain, price
 from sim2real.perception.conflicts import streak_m
 from sim2real.perception.crossings import Crossings, find_crossings
-from sim2real.perception.drifting import drift_in_words
+from sim2real.perception.drifting import find_drift
 from sim2real.perception.frames import Modelled, Results
 from sim2real.perception.likelihood import (
     ERROR_M,
@@ -212,9 +212,17 @@ def shift_chain(
     )
     others = [_account(shifted, plain, unseen, height_m, scale, known) for shifted in free]
     best = max(account.score for account in (*accounts, *others))
-    drift = drift_in_words(known, unseen, plain.log_likelihood_of(every, height_m), best)
+    drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
     if drift:
-        return replace(chain, unexplained=drift)
+        nothing, *rest = (_account(f, plain, unseen, height_m, drift.scale, known) for f in (plain, *fits))
+        return replace(
+            chain,
+            nothing=nothing,
+            accounts=tuple(rest),
+            places=_places(nothing, unseen),
+            unexplained=drift.words,
+            quiet=False,
+        )
     for choice, other in zip(outside, others, strict=True):
         if other.score > chain.best().score + DECISIVE and not chain.quiet:
             return replace(chain, unexplained=_another_law(chain.best(), choice))
