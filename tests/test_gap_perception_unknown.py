@@ -10,9 +10,10 @@ from camera_drives import Camera, changed, drive, road
 from test_gap_perception import BARE, diagnose
 
 from sim2real.perception.blocks import Blocks
+from sim2real.perception.chain import Account, Chain
 from sim2real.perception.confidence import ConfidenceFit, ConfidenceModel
 from sim2real.perception.confidence_chain import rest_of
-from sim2real.perception.diagnose import diagnose_perception
+from sim2real.perception.diagnose import _unexplained, diagnose_perception
 from sim2real.result import Interval, Verdict
 
 
@@ -148,3 +149,30 @@ def test_what_the_hold_out_does_not_show_is_no_blur():
     cameras = (Camera(blur_s=0.004), Camera(blur_s=0.004), Camera())
     logs = [drive(r, c, seed=50 + i) for i, (r, c) in enumerate(zip(roads, cameras, strict=True))]
     assert diagnose_perception(logs[:2], logs[2], roads, BARE).verdict is Verdict.NO_GAP
+
+
+@pytest.mark.parametrize(
+    ("before", "left", "signal", "explained"),
+    [
+        (8.0, 2.6, "image_confidence", True),  # an eighth of the square
+        (5.0, 2.6, "image_confidence", False),
+        (20.0, 3.2, "image_confidence", False),
+        (3.0, 2.4, "image_confidence", True),
+        (3.0, 1.6, "mu_reference", False),
+        (8.0, 1.6, "mu_reference", True),
+    ],
+)
+def test_an_effect_may_leave_an_eighth_of_what_there_was(before, left, signal, explained):
+    nothing, blamed = (
+        Account(effects, 1, 0.0, 0.0, 0.0, {}, np.full(20, size))
+        for effects, size in (((), before), (("motion_blur",), left))
+    )
+    chain = Chain(signal, 100, 20.0, nothing, (blamed,))
+    assert (_unexplained(chain, blamed) == "") is explained
+    assert _unexplained(chain, nothing)
+
+
+def test_a_change_of_confidence_by_less_than_a_tenth_is_none():
+    steady = Account((), 0, 0.0, 0.0, 0.0, {}, np.full(20, 4.0))
+    assert _unexplained(Chain("image_confidence", 100, 20.0, steady, ()), steady)
+    assert not _unexplained(Chain("image_confidence", 100, 20.0, steady, (), noticed=0.1 / 0.02), steady)

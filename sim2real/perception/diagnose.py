@@ -33,6 +33,9 @@ NOISE_FLOOR = 1.0
 UNEXPLAINED, UNEXPLAINED_REFERENCE = 2.5, 1.5
 """Rest of a signal, in standard deviations, from which on its best account does not explain it; less of the friction
 reference, whose deviations hold what all stretches may be off by together [-]."""
+AN_EIGHTH, AT_MOST = 0.125, 3.0
+"""Share of the gap's square beyond noise that an effect may leave all the same, while the rest is below so many
+standard deviations: no form of an effect is exact [-]."""
 TYPICAL = 0.75
 """Quantile that is taken for it: a few odd borders or stretches depend on nothing, a whole class of road does."""
 MAKE_CLASSES_ERR = {"exposure_shift", "motion_blur"}
@@ -287,6 +290,9 @@ def _unexplained(chain: Chain, account: Account) -> str:
         return ""
     typical = float(np.hypot(np.quantile(np.abs(account.z), TYPICAL), np.sqrt(account.excess)))
     least = UNEXPLAINED_REFERENCE if chain.signal == REFERENCE else UNEXPLAINED
+    most = AN_EIGHTH * (chain.nothing.left() ** 2 - 1.0)
+    if account.effects and account.left() ** 2 - 1.0 <= most:
+        least = max(least, AT_MOST)
     if typical < max(least, chain.noticed):
         return ""
     named = " and ".join(account.effects) or "the simulation as it is"
