@@ -20,7 +20,6 @@ from sim2real.findings import Findings, describe
 from sim2real.gap import measure
 from sim2real.lattice import common_lattice
 from sim2real.law import held_to_curves, held_to_itself
-from sim2real.logs import resample
 from sim2real.merge import camera_side, counter_side, merge
 from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
@@ -103,12 +102,9 @@ def diagnose_files(
 
 def _estimate(findings: Findings, sources: Sources) -> TrpacError | None:
     """What the found effects do to the estimator's own error."""
-    drive = sources.holdout.drive
-    reference = None
-    if "mu_reference" in sources.holdout.log.signals:
-        # of a drive that begins where its sensors wake, the log's last rows
-        reference = resample(sources.holdout.log, drive.step_s)[1]["mu_reference"][-len(drive) :]
-    return trpac_error(sources.vehicle, drive, findings.added(), reference)
+    held = sources.holdout
+    reference = held.on_rows("mu_reference") if "mu_reference" in held.log.signals else None
+    return trpac_error(sources.vehicle, held.drive, findings.added(), reference)
 
 
 def diagnose(

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from scenarios.errors import ScenarioError
 from scenarios.files import WHEELS, RoadFile, VehicleFile, load_road, load_vehicle
 from sim2real.drive import Drive, awake, grid_step, make_drive
@@ -22,6 +25,10 @@ class Source:
     road: RoadFile
     road_path: Path
     drive: Drive
+
+    def on_rows(self, signal: str) -> NDArray[np.float64]:
+        """A signal of the log on the drive's rows: the last ones, where the drive begins as its sensors wake."""
+        return resample(self.log, grid_step(self.log.rate_hz))[1][signal][-len(self.drive) :]
 
 
 @dataclass(frozen=True)

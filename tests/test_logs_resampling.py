@@ -8,6 +8,7 @@ from log_maker import make_frame, save
 
 from sim2real.logs import read_log, resample
 from sim2real.logs.resampling import hold, lost_share, onto
+from sim2real.sources import read_source
 
 STEPS = st.sampled_from([0.001, 0.002, 0.0025, 0.004, 0.01, 0.013, 0.05])
 
@@ -119,3 +120,18 @@ def test_a_signal_that_comes_once_a_second_is_lost_between():
     values = np.where(np.arange(1000) % 100 == 0, 3.0, np.nan)
     assert lost_share(values, 0.01) == pytest.approx(0.99)
     assert np.isnan(onto(time_s, values, np.arange(0.004, 9.9, 0.008), 0.008)).mean() > 0.98
+
+
+def test_a_signal_on_the_drives_rows_has_a_value_for_each_at_any_time_of_day(tmp_path):
+    """A logger's clock counts from midnight: differences of its times carry the rounding of five digits before them."""
+    frame = make_frame(rate_hz=150.0, duration_s=47.04)
+    frame["time_s"] = np.round(frame["time_s"] + 74490.2966667, 7)
+    frame["mu_reference"] = 0.8
+    road = tmp_path / "road.yaml"
+    road.write_text("schema: 1\nsegments:\n  - {start_m: 0.0, mu_left: 0.8, mu_right: 0.8, surface: dry}\n")
+    source = read_source(str(save(frame, tmp_path / "day.csv")), road)
+    assert len(source.on_rows("mu_reference")) == len(source.drive)
+    assert source.on_rows("mu_reference") == pytest.approx(0.8)
+    assert len(resample(source.log, source.drive.step_s)[0]) != len(
+        source.drive
+    )  # what the drive's own step would do
