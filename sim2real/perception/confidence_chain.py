@@ -39,8 +39,9 @@ FEWEST_BLOCKS = 8
 """With fewer blocks nothing is said of confidence."""
 NOTICED = 0.1
 """Change of the confidence's logarithm below which it is no gap, however steady the camera is otherwise [-]."""
-QUIET = 0.97
-"""Share of the hold-out's gap that an effect has to get below, else it is none [-]."""
+QUIET, BEYOND_DOUBT = 0.97, 6.0
+"""Share of the hold-out's gap that an effect has to get below, else it is none [-], unless all logs together speak for
+it by so much [nats]."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +117,9 @@ def confidence_chain(
         next_step=NEXT_STEP,
         noticed=NOTICED / model.deviation,
     )
-    shrunk = min((account.left() for account in (*chain.accounts, *outside)), default=0.0)
-    if len(unseen) >= FEWEST_BLOCKS and shrunk > QUIET * chain.nothing.left():
+    every = (*chain.accounts, *outside)
+    shrunk, most = min((a.left() for a in every), default=0.0), max((a.score for a in every), default=0.0)
+    if len(unseen) >= FEWEST_BLOCKS and shrunk > QUIET * chain.nothing.left() and most < BEYOND_DOUBT:
         chain = replace(chain, quiet=True)
     stands = next(f for f in (plain, *fits) if f.effects == chain.best().effects)
     pattern = pattern_in_words(seen.together, stands, model)

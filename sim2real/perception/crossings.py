@@ -34,7 +34,7 @@ LEAST_ERROR = 0.02
 """Share of pictures that are taken to be wrong even where none contradicts."""
 LIKELY_NATS = 2.0
 """Splits less likely than the best one by no more than this are in the bracket [nats]."""
-WAYS = 9
+WAYS = 10
 """Column of the crossings' numbers that is a table."""
 
 
@@ -51,6 +51,8 @@ class Crossings:
         Where it was seen.
     time_s, speed_m_s, border_m : array, shape (k,)
         When and how fast it was passed in the stamps, and where road.yaml has it [s], [m/s], [m].
+    accel_m_s2 : array, shape (k,)
+        By how much the car had become faster in the second before [m/s²].
     since_s, since_m : array, shape (k,)
         Time and way since the log's begin [s], [m].
     low_m, high_m : array, shape (k,)
@@ -67,6 +69,7 @@ class Crossings:
     time_s: Array
     speed_m_s: Array
     border_m: Array
+    accel_m_s2: Array
     since_s: Array
     since_m: Array
     low_m: Array
@@ -94,12 +97,6 @@ class Crossings:
     def shift_by_pitch(self, pitch_rad: Array, height_m: float) -> Array:
         """How far stamps lie beyond what a pitched camera saw, shape (len(pitch_rad), k) [m]."""
         return self.ahead_m - seen_distance_m(self.ahead_m, height_m, pitch_rad[:, None])
-
-    @property
-    def accel_m_s2(self) -> Array:
-        """Acceleration over the second before, from the way driven in it and in its later half, shape (k,) [m/s²]."""
-        half = len(AGES_S) // 2
-        return np.asarray((2.0 * self.way_m[:, half] - self.way_m[:, -1]) / AGES_S[half] ** 2)
 
     def bracket(self, share: float) -> tuple[Array, Array]:
         """Where the border was seen to lie beyond its place, if a class is for this share of its stamp [m]."""
@@ -159,6 +156,7 @@ def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:
                 one.time_s[at],
                 one.speed_m_s[at],
                 border,
+                one.speed_m_s[at] - np.interp(one.time_s[at] - 1.0, one.time_s, one.speed_m_s),
                 one.time_s[at] - one.begin_s,
                 border - one.begin_m,
                 one.from_m[i] - border,
