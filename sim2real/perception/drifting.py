@@ -26,7 +26,7 @@ CLEARLY, MOSTLY = 10.0, 1.5
 settles, or a delay that wanders, is still an angle, or a delay, and takes most of it."""
 LEAST_CHANGE_M = 0.7
 """Change of the shift over the crossings from which on it is a gap [m]."""
-GRID, ZOOMS = 41, 4
+GRID, ZOOMS = 17, 5
 """Points per axis of the search, and how often it is drawn closer about the best."""
 
 
