@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from camera_stand_ins import PLAIN
+from camera_stand_ins import PLAIN, ROAD, steady
 from numpy.testing import assert_allclose
 
 from benchmarks.blind.generator import camera_case
@@ -26,7 +26,7 @@ from benchmarks.blind.generator.camera_gap import Stage, gap_of
 from benchmarks.blind.generator.camera_layouts import LAYOUTS, draw_laid_road
 from benchmarks.blind.generator.camera_library import Scene
 from benchmarks.blind.generator.camera_reference import friction_of, friction_under, reference
-from benchmarks.blind.generator.camera_road import CLASS_FRICTION, ROAD_M, CameraRoad, Passage
+from benchmarks.blind.generator.camera_road import CLASS_FRICTION, ROAD_M, Passage
 from benchmarks.blind.generator.camera_system import Chain, Fault, Results, draw_chain
 from benchmarks.blind.generator.camera_telling import MISTAKEN, voted
 from benchmarks.blind.generator.camera_timing import timing
@@ -37,12 +37,6 @@ from benchmarks.blind.generator.table import Group, table
 TENTH = Family.TENTH
 
 
-ROAD = CameraRoad(
-    (0.0, *(45.0 + 31.7 * np.arange(60))),
-    tuple(CLASS_FRICTION[i % 3] for i in range(61)),
-    tuple(i % 3 for i in range(61)),
-)
-"""Dry, wet and snow in turn."""
 ROWS = np.arange(0.01, 60.0, 0.01)
 FORMS = [(aspect, name) for aspect, forms in SECOND.items() for name in forms]
 OF_CHAIN = [
@@ -63,11 +57,6 @@ def uneven(seconds: float = 60.0) -> Passage:
     clock = np.arange(round(1000 * seconds) + 1) * 1e-3
     speed = 14.0 + 5.0 * np.sin(0.4 * clock)
     return Passage(2.0 + np.cumsum(speed) * 1e-3, speed)
-
-
-def steady(speed_m_s: float) -> Passage:
-    clock = np.arange(40_001) * 1e-3
-    return Passage(2.0 + speed_m_s * clock, np.full(clock.size, speed_m_s))
 
 
 def said(chain: Chain, fault: Fault, passage: Passage | None = None) -> Results:

@@ -6,10 +6,9 @@ import hashlib
 import json
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
-from camera_stand_ins import blaming, rolled
+from camera_stand_ins import blaming, check_log, rolled
 
 from benchmarks.blind import runner
 from benchmarks.blind.generator import camera_case
@@ -58,20 +57,6 @@ def test_files_keep_the_contract_and_the_secret(name, tmp_path, monkeypatch):
     for path in tmp_path.iterdir():
         text = path.read_text(encoding="utf-8")
         assert not [e for e in ALL_EFFECTS if e in text]
-
-
-def check_log(log: pd.DataFrame) -> None:
-    """Columns of the contract; a result's stay the same as long as its number does."""
-    assert np.all(np.diff(log["time_s"]) > 0.0)
-    seen = log.filter(regex="^(image|frame)").dropna(how="all")
-    assert set(seen["image_class"]) <= {-1, 0, 1, 2}
-    told = seen[seen["image_class"] >= 0]
-    assert len(told) > 0.6 * len(seen)
-    assert told["image_confidence"].between(0.0, 1.0).all()
-    assert (told["image_to_m"] > told["image_from_m"]).all()
-    same = np.diff(seen["frame_id"]) == 0.0
-    before, after = (part[same].reset_index(drop=True) for part in (seen.iloc[:-1], seen.iloc[1:]))
-    pd.testing.assert_frame_equal(before, after)
 
 
 def test_a_case_repeats_and_a_removed_one_has_the_same_logs(monkeypatch):

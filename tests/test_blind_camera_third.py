@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from camera_stand_ins import ROAD, steady
 from numpy.testing import assert_allclose
 
 from benchmarks.blind.generator import camera_case
@@ -25,7 +26,7 @@ from benchmarks.blind.generator.camera_gap import Stage, gap_of
 from benchmarks.blind.generator.camera_layouts import draw_laid_road
 from benchmarks.blind.generator.camera_library import CAMERA_LIBRARY, Scene
 from benchmarks.blind.generator.camera_reference import friction_of, friction_under, reference
-from benchmarks.blind.generator.camera_road import CLASS_FRICTION, ROAD_M, CameraRoad, Passage
+from benchmarks.blind.generator.camera_road import CLASS_FRICTION, ROAD_M, Passage
 from benchmarks.blind.generator.camera_system import Chain, Fault, Results, draw_chain
 from benchmarks.blind.generator.camera_telling import columns, voted
 from benchmarks.blind.generator.camera_third import FURTHER
@@ -37,12 +38,6 @@ from benchmarks.blind.generator.table import TARGETS, Group, table
 
 TENTH = Family.TENTH
 
-ROAD = CameraRoad(
-    (0.0, *(45.0 + 31.7 * np.arange(60))),
-    tuple(CLASS_FRICTION[i % 3] for i in range(61)),
-    tuple(i % 3 for i in range(61)),
-)
-"""Dry, wet and snow in turn."""
 ROWS = np.arange(0.01, 60.0, 0.01)
 FORMS = [(aspect, name) for aspect, forms in FURTHER.items() for name in forms]
 OF_CASE = ("layout", "speeds", "position", "friction_off")
@@ -65,11 +60,6 @@ def uneven(seconds: float = 60.0) -> Passage:
     clock = np.arange(round(1000 * seconds) + 1) * 1e-3
     speed = 13.0 + 7.0 * np.sin(0.4 * clock)
     return Passage(2.0 + np.cumsum(speed) * 1e-3, speed)
-
-
-def steady(speed_m_s: float, seconds: float = 40.0) -> Passage:
-    clock = np.arange(round(1000 * seconds) + 1) * 1e-3
-    return Passage(2.0 + speed_m_s * clock, np.full(clock.size, speed_m_s))
 
 
 def said(chain: Chain, fault: Fault, passage: Passage | None = None) -> Results:

@@ -80,19 +80,16 @@ def _changes(course: Course) -> bool:
 
 def _left(courses: Sequence[Course], dead_s: float, lag_s: float) -> float:
     """Mean square that the best levels leave [-]."""
-    parts = [(_seen(c.on, dead_s, lag_s)[known], c.reference[known]) for c, known in _known(courses)]
-    seen, reference = np.vstack([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+    seen = np.vstack([_seen(c.on, dead_s, lag_s) for c in courses])
+    reference = np.concatenate([c.reference for c in courses])
+    known = np.isfinite(reference)
+    seen, reference = seen[known], reference[known]
     weight = off = np.ones(len(reference))
     for _ in range(3):
         levels = np.linalg.lstsq(seen * weight[:, None], reference * weight, rcond=None)[0]
         off = np.abs(reference - seen @ levels)
         weight = 1.0 / np.sqrt(np.maximum(1.0, off / (2.0 * np.median(off) + 1e-3)))
     return float(np.mean(np.minimum(off, MOST_OFF) ** 2))
-
-
-def _known(courses: Sequence[Course]) -> Iterator[tuple[Course, NDArray[np.bool_]]]:
-    for course in courses:
-        yield course, np.isfinite(course.reference)
 
 
 def _seen(on: Array, dead_s: float, lag_s: float) -> Array:
