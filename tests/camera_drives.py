@@ -7,13 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.files import RoadFile, load_vehicle
+from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from sim2real.logs import Log
+from sim2real.perception.diagnose import diagnose_perception
 
 CAR = load_vehicle(Path(__file__).parents[1] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml")
 FRONT_M = CAR.wheelbase_m - CAR.cog_to_rear_axle_m
 CLASS_FRICTION = np.array([0.8, 0.6, 0.2])
 NAMES = ("dry", "wet", "snow_ice")
+BLIND = dict.fromkeys(("frame_id", "image_class", "image_confidence", "image_from_m", "image_to_m"))
+SLOW_AND_FAST = (10.0, 10.0, 10.0, 10.0, 25.0, 25.0)
+SPEEDS = ((10.0, 25.0), (5.0, 15.0, 8.0, 20.0), (12.0, 12.0), (20.0, 8.0, 3.0, 14.0), (25.0, 10.0))
 
 
 @dataclass(frozen=True)
@@ -125,3 +129,44 @@ def changed(log: Log, **columns) -> Log:
     """The log with other columns; None takes one out."""
     signals = {**log.signals, **columns}
     return replace(log, signals={name: x for name, x in signals.items() if x is not None})
+
+
+def car_with(**effects):
+    return VehicleFile.model_validate({**CAR.model_dump(by_alias=True), "effects": effects})
+
+
+BARE = car_with()
+
+
+def diagnose(
+    camera,
+    seed=0,
+    vehicle=BARE,
+    spacing_m=40.0,
+    mu=CLASS_FRICTION,
+    damage=lambda log: log,
+    exclude=(),
+    **kw,
+):
+    roads = [road(spacing_m, seed=3 * seed + i, mu=mu) for i in range(3)]
+    logs = [damage(drive(r, camera, seed=10 * seed + i, **kw)) for i, r in enumerate(roads)]
+    return diagnose_perception(logs[:2], logs[2], roads, vehicle, exclude=exclude)
+
+
+def candidate(finding, *effects):
+    (found,) = [c for c in finding.candidates if set(c.effects) == set(effects)]
+    return found
+
+
+def any_camera(seed, **faults):
+    """A camera chain like others: rate, mistakes, confidence, and what of a stamp its class is for."""
+    rng = np.random.default_rng([seed, 99])
+    plain = Camera(
+        fps=float(rng.choice([8, 10, 20, 30, 40])),
+        wrong=float(rng.uniform(0.0, 0.1)),
+        share=float(rng.choice([0.0, 0.5, 1.0])),
+        flicker_m=float(rng.choice([0.0, 0.05, 0.2])),
+        confidence=float(rng.uniform(0.7, 0.98)),
+        roughness=float(rng.uniform(0.0, 0.1)),
+    )
+    return replace(plain, **faults)

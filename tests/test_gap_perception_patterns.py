@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from camera_drives import Camera, changed, drive, road
-from test_gap_perception import BARE, diagnose
+from camera_drives import BARE, Camera, changed, diagnose, drive, road
 
 from sim2real.perception.crossings import Crossings
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception

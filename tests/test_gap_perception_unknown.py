@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from camera_drives import Camera, changed, drive, road
-from test_gap_perception import BARE, diagnose
+from camera_drives import BARE, Camera, changed, diagnose, drive, road
 
 from sim2real.perception.blocks import Blocks
 from sim2real.perception.chain import Account, Chain

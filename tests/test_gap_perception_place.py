@@ -1,0 +1,207 @@
+"""Where the camera puts the changes of class: late, tilted, or at odds with road.yaml."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from camera_drives import (
+    BARE,
+    FRONT_M,
+    SLOW_AND_FAST,
+    SPEEDS,
+    Camera,
+    any_camera,
+    candidate,
+    car_with,
+    changed,
+    diagnose,
+    drive,
+    road,
+)
+
+from sim2real.perception.diagnose import diagnose_perception
+from sim2real.result import Verdict
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("effect", "faults"), [("camera_latency", {"delay_s": 0.04}), ("camera_pitch", {"distance_m": 0.5})]
+)
+def test_delay_and_angle_are_told_apart_by_five_crossings_each_at_two_speeds(effect, faults, share):
+    for seed in range(5):
+        roads = [road(20.0, seed=3 * seed + i) for i in range(2)]
+        camera = Camera(share=share, **faults)
+        logs = [drive(r, camera, SLOW_AND_FAST, 18.0, seed=10 * seed + i) for i, r in enumerate(roads)]
+        finding = diagnose_perception(logs[:1], logs[1], roads, BARE)
+        assert (finding.verdict, finding.causes) == (Verdict.IDENTIFIED, (effect,)), seed
+        assert candidate(finding, effect).effective <= 28
+
+
+@pytest.mark.parametrize("faults", [{"delay_s": 0.04}, {"distance_m": 0.5}])
+def test_at_one_speed_delay_and_angle_are_ambiguous(faults):
+    for seed in range(4):
+        finding = diagnose(Camera(**faults), seed, speeds=(15.0, 15.0))
+        assert finding.verdict is Verdict.AMBIGUOUS
+        assert [set(group) for group in finding.ambiguous_with] == [{"camera_latency", "camera_pitch"}]
+        assert "10 and 25 m/s" in finding.next_step
+
+
+def test_latency_is_found_with_its_delay_over_severities_and_cameras():
+    inside, errors, found, shrinks = [], [], [], []
+    for seed in range(20):
+        delay = (0.06, 0.1, 0.15, 0.3, 0.6)[seed % 5]
+        camera = any_camera(seed, delay_s=delay, fps=(20.0, 40.0)[seed % 2])
+        finding = diagnose(camera, seed, speeds=SPEEDS[(0, 1, 4)[seed % 3]])
+        found.append(finding.causes == ("camera_latency",))
+        estimate = candidate(finding, "camera_latency").parameters["delay_s"]
+        inside.append(estimate.low <= delay <= estimate.high)
+        errors.append(abs(estimate.value - delay) * camera.fps)
+        shrinks.append(candidate(finding, "camera_latency").shrink_percent.value)
+    assert np.mean(found) >= 0.9
+    assert np.mean(inside) >= 0.9
+    assert np.median(shrinks) > 50.0
+    assert max(errors) < 1.0  # frame intervals: half a stamp is not known
+
+
+def test_pitch_is_found_with_its_angle():
+    """The distance that stamps shift by, at a near end 2.9 m ahead of a lens 1.4 m high."""
+    inside, found = [], []
+    for seed in range(18):
+        pitch = (-0.12, -0.07, 0.08, 0.12, 0.2, 0.25)[seed % 6]
+        distance = 2.9 - 1.4 / np.tan(np.arctan(1.4 / 2.9) + pitch)
+        camera = any_camera(seed, distance_m=distance, fps=40.0, share=0.5)
+        finding = diagnose(camera, seed, speeds=SPEEDS[(0, 1, 4)[seed % 3]])
+        found.append(finding.causes == ("camera_pitch",))
+        estimate = candidate(finding, "camera_pitch").parameters["pitch_rad"]
+        inside.append(estimate.low <= pitch <= estimate.high)
+        assert estimate.value == pytest.approx(pitch, abs=0.05)
+    assert np.mean(found) >= 0.9
+    assert np.mean(inside) >= 0.9
+
+
+@pytest.mark.parametrize("arrives_s", [0.0, 0.15])
+def test_results_that_arrive_late_with_the_right_stamp_leave_the_angle_alone(arrives_s):
+    """The car has come nearer to the stamp by then; the angle is one at the distance when the picture was taken."""
+
+    def late(log):
+        then = np.round(np.interp(log.time_s - arrives_s, log.time_s, np.arange(len(log.time_s)))).astype(int)
+        names = ("frame_id", "image_class", "image_confidence", "image_from_m", "image_to_m")
+        return changed(log, **{name: log.signals[name][then] for name in names})
+
+    ahead_m, pitch = 8.0, 0.05
+    distance = ahead_m - 1.4 / np.tan(np.arctan(1.4 / ahead_m) + pitch)
+    camera = Camera(distance_m=distance, preview_m=ahead_m + FRONT_M - 0.4)
+    finding = diagnose(camera, 3, damage=late)
+    assert finding.causes == ("camera_pitch",)
+    estimate = candidate(finding, "camera_pitch").parameters["pitch_rad"]
+    assert estimate.low <= pitch <= estimate.high
+    assert estimate.value == pytest.approx(pitch, abs=0.006)
+    assert diagnose(Camera(preview_m=ahead_m), 3, damage=late).verdict is Verdict.NO_GAP
+
+
+def test_a_delay_and_an_angle_together_are_a_compound():
+    for seed in range(4):
+        finding = diagnose(Camera(delay_s=0.1, distance_m=-0.9), seed)
+        assert finding.verdict is Verdict.COMPOUND
+        assert set(finding.causes) == {"camera_latency", "camera_pitch"}
+        both = candidate(finding, "camera_latency", "camera_pitch").parameters
+        assert both["delay_s"].low <= 0.1 <= both["delay_s"].high
+        assert both["delay_s"].value == pytest.approx(0.1, abs=0.03)
+
+
+def test_a_delay_that_the_simulation_models_already_is_no_gap():
+    modelled = car_with(camera_latency={"delay_s": 0.2})
+    assert diagnose(Camera(delay_s=0.2), vehicle=modelled).verdict is Verdict.NO_GAP
+    finding = diagnose(Camera(delay_s=0.3), vehicle=modelled)
+    assert finding.causes == ("camera_latency",)
+    assert candidate(finding, "camera_latency").parameters["delay_s"].value == pytest.approx(0.3, abs=0.02)
+
+
+def test_no_border_passed_is_said():
+    finding = diagnose(Camera(delay_s=0.2), spacing_m=5000.0)
+    assert finding.verdict is Verdict.NO_GAP
+    assert {"camera_latency", "camera_pitch"} <= set(finding.cannot_rule_out)
+    assert "No border" in finding.cannot_rule_out["camera_latency"]
+
+
+def test_borders_in_other_places_than_road_yaml_are_unknown():
+    roads = [road(seed=i) for i in range(3)]
+    logs = [drive(r, Camera(), seed=i) for i, r in enumerate(roads)]
+    rng = np.random.default_rng(0)
+    moved = [
+        r.model_copy(
+            update={
+                "segments": [
+                    s.model_copy(update={"start_m": s.start_m + 4.0 * (i > 0) * rng.uniform(-1.0, 1.0)})
+                    for i, s in enumerate(r.segments)
+                ]
+            }
+        )
+        for r in roads
+    ]
+    finding = diagnose_perception(logs[:2], logs[2], moved, BARE)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert "beside road.yaml's borders" in finding.unexplained[0]
+
+
+def moved(road_file, by_m, seed):
+    rng = np.random.default_rng(seed)
+    segments = [
+        s.model_copy(update={"start_m": s.start_m + by_m * (i > 0) * rng.uniform(-1.0, 1.0)})
+        for i, s in enumerate(road_file.segments)
+    ]
+    return road_file.model_copy(update={"segments": segments})
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_careless_chains_scatter_is_no_gap(seed):
+    finding = diagnose(Camera(fps=12.0, flicker_m=1.5, wrong=0.08), seed, duration_s=60.0)
+    assert finding.verdict is Verdict.NO_GAP, finding.unexplained
+
+
+def test_borders_that_lie_elsewhere_are_so_each_time():
+    same = road(seed=3)
+    logs = [drive(same, Camera(), seed=i, duration_s=60.0) for i in range(3)]
+    finding = diagnose_perception(logs[:2], logs[2], [moved(same, 2.5, 1)] * 3, BARE)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert "the same each time that a border is passed" in finding.unexplained[0]
+
+
+def test_a_position_that_drifts_puts_neighbouring_borders_off_alike():
+    def drifting(log):
+        drift_m = 2.5 * np.sin(2.0 * np.pi * log.time_s / 20.0)
+        names = ("position_m", "image_from_m", "image_to_m")
+        return changed(log, **{name: log.signals[name] + drift_m for name in names})
+
+    finding = diagnose(Camera(), 1, damage=drifting, duration_s=60.0, reference=None)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert "neighbours alike" in finding.unexplained[0]
+
+
+def test_classes_that_keep_contradicting_road_yaml_are_a_gap_and_one_that_does_is_a_warning():
+    def confused(most):
+        def damage(log):
+            classes = log.signals["image_class"]
+            far = (log.signals["image_from_m"] > 100.0) & (log.signals["image_from_m"] < most)
+            return changed(log, image_class=np.where(far & (classes == 1.0), 0.0, classes))
+
+        return damage
+
+    finding = diagnose(Camera(wrong=0.0), 2, damage=confused(500.0))
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("keeps seeing another class than road.yaml" in text for text in finding.unexplained)
+    one = diagnose(Camera(wrong=0.0), 2, damage=confused(170.0))
+    assert one.verdict is Verdict.NO_GAP
+    assert any("road.yaml has wet" in text for text in one.warnings)
+
+
+@pytest.mark.parametrize(
+    ("faults", "law"),
+    [({"delay_s": 0.25}, "goes with speed"), ({"distance_m": 2.0}, "does not depend on speed")],
+)
+def test_a_twin_is_not_blamed_for_a_law_that_is_not_its_own(faults, law):
+    true = {"delay_s": "camera_latency", "distance_m": "camera_pitch"}[next(iter(faults))]
+    finding = diagnose(Camera(**faults), exclude=(true,), speeds=SLOW_AND_FAST)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert all(true not in c.effects for c in finding.candidates)
+    assert law in finding.unexplained[0]
