@@ -24,7 +24,7 @@ from sim2real.merge import camera_side, counter_side, merge
 from sim2real.noise import RESOLUTION
 from sim2real.observer import Simulation
 from sim2real.orders import Order, counts, read_order, without_swing
-from sim2real.pairs import add_pairs, add_partners, add_twins
+from sim2real.pairs import add_pairs, add_partners, add_twins, deepened
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
 from sim2real.selection import decide, is_noise, needs_pairs
@@ -159,6 +159,7 @@ def find(
         if needs_pairs(contest, fit_to, held):
             contest = add_pairs(contest, base, fit_to, held, jobs, progress)
             contest = add_structure(contest, base, fit_to, held, exclude, jobs, progress)
+            contest = deepened(contest, fit_to, held)
             contest = replace(contest, lone=min(contest.lone, unlike_wheels(base, fit_to, held, jobs)))
         else:
             contest = add_twins(contest, base, fit_to, held, jobs, progress)

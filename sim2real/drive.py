@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from scenarios.files import WHEELS, RoadFile
 from sim2real.lattice import Lattice
@@ -52,7 +53,8 @@ class Drive:
     measured : array, shape (n, 7)
         The channels as measured; NaN where a sample is lost or a channel is not measured.
     moving : array of bool, shape (n,)
-        Rows in which the car moves: at rest nothing of the model shows.
+        Rows in which the car moves, and all wheels forward: at rest nothing of the model shows, and it has no wheels
+        that turn back.
     counted : array of bool, shape (7,)
         Channels that are evidence: measured, and not computed from others.
     lattice : Lattice or None
@@ -86,6 +88,10 @@ class Drive:
 
 LEAST_SPEED_M_S = 0.5
 """Below this speed the car counts as standing [m/s]."""
+BACKWARD_RAD_S, BACKWARD_S = -1.0, 0.05
+"""A wheel that is slower than this, in the median over this time, turns back [rad/s], [s]."""
+RECOVERY_S = 2.0
+"""Until the model has forgotten that a wheel turned back: twice the observer's memory of the car's speed [s]."""
 
 
 def make_drive(
@@ -119,8 +125,30 @@ def make_drive(
             torque[lost, i] = np.interp(time_s[lost], time_s[~lost], torque[~lost, i])
     speed = measured[:, SPEED]
     moving = np.nan_to_num(speed, nan=np.inf) > LEAST_SPEED_M_S
+    moving &= ~backward(time_s, measured[:, WHEEL])
     counted = np.isfinite(measured).any(axis=0) & np.array([name not in without for name in CHANNELS])
     return Drive(name, road, time_s, torque, measured, moving, counted, lattice)
+
+
+def backward(time_s: Array, wheels: Array) -> NDArray[np.bool_]:
+    """Rows in which a wheel turns back, as a motor does with a locked wheel, and those in which it still matters.
+
+    Parameters
+    ----------
+    time_s : array, shape (n,)
+        Uniform time [s].
+    wheels : array, shape (n, 4)
+        Wheel speeds, NaN where lost [rad/s].
+    """
+    step_s = time_s[1] - time_s[0]
+    rows = 2 * round(0.5 * BACKWARD_S / step_s) + 1
+    slowest = np.nan_to_num(wheels, nan=np.inf).min(axis=1)
+    back = np.flatnonzero(median_filter(slowest, max(rows, 3), mode="nearest") < BACKWARD_RAD_S)
+    since = (
+        time_s
+        - np.concatenate([[-np.inf], time_s[back]])[np.searchsorted(back, np.arange(len(time_s)), "right")]
+    )
+    return np.asarray(since <= RECOVERY_S)
 
 
 def awake(drive: Drive) -> Drive:

@@ -187,7 +187,7 @@ def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None, st
         loss="soft_l1",
         f_scale=ROBUST_FROM,
         ftol=1e-4,
-        xtol=1e-3,
+        xtol=1e-5,
         gtol=1e-8,
         max_nfev=steps,
     )

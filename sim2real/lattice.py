@@ -1,13 +1,18 @@
 """Pulse-counting wheel-speed sensors: their values lie on a lattice and are held over a window.
 
 Rounding is not noise that a model's prediction could beat, but it leaves a mark that nothing else does: the values
-are multiples of one quantum, 2 pi / (teeth window), and change only when a window ends.
+are multiples of one quantum, 2 pi / (teeth window), and change only when a window ends. A counter that reports at every
+row what it counted over a longer window shows the window otherwise: a pulse adds to the count as it comes, and is taken
+off again a window later.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +45,32 @@ FIVES = 4
 """Greatest power of five in a round number."""
 SEEN = 1.5
 """Least window that a log shows, in its steps; samples further apart have lost ones between them [-]."""
+COARSER = 6
+"""Multiples of the quantum that are held to be it if the values change by them alone."""
+ALL_BUT_FEW = 0.9
+"""Share of the changes that have to be such multiples: noise makes the others [-]."""
+PULSE_LEAVES, NEXT_LEAVES = -0.35, -0.58
+"""Correlation of the rounding's steps with those a window later, at most, where the counter runs along.
+
+Without noise it is -1/2, and -2/3 where the window is the log's step; of roundings that have nothing in common -1/2
+from row to row [-].
+"""
+COUNTED = 0.25
+"""Variance of the steps from which on they are those of a count: of a difference of two roundings it is 1/3, of one
+1/6 [squared quanta]."""
 UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
 MOST_SAMPLES = 1200
 SEARCH = 3000
+
+
+class Reading(StrEnum):
+    """How a log shows a counter's window."""
+
+    HELD = "changes every"
+    RUNNING = "counts over the last"
+    UNSEEN = "changes at any row, and counts over less than"
+    ROUNDED = "is rounded at any row, over a window that does not show; taken for"
 
 
 @dataclass(frozen=True)
@@ -52,6 +79,9 @@ class SmoothCounter(WheelSpeedQuantisation):
 
     Where in a tooth and in a window the log began is not known, so the rounding itself cannot be foretold.
     """
+
+    held: ClassVar[float] = 0.5
+    """Age of a count on average, over the window [-]."""
 
     def sense(self, time_s: Array, signals: Signals) -> Signals:
         """Each wheel's mean speed over a window, half a window old."""
@@ -65,7 +95,13 @@ class SmoothCounter(WheelSpeedQuantisation):
         before = np.interp(time_s - self.window_s, time_s, turned)
         span = np.minimum(self.window_s, time_s - time_s[0])
         mean = np.where(span > 0.0, (turned - before) / np.maximum(span, 1e-12), speed_rad_s)
-        return delayed(time_s, mean, 0.5 * self.window_s)
+        return delayed(time_s, mean, self.held * self.window_s) if self.held else mean
+
+
+class RunningCounter(SmoothCounter):
+    """One that reports at every row what it counted over the last window."""
+
+    held = 0.0
 
 
 @dataclass(frozen=True)
@@ -80,12 +116,15 @@ class Lattice:
         Noise beside the rounding [rad/s].
     step_s : float
         The log's own; a window of no more than it cannot be seen [s].
+    reading : Reading
+        How the log shows the window.
     """
 
     quantum_rad_s: float
     window_s: float
     sigma_rad_s: float
     step_s: float
+    reading: Reading = Reading.HELD
 
     @property
     def teeth(self) -> int:
@@ -94,15 +133,25 @@ class Lattice:
 
     def effect(self) -> SmoothCounter:
         """The sensor that leaves it."""
-        return SmoothCounter(float(self.teeth), self.window_s)
+        kind = RunningCounter if self.reading is Reading.RUNNING else SmoothCounter
+        return kind(float(self.teeth), self.window_s)
 
     @property
     def window_range_s(self) -> tuple[float, float]:
         """What the window may be [s]."""
-        least = (
-            UNSEEN * self.step_s if self.window_s <= SEEN * self.step_s else self.window_s - 0.5 * self.step_s
-        )
+        if self.reading is Reading.ROUNDED:
+            return UNSEEN * self.step_s, LONGEST_WINDOW_S
+        seen = self.reading is not Reading.UNSEEN
+        least = self.window_s - 0.5 * self.step_s if seen else UNSEEN * self.step_s
         return least, self.window_s + 0.5 * self.step_s
+
+    @property
+    def sentence(self) -> str:
+        """What it is, in words."""
+        return (
+            f"All wheel speeds are multiples of {self.quantum_rad_s:.4g} rad/s, and each {self.reading} "
+            f"{1e3 * self.window_s:.4g} ms."
+        )
 
     @property
     def teeth_range(self) -> tuple[float, float]:
@@ -135,9 +184,12 @@ def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
     quantum, strength = _best_quantum(pooled, QUANTUM_RANGE[0] * spread, QUANTUM_RANGE[1] * spread)
     if strength < LATTICE_COHERENCE:
         return None
+    quantum = _coarsest(values, quantum)
     rest = np.concatenate([v - quantum * np.round(v / quantum) for v in values])
-    window = _window(time_s, wheels, quantum, step_s)
-    found = Lattice(quantum, window, 1.4826 * float(np.median(np.abs(rest))), step_s)
+    window, reading = _held_window(time_s, wheels, quantum, step_s), Reading.HELD
+    if window is None:
+        window, reading = _running_window(wheels, quantum, step_s)
+    found = Lattice(quantum, window, 1.4826 * float(np.median(np.abs(rest))), step_s, reading)
     return None if is_digit(quantum) or found.teeth > MOST_TEETH else found
 
 
@@ -152,8 +204,10 @@ def common_lattice(found: Sequence[Lattice | None]) -> Lattice | None:
     there = [lattice for lattice in found if lattice is not None]
     if 2 * len(there) <= len(found):
         return None
-    middle = sorted(there, key=lambda lattice: lattice.quantum_rad_s)[len(there) // 2]
-    windows = float(np.median([lattice.window_s for lattice in there]))
+    reading = Counter(lattice.reading for lattice in there).most_common(1)[0][0]
+    alike = [lattice for lattice in there if lattice.reading is reading]
+    middle = sorted(alike, key=lambda lattice: lattice.quantum_rad_s)[len(alike) // 2]
+    windows = float(np.median([lattice.window_s for lattice in alike]))
     return replace(middle, window_s=windows)
 
 
@@ -175,6 +229,18 @@ def _best_quantum(values: Array, low: float, high: float) -> tuple[float, float]
     return float(near[int(finer.argmax())]), float(finer.max())
 
 
+def _coarsest(values: Sequence[Array], quantum: float) -> float:
+    """The greatest multiple of a quantum by which the values change: a lattice lies on every finer one, too."""
+    steps = np.concatenate([np.diff(np.round(v / quantum)) for v in values])
+    steps = steps[steps != 0.0]
+    pooled = np.concatenate(values)
+    for times in range(COARSER, 1, -1):
+        alike = np.mean(steps % times == 0.0) if len(steps) else 0.0
+        if alike >= ALL_BUT_FEW and _coherence(pooled, np.array([times * quantum]))[0] >= LATTICE_COHERENCE:
+            return times * quantum
+    return quantum
+
+
 def _changes(time_s: Array, wheel: Array, quantum: float) -> Array:
     """Times at which a wheel's value changes, those across lost samples excepted: nobody knows when [s]."""
     there = np.isfinite(wheel)
@@ -183,15 +249,15 @@ def _changes(time_s: Array, wheel: Array, quantum: float) -> Array:
     return at[1:][(np.abs(np.diff(steps)) > 0.5) & (since < SEEN * np.median(since))]
 
 
-def _window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s: float) -> float:
-    """The longest window at whose ends alone the values change; the log's step where they change at any row [s]."""
+def _held_window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s: float) -> float | None:
+    """The longest window at whose ends alone the values change; None where they change at any row [s]."""
     changes = [_changes(time_s, w, quantum) for w in wheels]
     # the counter's window need not be a multiple of the log's step, and the log sees its end a part of a step late
     early = [c[c < c[0] + CHANGES_S] - c[0] for c in changes if len(c)]
     early = [c for c in early if len(c) >= FEWEST_CHANGES]
     low, high = 1.0 / LONGEST_WINDOW_S, 1.0 / (SEEN * step_s)
     if high <= low or not early:
-        return step_s
+        return None
 
     def coherence(rates: Array) -> Array:
         """Each wheel's windows may begin at times of their own."""
@@ -200,6 +266,23 @@ def _window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s: floa
     rates = np.linspace(low, high, max(int(4.0 * CHANGES_S * (high - low)), 2))
     good = np.flatnonzero(coherence(rates) > HOLD_COHERENCE)
     if not len(good):
-        return step_s
+        return None
     near = rates[good[0]] + np.linspace(0.0, 1.0 / CHANGES_S, 41)
     return float(1.0 / near[int(coherence(near).argmax())])
+
+
+def _running_window(wheels: Sequence[Array], quantum: float, step_s: float) -> tuple[float, Reading]:
+    """The window after which each pulse is taken off the count again [s], and how the log shows it.
+
+    Where no such time shows, no row's pulses are another's, or it is no count at all: the log's step stands for it.
+    """
+    steps = [np.diff(v) for w in wheels if len(v := w[np.isfinite(w)]) > 2]
+    steps = [d - uniform_filter1d(d, max(round(SMOOTHING_S / step_s), 3)) for d in steps]
+    variance = np.mean([np.mean(d * d) for d in steps])
+    lags = np.arange(1, min(round(LONGEST_WINDOW_S / step_s), min(map(len, steps)) - 1) + 1)
+    again = np.array([np.mean([np.mean(d[lag:] * d[:-lag]) for d in steps]) for lag in lags]) / variance
+    if len(lags) > 1 and again[1:].min() < PULSE_LEAVES:
+        return float(lags[1 + int(again[1:].argmin())] * step_s), Reading.RUNNING
+    if again[0] < NEXT_LEAVES:
+        return step_s, Reading.RUNNING
+    return step_s, Reading.UNSEEN if variance > COUNTED * quantum**2 else Reading.ROUNDED

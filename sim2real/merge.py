@@ -161,10 +161,7 @@ def counter_side(lattice: Lattice, before: Measure, after: Measure, excluded: bo
         Whether the effect was left out of the library.
     """
     old, new = before.signals["wheel_speed"], after.signals["wheel_speed"]
-    what = (
-        f"All wheel speeds are multiples of {lattice.quantum_rad_s:.4g} rad/s and change every "
-        f"{1e3 * lattice.window_s:.4g} ms."
-    )
+    what = lattice.sentence
     if excluded:
         term = Unexplained(
             "wheel_speed_sensor", "wheel_speed", "value", "rad/s", "has no sign", "a staircase", 1.0,

@@ -34,6 +34,8 @@ REFORMED, REFORMINGS = 3, 2
 """Best pairs that are fitted with one of their effects in another form, and how often: both may be of another."""
 TWINS = 3
 """Partners of a plain form that are tried against one with a further parameter."""
+DEEPER = 4
+"""Pairs, the best ones, from whose values the best single effect is fitted again."""
 LINEAR_PAIRS = 4
 """Further pairs, the most promising by the slopes at the effects' own fits."""
 
@@ -233,6 +235,36 @@ def add_twins(
     ]
     twins = [pair for pair in run_all(work, jobs, progress, "twins") if is_proper(pair)]
     return replace(contest, twins=tuple(sorted(twins, key=lambda e: e.loss)))
+
+
+def deepened(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Contest:
+    """The contest with the best single effect fitted again from where it stands beside others that leave less.
+
+    A wheel that just locks, or just does not, makes steps in the loss near the limit of grip. A fit may stop at one,
+    and then anything that stands beside the effect seems to be needed.
+    """
+    best, *others = contest.singles
+    candidate = best.fitted.candidate
+    ends = [
+        x
+        for entry in sorted((*contest.pairs, *contest.structured), key=lambda e: e.loss)
+        if entry.loss < best.loss and (x := _values_of(candidate, entry)) is not None
+    ]
+    if not ends:
+        return contest
+    again = enter(candidate, fit_to, holdout, np.array([best.fitted.x, *ends[:DEEPER]]), FULL_STEPS)
+    if again.loss >= best.loss:
+        return contest
+    return replace(contest, singles=tuple(sorted((again, *others), key=priced)))
+
+
+def _values_of(candidate: Candidate, entry: Entry) -> Array | None:
+    """The parameters of a single effect in an entry that holds it in the same form; None of any other."""
+    other = entry.fitted.candidate
+    if candidate.kinds[0] not in other.kinds:
+        return None
+    mine = [i for i, (key, _) in enumerate(other.parameters) if key == candidate.ids[0]]
+    return np.asarray(entry.fitted.x[mine])
 
 
 def _ordered(a: str, b: str) -> tuple[str, ...]:

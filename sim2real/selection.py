@@ -22,9 +22,10 @@ NO_GAP_MISFIT = 1.4
 """Up to this misfit of the model as it is, what is left is noise [-]."""
 NO_GAP_GAIN = 0.03
 """As long as no effect takes more than this share off the loss [-]."""
-QUIET_MISFIT, QUIET_GAIN = 1.0, 0.06
-"""And twice as much where the misfit is no more than noise alone gives: noise that was read too large, as of a signal
-that is held, leaves room for small ages [-]."""
+QUIET_MISFIT, QUIET_GAIN = 1.0, 0.12
+"""And four times as much where the misfit is no more than noise alone gives: noise that was read too large, as of a
+signal that is held, or of sensors that are next to ideal, leaves room for small ages, and for air of another density
+[-]."""
 LONE_MISFIT, LONE_GAIN = 1.6, 0.015
 """And up to this misfit where no effect takes even this share: sensors that wander by themselves, for nothing of the
 library moves with them [-]."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenarios.errors import ScenarioError
 from scenarios.files import WHEELS, RoadFile, VehicleFile, load_road, load_vehicle
-from sim2real.drive import Drive, awake, grid_step, make_drive
+from sim2real.drive import WHEEL, Drive, awake, backward, grid_step, make_drive
 from sim2real.lattice import find_lattice
 from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
 from sim2real.logs.checks import MIN_DURATION_S
@@ -106,7 +106,9 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     whole = drive_of(log, course)
     drive = awake(whole)
     if not drive.moving.any():
-        raise ScenarioError(f"{log_path}: the car never moves; expected a log of driving.")
+        raise ScenarioError(
+            f"{log_path}: the car never moves forward on all wheels; expected a log of driving."
+        )
     told_s = float(drive.time_s[-1] - drive.time_s[0])
     if told_s < MIN_DURATION_S:
         raise ScenarioError(
@@ -116,6 +118,10 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     asleep_s = float(drive.time_s[0] - whole.time_s[0])
     if asleep_s > 0.0:
         left_out = f"the first {asleep_s:.3g} s are left out: nothing tells yet how fast the car is."
+        log = replace(log, warnings=(*log.warnings, left_out))
+    back_s = float(backward(drive.time_s, drive.measured[:, WHEEL]).sum() * drive.step_s)
+    if back_s > 0.0:
+        left_out = f"{back_s:.3g} s are left out: a wheel turns back, or has just done so, which the plant's never do."
         log = replace(log, warnings=(*log.warnings, left_out))
     return Source(log, course, road_path, drive)
 

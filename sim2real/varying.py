@@ -112,6 +112,7 @@ def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied
     step = STEP * candidate.scale * np.where(high - x > x - low, 1.0, -1.0)
     base = candidate.model(x)
     count = len(x)
+    within = np.sort([(low - x) / step, (high - x) / step], axis=0)
     ends = tuple(candidate.model(x + step * (np.arange(count) == j)) for j in range(count))
     every = [(e, i) for e in (fit_to, holdout) for i in range(len(e.drives))]
     drives = [e.drives[i] for e, i in every]
@@ -134,7 +135,8 @@ def vary(entry: Entry, fit_to: Evidence, holdout: Evidence, over: str) -> Varied
     best = sum(loss(part) for part in z)
     for _ in range(ROUNDS):
         new = _solved(z, slopes, prior, a)
-        tried = [_along(bumps, new, i, len(d), count) for i, d in enumerate(drives)]
+        # Beyond its bounds a parameter is no car's any more: a negative inertia the plant would follow in tiny steps.
+        tried = [np.clip(_along(bumps, new, i, len(d), count), *within) for i, d in enumerate(drives)]
         z_new = [left(i, tried[i]) for i in range(len(drives))]
         cost = sum(loss(part) for part in z_new) + float(prior @ new**2)
         if cost >= best:

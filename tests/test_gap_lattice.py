@@ -8,7 +8,15 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
-from sim2real.lattice import Lattice, SmoothCounter, common_lattice, find_lattice, is_digit
+from sim2real.lattice import (
+    Lattice,
+    Reading,
+    RunningCounter,
+    SmoothCounter,
+    common_lattice,
+    find_lattice,
+    is_digit,
+)
 
 RATE_HZ = 500.0
 TURN = 2.0 * np.pi
@@ -34,6 +42,18 @@ def count(time_s, speed_rad_s, teeth, window_s, phase=0.0, begin_s=0.0):
     values = np.diff(pulses) * TURN / (teeth * window_s)
     last_full = np.searchsorted(ends, time_s + 1e-9, side="right") - 1
     return values[np.clip(last_full - 1, 0, len(values) - 1)]
+
+
+def running(time_s, speed_rad_s, teeth, window_s, phase=0.0):
+    """Pulses of the last window at every row: those that have come by now, less those that had by its begin."""
+    fine = np.linspace(time_s[0] - 2.0 * window_s, time_s[-1], 10 * len(time_s))
+    speed = np.interp(fine, time_s, speed_rad_s)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(fine) * (speed[1:] + speed[:-1]))])
+
+    def come(at_s):
+        return np.floor(np.interp(at_s, fine, angle) * teeth / TURN + phase)
+
+    return (come(time_s) - come(time_s - window_s)) * TURN / (teeth * window_s)
 
 
 def counted_wheels(teeth, window_s, noise_quanta=0.0, seed=0, rate_hz=RATE_HZ, duration_s=12.0):
@@ -129,6 +149,57 @@ def test_wheels_whose_windows_begin_at_times_of_their_own_share_one_window():
     assert found.window_s == pytest.approx(0.04, abs=0.5 / RATE_HZ)
 
 
+@pytest.mark.parametrize("noise_quanta", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("teeth", "window_s", "rate_hz"),
+    [
+        (48, 0.02, 100.0),
+        (48, 0.05, 500.0),
+        (100, 0.03, 100.0),
+        (96, 0.1, 200.0),
+        (48, 0.024, 500.0),
+        (48, 0.02, 50.0),
+    ],
+)
+def test_a_counter_that_runs_along_with_the_log_shows_its_window_too(teeth, window_s, rate_hz, noise_quanta):
+    rng = np.random.default_rng(0)
+    time_s, speed = driving(rate_hz=rate_hz, duration_s=20.0)
+    quantum = TURN / (teeth * window_s)
+    wheels = [
+        running(time_s, speed * (1.0 + 0.002 * i), teeth, window_s, rng.uniform())
+        + noise_quanta * quantum * rng.standard_normal(len(time_s))
+        for i in range(4)
+    ]
+    found = find_lattice(time_s, wheels)
+    assert found is not None
+    assert found.reading is Reading.RUNNING
+    assert found.quantum_rad_s == pytest.approx(quantum, rel=5e-3)
+    assert found.window_s == pytest.approx(window_s, abs=0.51 / rate_hz)
+    low, high = found.teeth_range
+    assert low <= teeth <= high
+
+
+def test_a_speed_that_is_rounded_at_every_row_leaves_the_window_open():
+    time_s, speed = driving()
+    quantum = TURN / (48 * 0.04)
+    wheels = [np.floor(speed * (1.0 + 0.002 * i) / quantum) * quantum for i in range(4)]
+    found = find_lattice(time_s, wheels)
+    assert found is not None
+    assert found.reading is Reading.ROUNDED
+    assert found.window_range_s[0] < 0.04 < found.window_range_s[1]
+    assert found.teeth_range[0] < 48 < found.teeth_range[1]
+
+
+def test_the_coarsest_lattice_is_it_though_the_car_cruises():
+    """Nine tenths of the time at constant speed: the spread of the fast part is a small part of the quantum."""
+    time_s = np.arange(3000) / 100.0
+    speed = 40.0 + 0.2 * np.sin(0.7 * time_s) + 15.0 * np.clip(time_s - 27.0, 0.0, None) / 3.0
+    wheels = [running(time_s, speed, 48, 0.02, 0.2 * i) + 0.02 * np.sin(1e5 * time_s + i) for i in range(4)]
+    found = find_lattice(time_s, wheels)
+    assert found is not None
+    assert found.teeth == 48
+
+
 # --- not found
 
 
@@ -218,6 +289,16 @@ def test_the_smooth_counter_is_the_counter_on_average():
     np.testing.assert_allclose(smooth["wheel_speed_fl_rad_s"][late], many[late], atol=0.25)
     assert np.abs(speed - many)[late].max() > 1.0
     np.testing.assert_array_equal(smooth["accel_x_m_s2"], speed)
+
+
+def test_a_running_counter_is_on_average_half_a_window_late():
+    time_s, speed = driving(duration_s=4.0)
+    rng = np.random.default_rng(3)
+    many = np.mean([running(time_s, speed, 48, 0.05, rng.uniform()) for _ in range(200)], axis=0)
+    (smooth,) = RunningCounter(48.0, 0.05).sense(time_s, {"wheel_speed_fl_rad_s": speed}).values()
+    late = time_s > 0.2
+    np.testing.assert_allclose(smooth[late], many[late], atol=0.25)
+    assert np.abs(speed - many)[late].max() > 0.5
 
 
 def test_a_counter_without_a_window_is_an_ideal_sensor():

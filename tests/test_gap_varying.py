@@ -21,7 +21,7 @@ from sim2real.observer import Towards
 from sim2real.probing import FORGOTTEN_S, sets_apart, windows
 from sim2real.result import Verdict
 from sim2real.selection import decide
-from sim2real.varying import vary
+from sim2real.varying import STEP, vary
 
 DURATION_S = 16.0
 
@@ -60,6 +60,31 @@ def test_a_value_that_sways_is_followed_to_the_noise(logs):
     assert fitness(entry, fit_to, held).misfit > 3.0
     assert fitness(varied.entry, fit_to, held).misfit < 1.5
     assert varied.spread["vehicle_speed_scale", "factor"] == pytest.approx(0.012 / np.sqrt(2.0), rel=0.3)
+
+
+def test_a_value_that_varies_stays_within_its_bounds(logs, monkeypatch):
+    """Beyond them an inertia may be negative, which the plant would follow in steps without end."""
+    fit_to, held = gather(MODEL, logs[:2]), gather(MODEL, logs[2:])
+    candidate = Candidate(MODEL, ("wheel_inertia_offset",))
+    entry = enter(candidate, fit_to, held, np.array([1.2]), 1)
+    (low,), (high,) = candidate.bounds
+    driven = []
+
+    def far_off(z, slopes, prior, a):
+        return np.where(np.arange(len(a)) % 2, 1e6, -1e6)
+
+    def predict(self, drive, push=None, towards=None):
+        driven.append(towards.shares[:, 0])
+        return plain(self, drive, push, towards)
+
+    plain = type(MODEL).predict
+    monkeypatch.setattr("sim2real.varying._solved", far_off)
+    monkeypatch.setattr(type(MODEL), "predict", predict)
+    vary(entry, fit_to, held, "time")
+    step = STEP * float(candidate.scale[0])
+    values = float(entry.fitted.x[0]) + step * np.concatenate(driven)
+    assert values.min() == pytest.approx(low)
+    assert values.max() == pytest.approx(high)
 
 
 def test_a_swaying_scale_is_named_with_its_spread(logs):

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 AIR_DENSITY_KG_M3 = 1.225
 """Density of air at sea level and 15 degrees Celsius, ISO 2533 standard atmosphere [kg/m^3]."""
+AIR_DENSITY_SHARE = 0.025
+"""By which the air's density is open: 1.2 kg/m^3, as many take it, of dry air at 20 degrees and 1010 hPa [-]."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class AeroDrag(Effect):
         low=0.0,
         high=5.0,
         starts=(0.4, 0.8, 2.0),
+        open_share=AIR_DENSITY_SHARE,
     )
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:

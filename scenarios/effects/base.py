@@ -53,6 +53,7 @@ class Parameter:
     low: Value
     high: Value
     starts: Values
+    open_share: float = 0.0
 
     def neutral_value(self, vehicle: Vehicle) -> float:
         """The value at which the effect vanishes on this vehicle, in `unit`."""
@@ -72,11 +73,21 @@ def _on(vehicle: Vehicle, value: Value) -> float:
 
 
 def parameter(
-    unit: str, meaning: str, *, neutral: Value, low: Value, high: Value, starts: Values = ()
+    unit: str,
+    meaning: str,
+    *,
+    neutral: Value,
+    low: Value,
+    high: Value,
+    starts: Values = (),
+    open_share: float = 0.0,
 ) -> Any:
-    """Declare one effect parameter; values outside [low, high] are refused, fits begin at `starts`."""
+    """Declare one effect parameter; values outside [low, high] are refused, fits begin at `starts`.
+
+    `open_share` of it no log can tell, since it stands beside a constant that others may take otherwise.
+    """
     about = {"unit": unit, "meaning": meaning, "neutral": neutral, "low": low, "high": high, "starts": starts}
-    return field(metadata=about)
+    return field(metadata=about | {"open_share": open_share})
 
 
 def share_of_axles(start: float, most: float) -> Any:

@@ -41,7 +41,10 @@ NOTICED = 0.1
 """Change of the confidence's logarithm below which it is no gap, however steady the camera is otherwise [-]."""
 QUIET, BEYOND_DOUBT = 0.97, 6.0
 """Share of the hold-out's gap that an effect has to get below, else it is none [-], unless all logs together speak for
-it by so much [nats]."""
+it by so much, and the hold-out not against it [nats]."""
+SLIGHT = 0.04
+"""Fall of the confidence's logarithm between low and high speed below which blur is none: a normal camera is as unsure
+[-]."""
 
 
 @dataclass(frozen=True)
@@ -118,15 +121,24 @@ def confidence_chain(
         noticed=NOTICED / model.deviation,
     )
     every = (*chain.accounts, *outside)
-    shrunk, most = min((a.left() for a in every), default=0.0), max((a.score for a in every), default=0.0)
-    if len(unseen) >= FEWEST_BLOCKS and shrunk > QUIET * chain.nothing.left() and most < BEYOND_DOUBT:
+    if len(unseen) >= FEWEST_BLOCKS and _is_quiet(chain.nothing, every):
         chain = replace(chain, quiet=True)
     stands = next(f for f in (plain, *fits) if f.effects == chain.best().effects)
+    if stands.effects == ("motion_blur",) and np.subtract(*_slow_and_fast(stands, known)[1]) > -SLIGHT:
+        chain, stands = replace(chain, quiet=True), plain
     pattern = pattern_in_words(seen.together, stands, model)
     needed = [a for a in outside if a.score > chain.best().score + DECISIVE and not chain.quiet]
     if needed and not pattern:
         pattern = _of_no_effect(max(needed, key=lambda account: account.score))
     return replace(chain, unexplained=pattern)
+
+
+def _is_quiet(nothing: Account, others: Sequence[Account]) -> bool:
+    """Whether no account makes the hold-out's gap smaller, nor has all logs together speak for it beyond doubt."""
+    if min((account.left() for account in others), default=0.0) <= QUIET * nothing.left():
+        return False
+    best = max(others, key=lambda account: account.score, default=nothing)
+    return best.score < BEYOND_DOUBT or best.gain_holdout < 0.0
 
 
 def _of_no_effect(needed: Account) -> str:
@@ -188,11 +200,8 @@ def rest_of(
 def _evidence(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
     blocks, sentences = seen.known, []
     if "motion_blur" in f.effects:
-        slow, fast = np.quantile(blocks.speed_m_s, (0.1, 0.9))
-        low, high = (
-            np.exp(-blocks.loss.mean() - f.per_speed * (v**f.power - (blocks.speed_m_s**f.power).mean()))
-            for v in (slow, fast)
-        )
+        (slow, fast), losses = _slow_and_fast(f, blocks)
+        low, high = np.exp(-losses)
         sentences.append(
             f"Confidence goes from {low:.2f} at {slow:.0f} m/s to {high:.2f} at {fast:.0f} m/s, classes held apart."
         )
@@ -213,6 +222,13 @@ def _evidence(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
                 f"{100.0 * light.white_share:.1f} % white, {100.0 * light.black_share:.1f} % black."
             )
     return tuple(sentences)
+
+
+def _slow_and_fast(f: ConfidenceFit, blocks: Blocks) -> tuple[Array, Array]:
+    """Low and high speed of some blocks [m/s], and the loss of confidence at them with a fit's blur [-]."""
+    ends = np.quantile(blocks.speed_m_s, (0.1, 0.9))
+    beyond = ends**f.power - (blocks.speed_m_s**f.power).mean()
+    return ends, blocks.loss.mean() + f.per_speed * beyond
 
 
 def _doubts(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:

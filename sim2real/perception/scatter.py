@@ -26,8 +26,9 @@ SCATTERED_M, SCATTERED_ALONE_M = 0.7, 2.0
 comes again [m]."""
 OF_BRACKET = 0.5
 """Share of what a crossing's bracket leaves open below which scatter is none [-]."""
-FEWEST_PAIRS, STANDS_OUT = 6, 2.5
-"""Pairs of crossings that can tell, and the standard score of their products from which on they do."""
+FEWEST_PAIRS, NEIGHBOURS_ALIKE, AGAIN_ALIKE = 6, 2.5, 3.2
+"""Pairs of crossings that can tell, and the standard score of their products from which on they do: a chain that errs
+at borders errs a little alike at one that it passes again."""
 CLIPPED = 3.0
 """Errors count up to so many times their median size: one misread border is no pattern [-]."""
 
@@ -54,11 +55,11 @@ def scatter_in_words(scale_m: float, rest_m: Array, crossings: Crossings, streak
         return ""
     again, along = _passed_again(crossings), _neighbours(crossings)
     lies = f"The changes of class lie about {scale_m:.1f} m beside road.yaml's borders, with no common shift or delay"
-    if _alike(rest_m, again) > STANDS_OUT:
+    if _alike(rest_m, again) > AGAIN_ALIKE:
         return (
             f"{lies}, the same each time that a border is passed: are the borders where road.yaml has them?"
         )
-    if _alike(rest_m, along) > STANDS_OUT:
+    if _alike(rest_m, along) > NEIGHBOURS_ALIKE:
         return f"{lies}, and neighbours alike: does position_m drift, or does the delay?"
     if len(again) < FEWEST_PAIRS and scale_m >= max(SCATTERED_ALONE_M, open_m, streak_m):
         return f"{lies}: are the borders where road.yaml has them, and does position_m drift?"
