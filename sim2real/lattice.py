@@ -20,7 +20,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from scenarios.effects.base import Signals
-from scenarios.effects.shifting import delayed
+from scenarios.effects.shifting import advanced, delayed
 from scenarios.effects.wheel_speed_quantisation import MOST_TEETH, WheelSpeedQuantisation
 
 Array = NDArray[np.float64]
@@ -83,6 +83,17 @@ class SmoothCounter(WheelSpeedQuantisation):
     held: ClassVar[float] = 0.5
     """Age of a count on average, over the window [-]."""
 
+    @property
+    def step_rad_s(self) -> float:
+        """What one pulse more makes of the speed [rad/s]."""
+        return 2.0 * np.pi / (self.teeth * self.window_s) if self.window_s > 0.0 else 0.0
+
+    def correct(self, time_s: Array, signals: Signals) -> Signals:
+        """As the plant's counter, at this one's mean age."""
+        age_s = (0.5 + self.held) * self.window_s
+        early = {k: advanced(time_s, v, age_s) for k, v in signals.items() if k.startswith("wheel_speed_")}
+        return {**signals, **early}
+
     def sense(self, time_s: Array, signals: Signals) -> Signals:
         """Each wheel's mean speed over a window, half a window old."""
         if self.window_s == 0.0:
@@ -130,6 +141,11 @@ class Lattice:
     def teeth(self) -> int:
         """Pulses per revolution."""
         return max(round(2.0 * np.pi / (self.quantum_rad_s * self.window_s)), 1)
+
+    @property
+    def rounding_rad_s(self) -> float:
+        """Standard deviation of the rounding: a count is the difference of two roundings [rad/s]."""
+        return self.quantum_rad_s / np.sqrt(6.0)
 
     def effect(self) -> SmoothCounter:
         """The sensor that leaves it."""

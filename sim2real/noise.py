@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from sim2real.drive import CHANNELS, Drive
+from sim2real.drive import CHANNELS, WHEEL, Drive
 
 Array = NDArray[np.float64]
 
@@ -98,6 +98,8 @@ def read_noise(drive: Drive, residuals: Array, doubt: Array) -> Noise:
         rho = _correlation(short / far, long_lag)
         sigma[i] = max(np.sqrt(far / _second_difference(rho**long_lag)), RESOLUTION[i])
         correlation[i] = rho if sigma[i] > RESOLUTION[i] else 0.0
+    if drive.lattice is not None:  # most rows may lie on one step, and the median knows nothing of the others
+        sigma[WHEEL] = np.maximum(sigma[WHEEL], drive.lattice.rounding_rad_s)
     return Noise(sigma, correlation, widening(doubt, sigma))
 
 

@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 MEMORY_S = np.array([1.0, 1.0, 0.1, 0.1, 0.1, 0.1])
 """Memory of position, vehicle speed and wheel speeds [s]: the wheels' is short, since they diverge within
 tenths of a second where the tyre slides."""
+COUNTED_S_PER_RAD_S, LONGEST_COUNTED_S = 0.4, 1.0
+"""Memory of wheels that a counter rounds: so much for each rad/s of a step, since steps that a wheel is drawn to would
+push the car by its tyres, and the longest [s]."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +153,7 @@ class Simulation:
             np.ascontiguousarray(torque + push.torque_nm if push else torque),
             push.accel_m_s2 if push else np.zeros(len(drive)),
             np.column_stack([columns[name] for name in CHANNELS[:6]]),
-            MEMORY_S,
+            self._memory_s,
             drive.step_s,
             np.array([parameters for parameters, _ in setups]),
             setups[0][1].start_m,
@@ -164,6 +167,14 @@ class Simulation:
         if push:
             channels = channels + push.offset
         return Prediction(channels, states, slip, force_n, load_n, theta)
+
+    @property
+    def _memory_s(self) -> Array:
+        """Memory of position, speed and wheel speeds [s]."""
+        steps = [effect.step_rad_s for effect in self.effects if isinstance(effect, SmoothCounter)]
+        memory_s = MEMORY_S.copy()
+        memory_s[2:] = np.clip(COUNTED_S_PER_RAD_S * max(steps, default=0.0), MEMORY_S[2:], LONGEST_COUNTED_S)
+        return memory_s
 
     def actuated(self, time_s: Array, torque_nm: Array) -> Array:
         """What the actuators make of a commanded torque, shape (n, 4) [N m]."""

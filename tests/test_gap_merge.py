@@ -8,7 +8,7 @@ import made_up_diagnosis as made_up
 import numpy as np
 import pytest
 
-from sim2real.lattice import Lattice
+from sim2real.lattice import Lattice, Reading
 from sim2real.merge import Side, camera_side, counter_side, merge
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.report import jsonable
@@ -206,7 +206,7 @@ def test_a_counter_is_identified_with_its_teeth_and_window():
 
 
 def test_a_window_that_the_log_is_too_slow_for_may_be_shorter():
-    slow = Lattice(TURN / (100 * 0.01), 0.01, 0.05, 0.01)
+    slow = Lattice(TURN / (100 * 0.01), 0.01, 0.05, 0.01, Reading.UNSEEN)
     (cause,) = counter_side(slow, BEFORE, AFTER, excluded=False).causes
     teeth, window = cause.parameters["teeth"], cause.parameters["window_s"]
     assert window.low < 0.005 < window.high

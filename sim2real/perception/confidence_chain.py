@@ -39,9 +39,9 @@ FEWEST_BLOCKS = 8
 """With fewer blocks nothing is said of confidence."""
 NOTICED = 0.1
 """Change of the confidence's logarithm below which it is no gap, however steady the camera is otherwise [-]."""
-QUIET, BEYOND_DOUBT = 0.97, 6.0
+QUIET, BEYOND_DOUBT, AGAINST = 0.97, 6.0, -1.0
 """Share of the hold-out's gap that an effect has to get below, else it is none [-], unless all logs together speak for
-it by so much, and the hold-out not against it [nats]."""
+it by so much, and the hold-out not by more than a nat against it [nats]."""
 SLIGHT = 0.04
 """Fall of the confidence's logarithm between low and high speed below which blur is none: a normal camera is as unsure
 [-]."""
@@ -138,7 +138,7 @@ def _is_quiet(nothing: Account, others: Sequence[Account]) -> bool:
     if min((account.left() for account in others), default=0.0) <= QUIET * nothing.left():
         return False
     best = max(others, key=lambda account: account.score, default=nothing)
-    return best.score < BEYOND_DOUBT or best.gain_holdout < 0.0
+    return best.score < BEYOND_DOUBT or best.gain_holdout < AGAINST
 
 
 def _of_no_effect(needed: Account) -> str:
