@@ -43,8 +43,9 @@ SAME_SPEED_M_S = 2.0
 """Crossings within this range of speeds count as one speed [m/s]."""
 NOTABLE = 3.0
 MOST_PLACES = 4
-FEWEST_UNSEEN = 4
-"""Borders passed on the hold-out that can say that there is no shift."""
+FEWEST_UNSEEN, BEYOND_DOUBT = 4, 6.0
+"""Borders passed on the hold-out that can say that there is no shift, unless all logs together speak by so much [nats]
+for one that no stamp is long enough for."""
 MOSTLY = 0.25
 """An account that leaves no more than this share of the gap's square beyond noise explains it, though the rest shows a
 pattern [-]."""
@@ -208,10 +209,12 @@ def shift_chain(
         tuple(accounts[1:]),
         places=_places(accounts[0], unseen),
         next_step=NEXT_STEP,
-        quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
     )
     others = [_account(shifted, plain, unseen, height_m, scale, known) for shifted in free]
-    best = max(account.score for account in (*accounts, *others))
+    scores = [account.score for account in (*accounts, *others)]
+    best, foremost = max(scores), (plain, *fits, *free)[int(np.argmax(scores))]
+    sure = best > BEYOND_DOUBT and _leaves_its_stamp(foremost, every, height_m)
+    chain = replace(chain, quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0 and not sure)
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
     if drift:
         nothing, *rest = (_account(f, plain, unseen, height_m, drift.scale, known) for f in (plain, *fits))
@@ -232,6 +235,12 @@ def shift_chain(
     seen = [*fitted, *([] if held_out is None else [held_out])]
     scatter = scatter_in_words(scale * ERROR_M, closest.rest_m(every, height_m), every, streak_m(seen))
     return replace(chain, unexplained=scatter)
+
+
+def _leaves_its_stamp(f: ShiftFit, crossings: Crossings, height_m: float) -> bool:
+    """Whether a shift takes the classes beyond the stretches that the simulation has them right in."""
+    half_m = 0.25 * (crossings.low_length_m + crossings.high_length_m)
+    return bool(np.median(np.abs(f.shift(crossings, height_m)) - half_m) > 0.0)
 
 
 def _another_law(best: Account, choice: tuple[str, ...]) -> str:
