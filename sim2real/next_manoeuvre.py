@@ -136,8 +136,14 @@ def propose(
         if power >= SEPARATE_SIGMA
         else f"Even so only {power:.1f} standard deviations would lie between {names[0]} and {names[1]}"
     )
+    at_hand = f"the logs at hand have {now_sigma:.1f}"
+    if now_sigma >= power:
+        better = min((a, b), key=lambda entry: entry.loss).name
+        at_hand += (
+            f", in favour of {better}, which may be no more than how simulation and car differ in all else"
+        )
     return NextManoeuvre(
-        f"{profile.sentence} {verdict}; the logs at hand have {now_sigma:.1f}.",
+        f"{profile.sentence} {verdict}; {at_hand}.",
         profile.initial_speed_m_s,
         time_s[::2],
         torque[::2],

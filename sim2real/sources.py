@@ -85,7 +85,11 @@ def read_sources(
             problems.append(str(error))
     if problems or car is None:
         raise ScenarioError("\n".join(dict.fromkeys(problems)))
-    return Sources(car, vehicle, tuple(found[:-1]), found[-1])
+    *fitted, held = found
+    if any(s.log.path.resolve() == held.log.path.resolve() for s in fitted):
+        told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
+        held = replace(held, log=replace(held.log, warnings=(*held.log.warnings, told)))
+    return Sources(car, vehicle, tuple(fitted), held)
 
 
 def read_source(text: str, road: Path | None, columns: Mapping | None = None) -> Source:

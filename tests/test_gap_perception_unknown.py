@@ -175,3 +175,23 @@ def test_a_change_of_confidence_by_less_than_a_tenth_is_none():
     steady = Account((), 0, 0.0, 0.0, 0.0, {}, np.full(20, 4.0))
     assert _unexplained(Chain("image_confidence", 100, 20.0, steady, ()), steady)
     assert not _unexplained(Chain("image_confidence", 100, 20.0, steady, (), noticed=0.1 / 0.02), steady)
+
+
+@pytest.mark.parametrize(("dimmed", "verdict"), [(1.0, Verdict.UNKNOWN), (0.55, Verdict.IDENTIFIED)])
+def test_a_surface_that_a_sure_camera_takes_for_another_is_no_exposure(dimmed, verdict):
+    """Snow is called wet in three of five results; bad pictures would make the camera less sure, too."""
+
+    def slush(log):
+        rng = np.random.default_rng(len(log))
+        classes, ids = log.signals["image_class"].copy(), log.signals["frame_id"]
+        mistaken = np.isin(ids, rng.permutation(np.unique(ids))[: int(0.6 * len(np.unique(ids)))])
+        classes[(classes == 2.0) & mistaken] = 1.0
+        return changed(log, image_class=classes)
+
+    finding = diagnose(Camera(dimmed=dimmed), damage=slush)
+    assert finding.verdict is verdict, finding.unexplained
+    if verdict is Verdict.UNKNOWN:
+        assert "road.yaml has snow" in finding.unexplained[0]
+        assert "exposure_shift" not in finding.causes
+    else:
+        assert finding.causes == ("exposure_shift",)

@@ -34,8 +34,9 @@ USUAL_ERROR, ERROR_SPREAD = 0.04, 0.7
 are normal [-]."""
 LEAST_DEVIATION = 0.01
 """Least standard deviation that a block is credited with [-]."""
-LAW_SPREAD = 0.4
-"""Standard deviation of the logarithm of how strongly networks' confidence answers, about the shipped ones' [-]."""
+LAW_SPREAD, BLUR_LAW_SPREAD = 0.4, 0.9
+"""Standard deviation of the logarithm of how strongly networks' confidence answers to exposure and to blur, about the
+shipped ones' [-]: a network that was never shown blur gives way five times as soon."""
 MOST_LOG_FACTOR = 5.0
 """Intervals of an exposure time reach no farther than by this factor's logarithm [-]."""
 STOPS = np.linspace(-6.0, 6.0, 241)
@@ -226,7 +227,7 @@ def _exposure_time(modelled_s: float, slope: float, half: float, power: float) -
         added = slope * TOLERATED_SMEAR_M
         return Interval(modelled_s + added, 0.0, modelled_s + half ** (1.0 / power) * TOLERATED_SMEAR_M, "s")
     added = slope ** (1.0 / power) * TOLERATED_SMEAR_M
-    spread = np.hypot(half / slope / power, 1.96 * LAW_SPREAD)
+    spread = np.hypot(half / slope / power, 1.96 * BLUR_LAW_SPREAD)
     factor = float(np.exp(min(spread, MOST_LOG_FACTOR)))
     return Interval(modelled_s + added, modelled_s + added / factor, modelled_s + added * factor, "s")
 

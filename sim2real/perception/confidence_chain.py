@@ -19,7 +19,7 @@ from sim2real.perception.confidence import (
     fit_confidence,
     read_model,
 )
-from sim2real.perception.conflicts import class_error
+from sim2real.perception.conflicts import class_error, confusion_in_words
 from sim2real.perception.frames import Modelled, Results
 from sim2real.perception.patterns import FEWEST_OF_CLASS, pattern_in_words
 from sim2real.perception.pictures import NORMAL_LIGHT_EV, Light
@@ -99,7 +99,9 @@ def confidence_chain(
         # the pictures alone still tell their exposure
         known, unseen = make_blocks([]), make_blocks([])
         choices = [c for c in choices if c == ("exposure_shift",)]
-    model, signs = read_model(known), Signs(class_error(fitted), lights[0])
+    # mistakes that are made with good pictures say nothing of bad ones
+    errors = float("nan") if confusion_in_words(fitted) else class_error(fitted)
+    model, signs = read_model(known), Signs(errors, lights[0])
     seen = Seen(known, unseen, signs, lights[1])
 
     def fit(effects: tuple[str, ...]) -> ConfidenceFit:
@@ -236,7 +238,7 @@ def _doubts(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
     if f.effects:
         doubts.append(
             "How strongly confidence answers is measured on the shipped networks; another chain's may differ by a "
-            "factor of two, which the interval holds."
+            "factor of two, to blur of six, which the interval holds."
         )
     if "exposure_shift" in f.effects and seen.signs.light is None:
         doubts.append("The log names no pictures: over- and underexposure cannot be told apart.")

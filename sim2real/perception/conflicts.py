@@ -23,6 +23,13 @@ MANY, SEVERAL_LOGS = 3, 2
 MOSTLY = 0.7
 """Share of a segment's results that name one other class, from which on they are no chance mistakes."""
 
+CONFUSED, FEWEST_OF_SURFACE = 0.3, 30
+"""Share of a surface's results that name others from which on these are no chance mistakes, and how many results of it
+have to be there."""
+SURE, AS_SURE = 0.8, 0.1
+"""Confidence from which on pictures are good [-], and by how much less sure mistakes may be all the same, in its
+logarithm [-]: with bad pictures the one is lower, or the other more."""
+
 
 def class_error(results: Sequence[Results]) -> float:
     """Share of the results away from borders that name another class than road.yaml; NaN where there are none [-].
@@ -36,6 +43,33 @@ def class_error(results: Sequence[Results]) -> float:
             wrong.append(one.classes[inside] != segment.surface_class)
     every = np.concatenate(wrong)
     return float(every.mean()) if len(every) else float("nan")
+
+
+def confusion_in_words(results: Sequence[Results]) -> str:
+    """The gap that one surface is taken for another with good pictures, in a sentence; empty where none is."""
+    seen: dict[Surface, list[tuple[NDArray[np.int64], Array]]] = {}
+    for one, segment, inside in _laid_over(results):
+        known = inside & (one.confidence > 0.0)
+        seen.setdefault(segment.surface_class, []).append((one.classes[known], np.log(one.confidence[known])))
+    of = {
+        true: (np.concatenate([c for c, _ in parts]), np.concatenate([s for _, s in parts]))
+        for true, parts in seen.items()
+    }
+    every = np.concatenate([sure for _, sure in of.values()]) if of else np.empty(0)
+    if not len(every) or np.exp(every.mean()) < SURE:
+        return ""
+    for true, (classes, sure) in sorted(of.items()):
+        wrong = classes != true
+        if len(classes) < FEWEST_OF_SURFACE or wrong.mean() < CONFUSED:
+            continue
+        if wrong.all() or sure[wrong].mean() > sure[~wrong].mean() - AS_SURE:
+            other = Surface(int(np.bincount(classes[wrong]).argmax()))
+            return (
+                f"The camera is as sure as ever, but names another class in {100.0 * wrong.mean():.0f} % of its "
+                f"results where road.yaml has {true.label}, mostly {other.label}: does it take one surface for "
+                "another, or is road.yaml out of date?"
+            )
+    return ""
 
 
 def streak_m(results: Sequence[Results]) -> float:

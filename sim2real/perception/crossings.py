@@ -62,7 +62,7 @@ class Crossings:
     way_m : array, shape (k, 201)
         Way driven during each of `AGES_S` before [m].
     ahead_m : array, shape (k,)
-        Distance of the stamps' near end from the lens [m].
+        Distance of the stamps' middle from the lens [m].
     """
 
     log: NDArray[np.str_]

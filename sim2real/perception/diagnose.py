@@ -17,7 +17,7 @@ from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
 from sim2real.perception.chain import Account, Chain
 from sim2real.perception.confidence_chain import confidence_chain
-from sim2real.perception.conflicts import class_conflicts, conflicts_in_words
+from sim2real.perception.conflicts import class_conflicts, conflicts_in_words, confusion_in_words
 from sim2real.perception.frames import Modelled, read_results
 from sim2real.perception.friction import SIGNAL as REFERENCE
 from sim2real.perception.friction import friction_chain
@@ -202,7 +202,10 @@ def diagnose_perception(
     chains = [chain for chain in judged if chain is not None]
     if not chains:
         return None
-    return _conclude(chains, conflicts_in_words(conflicts), stuck_in_words(every), tuple(warnings), seed)
+    confused = confusion_in_words(every)
+    return _conclude(
+        chains, conflicts_in_words(conflicts), (confused, stuck_in_words(every)), tuple(warnings), seed
+    )
 
 
 def camera_shrink(
@@ -227,11 +230,12 @@ def camera_shrink(
 
 
 def _conclude(
-    chains: Sequence[Chain], conflict: str, stuck: str, warnings: tuple[str, ...], seed: int
+    chains: Sequence[Chain], conflict: str, further: Sequence[str], warnings: tuple[str, ...], seed: int
 ) -> PerceptionFinding:
     """Each signal's best account, and what they make together.
 
-    `conflict` is what classes say against road.yaml, `stuck` what repeated results say; both may be empty.
+    `conflict` is what classes say against road.yaml, which bad pictures may cause; `further` is what they may not. All
+    may be empty.
     """
     best = [chain.best() for chain in chains]
     rivals = [chain.rivals() for chain in chains]
@@ -244,8 +248,7 @@ def _conclude(
     causes = tuple(dict.fromkeys(effect for account in best for effect in account.effects))
     if conflict and not set(causes) & MAKE_CLASSES_ERR:
         odd.append((PLACE, conflict))
-    if stuck:
-        odd.append((PLACE, stuck))
+    odd += [(PLACE, text) for text in further if text]
     ambiguous = tuple(
         dict.fromkeys(
             tuple(dict.fromkeys((*account.effects, *(e for r in others for e in r.effects))))

@@ -76,7 +76,7 @@ class Results:
     from_m, to_m : array, shape (n,)
         Its stamp [m].
     ahead_m : float
-        Distance of the stamps' near end from the lens by the camera file when the picture was taken, the median [m].
+        Distance of the stamps' middle from the lens by the camera file when the picture was taken, the median [m].
     classes : array, shape (n,)
         Class index.
     confidence : array, shape (n,)
@@ -147,11 +147,12 @@ def read_results(
     clock, speed = _finite(log.time_s, log.signals["vehicle_speed_m_s"])
     speed_m_s = np.interp(time_s, clock, speed)
     lens_m = vehicle.to_core().cog_to_front_axle_m + camera.x_from_front_axle_m
-    beyond_m = table["from"].to_numpy() - np.interp(time_s, drive_time_s, position_m)
+    middle_m = 0.5 * (table["from"].to_numpy() + table["to"].to_numpy())
+    beyond_m = middle_m - np.interp(time_s, drive_time_s, position_m)
     ahead_m = _ahead_when_taken(beyond_m, speed_m_s) - lens_m
     if ahead_m < LEAST_AHEAD_M:
         warnings.append(
-            f"{log.name}: stamps begin {ahead_m:.1f} m ahead of the lens; the pitch is reckoned for "
+            f"{log.name}: stamps lie {ahead_m:.1f} m ahead of the lens; the pitch is reckoned for "
             f"{USUAL_AHEAD_M:g} m instead."
         )
         ahead_m = USUAL_AHEAD_M
@@ -173,7 +174,7 @@ def read_results(
 
 
 def _ahead_when_taken(beyond_m: Array, speed_m_s: Array) -> float:
-    """How far beyond the car stamps begin when their pictures are taken [m].
+    """How far beyond the car stamps lie when their pictures are taken [m].
 
     A result arrives some time after its picture, and the car has come nearer to the stamp by then, the more the faster
     it is: how the distance falls with speed is that time.

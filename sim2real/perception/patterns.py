@@ -17,7 +17,7 @@ logarithm in the hardest twentieth of driving, from which on it does: others wer
 SLOW_SHARE, SLOW_BY = 0.3, 0.15
 """Share of that variance that goes against speed, and the fall of the logarithm from the fastest to the slowest tenth,
 from which on the camera is unsure when it is slow [-]."""
-SHUNNED_BY, SHUNNED_SHARE = 0.3, 0.15
+SHUNNED_BY, SHUNNED_SHARE = 0.45, 0.15
 """Fall of the logarithm on one class against another, and of the confidence itself, from which on the class is shunned:
 nominal chains had up to 0.25, and little of a confidence that is low everywhere [-]."""
 FEWEST_OF_CLASS = 5
