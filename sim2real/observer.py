@@ -199,9 +199,9 @@ class Simulation:
 
 def _foretold(effect: Effect) -> Effect:
     """An effect as a prediction can take it."""
-    return (
-        SmoothCounter(effect.teeth, effect.window_s) if isinstance(effect, WheelSpeedQuantisation) else effect
-    )
+    if isinstance(effect, WheelSpeedQuantisation) and not isinstance(effect, SmoothCounter):
+        return SmoothCounter(effect.teeth, effect.window_s)
+    return effect
 
 
 def start(columns: dict[str, Array], step_s: float, p: DynamicsParameters) -> Array:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gap_drives import random_drives
+from gap_drives import MODEL, random_drives
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
@@ -299,6 +299,15 @@ def test_a_running_counter_is_on_average_half_a_window_late():
     late = time_s > 0.2
     np.testing.assert_allclose(smooth[late], many[late], atol=0.25)
     assert np.abs(speed - many)[late].max() > 0.5
+
+
+@pytest.mark.parametrize("counter", [SmoothCounter(48.0, 0.05), RunningCounter(48.0, 0.05)])
+def test_a_model_predicts_with_the_counter_that_was_read(counter):
+    (effect,) = MODEL.with_effects(counter).effects
+    assert effect == counter
+    assert type(effect) is type(counter)
+    (plants,) = MODEL.with_effects(WheelSpeedQuantisation(48.0, 0.05)).effects
+    assert type(plants) is SmoothCounter
 
 
 def test_a_counter_without_a_window_is_an_ideal_sensor():
