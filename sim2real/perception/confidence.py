@@ -34,9 +34,9 @@ USUAL_ERROR, ERROR_SPREAD = 0.04, 0.7
 are normal [-]."""
 LEAST_DEVIATION = 0.01
 """Least standard deviation that a block is credited with [-]."""
-LAW_SPREAD, BLUR_LAW_SPREAD = 0.4, 0.9
+LAW_SPREAD, BLUR_LAW_SPREAD = 0.4, 1.0
 """Standard deviation of the logarithm of how strongly networks' confidence answers to exposure and to blur, about the
-shipped ones' [-]: a network that was never shown blur gives way five times as soon."""
+shipped ones' [-]: another chain was found to give way six times as soon."""
 MOST_LOG_FACTOR = 5.0
 """Intervals of an exposure time reach no farther than by this factor's logarithm [-]."""
 STOPS = np.linspace(-6.0, 6.0, 241)

@@ -238,7 +238,7 @@ def _doubts(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
     if f.effects:
         doubts.append(
             "How strongly confidence answers is measured on the shipped networks; another chain's may differ by a "
-            "factor of two, to blur of six, which the interval holds."
+            "factor of two, to blur of seven, which the interval holds."
         )
     if "exposure_shift" in f.effects and seen.signs.light is None:
         doubts.append("The log names no pictures: over- and underexposure cannot be told apart.")
