@@ -143,11 +143,8 @@ def backward(time_s: Array, wheels: Array) -> NDArray[np.bool_]:
     step_s = time_s[1] - time_s[0]
     rows = 2 * round(0.5 * BACKWARD_S / step_s) + 1
     slowest = np.nan_to_num(wheels, nan=np.inf).min(axis=1)
-    back = np.flatnonzero(median_filter(slowest, max(rows, 3), mode="nearest") < BACKWARD_RAD_S)
-    since = (
-        time_s
-        - np.concatenate([[-np.inf], time_s[back]])[np.searchsorted(back, np.arange(len(time_s)), "right")]
-    )
+    back = median_filter(slowest, max(rows, 3), mode="nearest") < BACKWARD_RAD_S
+    since = time_s - np.maximum.accumulate(np.where(back, time_s, -np.inf))
     return np.asarray(since <= RECOVERY_S)
 
 

@@ -20,7 +20,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from scenarios.effects.base import Signals
-from scenarios.effects.shifting import advanced, delayed
+from scenarios.effects.shifting import delayed
 from scenarios.effects.wheel_speed_quantisation import MOST_TEETH, WheelSpeedQuantisation
 
 Array = NDArray[np.float64]
@@ -88,11 +88,10 @@ class SmoothCounter(WheelSpeedQuantisation):
         """What one pulse more makes of the speed [rad/s]."""
         return 2.0 * np.pi / (self.teeth * self.window_s) if self.window_s > 0.0 else 0.0
 
-    def correct(self, time_s: Array, signals: Signals) -> Signals:
-        """As the plant's counter, at this one's mean age."""
-        age_s = (0.5 + self.held) * self.window_s
-        early = {k: advanced(time_s, v, age_s) for k, v in signals.items() if k.startswith("wheel_speed_")}
-        return {**signals, **early}
+    @property
+    def age_s(self) -> float:
+        """Mean age of what is read [s]."""
+        return (0.5 + self.held) * self.window_s
 
     def sense(self, time_s: Array, signals: Signals) -> Signals:
         """Each wheel's mean speed over a window, half a window old."""

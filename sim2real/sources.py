@@ -88,7 +88,7 @@ def read_sources(
     *fitted, held = found
     if any(s.log.path.resolve() == held.log.path.resolve() for s in fitted):
         told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
-        held = replace(held, log=replace(held.log, warnings=(*held.log.warnings, told)))
+        held = replace(held, log=held.log.warned(told))
     return Sources(car, vehicle, tuple(fitted), held)
 
 
@@ -122,11 +122,11 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     asleep_s = float(drive.time_s[0] - whole.time_s[0])
     if asleep_s > 0.0:
         left_out = f"the first {asleep_s:.3g} s are left out: nothing tells yet how fast the car is."
-        log = replace(log, warnings=(*log.warnings, left_out))
+        log = log.warned(left_out)
     back_s = float(backward(drive.time_s, drive.measured[:, WHEEL]).sum() * drive.step_s)
     if back_s > 0.0:
         left_out = f"{back_s:.3g} s are left out: a wheel turns back, or has just done so, which the plant's never do."
-        log = replace(log, warnings=(*log.warnings, left_out))
+        log = log.warned(left_out)
     return Source(log, course, road_path, drive)
 
 

@@ -42,10 +42,15 @@ class WheelSpeedQuantisation(Effect):
         counted = {k: self._count(time_s, v) for k, v in signals.items() if k.startswith("wheel_speed_")}
         return {**signals, **counted}
 
+    @property
+    def age_s(self) -> float:
+        """Mean age of what is read: half a window of counting and half a window of holding [s]."""
+        return self.window_s
+
     def correct(self, time_s: Array, signals: Signals) -> Signals:
-        """The mean age is half a window of counting and half a window of holding."""
+        """What is read, earlier by its mean age."""
         early = {
-            k: advanced(time_s, v, self.window_s) for k, v in signals.items() if k.startswith("wheel_speed_")
+            k: advanced(time_s, v, self.age_s) for k, v in signals.items() if k.startswith("wheel_speed_")
         }
         return {**signals, **early}
 

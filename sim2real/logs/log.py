@@ -64,6 +64,10 @@ class Log:
         """The folder that `image_path` is relative to."""
         return self.path.parent
 
+    def warned(self, text: str) -> Log:
+        """The log with one more warning."""
+        return replace(self, warnings=(*self.warnings, text))
+
     def window(self, from_s: float, to_s: float) -> Log:
         """The rows from one time up to, not including, another [s]; raises LogError where there are fewer than two."""
         inside = (self.time_s >= from_s) & (self.time_s < to_s)

@@ -22,7 +22,6 @@ MANY, SEVERAL_LOGS = 3, 2
 """Conflicts, and logs that have them, from which on they are a gap: chance mistakes in streaks make one or two."""
 MOSTLY = 0.7
 """Share of a segment's results that name one other class, from which on they are no chance mistakes."""
-
 CONFUSED, FEWEST_OF_SURFACE = 0.3, 30
 """Share of a surface's results that name others from which on these are no chance mistakes, and how many results of it
 have to be there."""

@@ -19,7 +19,8 @@ SLOW_SHARE, SLOW_BY = 0.3, 0.15
 from which on the camera is unsure when it is slow [-]."""
 SHUNNED_BY, SHUNNED_SHARE = 0.45, 0.15
 """Fall of the logarithm on one class against another, and of the confidence itself, from which on the class is shunned:
-nominal chains had up to 0.25, and little of a confidence that is low everywhere [-]."""
+nominal chains had up to 0.25, one that is less sure of snow 0.41, and little of a confidence that is low everywhere
+[-]."""
 FEWEST_OF_CLASS = 5
 """Blocks of a class that can tell."""
 CREEPS, CREEPS_BY = 0.6, 0.2

@@ -201,6 +201,10 @@ def shift_chain(
     # A chain that errs in streaks may do so on the hold-out alone: scatter is no shift there either.
     scale = max(closest.scale, closest.scale_of(unseen, height_m))
     accounts = [_account(f, plain, unseen, height_m, scale, known) for f in (plain, *fits)]
+    others = [_account(shifted, plain, unseen, height_m, scale, known) for shifted in free]
+    scores = [account.score for account in (*accounts, *others)]
+    best, foremost = max(scores), (plain, *fits, *free)[int(np.argmax(scores))]
+    sure = best > BEYOND_DOUBT and _leaves_its_stamp(foremost, every, height_m)
     chain = Chain(
         SIGNAL,
         pictures,
@@ -209,12 +213,8 @@ def shift_chain(
         tuple(accounts[1:]),
         places=_places(accounts[0], unseen),
         next_step=NEXT_STEP,
+        quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0 and not sure,
     )
-    others = [_account(shifted, plain, unseen, height_m, scale, known) for shifted in free]
-    scores = [account.score for account in (*accounts, *others)]
-    best, foremost = max(scores), (plain, *fits, *free)[int(np.argmax(scores))]
-    sure = best > BEYOND_DOUBT and _leaves_its_stamp(foremost, every, height_m)
-    chain = replace(chain, quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0 and not sure)
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
     if drift:
         nothing, *rest = (_account(f, plain, unseen, height_m, drift.scale, known) for f in (plain, *fits))
