@@ -53,12 +53,15 @@ class Entry:
         Whitened residuals on the fit logs and on the hold-out.
     loss_fit, loss_hold : float
         Their losses.
+    odds : float
+        Against any other entry before the logs are looked at [-].
     """
 
     ids: tuple[str, ...]
     fit: Fit | None
     z_fit: Array
     z_hold: Array
+    odds: float = 1.0
 
     @property
     def name(self) -> str:
@@ -88,8 +91,8 @@ class Entry:
 
     @property
     def size(self) -> int:
-        """Number of parameters."""
-        return 0 if self.fit is None else len(self.fit.x)
+        """Number of parameters that logs can tell."""
+        return 0 if self.fit is None else sum(np.isfinite(self.fit.candidate.open_share))
 
 
 @dataclass(frozen=True)
@@ -264,7 +267,8 @@ def _beyond(candidate: Candidate, x: Array) -> Array:
 
 def as_it_is(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Entry:
     """The entry of a model to which nothing is fitted."""
-    return Entry((), None, *(e.whitened(e.residuals(model)) for e in (fit_to, holdout)))
+    left_fit, left_hold = (e.whitened(e.residuals(model)) for e in (fit_to, holdout))
+    return Entry((), None, left_fit, left_hold)
 
 
 def enter(candidate: Candidate, fit_to: Evidence, holdout: Evidence, start: Array, steps: int) -> Entry:

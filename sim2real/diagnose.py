@@ -16,6 +16,7 @@ from sim2real.closure import closing
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import drift_of, gather, residuals
+from sim2real.faint_counter import DELAY, traced, with_hidden_counter
 from sim2real.findings import Findings, describe
 from sim2real.gap import measure
 from sim2real.lattice import common_lattice
@@ -146,6 +147,10 @@ def find(
     order, (*fit, holdout) = without_order(base, [*fit, holdout])
     fit_to, held = gather(base, fit), gather(base, [holdout])
     first = first_round(base, fit_to, exclude, jobs, progress)
+    if not base.has(COUNTER) and (lattice := traced((*fit, holdout), first)):
+        base = model.with_effects(lattice.effect())
+        fit_to, held = gather(base, fit), gather(base, [holdout])
+        first = first_round(base, fit_to, exclude, jobs, progress)
     if first:
         best = first[0].candidate.model(first[0].x)
         fit_to, held = fit_to.sharpened(best), held.sharpened(best)
@@ -166,6 +171,9 @@ def find(
     decision = decide(contest, fit_to, held)
     if decision.verdict is Verdict.UNKNOWN:
         contest = add_varied(contest, base, fit_to, held, jobs, progress)
+        decision = decide(contest, fit_to, held)
+    elif decision.winner.ids == (DELAY,) and not base.has(COUNTER) and COUNTER not in exclude:
+        contest = with_hidden_counter(contest, base, fit_to, held)
         decision = decide(contest, fit_to, held)
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)

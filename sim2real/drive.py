@@ -10,6 +10,7 @@ from scipy.ndimage import median_filter
 
 from scenarios.files import WHEELS, RoadFile
 from sim2real.lattice import Lattice
+from sim2real.lattice_trace import Trace
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,8 @@ class Drive:
         Channels that are evidence: measured, and not computed from others.
     lattice : Lattice or None
         What a pulse-counting sensor left in the wheel speeds, as logged.
+    trace : Trace or None
+        What is left of such a lattice where noise hides it.
     swing : array, shape (n, 7), or None
         What was taken off `measured` since it repeats with the wheels' angle, see `sim2real.orders`.
     """
@@ -71,6 +74,7 @@ class Drive:
     moving: NDArray[np.bool_]
     counted: NDArray[np.bool_]
     lattice: Lattice | None = None
+    trace: Trace | None = None
     swing: Array | None = None
 
     @property
@@ -101,6 +105,7 @@ def make_drive(
     columns: dict[str, Array],
     without: frozenset[str] = frozenset(),
     lattice: Lattice | None = None,
+    trace: Trace | None = None,
 ) -> Drive:
     """Channels of a log that is on a uniform grid.
 
@@ -114,7 +119,7 @@ def make_drive(
         The contract's columns, shape (n,) each, NaN where lost.
     without : frozenset of str
         Columns that are not evidence of their own (computed from others); they still tell where on the road the car is.
-    lattice : Lattice, optional
+    lattice, trace : Lattice, Trace, optional
         Found in the wheel speeds at the log's own rate.
     """
     measured = np.column_stack([columns[name] for name in CHANNELS]).astype(np.float64)
@@ -127,7 +132,7 @@ def make_drive(
     moving = np.nan_to_num(speed, nan=np.inf) > LEAST_SPEED_M_S
     moving &= ~backward(time_s, measured[:, WHEEL])
     counted = np.isfinite(measured).any(axis=0) & np.array([name not in without for name in CHANNELS])
-    return Drive(name, road, time_s, torque, measured, moving, counted, lattice)
+    return Drive(name, road, time_s, torque, measured, moving, counted, lattice, trace)
 
 
 def backward(time_s: Array, wheels: Array) -> NDArray[np.bool_]:

@@ -207,7 +207,8 @@ def _cause(
     values = values or {name: value for (_, name), value in alone.items()}
     if found.decision.varied and key in found.decision.winner.ids:
         values = _as_means(values, found.decision.varied, told.fitted, key)
-    excited = _excited(next(iter(alone.values())), float(best.candidate.scale[0]))
+    told_first = int(np.flatnonzero(np.isfinite(best.candidate.open_share))[0])
+    excited = _excited(list(alone.values())[told_first], float(best.candidate.scale[told_first]))
     fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
     shrunk = shrink(held, before, after, seed)

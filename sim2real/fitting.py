@@ -82,6 +82,11 @@ class Candidate:
         return np.array([p.neutral_value(car) for _, p in self.parameters])
 
     @cached_property
+    def open_share(self) -> Array:
+        """Share of each parameter that no log can tell [-]."""
+        return np.array([p.open_share for _, p in self.parameters])
+
+    @cached_property
     def starts(self) -> Array:
         """Points to start from, shape (m, k)."""
         car = self.base.vehicle.to_core()

@@ -129,9 +129,8 @@ def intervals(found: Fit, evidence: Evidence) -> list[tuple[float, float, float]
             meat += np.outer(score, score)
     sandwich = bread @ meat @ bread
     variance = np.maximum(np.diag(sandwich), np.diag(bread))
-    open_share = np.array([p.open_share for _, p in found.candidate.parameters])
     half = np.hypot(1.96 * INTERVAL_FACTOR * np.sqrt(variance), LEAST_HALF_WIDTH) * scale
-    half = np.hypot(half, open_share * found.x)
+    half = np.hypot(half, found.candidate.open_share * found.x)
     low, high = found.candidate.bounds
     return [
         (float(x), float(max(x - h, a)), float(min(x + h, b)))

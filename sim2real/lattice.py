@@ -60,6 +60,8 @@ COUNTED = 0.25
 1/6 [squared quanta]."""
 UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
+AGE_RANGE = 1.2
+"""A window that only the wheels' age tells may be so much longer or shorter [-]."""
 MOST_SAMPLES = 1200
 SEARCH = 3000
 
@@ -71,6 +73,7 @@ class Reading(StrEnum):
     RUNNING = "counts over the last"
     UNSEEN = "changes at any row, and counts over less than"
     ROUNDED = "is rounded at any row, over a window that does not show; taken for"
+    AGED = "is as old on average as a count over"
 
 
 @dataclass(frozen=True)
@@ -156,6 +159,8 @@ class Lattice:
         """What the window may be [s]."""
         if self.reading is Reading.ROUNDED:
             return UNSEEN * self.step_s, LONGEST_WINDOW_S
+        if self.reading is Reading.AGED:
+            return self.window_s / AGE_RANGE, self.window_s * AGE_RANGE
         seen = self.reading is not Reading.UNSEEN
         least = self.window_s - 0.5 * self.step_s if seen else UNSEEN * self.step_s
         return least, self.window_s + 0.5 * self.step_s
@@ -163,8 +168,9 @@ class Lattice:
     @property
     def sentence(self) -> str:
         """What it is, in words."""
+        near = "lie nearer than chance to" if self.reading is Reading.AGED else "are"
         return (
-            f"All wheel speeds are multiples of {self.quantum_rad_s:.4g} rad/s, and each {self.reading} "
+            f"All wheel speeds {near} multiples of {self.quantum_rad_s:.4g} rad/s, and each {self.reading} "
             f"{1e3 * self.window_s:.4g} ms."
         )
 
@@ -226,7 +232,7 @@ def common_lattice(found: Sequence[Lattice | None]) -> Lattice | None:
     return replace(middle, window_s=windows)
 
 
-def _coherence(values: Array, periods: Array) -> Array:
+def coherence(values: Array, periods: Array) -> Array:
     """How well values agree with multiples of each period, 0 to 1."""
     return np.array([abs(np.mean(np.exp(2j * np.pi * values / p))) for p in periods])
 
@@ -236,11 +242,11 @@ def _best_quantum(values: Array, low: float, high: float) -> tuple[float, float]
     reach = max(float(np.ptp(values)), high)
     count = int(min(max(4.0 * reach * (1.0 / low - 1.0 / high), 50.0), SEARCH))
     periods = 1.0 / np.linspace(1.0 / high, 1.0 / low, count)
-    found = _coherence(values, periods)
+    found = coherence(values, periods)
     best = float(periods[int(found.argmax())])
     near = 1.0 / np.linspace(1.0 / best - 1.0 / reach, 1.0 / best + 1.0 / reach, 201)
     near = near[(near >= low) & (near <= high)]
-    finer = _coherence(values, near)
+    finer = coherence(values, near)
     return float(near[int(finer.argmax())]), float(finer.max())
 
 
@@ -251,7 +257,7 @@ def _coarsest(values: Sequence[Array], quantum: float) -> float:
     pooled = np.concatenate(values)
     for times in range(COARSER, 1, -1):
         alike = np.mean(steps % times == 0.0) if len(steps) else 0.0
-        if alike >= ALL_BUT_FEW and _coherence(pooled, np.array([times * quantum]))[0] >= LATTICE_COHERENCE:
+        if alike >= ALL_BUT_FEW and coherence(pooled, np.array([times * quantum]))[0] >= LATTICE_COHERENCE:
             return times * quantum
     return quantum
 
@@ -274,16 +280,16 @@ def _held_window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s:
     if high <= low or not early:
         return None
 
-    def coherence(rates: Array) -> Array:
+    def agreement(rates: Array) -> Array:
         """Each wheel's windows may begin at times of their own."""
-        return np.asarray(np.mean([_coherence(c, 1.0 / rates) for c in early], axis=0))
+        return np.asarray(np.mean([coherence(c, 1.0 / rates) for c in early], axis=0))
 
     rates = np.linspace(low, high, max(int(4.0 * CHANGES_S * (high - low)), 2))
-    good = np.flatnonzero(coherence(rates) > HOLD_COHERENCE)
+    good = np.flatnonzero(agreement(rates) > HOLD_COHERENCE)
     if not len(good):
         return None
     near = rates[good[0]] + np.linspace(0.0, 1.0 / CHANGES_S, 41)
-    return float(1.0 / near[int(coherence(near).argmax())])
+    return float(1.0 / near[int(agreement(near).argmax())])
 
 
 def _running_window(wheels: Sequence[Array], quantum: float, step_s: float) -> tuple[float, Reading]:

@@ -84,7 +84,8 @@ def parameter(
 ) -> Any:
     """Declare one effect parameter; values outside [low, high] are refused, fits begin at `starts`.
 
-    `open_share` of it no log can tell, since it stands beside a constant that others may take otherwise.
+    `open_share` of it no log can tell, since it stands beside a constant that others may take otherwise; where it is
+    infinite nothing is told but the bounds.
     """
     about = {"unit": unit, "meaning": meaning, "neutral": neutral, "low": low, "high": high, "starts": starts}
     return field(metadata=about | {"open_share": open_share})
