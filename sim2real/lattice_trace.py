@@ -12,18 +12,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft, rfftfreq
 from scipy.ndimage import uniform_filter1d
 
-from sim2real.lattice import QUANTUM_RANGE, SMOOTHING_S, Lattice, Reading, coherence, is_digit
+from sim2real.lattice import SMOOTHING_S, Lattice, Reading, coherence, find_lattice, is_digit
 
 Array = NDArray[np.float64]
 
 EXCESS = 0.15
-"""Least coherence of the values with a lattice beyond that of the motion; of noise alone, three thousand lattices
-leave less than 0.07 where there are two thousand values [-]."""
+"""Least coherence of the values with a lattice beyond that of the motion; of noise alone, the best of ten thousand
+lattices has less than 0.07 where there are two thousand values [-]."""
 LEAST_SAMPLES = 2000
 MOST_SAMPLES = 6000
-SEARCH = 3000
+RANGE = (0.6, 4.6)
+"""Quanta that are looked for, in standard deviations of what is faster than the motion; what is held over a window lags
+behind the motion, too [-]."""
+BINS, FINER = 8, 4
+"""Bins per least quantum, and steps of the search per one that the values' range tells from the next [-]."""
 ALIKE = 0.005
 """How closely the logs of one car have to agree in the quantum [-]."""
 
@@ -51,6 +56,12 @@ class Trace:
         return Lattice(self.quantum_rad_s, age_s, self.sigma_rad_s, self.step_s, Reading.AGED)
 
 
+def find_counter(time_s: Array, wheels: Sequence[Array]) -> tuple[Lattice | None, Trace | None]:
+    """What wheel speeds as logged, NaN where lost, tell of a counter: its lattice, or at least a trace of it."""
+    lattice = find_lattice(time_s, wheels)
+    return lattice, None if lattice else find_trace(time_s, wheels)
+
+
 def find_trace(time_s: Array, wheels: Sequence[Array]) -> Trace | None:
     """The lattice that all wheel speeds have a trace of, or None.
 
@@ -70,25 +81,42 @@ def find_trace(time_s: Array, wheels: Sequence[Array]) -> Trace | None:
     spread = 1.4826 * float(np.median(np.abs(np.concatenate(values) - np.concatenate(motion))))
     if spread <= 0.0:
         return None
-    thin = max(sum(map(len, values)) // MOST_SAMPLES, 1)
-    seen, moved = (np.concatenate([v[::thin] for v in part]) for part in (values, motion))
-    low, high = QUANTUM_RANGE[0] * spread, QUANTUM_RANGE[1] * spread
-    reach = max(float(np.ptp(seen)), high)
-    count = int(np.clip(4.0 * reach * (1.0 / low - 1.0 / high), 50, SEARCH))
-    best, _ = _most(seen, moved, 1.0 / np.linspace(1.0 / high, 1.0 / low, count))
-    near = 1.0 / np.linspace(1.0 / best - 1.0 / reach, 1.0 / best + 1.0 / reach, 201)
-    quantum, excess = _most(seen, moved, near[(near >= low) & (near <= high)])
-    if excess < EXCESS or is_digit(quantum):
+    best, excess = _most_traced(np.concatenate(values), np.concatenate(motion), spread)
+    if excess < EXCESS:
         return None
-    sigma = quantum * np.sqrt(-np.log(min(excess, 1.0))) / (np.sqrt(2.0) * np.pi)
+    quantum, strength = _refined(values, best)
+    if is_digit(quantum):
+        return None
+    sigma = quantum * np.sqrt(-np.log(min(strength, 1.0))) / (np.sqrt(2.0) * np.pi)
     return Trace(quantum, float(sigma), step_s)
 
 
-def _most(seen: Array, moved: Array, periods: Array) -> tuple[float, float]:
-    """The period that the values agree with most beyond the motion, and by how much [-]."""
-    beyond = coherence(seen, periods) - coherence(moved, periods)
+def _most_traced(values: Array, motion: Array, spread: float) -> tuple[float, float]:
+    """The quantum that the values agree with most beyond the motion, and by how much [-]."""
+    low, high = (share * spread for share in RANGE)
+    start, width = min(values.min(), motion.min()), low / BINS
+    reach = max(values.max(), motion.max()) - start
+    length = next_fast_len(int(FINER * max(reach, high) / width) + 1)
+    rates = rfftfreq(length, width)
+    looked = (rates >= 1.0 / high) & (rates <= 1.0 / low)
+
+    def agreement(each: Array) -> Array:
+        counts = np.bincount(((each - start) / width).astype(int), minlength=length)
+        return np.abs(rfft(counts, length))[looked] / len(each)
+
+    beyond = agreement(values) - agreement(motion)
     best = int(beyond.argmax())
-    return float(periods[best]), float(beyond[best])
+    return float(1.0 / rates[looked][best]), float(beyond[best])
+
+
+def _refined(values: Sequence[Array], quantum: float) -> tuple[float, float]:
+    """The quantum nearby that the values agree with best, and how well [-]."""
+    thin = max(sum(map(len, values)) // MOST_SAMPLES, 1)
+    seen = np.concatenate([v[::thin] for v in values])
+    near = 1.0 / (1.0 / quantum + np.linspace(-1.0, 1.0, 201) / max(float(np.ptp(seen)), quantum))
+    found = coherence(seen, near := near[near > 0.0])
+    best = int(found.argmax())
+    return float(near[best]), float(found[best])
 
 
 def common_trace(found: Sequence[Trace | None]) -> Trace | None:

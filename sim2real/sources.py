@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scenarios.errors import ScenarioError
 from scenarios.files import WHEELS, RoadFile, VehicleFile, load_road, load_vehicle
 from sim2real.drive import WHEEL, Drive, awake, backward, grid_step, make_drive
-from sim2real.lattice import find_lattice
-from sim2real.lattice_trace import find_trace
+from sim2real.lattice_trace import find_counter
 from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
 from sim2real.logs.checks import MIN_DURATION_S
 
@@ -135,8 +134,7 @@ def drive_of(log: Log, road: RoadFile) -> Drive:
     """All of a log on the diagnosis' grid, with what its wheel speeds tell of a counter at their own rate."""
     time_s, signals = resample(log, grid_step(log.rate_hz))
     wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
-    lattice = find_lattice(log.time_s, wheels)
-    trace = None if lattice else find_trace(log.time_s, wheels)
+    lattice, trace = find_counter(log.time_s, wheels)
     return make_drive(log.name, road, time_s, signals, log.derived, lattice, trace)
 
 
