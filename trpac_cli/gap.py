@@ -69,6 +69,11 @@ def diagnose(
     --fit monday.csv --fit tuesday.mf4 --holdout friday.csv@wet_track.yaml
     --map mapping.yaml --out out/gap
 
+    A mapping file names columns and units that are not the log format's:
+    schema: 1, and under columns: lines such as
+    vehicle_speed_m_s: {column: VehSpd, unit: km/h}. Ready-made ones lie in
+    sim2real/mappings, all that they can say is in docs/logs.md.
+
     No logs at hand? trpac gap demo --out out/demo makes some.
 
     Exit codes: 0 with a diagnosis, 2 unusable input.

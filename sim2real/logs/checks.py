@@ -154,7 +154,8 @@ def check_motion(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Findin
 
 
 def check_wheels(signals: Mapping[str, Array]) -> Iterator[Finding]:
-    """Whether the wheels turn about as fast as the car moves: units, signs."""
+    """Whether the wheels turn about as fast as the car moves: units, signs; said once where all are off alike."""
+    off = {}
     for name in (n for n in WHEEL_SPEEDS if n in signals and "vehicle_speed_m_s" in signals):
         speed = signals["vehicle_speed_m_s"]
         moving = (np.abs(speed) > MOVING_M_S) & np.isfinite(speed + signals[name])
@@ -162,10 +163,19 @@ def check_wheels(signals: Mapping[str, Array]) -> Iterator[Finding]:
             continue
         ratio = float(np.median(signals[name][moving] / speed[moving]))
         if not WHEEL_PER_METRE[0] <= ratio <= WHEEL_PER_METRE[1]:
-            yield Finding(
-                f"column {name} over vehicle_speed_m_s is {ratio:.3g} rad/m in the median; expected "
-                f"{_span(WHEEL_PER_METRE)} rad/m (one over the wheel's radius). {_ratio_hint(ratio)}"
-            )
+            off[name] = ratio
+    if len(off) == len(WHEEL_SPEEDS) and len({_ratio_hint(ratio) for ratio in off.values()}) == 1:
+        yield _wheel_finding("every wheel speed", float(np.median(list(off.values()))))
+        return
+    for name, ratio in off.items():
+        yield _wheel_finding(f"column {name}", ratio)
+
+
+def _wheel_finding(what: str, ratio: float) -> Finding:
+    return Finding(
+        f"{what} over vehicle_speed_m_s is {ratio:.3g} rad/m in the median; expected {_span(WHEEL_PER_METRE)} rad/m "
+        f"(one over the wheel's radius). {_ratio_hint(ratio)}"
+    )
 
 
 def _check_position(time_s: Array, speed: Array, position: Array) -> Iterator[Finding]:
@@ -240,8 +250,14 @@ def _ratio_hint(ratio: float) -> str:
     if ratio < 0.0:
         return "Is a sign reversed?"
     if ratio < WHEEL_PER_METRE[0]:
-        return "Is the vehicle's speed in km/h, or the wheel's in m/s or rev/s?"
-    return "Is the wheel's speed in rpm, deg/s or km/h?"
+        return (
+            "Is the vehicle's speed in km/h, or the wheel's in m/s or rev/s? A mapping file says so: "
+            "`vehicle_speed_m_s: {column: NAME, unit: km/h}`."
+        )
+    return (
+        "Is the wheel's speed in rpm, deg/s or km/h? A mapping file says so: "
+        "`wheel_speed_fl_rad_s: {column: NAME, unit: rpm}`."
+    )
 
 
 def _span(bounds: tuple[float, float]) -> str:
