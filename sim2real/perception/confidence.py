@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 
 NORMAL_CONFIDENCE = 0.9
 """Q_v of a camera chain that nothing disturbs: the shipped networks' median is 0.99, other chains say less [-]."""
-NORMAL_SPREAD = 0.125
-"""Standard deviation of its logarithm among chains: 0.7 is still normal, 0.5 (the flag's threshold) is not [-]."""
+NORMAL_SPREAD = 0.1
+"""Standard deviation of its logarithm among chains: 0.74 is still normal, 0.5 (the flag's threshold) is not [-]."""
 CLASS_SPREAD = 0.1
 """Standard deviation of its logarithm among the classes of one chain [-]."""
 USUAL_ERROR, ERROR_SPREAD = 0.04, 0.7

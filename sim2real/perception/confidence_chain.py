@@ -42,7 +42,7 @@ NOTICED = 0.1
 QUIET, BEYOND_DOUBT, AGAINST = 0.97, 6.0, -1.0
 """Share of the hold-out's gap that an effect has to get below, else it is none [-], unless all logs together speak for
 it by so much, and the hold-out not by more than a nat against it [nats]."""
-SLIGHT = 0.04
+SLIGHT = 0.035
 """Fall of the confidence's logarithm between low and high speed below which blur is none: a normal camera is as unsure
 [-]."""
 
