@@ -81,7 +81,7 @@ def beside(structure: Structure | None) -> str:
     """The structural part."""
     if structure is None:
         return ""
-    values = ", ".join(f"{name} {100.0 * v.value:+.0f} %" for name, v in structure.parameters.items())
+    values = ", ".join(f"{name} {100.0 * v.value:+.1f} %" for name, v in structure.parameters.items())
     return (
         f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}), "
         f"which leaves {structure.gap_after:.1f}: a difference of the models, not a fault."

@@ -72,6 +72,8 @@ class Term:
         The loss without it.
     size, samples : int
         Values that were fitted, and residuals behind them.
+    drawn_from : int
+        First value to draw: of a curve that each drive has its own of, the last drive's, which is the hold-out.
     """
 
     equation: Equation
@@ -82,6 +84,7 @@ class Term:
     null_loss: float
     size: int
     samples: int
+    drawn_from: int = 0
 
 
 def fit_terms(
@@ -130,7 +133,9 @@ def _fit_term(free: _Free, z: Sequence[Array]) -> Term:
     y, left = _solve(every, free.slopes(z, np.zeros(len(free.hats))))
     null = float(np.sum(robust(every)))
     x = np.array([place for _, place, _ in free.hats])
-    return Term(free.equation, free.quantity, x, y, left, null, len(x), int(np.count_nonzero(every)))
+    last = sum(len(free.drives) - 1 in which for which, _, _ in free.hats)
+    samples = int(np.count_nonzero(every))
+    return Term(free.equation, free.quantity, x, y, left, null, len(x), samples, len(x) - last)
 
 
 Hat = tuple[list[int], float, Callable[[Array], Array]]
@@ -338,8 +343,8 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
         sign,
         shape,
         share,
-        best.x,
-        best.y,
+        best.x[best.drawn_from :],
+        best.y[best.drawn_from :],
         sentence,
     )
 

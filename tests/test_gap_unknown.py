@@ -186,6 +186,19 @@ def test_what_is_told_by_a_curve_over_the_motion_is_not_followed_closely(dragged
     assert finer(MODEL, held.drives, held.noises, dragged) == dragged
 
 
+@pytest.mark.parametrize("quantity", ["time", "speed"])
+def test_a_curve_of_each_log_is_drawn_for_the_last(quantity):
+    drives = [clean(pulses(d), 12.0) for d in (8.0, 12.0)]
+    held = gather(MODEL, drives)
+    (term,) = fit_terms(
+        MODEL, held.drives, held.noises, equations=[EQUATION["force"]], quantities=(quantity,)
+    )
+    told = characterise([term])
+    assert np.all(np.diff(told.x) > 0.0)
+    assert len(told.x) == len(told.y) == (len(term.x) if quantity == "speed" else 7)  # 12 s in knots of 2 s
+    assert told.y == pytest.approx(term.y[-len(told.y) :])
+
+
 def test_a_log_whose_gap_is_elsewhere_in_time_shares_no_curve():
     """Curves over time are each log's own, so knots double with the logs."""
     drives = random_drives({}, count=2, seed=4, duration_s=6.0)
