@@ -208,7 +208,11 @@ def _cause(
     if found.decision.varied and key in found.decision.winner.ids:
         values = _as_means(values, found.decision.varied, told.fitted, key)
     told_first = int(np.flatnonzero(np.isfinite(best.candidate.open_share))[0])
-    excited = _excited(list(alone.values())[told_first], float(best.candidate.scale[told_first]))
+    excited = _excited(
+        list(alone.values())[told_first],
+        float(best.candidate.neutral[told_first]),
+        float(best.candidate.scale[told_first]),
+    )
     fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
     shrunk = shrink(held, before, after, seed)
@@ -326,12 +330,14 @@ def _over_forms(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval
 
 
 EXCITED_SHARE = 4.0 / 3.0
-"""A parameter is seen when its interval's half width is below this many noticeable changes of it [-]."""
+"""A parameter is seen when its interval's half width is below this many noticeable changes of it, or leaves its absence
+out [-]."""
 
 
-def _excited(first: Interval, noticeable: float) -> bool:
+def _excited(first: Interval, neutral: float, noticeable: float) -> bool:
     """Whether an effect's first parameter is seen."""
-    return 0.5 * (first.high - first.low) < EXCITED_SHARE * noticeable
+    narrow = 0.5 * (first.high - first.low) < EXCITED_SHARE * noticeable
+    return narrow or not first.low <= neutral <= first.high
 
 
 def _subsystem(decision: Decision, terms: Sequence[Term]) -> str:

@@ -9,13 +9,14 @@ from gap_drives import MODEL, SIGMA, clean, noisy, pulses, random_drives, rms, r
 from scenarios.effects import EFFECTS
 from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.mass_offset import MassOffset
-from sim2real import gap, where
+from sim2real import findings, gap, where
 from sim2real.diagnose import diagnose
 from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
 from sim2real.evidence import Evidence, gather, residuals
 from sim2real.findings import at_bound
 from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
+from sim2real.result import Interval
 from sim2real.where import REGIMES, Blocks, blocks, equation_shares, heat_map, places, regimes
 
 
@@ -157,9 +158,19 @@ def test_intervals_cover_and_are_no_wider_than_said(colour):
     rows = int((drive.time_s >= 0.3).sum())
     error = SIGMA[ACCEL] * np.sqrt((1.0 + colour) / (1.0 - colour) / rows)
     assert share >= 0.95
-    # the least half width is a hundredth of a noticeable change
+    # the least half width is a hundredth of a noticeable change, and a share of the bias
     least = gap.LEAST_HALF_WIDTH * Candidate(MODEL, ("accelerometer_bias",)).scale[0]
-    assert width == pytest.approx(np.hypot(1.96 * gap.INTERVAL_FACTOR * error, least), rel=0.25)
+    form = gap.FORM_SHARE * 0.2
+    assert width == pytest.approx(
+        np.hypot(1.96 * gap.INTERVAL_FACTOR * error, np.hypot(least, form)), rel=0.25
+    )
+
+
+def test_an_effect_that_is_far_from_its_absence_is_seen_however_wide_its_interval():
+    noticeable = 0.01
+    assert findings._excited(Interval(0.5, 0.45, 0.55, "s"), 0.0, noticeable)
+    assert findings._excited(Interval(0.0, -0.01, 0.01, "s"), 0.0, noticeable)
+    assert not findings._excited(Interval(0.05, -0.01, 0.11, "s"), 0.0, noticeable)
 
 
 def test_intervals_stay_within_the_bounds(tame):
