@@ -53,15 +53,12 @@ class Entry:
         Whitened residuals on the fit logs and on the hold-out.
     loss_fit, loss_hold : float
         Their losses.
-    odds : float
-        Against any other entry before the logs are looked at [-].
     """
 
     ids: tuple[str, ...]
     fit: Fit | None
     z_fit: Array
     z_hold: Array
-    odds: float = 1.0
 
     @property
     def name(self) -> str:

@@ -16,7 +16,7 @@ from sim2real.closure import closing
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import drift_of, gather, residuals
-from sim2real.faint_counter import DELAY, traced, with_hidden_counter
+from sim2real.faint_counter import DELAY, beside_a_counter, traced
 from sim2real.findings import Findings, describe
 from sim2real.gap import measure
 from sim2real.lattice import common_lattice
@@ -173,8 +173,7 @@ def find(
         contest = add_varied(contest, base, fit_to, held, jobs, progress)
         decision = decide(contest, fit_to, held)
     elif decision.winner.ids == (DELAY,) and not base.has(COUNTER) and COUNTER not in exclude:
-        contest = with_hidden_counter(contest, base, fit_to, held)
-        decision = decide(contest, fit_to, held)
+        contest, decision = beside_a_counter(contest, decision, base, fit_to, held)
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)

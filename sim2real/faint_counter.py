@@ -1,7 +1,7 @@
 """A pulse counter whose steps are lost in noise: what is left of it is its age, which a delay has too.
 
 Where a trace of its lattice is left, see `sim2real.lattice_trace`, late wheel speeds are a counter's. Without one it
-differs from a delay by its averaging alone, and may stand beside one as what it is as well.
+differs from a delay by its averaging alone, which other things do too: it stands beside the delay as its rival.
 """
 
 from __future__ import annotations
@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 
 from scenarios.effects.base import parameter
 from scenarios.effects.wheel_speed_quantisation import MOST_TEETH
-from sim2real.contest import Contest, enter
+from sim2real.contest import Contest, Entry, enter
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import Evidence, all_logs
 from sim2real.fitting import FULL_STEPS, Candidate, Fit
 from sim2real.lattice import AGE_RANGE, LONGEST_WINDOW_S, Lattice, RunningCounter, SmoothCounter
 from sim2real.lattice_trace import common_trace
 from sim2real.observer import Simulation
+from sim2real.result import Verdict
+from sim2real.selection import RIVAL, Decision, probabilities
 
 Array = NDArray[np.float64]
 
@@ -31,8 +33,8 @@ HIDDEN = 2.0
 """Steps of up to this many standard deviations of the wheel speeds leave no trace [-]."""
 FINEST_TEETH = 5000.0
 """A counter that would need more pulses per revolution to leave no trace is none [-]."""
-ODDS = 0.1
-"""Of a counter as fine as that against a plain delay, before the logs are looked at [-]."""
+MOST_BELIEF = 0.4
+"""Share of the belief in both that is the counter's at most: late messages average alike, and have no teeth [-]."""
 
 
 @dataclass(frozen=True)
@@ -97,18 +99,38 @@ def traced(drives: Sequence[Drive], first: Sequence[Fit]) -> Lattice | None:
     return trace.aged(float(first[0].x[0]))
 
 
-def with_hidden_counter(contest: Contest, model: Simulation, fit_to: Evidence, holdout: Evidence) -> Contest:
-    """The contest with such a counter in it, where a delay could be one."""
-    delay = next(e for e in contest.singles if e.ids == (DELAY,))
+def beside_a_counter(
+    contest: Contest, decision: Decision, model: Simulation, fit_to: Evidence, holdout: Evidence
+) -> tuple[Contest, Decision]:
+    """Contest and decision with such a counter beside the delay that the decision is about, where it could be one.
+
+    However well it averages, it does not come before the delay: many things do that are no counter.
+    """
+    delay = decision.winner
+    counter = _counter_as_late(delay, model, fit_to, holdout)
+    if counter is None:
+        return contest, decision
+    contest = replace(contest, singles=(*contest.singles, counter))
+    ours, its = probabilities(contest, [delay, counter], fit_to, holdout)[1:]
+    if its <= RIVAL * ours or decision.verdict is Verdict.UNKNOWN:
+        return contest, decision
+    share = min(float(its / (ours + its)), MOST_BELIEF)
+    both = decision.probability[DELAY]
+    belief = {**decision.probability, DELAY: (1.0 - share) * both, counter.ids[0]: share * both}
+    rivals = (counter, *decision.rivals)
+    return contest, replace(decision, verdict=Verdict.AMBIGUOUS, rivals=rivals, probability=belief)
+
+
+def _counter_as_late(delay: Entry, model: Simulation, fit_to: Evidence, holdout: Evidence) -> Entry | None:
+    """The counter that does best, fitted from a delay's age; None where it would have to be finer than any is."""
     sigma = min(float(n.sigma[WHEEL].max()) for n in all_logs(fit_to, holdout)[1])
     age_s = float(delay.fitted.x[0])
     least = 2.0 * np.pi / (HIDDEN * sigma * age_s)
     if least > FINEST_TEETH:
-        return contest
+        return None
     entries = []
     for kind, windows in ((HiddenCounter, 1.0), (HiddenRunningCounter, 2.0)):
         candidate = HiddenCandidate(model, (HiddenCounter.id,), least_teeth=least / windows, kind=kind)
         start = np.array([FINEST_TEETH, windows * age_s])
         entries.append(enter(candidate, fit_to, holdout, start, FULL_STEPS))
-    best = min(entries, key=lambda e: e.loss)
-    return replace(contest, singles=(*contest.singles, replace(best, odds=ODDS)))
+    return min(entries, key=lambda e: e.loss)

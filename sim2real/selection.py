@@ -84,9 +84,7 @@ def probabilities(contest: Contest, entries: list[Entry], fit_to: Evidence, hold
     factor = inflation(best, fit_to, holdout)
     samples = max(np.count_nonzero(best.z_fit) / factor, 2.0)
     tempered = SOFTNESS * factor + FORM * (contest.null.loss - best.loss)
-    score = np.array(
-        [-0.5 * e.loss / tempered - 0.5 * e.size * np.log(samples) + np.log(e.odds) for e in everyone]
-    )
+    score = np.array([-0.5 * e.loss / tempered - 0.5 * e.size * np.log(samples) for e in everyone])
     weight = np.exp(score - score.max())
     return weight / weight.sum()
 

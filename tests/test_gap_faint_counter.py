@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from benchmarks.gap_development import Levels
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import diagnose, find
-from sim2real.faint_counter import FINEST_TEETH, with_hidden_counter
+from sim2real.faint_counter import FINEST_TEETH, HIDDEN
 from sim2real.lattice import find_lattice
 from sim2real.lattice_trace import Trace, common_trace, find_trace
 from sim2real.result import Verdict
@@ -101,31 +101,40 @@ def test_a_trace_of_a_counter_that_was_left_out_is_unknown():
     assert said.unexplained.subsystem == "wheel_speed_sensor"
 
 
-def test_without_a_trace_its_averaging_tells_it_from_a_delay():
+def test_without_a_trace_it_stands_beside_a_delay():
     teeth, window_s = 4096.0, 0.04
     drives = counted_logs(teeth, window_s, 0.6 * TURN / (teeth * window_s))
     assert not any(d.lattice or d.trace for d in drives)
     said = diagnose(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT)
-    assert said.causes[0].effect == COUNTER
-    window = said.causes[0].parameters["window_s"]
-    assert window.low < window_s < window.high
-    assert said.causes[0].parameters["teeth"].low < teeth < said.causes[0].parameters["teeth"].high
+    assert said.verdict is Verdict.AMBIGUOUS
+    assert said.ambiguous_with == ((DELAY, COUNTER),)
+    assert [c.effect for c in said.causes[:2]] == [DELAY, COUNTER]
+    counter = said.causes[1]
+    for name, truth in (("teeth", teeth), ("window_s", window_s)):
+        assert counter.parameters[name].low < truth < counter.parameters[name].high
     assert COUNTER not in said.cannot_rule_out  # its window shows, if not its teeth
+    assert sum(c.probability for c in said.causes) <= 1.0
+    assert said.next_manoeuvre is not None
 
 
 @pytest.mark.parametrize("delay_s", [0.015, 0.04])
-def test_a_delay_stays_one_beside_such_a_counter(delay_s):
+def test_a_delay_stays_one_though_a_counter_could_be_hidden(delay_s):
     drives = counted_logs(0, 0.0, 0.05, **{DELAY: {"delay_s": delay_s}})
     found = find(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT)
     assert found.decision.winner.ids == (DELAY,)
 
 
+def test_a_counter_that_was_left_out_is_no_rival():
+    drives = counted_logs(0, 0.0, 0.05, **{DELAY: {"delay_s": 0.04}})
+    found = find(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT | {COUNTER})
+    assert [e.ids[0] for e in found.contest.singles] == [DELAY, "torque_lag"]
+
+
 def test_no_counter_is_as_fine_as_it_would_have_to_be():
     drives = counted_logs(0, 0.0, 0.01, **{DELAY: {"delay_s": 0.01}})
     found = find(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT)
-    assert TURN / (2.0 * 0.01 * 0.01) > FINEST_TEETH
-    again = with_hidden_counter(found.contest, found.model, found.fit_to, found.holdout)
-    assert COUNTER not in [e.ids[0] for e in again.singles]
+    assert TURN / (HIDDEN * 0.01 * 0.01) > FINEST_TEETH
+    assert COUNTER not in [e.ids[0] for e in found.contest.singles]
 
 
 def test_what_counts_over_a_window_is_a_mean_of_it():
