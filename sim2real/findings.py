@@ -111,7 +111,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         sentence=" ".join(
             part
             for part in (
-                sentences.verdict(decision, gap, causes),
+                sentences.verdict(decision, gap, causes, structure),
                 unexplained.sentence if unexplained else "",
                 "" if found.only_order else sentences.nearest(decision, found.contest),
                 sentences.beside(structure),

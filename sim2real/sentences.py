@@ -19,8 +19,8 @@ SHOWN = 3
 """How many effects a sentence lists; the report and the JSON have all."""
 
 
-def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
-    """The verdict itself."""
+def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: Structure | None = None) -> str:
+    """The verdict itself; what a structural difference beside the cause takes is told with it."""
     size = f"{gap.before.total:.1f} times the noise floor"
     if decision.verdict is Verdict.NO_GAP:
         return "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
@@ -32,13 +32,15 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     if decision.verdict is Verdict.UNKNOWN:
         return f"There is a gap of {size}, and no effect of the library explains it."
     top = causes[0]
-    cut = f"it takes the gap from {gap.before.total:.1f} to {gap.after.total:.1f} times the noise floor"
+    after = structure.gap_after if structure else gap.after.total
+    cut = f"it takes the gap from {gap.before.total:.1f} to {after:.1f} times the noise floor"
     if decision.verdict is Verdict.COMPOUND:
         return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
     if decision.verdict is Verdict.AMBIGUOUS:
         return f"The gap of {size} is {top.effect}{_rivals(decision)}: these logs cannot tell which."
     values = ", ".join(f"{name} {_number(v.value, v.unit)}" for name, v in top.parameters.items())
-    return f"The gap of {size} is {top.effect} ({values}): {cut}."
+    together = ", together with what stands beside it" if structure else ""
+    return f"The gap of {size} is {top.effect} ({values}): {cut}{together}."
 
 
 def _rivals(decision: Decision) -> str:
@@ -83,8 +85,8 @@ def beside(structure: Structure | None) -> str:
         return ""
     values = ", ".join(f"{name} {100.0 * v.value:+.1f} %" for name, v in structure.parameters.items())
     return (
-        f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}), "
-        f"which leaves {structure.gap_after:.1f}: a difference of the models, not a fault."
+        f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}): "
+        "a difference of the models, not a fault."
     )
 
 

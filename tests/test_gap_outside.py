@@ -22,7 +22,7 @@ from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.goodness import Fitness, fitness
 from sim2real.hum import hum
 from sim2real.law import held_to_curves
-from sim2real.result import Verdict
+from sim2real.result import Structure, Verdict
 from sim2real.selection import EXPLAINED_MISFIT, NO_GAP_MISFIT, PAIR_MISFIT, Decision
 from sim2real.sentences import verdict as verdict_of
 
@@ -362,3 +362,14 @@ def test_torque_that_moves_between_the_axles_is_no_gain(factor, verdict):
     assert found.decision.further is (factor == 1.0)
     against = describe(found, seed=0, jobs=1, progress=silent).causes[0].evidence_against
     assert any("not what it is" in text for text in against) is found.decision.further
+
+
+def test_a_sentence_takes_what_stands_beside_the_cause_together_with_it(mistaken):
+    """Alone the cause may even enlarge the gap, where another curve of the tyres stands beside it."""
+    found = describe(mistaken, seed=0, jobs=1, progress=silent)
+    decision = replace(mistaken.decision, verdict=Verdict.IDENTIFIED)
+    before = f"takes the gap from {found.gap.before.total:.1f} to "
+    alone = verdict_of(decision, found.gap, found.causes)
+    beside = verdict_of(decision, found.gap, found.causes, Structure("tyre_shape", {}, 1.04))
+    assert f"{before}{found.gap.after.total:.1f} times the noise floor." in alone
+    assert f"{before}1.0 times the noise floor, together with what stands beside it." in beside
