@@ -125,9 +125,9 @@ def _counter_as_late(delay: Entry, model: Simulation, fit_to: Evidence, holdout:
     """The counter that does best, fitted from a delay's age; None where it would have to be finer than any is."""
     sigma = min(float(n.sigma[WHEEL].max()) for n in all_logs(fit_to, holdout)[1])
     age_s = float(delay.fitted.x[0])
-    least = 2.0 * np.pi / (HIDDEN * sigma * age_s)
-    if least > FINEST_TEETH:
+    if HIDDEN * sigma * age_s * FINEST_TEETH < 2.0 * np.pi:
         return None
+    least = 2.0 * np.pi / (HIDDEN * sigma * age_s)
     entries = []
     for kind, windows in ((HiddenCounter, 1.0), (HiddenRunningCounter, 2.0)):
         candidate = HiddenCandidate(model, (HiddenCounter.id,), least_teeth=least / windows, kind=kind)

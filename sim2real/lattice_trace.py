@@ -29,6 +29,8 @@ RANGE = (0.6, 4.6)
 behind the motion, too [-]."""
 BINS, FINER = 8, 4
 """Bins per least quantum, and steps of the search per one that the values' range tells from the next [-]."""
+MOST_BINS = 2**21
+"""Where the search would need more, the sensors are next to ideal, or a value is out of all bounds [-]."""
 ALIKE = 0.005
 """How closely the logs of one car have to agree in the quantum [-]."""
 
@@ -96,6 +98,8 @@ def _most_traced(values: Array, motion: Array, spread: float) -> tuple[float, fl
     low, high = (share * spread for share in RANGE)
     start, width = min(values.min(), motion.min()), low / BINS
     reach = max(values.max(), motion.max()) - start
+    if FINER * max(reach, high) / width > MOST_BINS:
+        return high, 0.0
     length = next_fast_len(int(FINER * max(reach, high) / width) + 1)
     rates = rfftfreq(length, width)
     looked = (rates >= 1.0 / high) & (rates <= 1.0 / low)

@@ -64,6 +64,16 @@ def test_a_log_without_wheel_noise_or_rounding_has_no_trace():
     assert find_trace(time_s, [np.full(1000, 40.0)] * 4) is None
 
 
+@pytest.mark.parametrize("noise_rad_s", [1e-12, 1e-6])
+def test_next_to_ideal_sensors_and_a_value_out_of_all_bounds_cost_no_memory(noise_rad_s):
+    time_s, speed = driving()
+    noise = np.random.default_rng(0).standard_normal(len(speed))
+    steady = np.full(len(speed), 40.0) + noise_rad_s * noise
+    assert find_trace(time_s, [steady, steady, steady, speed]) is None
+    speed[100] = 1e9
+    assert find_trace(time_s, [speed + 0.05 * noise] * 4) is None
+
+
 def test_logs_that_disagree_share_no_trace():
     a, near, far = (Trace(q, 0.03, 0.002) for q in (0.15, 0.1502, 0.19))
     assert common_trace([a, near, None]) == near
