@@ -23,7 +23,7 @@ from sim2real.lattice import AGE_RANGE, LONGEST_WINDOW_S, Lattice, RunningCounte
 from sim2real.lattice_trace import common_trace
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
-from sim2real.selection import RIVAL, Decision, probabilities
+from sim2real.selection import Decision, probabilities
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,8 @@ def beside_a_counter(
 ) -> tuple[Contest, Decision]:
     """Contest and decision with such a counter beside the delay that the decision is about, where it could be one.
 
-    However well it averages, it does not come before the delay: many things do that are no counter.
+    A counter as fine as that is rare, so it has to do better than the delay. And however well it averages, it does not
+    come before the delay: many things do that are no counter.
     """
     delay = decision.winner
     counter = _counter_as_late(delay, model, fit_to, holdout)
@@ -112,7 +113,7 @@ def beside_a_counter(
         return contest, decision
     contest = replace(contest, singles=(*contest.singles, counter))
     ours, its = probabilities(contest, [delay, counter], fit_to, holdout)[1:]
-    if its <= RIVAL * ours or decision.verdict is Verdict.UNKNOWN:
+    if its <= ours or decision.verdict is Verdict.UNKNOWN:
         return contest, decision
     share = min(float(its / (ours + its)), MOST_BELIEF)
     both = decision.probability[DELAY]
