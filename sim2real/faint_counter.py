@@ -113,7 +113,7 @@ def beside_a_counter(
         return contest, decision
     contest = replace(contest, singles=(*contest.singles, counter))
     ours, its = probabilities(contest, [delay, counter], fit_to, holdout)[1:]
-    if its <= ours or decision.verdict is Verdict.UNKNOWN:
+    if its <= ours:
         return contest, decision
     share = min(float(its / (ours + its)), MOST_BELIEF)
     both = decision.probability[DELAY]

@@ -62,7 +62,7 @@ UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
 AGE_RANGE = 1.2
 """A window that only the wheels' age tells may be so much longer or shorter [-]."""
-MOST_SAMPLES = 1200
+FEWEST_SAMPLES, MOST_SAMPLES = 100, 1200
 SEARCH = 3000
 
 
@@ -182,6 +182,38 @@ class Lattice:
         return turns / long - 0.5, turns / short + 0.5
 
 
+@dataclass(frozen=True)
+class Wheels:
+    """Wheel speeds as logged, lost samples left out, and their slow part.
+
+    Attributes
+    ----------
+    values, motion : list of array
+        Of each wheel: what was read, and its moving mean [rad/s].
+    step_s : float
+        The longest of the wheels' own [s].
+    spread_rad_s : float
+        Standard deviation of what is faster than the motion, by its median; more than 0.
+    """
+
+    values: list[Array]
+    motion: list[Array]
+    step_s: float
+    spread_rad_s: float
+
+
+def read_wheels(time_s: Array, wheels: Sequence[Array]) -> Wheels | None:
+    """Wheel speeds in which a lattice may be looked for; None where they are too few, or nothing in them is fast."""
+    values = [w[np.isfinite(w)] for w in wheels]
+    if min(len(v) for v in values) < FEWEST_SAMPLES:
+        return None
+    step_s = max(float(np.median(np.diff(time_s[np.isfinite(w)]))) for w in wheels)
+    length = max(round(SMOOTHING_S / step_s), 3)
+    motion = [uniform_filter1d(v, length) for v in values]
+    spread = 1.4826 * float(np.median(np.abs(np.concatenate(values) - np.concatenate(motion))))
+    return Wheels(values, motion, step_s, spread) if spread > 0.0 else None
+
+
 def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
     """The lattice that all wheel speeds lie on, or None.
 
@@ -192,15 +224,10 @@ def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
     wheels : sequence of array, shape (n,)
         Wheel speeds as logged [rad/s]; NaN where lost.
     """
-    values = [w[np.isfinite(w)] for w in wheels]
-    if min(len(v) for v in values) < 100:
+    read = read_wheels(time_s, wheels)
+    if read is None:
         return None
-    step_s = max(float(np.median(np.diff(time_s[np.isfinite(w)]))) for w in wheels)
-    length = max(round(SMOOTHING_S / step_s), 3)
-    fast = np.concatenate([v - uniform_filter1d(v, length) for v in values])
-    spread = 1.4826 * float(np.median(np.abs(fast)))
-    if spread <= 0.0:
-        return None
+    values, step_s, spread = read.values, read.step_s, read.spread_rad_s
     pooled = np.concatenate([v[:: max(len(v) * 4 // MOST_SAMPLES, 1)] for v in values])
     quantum, strength = _best_quantum(pooled, QUANTUM_RANGE[0] * spread, QUANTUM_RANGE[1] * spread)
     if strength < LATTICE_COHERENCE:

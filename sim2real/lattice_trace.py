@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft, rfftfreq
-from scipy.ndimage import uniform_filter1d
 
-from sim2real.lattice import SMOOTHING_S, Lattice, Reading, coherence, find_lattice, is_digit
+from sim2real.lattice import Lattice, Reading, coherence, find_lattice, is_digit, read_wheels
 
 Array = NDArray[np.float64]
 
@@ -74,23 +73,18 @@ def find_trace(time_s: Array, wheels: Sequence[Array]) -> Trace | None:
     wheels : sequence of array, shape (n,)
         Wheel speeds as logged [rad/s]; NaN where lost.
     """
-    values = [w[np.isfinite(w)] for w in wheels]
-    if sum(map(len, values)) < LEAST_SAMPLES:
+    read = read_wheels(time_s, wheels)
+    if read is None or sum(map(len, read.values)) < LEAST_SAMPLES:
         return None
-    step_s = max(float(np.median(np.diff(time_s[np.isfinite(w)]))) for w in wheels)
-    length = max(round(SMOOTHING_S / step_s), 3)
-    motion = [uniform_filter1d(v, length) for v in values]
-    spread = 1.4826 * float(np.median(np.abs(np.concatenate(values) - np.concatenate(motion))))
-    if spread <= 0.0:
-        return None
-    best, excess = _most_traced(np.concatenate(values), np.concatenate(motion), spread)
+    values, spread = read.values, read.spread_rad_s
+    best, excess = _most_traced(np.concatenate(values), np.concatenate(read.motion), spread)
     if excess < EXCESS:
         return None
     quantum, strength = _refined(values, best)
     if is_digit(quantum):
         return None
     sigma = quantum * np.sqrt(-np.log(min(strength, 1.0))) / (np.sqrt(2.0) * np.pi)
-    return Trace(quantum, float(sigma), step_s)
+    return Trace(quantum, float(sigma), read.step_s)
 
 
 def _most_traced(values: Array, motion: Array, spread: float) -> tuple[float, float]:
