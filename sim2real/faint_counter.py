@@ -18,7 +18,7 @@ from scenarios.effects.wheel_speed_quantisation import MOST_TEETH
 from sim2real.contest import Contest, Entry, enter
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import Evidence, all_logs
-from sim2real.fitting import FULL_STEPS, Candidate, Fit
+from sim2real.fitting import FULL_STEPS, Fit, OutsideCandidate
 from sim2real.lattice import AGE_RANGE, LONGEST_WINDOW_S, Lattice, RunningCounter, SmoothCounter
 from sim2real.lattice_trace import common_trace
 from sim2real.observer import Simulation
@@ -73,16 +73,10 @@ class HiddenRunningCounter(HiddenCounter):
 
 
 @dataclass(frozen=True)
-class HiddenCandidate(Candidate):
+class HiddenCandidate(OutsideCandidate):
     """The counter, of at least so many teeth."""
 
     least_teeth: float = 1.0
-    kind: type[HiddenCounter] = HiddenCounter
-
-    @cached_property
-    def kinds(self) -> tuple[type[HiddenCounter], ...]:
-        """The one class."""
-        return (self.kind,)
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:

@@ -8,7 +8,6 @@ rate is limited is taken for one that lags or comes late: both do in steps, but 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -19,7 +18,7 @@ from scenarios.effects.torque_lag import TorqueLag
 from scenarios.effects.vehicle_speed_delay import VehicleSpeedDelay
 from sim2real.contest import Contest, Entry, enter
 from sim2real.evidence import Evidence
-from sim2real.fitting import FULL_STEPS, Candidate
+from sim2real.fitting import FULL_STEPS, OutsideCandidate
 from sim2real.observer import Simulation
 from sim2real.result import Unexplained
 
@@ -133,16 +132,6 @@ SHARES = (0.95, 0.85, 0.7, 0.5, 0.3, 0.15)
 """Limits of the torque's rate that are tried first, as shares of the fastest command's [-]."""
 
 
-@dataclass(frozen=True)
-class OutsideCandidate(Candidate):
-    """A candidate that stands in no library, in the place of one that does."""
-
-    @cached_property
-    def kinds(self) -> tuple[type[Effect], ...]:
-        """The one class."""
-        return (PASSES_FOR[self.ids[0]],)
-
-
 def impostor(contest: Contest, model: Simulation, fit_to: Evidence, holdout: Evidence) -> Entry | None:
     """What passes for the best effect, fitted in its place; None where nothing known does."""
     best = contest.singles[0]
@@ -150,7 +139,9 @@ def impostor(contest: Contest, model: Simulation, fit_to: Evidence, holdout: Evi
         return None
     slow = PASSES_FOR[best.ids[0]] is SlowSpeed
     starts = np.atleast_2d(best.fitted.x) if slow else _limits(fit_to)
-    return enter(OutsideCandidate(model, best.ids), fit_to, holdout, starts, FULL_STEPS)
+    return enter(
+        OutsideCandidate(model, best.ids, kind=PASSES_FOR[best.ids[0]]), fit_to, holdout, starts, FULL_STEPS
+    )
 
 
 def characterise(contest: Contest) -> Unexplained | None:
