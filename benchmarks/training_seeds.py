@@ -8,7 +8,7 @@ interval over pictures and seeds, drawn anew together.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +22,8 @@ from trpac_core.vision.classes import Surface
 from trpac_core.vision.networks import SurfaceClassifier
 
 DRAWS = 10_000
-SETS = {"stills, same search": "condition_web", "other cameras": "other_cameras/"}
-"""What the sources of each set begin with."""
+SETS = {"stills, same search": ("condition_web", "test"), "other cameras": ("other_cameras/", "test")}
+"""What the sources of each set begin with, and its split."""
 
 Hits = NDArray[np.bool_]
 
@@ -31,7 +31,7 @@ Hits = NDArray[np.bool_]
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table; one line and exit code 1 where a set has no pictures in the folder."""
     given = _options(arguments)
-    test = _test_pictures(given.data)
+    test = sets_of_pictures(given.data, SETS, "training_seeds")
     networks = [SurfaceClassifier(path) for path in given.networks]
     numbers = " | ".join(str(i + 1) for i in range(len(networks)))
     print(f"| set | score | pictures | {numbers} | mean [95 %] |")
@@ -86,20 +86,26 @@ def _right(network: SurfaceClassifier, seen: SceneSet) -> Hits:
     return true == found
 
 
-def _test_pictures(folder: Path) -> dict[str, list[Picture]]:
-    """The test pictures of each set; raises SystemExit where the folder cannot be read or lacks a set."""
+def sets_of_pictures(
+    folder: Path, sets: Mapping[str, tuple[str, str]], command: str
+) -> dict[str, list[Picture]]:
+    """The pictures of each set; raises SystemExit where the folder cannot be read or lacks a set."""
     try:
-        test = of_split(read_manifest(folder), "test")
+        every = read_manifest(folder)
     except DataFolderError as error:
-        raise SystemExit(f"training_seeds: {error}") from error
-    sets = {name: [p for p in test if p.source.startswith(source)] for name, source in SETS.items()}
-    for name, pictures in sets.items():
+        raise SystemExit(f"{command}: {error}") from error
+    found = {
+        name: [p for p in of_split(every, split) if p.source.startswith(source)]
+        for name, (source, split) in sets.items()
+    }
+    for name, pictures in found.items():
         if not pictures:
+            source, split = sets[name]
             raise SystemExit(
-                f"training_seeds: {folder / MANIFEST}: no test pictures for '{name}'; "
-                f"expected rows of split test whose files lie in {SETS[name]}"
+                f"{command}: {folder / MANIFEST}: no {split} pictures for '{name}'; "
+                f"expected rows of split {split} whose files lie in {source}"
             )
-    return sets
+    return found
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
