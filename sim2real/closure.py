@@ -1,4 +1,4 @@
-"""Does the cause close the gap: what it leaves of a log that it was not fitted to, doubtful rows included.
+"""The gap itself, doubtful rows included: whether there is one, and whether the cause closes it.
 
 The misfit averages over blocks and lets rows count less where even the right model cannot foretell, near the grip
 limit above all. So a wrong effect may pass it, where most of the gap lies just there. The gap itself counts every row:
@@ -7,14 +7,16 @@ what a cause leaves of it beyond the noise floor, as energy, has to be the lesse
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from sim2real.contest import Entry
+from sim2real.contest import Contest, Entry
 from sim2real.evidence import Evidence
 from sim2real.gap import measure, noise_floor
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
-from sim2real.selection import Decision, doubted
+from sim2real.selection import NO_GAP_DOUBT, Decision, doubted, rare_share
 
 MOST_LEFT = 1.0 / 6.0
 """Share of the gap's energy beyond the floor that a cause may leave on the hold-out [-]."""
@@ -23,6 +25,8 @@ FLOOR_DOUBT = 4.0 / 3.0
 one log is known no better [-]."""
 MOST_NEAR_FLOOR = 0.5
 """Share that a cause may leave there: it takes the better part [-]."""
+AT_FLOOR = 1.02
+"""Up to this many times its noise floor a log's residual is at it: chance moves both by about a hundredth [-]."""
 OPEN_BELIEF = 0.2
 """Probability that an effect is the cause though it leaves more [-]."""
 
@@ -40,6 +44,27 @@ def left_open(model: Simulation, entry: Entry, holdout: Evidence, seed: int = 0)
     floor = noise_floor(added, held, seed) ** 2
     share = max(after - floor, 0.0) / (before - floor) if before > floor else 0.0
     return share, float(np.sqrt(after / floor))
+
+
+def at_the_floor(decision: Decision, contest: Contest, model: Simulation, *evidence: Evidence) -> Decision:
+    """The decision, `no_gap` where something is blamed though every log's residual is at its noise floor.
+
+    Blocks average so much noise out that an effect may be found which no row shows. The noise is read anew from what
+    the effect leaves; where nothing explains the gap it may be the gap that was read as noise.
+    """
+    if decision.verdict in (Verdict.NO_GAP, Verdict.UNKNOWN) or rare_share(contest.null, *evidence):
+        return decision
+    found = decision.winner.fitted
+    added = found.candidate.model(found.x)
+    if not all(_within(model, added, log) for part in evidence for log in part.sharpened(added).each()):
+        return decision
+    nothing = doubted(decision, NO_GAP_DOUBT, winner=contest.null, after=decision.before, varied=None)
+    return replace(nothing, verdict=Verdict.NO_GAP, slight=decision.winner.name)
+
+
+def _within(model: Simulation, added: Simulation, log: Evidence) -> bool:
+    """Whether what the model leaves of a log is no more than noise."""
+    return measure(log, log.residuals(model)).total <= AT_FLOOR * noise_floor(added, log, 0)
 
 
 def closing(decision: Decision, model: Simulation, holdout: Evidence) -> Decision:

@@ -12,7 +12,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
-from sim2real.closure import closing
+from sim2real.closure import at_the_floor, closing
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import drift_of, gather, residuals
@@ -174,6 +174,7 @@ def find(
         decision = decide(contest, fit_to, held)
     elif decision.winner.ids == (DELAY,) and not base.has(COUNTER) and COUNTER not in exclude:
         contest, decision = beside_a_counter(contest, decision, base, fit_to, held)
+    decision = at_the_floor(decision, contest, base, fit_to, held)
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)

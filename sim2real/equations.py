@@ -43,6 +43,11 @@ def _torque(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> P
     return Push(**{**_none(drive), "torque_nm": np.repeat(term[:, None], 4, axis=1)}, felt=False)
 
 
+def _gain(model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
+    """A share of the torque that the wheels get besides, or lack."""
+    return Push(**{**_none(drive), "torque_nm": drive.torque_nm * term[:, None]}, felt=False)
+
+
 def _motor(wheel: int, model: Simulation, drive: Drive, seen: Prediction, term: Array) -> Push:
     none = _none(drive)
     none["torque_nm"][:, wheel] = term
@@ -93,8 +98,11 @@ def _one(column: int) -> slice:
     return slice(column, column + 1)
 
 
+TORQUE_GAIN = "torque gain"
+
 EQUATIONS = (
     Equation("torque", "powertrain", "wheel_torque", "N m", 5.0, _torque, ("torque", "acceleration", "time")),
+    Equation(TORQUE_GAIN, "powertrain", "wheel_torque", "-", 0.02, _gain, ("power", "driven speed", "time")),
     Equation("bearing", "wheel", "wheel_torque", "N m", 5.0, _torque, ("speed",)),
     Equation("force", "vehicle", "accel_x", "N", 50.0, _force, ("speed", "acceleration", "time", "position")),
     Equation("gravity", "road", "vehicle_speed", "m/s^2", 0.05, _gravity, ("time", "position")),
@@ -137,10 +145,15 @@ QUANTITIES: dict[str, tuple[str, Callable[[Drive, Prediction], Array]]] = {
     "torque": ("N m", lambda drive, seen: drive.torque_nm.mean(axis=1)),
     "acceleration": ("m/s^2", lambda drive, seen: seen.force_n.sum(axis=1)),
     "slip": ("-", lambda drive, seen: np.sign(seen.force_n.sum(axis=1)) * seen.slip.mean(axis=1)),
+    "power": ("W", lambda drive, seen: (drive.torque_nm * seen.states[:, WHEEL]).sum(axis=1)),
+    "driven speed": ("m/s", lambda drive, seen: np.sign(drive.torque_nm.sum(axis=1)) * seen.states[:, SPEED]),
     "time": ("s", lambda drive, seen: drive.time_s),
     "position": ("m", lambda drive, seen: seen.states[:, 0]),
 }
-"""Unit and values of what a term may depend on; acceleration is the tyres' force, scaled by the mass later."""
+"""Unit and values of what a term may depend on; acceleration is the tyres' force, scaled by the mass later, and driven
+speed is negative where the torque brakes."""
 PER_DRIVE = ("time", "position")
 """Quantities whose curve is another one in each drive."""
-OF_THE_MOTION = tuple(key for key in QUANTITIES if key not in PER_DRIVE)
+OF_THE_MOTION = ("speed", "torque", "acceleration", "slip")
+TWO_SIDED = ("power", "driven speed")
+"""Quantities on the two sides of 0 of which, driving and braking, a curve need not be of one piece."""

@@ -56,10 +56,13 @@ class Evidence:
         drives = [d if d.swing is None else replace(d, measured=d.measured + d.swing) for d in self.drives]
         return replace(self, drives=tuple(drives))
 
+    def each(self) -> list[Evidence]:
+        """Each drive alone."""
+        return [Evidence((d,), (n,)) for d, n in zip(self.drives, self.noises, strict=True)]
+
     def longest(self) -> Evidence:
         """The longest drive alone."""
-        i = int(np.argmax([len(d) for d in self.drives]))
-        return Evidence((self.drives[i],), (self.noises[i],))
+        return max(self.each(), key=lambda log: len(log.drives[0]))
 
     @cached_property
     def parts(self) -> tuple[slice, ...]:

@@ -186,6 +186,10 @@ class Decision:
         The free curve that does the winner's work as well, where that is why it is not blamed, see `sim2real.law`.
     further : bool
         Whether only what the winner's form adds to its effect is needed, and that is why it is not blamed.
+    rare : float
+        Share of the logs' time that lies far beyond noise, where the rest does not [-].
+    slight : str
+        What was found and is not blamed, as every log's residual is at its noise floor.
     """
 
     verdict: Verdict
@@ -199,6 +203,7 @@ class Decision:
     curve: str = ""
     further: bool = False
     rare: float = 0.0
+    slight: str = ""
 
 
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:

@@ -23,7 +23,10 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: St
     """The verdict itself; what a structural difference beside the cause takes is told with it."""
     size = f"{gap.before.total:.1f} times the noise floor"
     if decision.verdict is Verdict.NO_GAP:
-        return "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
+        slight = decision.slight.replace("+", " with ")
+        traced = f" On the average something slighter than any row's noise is left, most like {slight}."
+        agree = "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
+        return agree + (traced if slight else "")
     if decision.verdict is Verdict.UNKNOWN and decision.rare:
         return (
             f"On the whole the gap is lost in the noise, but {100.0 * decision.rare:.0f} % of the logs' time lies far "
@@ -33,7 +36,8 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: St
         return f"There is a gap of {size}, and no effect of the library explains it."
     top = causes[0]
     after = structure.gap_after if structure else gap.after.total
-    cut = f"it takes the gap from {gap.before.total:.1f} to {after:.1f} times the noise floor"
+    digits = 1 if gap.before.total > 1.1 else 2
+    cut = f"it takes the gap from {gap.before.total:.{digits}f} to {after:.{digits}f} times the noise floor"
     if decision.verdict is Verdict.COMPOUND:
         return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
     if decision.verdict is Verdict.AMBIGUOUS:

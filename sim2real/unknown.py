@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, sparray
 
 from sim2real.drive import Drive
-from sim2real.equations import EQUATIONS, PER_DRIVE, QUANTITIES, Equation
+from sim2real.equations import EQUATIONS, PER_DRIVE, QUANTITIES, TORQUE_GAIN, TWO_SIDED, Equation
 from sim2real.evidence import rest_of
 from sim2real.fitting import robust, robust_weight
 from sim2real.noise import Noise
@@ -40,6 +40,8 @@ PRICE_PER_KNOT = 10.0
 """Price of a fitted value, about the logarithm of the number of residuals [-]."""
 PRICE_PER_DRIVE = 1.4
 """By how much more such a curve has to explain: it tells less than one over the car's own motion [-]."""
+PRICE_OF_SHARE = 1.4
+"""The same of a curve of the torque's share over power or speed, which bends on either side of 0 as it likes [-]."""
 LITTLE = 0.5
 """Below this share of the loss the best term tells little [-]."""
 SLIGHT, ALONE = 0.15, 20.0
@@ -116,7 +118,9 @@ def fit_terms(
 def score(term: Term) -> float:
     """Loss and a price for each value of the curve, in units of what the loss leaves per degree of freedom."""
     priced = term.loss + PRICE_PER_KNOT * term.size * max(term.loss, 1.0) / max(term.samples, 1)
-    return priced * (PRICE_PER_DRIVE if term.quantity in PER_DRIVE else 1.0)
+    for quantities, price in ((PER_DRIVE, PRICE_PER_DRIVE), (TWO_SIDED, PRICE_OF_SHARE)):
+        priced *= price if term.quantity in quantities else 1.0
+    return priced
 
 
 def explained(term: Term) -> float:
@@ -284,12 +288,14 @@ def _runs(
 
 
 def _knots(values: Sequence[Array], drives: Sequence[Drive], quantity: str, knot_s: float) -> list[Array]:
-    """Knots per drive; the same for all where the curve is the same."""
+    """Knots per drive; the same for all where the curve is the same, on either side of 0 where it is of two pieces."""
     if quantity in PER_DRIVE:
         count = [max(round((d.time_s[-1] - d.time_s[0]) / knot_s), 2) + 1 for d in drives]
         return [np.linspace(v.min(), v.max(), n) for v, n in zip(values, count, strict=True)]
     every = np.concatenate([v[d.moving] for v, d in zip(values, drives, strict=True)])
-    shared = np.unique(np.quantile(every, np.linspace(0.01, 0.99, KNOTS)))
+    sides = (every[every < 0.0], every[every > 0.0]) if quantity in TWO_SIDED else (every,)
+    spread = np.linspace(0.01, 0.99, KNOTS)
+    shared = np.unique(np.concatenate([np.quantile(side, spread) for side in sides if len(side)] or [[0.0]]))
     return [shared] * len(drives) if len(shared) > 1 else [shared + np.array([0.0, 1.0])] * len(drives)
 
 
@@ -327,10 +333,8 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
     best = terms[0]
     share = 1.0 - best.loss / max(best.null_loss, 1e-12)
     shape, sign = shape_of(best), sign_of(best)
-    unit = QUANTITIES[best.quantity][0]
     sentence = (
-        f"The {best.equation.subsystem.replace('_', ' ')}'s equation ({best.equation.key}) wants a further term in "
-        f"{best.equation.unit} that depends on {best.quantity} [{unit}]: it {sign} and {shape}. "
+        f"The {best.equation.subsystem.replace('_', ' ')}'s equation ({best.equation.key}) {_wanted(best)}. "
         f"Such a term takes {100.0 * share:.0f} % of the misfit."
     )
     if suspect:
@@ -347,6 +351,17 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
         best.y[best.drawn_from :],
         sentence,
     )
+
+
+def _wanted(term: Term) -> str:
+    """What an equation wants, in words."""
+    on = f"{term.quantity} [{QUANTITIES[term.quantity][0]}]"
+    if term.equation.key != TORQUE_GAIN:
+        curve = f"it {sign_of(term)} and {shape_of(term)}"
+        return f"wants a further term in {term.equation.unit} that depends on {on}: {curve}"
+    ends = [f"{term.y[at]:+.0%} at {term.x[at]:.3g}" for at in (term.y.argmin(), term.y.argmax())]
+    side = ", negative where it brakes" if term.quantity in TWO_SIDED else ""
+    return f"wants another share of the torque, which depends on {on}{side}: {' to '.join(ends)}"
 
 
 def seen_alone(term: Unexplained, before: Measure) -> Unexplained:

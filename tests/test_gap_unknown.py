@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of
+from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of, trace
 from scipy.sparse import csc_array
 
 from sim2real import unknown
@@ -107,6 +107,52 @@ def test_a_hill_is_found_in_the_road():
     assert found.subsystem == "road"
     assert found.depends_on in ("time", "position")
     assert np.median(found.y) == pytest.approx(-9.81 * 0.04, rel=0.1)
+
+
+SIZES = trace((0, 0.6), (4, 1.5), (8, 2.5), (12, 1), (16, 2), duration_s=16.0)
+"""Of the pulses of `with_share`: other sizes at other speeds."""
+
+
+def with_share(share, commanded_nm, speeds_m_s):
+    """Drives whose motors give a share of the commanded torque that depends on the motion."""
+    drives = []
+    for seed, v0 in enumerate(speeds_m_s):
+        actual = commanded_nm
+        for _ in range(5):  # the motion hangs on the torque
+            actual = commanded_nm * share(clean(actual, v0, commanded_nm=commanded_nm))[:, None]
+        drives.append(noisy(clean(actual, v0, commanded_nm=commanded_nm), seed))
+    return drives
+
+
+def test_motors_that_give_no_more_than_their_power_lack_a_share_of_torque_by_power():
+    limit_w = 24e3
+
+    def share(drive):
+        power_w = (drive.torque_nm * drive.measured[:, WHEEL]).sum(axis=1)
+        return limit_w / np.maximum(power_w, limit_w)
+
+    found = characterise(terms_of(*with_share(share, 1.2 * SIZES * pulses(16.0), (6.0, 14.0, 22.0))))
+    assert (found.subsystem, found.depends_on, found.unit) == ("powertrain", "power", "-")
+    assert found.share > 0.9
+    beyond = found.x > 1.5 * limit_w
+    assert beyond.sum() >= 2
+    np.testing.assert_allclose(found.y[beyond], limit_w / found.x[beyond] - 1.0, atol=0.06)
+    np.testing.assert_allclose(found.y[found.x < 0.8 * limit_w], 0.0, atol=0.06)
+    assert all(word in found.sentence for word in ("share", "power", "[W]"))
+
+
+def test_a_regeneration_that_fades_lacks_a_share_of_torque_where_it_brakes_slowly():
+    def share(drive):
+        left = np.clip((drive.measured[:, SPEED] - 2.0) / 4.0, 0.0, 1.0)
+        return np.where(drive.torque_nm[:, 0] < 0.0, left, 1.0)
+
+    found = characterise(terms_of(*with_share(share, 0.7 * SIZES * pulses(16.0), (3.0, 7.0, 12.0))))
+    assert (found.subsystem, found.depends_on, found.unit) == ("powertrain", "driven speed", "-")
+    assert found.share > 0.8
+    np.testing.assert_allclose(found.y[(found.x > 0.0) | (found.x < -6.5)], 0.0, atol=0.03)
+    slow = (found.x < 0.0) & (found.x > -4.0)
+    assert slow.any()
+    assert (found.y[slow] < -0.5).all()
 
 
 def test_without_a_gap_no_term_takes_much():

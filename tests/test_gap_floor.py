@@ -1,0 +1,83 @@
+"""A gap that no row shows is none; and how a small one is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_drives import MODEL, clean, noisy, pulses
+
+from sim2real.closure import at_the_floor
+from sim2real.contest import Contest, Entry
+from sim2real.evidence import gather
+from sim2real.fitting import Candidate, fit
+from sim2real.goodness import Fitness
+from sim2real.result import Gap, Measure, Verdict
+from sim2real.selection import NO_GAP_DOUBT, Decision
+from sim2real.sentences import verdict
+
+KEY = "torque_gain"
+
+
+def evidence(bias_m_s2, seed):
+    drives = [clean(pulses(24.0), v0, effects=with_bias(bias_m_s2)) for v0 in (10.0, 16.0)]
+    return gather(MODEL, [noisy(drive, seed + i) for i, drive in enumerate(drives)])
+
+
+def with_bias(bias_m_s2):
+    return {"accelerometer_bias": {"bias_m_s2": bias_m_s2}} if bias_m_s2 else None
+
+
+def decided(fit_to, held, verdict=Verdict.IDENTIFIED):
+    found = fit(Candidate(MODEL, ("accelerometer_bias",)), fit_to, steps=3)
+    model = found.candidate.model(found.x)
+    null, entry = (
+        Entry(ids, it, *(part.whitened(part.residuals(m)) for part in (fit_to, held)))
+        for ids, it, m in (((), None, MODEL), (("accelerometer_bias",), found, model))
+    )
+    fits = Fitness(1.3, {}), Fitness(1.0, {})
+    said = Decision(verdict, entry, (), {"accelerometer_bias": 0.9}, *fits)
+    return said, Contest(null, (entry,), ())
+
+
+def test_what_every_row_of_every_log_hides_is_not_blamed():
+    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
+    decision, contest = decided(fit_to, held)
+    said = at_the_floor(decision, contest, MODEL, fit_to, held)
+    assert said.verdict is Verdict.NO_GAP
+    assert said.winner is contest.null
+    assert said.probability == {"accelerometer_bias": pytest.approx(0.9 * NO_GAP_DOUBT)}
+    assert said.slight == "accelerometer_bias"
+
+
+def test_what_nothing_explains_may_have_been_read_as_noise():
+    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
+    decision, contest = decided(fit_to, held, Verdict.UNKNOWN)
+    assert at_the_floor(decision, contest, MODEL, fit_to, held) is decision
+
+
+def test_a_gap_of_one_log_is_a_gap():
+    fit_to, held = evidence(0.004, 1), evidence(0.15, 5)
+    decision, contest = decided(held, fit_to)
+    assert at_the_floor(decision, contest, MODEL, held, fit_to) is decision
+    decision, contest = decided(fit_to, held)
+    assert at_the_floor(decision, contest, MODEL, fit_to, held) is decision
+
+
+def test_a_log_that_is_far_beyond_noise_now_and_then_has_a_gap():
+    """Rows that hardly move the whole still count."""
+    fit_to, held = evidence(0.0, 1), evidence(0.0, 5)
+    decision, contest = decided(fit_to, held)
+    far = contest.null.z_hold.copy()
+    far[: len(far) // 25] += 9.0
+    rare = replace(contest, null=replace(contest.null, z_hold=far))
+    assert at_the_floor(decision, contest, MODEL, fit_to, held).verdict is Verdict.NO_GAP
+    assert at_the_floor(decision, rare, MODEL, fit_to, held) is decision
+
+
+def test_a_slight_effect_is_told_beside_no_gap():
+    gap = Gap(Measure(0.99, {}, {}), Measure(0.99, {}, {}), 1.01)
+    fits = Fitness(1.0, {}), Fitness(1.0, {})
+    null = Entry((), None, np.zeros(7), np.zeros(7))
+    quiet = Decision(Verdict.NO_GAP, null, (), {}, *fits)
+    assert verdict(quiet, gap, ()).endswith("nothing may be blamed.")
+    assert verdict(replace(quiet, slight=KEY), gap, ()).endswith(f"most like {KEY}.")
