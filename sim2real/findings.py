@@ -37,7 +37,8 @@ from sim2real.result import (
 )
 from sim2real.selection import Decision
 from sim2real.suspect import lone_sensor
-from sim2real.unknown import Term, characterise, finer, fit_terms, seen_alone, with_refined
+from sim2real.terms import Term, finer, fit_terms, with_refined
+from sim2real.unknown import characterise, seen_alone
 from sim2real.varying import KNOT_S
 
 Array = NDArray[np.float64]

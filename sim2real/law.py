@@ -18,7 +18,7 @@ from sim2real.goodness import noise_margin
 from sim2real.observer import Simulation
 from sim2real.result import Verdict
 from sim2real.selection import Decision, doubted
-from sim2real.unknown import Term, fit_terms, with_refined
+from sim2real.terms import Term, fit_terms, with_refined
 
 MORE_BESIDE = 0.0075
 """Share of what the effect takes off the loss that a curve beside it takes, too: less is how its form differs [-]."""

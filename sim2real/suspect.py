@@ -21,7 +21,7 @@ from sim2real.equations import EQUATIONS, OF_THE_MOTION, UNLIKE, Equation
 from sim2real.evidence import SETTLING_S, Evidence, all_logs
 from sim2real.goodness import fitness
 from sim2real.observer import Simulation
-from sim2real.unknown import best_of_each, fit_terms, refined
+from sim2real.terms import best_of_each, fit_terms, refined
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from sim2real.noise import Noise
 from sim2real.observer import Simulation, Towards
 from sim2real.probing import sets_apart, windows
 from sim2real.selection import explains, two_are_needed
-from sim2real.unknown import Term, fit_terms, with_refined
+from sim2real.terms import Term, fit_terms, with_refined
 
 Array = NDArray[np.float64]
 

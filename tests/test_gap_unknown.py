@@ -7,24 +7,13 @@ import pytest
 from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of, trace
 from scipy.sparse import csc_array
 
-from sim2real import unknown
+from sim2real import terms
 from sim2real.drive import ACCEL, SPEED, WHEEL
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, PER_DRIVE, QUANTITIES
 from sim2real.evidence import gather
 from sim2real.result import Measure
-from sim2real.unknown import (
-    Term,
-    characterise,
-    explained,
-    finer,
-    fit_terms,
-    refined,
-    score,
-    seen_alone,
-    shape_of,
-    sign_of,
-    with_refined,
-)
+from sim2real.terms import Term, explained, finer, fit_terms, refined, score, with_refined
+from sim2real.unknown import characterise, seen_alone, shape_of, sign_of
 
 EQUATION = {equation.key: equation for equation in EQUATIONS}
 
@@ -351,10 +340,10 @@ def test_every_quantity_has_a_unit_and_every_equation_asks_for_known_ones():
 def test_slopes_along_drives_are_what_a_run_for_each_knot_gives(monkeypatch):
     held = gather(MODEL, [noisy(clean(pulses(12.0), 12.0), seed) for seed in range(2)])
     seen = [MODEL.predict(drive) for drive in held.drives]
-    free = unknown._free(MODEL, held.drives, held.noises, seen, EQUATION["force"], "time")
+    free = terms._free(MODEL, held.drives, held.noises, seen, EQUATION["force"], "time")
     z = free.left(np.zeros(len(free.hats)))
     together = free.slopes(z, np.zeros(len(free.hats))).toarray()
-    monkeypatch.setattr(unknown, "sets_apart", lambda weights, _: [[i] for i in range(len(weights))])
+    monkeypatch.setattr(terms, "sets_apart", lambda weights, _: [[i] for i in range(len(weights))])
     alone = free.slopes(z, np.zeros(len(free.hats))).toarray()
     assert np.count_nonzero(together) < 0.6 * together.size
     # Runs are told apart after four memories: e^-4 of a slope.
@@ -365,12 +354,12 @@ def test_a_sparse_matrix_is_solved_as_the_dense_one_is():
     rng = np.random.default_rng(5)
     dense = np.where(rng.random((400, 7)) < 0.3, rng.normal(size=(400, 7)), 0.0)
     z = rng.normal(size=400) + dense @ np.arange(7.0)
-    for a, b in zip(unknown._solve(z, csc_array(dense)), unknown._solve(z, dense), strict=True):
+    for a, b in zip(terms._solve(z, csc_array(dense)), terms._solve(z, dense), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-9)
 
 
 def test_a_knot_that_no_row_lies_at_has_no_slope():
     stretch = np.array([1.0, 2.0])
-    matrix = unknown._columns([[(0, stretch)], [], [(1, stretch), (4, stretch)]], 6).toarray()
+    matrix = terms._columns([[(0, stretch)], [], [(1, stretch), (4, stretch)]], 6).toarray()
     expected = np.array([[1, 2, 0, 0, 0, 0], [0] * 6, [0, 1, 2, 0, 1, 2]], dtype=float).T
     np.testing.assert_array_equal(matrix, expected)
