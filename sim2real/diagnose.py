@@ -15,9 +15,10 @@ from scenarios.files import load_vehicle
 from sim2real.closure import at_the_floor, closing
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
-from sim2real.evidence import drift_of, gather, residuals
+from sim2real.evidence import Evidence, drift_of, gather, residuals
 from sim2real.faint_counter import DELAY, beside_a_counter, traced
 from sim2real.findings import Findings, describe
+from sim2real.fitting import Fit
 from sim2real.gap import measure
 from sim2real.lattice import common_lattice
 from sim2real.law import held_to_curves, held_to_itself
@@ -145,12 +146,15 @@ def find(
     lattice = None if model.has(COUNTER) else common_lattice([d.lattice for d in (*fit, holdout)])
     base = model.with_effects(lattice.effect()) if lattice else model
     order, (*fit, holdout) = without_order(base, [*fit, holdout])
-    fit_to, held = gather(base, fit), gather(base, [holdout])
-    first = first_round(base, fit_to, exclude, jobs, progress)
+
+    def first_look(car: Simulation) -> tuple[Evidence, Evidence, list[Fit]]:
+        fit_to, held = gather(car, fit), gather(car, [holdout])
+        return fit_to, held, first_round(car, fit_to, exclude, jobs, progress)
+
+    fit_to, held, first = first_look(base)
     if not base.has(COUNTER) and (lattice := traced((*fit, holdout), first)):
         base = model.with_effects(lattice.effect())
-        fit_to, held = gather(base, fit), gather(base, [holdout])
-        first = first_round(base, fit_to, exclude, jobs, progress)
+        fit_to, held, first = first_look(base)
     if first:
         best = first[0].candidate.model(first[0].x)
         fit_to, held = fit_to.sharpened(best), held.sharpened(best)
