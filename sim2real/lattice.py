@@ -58,6 +58,8 @@ from row to row [-].
 COUNTED = 0.25
 """Variance of the steps from which on they are those of a count: of a difference of two roundings it is 1/3, of one
 1/6 [squared quanta]."""
+JITTER = 0.03
+"""Scatter of the log's steps from which on its rows are not regular [steps]."""
 UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
 AGE_RANGE = 1.2
@@ -236,7 +238,7 @@ def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
     rest = np.concatenate([v - quantum * np.round(v / quantum) for v in values])
     window, reading = _held_window(time_s, wheels, quantum, step_s), Reading.HELD
     if window is None:
-        window, reading = _running_window(wheels, quantum, step_s)
+        window, reading = _running_window(wheels, quantum, step_s, regular=_jitter(time_s) < JITTER)
     found = Lattice(quantum, window, 1.4826 * float(np.median(np.abs(rest))), step_s, reading)
     return None if is_digit(quantum) or found.teeth > MOST_TEETH else found
 
@@ -319,10 +321,20 @@ def _held_window(time_s: Array, wheels: Sequence[Array], quantum: float, step_s:
     return float(1.0 / near[int(agreement(near).argmax())])
 
 
-def _running_window(wheels: Sequence[Array], quantum: float, step_s: float) -> tuple[float, Reading]:
+def _jitter(time_s: Array) -> float:
+    """Scatter of the log's steps, by their median, lost samples left out [steps]."""
+    steps = np.diff(time_s)
+    step_s = float(np.median(steps))
+    return 1.4826 * float(np.median(np.abs(steps - step_s))) / step_s
+
+
+def _running_window(
+    wheels: Sequence[Array], quantum: float, step_s: float, regular: bool
+) -> tuple[float, Reading]:
     """The window after which each pulse is taken off the count again [s], and how the log shows it.
 
-    Where no such time shows, no row's pulses are another's, or it is no count at all: the log's step stands for it.
+    Where no such time shows, no row's pulses are another's, or it is no count at all: the log's step stands for it. Nor
+    does it where the rows are not `regular`: then a pulse is taken off a part of a step after some row.
     """
     steps = [np.diff(v) for w in wheels if len(v := w[np.isfinite(w)]) > 2]
     steps = [d - uniform_filter1d(d, max(round(SMOOTHING_S / step_s), 3)) for d in steps]
@@ -333,4 +345,5 @@ def _running_window(wheels: Sequence[Array], quantum: float, step_s: float) -> t
         return float(lags[1 + int(again[1:].argmin())] * step_s), Reading.RUNNING
     if again[0] < NEXT_LEAVES:
         return step_s, Reading.RUNNING
-    return step_s, Reading.UNSEEN if variance > COUNTED * quantum**2 else Reading.ROUNDED
+    counted = regular and variance > COUNTED * quantum**2
+    return step_s, Reading.UNSEEN if counted else Reading.ROUNDED

@@ -129,6 +129,24 @@ def test_a_counter_that_runs_along_with_the_log_shows_its_window_too(teeth, wind
     assert low <= teeth <= high
 
 
+def test_rows_at_uneven_times_leave_the_window_of_a_running_counter_open():
+    """A pulse is taken off at another row than the one that many steps later: none of them is the window."""
+    teeth, window_s = 96, 0.05
+    even_s, speed = driving()
+    step_s = even_s[1] - even_s[0]
+    time_s = even_s + 0.1 * step_s * np.random.default_rng(3).standard_normal(len(even_s))
+    wheels = [
+        running(time_s, np.interp(time_s, even_s, speed) * (1.0 + 0.002 * i), teeth, window_s, 0.2 * i)
+        for i in range(4)
+    ]
+    found = find_lattice(time_s, wheels)
+    assert found is not None
+    assert found.reading in (Reading.ROUNDED, Reading.RUNNING)
+    assert found.quantum_rad_s == pytest.approx(TURN / (teeth * window_s), rel=5e-3)
+    assert found.window_range_s[0] <= window_s <= found.window_range_s[1]
+    assert found.teeth_range[0] <= teeth <= found.teeth_range[1]
+
+
 def test_a_speed_that_is_rounded_at_every_row_leaves_the_window_open():
     time_s, speed = driving()
     quantum = TURN / (48 * 0.04)
