@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, sparray
 
 from sim2real.drive import Drive
-from sim2real.equations import EQUATIONS, PER_DRIVE, QUANTITIES, TWO_SIDED, Equation
+from sim2real.equations import EQUATIONS, PER_DRIVE, QUANTITIES, TORQUE_GAIN, TWO_SIDED, Equation
 from sim2real.evidence import rest_of
 from sim2real.fitting import robust, robust_weight
 from sim2real.noise import Noise
@@ -40,7 +40,7 @@ PRICE_PER_KNOT = 10.0
 PRICE_PER_DRIVE = 1.4
 """By how much more such a curve has to explain: it tells less than one over the car's own motion [-]."""
 PRICE_OF_SHARE = 1.4
-"""The same of a curve of the torque's share over power or speed, which bends on either side of 0 as it likes [-]."""
+"""The same of a curve of the torque's share, which bends on either side of 0 as it likes [-]."""
 LITTLE = 0.5
 """Below this share of the loss the best term tells little [-]."""
 REFINED = 4
@@ -79,6 +79,11 @@ class Term:
     samples: int
     drawn_from: int = 0
 
+    @property
+    def drawn(self) -> tuple[Array, Array]:
+        """What of x and y is drawn."""
+        return self.x[self.drawn_from :], self.y[self.drawn_from :]
+
 
 def fit_terms(
     model: Simulation,
@@ -109,9 +114,8 @@ def fit_terms(
 def score(term: Term) -> float:
     """Loss and a price for each value of the curve, in units of what the loss leaves per degree of freedom."""
     priced = term.loss + PRICE_PER_KNOT * term.size * max(term.loss, 1.0) / max(term.samples, 1)
-    for quantities, price in ((PER_DRIVE, PRICE_PER_DRIVE), (TWO_SIDED, PRICE_OF_SHARE)):
-        priced *= price if term.quantity in quantities else 1.0
-    return priced
+    priced *= PRICE_PER_DRIVE if term.quantity in PER_DRIVE else 1.0
+    return priced * (PRICE_OF_SHARE if term.equation.key == TORQUE_GAIN else 1.0)
 
 
 def explained(term: Term) -> float:

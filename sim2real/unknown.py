@@ -40,8 +40,7 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
         sign,
         shape,
         share,
-        best.x[best.drawn_from :],
-        best.y[best.drawn_from :],
+        *best.drawn,
         sentence,
     )
 
@@ -52,7 +51,8 @@ def _wanted(term: Term) -> str:
     if term.equation.key != TORQUE_GAIN:
         curve = f"it {sign_of(term)} and {shape_of(term)}"
         return f"wants a further term in {term.equation.unit} that depends on {on}: {curve}"
-    ends = [f"{term.y[at]:+.0%} at {term.x[at]:.3g}" for at in (term.y.argmin(), term.y.argmax())]
+    x, y = term.drawn
+    ends = [f"{100.0 * y[at]:+.0f} % at {x[at]:.3g}" for at in (y.argmin(), y.argmax())]
     side = ", negative where it brakes" if term.quantity in TWO_SIDED else ""
     return f"wants another share of the torque, which depends on {on}{side}: {' to '.join(ends)}"
 
