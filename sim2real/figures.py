@@ -18,6 +18,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from scenarios.files import WHEELS
+from sim2real.equations import QUANTITIES, TWO_SIDED
 from sim2real.result import Gap, NextManoeuvre, Trace, Unexplained
 
 Array = NDArray[np.float64]
@@ -217,12 +218,21 @@ def missing_term(term: Unexplained) -> bytes:
     with _sheet(1, 1, 2.9) as (_, axes, buffer):
         axis: Axes = axes[0, 0]
         axis.axhline(0.0, color=FLOOR, lw=0.8)
-        starts = np.flatnonzero(np.diff(term.x) < 0.0) + 1  # one curve per log where the quantity is time
+        begins = np.diff(term.x) < 0.0  # one curve per log where the quantity is time
+        if term.depends_on in TWO_SIDED:
+            begins |= np.diff(np.sign(term.x)) > 0.0
+        starts = np.flatnonzero(begins) + 1
         for x, y in zip(np.split(term.x, starts), np.split(term.y, starts), strict=True):
             axis.plot(x, y, color=BEFORE, lw=1.6, alpha=0.8, marker="o", ms=3.0)
-        axis.set_xlabel(label_of(term.depends_on))
+        axis.set_xlabel(_quantity_label(term.depends_on))
         axis.set_ylabel(f"missing term in\n{words(term.subsystem)} [{pretty_unit(term.unit)}]")
     return buffer.getvalue()
+
+
+def _quantity_label(quantity: str) -> str:
+    """Axis label of what a missing term depends on."""
+    unit = f" [{pretty_unit(QUANTITIES[quantity][0])}]" if quantity in QUANTITIES else ""
+    return f"{words(quantity)}{unit}" + (", negative where it brakes" if quantity in TWO_SIDED else "")
 
 
 def profile(manoeuvre: NextManoeuvre) -> bytes:
