@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim2real.equations import PER_DRIVE, QUANTITIES, TORQUE_GAIN, TWO_SIDED, Equation
 from sim2real.result import Measure, Unexplained
 from sim2real.terms import Term
+
+Array = NDArray[np.float64]
 
 SLIGHT, ALONE = 0.15, 20.0
 """Share of the misfit below which no term explains it, and how many times the others' squares beyond noise one kind of
@@ -52,9 +55,17 @@ def _wanted(term: Term) -> str:
         curve = f"it {sign_of(term)} and {shape_of(term)}"
         return f"wants a further term in {term.equation.unit} that depends on {on}: {curve}"
     x, y = term.drawn
-    ends = [f"{100.0 * y[at]:+.0f} % at {x[at]:.3g}" for at in (y.argmin(), y.argmax())]
-    side = ", negative where it brakes" if term.quantity in TWO_SIDED else ""
-    return f"wants another share of the torque, which depends on {on}{side}: {' to '.join(ends)}"
+    if term.quantity not in TWO_SIDED:
+        return f"wants another share of the torque, which depends on {on}: {_span(x, y)}"
+    sides = {"where it drives": x > 0.0, "where it brakes": x < 0.0}
+    spans = [f"{words} {_span(np.abs(x[side]), y[side])}" for words, side in sides.items() if side.any()]
+    return f"wants another share of the torque, which depends on {on}: {', '.join(spans)}"
+
+
+def _span(x: Array, y: Array) -> str:
+    """The least and the greatest share of a curve, in the order of their places."""
+    ends = sorted((int(y.argmin()), int(y.argmax())), key=lambda at: float(x[at]))
+    return " to ".join(f"{100.0 * y[at]:+.0f} % at {x[at]:.3g}" for at in ends)
 
 
 def seen_alone(term: Unexplained, before: Measure) -> Unexplained:
