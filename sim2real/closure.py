@@ -25,8 +25,8 @@ FLOOR_DOUBT = 4.0 / 3.0
 one log is known no better [-]."""
 MOST_NEAR_FLOOR = 0.5
 """Share that a cause may leave there: it takes the better part [-]."""
-AT_FLOOR = 1.02
-"""Up to this many times its noise floor a log's residual is at it: chance moves both by about a hundredth [-]."""
+AT_FLOOR = 1.03
+"""Up to this many times its noise floor a log's residual is at it: chance moves either by a hundredth or more [-]."""
 OPEN_BELIEF = 0.2
 """Probability that an effect is the cause though it leaves more [-]."""
 
