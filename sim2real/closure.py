@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim2real.contest import Contest, Entry
+from sim2real.contest import COUNTER, Contest, Entry
 from sim2real.evidence import Evidence
 from sim2real.gap import measure, noise_floor
 from sim2real.observer import Simulation
@@ -27,6 +27,9 @@ MOST_NEAR_FLOOR = 0.5
 """Share that a cause may leave there: it takes the better part [-]."""
 AT_FLOOR = 1.03
 """Up to this many times its noise floor a log's residual is at it: chance moves either by a hundredth or more [-]."""
+LOUD = 2.1
+"""From this many times the floor on in every log there is a gap, however well it averages out: noise in bursts reaches
+1.8 [-]."""
 OPEN_BELIEF = 0.2
 """Probability that an effect is the cause though it leaves more [-]."""
 
@@ -56,15 +59,27 @@ def at_the_floor(decision: Decision, contest: Contest, model: Simulation, *evide
         return decision
     found = decision.winner.fitted
     added = found.candidate.model(found.x)
-    if not all(_within(model, added, log) for part in evidence for log in part.sharpened(added).each()):
+    logs = [log for part in evidence for log in part.sharpened(added).each()]
+    if any(_floors(model, added, log) > AT_FLOOR for log in logs):
         return decision
     nothing = doubted(decision, NO_GAP_DOUBT, winner=contest.null, after=decision.before, varied=None)
     return replace(nothing, verdict=Verdict.NO_GAP, slight=decision.winner.name)
 
 
-def _within(model: Simulation, added: Simulation, log: Evidence) -> bool:
-    """Whether what the model leaves of a log is no more than noise."""
-    return measure(log, log.residuals(model)).total <= AT_FLOOR * noise_floor(added, log, 0)
+def loud(decision: Decision, model: Simulation, *evidence: Evidence) -> Decision:
+    """The decision, `unknown` instead of `no_gap` where the rows of every log are far above the floor.
+
+    What is over within a block, as the knock of a backlash, averages out in it. Flanks of a counter do so, too.
+    """
+    if decision.verdict is not Verdict.NO_GAP or model.has(COUNTER):
+        return decision
+    quiet = any(_floors(model, model, log) <= LOUD for part in evidence for log in part.each())
+    return decision if quiet else replace(decision, verdict=Verdict.UNKNOWN, fast=True)
+
+
+def _floors(model: Simulation, added: Simulation, log: Evidence) -> float:
+    """What the model leaves of a log, in noise floors."""
+    return measure(log, log.residuals(model)).total / noise_floor(added, log, 0)
 
 
 def closing(decision: Decision, model: Simulation, holdout: Evidence) -> Decision:

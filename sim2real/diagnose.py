@@ -12,7 +12,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
-from sim2real.closure import at_the_floor, closing
+from sim2real.closure import at_the_floor, closing, loud
 from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import Evidence, drift_of, gather, residuals
@@ -182,7 +182,7 @@ def find(
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)
-    decision = held_to_itself(decision, contest, fit_to, held)
+    decision = held_to_itself(loud(decision, base, fit_to, held), contest, fit_to, held)
     decision = closing(held_to_curves(decision, contest, base, fit_to, held, jobs), base, held)
     return Findings(base, fit_to, held, contest, decision, lattice, order)
 

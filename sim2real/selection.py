@@ -188,6 +188,8 @@ class Decision:
         Whether only what the winner's form adds to its effect is needed, and that is why it is not blamed.
     rare : float
         Share of the logs' time that lies far beyond noise, where the rest does not [-].
+    fast : bool
+        Whether the gap is one of rows alone, which averages out within a block.
     slight : str
         What was found and is not blamed, as every log's residual is at its noise floor.
     """
@@ -203,6 +205,7 @@ class Decision:
     curve: str = ""
     further: bool = False
     rare: float = 0.0
+    fast: bool = False
     slight: str = ""
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS
 from sim2real.contest import Contest
+from sim2real.drive import BLOCK_S
 from sim2real.goodness import loss_beyond_noise
 from sim2real.result import Cause, Gap, Structure, Variation, Verdict
 from sim2real.selection import Decision
@@ -33,7 +34,8 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: St
             "beyond it, and no effect of the library explains that."
         )
     if decision.verdict is Verdict.UNKNOWN:
-        return f"There is a gap of {size}, and no effect of the library explains it."
+        fast = f": it averages out within {BLOCK_S:g} s, as knocks and vibrations do" if decision.fast else ""
+        return f"There is a gap of {size}, and no effect of the library explains it{fast}."
     top = causes[0]
     after = structure.gap_after if structure else gap.after.total
     digits = 1 if gap.before.total > 1.1 else 2

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, clean, noisy, pulses
+from gap_drives import MODEL, SIGMA, clean, noisy, pulses, remeasured
 
-from sim2real.closure import at_the_floor
+from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
+from sim2real.closure import at_the_floor, loud
 from sim2real.contest import Contest, Entry
+from sim2real.drive import ACCEL
 from sim2real.evidence import gather
 from sim2real.fitting import Candidate, fit
 from sim2real.goodness import Fitness
@@ -72,6 +74,41 @@ def test_a_log_that_is_far_beyond_noise_now_and_then_has_a_gap():
     rare = replace(contest, null=replace(contest.null, z_hold=far))
     assert at_the_floor(decision, contest, MODEL, fit_to, held).verdict is Verdict.NO_GAP
     assert at_the_floor(decision, rare, MODEL, fit_to, held) is decision
+
+
+def knocking(part, size_sigmas):
+    """The same logs with an accelerometer that rings for a tenth of a second, every second."""
+    drives = []
+    for drive in part.drives:
+        measured = drive.measured.copy()
+        ringing = drive.time_s % 1.0 < 0.1
+        swings = np.where(np.arange(ringing.sum()) % 2, 1.0, -1.0)
+        measured[ringing, ACCEL] += size_sigmas * SIGMA[ACCEL] * swings
+        drives.append(remeasured(drive, measured))
+    return gather(MODEL, drives)
+
+
+def test_knocks_that_average_out_are_a_gap_where_every_log_has_them():
+    calm = evidence(0.0, 1), evidence(0.0, 5)
+    loud_ones = [knocking(part, 14.0) for part in calm]
+    found, contest = decided(*calm)
+    quiet = replace(found, verdict=Verdict.NO_GAP, winner=contest.null)
+    said = loud(quiet, MODEL, *loud_ones)
+    assert (said.verdict, said.fast) == (Verdict.UNKNOWN, True)
+    gap = Gap(Measure(2.4, {}, {}), Measure(2.4, {}, {}), 1.0)
+    assert "2.4 times" in verdict(said, gap, ())
+    assert "averages out within 0.2 s" in verdict(said, gap, ())
+    assert loud(quiet, MODEL, loud_ones[0], calm[1]) is quiet
+    assert loud(quiet, MODEL, *calm) is quiet
+    assert loud(found, MODEL, *loud_ones) is found
+
+
+def test_flanks_of_a_counter_are_no_knocks():
+    calm = evidence(0.0, 1), evidence(0.0, 5)
+    decision, contest = decided(*calm)
+    quiet = replace(decision, verdict=Verdict.NO_GAP, winner=contest.null)
+    counted = MODEL.with_effects(WheelSpeedQuantisation(48.0, 0.02))
+    assert loud(quiet, counted, *(knocking(part, 14.0) for part in calm)) is quiet
 
 
 def test_a_slight_effect_is_told_beside_no_gap():
