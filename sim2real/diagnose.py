@@ -13,7 +13,7 @@ import numpy as np
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
 from sim2real.closure import at_the_floor, closing, loud
-from sim2real.contest import COUNTER, Progress, first_round, hold_contest, silent
+from sim2real.contest import COUNTER, Contest, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import Evidence, drift_of, gather, residuals
 from sim2real.faint_counter import DELAY, beside_a_counter, traced
@@ -29,7 +29,7 @@ from sim2real.orders import Order, counts, read_order, without_swing
 from sim2real.pairs import add_pairs, add_partners, add_twins, deepened
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
-from sim2real.selection import decide, is_noise, needs_pairs
+from sim2real.selection import Decision, decide, is_noise, needs_pairs
 from sim2real.sluggish import impostor
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.structure import add_structure
@@ -162,29 +162,54 @@ def find(
         fit_to, held = fit_to.drifting(best, drift), held.drifting(best, drift)
     contest = hold_contest(base, fit_to, held, first, jobs, progress)
     if contest.singles and not is_noise(contest, fit_to, held):
-        passes = impostor(contest, base, fit_to, held)
-        contest = replace(contest, impostor=passes, lone=passes.loss if passes else contest.lone)
-        contest = add_partners(contest, fit_to, jobs, progress)
-        if needs_pairs(contest, fit_to, held):
-            contest = add_pairs(contest, base, fit_to, held, jobs, progress)
-            contest = add_structure(contest, base, fit_to, held, exclude, jobs, progress)
-            contest = deepened(contest, fit_to, held)
-            contest = replace(contest, lone=min(contest.lone, unlike_wheels(base, fit_to, held, jobs)))
-        else:
-            contest = add_twins(contest, base, fit_to, held, jobs, progress)
-    decision = decide(contest, fit_to, held)
-    if decision.verdict is Verdict.UNKNOWN:
-        contest = add_varied(contest, base, fit_to, held, jobs, progress)
-        decision = decide(contest, fit_to, held)
-    elif decision.winner.ids == (DELAY,) and not base.has(COUNTER) and COUNTER not in exclude:
-        contest, decision = beside_a_counter(contest, decision, base, fit_to, held)
-    decision = at_the_floor(decision, contest, base, fit_to, held)
+        contest = _widened(contest, base, fit_to, held, exclude, jobs, progress)
+    contest, decision = _decided(contest, base, fit_to, held, exclude, jobs, progress)
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)
     decision = held_to_itself(loud(decision, base, fit_to, held), contest, fit_to, held)
     decision = closing(held_to_curves(decision, contest, base, fit_to, held, jobs), base, held)
     return Findings(base, fit_to, held, contest, decision, lattice, order)
+
+
+def _widened(
+    contest: Contest,
+    model: Simulation,
+    fit_to: Evidence,
+    held: Evidence,
+    exclude: Collection[str],
+    jobs: int,
+    progress: Progress,
+) -> Contest:
+    """The contest with all that may stand beside the single effects, or in their place."""
+    passes = impostor(contest, model, fit_to, held)
+    contest = replace(contest, impostor=passes, lone=passes.loss if passes else contest.lone)
+    contest = add_partners(contest, fit_to, jobs, progress)
+    if not needs_pairs(contest, fit_to, held):
+        return add_twins(contest, model, fit_to, held, jobs, progress)
+    contest = add_pairs(contest, model, fit_to, held, jobs, progress)
+    contest = add_structure(contest, model, fit_to, held, exclude, jobs, progress)
+    contest = deepened(contest, fit_to, held)
+    return replace(contest, lone=min(contest.lone, unlike_wheels(model, fit_to, held, jobs)))
+
+
+def _decided(
+    contest: Contest,
+    model: Simulation,
+    fit_to: Evidence,
+    held: Evidence,
+    exclude: Collection[str],
+    jobs: int,
+    progress: Progress,
+) -> tuple[Contest, Decision]:
+    """The decision, with what had to be added to the contest for it."""
+    decision = decide(contest, fit_to, held)
+    if decision.verdict is Verdict.UNKNOWN:
+        contest = add_varied(contest, model, fit_to, held, jobs, progress)
+        decision = decide(contest, fit_to, held)
+    elif decision.winner.ids == (DELAY,) and not model.has(COUNTER) and COUNTER not in exclude:
+        contest, decision = beside_a_counter(contest, decision, model, fit_to, held)
+    return contest, at_the_floor(decision, contest, model, fit_to, held)
 
 
 def without_order(model: Simulation, drives: Sequence[Drive]) -> tuple[Order | None, list[Drive]]:

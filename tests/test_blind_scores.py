@@ -362,8 +362,13 @@ def test_cosine_finds_an_effect_that_stands_alone_in_its_signal():
 
 
 def test_a_watched_command_tells_memory_of_all_its_processes():
-    hold = "b = bytearray(b'x') * 150_000_000; import time; time.sleep(1.0)"
-    both = f"import subprocess, sys; c = subprocess.Popen([sys.executable, '-c', {hold!r}]); {hold}; c.wait()"
+    hold = "b = bytearray(b'x') * 150_000_000"
+    child = f"{hold}; print('held', flush=True); input()"
+    both = (  # the child may be long in coming on a busy machine
+        "import subprocess as sp, sys, time; "
+        f"c = sp.Popen([sys.executable, '-c', {child!r}], stdin=sp.PIPE, stdout=sp.PIPE, text=True); "
+        f"{hold}; c.stdout.readline(); time.sleep(1.0); c.communicate('done\\n')"
+    )
     usage = watch([sys.executable, "-c", both])
     assert usage.code == 0
     assert 3e8 < usage.peak_bytes < 4e8
