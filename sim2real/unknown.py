@@ -29,8 +29,9 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
     best = terms[0]
     share = 1.0 - best.loss / max(best.null_loss, 1e-12)
     shape, sign = shape_of(best), sign_of(best)
+    wanted = _wanted(best, sign, shape)
     sentence = (
-        f"The {best.equation.subsystem.replace('_', ' ')}'s equation ({best.equation.key}) {_wanted(best)}. "
+        f"The {best.equation.subsystem.replace('_', ' ')}'s equation ({best.equation.key}) {wanted}. "
         f"Such a term takes {100.0 * share:.0f} % of the misfit."
     )
     if suspect:
@@ -48,12 +49,11 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
     )
 
 
-def _wanted(term: Term) -> str:
-    """What an equation wants, in words."""
+def _wanted(term: Term, sign: str, shape: str) -> str:
+    """What an equation wants, in words; sign and shape are the curve's."""
     on = f"{term.quantity} [{QUANTITIES[term.quantity][0]}]"
     if term.equation.key != TORQUE_GAIN:
-        curve = f"it {sign_of(term)} and {shape_of(term)}"
-        return f"wants a further term in {term.equation.unit} that depends on {on}: {curve}"
+        return f"wants a further term in {term.equation.unit} that depends on {on}: it {sign} and {shape}"
     x, y = term.drawn
     if term.quantity not in TWO_SIDED:
         return f"wants another share of the torque, which depends on {on}: {_span(x, y)}"

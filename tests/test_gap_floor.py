@@ -14,7 +14,7 @@ from sim2real.evidence import gather
 from sim2real.fitting import Candidate, fit
 from sim2real.goodness import Fitness
 from sim2real.result import Gap, Measure, Verdict
-from sim2real.selection import NO_GAP_DOUBT, Decision
+from sim2real.selection import NO_GAP_DOUBT, Decision, rare_share
 from sim2real.sentences import verdict
 
 KEY = "torque_gain"
@@ -58,8 +58,10 @@ def test_what_nothing_explains_may_have_been_read_as_noise():
 
 
 def test_a_gap_of_one_log_is_a_gap():
-    fit_to, held = evidence(0.004, 1), evidence(0.15, 5)
+    """One of 1.1 floors, no block of which is beyond all noise."""
+    fit_to, held = evidence(0.004, 1), evidence(0.07, 5)
     decision, contest = decided(held, fit_to)
+    assert rare_share(contest.null, held, fit_to) == 0.0
     assert at_the_floor(decision, contest, MODEL, held, fit_to) is decision
     decision, contest = decided(fit_to, held)
     assert at_the_floor(decision, contest, MODEL, fit_to, held) is decision
