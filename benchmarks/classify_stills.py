@@ -1,4 +1,4 @@
-"""How often `trpac vision classify` is right on real pictures that the surface network was not trained on.
+"""How often `trpac vision classify` is right on real pictures that the networks were not trained on.
 
 ``python -m benchmarks.classify_stills --data ROAD_IMAGES`` prints accuracy and recall per class with their 95 %
 intervals for each set of pictures, and how often a verdict of a given confidence is right.

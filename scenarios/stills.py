@@ -6,6 +6,7 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -17,7 +18,14 @@ from scenarios.looks import MODELS
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import LEAST_CONTRAST, LEAST_READABLE, usable_road
 from trpac_core.vision.images import ImageError, decode_image
-from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier, calibrated_probabilities
+from trpac_core.vision.networks import (
+    PatchClassifier,
+    PictureClassifier,
+    RoadMasks,
+    Segmenter,
+    SurfaceClassifier,
+    calibrated_probabilities,
+)
 from trpac_core.vision.regions import cut_box
 from trpac_core.vision.scene import scene_of
 
@@ -95,12 +103,11 @@ def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tup
     ModelError
         If a network file cannot be used.
     """
-    segmenter, classifier = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
+    networks = StillNetworks.load(MODELS)
     rows, problems = [], []
     for done, file in enumerate(files, start=1):
         try:
-            image = _upright(file)
-            probabilities = picture_probabilities(image, segmenter.segment(image), classifier, str(file))
+            probabilities = networks.probabilities(upright(file), str(file))
             surface = Surface(int(probabilities.argmax()))
             rows.append((str(file), surface.label, float(probabilities.max()), *probabilities.tolist()))
         except ImageError as error:
@@ -109,13 +116,13 @@ def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tup
     return pd.DataFrame(rows, columns=list(CLASSIFY_COLUMNS)), problems
 
 
-def picture_probabilities(
-    image: NDArray[np.uint8], masks: RoadMasks, classifier: SurfaceClassifier, name: str = "image"
+def patch_logs(
+    image: NDArray[np.uint8], masks: RoadMasks, classifier: PatchClassifier, name: str = "image"
 ) -> NDArray[np.float64]:
-    """Probabilities of dry, wet, snow and ice of one picture, shape (3,) [-].
+    """Mean log probability of dry, wet, snow and ice over the patches of one picture, shape (3,).
 
-    The mean log probability of its patches, normalised: patches of one picture share light, camera and road, so they
-    are not the independent bodies of evidence that Dempster's rule would multiply to near-certainty.
+    Patches of one picture share light, camera and road, so they are not the independent bodies of evidence that
+    Dempster's rule would multiply to near-certainty.
 
     Raises ImageError where the lower centre shows nothing at all, or nothing that could be read: a covered, blinded or
     dark camera, a picture without road.
@@ -140,14 +147,46 @@ def picture_probabilities(
     best = next(
         (looks for looks, least in ((on_road, LEAST_LOOKS), (readable, 1)) if looks.sum() >= least), contrast
     )
-    logits = verdicts.logits[best]
-    probabilities = calibrated_probabilities(logits, classifier.temperature)
-    logs = np.log(np.maximum(probabilities, _LEAST_PROBABILITY)).mean(axis=0)
+    probabilities = calibrated_probabilities(verdicts.logits[best], classifier.temperature)
+    return np.asarray(np.log(np.maximum(probabilities, _LEAST_PROBABILITY)).mean(axis=0))
+
+
+def normalised(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Probabilities of sum 1 from logarithms, shape (3,) [-]."""
     raised = np.exp(logs - logs.max())
-    return raised / raised.sum()
+    return np.asarray(raised / raised.sum())
 
 
-def _upright(file: Path) -> NDArray[np.uint8]:
+@dataclass(frozen=True)
+class StillNetworks:
+    """The networks that judge single pictures."""
+
+    segmenter: Segmenter
+    classifier: SurfaceClassifier
+    picture: PictureClassifier
+
+    @classmethod
+    def load(cls, folder: Path) -> StillNetworks:
+        """From segmenter.onnx, surface.onnx and picture.onnx of a folder; raises ModelError."""
+        return cls(
+            Segmenter(folder / "segmenter.onnx"),
+            SurfaceClassifier(folder / "surface.onnx"),
+            PictureClassifier(folder / "picture.onnx"),
+        )
+
+    def probabilities(self, image: NDArray[np.uint8], name: str = "image") -> NDArray[np.float64]:
+        """Probabilities of dry, wet, snow and ice of one BGR picture, shape (3,) [-].
+
+        What its patches say and what it says as a whole, multiplied; the second weighs as much as its T allows, which
+        was learned beside the first.
+
+        Raises ImageError where there is no road to be judged, see `patch_logs`.
+        """
+        logs = patch_logs(image, self.segmenter.segment(image), self.classifier, name)
+        return normalised(logs + self.picture.logits(image) / self.picture.temperature)
+
+
+def upright(file: Path) -> NDArray[np.uint8]:
     """The picture as a viewer shows it; raises ImageError. A turn noted by a telephone would move the road."""
     image = decode_image(file)
     data = file.read_bytes()

@@ -41,6 +41,7 @@ QUICK_KINDS = (
     "sweep_part_json",
     "log_parquet",
     "surface_onnx",
+    "picture_onnx",
     "state_TrpacEstimator",
 )
 """Kinds that are read in milliseconds; CSV logs have tests of their own, and an MDF log takes a process each."""

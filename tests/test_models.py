@@ -11,8 +11,10 @@ import pytest
 
 from models.training import data, patches, scores
 from models.training.calibrate import probabilities
+from models.training.picture_looks import rendered_looks
 from models.training.rendered import SEED_RANGES, draw_worlds
 from models.training.segmenter_data import masked_sample, painted_views, plain_view
+from scenarios.stills import classify_pictures
 from trpac_core.vision.onnx_runtime import ort
 
 ROOT = Path(__file__).parents[1]
@@ -101,6 +103,33 @@ def test_surface_contract(surface):
         assert ((readable >= 0.0) & (readable <= 1.0)).all()
 
 
+def test_picture_contract():
+    picture = session("picture")
+    (batch,) = picture.get_inputs()
+    assert (batch.name, batch.type, batch.shape[1:]) == ("looks", "tensor(uint8)", [128, 192, 3])
+    assert not isinstance(batch.shape[0], int)
+    assert {output.name: output.shape[1:] for output in picture.get_outputs()} == {"logits": [3]}
+    assert picture.get_modelmeta().custom_metadata_map["classes"] == "dry,wet,snow_ice"
+    images = np.stack([cv2.resize(patch, (192, 128)) for patch in random_patches(7)])
+    together, alone = (
+        np.concatenate([picture.run(["logits"], {"looks": part})[0] for part in parts])
+        for parts in ([images], images[:, None])
+    )
+    assert np.isfinite(together).all()
+    assert together == pytest.approx(alone, abs=1e-4)
+
+
+def test_pictures_of_worlds_never_seen_are_classified():
+    """The card of the surface network has what patches reach; a picture as a whole must not fall below chance by far.
+
+    Floor 0.7: 0.9 less three standard errors of 18 views of 9 worlds, which are alike.
+    """
+    looks = rendered_looks(SEED_RANGES["test"][:9], 1, lambda: None)
+    found = session("picture").run(["logits"], {"looks": looks.patches})[0]
+    assert set(looks.labels) == {0, 1, 2}
+    assert np.mean(found.argmax(axis=1) == looks.labels) >= 0.7
+
+
 def test_readable_road_is_told_from_what_is_none(surface, held_out):
     """Rendered roads that no training has seen, and noise, an even grey and a grid, none of them as in the training."""
     rng = np.random.default_rng(1)
@@ -138,20 +167,21 @@ def test_temperature_keeps_the_class_and_makes_probabilities(surface):
     assert (calibrated.argmax(axis=1) == logits.argmax(axis=1)).all()
 
 
-@pytest.mark.parametrize("name", ["segmenter", "surface"])
+@pytest.mark.parametrize("name", ["segmenter", "surface", "picture"])
 def test_card_belongs_to_the_file(name):
     found = hashlib.sha256((MODELS / f"{name}.onnx").read_bytes()).hexdigest()
     card = (MODELS / f"{name}.md").read_text(encoding="utf-8")
     assert f"sha256: `{found}`" in card
 
 
-def test_surface_card_tells_the_temperature(surface):
-    card = (MODELS / "surface.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["surface", "picture"])
+def test_card_tells_the_temperature(name):
+    card = (MODELS / f"{name}.md").read_text(encoding="utf-8")
     (told,) = re.findall(r"`temperature` = ([0-9.]+)", card)
-    assert float(told) == pytest.approx(temperature_of(surface), abs=1e-6)
+    assert float(told) == pytest.approx(temperature_of(session(name)), abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["segmenter", "surface"])
+@pytest.mark.parametrize("name", ["segmenter", "surface", "picture"])
 def test_files_name_no_place_of_their_making(name):
     content = (MODELS / f"{name}.onnx").read_bytes()
     for trace in (b"/work", b"/tmp", b"/home", b".py"):
@@ -222,6 +252,16 @@ def test_real_stills_are_classified(surface):
 
 
 @pytest.mark.data
+def test_real_stills_are_classified_by_patches_and_whole():
+    """The same stills by the command: the floor is the lower end of the interval that docs/vision_commands.md has."""
+    chosen = [p for p in data.of_split(real_pictures(), "test") if p.source == "condition_web"]
+    table, refused = classify_pictures([picture.path for picture in chosen])
+    assert not refused
+    right = table["class"].to_numpy() == [picture.surface.label for picture in chosen]
+    assert right.mean() >= 0.79
+
+
+@pytest.mark.data
 def test_real_road_is_segmented(segmenter):
     """CamVid 0001TP, a dusk drive that the network was not trained on."""
     samples = [masked_sample(p) for p in data.of_split(real_pictures(), "val", masked=True)][::4]
@@ -282,7 +322,7 @@ def test_training_computes_the_layers_that_ship():
 
 def test_export_computes_what_was_trained(tmp_path):
     torch = pytest.importorskip("torch", reason="the training extra is not installed")
-    from models.training.export import export_surface
+    from models.training.export import export_picture, export_surface
     from models.training.nets import SurfaceNet
 
     torch.manual_seed(3)
@@ -294,3 +334,10 @@ def test_export_computes_what_was_trained(tmp_path):
         expected = net(torch.from_numpy(images))[0].numpy()
     assert logits_of(network, images) == pytest.approx(expected, abs=1e-4)
     assert temperature_of(network) == 1.25
+    export_picture(net, 1.75, tmp_path / "picture.onnx")
+    network = ort.InferenceSession(str(tmp_path / "picture.onnx"))
+    looks = np.stack([cv2.resize(patch, (192, 128)) for patch in images])
+    with torch.no_grad():
+        expected = net.classifier(net.embed(torch.from_numpy(looks))).numpy()
+    assert network.run(["logits"], {"looks": looks})[0] == pytest.approx(expected, abs=1e-4)
+    assert temperature_of(network) == 1.75

@@ -16,7 +16,7 @@ from scenarios import film, stills
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.looks import MODELS
-from scenarios.stills import CLASSIFY_COLUMNS, picture_probabilities
+from scenarios.stills import CLASSIFY_COLUMNS, StillNetworks, normalised, patch_logs
 from scenarios.vision_runs import FRAME_COLUMNS, Frames, run_frames
 from trpac_cli.main import app
 from trpac_core.vision.camera import Camera
@@ -102,6 +102,10 @@ def noisy(colour, height, width):
     """A colour with just enough grain to count as a picture."""
     grain = np.random.default_rng(0).integers(-4, 5, (height, width, 1))
     return np.clip(np.array(colour) + grain, 0, 255).astype(np.uint8)
+
+
+def patch_probabilities(*arguments):
+    return normalised(patch_logs(*arguments))
 
 
 def masks(drivable, shadow=None):
@@ -205,13 +209,13 @@ def test_only_usable_road_of_the_lower_centre_counts():
     everywhere = np.ones((160, 256), bool)
 
     def verdict(shown):
-        return Surface(int(picture_probabilities(image, shown, ByColour()).argmax()))
+        return Surface(int(patch_probabilities(image, shown, ByColour()).argmax()))
 
     assert verdict(masks(left)) is Surface.DRY
     assert verdict(masks(everywhere, shadow=left)) is Surface.SNOW_ICE
     assert verdict(masks(everywhere, shadow=~left)) is Surface.DRY
     both = [
-        picture_probabilities(image, shown, ByColour())
+        patch_probabilities(image, shown, ByColour())
         for shown in (masks(everywhere), masks(~everywhere), masks(everywhere, shadow=everywhere))
     ]
     np.testing.assert_array_equal(both[0], both[1])
@@ -222,13 +226,37 @@ def test_only_usable_road_of_the_lower_centre_counts():
 
 def test_agreeing_patches_do_not_grow_more_certain_than_one():
     image = noisy((100, 100, 100), 400, 640)
-    fused = picture_probabilities(image, masks(np.ones((160, 256), bool)), Certain())
+    fused = patch_probabilities(image, masks(np.ones((160, 256), bool)), Certain())
     np.testing.assert_allclose(fused, calibrated_probabilities(np.array([[2.0, 0.5, -1.0]]), 1.5)[0])
+
+
+class Road:
+    """All is road out of the shadow."""
+
+    def segment(self, image):
+        return masks(np.ones((160, 256), bool))
+
+
+class Whole:
+    """Every picture as a whole has the same logits."""
+
+    temperature = 4.0
+
+    def logits(self, image):
+        return np.array([-1.0, 3.0, 0.5])
+
+
+def test_the_picture_as_a_whole_counts_beside_its_patches_by_its_own_temperature():
+    """Their probabilities are multiplied: exponents add up, each over its T."""
+    networks = StillNetworks(Road(), Certain(), Whole())
+    expected = np.exp(np.array([2.0, 0.5, -1.0]) / 1.5 + np.array([-1.0, 3.0, 0.5]) / 4.0)
+    found = networks.probabilities(noisy((100, 100, 100), 400, 640))
+    np.testing.assert_allclose(found, expected / expected.sum())
 
 
 def test_one_even_colour_is_refused():
     with pytest.raises(ImageError, match=r"dark\.png: one even colour"):
-        picture_probabilities(
+        patch_probabilities(
             np.full((300, 400, 3), 90, np.uint8), masks(np.ones((160, 256), bool)), Certain(), "dark.png"
         )
 
@@ -261,10 +289,10 @@ def test_what_cannot_be_read_does_not_count_and_alone_is_refused():
     image = noisy((60, 60, 60), 320, 512)
     image[:, 260:] = noisy((200, 200, 200), 320, 252)
     everywhere = masks(np.ones((160, 256), bool))
-    assert picture_probabilities(image, everywhere, Blind(0)).argmax() == Surface.DRY
-    assert picture_probabilities(image, everywhere, Blind(150)).argmax() == Surface.SNOW_ICE
+    assert patch_probabilities(image, everywhere, Blind(0)).argmax() == Surface.DRY
+    assert patch_probabilities(image, everywhere, Blind(150)).argmax() == Surface.SNOW_ICE
     with pytest.raises(ImageError, match=r"wall\.png: no road that could be read"):
-        picture_probabilities(image, everywhere, Blind(255), "wall.png")
+        patch_probabilities(image, everywhere, Blind(255), "wall.png")
 
 
 # --- run ---

@@ -94,3 +94,15 @@ def write_segmenter(
         [_tensor(drivable, FLOAT, mask), _tensor(shadow, FLOAT, mask)],
         {},
     )
+
+
+def write_picture_classifier(path: Path, *, metadata: dict | None = None) -> Path:
+    """Logits are the mean blue, green and red of each look."""
+    calibration = {"temperature": "3.5", "classes": "dry,wet,snow_ice"} if metadata is None else metadata
+    return _write(
+        path,
+        [_cast("looks"), _mean("logits", [1, 2])],
+        [_tensor("looks", UINT8, ["n", 128, 192, 3])],
+        [_tensor("logits", FLOAT, ["n", 3])],
+        calibration,
+    )

@@ -1,4 +1,4 @@
-"""Train both networks again: `python -m models.training --data DIR [--out models] [--seed N]`."""
+"""Train the networks again: `python -m models.training --data DIR [--out models] [--seed N]`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one clear line when the surroundings or the data folder lack something."""
     parser = argparse.ArgumentParser(
         prog="python -m models.training",
-        description="Trains the segmenter and the surface classifier, exports them as ONNX and writes their cards.",
+        description="Trains the segmenter and both classifiers, exports them as ONNX and writes their cards.",
     )
     parser.add_argument(
         "--data", type=Path, required=True, help="folder of road pictures with its manifest.csv"
@@ -28,9 +28,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="seed of every random choice (default: 1)")
     parser.add_argument(
         "--only",
-        choices=("segmenter", "surface", "scene"),
-        help="train one of the two networks, the other file stays; or only what a scene adds to the surface network "
-        "that lies with its card in --out",
+        choices=("segmenter", "surface", "scene", "picture"),
+        help="train one network, the other files stay; scene: only what a scene adds to the surface network that lies "
+        "with its card in --out; picture: the picture network from the --trunk, beside the two others in --out",
     )
     parser.add_argument(
         "--effort", type=float, default=1.0, help="share of the usual steps and rendered worlds (default: 1)"

@@ -8,11 +8,13 @@ import torch
 from torch import Tensor, nn
 
 from trpac_core.vision.classes import Surface
+from trpac_core.vision.picture import LOOK_HEIGHT_PX, LOOK_WIDTH_PX
 
 from .annotate import annotate
 from .nets import Segmenter, SurfaceNet
 
 OPSET = 18
+CLASS_LIST = ",".join(surface.label for surface in Surface)
 
 
 class _SegmenterGraph(nn.Module):
@@ -41,8 +43,25 @@ def export_surface(net: SurfaceNet, temperature: float, path: Path) -> None:
     """
     example = torch.zeros((2, 64, 96, 3), dtype=torch.uint8)
     _export(net, example, path, "patches", ["logits", "readable"], {"patches": {0: "n"}})
-    classes = ",".join(surface.label for surface in Surface)
-    annotate(path, {"temperature": f"{temperature:.6f}", "classes": classes})
+    annotate(path, {"temperature": f"{temperature:.6f}", "classes": CLASS_LIST})
+
+
+class _PictureGraph(nn.Module):
+    """The classes alone: the other heads know patches."""
+
+    def __init__(self, net: SurfaceNet):
+        super().__init__()
+        self.net = net
+
+    def forward(self, looks: Tensor) -> Tensor:
+        return self.net.classifier(self.net.embed(looks))
+
+
+def export_picture(net: SurfaceNet, temperature: float, path: Path) -> None:
+    """Write picture.onnx: `looks` uint8 (N, 128, 192, 3) BGR to `logits` (N, 3); T is in the metadata."""
+    example = torch.zeros((2, LOOK_HEIGHT_PX, LOOK_WIDTH_PX, 3), dtype=torch.uint8)
+    _export(_PictureGraph(net), example, path, "looks", ["logits"], {"looks": {0: "n"}})
+    annotate(path, {"temperature": f"{temperature:.6f}", "classes": CLASS_LIST})
 
 
 def _export(

@@ -1,4 +1,4 @@
-"""The two networks: a two-task segmenter and a ShuffleNet surface classifier.
+"""The networks: a two-task segmenter and a ShuffleNet surface classifier, of patches or of whole pictures.
 
 Both take BGR uint8 pictures with channels last; normalisation is part of the graph.
 """

@@ -1,4 +1,4 @@
-"""The training run: data, both networks, calibration, export, cards."""
+"""The training run: data, networks, calibration, export, cards."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from .annotate import sha256_of
 from .data import Picture, check_trainable, of_split, read_manifest
 from .export import export_segmenter
 from .patches import PatchSet
+from .picture_run import ship_picture
 from .rendered import (
     PATCHES_PER_VIEW,
     SEED_RANGES,
@@ -40,8 +41,9 @@ from .rendered import (
 )
 from .scene_run import ship_scene
 from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
-from .surface_run import Steps, train_and_ship
+from .surface_run import Steps, kept_trunk, train_and_ship
 from .train_segmenter import score_segmenter, train_segmenter
+from .train_surface import Taught
 
 WORLDS = {"train": 480, "val": 36, "test": 60}
 FURTHER_WORLDS, FURTHER_PATCHES_PER_VIEW = 2520, 6
@@ -74,6 +76,9 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
         if given.only == "scene":
             _scene(progress, given, pictures, worlds, steps)
             return
+        if given.only == "picture":
+            _picture(progress, given, kept_trunk(given), pictures, steps)
+            return
         further = max(3, round(given.effort * FURTHER_WORLDS))
         start = time.monotonic()
         rendered = _render(progress, worlds, given.worlds)
@@ -97,8 +102,10 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
         if given.only != "surface":
             _segmenter(progress, given, facts, rendered)
         if given.only != "segmenter":
-            train_and_ship(given, facts, patches, progress, steps)
+            trunk = train_and_ship(given, facts, patches, progress, steps)
             _scene(progress, given, pictures, worlds, steps)
+        if given.only is None:
+            _picture(progress, given, trunk, pictures, steps)
 
 
 def _scene(
@@ -112,6 +119,16 @@ def _scene(
     found = ship_scene(given.out / "surface.onnx", given, pictures, worlds, steps)
     shown = {name: both.in_scene for name, both in found.items()}
     progress.console.print(cards.class_table(shown), markup=False)
+
+
+def _picture(
+    progress: Progress, given: argparse.Namespace, trunk: Taught, pictures: Sequence[Picture], steps: Steps
+) -> None:
+    """The picture network, beside the two others that lie in the folder."""
+    found = ship_picture(given, trunk, pictures, steps)
+    progress.console.print(
+        cards.class_table({name: scores.together for name, scores in found.items()}), markup=False
+    )
 
 
 def _keep_memory() -> None:

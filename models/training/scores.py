@@ -20,6 +20,13 @@ class ClassScore:
 
     confusion: NDArray[np.int64]
 
+    @classmethod
+    def of(cls, true: NDArray[np.int64], found: NDArray[np.int64]) -> ClassScore:
+        """From class indices."""
+        counts = np.zeros((3, 3), np.int64)
+        np.add.at(counts, (true, found), 1)
+        return cls(counts)
+
     @property
     def count(self) -> int:
         """Judged items."""
@@ -54,12 +61,12 @@ def wilson_interval(right: int, count: int) -> tuple[float, float]:
 
 def by_patch(logits: NDArray[np.float64], patches: PatchSet) -> ClassScore:
     """Confusion over single patches."""
-    return _confusion(patches.labels, logits.argmax(axis=1))
+    return ClassScore.of(patches.labels, logits.argmax(axis=1))
 
 
 def by_picture(logits: NDArray[np.float64], patches: PatchSet, temperature: float) -> ClassScore:
     """Confusion over pictures."""
-    return _confusion(*picture_verdicts(logits, patches, temperature))
+    return ClassScore.of(*picture_verdicts(logits, patches, temperature))
 
 
 def picture_verdicts(
@@ -71,9 +78,3 @@ def picture_verdicts(
     summed = np.zeros((len(numbers), logits.shape[1]))
     np.add.at(summed, index, logs)
     return patches.labels[first], summed.argmax(axis=1)
-
-
-def _confusion(true: NDArray[np.int64], found: NDArray[np.int64]) -> ClassScore:
-    counts = np.zeros((3, 3), np.int64)
-    np.add.at(counts, (true, found), 1)
-    return ClassScore(counts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import copy
 import hashlib
 import time
 from collections.abc import Callable, Sequence
@@ -79,15 +80,22 @@ def train_and_ship(
     rendered: dict[str, PatchSet],
     progress: Progress,
     steps: Steps,
-) -> None:
-    """Train as the command line asks, write surface.onnx, its card and the reliability diagram."""
+) -> Taught:
+    """Train as the command line asks, write surface.onnx, its card and the reliability diagram.
+
+    Returns
+    -------
+    Taught
+        The net after its first stage.
+    """
     start = time.monotonic()
     material = gather(given, facts.pictures, rendered, steps)
     trunk = _trunk(given, material, steps)
+    student = copy.deepcopy(trunk)
     count = max(2, round(given.effort * CLASS_STEPS))
     with steps("training the surface classifier", count) as report:
         taught = learn_classes(
-            trunk, material.patches, material.teacher, steps=count, seed=given.seed, report=report
+            student, material.patches, material.teacher, steps=count, seed=given.seed, report=report
         )
     net = taught.net
     learn_heads(net, material, given.seed, given.effort)
@@ -103,6 +111,7 @@ def train_and_ship(
     )
     cards.write_card(path.with_suffix(".md"), text)
     progress.console.print(cards.class_table(outcome.picture_scores), markup=False)
+    return trunk
 
 
 def gather(
@@ -114,7 +123,7 @@ def gather(
     """
     every = of_split(pictures, "train")
     patches = joined([training_patches(every, CUTTING_SEED), rendered["train"]])
-    teacher = _ask_teacher(given, patches, steps) if given.teacher else None
+    teacher = ask_teacher(given, patches, steps) if given.teacher else None
     cuts = round(min(given.effort, 1.0) * FURTHER_CUTS)
     further = [training_patches(every, CUTTING_SEED + 1 + number) for number in range(cuts)]
     patches = joined([patches, *further, *([rendered["further"]] if "further" in rendered else [])])
@@ -131,7 +140,7 @@ def gather(
     return Material(patches.where(kept), teacher, outliers)
 
 
-def _ask_teacher(given: argparse.Namespace, patches: PatchSet, steps: Steps) -> TeacherFeatures:
+def ask_teacher(given: argparse.Namespace, patches: PatchSet, steps: Steps) -> TeacherFeatures:
     """The teacher's features, kept beside the rendered worlds where there is a folder for those."""
     if not given.teacher.is_file():
         raise TeacherError(f"{given.teacher}: not found; leave --teacher out to train without one")
@@ -151,15 +160,9 @@ def _ask_teacher(given: argparse.Namespace, patches: PatchSet, steps: Steps) -> 
 
 def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taught:
     """The first stage's net: read from its file where there is one, else trained (and kept)."""
+    if material.teacher is None or (given.trunk and given.trunk.is_file()):
+        return kept_trunk(given)
     student = new_student(given.seed)
-    if material.teacher is None:
-        return student
-    if given.trunk and given.trunk.is_file():
-        kept = torch.load(given.trunk, weights_only=True)
-        heads = ("0.softening", "0.reading", "0.disturbed")  # learned last, in other forms at times
-        kept = {name: value for name, value in kept.items() if not name.startswith(heads)}
-        torch.nn.ModuleList(student).load_state_dict(kept, strict=False)
-        return student
     seen = np.arange(len(material.patches)) < len(material.teacher)
     chosen = seen & np.isin(material.patches.sources, TRUNK_SOURCES)
     count = max(2, round(given.effort * TRUNK_STEPS))
@@ -177,6 +180,28 @@ def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taugh
         torch.save(torch.nn.ModuleList(trunk).state_dict(), part)
         part.replace(given.trunk)
     return trunk
+
+
+def kept_trunk(given: argparse.Namespace) -> Taught:
+    """The first stage's net from its file; without a teacher an untrained one.
+
+    Raises
+    ------
+    TeacherError
+        There is a teacher but no such file.
+    """
+    student = new_student(given.seed)
+    if given.teacher is None:
+        return student
+    if not (given.trunk and given.trunk.is_file()):
+        raise TeacherError(
+            f"--trunk {given.trunk}: no such file; name the one that `--only surface --trunk FILE` has kept"
+        )
+    kept = torch.load(given.trunk, weights_only=True)
+    heads = ("0.softening", "0.reading", "0.disturbed")  # learned last, in other forms at times
+    kept = {name: value for name, value in kept.items() if not name.startswith(heads)}
+    torch.nn.ModuleList(student).load_state_dict(kept, strict=False)
+    return student
 
 
 def learn_heads(net: SurfaceNet, material: Material, seed: int, effort: float) -> None:

@@ -1,4 +1,4 @@
-"""The two networks behind the camera side: road and shadow masks, surface of patches."""
+"""The networks behind the camera side: road and shadow masks, surface of patches, surface of a whole picture."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .classes import Surface
 from .onnx_runtime import ort, ort_errors
+from .picture import LOOK_HEIGHT_PX, LOOK_WIDTH_PX, picture_looks
 from .regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
 from .scene import SceneHead
 
@@ -19,7 +20,8 @@ MASK_WIDTH_PX = 256
 MASK_HEIGHT_PX = 160
 MASKS = ("drivable", "shadow")
 VERDICTS = ("logits", "readable")
-"""Outputs of the two networks."""
+PICTURE_VERDICTS = ("logits",)
+"""Outputs of the networks."""
 _ROUNDING = 1e-5
 """By how much the runtime's sigmoid may leave [0, 1]."""
 
@@ -151,11 +153,7 @@ class SurfaceClassifier:
             The picture that they were cut from, or the picture of each, by `scene_of`; None judges patches alone.
         """
         logits, readable = _run(self._session, self._path, VERDICTS, {"patches": patches})
-        if logits.shape != (len(patches), len(Surface)) or not np.isfinite(logits).all():
-            raise ModelError(
-                f"{self._path}: expected finite logits of shape {(len(patches), len(Surface))}, got shape "
-                f"{logits.shape}. Export or train the network again."
-            )
+        _check_logits(logits, len(patches), self._path)
         if readable.shape != (len(patches),) or not (np.abs(readable - 0.5) <= 0.5 + _ROUNDING).all():
             raise ModelError(
                 f"{self._path}: expected 'readable' of shape {(len(patches),)} within [0, 1], got shape "
@@ -165,6 +163,30 @@ class SurfaceClassifier:
         if scene is not None and self._head is not None:
             seen = seen + self._head.logits(patches, scene)
         return PatchVerdicts(seen, readable.astype(np.float64).clip(0.0, 1.0))
+
+
+class PictureClassifier:
+    """The classifier of a picture as a whole, for stills: it goes with the surface classifier of the same training."""
+
+    def __init__(self, path: str | Path, threads: int = 2) -> None:
+        """Load and check the file; raises ModelError."""
+        self._session = _load(path, threads)
+        self._path = path
+        _check_input(self._session, path, "looks", [None, LOOK_HEIGHT_PX, LOOK_WIDTH_PX, 3])
+        _check_outputs(self._session, path, PICTURE_VERDICTS)
+        self._temperature = _read_temperature(self._session, path)
+
+    @property
+    def temperature(self) -> float:
+        """T of the temperature scaling, learned beside the log probabilities of the patches [-]."""
+        return self._temperature
+
+    def logits(self, image: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Mean logits of the looks at a BGR picture, shape (3,); raises ModelError if they are not finite."""
+        looks = picture_looks(image)
+        (logits,) = _run(self._session, self._path, PICTURE_VERDICTS, {"looks": looks})
+        _check_logits(logits, len(looks), self._path)
+        return np.asarray(logits.mean(axis=0, dtype=np.float64))
 
 
 def _load(path: str | Path, threads: int) -> ort.InferenceSession:
@@ -217,7 +239,15 @@ def _check_input(session: ort.InferenceSession, path: str | Path, name: str, sha
         )
     )
     if not fits:
-        raise ModelError(f"{path}: expected {wanted}; found {found}. Is it the other network's file?")
+        raise ModelError(f"{path}: expected {wanted}; found {found}. Is it another network's file?")
+
+
+def _check_logits(logits: NDArray[np.float32], count: int, path: str | Path) -> None:
+    if logits.shape != (count, len(Surface)) or not np.isfinite(logits).all():
+        raise ModelError(
+            f"{path}: expected finite logits of shape {(count, len(Surface))}, got shape {logits.shape}. Export or "
+            "train the network again."
+        )
 
 
 def _check_outputs(session: ort.InferenceSession, path: str | Path, names: tuple[str, ...]) -> None:

@@ -1,0 +1,101 @@
+"""Looks at whole pictures, real and rendered: the road in its surroundings, for the picture network."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from trpac_core.vision.picture import look
+
+from .data import Box, Image, Picture
+from .patches import PatchSet, patch_set
+from .rendered import REDUCED_SCALE, WORLDS_PER_CAMERA, random_camera, world_views
+
+LOOKS_PER_PICTURE = {
+    "condition_web": 8,
+    "drivable_camvid": 2,
+    "drivable_lums": 1,
+    "dry_udacity": 8,
+    "seq_dry_yolop": 4,
+    "seq_extreme": 12,
+}
+"""Training looks at each picture of a family."""
+LOOKS_PER_VIEW = 3
+PURE_SHARE = 0.9
+"""Least share of one surface on the road of a rendered view [-]: a look has one class."""
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Between which fractions of a picture each edge of a look is drawn."""
+
+    left: tuple[float, float]
+    top: tuple[float, float]
+    right: tuple[float, float]
+    bottom: tuple[float, float]
+
+    def draw(self, rng: np.random.Generator) -> Box:
+        """One box."""
+        left, top, right, bottom = (
+            float(rng.uniform(*edge)) for edge in (self.left, self.top, self.right, self.bottom)
+        )
+        return left, top, right, bottom
+
+
+WIDE = Edges((0.0, 0.2), (0.2, 0.5), (0.8, 1.0), (0.9, 1.0))
+"""About the looks that a picture is judged by."""
+OVERLAID = (
+    Edges((0.02, 0.12), (0.43, 0.47), (0.5, 0.6), (0.84, 0.87)),
+    Edges((0.4, 0.5), (0.43, 0.47), (0.88, 0.98), (0.84, 0.87)),
+)
+"""In the clips that have the weather written into them: the left and the right of what is below the text and above the
+bonnet, by turns."""
+
+
+def training_looks(pictures: Iterable[Picture], seed: int) -> PatchSet:
+    """Looks at training pictures, as many as LOOKS_PER_PICTURE says."""
+    rng = np.random.default_rng(seed)
+    return patch_set((_drawn(rng, picture), int(picture.surface), picture.source) for picture in pictures)
+
+
+def _drawn(rng: np.random.Generator, picture: Picture) -> list[Image]:
+    edges = OVERLAID if picture.family == "seq_extreme" else (WIDE,)
+    image = picture.image()
+    return [
+        look(image, edges[number % len(edges)].draw(rng))
+        for number in range(LOOKS_PER_PICTURE[picture.family])
+    ]
+
+
+def rendered_looks(seeds: Sequence[int], processes: int, report: Callable[[], None]) -> PatchSet:
+    """Looks at views of rendered worlds whose road is of one surface; independent of `processes`."""
+    sharing = [seeds[first : first + WORLDS_PER_CAMERA] for first in range(0, len(seeds), WORLDS_PER_CAMERA)]
+    groups: list[tuple[list[Image], int, str]] = []
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        for some, seen in zip(sharing, pool.map(_seen_in_worlds, sharing), strict=True):
+            groups += [(looks, label, "rendered") for looks, label in seen]
+            for _ in some:
+                report()
+    return patch_set(groups)
+
+
+def _seen_in_worlds(seeds: Sequence[int]) -> list[tuple[list[Image], int]]:
+    """Looks at each view of worlds seen by one camera, with the class index of its road."""
+    cv2.setNumThreads(1)
+    camera = random_camera(np.random.default_rng([seeds[0], 2]), REDUCED_SCALE)
+    found = []
+    for seed in seeds:
+        for view in world_views(seed, REDUCED_SCALE, camera):
+            road = view.frame.surface[view.frame.surface >= 0]
+            counts = np.bincount(road, minlength=1)
+            if counts.max() < PURE_SHARE * max(len(road), 1):
+                continue
+            rng = np.random.default_rng([view.patch_seed, 2])
+            looks = [look(view.frame.image, WIDE.draw(rng)) for _ in range(LOOKS_PER_VIEW)]
+            found.append((looks, int(counts.argmax())))
+    return found

@@ -1,0 +1,81 @@
+"""One training of the picture network: looks, the second stage, T beside the patches' verdicts, card."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from . import cards
+from .annotate import annotate, sha256_of
+from .data import Picture, of_split
+from .export import export_picture
+from .nets import SurfaceNet
+from .patches import PatchSet, joined
+from .picture_card import picture_card
+from .picture_looks import rendered_looks, training_looks
+from .picture_scores import Scores, calibrated
+from .rendered import FIRST_SCENE_WORLD, SEED_RANGES, load_patches, save_patches
+from .surface_run import Steps, ask_teacher
+from .train_surface import Taught, learn_classes
+
+PICTURE_STEPS = 1000
+WORLDS = 480
+CUTTING_SEED = 31
+
+
+def ship_picture(
+    given: argparse.Namespace, trunk: Taught, pictures: Sequence[Picture], steps: Steps
+) -> dict[str, Scores]:
+    """Train from the first stage of the surface network, calibrate beside the two others in the folder, write card."""
+    start = time.monotonic()
+    looks = gather(given, pictures, steps)
+    teacher = ask_teacher(given, looks, steps) if given.teacher else None
+    count = max(2, round(given.effort * PICTURE_STEPS))
+    with steps("training the picture network", count) as report:
+        taught = learn_classes(trunk, looks, teacher, steps=count, seed=given.seed, report=report)
+    file = given.out / "picture.onnx"
+    export_picture(taught.net, 1.0, file)
+    train_s = time.monotonic() - start
+    found, temperature = calibrated(given.out, pictures)
+    annotate(file, {"temperature": f"{temperature:.6f}"})
+    text = picture_card(
+        found,
+        looks=looks,
+        steps=count,
+        given=given,
+        sha256=sha256_of(file),
+        temperature=temperature,
+        train_s=train_s,
+        parameters=_parameters(taught.net),
+    )
+    cards.write_card(file.with_suffix(".md"), text)
+    return found
+
+
+def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps) -> PatchSet:
+    """Looks at the training pictures, and at worlds that the surface network has not seen."""
+    count = max(6, round(given.effort * WORLDS))
+    first = SEED_RANGES["train"].start + FIRST_SCENE_WORLD
+    real = [picture for picture in of_split(pictures, "train") if picture.family not in given.without]
+    return joined([training_looks(real, CUTTING_SEED), _rendered(given, range(first, first + count), steps)])
+
+
+def _rendered(given: argparse.Namespace, seeds: Sequence[int], steps: Steps) -> PatchSet:
+    file = given.worlds / f"looks-{len(seeds)}.npz" if given.worlds else None
+    if file and file.is_file():
+        return load_patches(file)
+    with steps("rendering worlds for whole pictures", len(seeds)) as report:
+        done = iter(range(1, len(seeds) + 1))
+        looks = rendered_looks(seeds, given.threads, lambda: report(next(done), np.nan))
+    if file:
+        save_patches(file, looks)
+    return looks
+
+
+def _parameters(net: SurfaceNet) -> int:
+    """Parameters that ship: the heads of the surface network are not in this file."""
+    heads = ("reading", "disturbed", "softening")
+    return sum(p.numel() for name, p in net.named_parameters() if not name.startswith(heads))
