@@ -63,6 +63,9 @@ MAJOR = 0.5
 """An effect that a structural difference stands beside takes alone at least this share of what both take [-]."""
 RIVAL = 0.1
 """An entry with more than this share of the winner's probability is not told apart from it [-]."""
+RIVAL_ALONE = 0.005
+"""The same of two effects that each explain the gap alone: their forms differ from nature's by more than that. On
+withheld cases those that are told apart rightly have a share of 1.4e-4 or less, look-alikes have 0.01 and more."""
 SOFTNESS = 4.0
 """Tempering of the quasi-likelihood: evidence counts for less than noise alone would say [-]."""
 FORM = 3e-4
@@ -257,7 +260,7 @@ def _decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         if varied:
             return varied
         return Decision(Verdict.UNKNOWN, best, (), _scaled(share, _belief(after, before)), before, after)
-    rivals = [e for e in singles if e is not best and share[e.ids[0]] > RIVAL * share[best.ids[0]]]
+    rivals = [e for e in singles if e is not best and share[e.ids[0]] > RIVAL_ALONE * share[best.ids[0]]]
     belief = _belief(after, before)
     further = _further(contest, best, fit_to, holdout)
     rivals += further

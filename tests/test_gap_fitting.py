@@ -10,6 +10,7 @@ from benchmarks.gap_development import SEVERITY, Levels
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.mass_offset import MassOffset
 from scenarios.effects.torque_gain import TorqueGain
+from sim2real import selection
 from sim2real.contest import COUNTER, first_round, hold_contest
 from sim2real.diagnose import find
 from sim2real.drive import ACCEL, SPEED
@@ -321,6 +322,28 @@ def test_one_effect_is_identified(heavy_contest):
     assert decision.probability["mass_offset"] > 0.9
     assert sum(decision.probability.values()) <= 1.0
     assert decision.after.misfit < 1.3 < decision.before.misfit
+
+
+@pytest.mark.parametrize(
+    ("odds", "verdict"), [(0.01, Verdict.AMBIGUOUS), (0.001, Verdict.IDENTIFIED), (0.0, Verdict.IDENTIFIED)]
+)
+def test_an_effect_that_explains_nearly_as_well_stands_beside_the_winner(
+    monkeypatch, heavy_contest, odds, verdict
+):
+    """Odds of a hundred to one are those of a lag of two stages against a delay of as many milliseconds."""
+    contest, fit_to, held, _ = heavy_contest
+    given = {"mass_offset": 1.0, contest.singles[1].ids[0]: odds}
+
+    def weights(contest, entries, *evidence):
+        raised = np.array([0.0, *(given.get(e.ids[0], 0.0) for e in entries)])
+        return raised / raised.sum()
+
+    monkeypatch.setattr(selection, "probabilities", weights)
+    decision = decide(contest, fit_to, held)
+    assert decision.verdict is verdict
+    assert decision.winner.ids == ("mass_offset",)
+    beside = [contest.singles[1].ids] if verdict is Verdict.AMBIGUOUS else []
+    assert [e.ids for e in decision.rivals] == beside
 
 
 PAIRS = (
