@@ -1,5 +1,7 @@
 """A pulse counter whose steps noise hides: its trace is found where it is, its age is told from a delay's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from counters import TURN, count, counted_wheels, driving
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from benchmarks.gap_development import Levels
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import diagnose, find
+from sim2real.drive import WHEEL
 from sim2real.faint_counter import FINEST_TEETH, HIDDEN
 from sim2real.lattice import find_lattice
 from sim2real.lattice_trace import Trace, common_trace, find_trace
@@ -109,6 +112,30 @@ def test_a_trace_of_a_counter_that_was_left_out_is_unknown():
     said = diagnose(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT | {COUNTER})
     assert said.verdict is Verdict.UNKNOWN
     assert said.unexplained.subsystem == "wheel_speed_sensor"
+
+
+def averaged(drive, window_s, noise_rad_s, seed):
+    """The wheel speeds as the mean of the last `window_s`, with new noise."""
+    rng = np.random.default_rng(seed)
+    rows = round(window_s / drive.step_s)
+    measured = drive.measured.copy()
+    for row in range(len(measured)):
+        measured[row, WHEEL] = drive.measured[max(row - rows + 1, 0) : row + 1, WHEEL].mean(axis=0)
+    measured[:, WHEEL] += noise_rad_s * rng.standard_normal(measured[:, WHEEL].shape)
+    return replace(drive, measured=measured)
+
+
+def test_wheel_speeds_that_are_late_by_averaging_are_a_delays_first():
+    """Though a running counter averages alike: what is smooth may be a filter or a queue as well."""
+    clean = random_drives({}, 3, 2, 20.0, levels=Levels(wheel=1e-4))
+    drives = [averaged(drive, 0.08, 0.03, seed) for seed, drive in enumerate(clean)]
+    said = diagnose(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT)
+    assert said.ambiguous_with == ((DELAY, COUNTER),)
+    assert [c.effect for c in said.causes[:2]] == [DELAY, COUNTER]
+    late_rows = (0.08 / drives[0].step_s - 1.0) / 2.0
+    assert said.causes[0].parameters["delay_s"].value == pytest.approx(
+        late_rows * drives[0].step_s, abs=0.002
+    )
 
 
 def test_without_a_trace_it_stands_beside_a_delay():
