@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from trpac_core.vision.picture import look
 
 from .data import Box, Image, Picture
 from .patches import PatchSet, patch_set
-from .rendered import REDUCED_SCALE, WORLDS_PER_CAMERA, random_camera, world_views
+from .rendered import View, seen_in_worlds
 
 LOOKS_PER_PICTURE = {
     "condition_web": 8,
@@ -74,28 +71,15 @@ def _drawn(rng: np.random.Generator, picture: Picture) -> list[Image]:
 
 def rendered_looks(seeds: Sequence[int], processes: int, report: Callable[[], None]) -> PatchSet:
     """Looks at views of rendered worlds whose road is of one surface; independent of `processes`."""
-    sharing = [seeds[first : first + WORLDS_PER_CAMERA] for first in range(0, len(seeds), WORLDS_PER_CAMERA)]
-    groups: list[tuple[list[Image], int, str]] = []
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
-        for some, seen in zip(sharing, pool.map(_seen_in_worlds, sharing), strict=True):
-            groups += [(looks, label, "rendered") for looks, label in seen]
-            for _ in some:
-                report()
-    return patch_set(groups)
+    seen = seen_in_worlds(seeds, _looks_at, processes, report)
+    return patch_set((looks, label, "rendered") for looks, label in seen if looks)
 
 
-def _seen_in_worlds(seeds: Sequence[int]) -> list[tuple[list[Image], int]]:
-    """Looks at each view of worlds seen by one camera, with the class index of its road."""
-    cv2.setNumThreads(1)
-    camera = random_camera(np.random.default_rng([seeds[0], 2]), REDUCED_SCALE)
-    found = []
-    for seed in seeds:
-        for view in world_views(seed, REDUCED_SCALE, camera):
-            road = view.frame.surface[view.frame.surface >= 0]
-            counts = np.bincount(road, minlength=1)
-            if counts.max() < PURE_SHARE * max(len(road), 1):
-                continue
-            rng = np.random.default_rng([view.patch_seed, 2])
-            looks = [look(view.frame.image, WIDE.draw(rng)) for _ in range(LOOKS_PER_VIEW)]
-            found.append((looks, int(counts.argmax())))
-    return found
+def _looks_at(view: View) -> tuple[list[Image], int]:
+    """Looks at a view with the class index of its road; none where that is mixed."""
+    road = view.frame.surface[view.frame.surface >= 0]
+    counts = np.bincount(road, minlength=1)
+    if counts.max() < PURE_SHARE * max(len(road), 1):
+        return [], 0
+    rng = np.random.default_rng([view.patch_seed, 2])
+    return [look(view.frame.image, WIDE.draw(rng)) for _ in range(LOOKS_PER_VIEW)], int(counts.argmax())

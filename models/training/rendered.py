@@ -8,6 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -62,6 +63,7 @@ DRIVEN_PURE_SHARE = 0.7
 
 Cut = list[tuple[Image, int]]
 """Patches of one view, each with its class index."""
+Seen = TypeVar("Seen")
 
 
 @dataclass(frozen=True)
@@ -133,31 +135,34 @@ def split_views(split: str, count: int, report: Callable[[], None]) -> Iterator[
 def draw_further_worlds(
     seeds: Sequence[int], patches_per_view: int, processes: int, report: Callable[[], None]
 ) -> list[tuple[Image, Cut]]:
-    """Scene and patches of each view of further worlds, at the reduced scale; independent of `processes`."""
-    draw = partial(_seen_in_worlds, patches_per_view=patches_per_view)
+    """Scene and patches of each view of further worlds, see `seen_in_worlds`."""
+    return seen_in_worlds(seeds, partial(_scene_and_patches, count=patches_per_view), processes, report)
+
+
+def seen_in_worlds(
+    seeds: Sequence[int], see: Callable[[View], Seen], processes: int, report: Callable[[], None]
+) -> list[Seen]:
+    """What each view of worlds shows, at the reduced scale, a camera for several; independent of `processes`."""
     sharing = [seeds[first : first + WORLDS_PER_CAMERA] for first in range(0, len(seeds), WORLDS_PER_CAMERA)]
-    seen: list[tuple[Image, Cut]] = []
+    seen: list[Seen] = []
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
-        for some, views in zip(sharing, pool.map(draw, sharing), strict=True):
+        for some, views in zip(sharing, pool.map(partial(_by_one_camera, see=see), sharing), strict=True):
             seen += views
             for _ in some:
                 report()
     return seen
 
 
-def _seen_in_worlds(seeds: Sequence[int], patches_per_view: int) -> list[tuple[Image, Cut]]:
-    """Scene and patches of each view of worlds seen by one camera, most patches cut as a driving car does."""
+def _by_one_camera(seeds: Sequence[int], see: Callable[[View], Seen]) -> list[Seen]:
     cv2.setNumThreads(1)
     camera = random_camera(np.random.default_rng([seeds[0], 2]), REDUCED_SCALE)
-    driven = round(DRIVEN_SHARE * patches_per_view)
-    return [
-        (
-            scene_of(view.frame.image),
-            driven_patches(view, driven) + view_patches(view, patches_per_view - driven),
-        )
-        for seed in seeds
-        for view in world_views(seed, REDUCED_SCALE, camera)
-    ]
+    return [see(view) for seed in seeds for view in world_views(seed, REDUCED_SCALE, camera)]
+
+
+def _scene_and_patches(view: View, count: int) -> tuple[Image, Cut]:
+    """A view's scene, and patches of which most are cut as a driving car does."""
+    driven = round(DRIVEN_SHARE * count)
+    return scene_of(view.frame.image), driven_patches(view, driven) + view_patches(view, count - driven)
 
 
 def view_sample(view: View) -> Sample:
