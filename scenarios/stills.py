@@ -151,12 +151,6 @@ def patch_logs(
     return np.asarray(np.log(np.maximum(probabilities, _LEAST_PROBABILITY)).mean(axis=0))
 
 
-def normalised(logs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Probabilities of sum 1 from logarithms, shape (3,) [-]."""
-    raised = np.exp(logs - logs.max())
-    return np.asarray(raised / raised.sum())
-
-
 @dataclass(frozen=True)
 class StillNetworks:
     """The networks that judge single pictures."""
@@ -183,7 +177,8 @@ class StillNetworks:
         Raises ImageError where there is no road to be judged, see `patch_logs`.
         """
         logs = patch_logs(image, self.segmenter.segment(image), self.classifier, name)
-        return normalised(logs + self.picture.logits(image) / self.picture.temperature)
+        both = logs + self.picture.logits(image) / self.picture.temperature
+        return calibrated_probabilities(both[None], 1.0)[0]
 
 
 def upright(file: Path) -> NDArray[np.uint8]:

@@ -16,7 +16,7 @@ from scenarios import film, stills
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.looks import MODELS
-from scenarios.stills import CLASSIFY_COLUMNS, StillNetworks, normalised, patch_logs
+from scenarios.stills import CLASSIFY_COLUMNS, StillNetworks, patch_logs
 from scenarios.vision_runs import FRAME_COLUMNS, Frames, run_frames
 from trpac_cli.main import app
 from trpac_core.vision.camera import Camera
@@ -105,7 +105,7 @@ def noisy(colour, height, width):
 
 
 def patch_probabilities(*arguments):
-    return normalised(patch_logs(*arguments))
+    return calibrated_probabilities(patch_logs(*arguments)[None], 1.0)[0]
 
 
 def masks(drivable, shadow=None):
