@@ -7,14 +7,13 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from trpac_core.vision.classes import Surface
+from trpac_core.vision.networks import CLASS_LIST
 from trpac_core.vision.picture import LOOK_HEIGHT_PX, LOOK_WIDTH_PX
 
 from .annotate import annotate
 from .nets import Segmenter, SurfaceNet
 
 OPSET = 18
-CLASS_LIST = ",".join(surface.label for surface in Surface)
 
 
 class _SegmenterGraph(nn.Module):

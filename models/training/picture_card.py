@@ -82,9 +82,7 @@ What the command says: refused pictures are not among them.
 
 {table([*header, "confusion, rows true"], rows)}
 
-| set | cross-entropy, its patches [nat] | both [nat] | ECE, both |
-| --- | --- | --- | --- |
-{chr(10).join("| " + " | ".join(row) + " |" for row in entropies)}
+{table(["set", "cross-entropy, its patches [nat]", "both [nat]", "ECE, both"], entropies)}
 
 ## Limits
 

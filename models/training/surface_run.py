@@ -195,7 +195,8 @@ def kept_trunk(given: argparse.Namespace) -> Taught:
         return student
     if not (given.trunk and given.trunk.is_file()):
         raise TeacherError(
-            f"--trunk {given.trunk}: no such file; name the one that `--only surface --trunk FILE` has kept"
+            "with a teacher the picture network starts from the first stage of the surface network: name its file, "
+            f"which `--only surface --trunk FILE` keeps, with --trunk (given: {given.trunk})"
         )
     kept = torch.load(given.trunk, weights_only=True)
     heads = ("0.softening", "0.reading", "0.disturbed")  # learned last, in other forms at times

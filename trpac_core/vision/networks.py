@@ -36,7 +36,7 @@ _RUNTIME_ERRORS = (
     UnicodeDecodeError,  # the runtime's own error text, where it quotes damaged names
 )
 """Of a damaged file, some as it is loaded and some not before it is run."""
-_CLASS_LIST = ",".join(surface.label for surface in Surface)
+CLASS_LIST = ",".join(surface.label for surface in Surface)
 
 
 class ModelError(ValueError):
@@ -266,8 +266,8 @@ def _read_temperature(session: ort.InferenceSession, path: str | Path) -> float:
     problems = []
     if not (np.isfinite(temperature) and temperature > 0.0):
         problems.append(f"'temperature' must be a decimal number above 0, is {text!r}")
-    if classes != _CLASS_LIST:
-        problems.append(f"'classes' must be {_CLASS_LIST!r}, is {classes!r}")
+    if classes != CLASS_LIST:
+        problems.append(f"'classes' must be {CLASS_LIST!r}, is {classes!r}")
     if problems:
         raise ModelError(
             f"{path}: wrong metadata: {'; '.join(problems)}. Export the network with its calibration."
