@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, Effect
 from sim2real import sentences, sluggish, where
-from sim2real.contest import Contest, Entry, Progress, Varied
+from sim2real.contest import Contest, Entry, Progress
 from sim2real.drive import CHANNELS
 from sim2real.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
+from sim2real.estimates import as_means, at_bound, is_excited, joint, over_forms
 from sim2real.evidence import Evidence, all_logs
-from sim2real.fitting import Fit, loss
-from sim2real.gap import intervals, measure, noise_floor, shrink
-from sim2real.goodness import fitness, noise_margin
+from sim2real.fitting import loss
+from sim2real.gap import measure, noise_floor, shrink
+from sim2real.goodness import fitness
 from sim2real.lattice import Lattice
 from sim2real.next_manoeuvre import propose
 from sim2real.observer import Simulation
@@ -39,7 +40,6 @@ from sim2real.selection import Decision
 from sim2real.suspect import lone_sensor
 from sim2real.terms import Term, finer, fit_terms, with_refined
 from sim2real.unknown import characterise, seen_alone
-from sim2real.varying import KNOT_S
 
 Array = NDArray[np.float64]
 
@@ -184,7 +184,7 @@ def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int)
     """All single candidates, ranked; a compound's members first, with their joint parameters."""
     winner = found.decision.winner
     compound = found.decision.verdict is Verdict.COMPOUND
-    together = _joint(found, winner) if compound or found.structure() else {}
+    together = joint(winner, found.fit_to) if compound or found.structure() else {}
     out = [_cause(found, entry, held, before, seed, together) for entry in found.contest.singles]
     first = winner.ids if compound else ()
     return tuple(sorted(out, key=lambda c: (c.effect not in first, -c.probability, c.gap_after)))
@@ -202,14 +202,14 @@ def _cause(
     blamed = [e for e in found.added() if e.id == key] if found.structure() else []
     after = held.residuals(found.model.with_effects(*blamed) if blamed else best.candidate.model(best.x))
     size = measure(held, after).total
-    alone = _over_forms(found, entry)
+    alone = over_forms(entry, found.contest, found.fit_to, found.holdout)
     values = {name: value for (effect, name), value in together.items() if effect == key}
     told = found.decision.winner if values else entry  # a pair's member may have another form there
     values = values or {name: value for (_, name), value in alone.items()}
     if found.decision.varied and key in found.decision.winner.ids:
-        values = _as_means(values, found.decision.varied, told.fitted, key)
+        values = as_means(values, found.decision.varied, told.fitted, key)
     told_first = int(np.flatnonzero(np.isfinite(best.candidate.open_share))[0])
-    excited = _excited(
+    excited = is_excited(
         list(alone.values())[told_first],
         float(best.candidate.neutral[told_first]),
         float(best.candidate.scale[told_first]),
@@ -258,41 +258,6 @@ def _cause(
     )
 
 
-AT_BOUND = 1e-3
-"""An estimate this close to a bound, in shares of the range, lies at it [-]."""
-
-
-def at_bound(found: Fit) -> list[str]:
-    """Parameters whose estimate lies at a bound that is not the effect's absence."""
-    low, high = found.candidate.bounds
-    near = AT_BOUND * (high - low)
-    off = ((found.x - low < near) & (found.candidate.neutral > low + near)) | (
-        (high - found.x < near) & (found.candidate.neutral < high - near)
-    )
-    return [p.name for (_, p), is_off in zip(found.candidate.parameters, off, strict=True) if is_off]
-
-
-STRETCH_S = 4.0 * KNOT_S
-"""Time after which a varying value has forgotten itself [s]."""
-
-
-def _as_means(values: dict[str, Interval], varied: Varied, found: Fit, effect: str) -> dict[str, Interval]:
-    """Intervals of an effect that varies along the logs, as of means of finitely many stretches."""
-    low, high = found.candidate.bounds
-    out = dict(values)
-    for (key, p), least, most in zip(found.candidate.parameters, low, high, strict=True):
-        if key != effect:
-            continue
-        value, spread = values[p.name], varied.spread.get((key, p.name), 0.0)
-        half = np.hypot(
-            0.5 * (value.high - value.low), 1.96 * spread / np.sqrt(max(varied.seconds / STRETCH_S, 1.0))
-        )
-        out[p.name] = replace(
-            value, low=float(max(value.value - half, least)), high=float(min(value.value + half, most))
-        )
-    return out
-
-
 def _variation(decision: Decision) -> Variation | None:
     """How the cause varies, where it does; of two, the one that varies more against its size."""
     varied = decision.varied
@@ -305,40 +270,6 @@ def _variation(decision: Decision) -> Variation | None:
     return Variation(
         most, varied.over, {name: value for (key, name), value in varied.spread.items() if key == most}
     )
-
-
-def _joint(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
-    """Effect id and parameter to its interval."""
-    triples = intervals(entry.fitted, found.fit_to)
-    return {
-        (key, p.name): Interval(*triple, unit=p.unit)
-        for (key, p), triple in zip(entry.fitted.candidate.parameters, triples, strict=True)
-    }
-
-
-def _over_forms(found: Findings, entry: Entry) -> dict[tuple[str, str], Interval]:
-    """Intervals of a single effect, as wide as those of all its forms that leave about as little: nature has one."""
-    others = [e for e in found.contest.forms if e.ids == entry.ids]
-    margin = noise_margin(entry, found.fit_to, found.holdout) if others else 0.0
-    out = _joint(found, entry)
-    for other in others:
-        if other.loss - entry.loss < margin:
-            for name, told in _joint(found, other).items():
-                if name in out:
-                    low, high = min(out[name].low, told.low), max(out[name].high, told.high)
-                    out[name] = replace(out[name], low=low, high=high)
-    return out
-
-
-EXCITED_SHARE = 4.0 / 3.0
-"""A parameter is seen when its interval's half width is below this many noticeable changes of it, or leaves its absence
-out [-]."""
-
-
-def _excited(first: Interval, neutral: float, noticeable: float) -> bool:
-    """Whether an effect's first parameter is seen."""
-    narrow = 0.5 * (first.high - first.low) < EXCITED_SHARE * noticeable
-    return narrow or not first.low <= neutral <= first.high
 
 
 def _subsystem(decision: Decision, terms: Sequence[Term]) -> str:
@@ -375,8 +306,8 @@ def _where(
 def _structure(found: Findings, held: Evidence, whole: Simulation) -> Structure | None:
     """What stands beside the cause, with its estimates and the gap that both leave."""
     for effect in found.structure():
-        joint = _joint(found, found.decision.winner)
-        values = {name: value for (key, name), value in joint.items() if key == effect.id}
+        told = joint(found.decision.winner, found.fit_to)
+        values = {name: value for (key, name), value in told.items() if key == effect.id}
         return Structure(effect.id, values, measure(held, held.residuals(whole)).total)
     return None
 

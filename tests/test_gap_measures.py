@@ -12,8 +12,8 @@ from scenarios.effects.mass_offset import MassOffset
 from sim2real import findings, gap, where
 from sim2real.diagnose import diagnose
 from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
+from sim2real.estimates import at_bound
 from sim2real.evidence import Evidence, gather, residuals
-from sim2real.findings import at_bound
 from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
 from sim2real.result import Interval
