@@ -144,7 +144,7 @@ def plant_log(road_file, seed, **effects):
         ("camera_pitch", {"pitch_rad": 0.2}),
         ("motion_blur", {"exposure_s": 0.03}),
         ("exposure_shift", {"stops": 3.5}),
-        ("class_friction_offset", {"dry": -0.1, "wet": 0.0, "snow_ice": 0.15}),
+        ("class_friction_offset", {"dry": 0.7, "wet": 0.6, "snow_ice": 0.35}),
         (None, {}),
     ],
 )

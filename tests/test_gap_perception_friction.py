@@ -22,7 +22,9 @@ from camera_drives import (
 from scenarios.effects import make_effect
 from scenarios.plant import make_log, simulate
 from sim2real.perception.diagnose import diagnose_perception
+from sim2real.perception.friction import USUAL
 from sim2real.result import Verdict
+from trpac_core.tyre import peak_friction
 
 
 @pytest.mark.parametrize("follows", ["road", "peak"])
@@ -31,8 +33,8 @@ def test_a_reference_that_follows_road_yaml_says_that_the_classes_values_are_wro
     finding = diagnose(Camera(), reference=follows, mu=(0.9, 0.5, 0.3))
     assert (finding.verdict, finding.causes) == (Verdict.IDENTIFIED, ("class_friction_offset",))
     estimate = candidate(finding, "class_friction_offset").parameters
-    off = np.array([0.1, -0.1, 0.1]) + (0.04 * np.array([0.9, 0.5, 0.3]) if follows == "peak" else 0.0)
-    assert [estimate[name].value for name in NAMES] == pytest.approx(off, abs=0.01)
+    value = np.array([0.9, 0.5, 0.3]) * (1.04 if follows == "peak" else 1.0)
+    assert [estimate[name].value for name in NAMES] == pytest.approx(value, abs=0.01)
 
 
 def test_without_a_camera_a_reference_that_follows_road_yaml_is_no_gap_whatever_the_classes_say():
@@ -44,16 +46,56 @@ def test_without_a_camera_a_reference_that_follows_road_yaml_is_no_gap_whatever_
         assert candidate(finding, "class_friction_offset").score < 0.0
 
 
-def test_class_offsets_are_found_per_class():
+def test_class_values_are_found_per_class():
     for seed, offset in enumerate(
         [(0.0, -0.2, 0.0), (-0.15, 0.0, 0.2), (-0.3, 0.1, 0.1), (0.15, -0.15, 0.0)]
     ):
         finding = diagnose(Camera(offset=offset), seed)
         assert (finding.verdict, finding.causes) == (Verdict.IDENTIFIED, ("class_friction_offset",))
         estimate = candidate(finding, "class_friction_offset").parameters
-        for name, truth in zip(NAMES, offset, strict=True):
+        for name, truth in zip(NAMES, np.array(offset) + USUAL, strict=True):
             assert estimate[name].low <= truth <= estimate[name].high
             assert estimate[name].value == pytest.approx(truth, abs=0.02)
+
+
+STIFF = BARE.model_copy(update={"tyre": BARE.tyre.model_copy(update={"longitudinal_stiffness_n": 75_000.0})})
+"""Its tyre's curve rises up to a sixth above theta."""
+
+
+def as_peak(log):
+    """The log of a tester that tells the maximum of the tyre's curve in place of theta."""
+    core = STIFF.to_core()
+    load, stiffness = core.wheel_load(front=True), core.longitudinal_stiffness_n
+    peaks = [peak_friction(theta, load, stiffness) for theta in log.signals["mu_reference"]]
+    return changed(log, mu_reference=np.array(peaks))
+
+
+def test_a_reference_that_tells_the_tyres_peak_at_the_class_values_is_no_gap():
+    for seed in range(3):
+        finding = diagnose(Camera(), seed, STIFF, damage=as_peak)
+        assert finding.verdict is Verdict.NO_GAP
+        assert candidate(finding, "class_friction_offset").score < 0.0
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.12), (0.0, -0.18, 0.1), (0.0, -0.2, 0.0)])
+def test_class_values_are_found_where_the_reference_tells_the_tyres_peak(offset):
+    """The classes that are as usual say that it is the peak."""
+    finding = diagnose(Camera(offset=offset), 0, STIFF, damage=as_peak)
+    assert (finding.verdict, finding.causes) == (Verdict.IDENTIFIED, ("class_friction_offset",))
+    estimate = candidate(finding, "class_friction_offset").parameters
+    for name, truth in zip(NAMES, np.array(offset) + USUAL, strict=True):
+        assert estimate[name].low <= truth <= estimate[name].high
+        assert estimate[name].value == pytest.approx(truth, abs=0.02)
+
+
+def test_a_few_stretches_off_on_the_fit_logs_are_nothing_where_the_hold_out_has_no_gap():
+    """What the hold-out shows lies at its floor: nothing may be blamed."""
+    roads = [road(seed=i, mu=(0.8, 0.6, 0.2)) for i in range(3)]
+    logs = [
+        drive(r, Camera(offset=(0.0, -0.1, 0.0) if i < 2 else (0.0, 0.0, 0.0)), seed=i)
+        for i, r in enumerate(roads)
+    ]
+    assert diagnose_perception(logs[:2], logs[2], roads, BARE).causes == ()
 
 
 def test_a_class_that_was_not_driven_on_is_left_open():
@@ -61,8 +103,8 @@ def test_a_class_that_was_not_driven_on_is_left_open():
     logs = [drive(dry, Camera(offset=(-0.2, 0.0, 0.0)), seed=i) for i in range(3)]
     finding = diagnose_perception(logs[:2], logs[2], [dry] * 3, BARE)
     estimate = candidate(finding, "class_friction_offset").parameters
-    assert (estimate["wet"].low, estimate["wet"].high) == (-0.5, 0.7)
-    assert estimate["dry"].low <= -0.2 <= estimate["dry"].high
+    assert (estimate["wet"].low, estimate["wet"].high) == (0.1, 1.3)
+    assert estimate["dry"].low <= 0.6 <= estimate["dry"].high
 
 
 def test_one_factor_on_the_roads_friction_is_the_dynamics_own():

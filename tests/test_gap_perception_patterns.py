@@ -201,7 +201,7 @@ def test_dead_time_and_filter_are_told_apart(dead_s, lag_s):
         (Camera(blur_s=0.1), {"motion_blur": {"exposure_s": 0.1}}),
         (
             Camera(offset=(0.0, 0.15, 0.0)),
-            {"class_friction_offset": {"dry": 0.0, "wet": 0.15, "snow_ice": 0.0}},
+            {"class_friction_offset": {"dry": 0.8, "wet": 0.75, "snow_ice": 0.2}},
         ),
     ],
 )

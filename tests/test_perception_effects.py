@@ -83,7 +83,7 @@ def test_starts_lie_within_the_bounds_and_change_the_columns(effect_id):
         low, high = p.bounds(CAR.to_core())
         for start in p.start_values(CAR.to_core()):
             assert low < start < high
-            others = {q.name: 0.0 for q in EFFECTS[effect_id].parameters()}
+            others = {q.name: q.neutral_value(CAR.to_core()) for q in EFFECTS[effect_id].parameters()}
             changed = look(20.0, fps=400.0, **{effect_id: {**others, p.name: start}})
             assert any(not np.array_equal(x, changed[n], equal_nan=True) for n, x in plain.items())
 
@@ -195,11 +195,11 @@ def test_blur_lowers_confidence_with_speed_times_exposure():
         assert ratio == pytest.approx(np.exp(-speed * exposure / 4.0), rel=1e-3)
 
 
-def test_class_friction_offset_shifts_the_reference_and_leaves_the_places():
-    plain, offset = look(), look(class_friction_offset={"dry": -0.1, "wet": 0.2, "snow_ice": 0.05})
+def test_class_friction_offset_changes_the_reference_and_leaves_the_places():
+    plain, offset = look(), look(class_friction_offset={"dry": 0.7, "wet": 0.8, "snow_ice": 0.25})
     for name in COLUMNS:
         assert np.array_equal(plain[name], offset[name], equal_nan=True)
     front = surfaces_at(ROAD, roll().position_m + CAR.to_core().cog_to_front_axle_m)
-    expected = np.array([-0.1, 0.2, 0.05])[front]
+    expected = np.array([0.7, 0.8, 0.25])[front] - np.array([0.8, 0.6, 0.2])[front]
     assert offset["mu_reference"] - plain["mu_reference"] == pytest.approx(expected, abs=1e-12)
     assert plain["mu_reference"] == pytest.approx(np.array([0.8, 0.6, 0.2])[front], abs=0.06)

@@ -12,7 +12,6 @@ from typing import Any
 from .baselines import closure, in_sample_bic
 from .generator.camera_family import CameraFamily, is_new
 from .generator.camera_library import CAMERA_LIBRARY
-from .generator.camera_road import CLASS_FRICTION, SURFACES
 from .generator.forms import Family, is_further
 from .generator.library import LIBRARY
 from .generator.table import Group
@@ -160,7 +159,7 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         name=result["case"],
         group=Group(seal["group"]),
         truth=truth,
-        parameters=_as_the_library_has_them(truth[0], seal["effects"][truth[0]]) if truth else {},
+        parameters=seal["effects"][truth[0]] if truth else {},
         further=frozenset(
             family
             for family in Family
@@ -188,14 +187,6 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
             if camera and any(is_new(seal["camera"]["chain"]["forms"], effect, family) for effect in truth)
         ),
     )
-
-
-def _as_the_library_has_them(effect: str, parameters: dict[str, float]) -> dict[str, float]:
-    """A seal's parameters; the contract leaves open whether a class's friction is its value or how far that is off."""
-    if effect != "class_friction_offset":
-        return parameters
-    usual = dict(zip(SURFACES, CLASS_FRICTION, strict=True))
-    return {name: value - usual[name] for name, value in parameters.items()}
 
 
 def _single(causes: Iterable[Mapping[str, Any]]) -> Iterable[tuple[str, float]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.effects.base import Effect, parameter
+from trpac_core.vision.classes import CLASS_THETA, Surface
 
 if TYPE_CHECKING:
     from scenarios.perception import Frames
@@ -15,45 +16,44 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ClassFrictionOffset(Effect):
-    """The road's friction differs from the value of its class (dry 0.8, wet 0.6, snow and ice 0.2), per class.
+    """The classes' friction values on this road, where they are not dry 0.8, wet 0.6, snow and ice 0.2.
 
-    The places of the classes stay; a friction reference lies beside the class's value.
+    The places of the classes stay; a friction reference lies beside the usual value.
     """
 
     id = "class_friction_offset"
     stage = "perception"
     subsystem = "camera"
-    equation = "mu_reference = class value + offset of the class"
+    equation = "mu_reference = this road's value of the class"
     source = "class values: section 4.1 of Tian et al. (2022), doi:10.3390/rs14215583"
     excited_by = "driving on each class with a friction reference"
     look_alikes = ("friction_offset",)
 
     dry: float = parameter(
         "-",
-        "road's friction minus the dry class's",
-        neutral=0.0,
-        low=-0.7,
-        high=0.7,
-        starts=(-0.3, -0.1, 0.1),
+        "friction of the dry class",
+        neutral=CLASS_THETA[Surface.DRY],
+        low=0.1,
+        high=1.5,
+        starts=(0.5, 0.7, 0.9),
     )
     wet: float = parameter(
         "-",
-        "road's friction minus the wet class's",
-        neutral=0.0,
-        low=-0.5,
-        high=0.7,
-        starts=(-0.2, 0.2),
+        "friction of the wet class",
+        neutral=CLASS_THETA[Surface.WET],
+        low=0.1,
+        high=1.3,
+        starts=(0.4, 0.8),
     )
     snow_ice: float = parameter(
         "-",
-        "road's friction minus the snow and ice class's",
-        neutral=0.0,
-        low=-0.15,
-        high=0.7,
-        starts=(-0.1, 0.1, 0.3),
+        "friction of the snow and ice class",
+        neutral=CLASS_THETA[Surface.SNOW_ICE],
+        low=0.05,
+        high=0.9,
+        starts=(0.1, 0.3, 0.5),
     )
 
     def perceive(self, frames: Frames) -> Frames:
         """The road has another friction than its class says."""
-        offset = np.array([self.dry, self.wet, self.snow_ice])
-        return replace(frames, class_friction=frames.class_friction + offset)
+        return replace(frames, class_friction=np.array([self.dry, self.wet, self.snow_ice]))

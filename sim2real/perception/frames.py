@@ -12,7 +12,7 @@ from scipy.stats import theilslopes
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
 from trpac_core.vision.camera import Camera
-from trpac_core.vision.classes import Surface
+from trpac_core.vision.classes import CLASS_THETA, Surface
 
 Array = NDArray[np.float64]
 
@@ -39,25 +39,25 @@ STUCK_RESULTS = 3
 
 @dataclass(frozen=True)
 class Modelled:
-    """What vehicle.yaml's effects make the simulation model already of the camera chain; 0 is nothing."""
+    """What vehicle.yaml's effects make the simulation model already of the camera chain; the defaults are nothing."""
 
     delay_s: float = 0.0
     pitch_rad: float = 0.0
     exposure_s: float = 0.0
     stops: float = 0.0
-    class_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    class_value: tuple[float, ...] = tuple(CLASS_THETA.values())
 
     @classmethod
     def of(cls, vehicle: VehicleFile) -> Modelled:
         """From a vehicle's effects."""
         effects = vehicle.effects
-        offset = effects.get("class_friction_offset", {})
+        value = effects.get("class_friction_offset", {})
         return cls(
             delay_s=effects.get("camera_latency", {}).get("delay_s", 0.0),
             pitch_rad=effects.get("camera_pitch", {}).get("pitch_rad", 0.0),
             exposure_s=effects.get("motion_blur", {}).get("exposure_s", 0.0),
             stops=effects.get("exposure_shift", {}).get("stops", 0.0),
-            class_offset=(offset.get("dry", 0.0), offset.get("wet", 0.0), offset.get("snow_ice", 0.0)),
+            class_value=tuple(value.get(s.label, theta) for s, theta in CLASS_THETA.items()),
         )
 
 

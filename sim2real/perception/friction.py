@@ -1,10 +1,10 @@
 """The class's friction value against a friction reference, stretch by stretch of road.
 
-The simulation of a car with a camera predicts mu_reference as the class's value: one that follows road.yaml's own
-friction instead says that the class's value is wrong for this road. Without camera results nothing is said of classes,
-and road.yaml's friction, or the tyre's peak there, is what the simulation has. With or without, a reference that
-follows the friction that the dynamics were found to show is no gap of the camera. A stretch of one segment is one
-observation.
+The simulation of a car with a camera predicts mu_reference as the class's value, or the tyre's peak at it: one that
+follows road.yaml's own friction instead says that the class's value is wrong for this road. Without camera results
+nothing is said of classes, and road.yaml's friction, or the tyre's peak there, is what the simulation has. With or
+without, a reference that follows the friction that the dynamics were found to show is no gap of the camera. A stretch
+of one segment is one observation.
 """
 
 from __future__ import annotations
@@ -19,78 +19,44 @@ from scipy.stats import t as student
 from scenarios.effects import Effect
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
 from scenarios.files import RoadFile, VehicleFile
-from scenarios.plant.pipeline import make_setup
 from sim2real.logs import Log
 from sim2real.perception.chain import DECISIVE, Account, Chain, price
 from sim2real.perception.frames import Modelled
 from sim2real.perception.late_reference import lateness_in_words
+from sim2real.perception.stretches import (
+    OF_ROAD_FILE,
+    SIMULATED,
+    TOLERANCE,
+    Reading,
+    Stretches,
+    find_stretches,
+    readings,
+)
 from sim2real.result import Interval, Place
-from trpac_core.tyre import peak_friction
 from trpac_core.vision.classes import CLASS_THETA, Surface
 
 Array = NDArray[np.float64]
 
-BORDER_M = 1.5
-"""Rows closer to a border are left out: either side may be under the wheels, and references average [m]."""
-FEWEST_ROWS = 5
-TOLERANCE = 0.02
-"""Standard deviation with which a reference gives a friction that is exactly known: testers repeat that well [-]."""
 TAIL = 4.0
 """Degrees of freedom of a stretch's error."""
 CALIBRATION = 0.04
-"""Standard deviation, as a share, of what references mean by friction: peak or theta, and on which tyre [-]."""
+"""Standard deviation, as a share, of what references are off in all stretches of a class: another tyre's peak [-]."""
 CLASSES = tuple(s.label for s in Surface)
-SIMULATED = (
-    "road.yaml's friction",
-    "the tyre's peak on road.yaml's friction",
-    "the friction that the dynamics show",
-    "the tyre's peak on the friction that the dynamics show",
-)
-"""Frictions that the simulation has already."""
-OF_ROAD_FILE = 2
-"""The first of them are those that it has without the dynamics' findings."""
+USUAL = np.array([CLASS_THETA[s] for s in Surface])
+"""The classes' values, in the order of `Surface` [-]."""
+CALIBRATION_ERROR = np.maximum(CALIBRATION * USUAL, TOLERANCE)
+"""Standard deviation of what all stretches of a class are off together, in the order of `Surface` [-]."""
 SIGNAL, OFFSET = "mu_reference", "class_friction_offset"
 NEXT_STEP = (
     "Brake to the limit on each surface: the tyres show the road's friction, and whose value is wrong."
 )
 NOTABLE, MOST_PLACES = 3.0, 4
+IN_DOUBT = 0.5 * DECISIVE
+"""By so much the plain reading may change the class values more than another one before it is left [nats]."""
+FEWEST_UNSEEN = 3
+"""Stretches of the hold-out that can say that there is no gap."""
 BOUNDS = {p.name: (float(p.low), float(p.high)) for p in ClassFrictionOffset.parameters()}  # type: ignore[arg-type]
-"""Offsets that are possible at all."""
-
-
-@dataclass(frozen=True)
-class Stretches:
-    """Pieces of road within one segment, one row each.
-
-    Attributes
-    ----------
-    log : array of str, shape (n,)
-        Where.
-    from_s, to_s : array, shape (n,)
-        When the front axle was on it [s].
-    classes : array of int, shape (n,)
-        Surface.
-    reference, deviation : array, shape (n,)
-        Mean mu_reference and its standard deviation, tolerance included [-].
-    simulated : array, shape (n, 4)
-        Frictions that the simulation has there, mean of left and right, in the order of `SIMULATED` [-].
-    """
-
-    log: NDArray[np.str_]
-    from_s: Array
-    to_s: Array
-    classes: NDArray[np.intp]
-    reference: Array
-    deviation: Array
-    simulated: Array
-
-    def __len__(self) -> int:
-        return len(self.classes)
-
-    @property
-    def class_value(self) -> Array:
-        """The classes' friction values, shape (n,) [-]."""
-        return np.array([CLASS_THETA[Surface(int(c))] for c in self.classes], dtype=np.float64)
+"""Class values that are possible at all."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +71,7 @@ class FrictionFit:
 
     def z(self, stretches: Stretches) -> Array:
         """What it leaves, in standard deviations, shape (n,)."""
-        spread = np.hypot(stretches.deviation, calibration_error(stretches.class_value))
+        spread = np.hypot(stretches.deviation, CALIBRATION_ERROR[stretches.classes])
         return (stretches.reference - self.predict(stretches)) / spread
 
     def log_likelihood(self, stretches: Stretches) -> float:
@@ -114,7 +80,7 @@ class FrictionFit:
         total = 0.0
         for c in np.unique(stretches.classes):
             here = stretches.classes == c
-            spread = float(calibration_error(stretches.class_value[here])[0])
+            spread = float(CALIBRATION_ERROR[c])
             off = np.linspace(-4.0, 4.0, 161) * spread
             z = (rest[here] - off[:, None]) / stretches.deviation[here]
             fits = -0.5 * (TAIL + 1.0) * np.log1p(z**2 / TAIL).sum(axis=1) - 0.5 * (off / spread) ** 2
@@ -122,86 +88,11 @@ class FrictionFit:
         return total
 
 
-def calibration_error(value: Array) -> Array:
-    """Standard deviation of what all stretches of a class are off together, same shape [-]."""
-    return np.maximum(CALIBRATION * value, TOLERANCE)
-
-
-def find_stretches(
-    logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile, found: Sequence[Effect] = ()
-) -> Stretches:
-    """Stretches of some drives that have a friction reference; `found` are effects that the dynamics show."""
-    rows = [
-        row
-        for log, road in zip(logs, roads, strict=True)
-        if "mu_reference" in log.signals
-        for row in _of_one(log, road, vehicle, found)
-    ]
-    columns = list(zip(*rows, strict=True)) if rows else [()] * 7
-    numbers = [np.array(c, dtype=np.float64) for c in columns[1:]]
-    return Stretches(
-        np.array(columns[0], dtype=np.str_),
-        numbers[0],
-        numbers[1],
-        numbers[2].astype(np.intp),
-        numbers[3],
-        numbers[4],
-        numbers[5].reshape(len(rows), len(SIMULATED)),
-    )
-
-
-def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile, found: Sequence[Effect]) -> list[tuple]:
-    core = vehicle.to_core()
-    simulated = _simulated(road, vehicle, found)
-    front_m = log.signals["position_m"] + core.cog_to_front_axle_m
-    starts = [-np.inf, *(s.start_m for s in road.segments[1:]), np.inf]
-    rows = []
-    for segment, begin, end, friction in zip(road.segments, starts[:-1], starts[1:], simulated, strict=True):
-        inside = (front_m > begin + BORDER_M) & (front_m < end - BORDER_M)
-        inside &= np.isfinite(log.signals["mu_reference"])
-        if np.count_nonzero(inside) < FEWEST_ROWS:
-            continue
-        values = log.signals["mu_reference"][inside]
-        # A reference is filtered, or late: at first it still tells of the stretch before.
-        settled, newest = values[len(values) // 2 :], values[3 * len(values) // 4 :]
-        wander = float(settled.std() / np.sqrt(min(len(settled), 10)))
-        moving = abs(float(np.median(newest) - np.median(settled)))
-        rows.append(
-            (
-                log.name,
-                log.time_s[inside][0],
-                log.time_s[inside][-1],
-                int(segment.surface_class),
-                float(np.median(settled)),
-                float(np.hypot(TOLERANCE, np.hypot(wander, moving))),
-                friction,
-            )
-        )
-    return rows
-
-
-def _simulated(road: RoadFile, vehicle: VehicleFile, found: Sequence[Effect]) -> Array:
-    """Frictions per segment, shape (segments, 4), in the order of `SIMULATED`."""
-    core = vehicle.to_core()
-    table = make_setup(vehicle, road).road
-    with_found = table
-    for effect in found:
-        with_found = effect.road(with_found)
-
-    def peak(theta: float) -> float:
-        return peak_friction(theta, core.wheel_load(front=True), core.longitudinal_stiffness_n)
-
-    columns = [
-        values.mean(axis=1)
-        for each in (table, with_found)
-        for values in (each.theta, np.vectorize(peak, otypes=[float])(each.theta))
-    ]
-    return np.column_stack(columns)
-
-
-def as_simulated(stretches: Stretches, offset: Array, camera: bool) -> FrictionFit:
-    """The best of the accounts that mean no gap: class values (with the offsets modelled already), road, tyre."""
-    fits = [FrictionFit((), 0, lambda s: s.class_value + offset[s.classes], {}, "the class's value")]
+def as_simulated(
+    stretches: Stretches, value: Array, camera: bool, meanings: Sequence[Reading]
+) -> FrictionFit:
+    """The best of the accounts that mean no gap: class values (as modelled already), road, tyre."""
+    fits = [_at_class_values((), value, {}, reading, reading.what) for reading in meanings]
     for column, what in enumerate(SIMULATED):
         is_found = not np.array_equal(
             stretches.simulated[:, column], stretches.simulated[:, column % OF_ROAD_FILE]
@@ -211,33 +102,49 @@ def as_simulated(stretches: Stretches, offset: Array, camera: bool) -> FrictionF
     return max(fits, key=lambda f: f.log_likelihood(stretches))
 
 
+def _at_class_values(
+    effects: tuple[str, ...], value: Array, parameters: dict[str, Interval], reading: Reading, what: str
+) -> FrictionFit:
+    told = reading.of(value)
+    return FrictionFit(effects, len(parameters), lambda s: told[s.classes], parameters, what)
+
+
 def _of_column(column: int, what: str) -> FrictionFit:
     """One of the frictions that the simulation has, taken as it is."""
     return FrictionFit((), 0, lambda s: s.simulated[:, column], {}, what)
 
 
-def with_class_offsets(stretches: Stretches) -> FrictionFit:
-    """The class's value plus an offset per class; classes that were not driven on are left open.
+def with_class_values(stretches: Stretches, value: Array, meanings: Sequence[Reading]) -> FrictionFit:
+    """A value per class, in the plain reading, or in another that changes fewer; classes not driven on are open."""
+    plain, *others = (_class_values(stretches, value, reading) for reading in meanings)
+    least = min(others, key=lambda fit: _changed(fit, value))
+    return least if _changed(least, value) + IN_DOUBT < _changed(plain, value) else plain
+
+
+def _class_values(stretches: Stretches, value: Array, reading: Reading) -> FrictionFit:
+    """A value per class under one reading.
 
     Intervals hold what a reference's calibration may be off, which no number of stretches averages out.
     """
-    values = np.zeros(len(CLASSES))
-    parameters = {}
+    values, parameters = value.copy(), {}
     for c, name in enumerate(CLASSES):
         here = stretches.classes == c
         if not here.any():
-            parameters[name] = Interval(0.0, *BOUNDS[name])
+            parameters[name] = Interval(float(value[c]), *BOUNDS[name])
             continue
-        off = (stretches.reference - stretches.class_value)[here]
-        values[c], half = _location(off, stretches.deviation[here])
-        half = float(np.hypot(half, 1.96 * calibration_error(stretches.class_value[here])[0]))
+        told, deviation = stretches.reference[here], stretches.deviation[here]
+        within = 0.5 * (reading.theta_of(told + deviation) - reading.theta_of(told - deviation))
+        values[c], half = _location(reading.theta_of(told), within)
+        half = float(np.hypot(half, 1.96 * CALIBRATION_ERROR[c]))
         parameters[name] = Interval(float(values[c]), float(values[c] - half), float(values[c] + half))
+    fit = _at_class_values((OFFSET,), values, parameters, reading, "class values of their own")
+    return replace(fit, size=len(np.unique(stretches.classes)))
 
-    def predict(s: Stretches) -> Array:
-        return s.class_value + values[s.classes]
 
-    size = len(np.unique(stretches.classes))
-    return FrictionFit(("class_friction_offset",), size, predict, parameters, "class values of their own")
+def _changed(fit: FrictionFit, value: Array) -> float:
+    """How much class values differ from those before, each up to what is beyond doubt [nats]."""
+    off = np.array([fit.parameters[name].value for name in CLASSES]) - value
+    return float(np.minimum(0.5 * (off / CALIBRATION_ERROR) ** 2, DECISIVE).sum())
 
 
 def with_road_factor(stretches: Stretches) -> FrictionFit:
@@ -294,8 +201,9 @@ def friction_chain(
     if not len(known):
         why = "mu_reference covers no stretch of one surface on the fit logs."
         return Chain.silent(SIGNAL, rows, [OFFSET], why)
-    plain = as_simulated(known, np.array(modelled.class_offset), camera)
-    fits = [with_class_offsets(known), with_road_factor(known)]
+    value, meanings = np.array(modelled.class_value), readings(vehicle)
+    plain = as_simulated(known, value, camera, meanings)
+    fits = [with_class_values(known, value, meanings), with_road_factor(known)]
     if _follows_road(known, fits[1]):
         fits = fits[:1]
     accounts = [_account(fit, plain, known, unseen) for fit in (plain, *fits)]
@@ -310,6 +218,7 @@ def friction_chain(
         places=_places(accounts[0], unseen),
         unexcited=_undriven(known),
         next_step=NEXT_STEP,
+        quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
     )
     late = lateness_in_words((*fitted[0], held_out[0]), (*fitted[1], held_out[1]), vehicle)
     if late:
@@ -343,7 +252,7 @@ def _evidence(fit: FrictionFit, nothing: FrictionFit, known: Stretches) -> tuple
         here = known.classes == c
         if here.any():
             means.append(
-                f"{name} {np.median(known.reference[here]):.2f} (class value {known.class_value[here][0]:g}, "
+                f"{name} {np.median(known.reference[here]):.2f} (class value {USUAL[c]:g}, "
                 f"road.yaml {np.median(known.simulated[here, 0]):.2f})"
             )
     return (
