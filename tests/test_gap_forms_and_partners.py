@@ -30,8 +30,9 @@ from scenarios.plant.pipeline import make_setup
 from sim2real.contest import first_round, hold_contest, silent
 from sim2real.diagnose import diagnose, find
 from sim2real.drive import ACCEL, SPEED, WHEEL
+from sim2real.estimates import joint
 from sim2real.evidence import Evidence, gather
-from sim2real.findings import Findings, _joint, describe
+from sim2real.findings import Findings, describe
 from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
 from sim2real.pairs import add_pairs, add_partners
@@ -119,7 +120,7 @@ def test_an_interval_holds_those_of_all_forms_that_do_as_well():
     def told(contest):
         return describe(replace(found, contest=contest), seed=0, jobs=1, progress=silent).causes[0].parameters
 
-    alone, there = ({name: said for (_, name), said in _joint(found, e).items()} for e in (best, other))
+    alone, there = ({name: said for (_, name), said in joint(e, found.fit_to).items()} for e in (best, other))
     assert told(found.contest) == alone
     alike = told(replace(found.contest, forms=(replace(other, z_fit=best.z_fit, z_hold=best.z_hold),)))
     for name, said in alike.items():

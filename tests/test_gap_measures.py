@@ -9,10 +9,10 @@ from gap_drives import MODEL, SIGMA, clean, noisy, pulses, random_drives, rms, r
 from scenarios.effects import EFFECTS
 from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.mass_offset import MassOffset
-from sim2real import findings, gap, where
+from sim2real import gap, where
 from sim2real.diagnose import diagnose
 from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
-from sim2real.estimates import at_bound
+from sim2real.estimates import at_bound, is_excited
 from sim2real.evidence import Evidence, gather, residuals
 from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
@@ -168,9 +168,9 @@ def test_intervals_cover_and_are_no_wider_than_said(colour):
 
 def test_an_effect_that_is_far_from_its_absence_is_seen_however_wide_its_interval():
     noticeable = 0.01
-    assert findings._excited(Interval(0.5, 0.45, 0.55, "s"), 0.0, noticeable)
-    assert findings._excited(Interval(0.0, -0.01, 0.01, "s"), 0.0, noticeable)
-    assert not findings._excited(Interval(0.05, -0.01, 0.11, "s"), 0.0, noticeable)
+    assert is_excited(Interval(0.5, 0.45, 0.55, "s"), 0.0, noticeable)
+    assert is_excited(Interval(0.0, -0.01, 0.01, "s"), 0.0, noticeable)
+    assert not is_excited(Interval(0.05, -0.01, 0.11, "s"), 0.0, noticeable)
 
 
 def test_intervals_stay_within_the_bounds(tame):
