@@ -146,11 +146,12 @@ def diagnose(
     mu=CLASS_FRICTION,
     damage=lambda log: log,
     exclude=(),
+    lens=None,
     **kw,
 ):
     roads = [road(spacing_m, seed=3 * seed + i, mu=mu) for i in range(3)]
     logs = [damage(drive(r, camera, seed=10 * seed + i, **kw)) for i, r in enumerate(roads)]
-    return diagnose_perception(logs[:2], logs[2], roads, vehicle, exclude=exclude)
+    return diagnose_perception(logs[:2], logs[2], roads, vehicle, lens, exclude=exclude)
 
 
 def candidate(finding, *effects):

@@ -21,6 +21,7 @@ from camera_drives import (
 
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Verdict
+from trpac_core.vision.camera import Camera as Lens
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
@@ -70,13 +71,28 @@ def test_pitch_is_found_with_its_angle():
         pitch = (-0.12, -0.07, 0.08, 0.12, 0.2, 0.25)[seed % 6]
         distance = 2.9 - 1.4 / np.tan(np.arctan(1.4 / 2.9) + pitch)
         camera = any_camera(seed, distance_m=distance, fps=40.0, share=0.5)
-        finding = diagnose(camera, seed, speeds=SPEEDS[(0, 1, 4)[seed % 3]])
+        finding = diagnose(camera, seed, speeds=SPEEDS[(0, 1, 4)[seed % 3]], lens=Lens())
         found.append(finding.causes == ("camera_pitch",))
         estimate = candidate(finding, "camera_pitch").parameters["pitch_rad"]
         inside.append(estimate.low <= pitch <= estimate.high)
         assert estimate.value == pytest.approx(pitch, abs=0.05)
     assert np.mean(found) >= 0.9
     assert np.mean(inside) >= 0.9
+
+
+def test_an_angle_holds_other_places_of_the_lens_where_nobody_says_where_it_is():
+    """The same distance, seen from a lens 1.25 m high at the centre of gravity: another angle."""
+    ahead_m, height_m = 3.5 + FRONT_M, 1.25
+    for pitch in (-0.06, 0.06):
+        distance = ahead_m - height_m / np.tan(np.arctan(height_m / ahead_m) + pitch)
+        camera = Camera(distance_m=distance, preview_m=ahead_m)
+        untold, told = (diagnose(camera, 5, lens=lens) for lens in (None, Lens()))
+        assert untold.causes == told.causes == ("camera_pitch",)
+        wide, narrow = (candidate(f, "camera_pitch").parameters["pitch_rad"] for f in (untold, told))
+        assert wide.low <= pitch <= wide.high
+        assert not narrow.low <= pitch <= narrow.high
+        assert wide.value == narrow.value
+        assert wide.low * wide.high > 0.0
 
 
 @pytest.mark.parametrize("arrives_s", [0.0, 0.15])
@@ -91,7 +107,7 @@ def test_results_that_arrive_late_with_the_right_stamp_leave_the_angle_alone(arr
     ahead_m, pitch = 8.0, 0.05
     distance = ahead_m - 1.4 / np.tan(np.arctan(1.4 / ahead_m) + pitch)
     camera = Camera(distance_m=distance, preview_m=ahead_m + FRONT_M - 0.4)
-    finding = diagnose(camera, 3, damage=late)
+    finding = diagnose(camera, 3, damage=late, lens=Lens())
     assert finding.causes == ("camera_pitch",)
     estimate = candidate(finding, "camera_pitch").parameters["pitch_rad"]
     assert estimate.low <= pitch <= estimate.high

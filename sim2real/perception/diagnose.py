@@ -21,6 +21,7 @@ from sim2real.perception.conflicts import class_conflicts, conflicts_in_words, c
 from sim2real.perception.frames import Modelled, read_results
 from sim2real.perception.friction import SIGNAL as REFERENCE
 from sim2real.perception.friction import friction_chain
+from sim2real.perception.mounting import Mounting
 from sim2real.perception.pictures import read_light
 from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.perception.shift import shift_chain
@@ -157,7 +158,8 @@ def diagnose_perception(
     vehicle : VehicleFile
         The car, with what the simulation models already.
     camera : Camera, optional
-        Height and place of the lens; the default is that of scenarios/cameras/paper.yaml.
+        Height and place of the lens. The default is that of scenarios/cameras/paper.yaml, and then intervals of a
+        mounting angle hold other heights and places too.
     exclude : collection of str
         Effects that are left out of the library.
     seed : int
@@ -170,7 +172,8 @@ def diagnose_perception(
     PerceptionFinding or None
         None where nothing of the camera chain is measured.
     """
-    camera = Camera() if camera is None else camera
+    known, camera = camera is not None, Camera() if camera is None else camera
+    further_m = 0.0 if known else vehicle.to_core().cog_to_front_axle_m + camera.x_from_front_axle_m
     read = [
         read_results(log, road, vehicle, camera)
         for log, road in zip((*logs_fit, log_holdout), roads, strict=True)
@@ -187,7 +190,7 @@ def diagnose_perception(
     conflicts = class_conflicts(every)
     warnings += [*more, *yet_more, *(conflict.sentence for conflict in conflicts)]
     judged = (
-        shift_chain(results, held_out, modelled, camera.height_m, exclude),
+        shift_chain(results, held_out, modelled, Mounting(camera.height_m, further_m), exclude),
         confidence_chain(results, held_out, (light, light_unseen), modelled, exclude),
         friction_chain(
             (logs_fit, roads[:-1]),

@@ -28,6 +28,7 @@ from sim2real.perception.likelihood import (
     profiles,
     share_price,
 )
+from sim2real.perception.mounting import Mounting
 from sim2real.perception.scatter import scatter_in_words
 from sim2real.result import Interval, Place
 
@@ -176,10 +177,11 @@ def shift_chain(
     fitted: Sequence[Results],
     held_out: Results | None,
     modelled: Modelled,
-    height_m: float,
+    mounting: Mounting,
     exclude: Collection[str],
 ) -> Chain | None:
     """The stamps' account; None where no log has camera results."""
+    height_m = mounting.height_m
     if not fitted and held_out is None:
         return None
     known, unseen = find_crossings(fitted), find_crossings([] if held_out is None else [held_out])
@@ -200,8 +202,8 @@ def shift_chain(
     closest = min((plain, *fits, *free), key=lambda f: f.scale)
     # A chain that errs in streaks may do so on the hold-out alone: scatter is no shift there either.
     scale = max(closest.scale, closest.scale_of(unseen, height_m))
-    accounts = [_account(f, plain, unseen, height_m, scale, known) for f in (plain, *fits)]
-    others = [_account(shifted, plain, unseen, height_m, scale, known) for shifted in free]
+    accounts = [_account(f, plain, unseen, mounting, scale, known) for f in (plain, *fits)]
+    others = [_account(shifted, plain, unseen, mounting, scale, known) for shifted in free]
     scores = [account.score for account in (*accounts, *others)]
     best, foremost = max(scores), (plain, *fits, *free)[int(np.argmax(scores))]
     sure = best > BEYOND_DOUBT and _leaves_its_stamp(foremost, every, height_m)
@@ -217,7 +219,7 @@ def shift_chain(
     )
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
     if drift:
-        nothing, *rest = (_account(f, plain, unseen, height_m, drift.scale, known) for f in (plain, *fits))
+        nothing, *rest = (_account(f, plain, unseen, mounting, drift.scale, known) for f in (plain, *fits))
         return replace(
             chain,
             nothing=nothing,
@@ -252,11 +254,12 @@ def _another_law(best: Account, choice: tuple[str, ...]) -> str:
 
 
 def _account(
-    f: ShiftFit, nothing: ShiftFit, unseen: Crossings, height_m: float, scale: float, known: Crossings
+    f: ShiftFit, nothing: ShiftFit, unseen: Crossings, mounting: Mounting, scale: float, known: Crossings
 ) -> Account:
+    height_m = mounting.height_m
     parameters = {"delay_s": f.delay_s} if "camera_latency" in f.effects else {}
     if "camera_pitch" in f.effects:
-        parameters["pitch_rad"] = f.pitch_rad
+        parameters["pitch_rad"] = mounting.over_places(f.pitch_rad, float(known.ahead_m.mean()))
     every = known.joined(unseen)
     known_gain, gain = (
         f.log_likelihood_of(seen, height_m) - nothing.log_likelihood_of(seen, height_m)
