@@ -15,8 +15,9 @@ from sim2real.contest import COUNTER, Contest, Entry
 from sim2real.evidence import Evidence
 from sim2real.gap import measure, noise_floor
 from sim2real.observer import Simulation
+from sim2real.quiet import rare_share
 from sim2real.result import Verdict
-from sim2real.selection import NO_GAP_DOUBT, Decision, doubted, rare_share
+from sim2real.selection import NO_GAP_DOUBT, Decision, doubted
 
 MOST_LEFT = 1.0 / 6.0
 """Share of the gap's energy beyond the floor that a cause may leave on the hold-out [-]."""
@@ -60,7 +61,7 @@ def at_the_floor(decision: Decision, contest: Contest, model: Simulation, *evide
     found = decision.winner.fitted
     added = found.candidate.model(found.x)
     logs = [log for part in evidence for log in part.sharpened(added).each()]
-    if any(_floors(model, added, log) > AT_FLOOR for log in logs):
+    if any(floors(model, added, log) > AT_FLOOR for log in logs):
         return decision
     nothing = doubted(decision, NO_GAP_DOUBT, winner=contest.null, after=decision.before, varied=None)
     return replace(nothing, verdict=Verdict.NO_GAP, slight=decision.winner.name)
@@ -73,11 +74,11 @@ def loud(decision: Decision, model: Simulation, *evidence: Evidence) -> Decision
     """
     if decision.verdict is not Verdict.NO_GAP or model.has(COUNTER):
         return decision
-    quiet = any(_floors(model, model, log) <= LOUD for part in evidence for log in part.each())
+    quiet = any(floors(model, model, log) <= LOUD for part in evidence for log in part.each())
     return decision if quiet else replace(decision, verdict=Verdict.UNKNOWN, fast=True)
 
 
-def _floors(model: Simulation, added: Simulation, log: Evidence) -> float:
+def floors(model: Simulation, added: Simulation, log: Evidence) -> float:
     """What the model leaves of a log, in noise floors."""
     return measure(log, log.residuals(model)).total / noise_floor(added, log, 0)
 

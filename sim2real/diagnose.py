@@ -28,14 +28,16 @@ from sim2real.observer import Simulation
 from sim2real.orders import Order, counts, read_order, without_swing
 from sim2real.pairs import add_pairs, add_partners, add_twins, deepened
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
+from sim2real.quiet import is_noise
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
-from sim2real.selection import Decision, decide, is_noise, needs_pairs
+from sim2real.selection import Decision, decide, needs_pairs
 from sim2real.sluggish import impostor
 from sim2real.sources import Sources, read_source, read_sources
 from sim2real.structure import add_structure
 from sim2real.suspect import unlike_wheels
 from sim2real.trpac_error import trpac_error
 from sim2real.varying import add_varied
+from sim2real.wander import held_to_wandering
 
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
 
@@ -203,7 +205,7 @@ def _decided(
     progress: Progress,
 ) -> tuple[Contest, Decision]:
     """The decision, with what had to be added to the contest for it."""
-    decision = decide(contest, fit_to, held)
+    decision = held_to_wandering(decide(contest, fit_to, held), contest, model, fit_to, held)
     if decision.verdict is Verdict.UNKNOWN:
         contest = add_varied(contest, model, fit_to, held, jobs, progress)
         decision = decide(contest, fit_to, held)

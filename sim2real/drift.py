@@ -7,7 +7,7 @@ drift by the same share of their noise: they are of one rig.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -85,19 +85,41 @@ def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: Array, seed
     if not np.any(drift > 0.0):
         return replace(noise, slow=np.zeros(len(CHANNELS)))
     generator = np.random.default_rng(seed)
+    offs = (
+        np.sum(
+            [
+                s * _drawn(len(drive), drive.step_s / tau, generator)
+                for s, tau in zip(drift, DRIFT_S, strict=True)
+            ],
+            0,
+        )
+        for _ in range(DRAWS)
+    )
+    return replace(noise, slow=_left_of(model, drive, noise, offs))
+
+
+def slow_part(
+    model: Simulation, drive: Drive, noise: Noise, channel: int, tau_s: float, seed: int = 0
+) -> Array:
+    """What one sensor that drifts by as much as its noise, within a time, adds to the variances of all, shape (7,)."""
+    generator = np.random.default_rng(seed)
+    alone = np.zeros(len(CHANNELS))
+    alone[channel] = 1.0
+    offs = (alone * _drawn(len(drive), drive.step_s / tau_s, generator) for _ in range(DRAWS))
+    return _left_of(model, drive, noise, offs)
+
+
+def _left_of(model: Simulation, drive: Drive, noise: Noise, offs: Iterable[Array]) -> Array:
+    """Variances of the blocks' sums that a right model leaves of drifts in standard deviations of the noise."""
     length, nominal = drive.rows_in(BLOCK_S), model.predict(drive).channels
-    found = np.zeros(len(CHANNELS))
-    for _ in range(DRAWS):
-        parts = [
-            s * _drawn(len(drive), drive.step_s / tau, generator)
-            for s, tau in zip(drift, DRIFT_S, strict=True)
-        ]
-        off = noise.sigma * np.sum(parts, axis=0)
+    found = []
+    for each in offs:
+        off = noise.sigma * each
         moved = model.predict(replace(drive, measured=drive.measured + off)).channels
         rest = np.where(np.isfinite(drive.measured), off - (moved - nominal), np.nan)
         sums = block_sums(np.nan_to_num(noise.whitened(rest)), length)
-        found += np.mean(np.square(sums), axis=0) / DRAWS
-    return replace(noise, slow=found)
+        found.append(np.mean(np.square(sums), axis=0))
+    return np.asarray(np.mean(found, axis=0))
 
 
 def _drawn(n: int, rate: float, generator: np.random.Generator) -> Array:

@@ -51,6 +51,14 @@ def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Fitness:
     return Fitness(float(np.sqrt(np.mean(np.square(list(signals.values()))))), signals)
 
 
+def block_squares(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Array:
+    """Mean squares of the blocks' sums of what an entry leaves, 1 where white noise is alone, shape (7,) [-]."""
+    sums = np.concatenate(
+        [block_sums(rows, drive.rows_in(BLOCK_S)) for rows, drive, _ in _logs(entry, fit_to, holdout)]
+    )
+    return np.array([np.mean(column[column != 0.0] ** 2) if column.any() else 1.0 for column in sums.T])
+
+
 def gross_share(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
     """Share of the blocks in which some signal is far beyond noise [-].
 

@@ -1,4 +1,4 @@
-"""From the contest to a verdict: probabilities, what cannot be told apart, the gates for no gap and unknown."""
+"""From the contest to a verdict: probabilities, what cannot be told apart, the gates of `unknown`."""
 
 from __future__ import annotations
 
@@ -9,34 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.contest import Contest, Entry, Varied
-from sim2real.drive import BLOCK_S
 from sim2real.evidence import Evidence
-from sim2real.fitting import loss
-from sim2real.goodness import Fitness, fitness, gross_share, inflation, loss_beyond_noise, noise_margin
-from sim2real.hum import without_hum
+from sim2real.goodness import Fitness, fitness, inflation, loss_beyond_noise, noise_margin
+from sim2real.quiet import NO_GAP_MISFIT, is_noise, rare_share
 from sim2real.result import Verdict
 
 Array = NDArray[np.float64]
 
-NO_GAP_MISFIT = 1.4
-"""Up to this misfit of the model as it is, what is left is noise [-]."""
-NO_GAP_GAIN = 0.03
-"""As long as no effect takes more than this share off the loss [-]."""
-QUIET_MISFIT, QUIET_GAIN = 1.0, 0.12
-"""And four times as much where the misfit is no more than noise alone gives: noise that was read too large, as of a
-signal that is held, or of sensors that are next to ideal, leaves room for small ages, and for air of another density
-[-]."""
-LONE_MISFIT, LONE_GAIN = 1.6, 0.015
-"""And up to this misfit where no effect takes even this share: sensors that wander by themselves, for nothing of the
-library moves with them [-]."""
-NEGLIGIBLE = 0.02
-"""An effect of no more than this share of a noticeable change is none, whatever it takes: no interval is much narrower
-[-]."""
-DRIFT_GAIN = 0.2
-"""And of the share of the loss that drifting sensors cause, an effect may take this, too [-]."""
-GROSS_BLOCKS = 0.01
-"""Nor where more than this share of the blocks is far beyond noise: what happens rarely, as a wheel locks, hardly moves
-the misfit [-]."""
 NO_GAP_DOUBT = 0.03
 """Probability that something is left of the candidates where the misfit says there is no gap [-]."""
 EXPLAINED_MISFIT = 1.5
@@ -107,53 +86,6 @@ def allowed(before: Fitness) -> float:
     return max(EXPLAINED_MISFIT, min(EXPLAINED_SHARE * before.misfit, EXPLAINED_MOST))
 
 
-def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
-    """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
-    null = contest.null
-    misfit = fitness(null, fit_to, holdout).misfit
-    if misfit > LONE_MISFIT or rare_share(null, fit_to, holdout):
-        return False
-    real = [e for e in contest.singles if not _negligible(e)]
-    if misfit > NO_GAP_MISFIT:
-        return all(e.loss >= (1.0 - LONE_GAIN) * null.loss for e in real)
-    most = (QUIET_GAIN if misfit <= QUIET_MISFIT else NO_GAP_GAIN) + DRIFT_GAIN * _drifting(fit_to, holdout)
-    gaining = [e for e in real if e.loss < (1.0 - most) * null.loss]
-    if not gaining:
-        return True
-    floor = (1.0 - most) * _quiet_loss(null, null, fit_to, holdout)
-    return all(_quiet_loss(e, null, fit_to, holdout) >= floor for e in gaining)
-
-
-def _negligible(entry: Entry) -> bool:
-    """Whether an effect is next to none at its best."""
-    candidate = entry.fitted.candidate
-    off = np.abs(entry.fitted.x - candidate.neutral) / candidate.scale
-    return bool(np.all(off < NEGLIGIBLE))
-
-
-def rare_share(null: Entry, fit_to: Evidence, holdout: Evidence) -> float:
-    """Share of the blocks that are far beyond noise, 0 where so few are that it may be chance [-]."""
-    share = gross_share(null, fit_to, holdout)
-    return share if share > GROSS_BLOCKS else 0.0
-
-
-def _quiet_loss(entry: Entry, null: Entry, fit_to: Evidence, holdout: Evidence) -> float:
-    """Loss on all logs without a hum of the wheels' sensors."""
-    return loss(without_hum(entry.z_fit, null.z_fit, fit_to)) + loss(
-        without_hum(entry.z_hold, null.z_hold, holdout)
-    )
-
-
-def _drifting(*evidence: Evidence) -> float:
-    """Share of the residuals' variance that is the sensors' drift [-]."""
-    parts = [
-        noise.slow / drive.rows_in(BLOCK_S)
-        for each in evidence
-        for drive, noise in zip(each.drives, each.noises, strict=True)
-    ]
-    return float(np.mean(parts))
-
-
 def needs_pairs(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether one effect is not enough; of a contest with partners."""
     if len(contest.singles) < 2:
@@ -195,6 +127,8 @@ class Decision:
         Whether the gap is one of rows alone, which averages out within a block.
     slight : str
         What was found and is not blamed, as every log's residual is at its noise floor.
+    wandering : tuple of str
+        Signals whose sensors wander by themselves, where that is all the gap there is, see `sim2real.wander`.
     """
 
     verdict: Verdict
@@ -210,6 +144,7 @@ class Decision:
     rare: float = 0.0
     fast: bool = False
     slight: str = ""
+    wandering: tuple[str, ...] = ()
 
 
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
@@ -249,6 +184,7 @@ def _decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         if (
             pair_explains(paired, before)
             and not _cancel(contest, pair)
+            and not _a_curve_does(contest, pair, fit_to, holdout)
             and takes_two(best, pair, after, paired, explains(after, before))
         ):
             return _compound(contest, pair, shares, before, paired)
@@ -350,6 +286,12 @@ def _cancel(contest: Contest, pair: Entry) -> bool:
     null = contest.null.loss
     alone = min(e.loss for e in contest.singles if e.ids[0] in pair.ids)
     return null - alone < ALONE * (null - pair.loss)
+
+
+def _a_curve_does(contest: Contest, pair: Entry, fit_to: Evidence, holdout: Evidence) -> bool:
+    """Whether one of two effects leaves clearly less beside another curve of the tyres than beside the other."""
+    margin = noise_margin(pair, fit_to, holdout)
+    return any(e.ids[0] in pair.ids and e.loss < pair.loss - margin for e in contest.structured)
 
 
 def takes_two(best: Entry, pair: Entry, after: Fitness, paired: Fitness, explained: bool) -> bool:

@@ -27,7 +27,8 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: St
         slight = decision.slight.replace("+", " with ")
         traced = f" On the average something slighter than any row's noise is left, most like {slight}."
         agree = "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
-        return agree + (traced if slight else "")
+        alone = f" {' and '.join(decision.wandering)} wanders beyond that, as sensors do by themselves."
+        return agree + (traced if slight else "") + (alone if decision.wandering else "")
     if decision.verdict is Verdict.UNKNOWN and decision.rare:
         return (
             f"On the whole the gap is lost in the noise, but {100.0 * decision.rare:.0f} % of the logs' time lies far "
@@ -89,7 +90,7 @@ def beside(structure: Structure | None) -> str:
     """The structural part."""
     if structure is None:
         return ""
-    values = ", ".join(f"{name} {100.0 * v.value:+.1f} %" for name, v in structure.parameters.items())
+    values = ", ".join(f"{name} {v.value:+.3g}" for name, v in structure.parameters.items())
     return (
         f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}): "
         "a difference of the models, not a fault."

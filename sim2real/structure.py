@@ -33,7 +33,7 @@ def add_structure(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Contest:
-    """The contest with its best single effects fitted once more beside each structural one."""
+    """The contest with its best single effects fitted once more, each beside the structural one that leaves least."""
     wanted = [key for key in STRUCTURAL if key not in exclude and not model.has(key)]
     work = [
         partial(_beside, entry, key, model, fit_to, holdout)
@@ -41,7 +41,8 @@ def add_structure(
         for key in wanted
     ]
     found = [entry for entry in run_all(work, jobs, progress, "structure") if is_proper(entry)]
-    return replace(contest, structured=tuple(sorted(found, key=lambda e: e.loss)))
+    best = {entry.ids[0]: entry for entry in sorted(found, key=lambda e: -e.loss)}
+    return replace(contest, structured=tuple(sorted(best.values(), key=lambda e: e.loss)))
 
 
 def _beside(entry: Entry, key: str, model: Simulation, fit_to: Evidence, holdout: Evidence) -> Entry:

@@ -14,8 +14,8 @@ from sim2real.drive import BLOCK_S, CHANNELS, WHEEL
 from sim2real.evidence import Evidence, drift_of, gather
 from sim2real.goodness import fitness
 from sim2real.noise import Noise
+from sim2real.quiet import NO_GAP_MISFIT
 from sim2real.result import Verdict
-from sim2real.selection import NO_GAP_MISFIT
 
 DURATION_S = 30.0
 SHARE = 0.4

@@ -13,8 +13,9 @@ from sim2real.drive import ACCEL
 from sim2real.evidence import gather
 from sim2real.fitting import Candidate, fit
 from sim2real.goodness import Fitness
+from sim2real.quiet import rare_share
 from sim2real.result import Gap, Measure, Verdict
-from sim2real.selection import NO_GAP_DOUBT, Decision, rare_share
+from sim2real.selection import NO_GAP_DOUBT, Decision
 from sim2real.sentences import verdict
 
 KEY = "torque_gain"

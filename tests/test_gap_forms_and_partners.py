@@ -36,8 +36,9 @@ from sim2real.findings import Findings, describe
 from sim2real.fitting import Candidate, fit
 from sim2real.noise import Noise
 from sim2real.pairs import add_pairs, add_partners
+from sim2real.quiet import is_noise
 from sim2real.result import Verdict
-from sim2real.selection import decide, is_noise, needs_pairs
+from sim2real.selection import decide, needs_pairs
 from sim2real.suspect import lone_sensor
 from sim2real.varying import vary
 

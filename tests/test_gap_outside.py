@@ -22,8 +22,9 @@ from sim2real.fitting import FULL_STEPS, Candidate
 from sim2real.goodness import Fitness, fitness
 from sim2real.hum import hum
 from sim2real.law import held_to_curves
+from sim2real.quiet import NO_GAP_MISFIT
 from sim2real.result import Structure, Verdict
-from sim2real.selection import EXPLAINED_MISFIT, NO_GAP_MISFIT, PAIR_MISFIT, Decision
+from sim2real.selection import EXPLAINED_MISFIT, PAIR_MISFIT, Decision
 from sim2real.sentences import verdict as verdict_of
 
 DURATION_S = 16.0

@@ -1,5 +1,6 @@
 """Tyres of another curve: the plant's force and slopes, and an effect that is found beside them."""
 
+import numpy as np
 import pytest
 from gap_drives import MODEL, clean, noisy, road_of, trace
 
@@ -13,6 +14,7 @@ from sim2real.evidence import gather
 from sim2real.result import Verdict
 
 SHAPE = {"knee": -0.08, "crest": 0.06, "sliding": -0.1}
+FORMULA = {"share": 1.0, "shape": 1.5, "curvature": -0.8}
 ROAD = road_of(0.9, 0.5, 0.9, 0.5, 0.9, 0.5)
 
 
@@ -49,6 +51,53 @@ def test_its_slopes_are_those_of_its_force(parameters, slip):
     assert by_load == pytest.approx(up - down, rel=1e-3, abs=1e-6)
 
 
+def by_formula(p, slip, load_n=3000.0, theta=0.5):
+    stiffness_n = p.longitudinal_stiffness_n
+    tyre = dynamics.tyre_force(theta, slip, load_n, stiffness_n)
+    return dynamics.by_formula(tyre, theta, slip, load_n, stiffness_n, p)
+
+
+@pytest.mark.parametrize("theta", [0.1, 0.3, 0.8, 1.2])
+@pytest.mark.parametrize("load_n", [500.0, 3000.0, 9000.0])
+def test_the_peak_is_the_greatest_force_of_all_slips(theta, load_n):
+    forces_n = [
+        dynamics.tyre_force(theta, slip, load_n, 50_000.0)[0] for slip in np.linspace(1e-4, 1.0, 4000)
+    ]
+    assert dynamics.peak_force(theta, load_n, 50_000.0)[0] == pytest.approx(max(forces_n), rel=1e-5)
+
+
+@pytest.mark.parametrize("theta", [0.2, 0.8])
+def test_a_formula_keeps_initial_slope_and_peak_and_is_the_published_one(parameters, theta):
+    p = parameters._replace(**{f"formula_{name}": value for name, value in FORMULA.items()})
+    plain = dynamics.tyre_force(theta, 1e-6, 3000.0, p.longitudinal_stiffness_n)[0]
+    assert by_formula(p, 1e-6, theta=theta)[0] == pytest.approx(plain, rel=1e-4)
+    slips = np.linspace(1e-4, 1.0, 4000)
+    forces_n = np.array([by_formula(p, slip, theta=theta)[0] for slip in slips])
+    peak_n, _ = dynamics.peak_force(theta, 3000.0, p.longitudinal_stiffness_n)
+    assert forces_n.max() == pytest.approx(peak_n, rel=1e-5)
+    c, e = FORMULA["shape"], FORMULA["curvature"]
+    b = dynamics.INITIAL_SLOPE * p.longitudinal_stiffness_n / (c * peak_n)
+    pacejka = peak_n * np.sin(c * np.arctan(b * slips - e * (b * slips - np.arctan(b * slips))))
+    np.testing.assert_allclose(forces_n, pacejka, rtol=1e-12)
+    half = p._replace(formula_share=0.5)
+    middle = 0.5 * (
+        by_formula(p, 0.2)[0] + dynamics.tyre_force(0.5, 0.2, 3000.0, p.longitudinal_stiffness_n)[0]
+    )
+    assert by_formula(half, 0.2)[0] == pytest.approx(middle, rel=1e-12)
+
+
+@pytest.mark.parametrize("slip", [0.003, 0.012, 0.03, 0.08, 0.3])
+def test_a_formulas_slopes_are_those_of_its_force(parameters, slip):
+    p = parameters._replace(formula_share=0.8, formula_shape=1.3, formula_curvature=0.4)
+    _, by_slip, by_load = by_formula(p, slip)
+    h = 1e-6
+    assert by_slip == pytest.approx(
+        (by_formula(p, slip + h)[0] - by_formula(p, slip - h)[0]) / (2 * h), rel=1e-4
+    )
+    by_difference = by_formula(p, slip, 3000.5)[0] - by_formula(p, slip, 2999.5)[0]
+    assert by_load == pytest.approx(by_difference, rel=1e-3, abs=1e-6)
+
+
 def hard_driving(duration_s):
     """Full torque and hard braking in turn: tyres pass their maximum on the slippery stretches."""
     points = [(0.0, 0.0)]
@@ -79,6 +128,23 @@ def test_an_effect_beside_another_tyre_is_blamed_alone():
     assert "another one than the simulation's" in said.sentence
     assert said.to_json()["structure"]["parameters"].keys() == SHAPE.keys()
     assert all("tyre_shape" not in name for group in said.ambiguous_with for name in group)
+
+
+def test_friction_is_found_beside_a_tyre_of_another_formula():
+    """On roads of unlike friction one bending of the curve would take a part of it, and find another factor."""
+    road = road_of(0.9, 0.3, 0.6, 0.3, 0.9, 0.3)
+    effects = {"friction_offset": {"factor": 0.9}, "tyre_formula": FORMULA}
+    logs = [
+        noisy(clean(hard_driving(12.0), v0, road, effects=effects), seed)
+        for seed, v0 in enumerate((9.0, 13.0))
+    ]
+    kept = only("friction_offset", "mass_offset", "torque_gain", "tyre_shape", "tyre_formula")
+    said = diagnose(MODEL, logs[:1], logs[1], exclude=kept)
+    assert said.verdict in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS)
+    assert said.causes[0].effect == "friction_offset"
+    assert said.causes[0].parameters["factor"].value == pytest.approx(0.9, abs=0.01)
+    assert said.structure.effect == "tyre_formula"
+    assert said.structure.parameters["shape"].value == pytest.approx(FORMULA["shape"], abs=0.1)
 
 
 def test_another_tyre_alone_is_no_effect_of_the_library():

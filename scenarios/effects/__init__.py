@@ -29,6 +29,7 @@ from scenarios.effects.rolling_resistance import (
 from scenarios.effects.torque_delay import TorqueDelay
 from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles, TorqueGainOfSigns
 from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages, TorqueLagOfRiseAndFall
+from scenarios.effects.tyre_formula import TyreFormula
 from scenarios.effects.tyre_relaxation import (
     TyreRelaxation,
     TyreRelaxationOfSlip,
@@ -75,6 +76,7 @@ EFFECTS: dict[str, type[Effect]] = {
         TyreRelaxation,
         FrictionFalloff,
         TyreShape,
+        TyreFormula,
         # road
         FrictionOffset,
         MuSplit,

@@ -45,10 +45,12 @@ __all__ = [
     "RoadTable",
     "Wheels",
     "advance",
+    "by_formula",
     "forces",
     "initial_y",
     "look_up_theta",
     "new_wheels",
+    "peak_force",
     "refresh",
     "reshaped",
     "run",
@@ -171,6 +173,62 @@ def reshaped(
 
 
 @compiled
+def peak_force(theta: float, load_n: float, stiffness_n: float) -> tuple[float, float]:
+    """The greatest force of the modified Dugoff tyre over all slips [N], and its derivative by load [-].
+
+    Beyond full adhesion it is theta F_z (1 + a / 4 - a / (4 lambda)) shape(lambda) with a = theta F_z / C_x. Where the
+    derivative vanishes is a fixed point that settles at once, since the force is flat there.
+    """
+    a = theta * load_n / stiffness_n
+    slip = np.sqrt(0.25 * a * INITIAL_SLOPE / (1.63 - 0.75 * theta))
+    force = by_load = 0.0
+    for _ in range(4):
+        slip = min(max(slip, a / (2.0 + a)), 0.6)
+        shape = (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + INITIAL_SLOPE
+        falling = (1.63 - 0.75 * theta) - 2.0 * (1.15 - 0.75 * theta) * slip
+        reach = 1.0 + 0.25 * a - 0.25 * a / slip
+        force = theta * load_n * reach * shape
+        by_load = theta * (2.0 * reach - 1.0) * shape  # where the force is flat, slip may stay
+        slip = np.sqrt(0.25 * a * shape / max(reach * falling, 1e-3))
+    return force, by_load
+
+
+@compiled
+def by_formula(
+    tyre: tuple[float, float, float],
+    theta: float,
+    slip: float,
+    load_n: float,
+    stiffness_n: float,
+    p: DynamicsParameters,
+) -> tuple[float, float, float]:
+    """A tyre's force and slopes on the way to a magic formula of the same initial slope and the same peak.
+
+    References
+    ----------
+    .. [1] Pacejka (2012), Tire and Vehicle Dynamics, Eq. (4.49): D sin(C arctan(B s - E (B s - arctan B s))).
+    """
+    force, by_slip, by_load = tyre
+    peak_n, peak_by_load = peak_force(theta, load_n, stiffness_n)
+    if peak_n < LEAST_GRIP_N:
+        return tyre
+    rate = INITIAL_SLOPE * stiffness_n / (p.formula_shape * peak_n)
+    x = rate * slip
+    bent = x - p.formula_curvature * (x - np.arctan(x))
+    angle = p.formula_shape * np.arctan(bent)
+    bent_by_x = 1.0 - p.formula_curvature * x * x / (1.0 + x * x)
+    other = peak_n * np.sin(angle)
+    other_by_slip = peak_n * np.cos(angle) * p.formula_shape / (1.0 + bent * bent) * bent_by_x * rate
+    other_by_load = (other - slip * other_by_slip) / peak_n * peak_by_load
+    share = p.formula_share
+    return (
+        force + share * (other - force),
+        by_slip + share * (other_by_slip - by_slip),
+        by_load + share * (other_by_load - by_load),
+    )
+
+
+@compiled
 def segment_at(start_m: NDArray, contact_m: float) -> int:
     """Index of the road segment under a contact point."""
     index = 0
@@ -275,6 +333,8 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             tyre = tyre_force(theta, abs(acting), load_n, stiffness_n)
             if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
                 tyre = reshaped(tyre, abs(acting), theta * load_n, load_n, p)
+            if p.formula_share != 0.0:
+                tyre = by_formula(tyre, theta, abs(acting), load_n, stiffness_n, p)
             force, by_slip, by_load = tyre
             force, by_load = np.copysign(force, acting), np.copysign(by_load, acting)
             # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.

@@ -50,6 +50,12 @@ class DynamicsParameters(NamedTuple):
     """By how much the tyre's force is off near its maximum [-]."""
     sliding: float = 0.0
     """By how much the tyre's force is off where it slides all over [-]."""
+    formula_share: float = 0.0
+    """How far the tyre's curve is from the modified Dugoff one to a magic formula of the same slope and peak [-]."""
+    formula_shape: float = 1.4
+    """That formula's shape factor C [-]."""
+    formula_curvature: float = 0.0
+    """That formula's curvature factor E [-]."""
     relaxation_m: float = 0.0
     """Way over which the tyre force follows its steady value; 0: at once [m]."""
     relaxation_by_load: float = 0.0

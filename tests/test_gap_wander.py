@@ -1,0 +1,82 @@
+"""A ground speed or an accelerometer that wanders by itself is noise; what goes with the car's motion is a gap."""
+
+import numpy as np
+import pytest
+from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured, road_of
+
+from scenarios.effects import EFFECTS
+from sim2real.contest import silent
+from sim2real.diagnose import find
+from sim2real.drive import ACCEL, SPEED
+from sim2real.findings import describe
+from sim2real.goodness import fitness
+from sim2real.noise import Noise
+from sim2real.result import Verdict
+
+ROAD = road_of(0.9, 0.6, 0.9, 0.6)
+OTHERS = set(EFFECTS) - {
+    "vehicle_speed_scale",
+    "vehicle_speed_delay",
+    "accelerometer_bias",
+    "mass_offset",
+    "aero_drag",
+}
+
+
+def wandering(drive, channel, share, tau_s, seed):
+    """The drive with a sensor that wanders by a share of its noise, in standard deviations."""
+    slow = Noise(np.ones(7), np.full(7, np.exp(-STEP_S / tau_s)), np.ones((1, 7)))
+    off = slow.draw(len(drive), np.random.default_rng(100 + seed))[:, channel]
+    measured = drive.measured.copy()
+    measured[:, channel] += share * SIGMA[channel] * off
+    return remeasured(drive, measured)
+
+
+def logs(change):
+    drives = [clean(pulses(20.0), v0, ROAD) for v0 in (9.0, 13.0)]
+    return [change(noisy(drive, seed), seed) for seed, drive in enumerate(drives)]
+
+
+@pytest.mark.parametrize(
+    ("channel", "name", "tau_s"),
+    [(SPEED, "vehicle_speed", 0.5), (SPEED, "vehicle_speed", 0.8), (ACCEL, "accel_x", 0.5)],
+)
+def test_a_sensor_that_wanders_within_its_noise_is_no_gap(channel, name, tau_s):
+    fit, holdout = logs(lambda drive, seed: wandering(drive, channel, 0.7, tau_s, seed))
+    found = find(MODEL, [fit], holdout, exclude=OTHERS)
+    shown = fitness(found.contest.null, found.fit_to, found.holdout).misfit
+    assert shown > 1.6, "the blocks have to show it"
+    assert found.decision.verdict is Verdict.NO_GAP
+    assert name in found.decision.wandering
+    assert "as sensors do by themselves" in describe(found, seed=0, jobs=1, progress=silent).sentence
+
+
+def test_an_effect_is_found_though_the_speed_wanders_beside_it():
+    """As large in the blocks as what would be left of a gap."""
+    off = {"vehicle_speed_scale": {"factor": 1.02}}
+    drives = [clean(pulses(20.0), v0, ROAD, effects=off) for v0 in (9.0, 13.0)]
+    fit, holdout = (wandering(noisy(drive, seed), SPEED, 1.0, 0.5, seed) for seed, drive in enumerate(drives))
+    found = find(MODEL, [fit], holdout, exclude=OTHERS)
+    assert fitness(found.contest.singles[0], found.fit_to, found.holdout).misfit > 1.5
+    assert found.decision.verdict is Verdict.IDENTIFIED
+    assert found.decision.winner.ids == ("vehicle_speed_scale",)
+    assert found.added()[0].factor == pytest.approx(1.02, abs=1e-3)
+
+
+def test_one_that_wanders_by_more_than_its_noise_is_a_gap():
+    fit, holdout = logs(lambda drive, seed: wandering(drive, SPEED, 3.0, 0.5, seed))
+    assert find(MODEL, [fit], holdout, exclude=OTHERS).decision.verdict is Verdict.UNKNOWN
+
+
+def test_a_small_error_that_goes_with_the_motion_is_no_wandering():
+    """The speed is off by what the car does, by as much as such a wandering: an effect or a term may say so."""
+
+    def off(drive, seed):
+        measured = drive.measured.copy()
+        measured[:, SPEED] *= 1.0 + 3e-3
+        return remeasured(drive, measured)
+
+    fit, holdout = logs(off)
+    found = find(MODEL, [fit], holdout, exclude=OTHERS)
+    assert found.decision.verdict is not Verdict.NO_GAP
+    assert not found.decision.wandering
