@@ -163,6 +163,25 @@ def test_a_low_confidence_scatters_more_by_its_logarithm_and_is_not_restless():
     assert finding.verdict is Verdict.IDENTIFIED, finding.unexplained
 
 
+@pytest.mark.parametrize("spared", [2.0, 1.0])
+def test_pictures_too_light_or_too_dark_spare_the_class_that_looks_so_anyhow(spared):
+    """Snow stays white, wet asphalt stays dark; most of the rest is taken for it, and unsure of."""
+
+    def damage(log):
+        true, number = log.signals["image_class"], log.signals["frame_id"].astype(int) % 997
+        flips = np.random.default_rng(3).random(997)[number] < 0.6
+        poor = true != spared
+        return changed(
+            log,
+            image_class=np.where(poor & flips, spared, true),
+            image_confidence=np.where(poor, 0.42, 0.9) * log.signals["image_confidence"] / 0.9,
+        )
+
+    finding = diagnose(QUIET, 6, speeds=UP_AND_DOWN, damage=damage)
+    assert finding.unexplained == ()
+    assert finding.causes == ("exposure_shift",)
+
+
 def late(by_s: float):
     def damage(log):
         then = np.interp(log.time_s - by_s, log.time_s, np.arange(len(log.time_s)))

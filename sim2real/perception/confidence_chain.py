@@ -19,7 +19,7 @@ from sim2real.perception.confidence import (
     fit_confidence,
     read_model,
 )
-from sim2real.perception.conflicts import class_error, confusion_in_words
+from sim2real.perception.conflicts import by_road, class_error, confusion_in_words
 from sim2real.perception.frames import Modelled, Results
 from sim2real.perception.patterns import FEWEST_OF_CLASS, pattern_in_words
 from sim2real.perception.pictures import NORMAL_LIGHT_EV, Light
@@ -128,11 +128,26 @@ def confidence_chain(
     stands = next(f for f in (plain, *fits) if f.effects == chain.best().effects)
     if stands.effects == ("motion_blur",) and np.subtract(*_slow_and_fast(stands, known)[1]) > -SLIGHT:
         chain, stands = replace(chain, quiet=True), plain
-    pattern = pattern_in_words(seen.together, stands, model)
+    every_log = [*fitted, *([held_out] if held_out else [])]
+    pattern = pattern_in_words(seen.together, stands, _restlessness(every_log, model, modelled))
     needed = [a for a in outside if a.score > chain.best().score + DECISIVE and not chain.quiet]
     if needed and not pattern:
         pattern = _of_no_effect(max(needed, key=lambda account: account.score))
     return replace(chain, unexplained=pattern)
+
+
+def _restlessness(results: Sequence[Results], model: ConfidenceModel, modelled: Modelled) -> float:
+    """Standard deviation of the confidence's logarithm from second to second, on one class at one speed [-].
+
+    Where pictures are so bad that classes err in turns, the class that is named is not the one on the road, and a
+    picture of which surface it is that is read well or badly.
+    """
+    blocks = make_blocks(by_road(results)).less(modelled.exposure_s, modelled.stops)
+    return (
+        min(model.deviation, read_model(blocks).deviation)
+        if len(blocks) >= FEWEST_BLOCKS
+        else model.deviation
+    )
 
 
 def _is_quiet(nothing: Account, others: Sequence[Account]) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ MOSTLY = 0.7
 CONFUSED, FEWEST_OF_SURFACE = 0.3, 30
 """Share of a surface's results that name others from which on these are no chance mistakes, and how many results of it
 have to be there."""
+HARDLY_READ = 0.3
+"""Share of wrong classes away from borders from which on a change of class may be any of them [-]."""
 SURE, AS_SURE = 0.8, 0.1
 """Confidence from which on pictures are good [-], and by how much less sure mistakes may be all the same, in its
 logarithm [-]: with bad pictures the one is lower, or the other more."""
@@ -72,7 +74,12 @@ def confusion_in_words(results: Sequence[Results]) -> str:
 
 
 def streak_m(results: Sequence[Results]) -> float:
-    """Way over which a camera that errs goes on doing so, the mean away from borders; 0 where it never errs [m]."""
+    """Way over which a camera that errs goes on doing so, the mean away from borders; 0 where it never errs [m].
+
+    Infinite where it errs so often that borders cannot be told from mistakes.
+    """
+    if class_error(results) > HARDLY_READ:
+        return float("inf")
     wrong_m, runs = 0.0, 0
     for one, place_m in _places(results):
         wrong = np.zeros(len(one), dtype=np.bool_)
@@ -129,6 +136,17 @@ def _laid_over(results: Sequence[Results]) -> Iterator[tuple[Results, RoadSegmen
     for one, place_m in _places(results):
         for segment, inside in _inside(one, place_m):
             yield one, segment, inside
+
+
+def by_road(results: Sequence[Results]) -> tuple[Results, ...]:
+    """The results, laid over the road as they fit best, with road.yaml's class; near borders without a confidence."""
+    out = []
+    for one, place_m in _places(results):
+        classes, confidence = one.classes.copy(), np.full(len(one), np.nan)
+        for segment, inside in _inside(one, place_m):
+            classes[inside], confidence[inside] = segment.surface_class, one.confidence[inside]
+        out.append(replace(one, classes=classes, confidence=confidence))
+    return tuple(out)
 
 
 def _places(results: Sequence[Results]) -> Iterator[tuple[Results, Array]]:

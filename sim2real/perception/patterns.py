@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.perception.blocks import Blocks
-from sim2real.perception.confidence import NORMAL_CONFIDENCE, ConfidenceFit, ConfidenceModel
+from sim2real.perception.confidence import NORMAL_CONFIDENCE, ConfidenceFit
 from trpac_core.vision.classes import Surface
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ RESTLESS = 0.155
 which on it is a gap of its own: chains that nothing disturbs were within 0.15 [-]."""
 
 
-def pattern_in_words(blocks: Blocks, fit: ConfidenceFit, model: ConfidenceModel) -> str:
+def pattern_in_words(blocks: Blocks, fit: ConfidenceFit, deviation: float) -> str:
     """The gap that a confidence is which goes with what no effect has it go, in a sentence; empty where it does not.
 
     Parameters
@@ -42,8 +42,8 @@ def pattern_in_words(blocks: Blocks, fit: ConfidenceFit, model: ConfidenceModel)
         Of all logs.
     fit : ConfidenceFit
         What blur and exposure take of them.
-    model : ConfidenceModel
-        What is usual between them.
+    deviation : float
+        Of the confidence's logarithm from second to second, on one class at one speed [-].
     """
     taken = fit.loss(blocks)
     # at one speed, but as low as blur and exposure leave it
@@ -54,7 +54,7 @@ def pattern_in_words(blocks: Blocks, fit: ConfidenceFit, model: ConfidenceModel)
         or _unsure_when_slow(rest, blocks)
         or _shunned(loss, blocks)
         or _creeping(rest, blocks)
-        or _restless(blocks, model)
+        or _restless(blocks, deviation)
     )
 
 
@@ -137,10 +137,10 @@ def _creeping(rest: Array, blocks: Blocks) -> str:
     )
 
 
-def _restless(blocks: Blocks, model: ConfidenceModel) -> str:
-    if not len(blocks) or model.deviation * np.exp(-blocks.loss.mean()) < RESTLESS * NORMAL_CONFIDENCE:
+def _restless(blocks: Blocks, deviation: float) -> str:
+    if not len(blocks) or deviation * np.exp(-blocks.loss.mean()) < RESTLESS * NORMAL_CONFIDENCE:
         return ""
     return (
-        f"The confidence comes and goes by a factor of {np.exp(model.deviation):.1f} from second to second, on one "
+        f"The confidence comes and goes by a factor of {np.exp(deviation):.1f} from second to second, on one "
         "class at one speed: what stands in the camera's way at times, or shines into it?"
     )
