@@ -37,7 +37,7 @@ from sim2real.structure import add_structure
 from sim2real.suspect import unlike_wheels
 from sim2real.trpac_error import trpac_error
 from sim2real.varying import add_varied
-from sim2real.wander import held_to_wandering
+from sim2real.wander import effect_beside_wandering, nothing_but_wandering
 
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
 
@@ -205,10 +205,10 @@ def _decided(
     progress: Progress,
 ) -> tuple[Contest, Decision]:
     """The decision, with what had to be added to the contest for it."""
-    decision = held_to_wandering(decide(contest, fit_to, held), contest, model, fit_to, held)
+    decision = nothing_but_wandering(decide(contest, fit_to, held), contest, model, fit_to, held)
     if decision.verdict is Verdict.UNKNOWN:
         contest = add_varied(contest, model, fit_to, held, jobs, progress)
-        decision = decide(contest, fit_to, held)
+        decision = effect_beside_wandering(decide(contest, fit_to, held), contest, fit_to, held)
     elif decision.winner.ids == (DELAY,) and not model.has(COUNTER) and COUNTER not in exclude:
         contest, decision = beside_a_counter(contest, decision, model, fit_to, held)
     return contest, at_the_floor(decision, contest, model, fit_to, held)

@@ -8,6 +8,7 @@ signals through the observer is what they show, and where neither rows nor any e
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +29,9 @@ from sim2real.selection import Decision, decide
 Array = NDArray[np.float64]
 
 SENSORS = {"vehicle_speed": SPEED, "accel_x": ACCEL}
+BESIDE_AN_EFFECT = {"vehicle_speed": SPEED}
+"""What may wander beside an effect: an accelerometer that does, and a speed, are also what a force leaves that the
+effect has not."""
 MOST = 2.0
 """Greatest wandering that is noise, in standard deviations of that on the grid of the diagnosis: what is white averages
 out on the way there from the log's own rate, a wandering does not [-]."""
@@ -35,44 +39,58 @@ MOST_FLOORS = 1.5
 """And what the rows of any log may be off by, in noise floors: a speed that wanders by as much makes about that [-]."""
 
 
-def held_to_wandering(
+def nothing_but_wandering(
     decision: Decision, contest: Contest, model: Simulation, fit_to: Evidence, holdout: Evidence
 ) -> Decision:
-    """The decision, another than `unknown` where all that is left is how sensors wander by themselves.
+    """The decision, `no_gap` in place of `unknown` where no effect takes anything that counts, and sensors wander."""
+    if decision.verdict is not Verdict.UNKNOWN or not nothing_gains(contest):
+        return decision
+    said = _said_of_calm(contest, contest.null, model, SENSORS, fit_to, holdout)
+    return said if said and said.verdict is Verdict.NO_GAP else decision
 
-    What is left is that of the model as it is, where no effect takes anything that counts, or of the best effect, where
-    nothing beside it does.
-    """
-    if decision.verdict is not Verdict.UNKNOWN:
+
+def effect_beside_wandering(
+    decision: Decision, contest: Contest, fit_to: Evidence, holdout: Evidence
+) -> Decision:
+    """The decision, for the best effect in place of `unknown` where a wandering speed is all that it leaves."""
+    if decision.verdict is not Verdict.UNKNOWN or not contest.singles:
         return decision
-    entry = contest.null if nothing_gains(contest) else min(contest.singles, key=lambda e: e.loss)
-    others = (*contest.singles, *contest.pairs, *contest.structured)
-    if entry is not contest.null and any(e.loss < (1.0 - LONE_GAIN) * entry.loss for e in others):
+    entry = min(contest.singles, key=lambda e: e.loss)
+    if any(e.loss < (1.0 - LONE_GAIN) * entry.loss for e in (*contest.pairs, *contest.structured)):
         return decision
-    car = model if entry.fit is None else entry.fit.candidate.model(entry.fit.x)
+    car = entry.fitted.candidate.model(entry.fitted.x)
+    said = _said_of_calm(contest, entry, car, BESIDE_AN_EFFECT, fit_to, holdout)
+    return said if said and said.winner is entry and said.verdict is not Verdict.UNKNOWN else decision
+
+
+def _said_of_calm(
+    contest: Contest,
+    entry: Entry,
+    car: Simulation,
+    sensors: Mapping[str, int],
+    fit_to: Evidence,
+    holdout: Evidence,
+) -> Decision | None:
+    """The decision once what an entry leaves is put down to sensors; None where the rows or the sensors forbid it."""
     logs = [log for part in (fit_to, holdout) for log in part.each()]
     if any(floors(car, car, log) > MOST_FLOORS for log in logs):
-        return decision
-    found = _wandering(entry, car, fit_to, holdout)
+        return None
+    found = _wandering(entry, car, sensors, fit_to, holdout)
     if found is None:
-        return decision
+        return None
     wandering, *calm = found
-    said = decide(contest, *calm)
-    expected = said.verdict is Verdict.NO_GAP if entry is contest.null else said.winner is entry
-    return (
-        replace(said, wandering=wandering) if expected and said.verdict is not Verdict.UNKNOWN else decision
-    )
+    return replace(decide(contest, *calm), wandering=wandering)
 
 
 def _wandering(
-    entry: Entry, model: Simulation, fit_to: Evidence, holdout: Evidence
+    entry: Entry, model: Simulation, sensors: Mapping[str, int], fit_to: Evidence, holdout: Evidence
 ) -> tuple[tuple[str, ...], Evidence, Evidence] | None:
-    """Which sensors wander, and both parts of the evidence with that in their noise; None where it is too much.
+    """Which of some sensors wander, and both parts of the evidence with that in their noise; None where it is too much.
 
     How much is what brings the variances of the signals' blocks nearest to those seen, a sum over sensors and times.
     """
     parts = (fit_to, holdout)
-    units = [(channel, tau) for channel in SENSORS.values() for tau in DRIFT_S]
+    units = [(channel, tau) for channel in sensors.values() for tau in DRIFT_S]
     makes = {
         (i, k): np.array([slow_part(model, d, n, *unit) for unit in units])
         for i, part in enumerate(parts)
@@ -87,12 +105,12 @@ def _wandering(
     weight = np.array([1.0 / max(float(np.mean(seen[at])), 1.0) for at in of])
     design = np.array([[np.mean(row[at]) for row in mean] for at in of])
     squares, _ = nnls(design * weight[:, None], excess * weight)
-    by_sensor = squares.reshape(len(SENSORS), -1).sum(axis=1)
+    by_sensor = squares.reshape(len(sensors), -1).sum(axis=1)
     if by_sensor.max() > MOST**2 or not by_sensor.any():
         return None
     fit_noises, hold_noises = (
         tuple(replace(n, slow=n.slow + squares @ makes[i, k]) for k, n in enumerate(part.noises))
         for i, part in enumerate(parts)
     )
-    names = tuple(name for name, square in zip(SENSORS, by_sensor, strict=True) if square > 0.0)
+    names = tuple(name for name, square in zip(sensors, by_sensor, strict=True) if square > 0.0)
     return names, replace(fit_to, noises=fit_noises), replace(holdout, noises=hold_noises)
