@@ -7,7 +7,7 @@ drift by the same share of their noise: they are of one rig.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -80,41 +80,26 @@ def _spread(sums: Array) -> Array:
     return np.array([(1.4826 * np.median(column)) ** 2 if len(column) else np.nan for column in known])
 
 
-def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: Array, seed: int = 0) -> Noise:
+def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: Array) -> Noise:
     """The noise with what drifting sensors add to the blocks' means that a right model leaves, by drawn drifts."""
     if not np.any(drift > 0.0):
         return replace(noise, slow=np.zeros(len(CHANNELS)))
-    generator = np.random.default_rng(seed)
-    offs = (
-        np.sum(
-            [
-                s * _drawn(len(drive), drive.step_s / tau, generator)
-                for s, tau in zip(drift, DRIFT_S, strict=True)
-            ],
-            0,
-        )
-        for _ in range(DRAWS)
-    )
-    return replace(noise, slow=_left_of(model, drive, noise, offs))
+    parts = [(tau_s, np.full(len(CHANNELS), share)) for share, tau_s in zip(drift, DRIFT_S, strict=True)]
+    return replace(noise, slow=left_of(model, drive, noise, parts))
 
 
-def slow_part(
-    model: Simulation, drive: Drive, noise: Noise, channel: int, tau_s: float, seed: int = 0
-) -> Array:
-    """What one sensor that drifts by as much as its noise, within a time, adds to the variances of all, shape (7,)."""
-    generator = np.random.default_rng(seed)
-    alone = np.zeros(len(CHANNELS))
-    alone[channel] = 1.0
-    offs = (alone * _drawn(len(drive), drive.step_s / tau_s, generator) for _ in range(DRAWS))
-    return _left_of(model, drive, noise, offs)
+def left_of(model: Simulation, drive: Drive, noise: Noise, parts: Sequence[tuple[float, Array]]) -> Array:
+    """Variances of the blocks' sums that a right model leaves of drifting sensors, by drawn drifts, shape (7,).
 
-
-def _left_of(model: Simulation, drive: Drive, noise: Noise, offs: Iterable[Array]) -> Array:
-    """Variances of the blocks' sums that a right model leaves of drifts in standard deviations of the noise."""
+    A drift is a sum of parts: correlation time [s], and of each channel how much, in deviations of its noise [-].
+    """
+    generator = np.random.default_rng(0)
     length, nominal = drive.rows_in(BLOCK_S), model.predict(drive).channels
     found = []
-    for each in offs:
-        off = noise.sigma * each
+    for _ in range(DRAWS):
+        off = noise.sigma * sum(
+            share * _drawn(len(drive), drive.step_s / tau_s, generator) for tau_s, share in parts
+        )
         moved = model.predict(replace(drive, measured=drive.measured + off)).channels
         rest = np.where(np.isfinite(drive.measured), off - (moved - nominal), np.nan)
         sums = block_sums(np.nan_to_num(noise.whitened(rest)), length)

@@ -177,17 +177,9 @@ def _decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         return Decision(Verdict.UNKNOWN, contest.null, (), {}, before, before)
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
-    if contest.pairs:
-        shares = probabilities(contest, list(contest.pairs), fit_to, holdout)[1:]
-        pair = contest.pairs[int(shares.argmax())]  # of equals, the one that needs fewer parameters
-        paired = fitness(pair, fit_to, holdout)
-        if (
-            pair_explains(paired, before)
-            and not _cancel(contest, pair)
-            and not _a_curve_does(contest, pair, fit_to, holdout)
-            and takes_two(best, pair, after, paired, explains(after, before))
-        ):
-            return _compound(contest, pair, shares, before, paired)
+    compound = _of_two(contest, best, before, fit_to, holdout)
+    if compound:
+        return compound
     structured = _structured(contest, before, fit_to, holdout)
     if structured:
         return structured
@@ -213,6 +205,30 @@ def _further(contest: Contest, best: Entry, fit_to: Evidence, holdout: Evidence)
     margin = noise_margin(best, fit_to, holdout)
     better = [pair for pair in contest.pairs[:1] if best.loss - pair.loss > margin]
     return better + [pair for pair in contest.twins if pair.loss - best.loss < margin]
+
+
+def _of_two(
+    contest: Contest, best: Entry, before: Fitness, fit_to: Evidence, holdout: Evidence
+) -> Decision | None:
+    """The verdict on the best pair; None where it does not explain the gap, or one effect does as well."""
+    if not contest.pairs:
+        return None
+    weight = probabilities(contest, list(contest.pairs), fit_to, holdout)[1:]
+    pair = contest.pairs[int(weight.argmax())]  # of equals, the one that needs fewer parameters
+    alone, after = fitness(best, fit_to, holdout), fitness(pair, fit_to, holdout)
+    if not pair_explains(after, before) or _cancel(contest, pair):
+        return None
+    if not takes_two(best, pair, alone, after, explains(alone, before)):
+        return None
+    if _a_curve_does(contest, pair, fit_to, holdout):
+        return None
+    weighed = list(zip(contest.pairs, weight, strict=True))
+    rivals = tuple(e for e, w in weighed if e is not pair and w > RIVAL * weight.max())
+    share: dict[str, float] = {e.ids[0]: 0.0 for e in contest.singles}
+    for entry, w in weighed:
+        for key in entry.ids:
+            share[key] += w / len(entry.ids)
+    return Decision(Verdict.COMPOUND, pair, rivals, _scaled(share, _belief(after, before)), before, after)
 
 
 def _structured(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Evidence) -> Decision | None:
@@ -315,16 +331,6 @@ def _is_needed(contest: Contest, entry: Entry) -> bool:
         alone = next(e for e in contest.singles if e.ids[0] == entry.ids[0])
         return contest.null.loss - alone.loss >= MAJOR * (contest.null.loss - entry.loss)
     return True
-
-
-def _compound(contest: Contest, pair: Entry, weight: Array, before: Fitness, after: Fitness) -> Decision:
-    weighed = list(zip(contest.pairs, weight, strict=True))
-    rivals = tuple(e for e, w in weighed if e is not pair and w > RIVAL * weight.max())
-    share: dict[str, float] = {e.ids[0]: 0.0 for e in contest.singles}
-    for entry, w in weighed:
-        for key in entry.ids:
-            share[key] += w / len(entry.ids)
-    return Decision(Verdict.COMPOUND, pair, rivals, _scaled(share, _belief(after, before)), before, after)
 
 
 def _belief(after: Fitness, before: Fitness) -> float:

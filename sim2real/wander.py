@@ -17,8 +17,8 @@ from scipy.optimize import nnls
 
 from sim2real.closure import floors
 from sim2real.contest import Contest, Entry
-from sim2real.drift import DRIFT_S, slow_part
-from sim2real.drive import ACCEL, GROUPS, SPEED
+from sim2real.drift import DRIFT_S, left_of
+from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED
 from sim2real.evidence import Evidence
 from sim2real.goodness import block_squares
 from sim2real.observer import Simulation
@@ -90,9 +90,9 @@ def _wandering(
     How much is what brings the variances of the signals' blocks nearest to those seen, a sum over sensors and times.
     """
     parts = (fit_to, holdout)
-    units = [(channel, tau) for channel in sensors.values() for tau in DRIFT_S]
+    units = [(tau_s, np.eye(len(CHANNELS))[channel]) for channel in sensors.values() for tau_s in DRIFT_S]
     makes = {
-        (i, k): np.array([slow_part(model, d, n, *unit) for unit in units])
+        (i, k): np.array([left_of(model, d, n, [unit]) for unit in units])
         for i, part in enumerate(parts)
         for k, (d, n) in enumerate(zip(part.drives, part.noises, strict=True))
     }

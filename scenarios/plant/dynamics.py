@@ -111,6 +111,13 @@ _PER_STATE = 11  # force per lagging state: 1 where the force itself lags, C_x o
 _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)  # makes the two-stage Rosenbrock method L-stable
 
 
+@inlined
+def falling_shape(theta: float, slip: float) -> tuple[float, float]:
+    """By what the modified Dugoff force falls with slip beyond Dugoff's own, and its slope [-]."""
+    square, line = 1.15 - 0.75 * theta, 1.63 - 0.75 * theta
+    return square * slip * slip - line * slip + INITIAL_SLOPE, 2.0 * square * slip - line
+
+
 @compiled
 def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> tuple[float, float, float]:
     """Modified Dugoff force without side slip, and its slopes.
@@ -131,8 +138,7 @@ def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> 
     ----------
     .. [1] Bian et al. (2014), SAE 2014-01-0123; coefficients as in docs/plant.md.
     """
-    shape = (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + INITIAL_SLOPE
-    shape_by_slip = 2.0 * (1.15 - 0.75 * theta) * slip - (1.63 - 0.75 * theta)
+    shape, shape_by_slip = falling_shape(theta, slip)
     grip_n = theta * load_n
     if grip_n * (1.0 - slip) >= 2.0 * stiffness_n * slip:  # L >= 1: the whole contact patch adheres
         stretch = slip / (1.0 - slip) if slip < 1.0 else 0.0
@@ -180,16 +186,15 @@ def peak_force(theta: float, load_n: float, stiffness_n: float) -> tuple[float, 
     derivative vanishes is a fixed point that settles at once, since the force is flat there.
     """
     a = theta * load_n / stiffness_n
-    slip = np.sqrt(0.25 * a * INITIAL_SLOPE / (1.63 - 0.75 * theta))
+    slip = np.sqrt(0.25 * a * INITIAL_SLOPE / -falling_shape(theta, 0.0)[1])
     force = by_load = 0.0
     for _ in range(4):
         slip = min(max(slip, a / (2.0 + a)), 0.6)
-        shape = (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + INITIAL_SLOPE
-        falling = (1.63 - 0.75 * theta) - 2.0 * (1.15 - 0.75 * theta) * slip
+        shape, shape_by_slip = falling_shape(theta, slip)
         reach = 1.0 + 0.25 * a - 0.25 * a / slip
         force = theta * load_n * reach * shape
         by_load = theta * (2.0 * reach - 1.0) * shape  # where the force is flat, slip may stay
-        slip = np.sqrt(0.25 * a * shape / max(reach * falling, 1e-3))
+        slip = np.sqrt(0.25 * a * shape / max(-reach * shape_by_slip, 1e-3))
     return force, by_load
 
 
