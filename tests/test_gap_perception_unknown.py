@@ -44,6 +44,21 @@ def test_results_repeated_to_the_last_digit_are_a_gap():
     assert any("repeats a result to the last digit" in text for text in finding.unexplained)
 
 
+def hanging(log, for_s=1.4, every_s=4.0):
+    """Classes of an old picture for a while, again and again, under new numbers and stamps, as sure as the others."""
+    since = np.mod(log.time_s, every_s)
+    begun = np.searchsorted(log.time_s, log.time_s - since)
+    old = log.signals["image_class"][np.minimum(begun, len(log) - 1)]
+    return changed(log, image_class=np.where(since < for_s, old, log.signals["image_class"]))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_camera_that_hands_out_old_pictures_now_and_then_is_a_gap(seed):
+    finding = diagnose(Camera(wrong=0.01), seed=seed, damage=hanging)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert any("old" in text for text in finding.unexplained)
+
+
 @pytest.mark.parametrize("digits", [1, 2])
 def test_rounded_or_saturated_confidence_is_no_repeated_result(digits):
     def rounded(log):
