@@ -16,7 +16,7 @@ from sim2real.closure import at_the_floor, closing, loud
 from sim2real.contest import COUNTER, Contest, Progress, first_round, hold_contest, silent
 from sim2real.drive import WHEEL, Drive
 from sim2real.evidence import Evidence, drift_of, gather, residuals
-from sim2real.faint_counter import DELAY, beside_a_counter, traced
+from sim2real.faint_counter import beside_a_counter, for_a_delay, traced
 from sim2real.findings import Findings, describe
 from sim2real.fitting import Fit
 from sim2real.gap import measure
@@ -209,7 +209,7 @@ def _decided(
     if decision.verdict is Verdict.UNKNOWN:
         contest = add_varied(contest, model, fit_to, held, jobs, progress)
         decision = effect_beside_wandering(decide(contest, fit_to, held), contest, fit_to, held)
-    elif decision.winner.ids == (DELAY,) and not model.has(COUNTER) and COUNTER not in exclude:
+    elif for_a_delay(decision) and not model.has(COUNTER) and COUNTER not in exclude:
         contest, decision = beside_a_counter(contest, decision, model, fit_to, held)
     return contest, at_the_floor(decision, contest, model, fit_to, held)
 

@@ -93,15 +93,21 @@ def traced(drives: Sequence[Drive], first: Sequence[Fit]) -> Lattice | None:
     return trace.aged(float(first[0].x[0]))
 
 
+def for_a_delay(decision: Decision) -> bool:
+    """Whether late wheel speeds are what a decision blames, alone or beside another tyre."""
+    one = decision.verdict in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS)
+    return one and decision.winner.ids[:1] == (DELAY,)
+
+
 def beside_a_counter(
     contest: Contest, decision: Decision, model: Simulation, fit_to: Evidence, holdout: Evidence
 ) -> tuple[Contest, Decision]:
-    """Contest and decision with such a counter beside the delay that the decision is about, where it could be one.
+    """Contest and decision with such a counter beside the delay that the decision is for, where it could be one.
 
     A counter as fine as that is rare, so it has to do better than the delay. And however well it averages, it does not
     come before the delay: many things do that are no counter.
     """
-    delay = decision.winner
+    delay = next(e for e in contest.singles if e.ids == (DELAY,))
     counter = _counter_as_late(delay, model, fit_to, holdout)
     if counter is None:
         return contest, decision

@@ -154,6 +154,17 @@ def test_without_a_trace_it_stands_beside_a_delay():
     assert said.next_manoeuvre is not None
 
 
+def test_it_stands_beside_a_delay_on_other_tyres():
+    teeth, window_s = 4096.0, 0.04
+    tyres = {"tyre_shape": {"knee": 0.1, "crest": 0.03, "sliding": 0.0}}
+    car = {COUNTER: {"teeth": teeth, "window_s": window_s}, **tyres}
+    drives = counted_logs(teeth, window_s, 0.6 * TURN / (teeth * window_s), **car)
+    found = find(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT - set(tyres))
+    assert found.decision.winner.ids == (DELAY, "tyre_shape")
+    assert found.decision.verdict is Verdict.AMBIGUOUS
+    assert COUNTER in [e.ids[0] for e in found.decision.rivals]
+
+
 @pytest.mark.parametrize("delay_s", [0.015, 0.04])
 def test_a_delay_stays_one_though_a_counter_could_be_hidden(delay_s):
     drives = counted_logs(0, 0.0, 0.05, **{DELAY: {"delay_s": delay_s}})
