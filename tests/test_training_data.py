@@ -18,6 +18,7 @@ from models.training import (
     data,
     outliers,
     patches,
+    picture_looks,
     rendered,
     scores,
     segmenter_data,
@@ -349,6 +350,19 @@ def test_unknown_source_is_refused_with_what_to_do(tmp_path):
     (picture,) = data.read_manifest(folder)
     with pytest.raises(data.DataFolderError, match="add one to ROAD_BOXES"):
         patches.fixed_patches(picture)
+    with pytest.raises(data.DataFolderError, match="no road box is known for source 'mine'"):
+        data.check_trainable([picture])
+
+
+def test_pictures_of_ones_own_need_no_share_and_no_number_of_looks(tmp_path, monkeypatch):
+    monkeypatch.setitem(data.ROAD_BOXES, "mine", ((0.2, 0.5, 0.8, 0.9),))
+    picture = np.full((240, 320, 3), 90, np.uint8)
+    (mine,) = data.read_manifest(
+        write_folder(tmp_path, [row("mine/a.png", "train", "dry")], {"mine/a.png": picture})
+    )
+    cut = patches.training_patches([mine], seed=0)
+    assert patches.draw_weights(cut).sum() == pytest.approx(1.0)
+    assert len(picture_looks.training_looks([mine], seed=0)) == picture_looks.OTHER_LOOKS
 
 
 def test_command_needs_the_training_extra_or_a_manifest(tmp_path, capsys):

@@ -109,11 +109,7 @@ class Picture:
         """Road boxes of a picture without a mask, as fractions of its width and height."""
         boxes = ROAD_BOXES.get(self.source, ROAD_BOXES.get(self.family))
         if boxes is None:
-            known = ", ".join(sorted(ROAD_BOXES))
-            raise DataFolderError(
-                f"{self.path}: no road box is known for source '{self.source}' (known: {known}); "
-                "add one to ROAD_BOXES in models/training/data.py"
-            )
+            raise DataFolderError(f"{self.path}: {_no_road_box(self.source)}")
         return boxes
 
 
@@ -221,6 +217,13 @@ def judged_groups(pictures: Sequence[Picture]) -> dict[str, list[Picture]]:
     return {name: group for name, group in groups.items() if group}
 
 
+def _no_road_box(source: str) -> str:
+    return (
+        f"no road box is known for source '{source}' (known: {', '.join(sorted(ROAD_BOXES))}); add one to ROAD_BOXES "
+        "in models/training/data.py"
+    )
+
+
 def check_trainable(pictures: list[Picture]) -> None:
     """Raise DataFolderError with all that is lacking for a training run."""
     lacking = []
@@ -231,6 +234,10 @@ def check_trainable(pictures: list[Picture]) -> None:
             count = sum(picture.surface == surface for picture in of_split(pictures, split))
             if count < MIN_EACH_CLASS:
                 lacking.append(f"split {split} holds no picture labelled {label}")
+    unmasked = {(p.source, p.family) for p in pictures if p.mask is None and p.split != "gap"}
+    lacking += [
+        _no_road_box(source) for source, family in sorted(unmasked) if not {source, family} & {*ROAD_BOXES}
+    ]
     if lacking:
         raise DataFolderError("the data folder lacks what training needs:\n  " + "\n  ".join(lacking))
 

@@ -55,6 +55,8 @@ SOURCE_SHARES = {
 Each class is drawn equally often, and its shares are normalised over the sources that it has. So nearly all dash
 cameras being dry does not make "dash camera" mean "dry": wet and snowy dash frames, real and rendered, weigh as much.
 """
+OTHER_SHARE = 1.0
+"""That of any other source."""
 
 LEAST_ROADS = (0.95, 0.7)
 """Least share of road in a patch cut by a mask, of one half and the other: some with kerbs and vehicles [-]."""
@@ -240,7 +242,7 @@ def draw_weights(patches: PatchSet) -> NDArray[np.float64]:
         of_class = patches.labels == label
         for group in np.unique(groups[of_class]):
             chosen = of_class & (groups == group)
-            weights[chosen] = SOURCE_SHARES[group] / chosen.sum()
+            weights[chosen] = SOURCE_SHARES.get(group, OTHER_SHARE) / chosen.sum()
         weights[of_class] /= weights[of_class].sum()
     return weights / weights.sum()
 

@@ -22,6 +22,8 @@ LOOKS_PER_PICTURE = {
     "seq_extreme": 12,
 }
 """Training looks at each picture of a family."""
+OTHER_LOOKS = 4
+"""At one of any other family."""
 LOOKS_PER_VIEW = 3
 PURE_SHARE = 0.9
 """Least share of one surface on the road of a rendered view [-]: a look has one class."""
@@ -65,7 +67,7 @@ def _drawn(rng: np.random.Generator, picture: Picture) -> list[Image]:
     image = picture.image()
     return [
         look(image, edges[number % len(edges)].draw(rng))
-        for number in range(LOOKS_PER_PICTURE[picture.family])
+        for number in range(LOOKS_PER_PICTURE.get(picture.family, OTHER_LOOKS))
     ]
 
 
