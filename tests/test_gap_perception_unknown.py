@@ -59,6 +59,13 @@ def test_a_camera_that_hands_out_old_pictures_now_and_then_is_a_gap(seed):
     assert any("old" in text for text in finding.unexplained)
 
 
+def test_a_late_camera_that_is_fast_for_a_while_does_not_hang():
+    """Its few fast borders lie far beyond the many slow ones, but not beyond its delay."""
+    finding = diagnose(Camera(delay_s=0.6), seed=1, speeds=(6.0, 6.0, 6.0, 6.0, 6.0, 25.0))
+    assert finding.verdict is Verdict.IDENTIFIED, finding.unexplained
+    assert finding.causes == ("camera_latency",)
+
+
 @pytest.mark.parametrize("digits", [1, 2])
 def test_rounded_or_saturated_confidence_is_no_repeated_result(digits):
     def rounded(log):

@@ -97,6 +97,8 @@ class Chain:
         What would tell its look-alikes apart.
     unexplained : str
         What no account explains, in a sentence; empty where nothing.
+    errs : str
+        What it shows that is a gap unless bad pictures make the classes err, in a sentence; empty where nothing.
     noticed : float
         Rest in standard deviations up to which it is too small to matter, however little the signal scatters [-].
     quiet : bool
@@ -112,6 +114,7 @@ class Chain:
     unexcited: dict[str, str] = field(default_factory=dict)
     next_step: str = ""
     unexplained: str = ""
+    errs: str = ""
     noticed: float = 0.0
     quiet: bool = False
 

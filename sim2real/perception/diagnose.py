@@ -18,11 +18,9 @@ from sim2real.logs import Log
 from sim2real.perception.chain import Account, Chain
 from sim2real.perception.confidence_chain import confidence_chain
 from sim2real.perception.conflicts import class_conflicts, conflicts_in_words, confusion_in_words
-from sim2real.perception.crossings import find_crossings
 from sim2real.perception.frames import Modelled, read_results
 from sim2real.perception.friction import SIGNAL as REFERENCE
 from sim2real.perception.friction import friction_chain
-from sim2real.perception.hanging import hanging_in_words
 from sim2real.perception.mounting import Mounting
 from sim2real.perception.pictures import read_light
 from sim2real.perception.shift import SIGNAL as PLACE
@@ -207,9 +205,8 @@ def diagnose_perception(
     chains = [chain for chain in judged if chain is not None]
     if not chains:
         return None
-    errs = conflicts_in_words(conflicts) or hanging_in_words(find_crossings(every))
     odd = (confusion_in_words(every), stuck_in_words(every))
-    return _conclude(chains, errs, odd, tuple(warnings), seed)
+    return _conclude(chains, conflicts_in_words(conflicts), odd, tuple(warnings), seed)
 
 
 def camera_shrink(
@@ -234,12 +231,12 @@ def camera_shrink(
 
 
 def _conclude(
-    chains: Sequence[Chain], errs: str, further: Sequence[str], warnings: tuple[str, ...], seed: int
+    chains: Sequence[Chain], conflict: str, further: Sequence[str], warnings: tuple[str, ...], seed: int
 ) -> PerceptionFinding:
     """Each signal's best account, and what they make together.
 
-    `errs` is what classes say against road.yaml, which bad or late pictures may cause; `further` is what they may not.
-    All may be empty.
+    `conflict` is what classes say against road.yaml, which bad pictures may cause; `further` is what they may not. All
+    may be empty.
     """
     best = [chain.best() for chain in chains]
     rivals = [chain.rivals() for chain in chains]
@@ -250,6 +247,7 @@ def _conclude(
         if (text := _unexplained(chain, account))
     ]
     causes = tuple(dict.fromkeys(effect for account in best for effect in account.effects))
+    errs = conflict or next((chain.errs for chain in chains if chain.errs), "")
     if errs and not set(causes) & MAKE_CLASSES_ERR:
         odd.append((PLACE, errs))
     odd += [(PLACE, text) for text in further if text]

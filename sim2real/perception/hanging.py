@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim2real.perception.crossings import Crossings
+
+Array = NDArray[np.float64]
 
 LATE_M = 3.0
 """By how much a change of class lies beyond all that its bracket and stamps leave open, to be far too late [m]."""
@@ -14,18 +17,22 @@ EARLY_SHARE = 0.2
 """As many that are too early, by the same measure, against those that are late: mistakes err both ways [-]."""
 
 
-def hanging_in_words(crossings: Crossings) -> str:
-    """The gap that a camera is which hands out old pictures now and then, in a sentence; empty where it does not."""
-    if len(crossings) < FEWEST:
-        return ""
+def hanging_in_words(rest_m: Array, crossings: Crossings) -> str:
+    """The gap that a camera is which hands out old pictures now and then, in a sentence; empty where it does not.
+
+    Parameters
+    ----------
+    rest_m : array, shape (k,)
+        By how far each change of class lies beyond its border, shifted as fits best [m].
+    crossings : Crossings
+        k of them.
+    """
     low, high = crossings.bracket(0.5)
-    off = 0.5 * (low + high)
-    off = off - np.median(off)
     open_m = 0.5 * (high - low) + 0.25 * (crossings.low_length_m + crossings.high_length_m)
-    late, early = off - open_m > LATE_M, -off - open_m > LATE_M
+    late, early = rest_m - open_m > LATE_M, -rest_m - open_m > LATE_M
     if late.sum() < max(FEWEST, LEAST_SHARE * len(crossings)) or early.sum() > EARLY_SHARE * late.sum():
         return ""
     return (
-        f"At {late.sum()} of {len(crossings)} borders the class changes late, by up to {off.max():.0f} m, and at the "
-        "others on time: does the camera hand out old pictures now and then?"
+        f"At {late.sum()} of {len(crossings)} borders the class changes late, by up to {rest_m.max():.0f} m, and at "
+        "the others on time: does the camera hand out old pictures now and then?"
     )

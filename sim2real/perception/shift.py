@@ -19,6 +19,7 @@ from sim2real.perception.conflicts import streak_m
 from sim2real.perception.crossings import Crossings, find_crossings
 from sim2real.perception.drifting import find_drift
 from sim2real.perception.frames import Modelled, Results
+from sim2real.perception.hanging import hanging_in_words
 from sim2real.perception.likelihood import (
     ERROR_M,
     SCALES,
@@ -215,6 +216,7 @@ def shift_chain(
         tuple(accounts[1:]),
         places=_places(accounts[0], unseen),
         next_step=NEXT_STEP,
+        errs=hanging_in_words(closest.rest_m(every, height_m), every),
         quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0 and not sure,
     )
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
