@@ -13,6 +13,7 @@ import numpy as np
 from scenarios.effects import EFFECTS
 from scenarios.effects.base import Parameter
 from sim2real.lattice import Lattice
+from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Unexplained, Verdict
@@ -120,8 +121,11 @@ def _in_numbers(found: PerceptionFinding) -> str:
 
 
 def _shares(found: PerceptionFinding) -> dict[str, float]:
-    """Probability per effect from the scores of what was tried; "as simulated" scores 0."""
-    scores = np.array([0.0, *(c.score for c in found.candidates)])
+    """Probability per effect from the scores of what was tried; "as simulated" scores 0.
+
+    A further effect has to earn what it takes for one to stand beside another.
+    """
+    scores = np.array([0.0, *(c.score - DECISIVE * (len(c.effects) - 1) for c in found.candidates)])
     weight = np.exp(scores - scores.max())
     weight /= weight.sum()
     belief = UNKNOWN_BELIEF if found.verdict is Verdict.UNKNOWN else CERTAIN

@@ -10,6 +10,7 @@ import pytest
 
 from sim2real.lattice import Lattice, Reading
 from sim2real.merge import Side, camera_side, counter_side, merge
+from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.report import jsonable
 from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict
@@ -296,6 +297,17 @@ def test_a_cameras_candidates_become_causes():
     assert tilted.parameters == {"pitch_rad": Interval(0.01, -0.1, 0.1, "rad")}
     assert side.named == ("camera_latency",)
     assert (side.before, side.after) == ({"image_place": 6.0}, {"image_place": 1.2})
+
+
+def test_a_pair_that_does_not_stand_lends_its_second_effect_little():
+    """As good as the one effect that stands, which it would have to beat by odds of twenty to one."""
+    equal = replace(BOTH, score=LATE.score)
+    side = camera_side(finding(Verdict.IDENTIFIED, LATE, equal, causes=("camera_latency",)))
+    late, tilted = side.causes
+    assert late.probability > 20.0 * tilted.probability
+    stands = replace(BOTH, score=LATE.score + 2.0 * DECISIVE)
+    both = camera_side(finding(Verdict.COMPOUND, stands, LATE, causes=BOTH.effects))
+    assert min(c.probability for c in both.causes) > 0.45
 
 
 def test_a_candidate_that_explains_no_more_than_nothing_is_not_probable():
