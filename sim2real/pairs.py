@@ -60,16 +60,17 @@ def beside(
 ) -> tuple[tuple[float, str], ...]:
     """Loss that each of `others` promises to leave beside a first effect at x, and its id, best first.
 
-    What an effect does beside another is tried at the ends of its starting values and at its own best; a weighted
-    linear fit of these and of the first effect's slopes foretells the loss. Its own slopes would not do: fitted to what
-    another effect has caused, it stands far from where it belongs.
+    What an effect does beside another is tried at its starting values and at its own best; a weighted linear fit of
+    these and of the first effect's slopes foretells the loss. Its own slopes would not do: fitted to what another
+    effect has caused, it stands far from where it belongs. Nor would the ends of its starting values: a shaft that
+    swings shows nothing of one that swings half as fast.
     """
     z = fit_to.whitened(fit_to.residuals(first.model(x)))
 
     def promise(other: Entry) -> tuple[float, str]:
         second = other.fitted.candidate
         both = Candidate(first.base, (*first.ids, *second.ids), (*first.forms, *second.forms))
-        tried = (second.starts[0], second.starts[-1], other.fitted.x)
+        tried = (*second.starts, other.fitted.x)
         models = [both.model(np.concatenate([x, values])) for values in tried]
         secants = np.column_stack([fit_to.whitened(fit_to.residuals(m)) - z for m in models])
         return _foretold(z, slopes, secants), second.ids[0]

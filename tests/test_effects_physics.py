@@ -531,3 +531,14 @@ class TestRollingResistanceAsAForce:
     def test_without_a_coefficient_nothing_changes(self):
         plain = drive(CAR, 100.0, 1.0, 10.0)
         assert np.array_equal(self.run(100.0, 1.0, 10.0, 0.0)[1][:, SPEED], plain.speed_m_s)
+
+
+@pytest.mark.parametrize("unlike", [-0.5, 0.5])
+def test_a_motor_leaves_the_lighter_axles_wheels_an_inertia(unlike):
+    """Else a wheel would turn against its torque, and the steps that follow it would never end."""
+    car = car_with(
+        {"wheel_inertia_offset": "axles unlike"},
+        wheel_inertia_offset={"inertia_kg_m2": 0.7, "unlike": unlike},
+        driveline_compliance={"stiffness_nm_rad": 1.4e5, "damping_nm_s_rad": 0.3, "motor_inertia_kg_m2": 0.9},
+    )
+    assert make_setup(car, DRY).parameters.motor_inertia_kg_m2 == pytest.approx(0.8 * 0.5 * 0.7)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
 
 LARGEST_MOTOR_SHARE = 0.8
-"""Of the wheel's inertia that may be the motor's: the wheel itself keeps the rest [-]."""
+"""Of a wheel's inertia, the lighter axle's, that may be the motor's: the wheel itself keeps the rest [-]."""
 LEAST_MOTOR_SHARE = 0.02
 """A motor with less of the wheel's inertia counts as rigid: it would only make the equations stiff [-]."""
 
@@ -58,7 +58,8 @@ class DrivelineCompliance(Effect):
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Motor speed and twist become states of each wheel."""
-        most = LARGEST_MOTOR_SHARE * parameters.wheel_inertia_kg_m2
+        lighter = parameters.wheel_inertia_kg_m2 - abs(parameters.axle_inertia_kg_m2)
+        most = LARGEST_MOTOR_SHARE * lighter
         motor = min(self.motor_inertia_kg_m2, most)
         return parameters._replace(
             shaft_stiffness_nm_rad=self.stiffness_nm_rad,
