@@ -222,6 +222,18 @@ def test_the_missing_effect_is_the_first_partner(two_causes):
     assert needs_pairs(contest, fit_to, held)
 
 
+def test_a_shaft_that_swings_is_found_beside_a_resistance():
+    """Alone it is fitted to nothing, and at the ends of its starting values it swings otherwise."""
+    shaft = {"stiffness_nm_rad": 1800.0, "damping_nm_s_rad": 8.0, "motor_inertia_kg_m2": 0.7}
+    effects = {"driveline_compliance": shaft, "rolling_resistance": {"coefficient": 0.026}}
+    logs = random_drives(effects, count=2, seed=3, duration_s=15.0)
+    fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
+    few = only("rolling_resistance", "driveline_compliance", "torque_delay", "torque_lag")
+    contest = add_partners(hold_contest(MODEL, fit_to, held, first_round(MODEL, fit_to, few)), fit_to)
+    assert contest.singles[0].ids == ("rolling_resistance",)
+    assert contest.partners[0][1] == "driveline_compliance"
+
+
 def test_a_pair_leaves_no_more_than_its_members(two_causes):
     contest, fit_to, held = two_causes
     paired = add_pairs(contest, MODEL, fit_to, held)
