@@ -177,7 +177,7 @@ def _decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         return Decision(Verdict.UNKNOWN, contest.null, (), {}, before, before)
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
-    compound = _of_two(contest, best, before, fit_to, holdout)
+    compound = _of_two(contest, best, after, before, fit_to, holdout)
     if compound:
         return compound
     structured = _structured(contest, before, fit_to, holdout)
@@ -208,14 +208,17 @@ def _further(contest: Contest, best: Entry, fit_to: Evidence, holdout: Evidence)
 
 
 def _of_two(
-    contest: Contest, best: Entry, before: Fitness, fit_to: Evidence, holdout: Evidence
+    contest: Contest, best: Entry, alone: Fitness, before: Fitness, fit_to: Evidence, holdout: Evidence
 ) -> Decision | None:
-    """The verdict on the best pair; None where it does not explain the gap, or one effect does as well."""
+    """The verdict on the best pair; None where it does not explain the gap, or one effect does as well.
+
+    `alone` is what the best single effect leaves.
+    """
     if not contest.pairs:
         return None
     weight = probabilities(contest, list(contest.pairs), fit_to, holdout)[1:]
     pair = contest.pairs[int(weight.argmax())]  # of equals, the one that needs fewer parameters
-    alone, after = fitness(best, fit_to, holdout), fitness(pair, fit_to, holdout)
+    after = fitness(pair, fit_to, holdout)
     if not pair_explains(after, before) or _cancel(contest, pair):
         return None
     if not takes_two(best, pair, alone, after, explains(alone, before)):

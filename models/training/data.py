@@ -107,7 +107,7 @@ class Picture:
     @property
     def boxes(self) -> tuple[Box, ...]:
         """Road boxes of a picture without a mask, as fractions of its width and height."""
-        boxes = ROAD_BOXES.get(self.source, ROAD_BOXES.get(self.family))
+        boxes = _road_boxes(self.source)
         if boxes is None:
             raise DataFolderError(f"{self.path}: {_no_road_box(self.source)}")
         return boxes
@@ -217,6 +217,11 @@ def judged_groups(pictures: Sequence[Picture]) -> dict[str, list[Picture]]:
     return {name: group for name, group in groups.items() if group}
 
 
+def _road_boxes(source: str) -> tuple[Box, ...] | None:
+    """Boxes of a source, or of its family; None where neither is known."""
+    return ROAD_BOXES.get(source, ROAD_BOXES.get(family_of(source)))
+
+
 def _no_road_box(source: str) -> str:
     return (
         f"no road box is known for source '{source}' (known: {', '.join(sorted(ROAD_BOXES))}); add one to ROAD_BOXES "
@@ -234,10 +239,8 @@ def check_trainable(pictures: list[Picture]) -> None:
             count = sum(picture.surface == surface for picture in of_split(pictures, split))
             if count < MIN_EACH_CLASS:
                 lacking.append(f"split {split} holds no picture labelled {label}")
-    unmasked = {(p.source, p.family) for p in pictures if p.mask is None and p.split != "gap"}
-    lacking += [
-        _no_road_box(source) for source, family in sorted(unmasked) if not {source, family} & {*ROAD_BOXES}
-    ]
+    unmasked = sorted({picture.source for picture in pictures if not picture.mask and picture.split != "gap"})
+    lacking += [_no_road_box(source) for source in unmasked if _road_boxes(source) is None]
     if lacking:
         raise DataFolderError("the data folder lacks what training needs:\n  " + "\n  ".join(lacking))
 
