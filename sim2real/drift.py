@@ -85,26 +85,33 @@ def with_drift(model: Simulation, drive: Drive, noise: Noise, drift: Array) -> N
     if not np.any(drift > 0.0):
         return replace(noise, slow=np.zeros(len(CHANNELS)))
     parts = [(tau_s, np.full(len(CHANNELS), share)) for share, tau_s in zip(drift, DRIFT_S, strict=True)]
-    return replace(noise, slow=left_of(model, drive, noise, parts))
+    return replace(noise, slow=left_of(model, drive, noise, [parts])[0][0])
 
 
-def left_of(model: Simulation, drive: Drive, noise: Noise, parts: Sequence[tuple[float, Array]]) -> Array:
-    """Variances of the blocks' sums that a right model leaves of drifting sensors, by drawn drifts, shape (7,).
+def left_of(
+    model: Simulation, drive: Drive, noise: Noise, drifts: Sequence[Sequence[tuple[float, Array]]]
+) -> tuple[Array, Array]:
+    """Variances that a right model leaves of drifting sensors, by drawn drifts: of the blocks' sums, and of the rows.
 
     A drift is a sum of parts: correlation time [s], and of each channel how much, in deviations of its noise [-].
+    Both are of shape (drifts, 7), and NaN for rows of what is not measured.
     """
-    generator = np.random.default_rng(0)
     length, nominal = drive.rows_in(BLOCK_S), model.predict(drive).channels
-    found = []
-    for _ in range(DRAWS):
-        off = noise.sigma * sum(
-            share * _drawn(len(drive), drive.step_s / tau_s, generator) for tau_s, share in parts
-        )
-        moved = model.predict(replace(drive, measured=drive.measured + off)).channels
-        rest = np.where(np.isfinite(drive.measured), off - (moved - nominal), np.nan)
-        sums = block_sums(np.nan_to_num(noise.whitened(rest)), length)
-        found.append(np.mean(np.square(sums), axis=0))
-    return np.asarray(np.mean(found, axis=0))
+    lost = ~np.isfinite(drive.measured)
+    blocks, rows = np.zeros((2, len(drifts), len(CHANNELS)))
+    for i, parts in enumerate(drifts):
+        generator = np.random.default_rng(0)
+        for _ in range(DRAWS):
+            off = noise.sigma * sum(
+                share * _drawn(len(drive), drive.step_s / tau_s, generator) for tau_s, share in parts
+            )
+            moved = model.predict(replace(drive, measured=drive.measured + off)).channels
+            rest = np.where(lost, np.nan, off - (moved - nominal))
+            sums = block_sums(np.nan_to_num(noise.whitened(rest)), length)
+            blocks[i] += np.mean(np.square(sums), axis=0) / DRAWS
+            known = np.maximum((~lost).sum(axis=0), 1)
+            rows[i] += np.nansum(np.square(noise.scaled(rest)), axis=0) / known / DRAWS
+    return blocks, np.where(lost.all(axis=0), np.nan, rows)
 
 
 def _drawn(n: int, rate: float, generator: np.random.Generator) -> Array:

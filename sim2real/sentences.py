@@ -27,7 +27,8 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: St
         slight = decision.slight.replace("+", " with ")
         traced = f" On the average something slighter than any row's noise is left, most like {slight}."
         agree = "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
-        alone = f" {' and '.join(decision.wandering)} wanders beyond that, as sensors do by themselves."
+        wanders = "wander" if len(decision.wandering) > 1 else "wanders"
+        alone = f" {' and '.join(decision.wandering)} {wanders} beyond that, as sensors do by themselves."
         return agree + (traced if slight else "") + (alone if decision.wandering else "")
     if decision.verdict is Verdict.UNKNOWN and decision.rare:
         return (

@@ -20,6 +20,7 @@ from sim2real.contest import Contest, Entry
 from sim2real.drift import DRIFT_S, left_of
 from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED
 from sim2real.evidence import Evidence
+from sim2real.gap import GAP_SIGNALS
 from sim2real.goodness import block_squares
 from sim2real.observer import Simulation
 from sim2real.quiet import LONE_GAIN, nothing_gains
@@ -35,8 +36,9 @@ effect has not."""
 MOST = 2.0
 """Greatest wandering that is noise, in standard deviations of that on the grid of the diagnosis: what is white averages
 out on the way there from the log's own rate, a wandering does not [-]."""
-MOST_FLOORS = 1.5
-"""And what the rows of any log may be off by, in noise floors: a speed that wanders by as much makes about that [-]."""
+MOST_ROWS = 1.3
+"""How far the rows of any log may be off, in what noise and such a wandering make of them on average: within half a
+minute a wandering has its bad seconds or has none [-]."""
 
 
 def nothing_but_wandering(
@@ -72,9 +74,6 @@ def _said_of_calm(
     holdout: Evidence,
 ) -> Decision | None:
     """The decision once what an entry leaves is put down to sensors; None where the rows or the sensors forbid it."""
-    logs = [log for part in (fit_to, holdout) for log in part.each()]
-    if any(floors(car, car, log) > MOST_FLOORS for log in logs):
-        return None
     found = _wandering(entry, car, sensors, fit_to, holdout)
     if found is None:
         return None
@@ -88,17 +87,14 @@ def _wandering(
     """Which of some sensors wander, and both parts of the evidence with that in their noise; None where it is too much.
 
     How much is what brings the variances of the signals' blocks nearest to those seen, a sum over sensors and times.
+    It is too much where the rows show more than that, too.
     """
-    parts = (fit_to, holdout)
+    logs = [(i, log) for i, part in enumerate((fit_to, holdout)) for log in part.each()]
     units = [(tau_s, np.eye(len(CHANNELS))[channel]) for channel in sensors.values() for tau_s in DRIFT_S]
-    makes = {
-        (i, k): np.array([left_of(model, d, n, [unit]) for unit in units])
-        for i, part in enumerate(parts)
-        for k, (d, n) in enumerate(zip(part.drives, part.noises, strict=True))
-    }
-    lengths = np.array([len(parts[i].drives[k]) for i, k in makes], dtype=np.float64)
-    mean = np.average(np.array(list(makes.values())), axis=0, weights=lengths)
-    slow = np.average([parts[i].noises[k].slow for i, k in makes], axis=0, weights=lengths)
+    makes = [left_of(model, log.drives[0], log.noises[0], [[unit] for unit in units]) for _, log in logs]
+    lengths = np.array([len(log.drives[0]) for _, log in logs], dtype=np.float64)
+    mean = np.average([blocks for blocks, _ in makes], axis=0, weights=lengths)
+    slow = np.average([log.noises[0].slow for _, log in logs], axis=0, weights=lengths)
     seen = block_squares(entry, fit_to, holdout)
     of = list(GROUPS.values())
     excess = np.maximum([np.mean(seen[at] - 1.0 - slow[at]) for at in of], 0.0)
@@ -108,9 +104,22 @@ def _wandering(
     by_sensor = squares.reshape(len(sensors), -1).sum(axis=1)
     if by_sensor.max() > MOST**2 or not by_sensor.any():
         return None
-    fit_noises, hold_noises = (
-        tuple(replace(n, slow=n.slow + squares @ makes[i, k]) for k, n in enumerate(part.noises))
-        for i, part in enumerate(parts)
-    )
+    for (_, log), (_, rows) in zip(logs, makes, strict=True):
+        if floors(model, model, log) > MOST_ROWS * np.sqrt(1.0 + _of_rows(squares @ rows)):
+            return None
+    calm = [
+        tuple(
+            replace(log.noises[0], slow=log.noises[0].slow + squares @ blocks)
+            for (at, log), (blocks, _) in zip(logs, makes, strict=True)
+            if at == i
+        )
+        for i in range(2)
+    ]
     names = tuple(name for name, square in zip(sensors, by_sensor, strict=True) if square > 0.0)
-    return names, replace(fit_to, noises=fit_noises), replace(holdout, noises=hold_noises)
+    return names, replace(fit_to, noises=calm[0]), replace(holdout, noises=calm[1])
+
+
+def _of_rows(variances: Array) -> float:
+    """What variances of the channels' rows add to the square of a gap [-]."""
+    of_signals = (variances[GROUPS[name]] for name in GAP_SIGNALS)
+    return float(np.mean([np.nanmean(v) for v in of_signals if np.isfinite(v).any()]))

@@ -5,6 +5,7 @@ import pytest
 from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured, road_of
 
 from scenarios.effects import EFFECTS
+from sim2real.closure import floors
 from sim2real.contest import silent
 from sim2real.diagnose import find
 from sim2real.drive import ACCEL, SPEED
@@ -50,6 +51,17 @@ def test_a_sensor_that_wanders_within_its_noise_is_no_gap(channel, name, tau_s):
     assert found.decision.verdict is Verdict.NO_GAP
     assert name in found.decision.wandering
     assert "as sensors do by themselves" in describe(found, seed=0, jobs=1, progress=silent).sentence
+
+
+def test_rows_of_precise_wheels_may_show_all_that_a_wandering_speed_does():
+    precise = SIGMA * np.array([1.0, 1.0, 0.4, 0.4, 0.4, 0.4, 1.0])
+    drives = [clean(pulses(20.0), v0, ROAD) for v0 in (9.0, 13.0)]
+    fit, holdout = (
+        wandering(noisy(drive, seed, precise), SPEED, 1.3, 0.5, seed) for seed, drive in enumerate(drives)
+    )
+    found = find(MODEL, [fit], holdout, exclude=OTHERS)
+    assert floors(MODEL, MODEL, found.fit_to) > 1.5, "more than any fixed limit would let pass"
+    assert found.decision.verdict is Verdict.NO_GAP
 
 
 def test_an_effect_is_found_though_the_speed_wanders_beside_it():
