@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -117,15 +118,18 @@ def rough_shift(results: Sequence[Results]) -> tuple[float, float]:
     """The age and the distance at which the classes' sequence lies best over the road's [s], [m]."""
     age, way = np.meshgrid(COARSE_AGES_S, COARSE_WAYS_M, indexing="ij")
     cost = np.hypot(age / COARSE_PRIOR[0], way / COARSE_PRIOR[1])
-    for one in results:
-        middle = 0.5 * (one.from_m + one.to_m)
-        driven = one.driven_m(one.time_s, COARSE_AGES_S)
-        for i in range(len(COARSE_AGES_S)):
-            places = (middle - driven[:, i])[None, :] - COARSE_WAYS_M[:, None]
-            wrong = surfaces_at(one.road, places) != one.classes
-            cost[i] += MISMATCH_NATS * wrong.sum(axis=1)
+    cost += MISMATCH_NATS * sum(_wrong(one) for one in results)
     best = np.unravel_index(int(np.argmin(cost)), cost.shape)
     return float(age[best]), float(way[best])
+
+
+@lru_cache(maxsize=16)
+def _wrong(one: Results) -> NDArray[np.intp]:
+    """How many pictures of a log show another class than the road has, shape (ages, ways)."""
+    middle = 0.5 * (one.from_m + one.to_m)
+    driven = one.driven_m(one.time_s, COARSE_AGES_S)
+    places = ((middle - late)[None, :] - COARSE_WAYS_M[:, None] for late in driven.T)
+    return np.array([(surfaces_at(one.road, place) != one.classes).sum(axis=1) for place in places])
 
 
 def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:

@@ -61,7 +61,7 @@ class Modelled:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # so that what is reckoned from it can be kept by its identity
 class Results:
     """What the camera chain said during one log, one row per result, in order of arrival.
 
