@@ -43,6 +43,11 @@ SMOOTH_S = 0.5
 VARIED_M_S2 = 0.5
 """Least standard deviation of the change of speed for that comparison [m/s2]."""
 
+FEWEST_STEPS = 50
+"""Changes of value from which on a signal may be called held."""
+EARLY_SHARE = 0.02
+"""Share of the changes that may come earlier than a held signal's."""
+
 Row = Callable[[int], str]
 
 
@@ -214,6 +219,31 @@ def _check_acceleration(time_s: Array, speed: Array, accel: Array) -> Iterator[F
         yield Finding(
             f"accel_x_m_s2 is {slope:.2g} times the change of vehicle_speed_m_s; {hint}", fatal=False
         )
+
+
+def check_held(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
+    """Signals whose values stand for several rows each: such a signal is late, by half of that on average."""
+    rows = {name: _rows_held(signals[name]) for name in REQUIRED if name in signals}
+    for count in sorted(set(rows.values()) - {1.0}):
+        held_ms = 1e3 * count * median_step(time_s)
+        yield Finding(
+            f"{', '.join(name for name in rows if rows[name] == count)}: every value stands for {count:.3g} rows, "
+            f"{held_ms:.3g} ms, as a recorder holds a message until the next one, or a counter shows its window. On "
+            f"average it is {0.5 * (held_ms - 1e3 * median_step(time_s)):.3g} ms old, which a diagnosis may call a "
+            "delay. If the recorder did that, leave the repeated cells empty.",
+            fatal=False,
+        )
+
+
+def _rows_held(values: Array) -> float:
+    """How many rows a signal's values stand for, where they change at an even pace; else 1."""
+    gaps = np.diff(np.flatnonzero(np.diff(values[np.isfinite(values)])))
+    if len(gaps) < FEWEST_STEPS:
+        return 1.0
+    early = int(np.quantile(gaps, EARLY_SHARE))
+    if early < 2 or np.median(gaps) > early + 1:
+        return 1.0
+    return float(np.mean(gaps[(gaps >= early) & (gaps <= early + 1)]).round(1))
 
 
 def _check_range(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sim2real.logs.checks import check_motion, check_time, check_values, check_wheels
+from sim2real.logs.checks import check_held, check_motion, check_time, check_values, check_wheels
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.log import Log
@@ -64,7 +64,7 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         *check_wheels(made.signals),
     ]
     if clock.usable:
-        findings += check_motion(time_s, made.signals)
+        findings += [*check_motion(time_s, made.signals), *check_held(time_s, made.signals)]
     if any(finding.fatal for finding in findings):
         raise _error(path, findings)
     return Log(
