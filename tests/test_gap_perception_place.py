@@ -80,6 +80,16 @@ def test_pitch_is_found_with_its_angle():
     assert np.mean(inside) >= 0.9
 
 
+def test_a_delay_within_long_stamps_shows_by_going_with_speed():
+    """As simulated a class is right anywhere in its stretch, which a distance may come of, and a delay may not."""
+    late = diagnose(Camera(stamp_m=8.0, delay_s=0.15), 3, speeds=SPEEDS[0])
+    assert late.causes == ("camera_latency",)
+    estimate = candidate(late, "camera_latency").parameters["delay_s"]
+    assert estimate.low <= 0.15 <= estimate.high
+    for share in (0.1, 0.9):
+        assert diagnose(Camera(stamp_m=8.0, share=share), 3, speeds=SPEEDS[0]).verdict is Verdict.NO_GAP
+
+
 def test_an_angle_holds_other_places_of_the_lens_where_nobody_says_where_it_is():
     """The same distance, seen from a lens 1.25 m high at the centre of gravity: another angle."""
     ahead_m, height_m = 3.5 + FRONT_M, 1.25

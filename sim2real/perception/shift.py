@@ -48,6 +48,9 @@ MOST_PLACES = 4
 FEWEST_UNSEEN, BEYOND_DOUBT = 4, 6.0
 """Borders passed on the hold-out that can say that there is no shift, unless all logs together speak by so much [nats]
 for one that no stamp is long enough for."""
+GOES_WITH_SPEED = 20.0
+"""Or by so much more for a delay than for any distance: within its stretch a class is right anywhere, but not the
+farther on the faster the car is [nats]."""
 MOSTLY = 0.25
 """An account that leaves no more than this share of the gap's square beyond noise explains it, though the rest shows a
 pattern [-]."""
@@ -196,18 +199,20 @@ def shift_chain(
     def fit(effects: tuple[str, ...]) -> ShiftFit:
         return fit_shift(known, effects, height_m, modelled.delay_s, modelled.pitch_rad)
 
-    plain, fits = fit(()), [fit(choice) for choice in choices]
-    free = [fit(choice) for choice in outside]
+    tried = [fit(choice) for choice in ((), *choices, *outside)]
+    plain = tried[0]
     every = known.joined(unseen)
     # What a shift takes is no scatter, whether or not the library has an effect for it.
-    closest = min((plain, *fits, *free), key=lambda f: f.scale)
+    closest = min(tried, key=lambda f: f.scale)
     # A chain that errs in streaks may do so on the hold-out alone: scatter is no shift there either.
     scale = max(closest.scale, closest.scale_of(unseen, height_m))
-    accounts = [_account(f, plain, unseen, mounting, scale, known) for f in (plain, *fits)]
-    others = [_account(shifted, plain, unseen, mounting, scale, known) for shifted in free]
-    scores = [account.score for account in (*accounts, *others)]
-    best, foremost = max(scores), (plain, *fits, *free)[int(np.argmax(scores))]
-    sure = best > BEYOND_DOUBT and _leaves_its_stamp(foremost, every, height_m)
+    told = [_account(f, plain, unseen, mounting, scale, known) for f in tried]
+    accounts, others = told[: 1 + len(choices)], told[1 + len(choices) :]
+    foremost = int(np.argmax([account.score for account in told]))
+    best = told[foremost].score
+    unhurried = max(account.score for account in told if "camera_latency" not in account.effects)
+    sure = best > BEYOND_DOUBT and _leaves_its_stamp(tried[foremost], every, height_m)
+    sure |= best - unhurried > GOES_WITH_SPEED
     chain = Chain(
         SIGNAL,
         pictures,
@@ -221,7 +226,8 @@ def shift_chain(
     )
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
     if drift:
-        nothing, *rest = (_account(f, plain, unseen, mounting, drift.scale, known) for f in (plain, *fits))
+        library = tried[: 1 + len(choices)]
+        nothing, *rest = (_account(f, plain, unseen, mounting, drift.scale, known) for f in library)
         return replace(
             chain,
             nothing=nothing,
