@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 SETTLING_S = 0.3
 """At the start of a drive the observer's state is no better than single samples: not counted [s]."""
+ASTRAY = 1e3
+"""What is left where a model predicts no number at all, in any channel's unit: no lost sample, but a bad model."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ def residuals(model: Simulation, drive: Drive) -> Array:
 
 def rest_of(drive: Drive, channels: Array) -> Array:
     """Measured minus given channels, shape (n, 7); NaN where a sample is lost or does not count."""
-    rest = drive.measured - channels
+    astray = np.isfinite(drive.measured) & ~np.isfinite(channels)
+    rest = np.where(astray, ASTRAY, drive.measured - channels)
     rest[~drive.moving] = np.nan
     rest[:, ~drive.counted] = np.nan
     rest[drive.time_s < drive.time_s[0] + SETTLING_S] = np.nan

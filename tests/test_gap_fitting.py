@@ -14,7 +14,7 @@ from sim2real import selection
 from sim2real.contest import COUNTER, first_round, hold_contest
 from sim2real.diagnose import find
 from sim2real.drive import ACCEL, SPEED
-from sim2real.evidence import SETTLING_S, Evidence, gather, residuals
+from sim2real.evidence import ASTRAY, SETTLING_S, Evidence, gather, residuals, rest_of
 from sim2real.fitting import (
     MOST_STARTS,
     ROBUST_FROM,
@@ -70,6 +70,16 @@ def test_only_what_counts_is_a_residual():
     assert np.isnan(rest[:, SPEED]).all()
     kept = rest[~standing & ~early][:, counted]
     assert np.isfinite(kept).all()
+
+
+def test_a_model_that_predicts_no_number_fits_nothing():
+    """Lost samples say nothing of a model, lost predictions that it is a bad one."""
+    drive = noisy(clean(pulses(4.0), 12.0))
+    measured = drive.measured.copy()
+    measured[200:210] = np.nan
+    rest = rest_of(replace(drive, measured=measured), np.full_like(measured, np.nan))
+    assert np.isnan(rest[200:210]).all()
+    assert (rest[210:260] == ASTRAY).all()
 
 
 def test_what_does_not_count_weighs_nothing(calm):

@@ -66,6 +66,15 @@ def test_the_peak_is_the_greatest_force_of_all_slips(theta, load_n):
     assert dynamics.peak_force(theta, load_n, 50_000.0)[0] == pytest.approx(max(forces_n), rel=1e-5)
 
 
+@pytest.mark.parametrize("theta", [2.1, 2.2, 2.5, 4.0])
+def test_beyond_all_roads_the_peak_stays_a_number_near_the_greatest_force(theta):
+    """A fit may try factors on friction there; at a slope that never falls the peak is at the greatest slip taken."""
+    forces_n = [
+        dynamics.tyre_force(theta, slip, 4000.0, 60_000.0)[0] for slip in np.linspace(1e-4, 0.6, 2000)
+    ]
+    assert dynamics.peak_force(theta, 4000.0, 60_000.0)[0] == pytest.approx(max(forces_n), rel=0.08)
+
+
 @pytest.mark.parametrize("theta", [0.2, 0.8])
 def test_a_formula_keeps_initial_slope_and_peak_and_is_the_published_one(parameters, theta):
     p = parameters._replace(**{f"formula_{name}": value for name, value in FORMULA.items()})

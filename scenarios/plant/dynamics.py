@@ -186,7 +186,8 @@ def peak_force(theta: float, load_n: float, stiffness_n: float) -> tuple[float, 
     derivative vanishes is a fixed point that settles at once, since the force is flat there.
     """
     a = theta * load_n / stiffness_n
-    slip = np.sqrt(0.25 * a * INITIAL_SLOPE / -falling_shape(theta, 0.0)[1])
+    # Beyond theta of 2.17 the force does not fall with slip at first, and the bound on slip takes over.
+    slip = np.sqrt(0.25 * a * INITIAL_SLOPE / max(-falling_shape(theta, 0.0)[1], 1e-3))
     force = by_load = 0.0
     for _ in range(4):
         slip = min(max(slip, a / (2.0 + a)), 0.6)
