@@ -98,6 +98,7 @@ def left_of(
     """
     length, nominal = drive.rows_in(BLOCK_S), model.predict(drive).channels
     lost = ~np.isfinite(drive.measured)
+    known = np.maximum((~lost).sum(axis=0), 1)
     blocks, rows = np.zeros((2, len(drifts), len(CHANNELS)))
     for i, parts in enumerate(drifts):
         generator = np.random.default_rng(0)
@@ -109,7 +110,6 @@ def left_of(
             rest = np.where(lost, np.nan, off - (moved - nominal))
             sums = block_sums(np.nan_to_num(noise.whitened(rest)), length)
             blocks[i] += np.mean(np.square(sums), axis=0) / DRAWS
-            known = np.maximum((~lost).sum(axis=0), 1)
             rows[i] += np.nansum(np.square(noise.scaled(rest)), axis=0) / known / DRAWS
     return blocks, np.where(lost.all(axis=0), np.nan, rows)
 

@@ -79,7 +79,7 @@ def residuals(model: Simulation, drive: Drive) -> Array:
 
 
 def rest_of(drive: Drive, channels: Array) -> Array:
-    """Measured minus given channels, shape (n, 7); NaN where a sample is lost or does not count."""
+    """Measured minus given channels, shape (n, 7); NaN where a sample is lost or does not count, see also `ASTRAY`."""
     astray = np.isfinite(drive.measured) & ~np.isfinite(channels)
     rest = np.where(astray, ASTRAY, drive.measured - channels)
     rest[~drive.moving] = np.nan

@@ -19,7 +19,7 @@ from sim2real.closure import floors
 from sim2real.contest import Contest, Entry
 from sim2real.drift import DRIFT_S, left_of
 from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED
-from sim2real.evidence import Evidence
+from sim2real.evidence import Evidence, all_logs
 from sim2real.gap import GAP_SIGNALS
 from sim2real.goodness import block_squares
 from sim2real.observer import Simulation
@@ -89,12 +89,12 @@ def _wandering(
     How much is what brings the variances of the signals' blocks nearest to those seen, a sum over sensors and times.
     It is too much where the rows show more than that, too.
     """
-    logs = [(i, log) for i, part in enumerate((fit_to, holdout)) for log in part.each()]
+    drives, noises = all_logs(fit_to, holdout)
     units = [(tau_s, np.eye(len(CHANNELS))[channel]) for channel in sensors.values() for tau_s in DRIFT_S]
-    makes = [left_of(model, log.drives[0], log.noises[0], [[unit] for unit in units]) for _, log in logs]
-    lengths = np.array([len(log.drives[0]) for _, log in logs], dtype=np.float64)
+    makes = [left_of(model, d, n, [[unit] for unit in units]) for d, n in zip(drives, noises, strict=True)]
+    lengths = np.array([len(drive) for drive in drives], dtype=np.float64)
     mean = np.average([blocks for blocks, _ in makes], axis=0, weights=lengths)
-    slow = np.average([log.noises[0].slow for _, log in logs], axis=0, weights=lengths)
+    slow = np.average([noise.slow for noise in noises], axis=0, weights=lengths)
     seen = block_squares(entry, fit_to, holdout)
     of = list(GROUPS.values())
     excess = np.maximum([np.mean(seen[at] - 1.0 - slow[at]) for at in of], 0.0)
@@ -104,19 +104,16 @@ def _wandering(
     by_sensor = squares.reshape(len(sensors), -1).sum(axis=1)
     if by_sensor.max() > MOST**2 or not by_sensor.any():
         return None
-    for (_, log), (_, rows) in zip(logs, makes, strict=True):
+    for log, (_, rows) in zip((*fit_to.each(), *holdout.each()), makes, strict=True):
         if floors(model, model, log) > MOST_ROWS * np.sqrt(1.0 + _of_rows(squares @ rows)):
             return None
-    calm = [
-        tuple(
-            replace(log.noises[0], slow=log.noises[0].slow + squares @ blocks)
-            for (at, log), (blocks, _) in zip(logs, makes, strict=True)
-            if at == i
-        )
-        for i in range(2)
-    ]
+    calm = tuple(
+        replace(noise, slow=noise.slow + squares @ blocks)
+        for noise, (blocks, _) in zip(noises, makes, strict=True)
+    )
+    fitted = len(fit_to.noises)
     names = tuple(name for name, square in zip(sensors, by_sensor, strict=True) if square > 0.0)
-    return names, replace(fit_to, noises=calm[0]), replace(holdout, noises=calm[1])
+    return names, replace(fit_to, noises=calm[:fitted]), replace(holdout, noises=calm[fitted:])
 
 
 def _of_rows(variances: Array) -> float:

@@ -69,7 +69,7 @@ def test_random_inputs_and_calls(unit: str) -> None:
 
 @pytest.mark.parametrize("kind", QUICK_KINDS)
 def test_damaged_files(kind: str) -> None:
-    assert run_kind(kind, SEED, 30)["shown"] == []
+    assert run_kind(kind, SEED, 60)["shown"] == []
 
 
 def test_damage_is_damage() -> None:

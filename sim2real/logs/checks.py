@@ -224,12 +224,13 @@ def _check_acceleration(time_s: Array, speed: Array, accel: Array) -> Iterator[F
 def check_held(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
     """Signals whose values stand for several rows each: such a signal is late, by half of that on average."""
     rows = {name: _rows_held(signals[name]) for name in REQUIRED if name in signals}
+    step_ms = 1e3 * median_step(time_s)
     for count in sorted(set(rows.values()) - {1.0}):
-        held_ms = 1e3 * count * median_step(time_s)
         yield Finding(
             f"{', '.join(name for name in rows if rows[name] == count)}: every value stands for {count:.3g} rows, "
-            f"{held_ms:.3g} ms, as a recorder holds a message until the next one, or a counter shows its window. On "
-            f"average it is {0.5 * (held_ms - 1e3 * median_step(time_s)):.3g} ms old, which a diagnosis may call a "
+            f"{count * step_ms:.3g} ms, as a recorder holds a message until the next one, or a counter shows its "
+            "window. "
+            f"On average it is {0.5 * (count - 1.0) * step_ms:.3g} ms old, which a diagnosis may call a "
             "delay. If the recorder did that, leave the repeated cells empty.",
             fatal=False,
         )

@@ -200,14 +200,14 @@ def shift_chain(
         return fit_shift(known, effects, height_m, modelled.delay_s, modelled.pitch_rad)
 
     tried = [fit(choice) for choice in ((), *choices, *outside)]
-    plain = tried[0]
+    plain, library = tried[0], 1 + len(choices)
     every = known.joined(unseen)
     # What a shift takes is no scatter, whether or not the library has an effect for it.
     closest = min(tried, key=lambda f: f.scale)
     # A chain that errs in streaks may do so on the hold-out alone: scatter is no shift there either.
     scale = max(closest.scale, closest.scale_of(unseen, height_m))
     told = [_account(f, plain, unseen, mounting, scale, known) for f in tried]
-    accounts, others = told[: 1 + len(choices)], told[1 + len(choices) :]
+    accounts, others = told[:library], told[library:]
     foremost = int(np.argmax([account.score for account in told]))
     best = told[foremost].score
     unhurried = max(account.score for account in told if "camera_latency" not in account.effects)
@@ -226,8 +226,7 @@ def shift_chain(
     )
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
     if drift:
-        library = tried[: 1 + len(choices)]
-        nothing, *rest = (_account(f, plain, unseen, mounting, drift.scale, known) for f in library)
+        nothing, *rest = (_account(f, plain, unseen, mounting, drift.scale, known) for f in tried[:library])
         return replace(
             chain,
             nothing=nothing,
