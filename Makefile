@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 BLIND_SEED ?= 1
 
+# The tests start hundreds of processes; without byte code each would compile every library anew.
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: help demo test check format lock clean blind bench
 
 help:            ## this list

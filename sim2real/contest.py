@@ -12,6 +12,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, FORMS
+from sim2real.drive import CHANNELS, WHEEL
 from sim2real.evidence import Evidence
 from sim2real.fitting import FULL_STEPS, Candidate, Fit, fit, loss
 from sim2real.observer import Simulation
@@ -35,6 +36,8 @@ FURTHER_FORMS = 8
 """Effects, the best ones in their plain forms, whose forms with further parameters are fitted, too."""
 NEAR = 0.2
 """Share of the way from an effect's absence to its nearest start that a fit begins at, too [-]."""
+WHEELS_APART, WHEEL_VALUES = 3.0, 11
+"""A wheel's own value is sought up to this many noticeable changes from the mean, among so many values."""
 FIRST_ROUND_STEPS = 4
 """Steps of the first round's fits."""
 
@@ -239,7 +242,9 @@ def first_round(
     ranked = list(dict.fromkeys(f.candidate.ids for f in sorted(found, key=lambda fit: fit.loss)))
     of = {f.candidate.ids: f for f in found if f.candidate.forms == (0,)}
     more = [
-        (c, _beyond(c, of[c.ids].x)) for c in candidates if c not in plain and c.ids in ranked[:FURTHER_FORMS]
+        (c, _beyond(c, of[c.ids], one_log))
+        for c in candidates
+        if c not in plain and c.ids in ranked[:FURTHER_FORMS]
     ]
     return sorted([*found, *fits(more, "forms, first round")], key=lambda fit: fit.loss)
 
@@ -255,11 +260,33 @@ def _near_and_far(candidate: Candidate) -> Array:
     return np.concatenate([np.reshape(near, (-1, 1)), far])
 
 
-def _beyond(candidate: Candidate, x: Array) -> Array:
-    """Where a form with further parameters starts: the effect as it is without them, and with each value of theirs."""
+def _beyond(candidate: Candidate, plain: Fit, evidence: Evidence) -> Array:
+    """Where a form with further parameters starts: the effect as it is without them, and with each value of theirs.
+
+    Where each wheel has its own value, also at what suits each wheel's speed best: wheels that ring at several
+    frequencies are found from nowhere else.
+    """
+    x = plain.x
     rest = candidate.neutral[len(x) :]
     values = np.unique(np.array([rest, *candidate.starts[:, len(x) :]]), axis=0)
-    return np.array([np.concatenate([x, value]) for value in values])
+    points = [np.concatenate([x, value]) for value in values]
+    if candidate.kinds[0].of_wheels:
+        points.append(wheel_by_wheel(candidate, x, evidence))
+    return np.array(points)
+
+
+def wheel_by_wheel(candidate: Candidate, plain: Array, evidence: Evidence) -> Array:
+    """Where each wheel has the value, about the plain fit's, that suits itself best, as the form writes it."""
+    values = plain[0] * (1.0 + WHEELS_APART * candidate.scale[-1] * np.linspace(-1.0, 1.0, WHEEL_VALUES))
+    rest = candidate.neutral[len(plain) :]
+    losses = np.empty((len(values), 4))
+    for row, value in enumerate(values):
+        alike = candidate.model(np.array([value, *plain[1:], *rest]))
+        z = evidence.whitened(evidence.residuals(alike)).reshape(-1, len(CHANNELS))[:, WHEEL]
+        losses[row] = [loss(z[:, wheel]) for wheel in range(4)]
+    own = values[np.argmin(losses, axis=0)]
+    mean, unlike, sides = own.mean(), 0.25 * (own[:2].sum() - own[2:].sum()), 0.5 * (own[::2] - own[1::2])
+    return np.array([mean, *plain[1:], *(np.array([unlike, *sides]) / mean)])
 
 
 def as_it_is(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Entry:

@@ -202,6 +202,16 @@ def test_stiffness_goes_with_each_wheels_load(by_load):
         )
 
 
+def test_each_tyre_has_a_stiffness_of_its_own():
+    values = {"stiffness_n": 50_000.0, "unlike": 0.1, "front_sides": 0.2, "rear_sides": -0.3}
+    form = {"tyre_stiffness_offset": "each wheel its own"}
+    run = drive(car_with(form, tyre_stiffness_offset=values), 150.0, 0.5, 10.0)
+    for wheel, share in enumerate((1.3, 0.9, 0.6, 1.2)):
+        slip, load = run.slip[-1, wheel], run.vertical_load_n[-1, wheel]
+        force_n = tyre_force(0.9, slip, load, share * 50_000.0, 1.0)
+        assert run.tyre_force_n[-1, wheel] == pytest.approx(force_n, rel=1e-9)
+
+
 @pytest.mark.parametrize("inertia", [0.6, 3.0])
 def test_true_inertia_sets_how_a_wheel_spins_up(inertia):
     """A spinning wheel: I omega' = T - F R with the force that the log holds."""
@@ -373,30 +383,38 @@ class TestRelaxation:
         assert peak_n > 1.2 * 20.0 / RADIUS  # it rings
         assert run.tyre_force_n[:, 0] == pytest.approx(expected[:, 1], abs=0.01 * peak_n)
 
-    def test_with_load_each_axle_has_the_length_that_its_load_gives(self):
-        """Both axles' wheels, their lagging slips and the car, at so little slip that the tyres are linear."""
+    @pytest.mark.parametrize(
+        ("form", "more", "shares"),
+        [
+            ("longer with load", {}, None),
+            ("axles unlike", {"unlike": -0.3}, [0.7, 0.7, 1.3, 1.3]),
+            (
+                "each wheel its own",
+                {"unlike": 0.1, "front_sides": 0.2, "rear_sides": -0.3},
+                [1.3, 0.9, 0.6, 1.2],
+            ),
+        ],
+    )
+    def test_each_wheel_has_the_length_that_its_load_or_its_tyre_gives(self, form, more, shares):
+        """The wheels, their lagging slips and the car, at so little slip that the tyres are linear."""
         length, speed, stiffness = 0.5, 10.0, 1.27 * STIFFNESS
-        car = car_with({"tyre_relaxation": "longer with load"}, tyre_relaxation={"length_m": length})
+        car = car_with({"tyre_relaxation": form}, tyre_relaxation={"length_m": length, **more})
         run = drive(car, [(0.0, 0.0), (1e-3, 20.0)], 0.5, speed)
-        front_m, rear_m = length * run.vertical_load_n[0, [0, 2]] / (0.25 * MASS * G)
-        pull, push = -RADIUS * stiffness / INERTIA, 2.0 * stiffness / MASS
-        system = StateSpace(
-            [
-                [0.0, pull, 0.0, 0.0, 0.0],
-                [RADIUS / front_m, -speed / front_m, 0.0, 0.0, -1.0 / front_m],
-                [0.0, 0.0, 0.0, pull, 0.0],
-                [0.0, 0.0, RADIUS / rear_m, -speed / rear_m, -1.0 / rear_m],
-                [0.0, push, 0.0, push, 0.0],
-            ],
-            [[1.0 / INERTIA], [0.0], [1.0 / INERTIA], [0.0], [0.0]],
-            np.eye(5),
-            np.zeros((5, 1)),
+        lengths_m = length * (
+            run.vertical_load_n[0] / (0.25 * MASS * G) if shares is None else np.array(shares)
         )
+        assert np.ptp(lengths_m) > 0.02
+        rates, push = np.zeros((9, 9)), stiffness / MASS
+        for wheel, length_m in enumerate(lengths_m):
+            spin, slip = 2 * wheel, 2 * wheel + 1
+            rates[spin, slip] = -RADIUS * stiffness / INERTIA
+            rates[slip, [spin, slip, 8]] = RADIUS / length_m, -speed / length_m, -1.0 / length_m
+            rates[8, slip] = push
+        torque = np.array([[1.0 / INERTIA, 0.0] * 4 + [0.0]]).T
+        system = StateSpace(rates, torque, np.eye(9), np.zeros((9, 1)))
         _, expected, _ = lsim(system, run.wheel_torque_nm[:, 0], run.time_s, interp=True)
-        assert abs(front_m - rear_m) > 0.02
-        for wheel, slip in ((0, 1), (2, 3)):
-            force = stiffness * expected[:, slip]
-            assert run.tyre_force_n[:, wheel] == pytest.approx(force, abs=0.01 * force.max())
+        forces = stiffness * expected[:, 1:8:2]
+        assert run.tyre_force_n == pytest.approx(forces, abs=0.01 * forces.max())
 
     def test_a_stop_ends_at_rest_and_what_is_wound_up_does_not_push_the_car(self):
         knots = [(0.0, 0.0), (0.1, -200.0), (2.0, -200.0), (2.1, 0.0), (6.0, 0.0)]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from plant_oracle import reference
 from scipy.optimize import brentq
 
-from scenarios.effects.driveline_compliance import DrivelineComplianceOfAxles
+from scenarios.effects.driveline_compliance import DrivelineComplianceOfAxles, DrivelineComplianceOfWheels
 from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip, TyreRelaxationWhileItAdheres
 from scenarios.errors import ScenarioError
@@ -250,14 +250,21 @@ def test_other_forms_agree_with_the_independent_solver(load_transfer_m, by_slope
     assert error[FORCE:TWIST].max() < (2.5e-3 if by_slope else 1e-3)
 
 
-def test_shafts_that_are_unlike_agree_with_the_independent_solver():
+@pytest.mark.parametrize(
+    ("effect", "shares"),
+    [
+        (DrivelineComplianceOfAxles(4000.0, 5.0, 0.5, 0.4), [1.4, 1.4, 0.6, 0.6]),
+        (DrivelineComplianceOfWheels(4000.0, 5.0, 0.5, 0.2, -0.3, 0.1), [0.9, 1.5, 0.9, 0.7]),
+    ],
+)
+def test_shafts_that_are_unlike_agree_with_the_independent_solver(effect, shares):
     knots = ((0.0, 0.0), (0.05, 250.0), (0.6, 250.0), (0.65, -150.0), (1.2, -150.0), (1.25, 0.0), (1.6, 0.0))
     segments = [(0.0, 0.9, 0.9), (8.0, 0.4, 0.4)]
     setup = make_setup(NOMINAL, make_road(*segments))
-    p = DrivelineComplianceOfAxles(4000.0, 5.0, 0.5, 0.4).dynamics(setup.parameters)
+    p = effect.dynamics(setup.parameters)
     times, torques = zip(*knots, strict=True)
     time_s = np.arange(1601) * 1e-3
-    shafts = {"shaft_stiffness": 4000.0 * np.array([1.4, 1.4, 0.6, 0.6]), "shaft_damping": 5.0}
+    shafts = {"shaft_stiffness": 4000.0 * np.array(shares), "shaft_damping": 5.0}
     truth = reference(
         {**oracle_car({}), **shafts, "motor_inertia": 0.5},
         segments, lambda t: np.interp(t, times, torques) * np.ones(4), times, time_s, 6.0, 0.0, FLOOR_SPEED_M_S,

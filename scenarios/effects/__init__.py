@@ -12,7 +12,11 @@ from scenarios.effects.brake_drag import BrakeDrag, BrakeDragOfAxles
 from scenarios.effects.camera_latency import CameraLatency
 from scenarios.effects.camera_pitch import CameraPitch
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
-from scenarios.effects.driveline_compliance import DrivelineCompliance, DrivelineComplianceOfAxles
+from scenarios.effects.driveline_compliance import (
+    DrivelineCompliance,
+    DrivelineComplianceOfAxles,
+    DrivelineComplianceOfWheels,
+)
 from scenarios.effects.exposure_shift import ExposureShift
 from scenarios.effects.friction_falloff import FrictionFalloff, FrictionFalloffHyperbolic
 from scenarios.effects.friction_offset import FrictionOffset
@@ -32,7 +36,9 @@ from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages, Torque
 from scenarios.effects.tyre_formula import TyreFormula
 from scenarios.effects.tyre_relaxation import (
     TyreRelaxation,
+    TyreRelaxationOfAxles,
     TyreRelaxationOfSlip,
+    TyreRelaxationOfWheels,
     TyreRelaxationWhileItAdheres,
     TyreRelaxationWithLoad,
 )
@@ -40,6 +46,7 @@ from scenarios.effects.tyre_shape import TyreShape
 from scenarios.effects.tyre_stiffness_offset import (
     TyreStiffnessOffset,
     TyreStiffnessOffsetOfAxles,
+    TyreStiffnessOffsetOfWheels,
     TyreStiffnessOffsetWithLoad,
 )
 from scenarios.effects.vehicle_speed_delay import VehicleSpeedDelay
@@ -110,11 +117,15 @@ OTHER_FORMS = (
     WheelRadiusOffsetOfWheels,
     WheelInertiaOffsetOfAxles,
     DrivelineComplianceOfAxles,
+    DrivelineComplianceOfWheels,
     TyreStiffnessOffsetOfAxles,
+    TyreStiffnessOffsetOfWheels,
     TyreStiffnessOffsetWithLoad,
     TyreRelaxationOfSlip,
     TyreRelaxationWithLoad,
     TyreRelaxationWhileItAdheres,
+    TyreRelaxationOfAxles,
+    TyreRelaxationOfWheels,
     FrictionFalloffHyperbolic,
 )
 FORMS: dict[str, tuple[type[Effect], ...]] = {

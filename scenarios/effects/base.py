@@ -41,6 +41,9 @@ Value = float | Callable[["Vehicle"], float]
 Values = tuple[float, ...] | Callable[["Vehicle"], tuple[float, ...]]
 """Numbers, or what they are for a given vehicle."""
 
+LEAST_OFF = 0.25
+"""Share of the mean offset that each wheel's own is at least: where one is nearly right, not all wheels are off [-]."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -101,6 +104,18 @@ def share_of_sides(axle: str, start: float, most: float) -> Any:
     return _share_of_mean(f"the {axle} left wheel has more and the {axle} right one less", start, most)
 
 
+def of_each_wheel(mean: float, unlike: float, front_sides: float, rear_sides: float) -> Array:
+    """The values of fl, fr, rl, rr, shape (4,), for a mean and the shares of it that wheels have more or less."""
+    sides = np.array([front_sides, -front_sides, rear_sides, -rear_sides])
+    return mean * (1.0 + np.array([unlike, unlike, -unlike, -unlike]) + sides)
+
+
+def all_are_off(values: Array, nominal: float) -> bool:
+    """Whether all wheels are off to the same side; of a single wrong wheel nobody says that the car's are others."""
+    off = values - nominal
+    return bool(np.all(off * np.sign(off.mean()) >= LEAST_OFF * abs(off.mean())))
+
+
 def _share_of_mean(who: str, start: float, most: float) -> Any:
     return parameter(
         "-", f"share of the mean that {who}", neutral=0.0, low=-most, high=most, starts=(-start, start)
@@ -116,6 +131,8 @@ class Effect:
     """Which of several forms of the effect this is; empty where there is one."""
     structural: ClassVar[bool] = False
     """Whether it is a difference between models rather than a fault or a setting: a diagnosis never blames it."""
+    of_wheels: ClassVar[bool] = False
+    """Whether each wheel has its own value: the mean, `share_of_axles`, and `share_of_sides` of both axles."""
     stage: ClassVar[Stage]
     subsystem: ClassVar[Subsystem]
     equation: ClassVar[str]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter, share_of_axles
+from scenarios.effects.base import Effect, parameter, share_of_axles, share_of_sides
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
@@ -81,4 +81,29 @@ class DrivelineComplianceOfAxles(DrivelineCompliance):
         """Each axle has its stiffness."""
         return DrivelineCompliance.dynamics(self, parameters)._replace(
             axle_shaft_stiffness_nm_rad=self.unlike * self.stiffness_nm_rad
+        )
+
+
+@dataclass(frozen=True)
+class DrivelineComplianceOfWheels(DrivelineComplianceOfAxles):
+    """Each shaft has its own length, as where a motor stands off the middle; `stiffness_nm_rad` is the mean."""
+
+    form = "each wheel its own"
+    of_wheels = True
+    equation = (
+        "k (1 + unlike +- front_sides) in front, k (1 - unlike +- rear_sides) in the rear, + on the left"
+    )
+
+    front_sides: float = share_of_sides("front", start=0.15, most=0.35)
+    rear_sides: float = share_of_sides("rear", start=0.15, most=0.35)
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each shaft has its stiffness."""
+        return (
+            super()
+            .dynamics(parameters)
+            ._replace(
+                front_side_shaft_stiffness_nm_rad=self.front_sides * self.stiffness_nm_rad,
+                rear_side_shaft_stiffness_nm_rad=self.rear_sides * self.stiffness_nm_rad,
+            )
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter
+from scenarios.effects.base import Effect, parameter, share_of_axles, share_of_sides
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
@@ -74,3 +74,43 @@ class TyreRelaxationWhileItAdheres(TyreRelaxationOfSlip):
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The lag shrinks with the slope of the force at the lagging slip."""
         return super().dynamics(parameters)._replace(relaxation_by_slope=1.0)
+
+
+@dataclass(frozen=True)
+class TyreRelaxationOfAxles(TyreRelaxationOfSlip):
+    """The tyres of the two axles differ, as where their sizes or pressures do; `length_m` is the mean."""
+
+    form = "axles unlike"
+    equation = "s' = V / L (slip - s), F_x = F_steady(s), L = length (1 +- unlike), + in front"
+
+    unlike: float = share_of_axles(start=0.15, most=0.5)
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each axle has its length."""
+        return super().dynamics(parameters)._replace(axle_relaxation_m=self.unlike * self.length_m)
+
+
+@dataclass(frozen=True)
+class TyreRelaxationOfWheels(TyreRelaxationOfAxles):
+    """Each tyre has its own wear and pressure, and so its own length; `length_m` is the mean."""
+
+    form = "each wheel its own"
+    of_wheels = True
+    equation = (
+        "s' = V / L (slip - s), F_x = F_steady(s), L = length (1 + unlike +- front_sides) in front, "
+        "length (1 - unlike +- rear_sides) in the rear, + on the left"
+    )
+
+    front_sides: float = share_of_sides("front", start=0.15, most=0.4)
+    rear_sides: float = share_of_sides("rear", start=0.15, most=0.4)
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each wheel has its length."""
+        return (
+            super()
+            .dynamics(parameters)
+            ._replace(
+                front_side_relaxation_m=self.front_sides * self.length_m,
+                rear_side_relaxation_m=self.rear_sides * self.length_m,
+            )
+        )

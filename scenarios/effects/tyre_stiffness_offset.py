@@ -5,10 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter, share_of_axles
+from scenarios.effects.base import (
+    Effect,
+    all_are_off,
+    of_each_wheel,
+    parameter,
+    share_of_axles,
+    share_of_sides,
+)
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
+    from trpac_core.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -51,6 +59,36 @@ class TyreStiffnessOffsetOfAxles(TyreStiffnessOffset):
         """Each axle has its stiffness."""
         return parameters._replace(
             longitudinal_stiffness_n=self.stiffness_n, axle_stiffness_n=self.unlike * self.stiffness_n
+        )
+
+
+@dataclass(frozen=True)
+class TyreStiffnessOffsetOfWheels(TyreStiffnessOffsetOfAxles):
+    """Each tyre has its own make, wear and pressure; `stiffness_n` is the mean."""
+
+    form = "each wheel its own"
+    of_wheels = True
+    equation = (
+        "C_x (1 + unlike +- front_sides) in front, C_x (1 - unlike +- rear_sides) in the rear, + on the left"
+    )
+
+    front_sides: float = share_of_sides("front", start=0.1, most=0.4)
+    rear_sides: float = share_of_sides("rear", start=0.1, most=0.4)
+
+    def is_itself(self, vehicle: Vehicle) -> bool:
+        """Whether all tyres are of another stiffness."""
+        stiffness_n = of_each_wheel(self.stiffness_n, self.unlike, self.front_sides, self.rear_sides)
+        return all_are_off(stiffness_n, vehicle.longitudinal_stiffness_n)
+
+    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
+        """Each wheel has its stiffness."""
+        return (
+            super()
+            .dynamics(parameters)
+            ._replace(
+                front_side_stiffness_n=self.front_sides * self.stiffness_n,
+                rear_side_stiffness_n=self.rear_sides * self.stiffness_n,
+            )
         )
 
 

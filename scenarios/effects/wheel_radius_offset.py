@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from scenarios.effects.base import Array, Effect, parameter, share_of_axles, share_of_sides
+from scenarios.effects.base import (
+    Array,
+    Effect,
+    all_are_off,
+    of_each_wheel,
+    parameter,
+    share_of_axles,
+    share_of_sides,
+)
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
     from trpac_core.vehicle import Vehicle
-
-LEAST_OFF = 0.25
-"""Share of the mean offset that each wheel's own is at least: where one is nearly right, not all wheels are off [-]."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,7 @@ class WheelRadiusOffsetOfWheels(WheelRadiusOffsetOfAxles):
     """Each tyre has its own wear and pressure; `radius_m` is the mean."""
 
     form = "each wheel its own"
+    of_wheels = True
     equation = (
         "R (1 + unlike +- front_sides) in front, R (1 - unlike +- rear_sides) in the rear, + on the left"
     )
@@ -87,15 +91,12 @@ class WheelRadiusOffsetOfWheels(WheelRadiusOffsetOfAxles):
     rear_sides: float = share_of_sides("rear", start=0.003, most=0.05)
 
     def is_itself(self, vehicle: Vehicle) -> bool:
-        """Of a single wrong wheel nobody says that the car's wheels are of another size."""
-        off_m = self.radii_m() - vehicle.wheel_radius_m
-        return bool(np.all(off_m * np.sign(off_m.mean()) >= LEAST_OFF * abs(off_m.mean())))
+        """Whether all wheels are of another size."""
+        return all_are_off(self.radii_m(), vehicle.wheel_radius_m)
 
     def radii_m(self) -> Array:
         """Rolling radii of the wheels fl, fr, rl, rr, shape (4,) [m]."""
-        front, rear = self.unlike, -self.unlike
-        sides = np.array([self.front_sides, -self.front_sides, self.rear_sides, -self.rear_sides])
-        return self.radius_m * (1.0 + np.array([front, front, rear, rear]) + sides)
+        return of_each_wheel(self.radius_m, self.unlike, self.front_sides, self.rear_sides)
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Each wheel has its radius."""

@@ -277,13 +277,42 @@ def _of_axle(i: int, mean: float, unlike: float) -> float:
 
 
 @inlined
+def _of_wheel(i: int, mean: float, unlike: float, front_sides: float, rear_sides: float) -> float:
+    """A wheel's own value, where beside it the left wheels of both axles have more by what the right ones have less."""
+    value = _of_axle(i, mean, unlike)
+    if front_sides == 0.0 and rear_sides == 0.0:
+        return value
+    side = front_sides if i < 2 else rear_sides
+    return value + side if i % 2 == 0 else value - side
+
+
+@inlined
 def _rolling_radius(i: int, p: DynamicsParameters) -> float:
     """A wheel's own [m]; fl, fr, rl, rr."""
-    radius_m = _of_axle(i, p.wheel_radius_m, p.axle_radius_m)
-    if p.front_side_radius_m == 0.0 and p.rear_side_radius_m == 0.0:
-        return radius_m
-    side_m = p.front_side_radius_m if i < 2 else p.rear_side_radius_m
-    return radius_m + side_m if i % 2 == 0 else radius_m - side_m
+    return _of_wheel(i, p.wheel_radius_m, p.axle_radius_m, p.front_side_radius_m, p.rear_side_radius_m)
+
+
+@inlined
+def _tyre_stiffness(i: int, p: DynamicsParameters) -> float:
+    """A wheel's own, along the road and at its usual load [N]."""
+    return _of_wheel(
+        i, p.longitudinal_stiffness_n, p.axle_stiffness_n, p.front_side_stiffness_n, p.rear_side_stiffness_n
+    )
+
+
+@inlined
+def _shaft_stiffness(i: int, p: DynamicsParameters) -> float:
+    """That of a wheel's own shaft [N m/rad]."""
+    front_sides, rear_sides = p.front_side_shaft_stiffness_nm_rad, p.rear_side_shaft_stiffness_nm_rad
+    return _of_wheel(i, p.shaft_stiffness_nm_rad, p.axle_shaft_stiffness_nm_rad, front_sides, rear_sides)
+
+
+@inlined
+def _relaxation_length(i: int, p: DynamicsParameters) -> float:
+    """A wheel's own at its usual load [m]."""
+    return _of_wheel(
+        i, p.relaxation_m, p.axle_relaxation_m, p.front_side_relaxation_m, p.rear_side_relaxation_m
+    )
 
 
 @compiled
@@ -334,8 +363,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             if slip_lags:
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
-            stiffness_n = _of_axle(i, p.longitudinal_stiffness_n, p.axle_stiffness_n)
-            stiffness_n *= 1.0 + p.stiffness_by_load * more
+            stiffness_n = _tyre_stiffness(i, p) * (1.0 + p.stiffness_by_load * more)
             tyre = tyre_force(theta, abs(acting), load_n, stiffness_n)
             if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
                 tyre = reshaped(tyre, abs(acting), theta * load_n, load_n, p)
@@ -349,7 +377,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
                 rest = speed <= 0.0 and y[FORCE + i] < 0.0
                 gone = p.relaxation_by_slope * max(1.0 - slope / (INITIAL_SLOPE * stiffness_n), 0.0)
                 share = max((1.0 + p.relaxation_by_load * more) * (1.0 - gone), LEAST_RELAXATION)
-                length_m = p.relaxation_m * share
+                length_m = _relaxation_length(i, p) * share
                 wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / length_m
                 wheels.work[_PER_STATE, i] = 1.0
             if slip_lags:
@@ -419,8 +447,7 @@ def _fill_rates(
         torque = torque_nm[i] + (next_nm[i] - torque_nm[i]) * part
         if p.motor_inertia_kg_m2 > 0.0:
             spread = y[MOTOR + i] - y[WHEEL + i]
-            stiffness = _of_axle(i, p.shaft_stiffness_nm_rad, p.axle_shaft_stiffness_nm_rad)
-            shaft_nm = stiffness * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
+            shaft_nm = _shaft_stiffness(i, p) * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
             motor_nm, wheels.work[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
             wheels.rates[TWIST - WHEEL + i] = spread
             wheels.rates[MOTOR - WHEEL + i] = (motor_nm - shaft_nm) / p.motor_inertia_kg_m2
@@ -439,7 +466,7 @@ def _fill_rates(
 @inlined
 def _shaft(i: int, gh: float, p: DynamicsParameters) -> tuple[float, float]:
     """What a shaft's twist, and its motor's speed beside the wheel's, add to its torque within gh [N m/(rad/s)]."""
-    stiffness = gh * _of_axle(i, p.shaft_stiffness_nm_rad, p.axle_shaft_stiffness_nm_rad)
+    stiffness = gh * _shaft_stiffness(i, p)
     return stiffness, gh * (stiffness + p.shaft_damping_nm_s_rad)
 
 

@@ -62,6 +62,12 @@ class DynamicsParameters(NamedTuple):
     """By which that way grows with a wheel's load, in shares of it over the mean static load: 1 in proportion [-]."""
     relaxation_by_slope: float = 0.0
     """Share of that way that shrinks as the force's slope by slip does; 1: all of it [-]."""
+    axle_relaxation_m: float = 0.0
+    """What that way is longer on the front wheels, and shorter on the rear ones [m]."""
+    front_side_relaxation_m: float = 0.0
+    """What it is longer beside that on the front left wheel, and shorter on the front right one [m]."""
+    rear_side_relaxation_m: float = 0.0
+    """The same of the rear wheels [m]."""
     slip_lags: float = 0.0
     """1: over that way it is the slip that follows, and the force is the steady one of the lagging slip [-]."""
     shaft_stiffness_nm_rad: float = 1e4
@@ -74,8 +80,16 @@ class DynamicsParameters(NamedTuple):
     """Likewise beside rolling_coefficient [-]."""
     axle_shaft_stiffness_nm_rad: float = 0.0
     """Likewise beside shaft_stiffness_nm_rad [N m/rad]."""
+    front_side_shaft_stiffness_nm_rad: float = 0.0
+    """What the front left shaft's stiffness has more beside it, and the front right one's less [N m/rad]."""
+    rear_side_shaft_stiffness_nm_rad: float = 0.0
+    """The same of the rear shafts [N m/rad]."""
     axle_stiffness_n: float = 0.0
     """Likewise beside longitudinal_stiffness_n [N]."""
+    front_side_stiffness_n: float = 0.0
+    """What the front left tyre's stiffness has more beside it, and the front right one's less [N]."""
+    rear_side_stiffness_n: float = 0.0
+    """The same of the rear tyres [N]."""
     stiffness_by_load: float = 0.0
     """By which stiffness grows with a wheel's load, as relaxation_by_load does [-]."""
     lever_more_m: float = 0.0
