@@ -54,7 +54,7 @@ def test_what_the_family_adds_to_the_physics_is_none_of_the_nominal_car():
     assert all(getattr(limit.world.physics, name) == 0.0 for name in (*names, *more, *rest))
     scaled = ("height_jack", "lag_warm", "relaxation_rise", "drag_shelter", "roll_slow", "brake_wet")
     of_none = limit.world.moved(**dict.fromkeys((*scaled, "grip_sign", "grip_slide", "gain_turn"), 0.3))
-    assert_allclose(limit.readings(of_none), limit.nominal, rtol=0, atol=0)
+    assert limit.is_nominal(of_none)
 
 
 # --- effects

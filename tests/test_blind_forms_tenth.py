@@ -34,7 +34,7 @@ def test_what_the_family_adds_to_the_physics_is_none_of_the_nominal_car():
     absolute = ("pitch_stops", "stiffness_sides", "grip_axles", "delay_warm", "lag_tail", "notch")
     assert all(getattr(limit.world.physics, name) == 0.0 for name in (*scaled, *absolute, "shaft_warm"))
     of_none = limit.world.moved(**dict.fromkeys((*scaled, "shaft_warm"), 0.3))
-    assert_allclose(limit.readings(of_none), limit.nominal, rtol=0, atol=0)
+    assert limit.is_nominal(of_none)
 
 
 # --- effects
