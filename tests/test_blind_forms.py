@@ -210,7 +210,7 @@ def test_opened_families_are_as_they_were(family, name, rows, means):
     assert_allclose(told, means, rtol=1e-5, atol=1e-5)
 
 
-@pytest.mark.parametrize(("family", "draws"), zip(DRAWN[:-1], DRAWS, strict=True))
+@pytest.mark.parametrize(("family", "draws"), list(zip(DRAWN[:-1], DRAWS, strict=True)))
 def test_opened_families_draw_the_forms_that_they_drew(family, draws):
     drawn = [draw_forms(family, np.random.default_rng(seed)) for seed in range(40)]
     assert zlib.crc32(json.dumps(drawn, sort_keys=True).encode()) == draws
