@@ -284,10 +284,6 @@ NEUTRAL = {
 }
 
 
-DRIVEN_AND_BRAKED = 4500
-"""Rows of the limit drive."""
-
-
 class LimitDrive:
     """A rich drive with ice in it: what the sensors of a world say when its torque is driven from the same start.
 
@@ -300,12 +296,11 @@ class LimitDrive:
         self._path = self._moved(self.world)
         self.nominal = self.readings(self.world)
 
-    def readings(self, world: World, rows: int | None = None) -> np.ndarray:
-        """Of the drive's first rows, or of all."""
+    def readings(self, world: World) -> np.ndarray:
         alike = (
             all(map(np.array_equal, world.physics, self.world.physics)) and world.split == self.world.split
         )
-        path = self._path[:rows] if alike else self._moved(world, rows)
+        path = self._path if alike else self._moved(world)
         return read(path[1:], world.sensors, np.arange(len(path) - 1) * 1e-3)
 
     def shows(self, world: World) -> bool:
@@ -314,11 +309,11 @@ class LimitDrive:
         return bool(np.any(np.sqrt(np.mean(off**2, axis=0)) > 2.0 * QUIET.sigmas))
 
     def is_nominal(self, world: World) -> bool:
-        """Whether its sensors say to the last bit what the nominal car's say, until both were driven and braked."""
-        return np.array_equal(self.readings(world, DRIVEN_AND_BRAKED), self.nominal[: DRIVEN_AND_BRAKED - 1])
+        """Whether its sensors say to the last bit what the nominal car's say."""
+        return np.array_equal(self.readings(world), self.nominal)
 
-    def _moved(self, world: World, rows: int | None = None) -> np.ndarray:
-        path, y = np.zeros_like(self._driven.path[:rows]), self._driven.path[0, :N].copy()
+    def _moved(self, world: World) -> np.ndarray:
+        path, y = np.zeros_like(self._driven.path), self._driven.path[0, :N].copy()
         integrate(world.physics, y, 0, len(path) - 1, world.split, self._driven.command, path)
         return path
 
