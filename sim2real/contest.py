@@ -227,10 +227,6 @@ def first_round(
     """
     one_log = fit_to.longest()
 
-    def fits(wanted: Sequence[tuple[Candidate, Array]], stage: str) -> list[Fit]:
-        work = [partial(fit, candidate, one_log, starts, FIRST_ROUND_STEPS) for candidate, starts in wanted]
-        return run_all(work, jobs, progress, stage)
-
     candidates = [
         Candidate(model, (key,), (form,))
         for key, kinds in FORMS.items()
@@ -238,15 +234,16 @@ def first_round(
         for form in range(len(kinds))
     ]
     plain = [c for c in candidates if len(c.parameters) == len(FORMS[c.ids[0]][0].parameters())]
-    found = fits([(c, _near_and_far(c)) for c in plain], "effects, first round")
+    near = [partial(fit, c, one_log, _near_and_far(c), FIRST_ROUND_STEPS) for c in plain]
+    found = run_all(near, jobs, progress, "effects, first round")
     ranked = list(dict.fromkeys(f.candidate.ids for f in sorted(found, key=lambda fit: fit.loss)))
     of = {f.candidate.ids: f for f in found if f.candidate.forms == (0,)}
     more = [
-        (c, _beyond(c, of[c.ids], one_log))
+        partial(_fit_beyond, c, of[c.ids], one_log)
         for c in candidates
         if c not in plain and c.ids in ranked[:FURTHER_FORMS]
     ]
-    return sorted([*found, *fits(more, "forms, first round")], key=lambda fit: fit.loss)
+    return sorted([*found, *run_all(more, jobs, progress, "forms, first round")], key=lambda fit: fit.loss)
 
 
 def _near_and_far(candidate: Candidate) -> Array:
@@ -258,6 +255,10 @@ def _near_and_far(candidate: Candidate) -> Array:
     sides = [side for side in (offsets[offsets > 0.0], offsets[offsets < 0.0]) if len(side)]
     near = [candidate.neutral[0] + NEAR * side[np.argmin(np.abs(side))] for side in sides]
     return np.concatenate([np.reshape(near, (-1, 1)), far])
+
+
+def _fit_beyond(candidate: Candidate, plain: Fit, evidence: Evidence) -> Fit:
+    return fit(candidate, evidence, _beyond(candidate, plain, evidence), FIRST_ROUND_STEPS)
 
 
 def _beyond(candidate: Candidate, plain: Fit, evidence: Evidence) -> Array:
