@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant import simulate
 from scenarios.plant.sensors import sense
-from sim2real.drive import CHANNELS, Drive, grid_step, make_drive
-from sim2real.lattice_trace import find_counter
+from sim2real.observing.drive import CHANNELS, Drive, grid_step, make_drive
+from sim2real.observing.lattice_trace import find_counter
 
 Array = NDArray[np.float64]
 CAR = load_vehicle(Path(__file__).parents[1] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml")

@@ -12,32 +12,32 @@ import numpy as np
 
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
-from sim2real.closure import at_the_floor, closing, loud
-from sim2real.contest import COUNTER, Contest, Progress, first_round, hold_contest, silent
-from sim2real.drive import WHEEL, Drive
-from sim2real.evidence import Evidence, drift_of, gather, residuals
-from sim2real.faint_counter import beside_a_counter, for_a_delay, traced
-from sim2real.findings import Findings, describe
-from sim2real.fitting import Fit
-from sim2real.gap import measure
-from sim2real.lattice import common_lattice
-from sim2real.law import held_to_curves, held_to_itself
+from sim2real.how_far.gap import measure
+from sim2real.how_far.trpac_error import trpac_error
 from sim2real.merge import camera_side, counter_side, merge
-from sim2real.noise import RESOLUTION
-from sim2real.observer import Simulation
-from sim2real.orders import Order, counts, read_order, without_swing
-from sim2real.pairs import add_pairs, add_partners, add_twins, deepened
+from sim2real.observing.drive import WHEEL, Drive
+from sim2real.observing.evidence import Evidence, drift_of, gather, residuals
+from sim2real.observing.lattice import common_lattice
+from sim2real.observing.noise import RESOLUTION
+from sim2real.observing.observer import Simulation
+from sim2real.observing.orders import Order, counts, read_order, without_swing
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
-from sim2real.quiet import is_noise
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
-from sim2real.selection import Decision, decide, needs_pairs
-from sim2real.sluggish import impostor
 from sim2real.sources import Sources, read_source, read_sources
-from sim2real.structure import add_structure
-from sim2real.suspect import unlike_wheels
-from sim2real.trpac_error import trpac_error
-from sim2real.varying import add_varied
-from sim2real.wander import effect_beside_wandering, nothing_but_wandering
+from sim2real.telling.findings import Findings, describe
+from sim2real.which.closure import at_the_floor, closing, loud
+from sim2real.which.contest import COUNTER, Contest, Progress, first_round, hold_contest, silent
+from sim2real.which.faint_counter import beside_a_counter, for_a_delay, traced
+from sim2real.which.fitting import Fit
+from sim2real.which.law import held_to_curves, held_to_itself
+from sim2real.which.pairs import add_pairs, add_partners, add_twins, deepened
+from sim2real.which.quiet import is_noise
+from sim2real.which.selection import Decision, decide, needs_pairs
+from sim2real.which.sluggish import impostor
+from sim2real.which.structure import add_structure
+from sim2real.which.suspect import unlike_wheels
+from sim2real.which.varying import add_varied
+from sim2real.which.wander import effect_beside_wandering, nothing_but_wandering
 
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS
 from scenarios.effects.base import Parameter
-from sim2real.lattice import Lattice
+from sim2real.observing.lattice import Lattice
 from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.perception.shift import SIGNAL as PLACE

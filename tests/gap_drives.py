@@ -7,8 +7,8 @@ import numpy as np
 from benchmarks.gap_development import BARE, Case, drives
 from scenarios.files import WHEELS, RoadFile, VehicleFile
 from scenarios.plant import simulate
-from sim2real.drive import CHANNELS, make_drive
-from sim2real.observer import Simulation
+from sim2real.observing.drive import CHANNELS, make_drive
+from sim2real.observing.observer import Simulation
 
 MODEL = Simulation(BARE)
 STEP_S = 0.008

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from benchmarks.gap_development import Levels
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import diagnose, find
-from sim2real.drive import WHEEL
-from sim2real.faint_counter import FINEST_TEETH, HIDDEN
-from sim2real.lattice import find_lattice
-from sim2real.lattice_trace import Trace, common_trace, find_trace
+from sim2real.observing.drive import WHEEL
+from sim2real.observing.lattice import find_lattice
+from sim2real.observing.lattice_trace import Trace, common_trace, find_trace
 from sim2real.result import Verdict
+from sim2real.which.faint_counter import FINEST_TEETH, HIDDEN
 
 COUNTER, DELAY = "wheel_speed_quantisation", "wheel_speed_delay"
 TAKEN_OUT = set(EFFECTS) - {COUNTER, DELAY, "torque_lag"}

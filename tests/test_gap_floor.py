@@ -7,16 +7,16 @@ import pytest
 from gap_drives import MODEL, SIGMA, clean, noisy, pulses, remeasured
 
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
-from sim2real.closure import at_the_floor, loud
-from sim2real.contest import Contest, Entry
-from sim2real.drive import ACCEL
-from sim2real.evidence import gather
-from sim2real.fitting import Candidate, fit
-from sim2real.goodness import Fitness
-from sim2real.quiet import rare_share
+from sim2real.observing.drive import ACCEL
+from sim2real.observing.evidence import gather
 from sim2real.result import Gap, Measure, Verdict
-from sim2real.selection import NO_GAP_DOUBT, Decision
-from sim2real.sentences import verdict
+from sim2real.telling.sentences import verdict
+from sim2real.which.closure import at_the_floor, loud
+from sim2real.which.contest import Contest, Entry
+from sim2real.which.fitting import Candidate, fit
+from sim2real.which.goodness import Fitness
+from sim2real.which.quiet import rare_share
+from sim2real.which.selection import NO_GAP_DOUBT, Decision
 
 KEY = "torque_gain"
 

@@ -28,20 +28,20 @@ from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset, TyreSti
 from scenarios.effects.wheel_radius_offset import WheelRadiusOffsetOfWheels
 from scenarios.plant import dynamics
 from scenarios.plant.pipeline import make_setup
-from sim2real.contest import first_round, hold_contest, silent, wheel_by_wheel
 from sim2real.diagnose import diagnose, find
-from sim2real.drive import ACCEL, SPEED, WHEEL
-from sim2real.estimates import joint
-from sim2real.evidence import Evidence, gather
-from sim2real.findings import Findings, describe
-from sim2real.fitting import Candidate, fit
-from sim2real.noise import Noise
-from sim2real.pairs import add_pairs, add_partners
-from sim2real.quiet import is_noise
+from sim2real.observing.drive import ACCEL, SPEED, WHEEL
+from sim2real.observing.evidence import Evidence, gather
+from sim2real.observing.noise import Noise
 from sim2real.result import Verdict
-from sim2real.selection import decide, needs_pairs
-from sim2real.suspect import lone_sensor
-from sim2real.varying import vary
+from sim2real.telling.estimates import joint
+from sim2real.telling.findings import Findings, describe
+from sim2real.which.contest import first_round, hold_contest, silent, wheel_by_wheel
+from sim2real.which.fitting import Candidate, fit
+from sim2real.which.pairs import add_pairs, add_partners
+from sim2real.which.quiet import is_noise
+from sim2real.which.selection import decide, needs_pairs
+from sim2real.which.suspect import lone_sensor
+from sim2real.which.varying import vary
 
 
 def only(*keys):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from gap_drives import MODEL, STEP_S, clean, noisy, pulses
 
-from sim2real.contest import Contest, Entry
-from sim2real.drive import SPEED, WHEEL
-from sim2real.evidence import gather
-from sim2real.fitting import ROBUST_FROM, Candidate, fit
-from sim2real.goodness import Fitness, fitness, gross_share, inflation
-from sim2real.lattice import Lattice
-from sim2real.selection import (
+from sim2real.observing.drive import SPEED, WHEEL
+from sim2real.observing.evidence import gather
+from sim2real.observing.lattice import Lattice
+from sim2real.which.contest import Contest, Entry
+from sim2real.which.fitting import ROBUST_FROM, Candidate, fit
+from sim2real.which.goodness import Fitness, fitness, gross_share, inflation
+from sim2real.which.selection import (
     EXPLAINED_MISFIT,
     EXPLAINED_MOST,
     EXPLAINED_SHARE,

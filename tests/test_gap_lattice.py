@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
-from sim2real.lattice import (
+from sim2real.observing.lattice import (
     Lattice,
     Reading,
     RunningCounter,

@@ -10,12 +10,12 @@ import yaml
 from gap_drives import MODEL, clean, noisy, pulses
 from test_gap_diagnose import DRY, VEHICLE, write_log, write_road
 
-from sim2real.contest import Contest, as_it_is, enter
-from sim2real.drive import RECOVERY_S, WHEEL, backward
-from sim2real.evidence import gather
-from sim2real.fitting import FULL_STEPS, Candidate
-from sim2real.pairs import deepened
+from sim2real.observing.drive import RECOVERY_S, WHEEL, backward
+from sim2real.observing.evidence import gather
 from sim2real.sources import read_sources
+from sim2real.which.contest import Contest, as_it_is, enter
+from sim2real.which.fitting import FULL_STEPS, Candidate
+from sim2real.which.pairs import deepened
 
 
 @pytest.fixture(scope="module")

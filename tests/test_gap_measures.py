@@ -9,15 +9,17 @@ from gap_drives import MODEL, SIGMA, clean, noisy, pulses, random_drives, rms, r
 from scenarios.effects import EFFECTS
 from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.mass_offset import MassOffset
-from sim2real import gap, where
 from sim2real.diagnose import diagnose
-from sim2real.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
-from sim2real.estimates import at_bound, is_excited
-from sim2real.evidence import Evidence, gather, residuals
-from sim2real.fitting import Candidate, fit
-from sim2real.noise import Noise
+from sim2real.how_far import gap
+from sim2real.observing.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
+from sim2real.observing.evidence import Evidence, gather, residuals
+from sim2real.observing.noise import Noise
 from sim2real.result import Interval
-from sim2real.where import REGIMES, Blocks, blocks, equation_shares, heat_map, places, regimes
+from sim2real.telling import estimates
+from sim2real.telling.estimates import at_bound, is_excited
+from sim2real.where import localise
+from sim2real.where.localise import REGIMES, Blocks, blocks, equation_shares, heat_map, places, regimes
+from sim2real.which.fitting import Candidate, fit
 
 
 def known(*drives):
@@ -144,7 +146,7 @@ def covering(drive, true, seeds, colour=0.0):
         drawn = noise.draw(len(drive), np.random.default_rng(seed))
         held = Evidence((replace(drive, measured=drive.measured + drawn),), (noise,))
         found = fit(Candidate(MODEL, ("accelerometer_bias",)), held, np.array([0.1]))
-        ((_, low, high),) = gap.intervals(found, held)
+        ((_, low, high),) = estimates.intervals(found, held)
         inside.append(low <= true <= high)
         widths.append(0.5 * (high - low))
     return np.mean(inside), np.mean(widths)
@@ -159,10 +161,10 @@ def test_intervals_cover_and_are_no_wider_than_said(colour):
     error = SIGMA[ACCEL] * np.sqrt((1.0 + colour) / (1.0 - colour) / rows)
     assert share >= 0.95
     # the least half width is a hundredth of a noticeable change, and a share of the bias
-    least = gap.LEAST_HALF_WIDTH * Candidate(MODEL, ("accelerometer_bias",)).scale[0]
-    form = gap.FORM_SHARE * 0.2
+    least = estimates.LEAST_HALF_WIDTH * Candidate(MODEL, ("accelerometer_bias",)).scale[0]
+    form = estimates.FORM_SHARE * 0.2
     assert width == pytest.approx(
-        np.hypot(1.96 * gap.INTERVAL_FACTOR * error, np.hypot(least, form)), rel=0.25
+        np.hypot(1.96 * estimates.INTERVAL_FACTOR * error, np.hypot(least, form)), rel=0.25
     )
 
 
@@ -178,7 +180,7 @@ def test_intervals_stay_within_the_bounds(tame):
     for effect in ("brake_drag", "torque_lag", "rolling_resistance"):
         found = fit(Candidate(MODEL, (effect,)), held)
         low, high = found.candidate.bounds
-        ((value, a, b),) = gap.intervals(found, held)
+        ((value, a, b),) = estimates.intervals(found, held)
         assert low[0] <= a <= value <= b <= high[0]
 
 
@@ -189,7 +191,7 @@ def test_a_parameter_that_nothing_shows_has_a_wide_interval():
     widths = []
     for held in (calm, hard):
         found = fit(Candidate(MODEL, ("friction_offset",)), held, np.array([1.0]))
-        ((_, low, high),) = gap.intervals(found, held)
+        ((_, low, high),) = estimates.intervals(found, held)
         widths.append(high - low)
     assert widths[0] > 20.0 * widths[1]
 
@@ -249,7 +251,7 @@ def test_blocks_of_noise_have_unit_means(tame):
     assert rms(part.z, axis=None) == pytest.approx(1.0, abs=0.1)
     assert part.z.shape == (len(part.from_s), 7)
     np.testing.assert_allclose(part.to_s[:-1], part.from_s[1:])
-    np.testing.assert_allclose(np.diff(part.from_s), where.BLOCK_S)
+    np.testing.assert_allclose(np.diff(part.from_s), localise.BLOCK_S)
 
 
 def test_blocks_without_samples_count_nothing(tame):

@@ -8,12 +8,12 @@ import made_up_diagnosis as made_up
 import numpy as np
 import pytest
 
-from sim2real.lattice import Lattice, Reading
 from sim2real.merge import Side, camera_side, counter_side, merge
+from sim2real.observing.lattice import Lattice, Reading
 from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
-from sim2real.report import jsonable
 from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict
+from sim2real.telling.report import jsonable
 
 TURN = 2.0 * np.pi
 QUIET = {"image_class": 1.0}

@@ -7,10 +7,10 @@ import pytest
 from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, rms, road_of, trace
 
 from scenarios.effects.friction_offset import FrictionOffset
-from sim2real.doubt import FRICTION, doubt
-from sim2real.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL
-from sim2real.evidence import residuals
-from sim2real.noise import FEWEST, RESOLUTION, Noise, read_noise
+from sim2real.observing.doubt import FRICTION, doubt
+from sim2real.observing.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL
+from sim2real.observing.evidence import residuals
+from sim2real.observing.noise import FEWEST, RESOLUTION, Noise, read_noise
 
 ROWS = 2500
 NO_DOUBT = np.zeros((ROWS, len(CHANNELS)))

@@ -29,10 +29,10 @@ from scenarios.effects.torque_gain import TorqueGain
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.files import VehicleFile
 from scenarios.plant import simulate
-from sim2real.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL, awake
-from sim2real.evidence import residuals
-from sim2real.lattice import SmoothCounter
-from sim2real.observer import MEMORY_S, Push, Simulation
+from sim2real.observing.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL, awake
+from sim2real.observing.evidence import residuals
+from sim2real.observing.lattice import SmoothCounter
+from sim2real.observing.observer import MEMORY_S, Push, Simulation
 
 G = 9.81
 

@@ -11,21 +11,21 @@ from scenarios.effects import EFFECTS
 from scenarios.effects.shifting import delayed
 from scenarios.effects.torque_gain import TorqueGainOfAxles
 from scenarios.effects.torque_lag import TorqueLag
-from sim2real import closure, law, sluggish
-from sim2real.closure import FLOOR_DOUBT, MOST_LEFT, closing, left_open
-from sim2real.contest import Entry, enter, silent
 from sim2real.diagnose import find
-from sim2real.drive import CHANNELS, SPEED, WHEEL
-from sim2real.evidence import gather
-from sim2real.findings import describe
-from sim2real.fitting import FULL_STEPS, Candidate
-from sim2real.goodness import Fitness, fitness
-from sim2real.hum import hum
-from sim2real.law import held_to_curves
-from sim2real.quiet import NO_GAP_MISFIT
+from sim2real.observing.drive import CHANNELS, SPEED, WHEEL
+from sim2real.observing.evidence import gather
+from sim2real.observing.hum import hum
 from sim2real.result import Structure, Verdict
-from sim2real.selection import EXPLAINED_MISFIT, PAIR_MISFIT, Decision
-from sim2real.sentences import verdict as verdict_of
+from sim2real.telling.findings import describe
+from sim2real.telling.sentences import verdict as verdict_of
+from sim2real.which import closure, law, sluggish
+from sim2real.which.closure import FLOOR_DOUBT, MOST_LEFT, closing, left_open
+from sim2real.which.contest import Entry, enter, silent
+from sim2real.which.fitting import FULL_STEPS, Candidate
+from sim2real.which.goodness import Fitness, fitness
+from sim2real.which.law import held_to_curves
+from sim2real.which.quiet import NO_GAP_MISFIT
+from sim2real.which.selection import EXPLAINED_MISFIT, PAIR_MISFIT, Decision
 
 DURATION_S = 16.0
 

@@ -19,11 +19,11 @@ from hypothesis import strategies as st
 
 from scenarios.effects import make_effect
 from scenarios.files import VehicleFile, load_vehicle
-from sim2real import figures, report
 from sim2real.demo import VEHICLE
-from sim2real.rating import LEAST_SAMPLES, MOST_SAMPLES, rating
-from sim2real.report import estimate, jsonable, percent, render, vehicle_snippet, write_diagnosis
+from sim2real.how_far.rating import LEAST_SAMPLES, MOST_SAMPLES, rating
 from sim2real.result import Interval, Measure, Trace, Verdict
+from sim2real.telling import figures, report
+from sim2real.telling.report import estimate, jsonable, percent, render, vehicle_snippet, write_diagnosis
 
 DIAGNOSES = {name: make() for name, make in made_up.ALL.items()}
 BRIEF = {name: replace(diagnosis, traces=()) for name, diagnosis in DIAGNOSES.items()}

@@ -8,10 +8,10 @@ from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.mu_split import MuSplit
 from scenarios.plant import dynamics
 from scenarios.plant.pipeline import make_setup
-from sim2real.contest import first_round, hold_contest, is_proper, priced
 from sim2real.diagnose import diagnose, find
-from sim2real.evidence import gather
+from sim2real.observing.evidence import gather
 from sim2real.result import Verdict
+from sim2real.which.contest import first_round, hold_contest, is_proper, priced
 
 SHAPE = {"knee": -0.08, "crest": 0.06, "sliding": -0.1}
 FORMULA = {"share": 1.0, "shape": 1.5, "curvature": -0.8}

@@ -7,13 +7,13 @@ import pytest
 from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, road_of, trace
 from scipy.sparse import csc_array
 
-from sim2real import terms
-from sim2real.drive import ACCEL, SPEED, WHEEL
-from sim2real.equations import EQUATIONS, OF_THE_MOTION, PER_DRIVE, QUANTITIES
-from sim2real.evidence import gather
+from sim2real.observing.drive import ACCEL, SPEED, WHEEL
+from sim2real.observing.evidence import gather
 from sim2real.result import Measure
-from sim2real.terms import Term, explained, finer, fit_terms, refined, score, with_refined
-from sim2real.unknown import characterise, seen_alone, shape_of, sign_of
+from sim2real.where import terms
+from sim2real.where.equations import EQUATIONS, OF_THE_MOTION, PER_DRIVE, QUANTITIES
+from sim2real.where.terms import Term, explained, finer, fit_terms, refined, score, with_refined
+from sim2real.where.unknown import characterise, seen_alone, shape_of, sign_of
 
 EQUATION = {equation.key: equation for equation in EQUATIONS}
 

@@ -10,18 +10,18 @@ from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles
 from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages
-from sim2real.contest import enter, silent
 from sim2real.diagnose import find
-from sim2real.drive import SPEED
-from sim2real.evidence import gather
-from sim2real.findings import describe
-from sim2real.fitting import FULL_STEPS, Candidate
-from sim2real.goodness import fitness
-from sim2real.observer import Towards
-from sim2real.probing import FORGOTTEN_S, sets_apart, windows
+from sim2real.observing.drive import SPEED
+from sim2real.observing.evidence import gather
+from sim2real.observing.observer import Towards
+from sim2real.observing.probing import FORGOTTEN_S, sets_apart, windows
 from sim2real.result import Verdict
-from sim2real.selection import decide
-from sim2real.varying import STEP, vary
+from sim2real.telling.findings import describe
+from sim2real.which.contest import enter, silent
+from sim2real.which.fitting import FULL_STEPS, Candidate
+from sim2real.which.goodness import fitness
+from sim2real.which.selection import decide
+from sim2real.which.varying import STEP, vary
 
 DURATION_S = 16.0
 
@@ -78,7 +78,7 @@ def test_a_value_that_varies_stays_within_its_bounds(logs, monkeypatch):
         return plain(self, drive, push, towards)
 
     plain = type(MODEL).predict
-    monkeypatch.setattr("sim2real.varying._solved", far_off)
+    monkeypatch.setattr("sim2real.which.varying._solved", far_off)
     monkeypatch.setattr(type(MODEL), "predict", predict)
     vary(entry, fit_to, held, "time")
     step = STEP * float(candidate.scale[0])

@@ -5,15 +5,15 @@ import pytest
 from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured, road_of
 
 from scenarios.effects import EFFECTS
-from sim2real.closure import floors
-from sim2real.contest import silent
 from sim2real.diagnose import find
-from sim2real.drive import ACCEL, SPEED
-from sim2real.findings import describe
-from sim2real.goodness import fitness
-from sim2real.noise import Noise
+from sim2real.observing.drive import ACCEL, SPEED
+from sim2real.observing.noise import Noise
 from sim2real.result import Verdict
-from sim2real.selection import explains
+from sim2real.telling.findings import describe
+from sim2real.which.closure import floors
+from sim2real.which.contest import silent
+from sim2real.which.goodness import fitness
+from sim2real.which.selection import explains
 
 ROAD = road_of(0.9, 0.6, 0.9, 0.6)
 OTHERS = set(EFFECTS) - {

@@ -12,8 +12,8 @@ from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant import simulate
 from scenarios.plant.pipeline import make_setup
 from scenarios.plant.sensors import SensorNoise, make_log, mu_reference
-from sim2real.drive import ACCEL, CHANNELS, SPEED, make_drive
-from sim2real.trpac_error import places, trpac_error
+from sim2real.how_far.trpac_error import places, trpac_error
+from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, make_drive
 
 NOISE = SensorNoise(wheel_speed_noise_rad_s=0.05, vehicle_speed_noise_m_s=0.02, accel_x_noise_m_s2=0.08)
 FINE_S, EVERY = 1e-3, 5

@@ -82,7 +82,7 @@ def diagnose(
 
     from scenarios.errors import ScenarioError
     from sim2real.diagnose import diagnose_files
-    from sim2real.report import rated, write_diagnosis
+    from sim2real.telling.report import rated, write_diagnosis
 
     command = "trpac gap diagnose"
     require_folder(command, out)
@@ -132,7 +132,7 @@ def demo(
     from scenarios.errors import ScenarioError
     from sim2real.demo import make_case, open_seal
     from sim2real.diagnose import diagnose_files
-    from sim2real.report import rated, write_diagnosis
+    from sim2real.telling.report import rated, write_diagnosis
 
     command = "trpac gap demo"
     require_folder(command, out)
@@ -190,7 +190,7 @@ def _tell_case(console: Console, case: Case) -> None:
 
 def _tell_truth(console: Console, case: Case, truth: Truth, said: Diagnosis) -> None:
     """The end of the demonstration: what was hidden against what was found."""
-    from sim2real.report import estimate
+    from sim2real.telling.report import estimate
 
     hidden = ", ".join(f"{name} {value:g}" for name, value in truth.parameters.items())
     _tell(
@@ -210,7 +210,7 @@ def _tell_truth(console: Console, case: Case, truth: Truth, said: Diagnosis) -> 
 
 def judge(hidden: str, said: Diagnosis) -> str:
     """Whether the diagnosis found the hidden effect, in a sentence with colours."""
-    from sim2real.report import percent
+    from sim2real.telling.report import percent
 
     ranked = [c.effect for c in said.causes]
     if hidden not in ranked:
@@ -229,7 +229,7 @@ def judge(hidden: str, said: Diagnosis) -> str:
 
 def _summarise(console: Console, said: Diagnosis) -> None:
     """Verdict, sizes and the first causes on the terminal."""
-    from sim2real.report import added, leading
+    from sim2real.telling.report import added, leading
 
     gap = said.gap
     sizes = f"gap {gap.before.total:.2f}"
@@ -247,7 +247,7 @@ def _summarise(console: Console, said: Diagnosis) -> None:
 
 
 def _cause_table(said: Diagnosis) -> Table:
-    from sim2real.report import estimate, percent
+    from sim2real.telling.report import estimate, percent
 
     table = Table(title="Causes, likeliest first", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("effect", no_wrap=True)

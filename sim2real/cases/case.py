@@ -12,11 +12,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from scenarios.errors import ScenarioError
 from scenarios.files import VehicleFile, load_road, load_vehicle
-from sim2real.drive import Drive, awake
-from sim2real.evidence import Evidence, gather
-from sim2real.gap import measure
+from sim2real.how_far.gap import measure
 from sim2real.logs import load_mapping, read_log
-from sim2real.observer import Simulation
+from sim2real.observing.drive import Drive, awake
+from sim2real.observing.evidence import Evidence, gather
+from sim2real.observing.observer import Simulation
 from sim2real.result import Measure
 from sim2real.sources import drive_of
 

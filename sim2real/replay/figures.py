@@ -15,8 +15,8 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from scenarios.files import WHEELS
-from sim2real.figures import AFTER, BEFORE, DPI, FLOOR, MEASURED, STYLE, WIDTH_IN
 from sim2real.replay.run import DYNAMICS, OURS, Replay
+from sim2real.telling.figures import AFTER, BEFORE, DPI, FLOOR, MEASURED, STYLE, WIDTH_IN
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import WHEELS, RoadFile, RoadSegment, VehicleFile
-from sim2real.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive, make_drive
 from sim2real.logs import Log, LogError, resample
-from sim2real.noise import RESOLUTION
-from sim2real.observer import Simulation
+from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive, make_drive
+from sim2real.observing.noise import RESOLUTION
+from sim2real.observing.observer import Simulation
 from trpac_core.estimator import LOCKED_M_S, EstimatorConfig
 from trpac_core.vehicle import Vehicle
 
@@ -111,8 +111,8 @@ def make_inputs(log: Log, vehicle: VehicleFile) -> Inputs:
     """The estimators' inputs of a log.
 
     The effects that the car file switches on are put where the estimator has a place for them: into its vehicle, on the
-    torque, or undone on the readings, as `sim2real.trpac_error` does. Load transfer is always there; its height is that
-    of the file's centre of gravity where the effect does not say another.
+    torque, or undone on the readings, as `sim2real.how_far.trpac_error` does. Load transfer is always there; its height
+    is that of the file's centre of gravity where the effect does not say another.
 
     Raises
     ------

@@ -16,7 +16,7 @@ import pandas as pd
 from scenarios.files import WHEELS
 from sim2real.replay import figures
 from sim2real.replay.run import DYNAMICS, OURS, Replay
-from sim2real.report import DASH, jsonable
+from sim2real.telling.report import DASH, jsonable
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 CSV_NAME, SUMMARY_NAME, REPORT_NAME = "estimates.csv", "summary.json", "report.html"

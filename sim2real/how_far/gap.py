@@ -1,0 +1,93 @@
+"""How large the gap is, and by how much it shrinks, in units of the sensors' noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim2real.observing.drive import GROUPS, UNITS
+from sim2real.observing.evidence import Evidence, residuals
+from sim2real.observing.observer import Simulation
+from sim2real.result import Interval, Measure
+
+Array = NDArray[np.float64]
+
+GAP_SIGNALS = ("wheel_speed", "vehicle_speed", "accel_x")
+"""Signals that the gap is measured on; position is evidence, but its noise is often too little known to divide by."""
+BOOTSTRAP = 400
+"""Resamplings behind an interval."""
+BLOCK_S = 1.0
+"""Length of the blocks that are resampled: beyond the observer's memory [s]."""
+QUANTILES = (0.025, 0.975)
+START_S = 0.2
+"""A free run begins from what was measured over this time [s]."""
+
+
+def measure(evidence: Evidence, rests: Sequence[Array]) -> Measure:
+    """Root mean square residual per signal in units of its noise, and over the signals."""
+    signals, si = {}, {}
+    for name in GAP_SIGNALS:
+        z, plain = [], []
+        for noise, rest in zip(evidence.noises, rests, strict=True):
+            scaled = noise.scaled(rest)[:, GROUPS[name]]
+            z.append(scaled[np.isfinite(scaled)])
+            plain.append(rest[:, GROUPS[name]][np.isfinite(scaled)])
+        values = np.concatenate(z)
+        if len(values):
+            signals[name] = float(np.sqrt(np.mean(values**2)))
+            si[f"{name} [{UNITS[name]}]"] = float(np.sqrt(np.mean(np.concatenate(plain) ** 2)))
+    return Measure(float(np.sqrt(np.mean(np.square(list(signals.values()))))), signals, si)
+
+
+def noise_floor(model: Simulation, evidence: Evidence, seed: int) -> float:
+    """What `measure` gives where the model is right: a free run of the model itself with fresh noise, followed."""
+    generator = np.random.default_rng(seed)
+    rests = []
+    for drive, noise in zip(evidence.drives, evidence.noises, strict=True):
+        begun = np.where((drive.time_s < drive.time_s[0] + START_S)[:, None], drive.measured, np.nan)
+        clean = model.predict(replace(drive, measured=begun)).channels
+        lost = ~np.isfinite(drive.measured)
+        noisy = np.where(lost, np.nan, clean + noise.draw(len(drive), generator))
+        again = replace(drive, measured=noisy)
+        rests.append(residuals(model, again))
+    return measure(evidence, rests).total
+
+
+def shrink(evidence: Evidence, before: Sequence[Array], after: Sequence[Array], seed: int) -> Interval:
+    """Shrink of the total gap with a 95 % interval, by resampling blocks of the drives [%]."""
+    weights_before, weights_after, counts = _block_squares(evidence, before, after)
+    blocks = len(counts)
+    generator = np.random.default_rng(seed)
+    values = []
+    for rows in generator.integers(0, blocks, (BOOTSTRAP, blocks)):
+        values.append(_shrink(weights_before[rows], weights_after[rows], counts[rows]))
+    low, high = np.nanquantile(values, QUANTILES)
+    value = _shrink(weights_before, weights_after, counts)
+    return Interval(value, float(min(low, value)), float(max(high, value)), "%")
+
+
+def _shrink(before: Array, after: Array, counts: Array) -> float:
+    total = np.maximum(counts.sum(axis=0), 1.0)
+    old = np.mean((before.sum(axis=0) / total)[counts.sum(axis=0) > 0])
+    new = np.mean((after.sum(axis=0) / total)[counts.sum(axis=0) > 0])
+    return float(100.0 * (1.0 - np.sqrt(new / old)))
+
+
+def _block_squares(
+    evidence: Evidence, before: Sequence[Array], after: Sequence[Array]
+) -> tuple[Array, Array, Array]:
+    """Per block and signal: sums of squares before and after, and how many samples stand behind them."""
+    rows_before, rows_after, rows_count = [], [], []
+    for drive, noise, old, new in zip(evidence.drives, evidence.noises, before, after, strict=True):
+        length = drive.rows_in(BLOCK_S)
+        z_old, z_new = noise.scaled(old), noise.scaled(new)
+        for at in range(0, len(drive), length):
+            cut = slice(at, at + length)
+            parts = [(z_old[cut, GROUPS[g]], z_new[cut, GROUPS[g]]) for g in GAP_SIGNALS]
+            rows_before.append([np.nansum(a**2) for a, _ in parts])
+            rows_after.append([np.nansum(b**2) for _, b in parts])
+            rows_count.append([np.isfinite(a).sum() for a, _ in parts])
+    return np.array(rows_before), np.array(rows_after), np.array(rows_count, dtype=np.float64)

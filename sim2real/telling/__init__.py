@@ -1,0 +1,1 @@
+"""What is said of a diagnosis: sizes and intervals, sentences, pictures, files."""

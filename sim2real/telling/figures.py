@@ -1,0 +1,285 @@
+"""The pictures of a diagnosis, each as the bytes of a PNG file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from io import BytesIO
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+
+from scenarios.files import WHEELS
+from sim2real.result import Gap, NextManoeuvre, Trace, Unexplained
+from sim2real.where.equations import QUANTITIES, TWO_SIDED
+
+Array = NDArray[np.float64]
+
+MEASURED, BEFORE, AFTER, FLOOR = "#30343b", "#d1622b", "#1f7a8c", "#8a8f98"
+"""One colour per thing, in all pictures and in the report's own bars."""
+HEAT = LinearSegmentedColormap.from_list("heat", ["#f7f5f2", "#f3c9a5", BEFORE, "#7a2e0e"])
+WIDTH_IN = 9.6
+DPI = 150
+STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "font.family": "DejaVu Sans",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#9aa0a8",
+    "axes.labelcolor": MEASURED,
+    "xtick.color": "#5c626b",
+    "ytick.color": "#5c626b",
+    "axes.grid": True,
+    "grid.color": "#e4e6e9",
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+}
+
+ZOOM_S = 2.0
+"""Length of the window that is looked at closely [s]."""
+MEAN_S = 0.1
+"""Window of the running mean that shows a pattern under the noise [s]."""
+LEFT_OUT = 0.005
+"""Share of the largest residuals that may leave the picture of the whole drive, so that a spike hides nothing [-]."""
+BAND_SIGMA = 2.0
+"""Half width of the shown noise band: 95 % of the samples of a right model lie in it."""
+
+
+@contextmanager
+def _sheet(
+    rows: int, columns: int, height_in: float, **options: Any
+) -> Iterator[tuple[Figure, Array, BytesIO]]:
+    """A figure, its axes, and the buffer that holds its PNG afterwards."""
+    buffer = BytesIO()
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(
+            rows,
+            columns,
+            figsize=(WIDTH_IN, height_in),
+            squeeze=False,
+            layout="constrained",
+            **options,
+        )
+        try:
+            yield figure, axes, buffer
+            figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+        finally:
+            plt.close(figure)
+
+
+def heat_map(shares: Mapping[str, Mapping[str, float]]) -> bytes:
+    """Share of the gap over subsystem (rows, largest first) and regime of driving."""
+    regimes = list(dict.fromkeys(r for row in shares.values() for r in row))
+    systems = sorted(shares, key=lambda s: -sum(shares[s].values()))
+    table = np.array([[shares[s].get(r, np.nan) for r in regimes] for s in systems])
+    top = max(float(np.nanmax(table)), 1e-9)
+    with _sheet(1, 1, 0.75 + 0.38 * len(systems)) as (_, axes, buffer):
+        axis: Axes = axes[0, 0]
+        axis.imshow(table, cmap=HEAT, vmin=0.0, vmax=top, aspect="auto")
+        for (i, j), share in np.ndenumerate(table):
+            text = "–" if np.isnan(share) else f"{100.0 * share:.0f} %"
+            axis.text(j, i, text, ha="center", va="center", color="white" if share > 0.55 * top else MEASURED)
+        axis.set_xticks(range(len(regimes)), regimes)
+        axis.set_yticks(range(len(systems)), [words(s) for s in systems])
+        axis.xaxis.tick_top()
+        axis.tick_params(length=0)
+        axis.grid(visible=False)
+        axis.spines[:].set_visible(False)
+        axis.set_xticks(np.arange(0.5, len(regimes) - 1.0), minor=True)
+        axis.set_yticks(np.arange(0.5, len(systems) - 1.0), minor=True)
+        axis.grid(which="minor", color="white", lw=3.0)
+        axis.tick_params(which="minor", length=0)
+    return buffer.getvalue()
+
+
+def gap_bars(gap: Gap) -> bytes:
+    """Gap per signal before and after, against what noise alone leaves."""
+    names = ["total", *gap.before.signals]
+    before = [gap.before.total, *gap.before.signals.values()]
+    after = [gap.after.total, *(gap.after.signals.get(n, np.nan) for n in gap.before.signals)]
+    bars = [(0.0, before, BEFORE, "gap")]
+    if gap.after != gap.before:
+        bars = [(-0.2, before, BEFORE, "before"), (0.2, after, AFTER, "after")]
+    place = np.arange(len(names))
+    with _sheet(1, 1, 1.1 + 0.2 * len(names) * (1 + len(bars))) as (_, axes, buffer):
+        axis: Axes = axes[0, 0]
+        for offset, values, colour, label in bars:
+            drawn = axis.barh(place + offset, values, 0.36, color=colour, label=label)
+            texts = ["" if np.isnan(v) else f"{v:.2f}" for v in values]
+            axis.bar_label(drawn, texts, padding=3, fontsize=8, color="#5c626b")
+        axis.axvline(gap.noise_floor, color=MEASURED, lw=1.0, ls=(0, (4, 3)), label="noise alone")
+        axis.set_yticks(place, [words(n) for n in names])
+        axis.get_yticklabels()[0].set_fontweight("bold")
+        axis.invert_yaxis()
+        axis.grid(visible=False, axis="y")
+        axis.tick_params(axis="y", length=0)
+        axis.set_xlabel("root mean square residual in units of the sensor's noise")
+        axis.set_xlim(0.0, 1.08 * max(np.nanmax(before), np.nanmax(after), gap.noise_floor))
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
+    return buffer.getvalue()
+
+
+def trace(shown: Trace) -> bytes:
+    """One signal over the hold-out, its residuals, and both again in the worst window."""
+    start, end = worst_window(shown)
+    with _sheet(2, 2, 3.5, sharex="col", width_ratios=[2.2, 1.0], height_ratios=[1.35, 1.0]) as (
+        _,
+        axes,
+        buffer,
+    ):
+        for column in (0, 1):
+            _curves(axes[0, column], shown)
+            _residuals(axes[1, column], shown)
+            axes[1, column].set_xlabel("time [s]")
+        axes[0, 0].set_xlim(shown.time_s[0], shown.time_s[-1])
+        axes[0, 1].set_xlim(start, end)
+        for axis in axes[:, 0]:
+            axis.axvspan(start, end, color="#f3e3d3", lw=0, zorder=-10)
+        axes[0, 0].set_ylabel(f"[{pretty_unit(shown.unit)}]")
+        axes[1, 0].set_ylabel(f"measured − model\n[{pretty_unit(shown.unit)}]")
+        axes[0, 1].set_title(f"worst window, {start:.1f} to {end:.1f} s", fontsize=9)
+        axes[0, 0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=8)
+        _fit_to_window(axes[0, 1], shown, start, end)
+        axes[1, 0].set_ylim(_limits(shown, shown.time_s[0], shown.time_s[-1], LEFT_OUT))
+        axes[1, 1].set_ylim(_limits(shown, start, end, 0.0))
+    return buffer.getvalue()
+
+
+def _same(shown: Trace) -> bool:
+    """Whether nothing was added, so that there is one simulation to draw."""
+    return bool(np.array_equal(shown.before, shown.after, equal_nan=True))
+
+
+def _curves(axis: Axes, shown: Trace) -> None:
+    label = "simulation" if _same(shown) else "simulation before"
+    axis.plot(shown.time_s, shown.measured, color=MEASURED, lw=1.6, alpha=0.55, label="measured")
+    axis.plot(shown.time_s, shown.before, color=BEFORE, lw=1.0, label=label)
+    if not _same(shown):
+        axis.plot(shown.time_s, shown.after, color=AFTER, lw=1.0, label="after")
+
+
+def _residuals(axis: Axes, shown: Trace) -> None:
+    band = BAND_SIGMA * shown.noise
+    axis.axhspan(-band, band, color="#e9ebee", lw=0)
+    models = [(shown.before, BEFORE)] if _same(shown) else [(shown.before, BEFORE), (shown.after, AFTER)]
+    for model, colour in models:
+        rest = shown.measured - model
+        axis.plot(shown.time_s, rest, color=colour, lw=0.5, alpha=0.45)
+        axis.plot(shown.time_s, _running_mean(shown.time_s, rest), color=colour, lw=1.3)
+
+
+def _running_mean(time_s: Array, values: Array) -> Array:
+    """Mean over a centred window of `MEAN_S`; lost samples are left out of it."""
+    window = np.ones(2 * round(0.5 * MEAN_S / (time_s[1] - time_s[0])) + 1)
+    there = np.convolve(np.isfinite(values), window, mode="same")
+    total = np.convolve(np.nan_to_num(values), window, mode="same")
+    return np.divide(total, there, out=np.full(len(values), np.nan), where=there > 0.5)
+
+
+def _limits(shown: Trace, start: float, end: float, left_out: float) -> tuple[float, float]:
+    """Symmetric limits for the residuals in a window but for this share of the largest."""
+    rows = (shown.time_s >= start) & (shown.time_s <= end)
+    rest = np.abs([shown.measured - shown.before, shown.measured - shown.after])[:, rows]
+    rest = rest[np.isfinite(rest)]
+    largest = float(np.quantile(rest, 1.0 - left_out)) if len(rest) else 0.0
+    limit = 1.1 * max(largest, 2.0 * BAND_SIGMA * shown.noise)
+    return -limit, limit
+
+
+def _fit_to_window(axis: Axes, shown: Trace, start: float, end: float) -> None:
+    """Limits of the closer look from what lies in it."""
+    rows = (shown.time_s >= start) & (shown.time_s <= end)
+    inside = np.concatenate([a[rows] for a in (shown.measured, shown.before, shown.after)])
+    inside = inside[np.isfinite(inside)]
+    if len(inside) and np.ptp(inside) > 0.0:
+        axis.set_ylim(inside.min() - 0.08 * np.ptp(inside), inside.max() + 0.08 * np.ptp(inside))
+
+
+def worst_window(shown: Trace, length_s: float = ZOOM_S) -> tuple[float, float]:
+    """Start and end of the window in which the simulation before is furthest off in the mean square [s]."""
+    step_s = float(shown.time_s[1] - shown.time_s[0])
+    rows = min(max(round(length_s / step_s), 1), len(shown.time_s))
+    square = np.nan_to_num((shown.measured - shown.before) ** 2)
+    sums = np.convolve(square, np.ones(rows), mode="valid")
+    first = int(np.argmax(sums))
+    return float(shown.time_s[first]), float(shown.time_s[first + rows - 1])
+
+
+def missing_term(term: Unexplained) -> bytes:
+    """The shape of a term that no effect of the library has."""
+    with _sheet(1, 1, 2.9) as (_, axes, buffer):
+        axis: Axes = axes[0, 0]
+        axis.axhline(0.0, color=FLOOR, lw=0.8)
+        begins = np.diff(term.x) < 0.0  # one curve per log where the quantity is time
+        if term.depends_on in TWO_SIDED:
+            begins |= np.diff(np.sign(term.x)) > 0.0
+        starts = np.flatnonzero(begins) + 1
+        for x, y in zip(np.split(term.x, starts), np.split(term.y, starts), strict=True):
+            axis.plot(x, y, color=BEFORE, lw=1.6, alpha=0.8, marker="o", ms=3.0)
+        axis.set_xlabel(_quantity_label(term.depends_on))
+        axis.set_ylabel(f"missing term in\n{words(term.subsystem)} [{pretty_unit(term.unit)}]")
+    return buffer.getvalue()
+
+
+def _quantity_label(quantity: str) -> str:
+    """Axis label of what a missing term depends on."""
+    unit = f" [{pretty_unit(QUANTITIES[quantity][0])}]" if quantity in QUANTITIES else ""
+    return f"{words(quantity)}{unit}" + (", negative where it brakes" if quantity in TWO_SIDED else "")
+
+
+def profile(manoeuvre: NextManoeuvre) -> bytes:
+    """The torque to drive next; wheels that get the same share a line."""
+    lines: dict[bytes, list[str]] = {}
+    for i, wheel in enumerate(WHEELS):
+        lines.setdefault(manoeuvre.wheel_torque_nm[:, i].tobytes(), []).append(wheel)
+    with _sheet(1, 1, 2.7) as (_, axes, buffer):
+        axis: Axes = axes[0, 0]
+        axis.axhline(0.0, color=FLOOR, lw=0.8)
+        for colour, wheels in zip((AFTER, BEFORE, "#7a5195", "#7f8c3a"), lines.values(), strict=False):
+            torque = manoeuvre.wheel_torque_nm[:, WHEELS.index(wheels[0])]
+            label = "all wheels" if len(wheels) == len(WHEELS) else ", ".join(wheels)
+            axis.plot(manoeuvre.time_s, torque, color=colour, lw=1.6, label=label)
+        axis.set_xlim(manoeuvre.time_s[0], manoeuvre.time_s[-1])
+        axis.set_xlabel("time [s]")
+        axis.set_ylabel("torque per wheel [N m]")
+        axis.legend(loc="upper right", fontsize=8, ncols=4)
+    return buffer.getvalue()
+
+
+UNIT_ENDINGS = {
+    "_rad_s": "rad/s",
+    "_m_s2": "m/s^2",
+    "_m_s": "m/s",
+    "_nm": "N m",
+    "_rad": "rad",
+    "_m": "m",
+    "_s": "s",
+    "_n": "N",
+}
+"""How the contract's names end, longest first, and the unit that this says."""
+
+
+def label_of(name: str) -> str:
+    """A name in code as an axis label: `vehicle_speed_m_s` is 'vehicle speed [m/s]'."""
+    for ending, unit in UNIT_ENDINGS.items():
+        if name.endswith(ending):
+            return f"{words(name.removesuffix(ending))} [{pretty_unit(unit)}]"
+    return words(name)
+
+
+def words(name: str) -> str:
+    """A name in code as words."""
+    return name.replace("_", " ")
+
+
+def pretty_unit(unit: str) -> str:
+    """A unit with its powers raised."""
+    return unit.replace("^2", "²").replace("^3", "³")

@@ -1,0 +1,343 @@
+"""From what was found to what is said: sizes, places, causes with intervals and evidence, sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.effects import EFFECTS, Effect
+from sim2real.how_far.gap import measure, noise_floor, shrink
+from sim2real.next_manoeuvre import propose
+from sim2real.observing.drive import CHANNELS
+from sim2real.observing.evidence import Evidence, all_logs
+from sim2real.observing.lattice import Lattice
+from sim2real.observing.observer import Simulation
+from sim2real.observing.orders import Order
+from sim2real.observing.orders import characterise as swing_in_words
+from sim2real.observing.robust import loss
+from sim2real.result import (
+    Cause,
+    Diagnosis,
+    Gap,
+    Interval,
+    NextManoeuvre,
+    Place,
+    Structure,
+    Trace,
+    Unexplained,
+    Variation,
+    Verdict,
+)
+from sim2real.telling import sentences
+from sim2real.telling.estimates import as_means, at_bound, is_excited, joint, over_forms
+from sim2real.where import localise
+from sim2real.where.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
+from sim2real.where.terms import Term, finer, fit_terms, with_refined
+from sim2real.where.unknown import characterise, seen_alone
+from sim2real.which import sluggish
+from sim2real.which.contest import Contest, Entry, Progress
+from sim2real.which.goodness import fitness
+from sim2real.which.selection import Decision
+from sim2real.which.suspect import lone_sensor
+
+Array = NDArray[np.float64]
+
+SHOWN = {
+    "vehicle_speed_m_s": "m/s",
+    "wheel_speed_fl_rad_s": "rad/s",
+    "wheel_speed_rl_rad_s": "rad/s",
+    "accel_x_m_s2": "m/s^2",
+}
+"""Channels that are drawn, and their units."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """A decided contest with the evidence that it was held on."""
+
+    model: Simulation
+    fit_to: Evidence
+    holdout: Evidence
+    contest: Contest
+    decision: Decision
+    lattice: Lattice | None = None
+    order: Order | None = None
+    """What repeats with the wheels' angle: it was taken off the logs before the contest."""
+    only_order: bool = False
+    """Whether that is the whole gap."""
+
+    def added(self) -> tuple[Effect, ...]:
+        """What the verdict blames, to be added to the model."""
+        return tuple(effect for effect in self._of_winner() if not effect.structural)
+
+    def structure(self) -> tuple[Effect, ...]:
+        """What stands beside it and is not blamed."""
+        return tuple(effect for effect in self._of_winner() if effect.structural)
+
+    def _of_winner(self) -> tuple[Effect, ...]:
+        entry = self.decision.winner
+        if entry.fit is None or self.decision.verdict is Verdict.UNKNOWN:
+            return ()
+        return tuple(entry.fit.candidate.effects(entry.fit.x))
+
+
+def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Diagnosis:
+    """Everything that a diagnosis says."""
+    decision = found.decision
+    held = _final_noise(found).swinging()
+    before = held.residuals(found.model)
+    added = found.model.with_effects(*found.added())
+    after = held.residuals(added)
+    whole = added.with_effects(*found.structure())
+    gap = Gap(measure(held, before), measure(held, after), noise_floor(whole, held, seed))
+    structure = _structure(found, held, whole)
+    variation = _variation(decision)
+    causes = _causes(found, held, before, seed)
+    swing = _swinging(found) if found.order else None
+    terms, unexplained = list[Term](), None
+    places: tuple[Place, ...] = ()
+    heat: dict[str, dict[str, float]] = {}
+    if decision.verdict is not Verdict.NO_GAP:
+        progress("equations", 0, 1)
+        terms, unexplained = _terms(found, held, jobs)
+        progress("equations", 1, 1)
+        if unexplained:
+            unexplained = seen_alone(_most_telling(found, unexplained, swing), gap.before)
+        subsystem = unexplained.subsystem if unexplained else _subsystem(decision, terms)
+        taken = loss(held.whitened(before)) - loss(held.whitened(after))
+        places, heat = _where(found, held, before, terms, subsystem, taken)
+    return Diagnosis(
+        verdict=decision.verdict,
+        sentence=" ".join(
+            part
+            for part in (
+                sentences.verdict(decision, gap, causes, structure),
+                unexplained.sentence if unexplained else "",
+                "" if found.only_order else sentences.nearest(decision, found.contest),
+                sentences.beside(structure),
+                sentences.uneven(variation),
+                swing.sentence if swing and unexplained is not swing else "",
+            )
+            if part
+        ),
+        gap=gap,
+        where=places,
+        heat_map=heat,
+        causes=causes,
+        ambiguous_with=_ambiguous(decision),
+        structure=structure,
+        variation=variation,
+        cannot_rule_out=tuple(c.effect for c in causes if not c.excited),
+        next_manoeuvre=_next(found, progress),
+        unexplained=unexplained,
+        traces=_traces(found, held, added),
+        provenance={"seed": seed},
+    )
+
+
+def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unexplained | None]:
+    """Free terms, best first, and what they say of a gap that no effect explains."""
+    decision = found.decision
+    if decision.verdict is not Verdict.UNKNOWN:
+        return fit_terms(
+            found.model, held.drives, held.noises, jobs, equations=WHOLE_CAR, quantities=OF_THE_MOTION
+        ), None
+    drives, noises = all_logs(found.fit_to, held)
+    suspect = None
+    if decision.left_open:  # the gap lies where the rows are doubtful
+        noises = tuple(replace(n, widening=np.ones_like(n.widening)) for n in noises)
+    else:
+        suspect = lone_sensor(found.model, found.fit_to, held)
+    terms = fit_terms(found.model, drives, noises, jobs, equations=(suspect,) if suspect else EQUATIONS)
+    terms = with_refined(found.model, drives, noises, terms, jobs)
+    if not suspect:
+        terms = finer(found.model, drives[-1:], noises[-1:], terms, jobs)
+    return terms, characterise(terms, suspect)
+
+
+def _most_telling(found: Findings, term: Unexplained, swing: Unexplained | None) -> Unexplained:
+    """Of a free term, what repeats with the wheels' angle and the impostor: what takes most of the gap."""
+    if swing and found.only_order:
+        return swing
+    said = (term, swing, sluggish.characterise(found.contest))
+    return max((each for each in said if each), key=lambda each: each.share)
+
+
+def _swinging(found: Findings) -> Unexplained:
+    """What repeats with the wheels' angle, and what of the misfit it takes."""
+    assert found.order is not None
+    calm = [found.fit_to, found.holdout]
+    left = sum(loss(e.whitened(e.residuals(found.model))) for e in calm)
+    whole = sum(loss(e.whitened(e.residuals(found.model))) for e in (part.swinging() for part in calm))
+    return swing_in_words(found.order, [d for e in calm for d in e.drives], 1.0 - left / max(whole, 1e-12))
+
+
+def _final_noise(found: Findings) -> Evidence:
+    """The hold-out with its noise read anew from what the winner leaves: a gap may have looked like noise."""
+    if not found.added():
+        return found.holdout
+    return found.holdout.sharpened(found.model.with_effects(*found.added(), *found.structure()))
+
+
+def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int) -> tuple[Cause, ...]:
+    """All single candidates, ranked; a compound's members first, with their joint parameters."""
+    winner = found.decision.winner
+    compound = found.decision.verdict is Verdict.COMPOUND
+    together = joint(winner, found.fit_to) if compound or found.structure() else {}
+    out = [_cause(found, entry, held, before, seed, together) for entry in found.contest.singles]
+    first = winner.ids if compound else ()
+    return tuple(sorted(out, key=lambda c: (c.effect not in first, -c.probability, c.gap_after)))
+
+
+def _cause(
+    found: Findings,
+    entry: Entry,
+    held: Evidence,
+    before: Sequence[Array],
+    seed: int,
+    together: dict[tuple[str, str], Interval],
+) -> Cause:
+    key, best = entry.ids[0], entry.fitted
+    blamed = [e for e in found.added() if e.id == key] if found.structure() else []
+    after = held.residuals(found.model.with_effects(*blamed) if blamed else best.candidate.model(best.x))
+    size = measure(held, after).total
+    alone = over_forms(entry, found.contest, found.fit_to, found.holdout)
+    values = {name: value for (effect, name), value in together.items() if effect == key}
+    told = found.decision.winner if values else entry  # a pair's member may have another form there
+    values = values or {name: value for (_, name), value in alone.items()}
+    if found.decision.varied and key in found.decision.winner.ids:
+        values = as_means(values, found.decision.varied, told.fitted, key)
+    told_first = int(np.flatnonzero(np.isfinite(best.candidate.open_share))[0])
+    excited = is_excited(
+        list(alone.values())[told_first],
+        float(best.candidate.neutral[told_first]),
+        float(best.candidate.scale[told_first]),
+    )
+    fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
+    worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
+    shrunk = shrink(held, before, after, seed)
+    pro, contra = [], []
+    if shrunk.low > 0.0:
+        pro.append(f"Takes {shrunk.value:.0f} % off the gap of a log that it was not fitted to.")
+    if fit_ok.misfit <= 1.5:
+        pro.append("What it leaves averages out like noise.")
+    else:
+        contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
+    winner = found.decision.winner
+    if entry is winner and found.decision.left_open:
+        contra.append(
+            f"Leaves {100.0 * found.decision.left_open:.0f} % of the gap on the hold-out, as energy."
+        )
+    if found.decision.curve and key in winner.ids:
+        work = "the work of both" if "+" in winner.name else "its work"
+        contra.append(
+            f"A free curve ({found.decision.curve}) does {work} as well, and one beside it finds more."
+        )
+    if entry is winner and found.decision.further:
+        contra.append(f"Only what its form adds ({best.candidate.kinds[0].form}) is needed, not what it is.")
+    if not excited:
+        contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
+    for name in at_bound(best):
+        contra.append(
+            f"{name} lies at its bound: more of it is not thought plausible, so look for another cause."
+        )
+    if shrunk.high <= 1.0:
+        contra.append("Does not shrink the gap on the hold-out.")
+    return Cause(
+        effect=key,
+        probability=round(found.decision.probability.get(key, 0.0), 6),
+        parameters=values,
+        gap_after=size,
+        shrink_percent=shrunk,
+        fit_bic=float(entry.loss_fit + entry.size * np.log(max(int(np.count_nonzero(entry.z_fit)), 2))),
+        evidence_for=tuple(pro),
+        evidence_against=tuple(contra),
+        excited=excited,
+        form=told.fitted.candidate.kinds[told.ids.index(key)].form,
+    )
+
+
+def _variation(decision: Decision) -> Variation | None:
+    """How the cause varies, where it does; of two, the one that varies more against its size."""
+    varied = decision.varied
+    if varied is None:
+        return None
+    found = varied.entry.fitted
+    sizes = np.maximum(np.abs(found.x - found.candidate.neutral), 1e-9)
+    size = {(key, p.name): s for (key, p), s in zip(found.candidate.parameters, sizes, strict=True)}
+    most, _ = max(varied.spread, key=lambda name: varied.spread[name] / size[name])
+    return Variation(
+        most, varied.over, {name: value for (key, name), value in varied.spread.items() if key == most}
+    )
+
+
+def _subsystem(decision: Decision, terms: Sequence[Term]) -> str:
+    if decision.verdict is Verdict.UNKNOWN or decision.winner.fit is None:
+        return terms[0].equation.subsystem if terms else ""
+    return EFFECTS[decision.winner.ids[0]].subsystem
+
+
+def _where(
+    found: Findings,
+    held: Evidence,
+    before: Sequence[Array],
+    terms: Sequence[Term],
+    subsystem: str,
+    taken: float,
+) -> tuple[tuple[Place, ...], dict[str, dict[str, float]]]:
+    """Places and heat map; what the verdict adds is a term of its subsystem too, and takes `taken` off the loss."""
+    null = sum(term.null_loss for term in terms[:1])
+    shares = localise.equation_shares(
+        [(subsystem, taken), *((t.equation.subsystem, null - t.loss) for t in terms)]
+    )
+    parts = [
+        localise.blocks(drive, noise, found.model.predict(drive), rest)
+        for drive, noise, rest in zip(held.drives, held.noises, before, strict=True)
+    ]
+    places = tuple(
+        place
+        for drive, part in zip(held.drives, parts, strict=True)
+        for place in localise.places(drive, part, subsystem)
+    )
+    return places, localise.heat_map(parts, shares)
+
+
+def _structure(found: Findings, held: Evidence, whole: Simulation) -> Structure | None:
+    """What stands beside the cause, with its estimates and the gap that both leave."""
+    for effect in found.structure():
+        told = joint(found.decision.winner, found.fit_to)
+        values = {name: value for (key, name), value in told.items() if key == effect.id}
+        return Structure(effect.id, values, measure(held, held.residuals(whole)).total)
+    return None
+
+
+def _ambiguous(decision: Decision) -> tuple[tuple[str, ...], ...]:
+    if not decision.rivals:
+        return ()
+    members = [decision.winner, *decision.rivals]
+    return (tuple(entry.name for entry in members),)
+
+
+def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:
+    decision = found.decision
+    if decision.verdict is not Verdict.AMBIGUOUS:
+        return None
+    a, b = decision.winner, decision.rivals[0]
+    now = float(np.sqrt(abs(b.loss - a.loss)))
+    drive, noise = found.holdout.drives[0], found.holdout.noises[0]
+    return propose(found.model, a, b, drive.road, noise, now, progress)
+
+
+def _traces(found: Findings, held: Evidence, added: Simulation) -> tuple[Trace, ...]:
+    drive, noise = held.drives[0], held.noises[0]
+    before, after = found.model.predict(drive).channels, added.predict(drive).channels
+    return tuple(
+        Trace(
+            name, unit, drive.time_s, drive.measured[:, i], before[:, i], after[:, i], float(noise.sigma[i])
+        )
+        for name, unit in SHOWN.items()
+        for i in [CHANNELS.index(name)]
+    )

@@ -1,0 +1,265 @@
+"""diagnosis.json and report.html: what a diagnosis says, for machines and for people."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import tempfile
+from base64 import b64encode
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from scenarios.effects import EFFECTS
+from scenarios.files import WHEELS
+from sim2real.how_far.rating import rate
+from sim2real.result import MEANING, Cause, Diagnosis, Interval, NextManoeuvre, Trace, Verdict
+from sim2real.telling import figures
+
+TEMPLATE = Path(__file__).with_name("report.html.jinja")
+JSON_NAME, REPORT_NAME = "diagnosis.json", "report.html"
+DASH = "–"
+
+LEADING_FROM = 0.02
+"""Probability from which a cause gets a card of its own [-]."""
+MOST_LEADING = 5
+NEEDED = {Verdict.IDENTIFIED: 1, Verdict.COMPOUND: 2}
+"""How many of the first causes a verdict says to model."""
+ADDED = {**NEEDED, Verdict.AMBIGUOUS: 1}
+"""How many of the first causes the gap after is measured with."""
+
+
+def write_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> tuple[Path, Path]:
+    """Write diagnosis.json and report.html into a folder, which is made where it is missing.
+
+    Both are made whole beside the folder first, so it never holds half a result.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be written to.
+    """
+    folder = Path(folder)
+    contents = {
+        JSON_NAME: json.dumps(jsonable(diagnosis.to_json()), indent=1, allow_nan=False) + "\n",
+        REPORT_NAME: render(diagnosis),
+    }
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=folder.parent) as scratch:
+        for name, text in contents.items():
+            (Path(scratch) / name).write_text(text, encoding="utf-8")
+        folder.mkdir(exist_ok=True)
+        for name in contents:
+            os.replace(Path(scratch) / name, folder / name)
+    return folder / JSON_NAME, folder / REPORT_NAME
+
+
+def rated(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with the ISO/TS 18571 ratings of its traces, which cost seconds and decide nothing."""
+    return replace(diagnosis, rating=rate(shown_traces(diagnosis)))
+
+
+def jsonable(value: Any) -> Any:
+    """The same with plain numbers; what is not a finite number (an undefined one) becomes null."""
+    if isinstance(value, dict):
+        return {str(k): jsonable(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [jsonable(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return jsonable(value.tolist())
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the report: its data address, and what it shows."""
+
+    source: str
+    alt: str
+
+
+def render(diagnosis: Diagnosis) -> str:
+    """The report as one HTML page that needs nothing beside it."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATE.parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(
+        number=number,
+        percent=percent,
+        estimate=estimate,
+        is_number=math.isfinite,
+        words=figures.words,
+        unit=figures.pretty_unit,
+        label=figures.label_of,
+    )
+    return environment.get_template(TEMPLATE.name).render(
+        d=diagnosis,
+        meaning=MEANING[diagnosis.verdict],
+        colours=figures,
+        effects=EFFECTS,
+        needed=needed(diagnosis),
+        added=added(diagnosis),
+        leading=leading(diagnosis),
+        none_of_these=max(0.0, 1.0 - sum(c.probability for c in diagnosis.causes)),
+        shrink=shrink(diagnosis),
+        possible=possible_shrink(diagnosis),
+        snippet=vehicle_snippet(needed(diagnosis)),
+        provenance=provenance_rows(diagnosis.provenance),
+        pictures=_pictures(diagnosis),
+        traces=[(t, _picture(figures.trace(t), f"{t.signal} over time")) for t in shown_traces(diagnosis)],
+        profile=None if diagnosis.next_manoeuvre is None else profile_csv(diagnosis.next_manoeuvre),
+    )
+
+
+def needed(diagnosis: Diagnosis) -> tuple[Cause, ...]:
+    """The causes that the verdict says to model: none where it names no single set."""
+    return diagnosis.causes[: NEEDED.get(diagnosis.verdict, 0)]
+
+
+def added(diagnosis: Diagnosis) -> tuple[Cause, ...]:
+    """The causes that the gap after is measured with; in an ambiguous verdict the likeliest."""
+    return diagnosis.causes[: ADDED.get(diagnosis.verdict, 0)]
+
+
+def leading(diagnosis: Diagnosis) -> tuple[Cause, ...]:
+    """The causes worth a closer look; none where nothing may be blamed."""
+    if diagnosis.verdict is Verdict.NO_GAP:
+        return ()
+    return tuple(c for c in diagnosis.causes if c.probability >= LEADING_FROM)[:MOST_LEADING]
+
+
+def shrink(diagnosis: Diagnosis) -> Interval:
+    """How far the hold-out's gap shrinks by what the verdict adds [%]; bounds are NaN where they are not known."""
+    if len(added(diagnosis)) == 1:
+        return diagnosis.causes[0].shrink_percent
+    gap = diagnosis.gap
+    return Interval(100.0 * (1.0 - gap.after.total / gap.before.total), math.nan, math.nan, "%")
+
+
+def possible_shrink(diagnosis: Diagnosis) -> float:
+    """The shrink that would leave nothing but noise [%]."""
+    return max(0.0, 100.0 * (1.0 - diagnosis.gap.noise_floor / diagnosis.gap.before.total))
+
+
+def vehicle_snippet(causes: tuple[Cause, ...]) -> str | None:
+    """Lines of vehicle.yaml that put the causes into the simulation."""
+    if not causes:
+        return None
+    lines = ["effects:"]
+    for cause in causes:
+        values = ", ".join(f"{name}: {interval.value:.4g}" for name, interval in cause.parameters.items())
+        lines.append(f"  {cause.effect}: {{{values}}}")
+    forms = [f"  {cause.effect}: {cause.form}" for cause in causes if cause.form]
+    lines += ["forms:", *forms] if forms else []
+    return "\n".join(lines)
+
+
+def shown_traces(diagnosis: Diagnosis) -> list[Trace]:
+    """Traces that have something to compare, worst first, in units of their noise.
+
+    Where the verdict adds nothing there is no after: a candidate that was refused is not drawn as if it were taken.
+    """
+
+    def size(trace: Trace) -> float:
+        return float(np.sqrt(np.nanmean((trace.measured - trace.before) ** 2)) / trace.noise)
+
+    comparable = [t for t in diagnosis.traces if np.isfinite(t.measured - t.before).any()]
+    if not added(diagnosis):
+        comparable = [replace(t, after=t.before) for t in comparable]
+    return sorted(comparable, key=size, reverse=True)
+
+
+def profile_csv(manoeuvre: NextManoeuvre) -> str:
+    """The torque profile as a data address of a CSV file with the log contract's column names."""
+    names = ["time_s", *(f"wheel_torque_{w}_nm" for w in WHEELS)]
+    text = io.StringIO()
+    table = np.column_stack([manoeuvre.time_s, manoeuvre.wheel_torque_nm])
+    np.savetxt(text, table, fmt="%.6g", delimiter=",", header=",".join(names), comments="")
+    return _address(text.getvalue().encode("ascii"), "text/csv")
+
+
+def provenance_rows(value: Any, label: str = "") -> list[tuple[str, str, str]]:
+    """What a diagnosis was made from, as label, value and, for a file, its SHA-256."""
+    if isinstance(value, dict):
+        rows = []
+        if {"path", "sha256"} <= set(value):
+            rows.append((label, str(value["path"]), str(value["sha256"])))
+            value = {k: v for k, v in value.items() if k not in ("path", "sha256")}
+        return rows + [
+            row
+            for k, v in value.items()
+            for row in provenance_rows(v, f"{label} {figures.words(str(k))}".strip())
+        ]
+    if isinstance(value, (list, tuple)):
+        return [row for i, v in enumerate(value, 1) for row in provenance_rows(v, f"{label} {i}")]
+    return [(label, f"{value:g}" if isinstance(value, float) else str(value), "")]
+
+
+def _pictures(diagnosis: Diagnosis) -> dict[str, Picture]:
+    """The pictures that this diagnosis has."""
+    made = {
+        "gap": _picture(
+            figures.gap_bars(diagnosis.gap), "Gap per signal before and after, and the noise floor"
+        )
+    }
+    if diagnosis.heat_map:
+        heat = figures.heat_map(diagnosis.heat_map)
+        made["heat"] = _picture(heat, "Share of the gap by subsystem and regime of driving")
+    if diagnosis.unexplained is not None:
+        term = diagnosis.unexplained
+        made["term"] = _picture(figures.missing_term(term), f"The missing term over {term.depends_on}")
+    if diagnosis.next_manoeuvre is not None:
+        made["profile"] = _picture(figures.profile(diagnosis.next_manoeuvre), "Torque per wheel over time")
+    return made
+
+
+def _picture(png: bytes, alt: str) -> Picture:
+    return Picture(_address(png, "image/png"), alt)
+
+
+def _address(data: bytes, media_type: str) -> str:
+    return f"data:{media_type};base64,{b64encode(data).decode('ascii')}"
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """A number as the tables show it; a dash where there is none."""
+    return DASH if value is None or not math.isfinite(value) else f"{value:.{digits}f}"
+
+
+def percent(share: float | None) -> str:
+    """A share of 1 as per cent, with a digit more near none and all; what is not all is never shown as all."""
+    if share is None or not math.isfinite(share):
+        return DASH
+    if 0.0 < share < 0.0005:
+        return "< 0.1 %"
+    if 0.9995 <= share < 1.0:
+        return "> 99.9 %"
+    return f"{100.0 * share:.1f} %" if 0.0 < share < 0.01 or 0.99 < share < 1.0 else f"{100.0 * share:.0f} %"
+
+
+def estimate(interval: Interval) -> str:
+    """A value with its interval and unit, with as many digits as the interval's width makes sense of."""
+    unit = "" if interval.unit in ("-", "") else f" {figures.pretty_unit(interval.unit)}"
+    if not math.isfinite(interval.value):
+        return DASH
+    known = math.isfinite(interval.low) and math.isfinite(interval.high)
+    width = interval.high - interval.low if known else 0.0
+    scale = max(width, 0.01 * abs(interval.value) if width <= 0.0 else 1e-6 * abs(interval.value))
+    digits = 0 if scale == 0.0 else max(0, 1 - math.floor(math.log10(scale)))
+    value = f"{interval.value:.{digits}f}"
+    if not known:
+        return value + unit
+    return f"{value}{unit} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"
