@@ -100,8 +100,9 @@ BORDER_TOLERANCE_M = 1e-7
 """A contact point this close to the next road segment counts as being on it [m]."""
 
 compiled = njit(cache=True, error_model="numpy")  # divisions are guarded here, not by the compiler
-# As calls these would count references of every working array, which takes twice as long as their arithmetic.
-inlined = njit(cache=True, error_model="numpy", inline="always")
+# As calls these would pass on fifty numbers and count references of every working array, which takes as long as their
+# arithmetic; what LLVM merges compiles faster than what numba does.
+inlined = njit(cache=True, error_model="numpy", forceinline=True)
 
 # Rows of the wheels' working array. It is one array, since each one that a call passes on costs time.
 _STEADY, _LAG, _SLOPE_WHEEL, _SLOPE_SPEED = range(4)  # the tyre's, filled by `forces`
@@ -118,7 +119,7 @@ def falling_shape(theta: float, slip: float) -> tuple[float, float]:
     return square * slip * slip - line * slip + INITIAL_SLOPE, 2.0 * square * slip - line
 
 
-@compiled
+@inlined
 def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> tuple[float, float, float]:
     """Modified Dugoff force without side slip, and its slopes.
 
@@ -153,14 +154,14 @@ def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> 
     return force, by_slip, theta * (1.0 - adhering) * shape
 
 
-@compiled
+@inlined
 def bump(x: float, at: float) -> tuple[float, float]:
     """A deviation that is 1 at a place and vanishes far from it on both sides, and its slope."""
     square = (x / at) ** 2
     return 4.0 * square / (1.0 + square) ** 2, 8.0 * x / (at * at) * (1.0 - square) / (1.0 + square) ** 3
 
 
-@compiled
+@inlined
 def reshaped(
     tyre: tuple[float, float, float], slip: float, grip_n: float, load_n: float, p: DynamicsParameters
 ) -> tuple[float, float, float]:
@@ -178,7 +179,7 @@ def reshaped(
     return force * ratio, by_slip, by_load
 
 
-@compiled
+@inlined
 def peak_force(theta: float, load_n: float, stiffness_n: float) -> tuple[float, float]:
     """The greatest force of the modified Dugoff tyre over all slips [N], and its derivative by load [-].
 
@@ -199,7 +200,7 @@ def peak_force(theta: float, load_n: float, stiffness_n: float) -> tuple[float, 
     return force, by_load
 
 
-@compiled
+@inlined
 def by_formula(
     tyre: tuple[float, float, float],
     theta: float,
@@ -234,7 +235,7 @@ def by_formula(
     )
 
 
-@compiled
+@inlined
 def segment_at(start_m: NDArray, contact_m: float) -> int:
     """Index of the road segment under a contact point."""
     index = 0
@@ -243,7 +244,7 @@ def segment_at(start_m: NDArray, contact_m: float) -> int:
     return index
 
 
-@compiled
+@inlined
 def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, theta: NDArray) -> float:
     """Fill theta under the wheels; return the least distance from a contact to the border ahead of it [m]."""
     front_m = position_m + p.cog_to_front_axle_m
@@ -327,7 +328,7 @@ def initial_y(speed_m_s: float, position_m: float, p: DynamicsParameters) -> NDA
     return y
 
 
-@compiled
+@inlined
 def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Fill loads, slips, signed forces and force slopes; return what the accelerometer reads [m/s^2].
 
@@ -404,14 +405,14 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
     return max(accel, p.slope_m_s2) if speed <= 0.0 else accel
 
 
-@compiled
+@inlined
 def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, first: Wheels) -> float:
     """Make `first` hold what `advance` needs after y was changed from outside; return the accelerometer [m/s^2]."""
     look_up_theta(y[POSITION], p, road, first.theta)
     return forces(y, accel, p, first)
 
 
-@compiled
+@inlined
 def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
     """Omega' of one wheel [rad/s^2]; a resting wheel that nothing drives forward stays at rest."""
     coefficient = _of_axle(i, p.rolling_coefficient, p.axle_rolling_coefficient)
@@ -423,7 +424,7 @@ def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParamet
     return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
 
 
-@compiled
+@inlined
 def _motor_torque(speed_rad_s: float, torque_nm: float) -> tuple[float, float]:
     """What a motor makes of its torque [N m], and its damping [N m s/rad].
 
@@ -538,7 +539,7 @@ def _solve(
     return k_speed
 
 
-@compiled
+@inlined
 def _states(p: DynamicsParameters) -> int:
     """How many entries of y are in use."""
     return STATES if p.relaxation_m > 0.0 or p.motor_inertia_kg_m2 > 0.0 else FORCE
@@ -586,7 +587,7 @@ def _try_step(
     return 0.5 * h * error, accel
 
 
-@compiled
+@inlined
 def advance(
     y: NDArray,
     trial: NDArray,

@@ -10,7 +10,7 @@ LINE_AND_TAIL = 9
 """Their codes."""
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def fallen(curve: int, sliding: float, floor: float) -> float:
     """Share of the friction that is left; `sliding` is the speed times the falloff [-].
 

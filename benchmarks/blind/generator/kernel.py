@@ -105,7 +105,7 @@ def tyre_force(
     return force if slip >= 0.0 else -force
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def relaxing(p: Physics, slip: float, theta: float, load: float) -> float:
     """Relaxation length of a tyre whose lagged slip is `slip` [m].
 
@@ -120,7 +120,7 @@ def relaxing(p: Physics, slip: float, theta: float, load: float) -> float:
     return length
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def lean(p: Physics, y: Array, reading: float, dy: Array) -> None:
     """How the body follows its acceleration, into `dy`: at once and in part through springs, or as a mass on them."""
     if p.body_rate > 0.0:
@@ -136,7 +136,7 @@ def lean(p: Physics, y: Array, reading: float, dy: Array) -> None:
     dy[BODY] = (reading - y[BODY]) / p.springs_time if p.springs_share > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float:
     """Derivative of the state into `dy`; returns what an ideal accelerometer reads [m/s^2]."""
     speed, length = y[V], p.front_arm + p.rear_arm
@@ -316,25 +316,31 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
     return reading
 
 
-@njit(cache=True)
-def step(p: Physics, y: Array, time: float, h: float, command: Array, k: Array, trial: Array) -> None:
-    """One step of the classical Runge-Kutta method, in place."""
-    slope(p, y, time, command, k[0])
-    trial[:] = y + 0.5 * h * k[0]
-    slope(p, trial, time + 0.5 * h, command, k[1])
-    trial[:] = y + 0.5 * h * k[1]
-    slope(p, trial, time + 0.5 * h, command, k[2])
-    trial[:] = y + h * k[2]
-    slope(p, trial, time + h, command, k[3])
+@njit(cache=True, no_cfunc_wrapper=True)
+def step(p: Physics, y: Array, time: float, h: float, command: Array, k: Array, trial: Array) -> float:
+    """One step of the classical Runge-Kutta method, in place; returns the accelerometer's reading before it.
+
+    The slope is called at one place, since each call compiles it once more.
+    """
+    reading = 0.0
+    trial[:] = y
+    for stage in range(4):
+        ahead = 0.0 if stage == 0 else h if stage == 3 else 0.5 * h
+        told = slope(p, trial, time + ahead, command, k[stage])
+        if stage == 0:
+            reading = told
+        if stage < 3:
+            trial[:] = y + (h if stage == 2 else 0.5 * h) * k[stage]
     y += h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
     y[V] = max(y[V], 0.0)
     for w in range(4):
         if y[W + w] < 0.0:
             y[W + w] = 0.0
             y[MOTOR + w] = max(y[MOTOR + w], 0.0)
+    return reading
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def integrate(p: Physics, y: Array, start: int, rows: int, split: int, command: Array, out: Array) -> None:
     """Carry `y` over `rows` records of `RECORD_STEP_S` from record `start` on; `out[start + 1:]` gets each new state.
 
@@ -355,14 +361,15 @@ def integrate(p: Physics, y: Array, start: int, rows: int, split: int, command: 
     k, trial = np.zeros((4, N)), np.zeros(N)
     h = RECORD_STEP_S / split
     for i in range(start, start + rows):
-        time = i * RECORD_STEP_S
         for j in range(split):
-            step(p, y, time + j * h, h, command, k, trial)
+            reading = step(p, y, i * RECORD_STEP_S + j * h, h, command, k, trial)
+            if j == 0:
+                out[i, N] = reading
         out[i + 1, :N] = y
-        out[i + 1, N] = slope(p, y, time + RECORD_STEP_S, command, trial)
+    out[start + rows, N] = slope(p, y, (start + rows) * RECORD_STEP_S, command, trial)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def begin(p: Physics, position: float, speed: float, wheels: Array, time: float, command: Array) -> Array:
     """State of a car that has driven steadily like this until now."""
     y = np.zeros(N)
@@ -385,7 +392,7 @@ def begin(p: Physics, position: float, speed: float, wheels: Array, time: float,
     return y
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def replay(
     p: Physics,
     position: Array,

@@ -165,7 +165,7 @@ def lag(signal: Array, time_constant_s: float) -> Array:
     return lfilter([1.0 - keep], [1.0, -keep], signal, zi=[keep * signal[0]])[0]
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def limited(signal: Array, rate: float) -> Array:
     """A record that follows by `rate` per second at most."""
     out, most = signal.copy(), rate * RECORD_STEP_S
@@ -174,7 +174,7 @@ def limited(signal: Array, rate: float) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def tracked(signal: Array, loop_s: float) -> Array:
     """A record that a loop of second order follows: not late on a ramp, but beyond the mark where one ends."""
     out, rate, value = signal.copy(), 0.0, signal[0]
@@ -187,7 +187,7 @@ def tracked(signal: Array, loop_s: float) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def played(signal: Array, play: float) -> Array:
     """A record that follows only when it is `play` behind, either way."""
     out = signal.copy()

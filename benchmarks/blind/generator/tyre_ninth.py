@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def brush_elliptic(slip: float, slope: float, peak: float) -> float:
     """Force of the brush model under an elliptic pressure, as Hertz has it of a stiff belt [N].
 
@@ -32,7 +32,7 @@ def brush_elliptic(slip: float, slope: float, peak: float) -> float:
     return peak * 2.0 / np.pi * (holds + slides)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def splined(slip: float, slope: float, peak: float, stretch: float, sliding: float) -> float:
     """Force of two cubics, as of a table with three points: at rest, at the peak, of the locked wheel [N].
 

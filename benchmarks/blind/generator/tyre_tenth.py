@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, no_cfunc_wrapper=True)
 def humped(slip: float, slope: float, peak: float, sliding: float) -> float:
     """Force of z exp(1 - z) up to the peak at z = 1, and beyond it of the same fall to `sliding` [N].
 
