@@ -86,7 +86,8 @@ def _left(courses: Sequence[Course], dead_s: float, lag_s: float) -> float:
     seen, reference = seen[known], reference[known]
     weight = off = np.ones(len(reference))
     for _ in range(3):
-        levels = np.linalg.lstsq(seen * weight[:, None], reference * weight, rcond=None)[0]
+        weighted = seen * np.square(weight)[:, None]
+        levels = np.linalg.lstsq(weighted.T @ seen, weighted.T @ reference, rcond=None)[0]
         off = np.abs(reference - seen @ levels)
         weight = 1.0 / np.sqrt(np.maximum(1.0, off / (2.0 * np.median(off) + 1e-3)))
     return float(np.mean(np.minimum(off, MOST_OFF) ** 2))

@@ -8,6 +8,7 @@ belongs is uncertain, and so is the scale of the errors.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from sim2real.perception.crossings import Crossings
@@ -24,6 +25,9 @@ SHARE_SPREAD, SHARE_SPREAD_SIMULATED = 0.2, 0.3
 """Standard deviation of it: the middle is the plain reading, its ends are possible. As simulated a class is right where
 the road has it anywhere in the stretch, so that any share is nearly as good [-]."""
 LEAST_WIDTH_M = 0.02
+"""Width of a bracket that is at least reckoned with [m]."""
+LEAST_SHARE = 1e-30
+"""Probability that a crossing has at least, under any account [-]."""
 
 
 def share_price(*, shifted: bool) -> Array:
@@ -34,9 +38,9 @@ def share_price(*, shifted: bool) -> Array:
 
 def profiles(crossings: Crossings, shift: Array) -> Array:
     """Log-likelihood of shifts, shape (..., k), over shares and scales: shape (shares, scales, ...) [nats]."""
-    return np.array(
-        [[log_likelihood(shift, *crossings.bracket(share), scale) for scale in SCALES] for share in SHARES]
-    )
+    flat = np.ascontiguousarray(shift).reshape(-1, shift.shape[-1])
+    table = np.array([over_scales(flat, *crossings.bracket(share), SCALES) for share in SHARES])
+    return table.reshape(len(SHARES), len(SCALES), *shift.shape[:-1])
 
 
 def likeliest(crossings: Crossings, shift: Array, *, shifted: bool) -> Array:
@@ -52,21 +56,33 @@ def scale_under(crossings: Crossings, shift: Array) -> float:
     return float(SCALES[np.unravel_index(int(np.argmax(table)), table.shape)[1]])
 
 
-def log_likelihood(shift: Array, low: Array, high: Array, scale: float) -> Array:
-    """Of crossings with these brackets under shifts, shape (..., k), summed over the crossings [nats].
+@njit(cache=True, error_model="numpy")
+def over_scales(shift: Array, low: Array, high: Array, scales: Array) -> Array:
+    """Of crossings with these brackets under shifts, shape (m, k), summed over the crossings: shape (scales, m) [nats].
 
     The probability that an error under Student's t moves the border's shifted place into the bracket, per width: flat
     within the bracket, so that crossings whose pictures happen to fall alike do not add up to a shift.
     """
-    width = np.maximum(high - low, LEAST_WIDTH_M)
-    beyond = np.abs(shift - 0.5 * (low + high))
-    share = _student((0.5 * width - beyond) / (scale * ERROR_M)) - _student(
-        (-0.5 * width - beyond) / (scale * ERROR_M)
-    )
-    return np.log(np.maximum(share, 1e-30) / width).sum(axis=-1)
+    out = np.zeros((scales.shape[0], shift.shape[0]))
+    for j in range(shift.shape[1]):
+        width = high[j] - low[j]
+        if width < LEAST_WIDTH_M:
+            width = LEAST_WIDTH_M
+        for i in range(shift.shape[0]):
+            beyond = abs(shift[i, j] - 0.5 * (low[j] + high[j]))
+            for s in range(scales.shape[0]):
+                error_m = scales[s] * ERROR_M
+                share = _student((0.5 * width - beyond) / error_m) - _student(
+                    (-0.5 * width - beyond) / error_m
+                )
+                if share < LEAST_SHARE:
+                    share = LEAST_SHARE
+                out[s, i] += np.log(share / width)
+    return out
 
 
-def _student(t: Array) -> Array:
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _student(t: float) -> float:
     """Distribution function of Student's t with four degrees of freedom, in closed form."""
     square = 1.0 + 0.25 * t * t
     return 0.5 + 0.375 * t / np.sqrt(square) * (1.0 - t * t / (12.0 * square))

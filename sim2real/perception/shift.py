@@ -25,7 +25,7 @@ from sim2real.perception.likelihood import (
     SCALES,
     SHARES,
     likeliest,
-    log_likelihood,
+    over_scales,
     profiles,
     share_price,
 )
@@ -99,8 +99,8 @@ class ShiftFit:
     def scale_of(self, crossings: Crossings, height_m: float) -> float:
         """Scale of any crossings' errors at its delay, pitch and share; the least where there are none [-]."""
         shift = self.shift(crossings, height_m)
-        bracket = crossings.bracket(self.share)
-        return float(SCALES[np.argmax([log_likelihood(shift, *bracket, scale) for scale in SCALES])])
+        table = over_scales(shift[None, :], *crossings.bracket(self.share), SCALES)
+        return float(SCALES[np.argmax(table[:, 0])])
 
     def rest_m(self, crossings: Crossings, height_m: float) -> Array:
         """Brackets' middles beyond the candidate's, shape (k,) [m]."""
