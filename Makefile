@@ -27,12 +27,13 @@ demo: $(READY)   ## build the unit, drive it over the paper's road, write out/de
 COMPILING := tests/test_gap_observer.py::test_a_log_without_measurements_is_the_plain_simulation_from_rest \
   tests/test_blind_plant.py::test_neutral_effect_is_the_nominal_car
 
-# Two workers on two cores: the threads of one's matrix products would wait for the other's.
+# Three workers for two cores: some tests wait for processes, rigs and clusters. One thread each: the threads of one's
+# matrix products would wait for the other's.
 test: export OPENBLAS_NUM_THREADS = 1
 test: $(READY) check  ## lint, types and the whole test suite
 	@echo "compiling the two plants, one per worker"  # else each worker would compile both
 	@$(BIN)/python -m pytest -q -n 2 --dist loadfile $(COMPILING)
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 3 --dist loadfile
 
 check: $(READY)  ## lint and types
 	$(BIN)/ruff check .
