@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from sim2real.perception.likelihood import ERROR_M, LEAST_SHARE, LEAST_WIDTH_M, SCALES, over_scales
+from sim2real.perception.crossings import find_crossings
+from sim2real.perception.likelihood import (
+    ERROR_M,
+    LEAST_SHARE,
+    LEAST_WIDTH_M,
+    SCALES,
+    likeliest,
+    over_scales,
+    profiles,
+)
 
 
 def test_it_is_the_probability_of_the_bracket_per_width():
@@ -34,3 +43,10 @@ def test_no_crossing_says_nothing_and_a_lost_one_is_lost():
     assert np.all(over_scales(np.zeros((3, 0)), none, none, SCALES) == 0.0)
     lost = np.array([np.nan])
     assert np.all(np.isnan(over_scales(np.zeros((1, 1)), lost, lost + 1.0, SCALES)))
+
+
+@pytest.mark.parametrize("shape", [(0,), (3, 0), (3, 2, 0)])
+def test_shifts_of_no_crossing_keep_their_shape(shape):
+    none = find_crossings([])
+    assert profiles(none, np.zeros(shape)).shape[2:] == shape[:-1]
+    assert np.all(likeliest(none, np.zeros(shape), shifted=False) == 0.0)

@@ -7,6 +7,8 @@ belongs is uncertain, and so is the scale of the errors.
 
 from __future__ import annotations
 
+from math import prod
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -38,7 +40,7 @@ def share_price(*, shifted: bool) -> Array:
 
 def profiles(crossings: Crossings, shift: Array) -> Array:
     """Log-likelihood of shifts, shape (..., k), over shares and scales: shape (shares, scales, ...) [nats]."""
-    flat = np.ascontiguousarray(shift).reshape(-1, shift.shape[-1])
+    flat = np.ascontiguousarray(shift).reshape(prod(shift.shape[:-1]), shift.shape[-1])  # also of no crossing
     table = np.array([over_scales(flat, *crossings.bracket(share), SCALES) for share in SHARES])
     return table.reshape(len(SHARES), len(SCALES), *shift.shape[:-1])
 
