@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import compiled
 from .details import FLOOR_M_S, USUAL_M_S
 from .physics import Physics
 
@@ -18,25 +19,25 @@ NOD_M_S2 = 3.0
 """About which a body that squats or dives has turned as far as its springs let it [m/s^2]."""
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def in_wake(share: float, time: float) -> float:
     """Of a drag that is less behind others, and more on a free road [-]."""
     return 1.0 - share * np.tanh(4.0 * np.sin(2.0 * np.pi * time / WAKE_S))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def drag_of(fast: float, speed: float) -> float:
     """Of a drag that is another before and after `USUAL_M_S` [-]."""
     return 1.0 + fast * np.tanh((speed - USUAL_M_S) / SHUT_M_S)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def sheltered(share: float, at: float) -> float:
     """Of a drag that is less between walls or woods, and more where the wind can reach [-]."""
     return 1.0 - share * np.tanh(4.0 * np.sin(2.0 * np.pi * at / BARRIER_M))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def crossed(wind: float, speed: float) -> float:
     """Of a drag in a wind from the side, over that at `USUAL_M_S`: the air is faster and comes askew [-]."""
     now, usual = (wind / max(speed, wind)) ** 2, (wind / USUAL_M_S) ** 2

@@ -8,12 +8,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .compiling import compiled
+
 Array = NDArray[np.floating[Any]]
 
 COMMAND_STEP_S = 0.01
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def on_grid(table: Array, at: float) -> float:
     """`table` at `at` steps from its start, linear between, held beyond."""
     if at <= 0.0:
@@ -29,7 +31,7 @@ def commanded(command: Array, wheel: int, time: float) -> float:
     return on_grid(command[:, wheel], time / COMMAND_STEP_S)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def joined(command: Array, wheel: int, time: float, message: float) -> float:
     """The command as straight lines between messages."""
     sent = np.floor(time / message)

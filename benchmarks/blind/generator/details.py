@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .compiling import compiled
 from .physics import Physics
 
 Array = NDArray[np.floating[Any]]
@@ -78,38 +79,38 @@ def spread(axles: float, cross: float, wheel: int) -> float:
     return (axles if wheel < 2 else -axles) + (cross if wheel == 0 or wheel == 3 else -cross)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def in_share(p: Physics, tilt: float, wheel: int) -> float:
     """What one wheel has more than the mean by weight at rest [-]."""
     half = 0.5 * (p.front_arm + p.rear_arm)
     return tilt * p.front_arm / half if wheel < 2 else -tilt * p.rear_arm / half
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def winding(at: float) -> float:
     """1 where a road winds and 0 where it is straight, with clothoids between [-]."""
     return 0.5 + 0.5 * np.tanh(4.0 * np.sin(2.0 * np.pi * at / BENDS_M))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def warmth(time: float) -> float:
     """From -1 of what is cold to 1 of what is warm; none on the mean of a drive [-]."""
     return 1.0 - 2.0 * np.exp(-time / WARM_S)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def stiffened(p: Physics, time: float, speed: float) -> float:
     """What a warm, fast tyre is stiffer by [N]."""
     return p.stiffness_warm * warmth(time) + p.stiffness_speed * (min(speed / USUAL_M_S, 2.0) - 1.0)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def coarse(at: float) -> float:
     """1 on stretches of coarse asphalt and -1 between them [-]."""
     return np.tanh(4.0 * np.sin(2.0 * np.pi * at / TEXTURE_M))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def gravelly(at: float) -> float:
     """1 where loose gravel lies and 0 elsewhere, with short ends [-]."""
     off = abs(at / GRAVEL_M - np.floor(at / GRAVEL_M) - 0.5) * GRAVEL_M
@@ -133,13 +134,13 @@ def braking(p: Physics, wheel: int, place: float, angle: float, turning: float, 
     return drag
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def released(share: float, turning: float) -> float:
     """Of pads that a fast disc knocks back [-]."""
     return 1.0 - share * (min(turning / USUAL_RAD_S, 2.0) - 1.0)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def lag_of(p: Physics, wheel: int, turning: float, told: float, given: float) -> float:
     """Of a lag that is another at each wheel, speed or torque, or where torque is built up and let go [-]."""
     lag = (1.0 + spread(p.lag_tilt, p.lag_side, wheel)) * (
@@ -154,7 +155,7 @@ def lag_of(p: Physics, wheel: int, turning: float, told: float, given: float) ->
     return lag
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def radius_at(p: Physics, wheel: int, speed: float, angle: float) -> float:
     """Rolling radius of a wheel [m]."""
     radius = p.radius
@@ -169,7 +170,7 @@ def radius_at(p: Physics, wheel: int, speed: float, angle: float) -> float:
     return radius
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def profile_at(profile: Array, position: float) -> float:
     """A road's profile, linear between its values and begun anew at its end."""
     at = position / PROFILE_STEP_M
@@ -178,13 +179,13 @@ def profile_at(profile: Array, position: float) -> float:
     return first + (at - whole) * (profile[(whole + 1) % profile.size] - first)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def stretched(depth: float, factor: float, at: float) -> float:
     """A friction factor whose deviation goes in stretches [-]."""
     return 1.0 + (factor - 1.0) * (1.0 + depth * np.tanh(4.0 * np.sin(2.0 * np.pi * at / STRETCH_M)))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def blurred(p: Physics, mus: Array, at: float, k: int) -> float:
     """A friction that goes straight from one segment's to the next one's, over a length about the border [-]."""
     over = p.border_blur
@@ -195,7 +196,7 @@ def blurred(p: Physics, mus: Array, at: float, k: int) -> float:
     return mus[k]
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def told_friction(p: Physics, wheel: int, position: float) -> float:
     """The road's friction under a wheel, as its file has it [-]."""
     at = position + (p.front_arm if wheel < 2 else -p.rear_arm)
@@ -205,7 +206,7 @@ def told_friction(p: Physics, wheel: int, position: float) -> float:
     return p.mu_left[k] if wheel % 2 == 0 else p.mu_right[k]
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def gripping(p: Physics, rubbing: float, loaded: float = 1.0) -> float:
     """What a friction deviates more by as a tyre drives rather than brakes, sweeps the road, and is pressed on it [-].
 
@@ -255,7 +256,7 @@ def friction(
     return mu * factor
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def rolling_of(p: Physics, wheel: int, position: float, speed: float, loaded: float) -> float:
     """What resists a wheel over that on a dry road at `ROLL_M_S`; `loaded` is 1 of a quarter of the weight [-]."""
     rolling = 1.0 + p.roll_linear * (speed / ROLL_M_S - 1.0)
@@ -275,7 +276,7 @@ def rolling_of(p: Physics, wheel: int, position: float, speed: float, loaded: fl
     return rolling
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def gain_of(
     gain: float, sign: float, fast: float, pads: float, hard: float, torque: float, turning: float
 ) -> float:
@@ -291,14 +292,14 @@ def gain_of(
     return gain
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def wait_of(cycle: float) -> float:
     """How long the message of a cycle has to wait, less the mean, over the longest [-]."""
     seed = np.sin(12.9898 * cycle + 4.137) * 43_758.5453
     return seed - np.floor(seed) - 0.5
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def stalled(duration: float, heard: float) -> float:
     """The time of what a controller goes by that for `duration`, now and then, gets nothing new [s]."""
     cycle = np.floor(heard / STALL_S)
@@ -306,7 +307,7 @@ def stalled(duration: float, heard: float) -> float:
     return begun if begun <= heard < begun + duration else heard
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def queued(jump: float, heard: float, time: float) -> float:
     """The time of what comes through a queue that now holds less, now more; the more it holds, the later [s]."""
     cycle = np.floor(time / QUEUE_S)
@@ -315,7 +316,7 @@ def queued(jump: float, heard: float, time: float) -> float:
     return heard + max(-jump, cycle * QUEUE_S - time + jump)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def let_through(p: Physics, torque: float, slip: float) -> float:
     """What a slip controller leaves of a torque that makes a wheel slip [N m]."""
     if torque * slip <= 0.0:
@@ -323,7 +324,7 @@ def let_through(p: Physics, torque: float, slip: float) -> float:
     return torque * (1.0 - p.slip_cut * min(max((abs(slip) - p.slip_allowed) / CUT_SLIP, 0.0), 1.0))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def shaft_of(
     p: Physics, wheel: int, twist: float, rate: float, angle: float = 0.0, time: float = 0.0
 ) -> float:

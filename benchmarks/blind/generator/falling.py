@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .compiling import compiled
 
 EXPONENTIAL, HYPERBOLIC, SATURATING, STRAIGHT, POWER, LOGARITHMIC, ARCTANGENT, TWO_RATES, ROOTED = range(9)
 LINE_AND_TAIL = 9
 """Their codes."""
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def fallen(curve: int, sliding: float, floor: float) -> float:
     """Share of the friction that is left; `sliding` is the speed times the falloff [-].
 

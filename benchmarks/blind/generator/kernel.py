@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .air import dragging
 from .commands import COMMAND_STEP_S, on_grid
+from .compiling import compiled
 from .details import (
     FLOOR_M_S,
     FORMING,
@@ -57,6 +58,8 @@ Array = NDArray[np.floating[Any]]
 GRAVITY = 9.81
 RECORD_STEP_S = 0.001
 LEAST_LAG_S = 0.001
+STAGES = (0.0, 0.5, 0.5, 1.0)
+"""Where in a step the Runge-Kutta method takes the slope [-]."""
 """Of a motor whose torque rises at a limited rate: how closely it follows below the limit."""
 
 BODY_DAMPING = 0.4
@@ -105,7 +108,7 @@ def tyre_force(
     return force if slip >= 0.0 else -force
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def relaxing(p: Physics, slip: float, theta: float, load: float) -> float:
     """Relaxation length of a tyre whose lagged slip is `slip` [m].
 
@@ -120,7 +123,7 @@ def relaxing(p: Physics, slip: float, theta: float, load: float) -> float:
     return length
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def lean(p: Physics, y: Array, reading: float, dy: Array) -> None:
     """How the body follows its acceleration, into `dy`: at once and in part through springs, or as a mass on them."""
     if p.body_rate > 0.0:
@@ -136,7 +139,7 @@ def lean(p: Physics, y: Array, reading: float, dy: Array) -> None:
     dy[BODY] = (reading - y[BODY]) / p.springs_time if p.springs_share > 0.0 else 0.0
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float:
     """Derivative of the state into `dy`; returns what an ideal accelerometer reads [m/s^2]."""
     speed, length = y[V], p.front_arm + p.rear_arm
@@ -316,21 +319,21 @@ def slope(p: Physics, y: Array, time: float, command: Array, dy: Array) -> float
     return reading
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def step(p: Physics, y: Array, time: float, h: float, command: Array, k: Array, trial: Array) -> float:
     """One step of the classical Runge-Kutta method, in place; returns the accelerometer's reading before it.
 
     The slope is called at one place, since each call compiles it once more.
     """
     reading = 0.0
-    trial[:] = y
     for stage in range(4):
-        ahead = 0.0 if stage == 0 else h if stage == 3 else 0.5 * h
+        ahead = STAGES[stage] * h
+        trial[:] = y
+        if stage > 0:
+            trial += ahead * k[stage - 1]
         told = slope(p, trial, time + ahead, command, k[stage])
         if stage == 0:
             reading = told
-        if stage < 3:
-            trial[:] = y + (h if stage == 2 else 0.5 * h) * k[stage]
     y += h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
     y[V] = max(y[V], 0.0)
     for w in range(4):
@@ -340,9 +343,9 @@ def step(p: Physics, y: Array, time: float, h: float, command: Array, k: Array, 
     return reading
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def integrate(p: Physics, y: Array, start: int, rows: int, split: int, command: Array, out: Array) -> None:
-    """Carry `y` over `rows` records of `RECORD_STEP_S` from record `start` on; `out[start + 1:]` gets each new state.
+    """Carry `y` over `rows` records of `RECORD_STEP_S` from record `start` on.
 
     Parameters
     ----------
@@ -356,7 +359,7 @@ def integrate(p: Physics, y: Array, start: int, rows: int, split: int, command: 
     command : array, shape (n, 4)
         Commanded torque every `COMMAND_STEP_S` [N m].
     out : array, shape (>= start + rows + 1, N + 1)
-        State, and the accelerometer's reading in the last column.
+        State from `start + 1` on; the accelerometer's reading in the last column, that at `start` included.
     """
     k, trial = np.zeros((4, N)), np.zeros(N)
     h = RECORD_STEP_S / split
@@ -369,7 +372,7 @@ def integrate(p: Physics, y: Array, start: int, rows: int, split: int, command: 
     out[start + rows, N] = slope(p, y, (start + rows) * RECORD_STEP_S, command, trial)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def begin(p: Physics, position: float, speed: float, wheels: Array, time: float, command: Array) -> Array:
     """State of a car that has driven steadily like this until now."""
     y = np.zeros(N)
@@ -392,7 +395,7 @@ def begin(p: Physics, position: float, speed: float, wheels: Array, time: float,
     return y
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def replay(
     p: Physics,
     position: Array,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
+from .compiling import compiled
 from .details import WAIT_S
 from .kernel import RECORD_STEP_S
 from .motors import BEAT_S
@@ -165,7 +165,7 @@ def lag(signal: Array, time_constant_s: float) -> Array:
     return lfilter([1.0 - keep], [1.0, -keep], signal, zi=[keep * signal[0]])[0]
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def limited(signal: Array, rate: float) -> Array:
     """A record that follows by `rate` per second at most."""
     out, most = signal.copy(), rate * RECORD_STEP_S
@@ -174,7 +174,7 @@ def limited(signal: Array, rate: float) -> Array:
     return out
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def tracked(signal: Array, loop_s: float) -> Array:
     """A record that a loop of second order follows: not late on a ramp, but beyond the mark where one ends."""
     out, rate, value = signal.copy(), 0.0, signal[0]
@@ -187,7 +187,7 @@ def tracked(signal: Array, loop_s: float) -> Array:
     return out
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def played(signal: Array, play: float) -> Array:
     """A record that follows only when it is `play` behind, either way."""
     out = signal.copy()

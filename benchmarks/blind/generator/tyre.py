@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from .compiling import compiled
 from .tyre_eighth import bristles, composite
 from .tyre_ninth import brush_elliptic, splined
 from .tyre_tenth import humped
@@ -23,7 +23,7 @@ BRUSH_ELLIPTIC, SPLINED, HUMPED = range(16, 19)
 """Codes of the foreign curves."""
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def dugoff(slip: float, stiffness: float, theta: float, load: float) -> float:
     """Force of the modified Dugoff tyre in pure longitudinal slip [N].
 
@@ -51,7 +51,7 @@ def dugoff(slip: float, stiffness: float, theta: float, load: float) -> float:
     return force * shape
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def magic(slip: float, slope: float, peak: float, shape: float, curvature: float) -> float:
     """Force of the magic formula [N] (Pacejka 2012, Tire and Vehicle Dynamics, Eq. 4.49).
 
@@ -72,7 +72,7 @@ def magic(slip: float, slope: float, peak: float, shape: float, curvature: float
     return peak * np.sin(shape * np.arctan(b - curvature * (b - np.arctan(b))))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def brush(slip: float, slope: float, peak: float) -> float:
     """Force of the brush model under a parabolic pressure [N] (Pacejka 2012, Sec. 3.2): cubic, then all of it slides.
 
@@ -91,7 +91,7 @@ def brush(slip: float, slope: float, peak: float) -> float:
     return peak * (1.0 - gripping**3)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def rational(slip: float, slope: float, peak: float, stretch: float, sliding: float) -> float:
     """Force of a rational function up to the peak and a cubic fall beyond [N] (Rill 2013, the TMeasy tyre).
 
@@ -117,7 +117,7 @@ def rational(slip: float, slope: float, peak: float, stretch: float, sliding: fl
     return peak * (1.0 - (1.0 - sliding) * z * z * (3.0 - 2.0 * z))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def decaying(slip: float, slope: float, peak: float, loss: float) -> float:
     """Force of c (1 - exp(-b s) - `loss` s) [N] (Burckhardt 1993, Fahrwerktechnik: Radschlupf-Regelsysteme).
 
@@ -141,7 +141,7 @@ def decaying(slip: float, slope: float, peak: float, loss: float) -> float:
     return top * (1.0 - np.exp(-(slope / top + loss) * slip) - loss * slip)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def saturated(slip: float, slope: float, peak: float) -> float:
     """Force of a straight line, then a hyperbola that has its peak at the locked wheel [N] (Fiala's, as Adams has it).
 
@@ -162,7 +162,7 @@ def saturated(slip: float, slope: float, peak: float) -> float:
     return grip - 0.25 * grip * grip / (slope * slip)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def brush_uniform(slip: float, slope: float, peak: float) -> float:
     """Force of the brush model under an even pressure [N]: a parabola, then all of it slides.
 
@@ -181,7 +181,7 @@ def brush_uniform(slip: float, slope: float, peak: float) -> float:
     return peak * x * (2.0 - x)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def brush_falling(slip: float, slope: float, peak: float, kinetic: float) -> float:
     """Force of the brush model under a parabolic pressure, whose bristles slide with less friction than they hold [N].
 
@@ -207,7 +207,7 @@ def brush_falling(slip: float, slope: float, peak: float, kinetic: float) -> flo
     return hold * (3.0 * (1.0 - held) * held**2 + kinetic * (1.0 - 3.0 * held**2 + 2.0 * held**3))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def cubed(slip: float, slope: float, peak: float, curvature: float) -> float:
     """Force of 1 - exp(-(x + E x^2 + (E^2 + 1/12) x^3)) times the peak, x = `slope` s / peak [N].
 
@@ -230,7 +230,7 @@ def cubed(slip: float, slope: float, peak: float, curvature: float) -> float:
     return peak * (1.0 - np.exp(-x * (1.0 + x * (curvature + x * (curvature**2 + 1.0 / 12.0)))))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def blended(slip: float, slope: float, peak: float, order: float) -> float:
     """Force of a line and a level blended, (1/line^n + 1/level^n)^(-1/n), with its peak at the locked wheel [N].
 
@@ -251,7 +251,7 @@ def blended(slip: float, slope: float, peak: float, order: float) -> float:
     return slope * slip / (1.0 + rest * slip**order) ** (1.0 / order)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def two_lines(slip: float, slope: float, peak: float, sliding: float) -> float:
     """Force of a parabola up to the peak and a straight fall to the locked wheel's [N].
 
@@ -275,7 +275,7 @@ def two_lines(slip: float, slope: float, peak: float, sliding: float) -> float:
     return peak * (1.0 - (1.0 - sliding) * (slip - best) / (1.0 - best))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def plain_dugoff(slip: float, slope: float, peak: float) -> float:
     """Force of Dugoff's tyre without the modified one's shape, with its peak at the locked wheel [N].
 
@@ -294,7 +294,7 @@ def plain_dugoff(slip: float, slope: float, peak: float) -> float:
     return adhesion if adhesion < 0.5 * peak else peak * (1.0 - 0.25 * peak / adhesion)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def sine_rise(slip: float, slope: float, peak: float, sliding: float) -> float:
     """Force of a quarter of a sine up to the peak, and a bell's fall to `sliding` of it over five times as far [N].
 
@@ -318,7 +318,7 @@ def sine_rise(slip: float, slope: float, peak: float, sliding: float) -> float:
     return peak * (sliding + (1.0 - sliding) * np.exp(-beyond * beyond))
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def arctangent(slip: float, slope: float, peak: float) -> float:
     """Force of an arctangent whose peak is the locked wheel's [N].
 
@@ -339,7 +339,7 @@ def arctangent(slip: float, slope: float, peak: float) -> float:
     return top * 2.0 / np.pi * np.arctan(0.5 * np.pi * slope * slip / top)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def foreign(curve: int, slip: float, slope: float, peak: float, first: float, second: float) -> float:
     """Force of a foreign curve by its code [N]; `first` and `second` are its own parameters."""
     if curve == BRUSH:

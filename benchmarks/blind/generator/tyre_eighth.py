@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .compiling import compiled
 
 COMPOSITE_AT, COMPOSITE_TOP = 2.1045880, 0.99907098
 """Where the composite slip's function has its peak, and how large that is [-]."""
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def bristles(slip: float, slope: float, peak: float) -> float:
     """Force of bristles with even load that give way [N]: 1 - (1 - exp(-2 x)) / (2 x) of `slope` s over it.
 
@@ -35,7 +36,7 @@ def bristles(slip: float, slope: float, peak: float) -> float:
     return top * (1.0 + np.expm1(-x) / x)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def composite(slip: float, slope: float, peak: float, fading: float) -> float:
     """Force of a ratio of cubics in the composite slip, less `fading` of it for the locked wheel [N].
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .compiling import compiled
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def brush_elliptic(slip: float, slope: float, peak: float) -> float:
     """Force of the brush model under an elliptic pressure, as Hertz has it of a stiff belt [N].
 
@@ -32,7 +33,7 @@ def brush_elliptic(slip: float, slope: float, peak: float) -> float:
     return peak * 2.0 / np.pi * (holds + slides)
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def splined(slip: float, slope: float, peak: float, stretch: float, sliding: float) -> float:
     """Force of two cubics, as of a table with three points: at rest, at the peak, of the locked wheel [N].
 

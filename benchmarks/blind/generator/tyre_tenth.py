@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .compiling import compiled
 
 
-@njit(cache=True, no_cfunc_wrapper=True)
+@compiled
 def humped(slip: float, slope: float, peak: float, sliding: float) -> float:
     """Force of z exp(1 - z) up to the peak at z = 1, and beyond it of the same fall to `sliding` [N].
 
