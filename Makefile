@@ -8,10 +8,10 @@ BLIND_SEED ?= 1
 # The tests start hundreds of processes; without byte code each would compile every library anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test check format lock clean blind bench
+.PHONY: help demo test test-all check style types compiled collected format lock clean blind bench
 
 help:            ## this list
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
 $(READY): requirements/dev.txt pyproject.toml
 	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found; install Python 3.11 or call make PYTHON=/path/to/python3.11" >&2; exit 1; }
@@ -25,20 +25,37 @@ demo: $(READY)   ## build the unit, drive it over the paper's road, write out/de
 	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo
 
 COMPILING := tests/test_gap_observer.py::test_a_log_without_measurements_is_the_plain_simulation_from_rest \
-  tests/test_blind_plant.py::test_neutral_effect_is_the_nominal_car
+  tests/test_blind_plant.py::test_neutral_effect_is_the_nominal_car \
+  tests/test_gap_report.py::TestRating::test_the_same_curve_is_rated_one
 
 # Three workers for two cores: some tests wait for processes, rigs and clusters. One thread each: the threads of one's
-# matrix products would wait for the other's.
-test: export OPENBLAS_NUM_THREADS = 1
-test: $(READY) check  ## lint, types and the whole test suite
-	@echo "compiling the two plants, one per worker"  # else each worker would compile both
-	@$(BIN)/python -m pytest -q -n 2 --dist loadfile $(COMPILING)
-	$(BIN)/python -m pytest -n 3 --dist loadfile
+# matrix products would wait for the other's. The seed is for random inputs; pytest by itself draws others every time.
+SUITE := $(BIN)/python -m pytest -n 3 --dist loadfile --hypothesis-seed 0
 
-check: $(READY)  ## lint and types
+test test-all: export OPENBLAS_NUM_THREADS = 1
+test: $(READY) style  ## lint, types and the test suite
+	@$(MAKE) --no-print-directory -j 3 types compiled collected
+	$(SUITE) -m "not long"
+
+test-all: $(READY) style  ## the same with the tests that take long (twice the time)
+	@$(MAKE) --no-print-directory -j 3 types compiled collected
+	$(SUITE)
+
+check: style types  ## lint and types
+
+style: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+types: $(READY)
 	$(BIN)/mypy
+
+compiled: $(READY)
+	@echo "compiling the two plants, one per worker"  # else each worker would compile both
+	@$(BIN)/python -m pytest -q -n 2 --dist loadfile $(COMPILING)
+
+collected: $(READY)
+	@$(BIN)/python -m pytest -q --collect-only >/dev/null || true  # else each worker would rewrite all assertions; what is wrong the suite tells
 
 format: $(READY) ## rewrite the sources in the house format
 	$(BIN)/ruff check --fix .

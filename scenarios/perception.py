@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 from scipy.special import expit, logit
 
 from scenarios.errors import ScenarioError
@@ -172,6 +171,8 @@ def surfaces_at(road: RoadFile, position_m: Array) -> NDArray[np.intp]:
 
 def _wandering(count: int, fps: float, random: np.random.Generator) -> Array:
     """A first-order autoregression of unit variance."""
+    from scipy.signal import lfilter  # here, since its import is slow
+
     keep = np.exp(-1.0 / (fps * CONFIDENCE_MEMORY_S))
     white = np.sqrt(1.0 - keep**2) * random.standard_normal(count)
     white[:1] /= np.sqrt(1.0 - keep**2)

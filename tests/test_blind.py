@@ -141,6 +141,7 @@ def case():
     return make_case(table("small")[0], seed=1)
 
 
+@pytest.mark.long
 def test_a_case_repeats_and_other_seeds_give_others():
     calm = next(spec for spec in table("full") if spec.group is Group.NO_GAP and not spec.rich)
     case, again, other = (make_case(calm, seed) for seed in (1, 1, 2))
@@ -180,6 +181,7 @@ def test_files_keep_the_contract_and_the_secret(case, tmp_path):
         assert not [e for e in case.spec.effects if e in path.read_text(encoding="utf-8")]
 
 
+@pytest.mark.long
 def test_a_case_without_a_deviation_has_no_gap():
     spec = Spec("quiet", Group.NO_GAP, (), 1.0, "quiet")
     assert make_case(spec, seed=3).truth.gap.total < 1.05

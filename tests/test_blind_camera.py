@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 from camera_stand_ins import PLAIN, blaming, rolled
+from long import beyond
 from numpy.testing import assert_allclose
 
 from benchmarks.blind import runner
@@ -247,7 +248,7 @@ def test_gap_of_a_delay_is_its_way_over_the_spread_of_a_border():
 # --- cases
 
 
-@pytest.mark.parametrize("name", [spec.name for spec in table("camera_small")])
+@pytest.mark.parametrize("name", beyond(4, [spec.name for spec in table("camera_small")]))
 def test_files_keep_the_contract_and_the_secret(name, tmp_path, monkeypatch):
     monkeypatch.setattr(camera_case, "drive", rolled)
     made = make_case(CASES[name], 1, TENTH)
@@ -287,6 +288,7 @@ def check_road(folder: Path, seal: dict[str, Any]) -> None:
         assert not measured or segment["mu_left"] == friction[segment["surface"]]
 
 
+@pytest.mark.long
 def test_a_rich_case_has_borders_at_many_speeds_and_its_gap():
     drawn = make_case(CASES["rich-camera_latency-0"], 1, TENTH)
     assert drawn.truth.gap.total == pytest.approx(drawn.spec.target, rel=0.15)

@@ -356,6 +356,7 @@ def test_scores_tell_what_is_pending_and_are_drawn(tmp_path, fake_diagnose):
     assert (tmp_path / "confusion.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_cosine_finds_an_effect_that_stands_alone_in_its_signal():
     case = make_case(Spec("rich-accelerometer_bias-1", Group.RICH, BIAS.effects, 10.0, BIAS.data), seed=1)
     assert cosine(case)[0] == "accelerometer_bias"

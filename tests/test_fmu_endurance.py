@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from fmu_unit import DRIVING, Unit
+from long import beyond
 
 from benchmarks.endurance_fmu import (
     MOST_INSTANCE_GROWTH_MB,
@@ -67,7 +68,7 @@ def test_random_inputs_and_calls(unit: str) -> None:
     assert result["taken_down"] >= 5, "rubbish has met flags that were up"
 
 
-@pytest.mark.parametrize("kind", QUICK_KINDS)
+@pytest.mark.parametrize("kind", beyond(5, QUICK_KINDS))
 def test_damaged_files(kind: str) -> None:
     assert run_kind(kind, SEED, 60)["shown"] == []
 

@@ -161,6 +161,7 @@ def same(a: Diagnosis, b: Diagnosis) -> bool:
     )
 
 
+@pytest.mark.long
 def test_the_same_seed_says_the_same_with_any_number_of_jobs(said, folder):
     assert same(said[0], ask(folder, jobs=2))
 

@@ -117,6 +117,7 @@ def test_without_drift_nothing_is_added(nominal):
     assert np.all(with_drift(MODEL, nominal, noise, np.array([0.0, 0.0, 0.3])).slow > 0.0)
 
 
+@pytest.mark.long
 def test_a_drifting_log_of_the_right_model_has_no_gap_and_a_gap_is_still_found(nominal):
     few = set(EFFECTS) - {"mass_offset", "road_grade", "accelerometer_bias", "aero_drag"}
     logs = [drifting(nominal, SHARE, seed) for seed in (11, 12)]

@@ -8,6 +8,7 @@ from counters import TURN, count, counted_wheels, driving
 from gap_drives import MODEL, random_drives
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from long import beyond
 
 from benchmarks.gap_development import Levels
 from scenarios.effects import EFFECTS
@@ -154,6 +155,7 @@ def test_without_a_trace_it_stands_beside_a_delay():
     assert said.next_manoeuvre is not None
 
 
+@pytest.mark.long
 def test_it_stands_beside_a_delay_on_other_tyres():
     teeth, window_s = 4096.0, 0.04
     tyres = {"tyre_shape": {"knee": 0.1, "crest": 0.03, "sliding": 0.0}}
@@ -165,7 +167,7 @@ def test_it_stands_beside_a_delay_on_other_tyres():
     assert COUNTER in [e.ids[0] for e in found.decision.rivals]
 
 
-@pytest.mark.parametrize("delay_s", [0.015, 0.04])
+@pytest.mark.parametrize("delay_s", beyond(1, [0.015, 0.04]))
 def test_a_delay_stays_one_though_a_counter_could_be_hidden(delay_s):
     drives = counted_logs(0, 0.0, 0.05, **{DELAY: {"delay_s": delay_s}})
     found = find(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT)

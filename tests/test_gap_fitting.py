@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_drives import BARE, MODEL, clean, noisy, pulses, random_drives, remeasured, rms
+from long import beyond
 
 from benchmarks.gap_development import SEVERITY, Levels
 from scenarios.effects import EFFECTS, FORMS
@@ -356,7 +357,7 @@ PAIRS = (
 )
 
 
-@pytest.mark.parametrize("pair", PAIRS, ids="+".join)
+@pytest.mark.parametrize("pair", beyond(1, ((pair,) for pair in PAIRS)), ids=map("+".join, PAIRS))
 def test_two_effects_are_found_together(pair):
     logs = random_drives(with_effect(*pair), count=2, seed=1, duration_s=8.0)
     rivals = ("torque_delay", "brake_drag", "friction_offset")

@@ -143,6 +143,7 @@ def told_of_unknown(logs):
     return describe(found, seed=0, jobs=2, progress=silent).unexplained
 
 
+@pytest.mark.long
 def test_what_takes_more_of_an_unknown_gap_is_told(nominal):
     """A swing beside a small fault of the speed sensor, and the same beside a great one."""
     logs = [swinging(d, i, at_order(1.0)) for i, d in enumerate(nominal)]

@@ -290,6 +290,7 @@ def with_bearing_drag(torque_nm, speed_m_s, nm_s_rad=0.1):
     return clean(true, speed_m_s, commanded_nm=torque_nm)
 
 
+@pytest.mark.long
 def test_two_resistances_that_only_make_up_a_third_are_not_blamed():
     """Air and rolling together come near to a drag that grows with speed, which a curve over speed says better."""
     logs = wide_drives(with_bearing_drag)
@@ -303,6 +304,7 @@ def test_two_resistances_that_only_make_up_a_third_are_not_blamed():
     assert all(any("the work of both" in text for text in c.evidence_against) for c in causes)
 
 
+@pytest.mark.long
 def test_two_resistances_stand_as_what_they_are():
     effects = {"aero_drag": {"drag_area_m2": 0.5}, "rolling_resistance": {"coefficient": 0.012}}
     logs = wide_drives(lambda torque_nm, speed_m_s: clean(torque_nm, speed_m_s, effects=effects))

@@ -252,7 +252,11 @@ class TestNumbers:
     def test_estimates_show_the_digits_that_their_interval_bears(self, interval, text):
         assert estimate(interval) == text
 
-    @given(st.floats(-1e6, 1e6), st.floats(0.0, 1e6), st.floats(0.0, 1e6))
+    @given(
+        st.floats(-1e6, 1e6, allow_subnormal=False),
+        st.floats(0.0, 1e6, allow_subnormal=False),
+        st.floats(0.0, 1e6, allow_subnormal=False),
+    )
     def test_what_is_shown_is_within_a_tenth_of_the_interval(self, value, below, above):
         interval = Interval(value, value - below, value + above)
         shown = estimate(interval).replace("(", "").replace(")", "").replace("to ", "").split()

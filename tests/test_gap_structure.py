@@ -139,6 +139,7 @@ def test_an_effect_beside_another_tyre_is_blamed_alone():
     assert all("tyre_shape" not in name for group in said.ambiguous_with for name in group)
 
 
+@pytest.mark.long
 def test_friction_is_found_beside_a_tyre_of_another_formula():
     """On roads of unlike friction one bending of the curve would take a part of it, and find another factor."""
     road = road_of(0.9, 0.3, 0.6, 0.3, 0.9, 0.3)

@@ -96,6 +96,7 @@ def test_a_swaying_scale_is_named_with_its_spread(logs):
     assert found.decision.varied.over == "time"
 
 
+@pytest.mark.long
 def test_two_causes_are_named_though_one_of_them_sways():
     nominal = clean(pulses(DURATION_S), 14.0, effects={"torque_gain": {"factor": 1.12}})
     both = [noisy(swaying(nominal), seed) for seed in range(3)]
@@ -113,6 +114,7 @@ def test_two_causes_are_named_though_one_of_them_sways():
     assert scale.parameters["factor"].low <= 0.97 <= scale.parameters["factor"].high
 
 
+@pytest.mark.long
 def test_torque_that_a_dead_band_takes_is_no_gain_that_varies():
     """Six values over the torque do in the gain's place what the gain does only as it varies."""
     rng = np.random.default_rng(3)

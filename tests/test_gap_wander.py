@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured, road_of
+from long import beyond
 
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import find
@@ -41,7 +42,7 @@ def logs(change):
 
 @pytest.mark.parametrize(
     ("channel", "name", "tau_s"),
-    [(SPEED, "vehicle_speed", 0.5), (SPEED, "vehicle_speed", 0.8), (ACCEL, "accel_x", 0.5)],
+    beyond(1, [(SPEED, "vehicle_speed", 0.8), (SPEED, "vehicle_speed", 0.5), (ACCEL, "accel_x", 0.5)]),
 )
 def test_a_sensor_that_wanders_within_its_noise_is_no_gap(channel, name, tau_s):
     fit, holdout = logs(lambda drive, seed: wandering(drive, channel, 0.7, tau_s, seed))
@@ -53,6 +54,7 @@ def test_a_sensor_that_wanders_within_its_noise_is_no_gap(channel, name, tau_s):
     assert "as sensors do by themselves" in describe(found, seed=0, jobs=1, progress=silent).sentence
 
 
+@pytest.mark.long
 def test_rows_of_precise_wheels_may_show_all_that_a_wandering_speed_does():
     precise = SIGMA * np.array([1.0, 1.0, 0.4, 0.4, 0.4, 0.4, 1.0])
     drives = [clean(pulses(20.0), v0, ROAD) for v0 in (9.0, 13.0)]

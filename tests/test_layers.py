@@ -1,6 +1,8 @@
 """Data flows one way: what lies below knows nothing of what stands on it."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -46,3 +48,22 @@ def test_the_diagnosis_is_built_floor_by_floor(floor):
         for path in paths:
             used = {name.split(".")[1] for name in imported(path) if name.startswith("sim2real.")}
             assert used <= known | {part}, path
+
+
+@pytest.mark.parametrize(
+    ("module", "slow"),
+    [
+        ("trpac_cli.main", {"numba", "numpy", "pandas", "scipy", "cv2", "onnxruntime", "matplotlib"}),
+        ("scenarios.plant", {"scipy.signal", "scipy.stats", "cv2", "onnxruntime", "matplotlib"}),
+        ("sim2real.diagnose", {"scipy.signal", "scipy.stats", "matplotlib"}),
+    ],
+)
+def test_what_is_slow_to_load_is_loaded_where_it_is_needed(module, slow):
+    told = subprocess.run(
+        [sys.executable, "-c", f"import sys, {module}; print(*sys.modules)"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert not slow & set(told.stdout.split())

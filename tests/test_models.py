@@ -130,6 +130,7 @@ def test_pictures_of_worlds_never_seen_are_classified():
     assert np.mean(found.argmax(axis=1) == looks.labels) >= 0.7
 
 
+@pytest.mark.long
 def test_readable_road_is_told_from_what_is_none(surface, held_out):
     """Rendered roads that no training has seen, and noise, an even grey and a grid, none of them as in the training."""
     rng = np.random.default_rng(1)

@@ -97,6 +97,7 @@ def test_run_writes_report_figure_log_and_scores(scenario_file, unit_file, tmp_p
     assert report.count("data:image/") == 2
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 def test_a_run_repeats_bit_by_bit(scenario_file, unit_file, tmp_path):
     scenario = load_scenario(scenario_file)

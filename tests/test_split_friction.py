@@ -43,6 +43,7 @@ def steady(drive: pd.DataFrame, wheel: str) -> pd.DataFrame:
     return drive[excited > STEADY_EXCITED_S]
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 @pytest.mark.parametrize("wheel", WHEELS)
 def test_each_excited_wheel_goes_to_its_own_sides_friction(drive: pd.DataFrame, wheel: str) -> None:
@@ -56,6 +57,7 @@ def test_each_excited_wheel_goes_to_its_own_sides_friction(drive: pd.DataFrame, 
         assert error.quantile(0.95) < ERROR
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 def test_the_camera_tells_each_side_its_own_class(drive: pd.DataFrame) -> None:
     for wheel in WHEELS:
@@ -65,6 +67,7 @@ def test_the_camera_tells_each_side_its_own_class(drive: pd.DataFrame) -> None:
         assert np.mean(flagged[f"TRPAC_image.{wheel}"] == expected) > 0.97
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 def test_the_cars_value_follows_the_rule(drive: pd.DataFrame) -> None:
     both = [set(steady(drive, wheel).index) for wheel in WHEELS]
@@ -76,6 +79,7 @@ def test_the_cars_value_follows_the_rule(drive: pd.DataFrame) -> None:
     assert (rows["theta.vehicle"] - expected).abs().max() < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 def test_the_car_stays_on_the_drive_that_was_meant(drive: pd.DataFrame) -> None:
     assert drive["position_m"].iloc[-1] > load_road(ROAD).segments[-1].start_m + 5.0

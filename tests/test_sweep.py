@@ -327,6 +327,7 @@ def test_a_scheduler_that_does_not_answer_is_said(sweep_of, tmp_path, monkeypatc
         execute(sweep_of(), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 def test_a_cluster_by_address_loses_no_run_when_a_worker_dies(sweep_of, tmp_path):
     """Killed half-way, the rest goes on; the bytes are those of runs done here one after the other."""
@@ -384,6 +385,7 @@ def test_coverage_is_weighted_by_time(sweep_of):
     assert distribution(fused)["stretches"] == 2
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 def test_rendered_pictures_go_through_the_image_estimator(tmp_path):
     """A short drive on dry road at a quarter of the camera's size: verdicts come from the networks."""

@@ -7,7 +7,7 @@ import tempfile
 import zipfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -15,13 +15,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from scenarios.errors import ScenarioError
-from scenarios.files import Scenario
 from trpac_cli import fmu as fmu_commands
 from trpac_cli import gap, vision
 from trpac_cli.console import EXIT_INPUT
 from trpac_cli.estimate import estimate
 from trpac_cli.hil import hil, hil_plant
 from trpac_cli.sweep import sweep
+
+if TYPE_CHECKING:
+    from scenarios.files import Scenario
 
 app = typer.Typer(
     help="Tyre-road adhesion from dynamics and camera: run scenarios, see how the gains come about.",

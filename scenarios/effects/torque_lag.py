@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.signal import lfilter
 
 from scenarios.effects.base import Array, Effect, parameter
 
@@ -37,6 +36,8 @@ class TorqueLag(Effect):
         """Solve the lag over each row's interval in closed form."""
         if self.time_constant_s == 0.0 or len(time_s) < 2:
             return torque_nm
+        from scipy.signal import lfilter  # here, since its import takes longer than all else of a plant
+
         ratio = self.time_constant_s * (len(time_s) - 1) / (time_s[-1] - time_s[0])
         decay = np.exp(-1.0 / ratio)
         gain = -np.expm1(-1.0 / ratio)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from scenarios.effects.exposure_shift import TOLERATED_STOPS
 from scenarios.effects.motion_blur import TOLERATED_SMEAR_M
@@ -208,7 +208,7 @@ def _fit_by_law(
     speed = float((blocks.speed_m_s**power).mean()) if len(blocks) else 0.0
     profile = profile + signs.log_likelihood(levels + slopes * speed, errors)
     best = int(np.argmax(profile))
-    quantile = float(student.ppf(0.975, max(len(blocks) / model.memory - 2.0, 1.0)))
+    quantile = float(stdtrit(max(len(blocks) / model.memory - 2.0, 1.0), 0.975))
     blur = Interval(exposure_s, exposure_s, exposure_s, "s")
     if "motion_blur" in effects:
         half = quantile / np.sqrt(max(products[1, 1], 1e-12))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import theilslopes
 
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
@@ -179,6 +178,8 @@ def _ahead_when_taken(beyond_m: Array, speed_m_s: Array) -> float:
     A result arrives some time after its picture, and the car has come nearer to the stamp by then, the more the faster
     it is: how the distance falls with speed is that time.
     """
+    from scipy.stats import theilslopes  # here, since its import is slow
+
     few = np.linspace(0, len(beyond_m) - 1, min(len(beyond_m), MOST_STAMPS)).astype(np.intp)
     worked_s = 0.0
     if speed_m_s[few].std() >= LEAST_SPEED_SPREAD_M_S:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from scenarios.effects import Effect
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
@@ -174,7 +174,7 @@ def _location(values: Array, deviation: Array) -> tuple[float, float]:
         pull = weight * (TAIL + 1.0) / (TAIL + ((values - centre) / deviation) ** 2)
         centre = float(np.average(values, weights=pull))
     scatter = max(float(np.sqrt(np.average(((values - centre) / deviation) ** 2, weights=pull))), 1.0)
-    quantile = float(student.ppf(0.975, max(len(values) - 1, 3)))
+    quantile = float(stdtrit(max(len(values) - 1, 3), 0.975))
     return centre, quantile * scatter / float(np.sqrt(weight.sum()))
 
 

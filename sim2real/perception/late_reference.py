@@ -12,7 +12,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
@@ -99,6 +98,8 @@ def _seen(on: Array, dead_s: float, lag_s: float) -> Array:
     late = np.vstack((np.repeat(on[:1], steps, axis=0), on[: len(on) - steps]))
     if not lag_s:
         return late
+    from scipy.signal import lfilter  # here, since its import is slow
+
     share = 1.0 - np.exp(-STEP_S / lag_s)
     begun = (1.0 - share) * late[:1]
     return np.asarray(lfilter([share], [1.0, share - 1.0], late, axis=0, zi=begun)[0])

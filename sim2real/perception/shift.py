@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from sim2real.perception.chain import DECISIVE, Account, Chain, price
 from sim2real.perception.conflicts import streak_m
@@ -134,7 +134,7 @@ def fit_shift(
     grid = GRID_OF_TWO if len(effects) == 2 else GRID
     delays = np.linspace(*DELAYS_S, grid) if "camera_latency" in effects else np.array([delay_s])
     pitches = np.linspace(*PITCHES_RAD, grid) if "camera_pitch" in effects else np.array([pitch_rad])
-    allowance = 0.5 * student.ppf(0.975, max(len(crossings) - 1, 1)) ** 2
+    allowance = 0.5 * stdtrit(max(len(crossings) - 1, 1), 0.975) ** 2
     for _ in range(ZOOMS):
         profile = profiles(crossings, _shifts(crossings, delays, pitches, height_m)).max(axis=(0, 1))
         delays = _about(delays, profile.max(axis=1), allowance)
