@@ -187,6 +187,7 @@ def test_a_case_without_a_deviation_has_no_gap():
     assert make_case(spec, seed=3).truth.gap.total < 1.05
 
 
+@pytest.mark.long
 def test_severity_reaches_the_wanted_gap():
     target, effect = 5.5, "wheel_radius_offset"
     case = make_case(Spec(f"rich-{effect}-x", Group.RICH, (effect,), target, f"rich-{effect}-x"), seed=3)

@@ -451,7 +451,7 @@ def test_a_foreign_share_of_nothing_is_the_nominal_tyre(foreign, limit):
     assert limit.is_nominal(none)
 
 
-@pytest.mark.parametrize("noisy", numbered(NOISES.values()))
+@pytest.mark.parametrize("noisy", beyond(9, NOISES.values()), ids=range(len(NOISES)))
 def test_noise_of_every_kind_has_its_size(noisy):
     noise = Noise(0.05, 0.02, 0.1, 0.0, 0.4, 0.01, 0.0, 0.0)
     values = noisy(noise, np.arange(400_000) * 2e-3, np.random.default_rng(0))

@@ -166,6 +166,7 @@ def test_the_same_seed_says_the_same_with_any_number_of_jobs(said, folder):
     assert same(said[0], ask(folder, jobs=2))
 
 
+@pytest.mark.long
 def test_another_seed_changes_the_resampling_alone(said, folder):
     other = ask(folder, seed=1)
     assert other.provenance["seed"] == 1
@@ -247,6 +248,7 @@ def test_what_logs_cannot_tell_apart_comes_with_the_next_manoeuvre():
     assert len(told["time_s"]) == len(told["wheel_torque_nm"])
 
 
+@pytest.mark.long
 def test_two_effects_stand_first_with_their_joint_parameters():
     real = {"torque_lag": {"time_constant_s": 0.12}, "mass_offset": {"mass_kg": 180.0}}
     logs = random_drives(real, count=2, seed=1, duration_s=8.0)

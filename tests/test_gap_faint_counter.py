@@ -126,6 +126,7 @@ def averaged(drive, window_s, noise_rad_s, seed):
     return replace(drive, measured=measured)
 
 
+@pytest.mark.long
 def test_wheel_speeds_that_are_late_by_averaging_are_a_delays_first():
     """Though a running counter averages alike: what is smooth may be a filter or a queue as well."""
     clean = random_drives({}, 3, 2, 20.0, levels=Levels(wheel=1e-4))
@@ -174,6 +175,7 @@ def test_a_delay_stays_one_though_a_counter_could_be_hidden(delay_s):
     assert found.decision.winner.ids == (DELAY,)
 
 
+@pytest.mark.long
 def test_a_counter_that_was_left_out_is_no_rival():
     drives = counted_logs(0, 0.0, 0.05, **{DELAY: {"delay_s": 0.04}})
     found = find(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT | {COUNTER})

@@ -376,6 +376,7 @@ def test_two_effects_are_found_together(pair):
     assert all(found.decision.probability[key] > 0.4 for key in pair)
 
 
+@pytest.mark.long
 def test_of_two_pairs_that_explain_alike_the_one_with_fewer_parameters_wins():
     """A split of friction holds a common factor too, with one parameter more."""
     logs = random_drives(
@@ -389,20 +390,23 @@ def test_of_two_pairs_that_explain_alike_the_one_with_fewer_parameters_wins():
 
 @pytest.mark.parametrize(
     ("effect", "others"),
-    [
-        (
-            "accelerometer_bias",
-            ("road_grade", "mass_offset", "vehicle_speed_scale"),
-        ),
-        (
-            "vehicle_speed_scale",
-            ("wheel_radius_offset", "tyre_stiffness_offset", "mass_offset"),
-        ),
-        (
-            "wheel_speed_delay",
-            ("torque_delay", "tyre_stiffness_offset", "torque_lag"),
-        ),
-    ],
+    beyond(
+        1,
+        [
+            (
+                "accelerometer_bias",
+                ("road_grade", "mass_offset", "vehicle_speed_scale"),
+            ),
+            (
+                "vehicle_speed_scale",
+                ("wheel_radius_offset", "tyre_stiffness_offset", "mass_offset"),
+            ),
+            (
+                "wheel_speed_delay",
+                ("torque_delay", "tyre_stiffness_offset", "torque_lag"),
+            ),
+        ],
+    ),
 )
 def test_an_effect_that_is_not_in_the_library_is_unknown(effect, others):
     logs = random_drives(with_effect(effect), count=2, seed=1, duration_s=8.0)

@@ -221,6 +221,12 @@ def mistaken(loaded):
     return find(MODEL, loaded[:2], loaded[2], exclude=only("torque_gain"))
 
 
+@pytest.fixture(scope="module")
+def told(mistaken):
+    """What is said of it."""
+    return describe(mistaken, seed=0, jobs=1, progress=silent)
+
+
 def test_a_look_alike_whose_law_is_not_the_cars_is_not_blamed(mistaken):
     """A torque's gain for a payload: a force over acceleration does as well, and the slip says that torque is right."""
     decision = mistaken.decision
@@ -231,10 +237,9 @@ def test_a_look_alike_whose_law_is_not_the_cars_is_not_blamed(mistaken):
     assert decision.curve.endswith("over acceleration")
 
 
-def test_what_comes_nearest_is_told_and_what_speaks_against_it(mistaken):
-    said = describe(mistaken, seed=0, jobs=1, progress=silent)
-    assert "Nearest comes torque_gain (factor 0.962" in said.sentence
-    assert any("A free curve (" in reason for reason in said.causes[0].evidence_against)
+def test_what_comes_nearest_is_told_and_what_speaks_against_it(told):
+    assert "Nearest comes torque_gain (factor 0.962" in told.sentence
+    assert any("A free curve (" in reason for reason in told.causes[0].evidence_against)
 
 
 def test_the_right_effect_is_held_to_curves_and_stands(loaded):
@@ -251,6 +256,7 @@ def test_an_effect_whose_law_is_a_curve_itself_stands_where_nothing_is_left_besi
     assert found.decision.winner.ids == ("accelerometer_bias",)
 
 
+@pytest.mark.long
 def test_an_effect_whose_work_no_curve_does_stands_though_more_is_found_beside_it(monkeypatch):
     """A late torque, in a car that is loaded too: a curve beside it finds the load, none is late in its place."""
     logs = three_logs({"torque_delay": {"delay_s": 0.08}, "mass_offset": {"mass_kg": 40.0}})
@@ -334,7 +340,7 @@ def test_what_is_not_blamed_for_sure_is_not_held_to_curves(mistaken, verdict):
         ),
     ],
 )
-def test_a_sentence_lists_a_few_rivals_and_counts_the_others(mistaken, monkeypatch, rivals, said):
+def test_a_sentence_lists_a_few_rivals_and_counts_the_others(mistaken, told, monkeypatch, rivals, said):
     for key in "abcde":
         monkeypatch.setitem(EFFECTS, key, EFFECTS["aero_drag"])
     null = mistaken.contest.null
@@ -343,8 +349,7 @@ def test_a_sentence_lists_a_few_rivals_and_counts_the_others(mistaken, monkeypat
         verdict=Verdict.AMBIGUOUS,
         rivals=tuple(replace(null, ids=ids) for ids in rivals),
     )
-    found = describe(mistaken, seed=0, jobs=1, progress=silent)
-    assert said in verdict_of(decision, found.gap, found.causes)
+    assert said in verdict_of(decision, told.gap, told.causes)
 
 
 # --- an effect that is needed for what its form adds alone
@@ -367,12 +372,11 @@ def test_torque_that_moves_between_the_axles_is_no_gain(factor, verdict):
     assert any("not what it is" in text for text in against) is found.decision.further
 
 
-def test_a_sentence_takes_what_stands_beside_the_cause_together_with_it(mistaken):
+def test_a_sentence_takes_what_stands_beside_the_cause_together_with_it(mistaken, told):
     """Alone the cause may even enlarge the gap, where another curve of the tyres stands beside it."""
-    found = describe(mistaken, seed=0, jobs=1, progress=silent)
     decision = replace(mistaken.decision, verdict=Verdict.IDENTIFIED)
-    before = f"takes the gap from {found.gap.before.total:.1f} to "
-    alone = verdict_of(decision, found.gap, found.causes)
-    beside = verdict_of(decision, found.gap, found.causes, Structure("tyre_shape", {}, 1.04))
-    assert f"{before}{found.gap.after.total:.1f} times the noise floor." in alone
+    before = f"takes the gap from {told.gap.before.total:.1f} to "
+    alone = verdict_of(decision, told.gap, told.causes)
+    beside = verdict_of(decision, told.gap, told.causes, Structure("tyre_shape", {}, 1.04))
+    assert f"{before}{told.gap.after.total:.1f} times the noise floor." in alone
     assert f"{before}1.0 times the noise floor, together with what stands beside it." in beside

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from camera_drives import BARE, Camera, changed, diagnose, drive, road
+from long import beyond
 
 from sim2real.perception.crossings import Crossings
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
@@ -215,14 +216,17 @@ def test_dead_time_and_filter_are_told_apart(dead_s, lag_s):
 
 @pytest.mark.parametrize(
     ("camera", "added"),
-    [
-        (Camera(delay_s=0.2), {"camera_latency": {"delay_s": 0.2}}),
-        (Camera(blur_s=0.1), {"motion_blur": {"exposure_s": 0.1}}),
-        (
-            Camera(offset=(0.0, 0.15, 0.0)),
-            {"class_friction_offset": {"dry": 0.8, "wet": 0.75, "snow_ice": 0.2}},
-        ),
-    ],
+    beyond(
+        1,
+        [
+            (Camera(delay_s=0.2), {"camera_latency": {"delay_s": 0.2}}),
+            (Camera(blur_s=0.1), {"motion_blur": {"exposure_s": 0.1}}),
+            (
+                Camera(offset=(0.0, 0.15, 0.0)),
+                {"class_friction_offset": {"dry": 0.8, "wet": 0.75, "snow_ice": 0.2}},
+            ),
+        ],
+    ),
 )
 def test_an_effect_in_the_vehicle_file_takes_the_gap_off_a_further_log(camera, added):
     """As far as the floor; the wrong one by as much takes nothing off, and a log without a gap has none to take."""

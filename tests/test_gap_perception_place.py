@@ -25,7 +25,7 @@ from sim2real.result import Verdict
 from trpac_core.vision.camera import Camera as Lens
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5])
+@pytest.mark.parametrize("share", beyond(1, [0.0, 0.5]))
 @pytest.mark.parametrize(
     ("effect", "faults"), [("camera_latency", {"delay_s": 0.04}), ("camera_pitch", {"distance_m": 0.5})]
 )
@@ -39,7 +39,7 @@ def test_delay_and_angle_are_told_apart_by_five_crossings_each_at_two_speeds(eff
         assert candidate(finding, effect).effective <= 28
 
 
-@pytest.mark.parametrize("faults", [{"delay_s": 0.04}, {"distance_m": 0.5}])
+@pytest.mark.parametrize("faults", beyond(1, [{"delay_s": 0.04}, {"distance_m": 0.5}]))
 def test_at_one_speed_delay_and_angle_are_ambiguous(faults):
     for seed in range(4):
         finding = diagnose(Camera(**faults), seed, speeds=(15.0, 15.0))

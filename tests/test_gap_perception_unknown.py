@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from camera_drives import BARE, Camera, changed, diagnose, drive, road
+from long import beyond
 
 from sim2real.perception.blocks import Blocks
 from sim2real.perception.chain import Account, Chain
@@ -77,11 +78,14 @@ def test_rounded_or_saturated_confidence_is_no_repeated_result(digits):
 
 @pytest.mark.parametrize(
     ("faults", "effect", "words"),
-    [
-        ({"offset": (0.2, 0.0, 0.0)}, "class_friction_offset", "explains mu_reference"),
-        ({"blur_s": 0.03}, "motion_blur", "how the confidence goes with speed"),
-        ({"dimmed": 0.4}, "exposure_shift", "how low the confidence is"),
-    ],
+    beyond(
+        1,
+        [
+            ({"offset": (0.2, 0.0, 0.0)}, "class_friction_offset", "explains mu_reference"),
+            ({"blur_s": 0.03}, "motion_blur", "how the confidence goes with speed"),
+            ({"dimmed": 0.4}, "exposure_shift", "how low the confidence is"),
+        ],
+    ),
 )
 def test_what_only_an_effect_that_is_left_out_explains_is_unknown(faults, effect, words):
     camera = replace(Camera(confidence=0.9), **faults)

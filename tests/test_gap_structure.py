@@ -157,6 +157,7 @@ def test_friction_is_found_beside_a_tyre_of_another_formula():
     assert said.structure.parameters["shape"].value == pytest.approx(FORMULA["shape"], abs=0.1)
 
 
+@pytest.mark.long
 def test_another_tyre_alone_is_no_effect_of_the_library():
     logs = [
         noisy(clean(hard_driving(12.0), v0, ROAD, effects={"tyre_shape": SHAPE}), seed)

@@ -130,6 +130,7 @@ def test_motors_that_give_no_more_than_their_power_lack_a_share_of_torque_by_pow
     assert all(word in found.sentence for word in ("share", "power", "[W]"))
 
 
+@pytest.mark.long
 def test_a_regeneration_that_fades_lacks_a_share_of_torque_where_it_brakes_slowly():
     def share(drive):
         left = np.clip((drive.measured[:, SPEED] - 2.0) / 4.0, 0.0, 1.0)

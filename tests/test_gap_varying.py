@@ -87,6 +87,7 @@ def test_a_value_that_varies_stays_within_its_bounds(logs, monkeypatch):
     assert values.max() == pytest.approx(high)
 
 
+@pytest.mark.long
 def test_a_swaying_scale_is_named_with_its_spread(logs):
     rest = set(EFFECTS) - {"vehicle_speed_scale", "wheel_radius_offset", "road_grade"}
     found = find(MODEL, logs[:2], logs[2], exclude=rest)

@@ -66,6 +66,7 @@ def test_rows_of_precise_wheels_may_show_all_that_a_wandering_speed_does():
     assert found.decision.verdict is Verdict.NO_GAP
 
 
+@pytest.mark.long
 def test_an_effect_is_found_though_the_speed_wanders_beside_it():
     """What wanders leaves more in the blocks than any effect may, and most of the gap's misfit."""
     off = {"tyre_relaxation": {"length_m": 0.7}}

@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from long import beyond
 from numpy.testing import assert_allclose
 
 from scenarios.camera.renderer import Renderer
@@ -397,7 +398,7 @@ def test_where_the_renderer_puts_a_change_of_surface_the_estimator_finds_it(posi
 
 
 @pytest.mark.parametrize("surface", list(Surface))
-@pytest.mark.parametrize("sky", ["overcast", "clear"])
+@pytest.mark.parametrize("sky", beyond(1, ["overcast", "clear"]))
 def test_trained_networks_on_rendered_road(surface, sky):
     """Plainly dry, plainly wet, plainly snowy: most frames carry the flag, and all that do are right."""
     files = MODELS / "segmenter.onnx", MODELS / "surface.onnx"

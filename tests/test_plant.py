@@ -221,7 +221,7 @@ def test_agrees_with_an_independent_stiff_solver(case):
         assert (error[MOTOR:] < 2e-2).all()
 
 
-@pytest.mark.parametrize("by_slope", [False, True])
+@pytest.mark.parametrize("by_slope", beyond(1, [False, True]))
 @pytest.mark.parametrize("load_transfer_m", beyond(1, [0.54, 0.0]))
 def test_other_forms_agree_with_the_independent_solver(load_transfer_m, by_slope):
     """A slip that lags, and rolling resistance on the body, over a border to ice where the wheels spin."""

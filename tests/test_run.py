@@ -106,6 +106,7 @@ def test_a_run_repeats_bit_by_bit(scenario_file, unit_file, tmp_path):
     assert first.summary == second.summary
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 def test_pictures_are_of_the_place_and_repeat(scenario_file, tmp_path):
     scenario = load_scenario(scenario_file)
