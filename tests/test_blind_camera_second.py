@@ -34,6 +34,8 @@ from benchmarks.blind.generator.cases import SHOWS
 from benchmarks.blind.generator.forms import Family
 from benchmarks.blind.generator.table import Group, table
 
+pytestmark = pytest.mark.long
+
 TENTH = Family.TENTH
 
 

@@ -18,6 +18,8 @@ from benchmarks.blind.generator.kernel import LAG, N, V, W, X
 from benchmarks.blind.generator.physics import Physics
 from benchmarks.blind.generator.world import nominal
 
+pytestmark = pytest.mark.long
+
 NO_COMMAND = np.zeros((2, 4))
 DRY, WET = 0.9, 0.5
 

@@ -23,6 +23,8 @@ from benchmarks.blind.generator.scales import AIRED_S, TABLE_M_S
 from benchmarks.blind.generator.sensors import Sensors, read
 from benchmarks.blind.generator.tyre_eighth import COMPOSITE_AT, COMPOSITE_TOP, bristles, composite
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("delay", [0.1, 0.02])
 def test_two_filters_are_late_by_the_delay(delay):

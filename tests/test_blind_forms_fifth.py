@@ -25,6 +25,8 @@ from benchmarks.blind.generator.forms import ASPECTS, OUTSIDES, Family, is_furth
 from benchmarks.blind.generator.kernel import LAG, MOTOR, TWIST, N, V, W, X
 from benchmarks.blind.generator.table import Group, table
 
+pytestmark = pytest.mark.long
+
 LOCKED = 0.79 * 0.9 * 9.81
 """Deceleration with locked wheels on a dry road [m/s^2]."""
 AIRBORNE = Road((0.0,), (1e-9,))

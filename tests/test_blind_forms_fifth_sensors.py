@@ -35,6 +35,8 @@ from benchmarks.blind.generator.sensors import read
 from benchmarks.blind.generator.tyre import cubed
 from benchmarks.blind.generator.world import nominal
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def ramp():

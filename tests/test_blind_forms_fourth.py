@@ -30,6 +30,8 @@ from benchmarks.blind.generator.sensors import read
 from benchmarks.blind.generator.tyre import brush_falling, brush_uniform
 from benchmarks.blind.generator.world import nominal
 
+pytestmark = pytest.mark.long
+
 LOCKED = 0.79 * 0.9 * 9.81
 """Deceleration with locked wheels on a dry road [m/s^2]."""
 WET = Road((0.0,), (0.5,))

@@ -17,6 +17,8 @@ from benchmarks.blind.generator.kernel import ANGLE, LAG, SLIP, TWIST, N, V, W, 
 from benchmarks.blind.generator.physics import Physics
 from benchmarks.blind.generator.world import nominal
 
+pytestmark = pytest.mark.long
+
 NO_COMMAND = np.zeros((2, 4))
 DRY, WET = 0.9, 0.5
 LOCKED = 0.79 * 9.81

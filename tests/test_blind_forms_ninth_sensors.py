@@ -24,6 +24,8 @@ from benchmarks.blind.generator.sensors import read
 from benchmarks.blind.generator.signals import JUMP_S
 from benchmarks.blind.generator.tyre_ninth import brush_elliptic, splined
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("delay", [0.1, 0.02])
 def test_a_median_is_late_by_the_delay_and_drops_what_is_short(delay):

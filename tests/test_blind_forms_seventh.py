@@ -28,6 +28,8 @@ from benchmarks.blind.generator.library import LIBRARY
 from benchmarks.blind.generator.table import SEVENTH_PAIRS, Group, table
 from benchmarks.blind.generator.world import World, nominal
 
+pytestmark = pytest.mark.long
+
 LOCKED = 0.79 * 0.9 * 9.81
 """Deceleration with locked wheels on a dry road [m/s^2]."""
 AIRBORNE = Road((0.0,), (1e-9,))

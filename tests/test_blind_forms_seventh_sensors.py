@@ -26,6 +26,8 @@ from benchmarks.blind.generator.signals import JUMP_S
 from benchmarks.blind.generator.tyre import arctangent, sine_rise
 from benchmarks.blind.generator.world import nominal
 
+pytestmark = pytest.mark.long
+
 
 def test_a_wheel_speed_may_be_the_motors():
     given = {"stiffness_nm_rad": 4000.0, "damping_nm_s_rad": 5.0, "motor_inertia_kg_m2": 0.6}

@@ -24,6 +24,8 @@ from benchmarks.blind.generator.kernel import LAG, SWAY, TWIST, N, V, W
 from benchmarks.blind.generator.table import Group, table
 from benchmarks.blind.generator.world import nominal
 
+pytestmark = pytest.mark.long
+
 LOCKED = 0.79 * 0.9 * 9.81
 """Deceleration with locked wheels on a dry road [m/s^2]."""
 AIRBORNE = Road((0.0,), (1e-9,))

@@ -35,6 +35,8 @@ from benchmarks.blind.generator.signals import JUMP_S
 from benchmarks.blind.generator.tyre import blended, plain_dugoff, two_lines
 from benchmarks.blind.generator.world import nominal
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def ramp():

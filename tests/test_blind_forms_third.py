@@ -28,6 +28,8 @@ from benchmarks.blind.generator.scales import SWAY_S
 from benchmarks.blind.generator.sensors import Noise, Sensors, read
 from benchmarks.blind.generator.world import nominal
 
+pytestmark = pytest.mark.long
+
 LOCKED = 0.79 * 0.9 * 9.81
 """Deceleration with locked wheels on a dry road [m/s^2]."""
 

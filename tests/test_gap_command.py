@@ -321,6 +321,7 @@ def test_matrix_products_take_one_thread_unless_the_user_says_otherwise(wish, gi
     assert said.stdout.split() == [given, "False"]
 
 
+@pytest.mark.long
 @pytest.mark.e2e
 def test_the_demonstration_as_a_newcomer_runs_it(tmp_path):
     """The real command in a process of its own; right first, as all but few seeds are."""

@@ -160,6 +160,7 @@ def test_what_takes_more_of_an_unknown_gap_is_told(nominal):
     assert with_speed_off_by(0.05).subsystem == "vehicle_speed_sensor"
 
 
+@pytest.mark.long
 def test_a_tone_wheel_off_its_centre_is_unknown_and_named(nominal):
     logs = [swinging(d, i, at_order(1.0)) for i, d in enumerate((*nominal, nominal[0]))]
     said = diagnose(MODEL, logs[:2], logs[2], jobs=2)

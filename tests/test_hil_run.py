@@ -244,6 +244,7 @@ def test_killed_helpers_are_said_and_the_loop_goes_on(
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["summary.json"]
 
 
+@pytest.mark.long
 def test_the_unit_of_four_wheels_runs_on_the_same_bus(tmp_path: Path) -> None:
     from fmu_src.packaging import build_unit
     from fmu_src.units import UNITS

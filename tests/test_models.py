@@ -119,6 +119,7 @@ def test_picture_contract():
     assert together == pytest.approx(alone, abs=1e-4)
 
 
+@pytest.mark.long
 def test_pictures_of_worlds_never_seen_are_classified():
     """The card of the surface network has what patches reach; a picture as a whole must not fall below chance by far.
 
