@@ -14,8 +14,9 @@ from collections.abc import Callable
 from typing import Any
 
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
-from trpac_core.four_wheels import WHEELS, CarSensors, FourWheels, FourWheelsConfig, SideClasses
+from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig, SideClasses
 from trpac_core.readings import Sensors
+from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
 
 STEP_S, STEPS, ROUNDS = 0.001, 2000, 9

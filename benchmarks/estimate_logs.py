@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from scenarios.files import WHEELS, VehicleFile, load_vehicle
+from scenarios.files import VehicleFile, load_vehicle
 from scenarios.peers import PEER_NAMES
 from sim2real.cases.case import FOLDER as CASES
 from sim2real.cases.case import MAPPINGS, load_case, stages
@@ -30,6 +30,7 @@ from sim2real.replay.inputs import Inputs, make_inputs
 from sim2real.replay.run import DYNAMICS, OURS, Replay, Trace, replay
 from sim2real.replay.score import score
 from trpac_core.estimator import RoadClass
+from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import CLASS_THETA, Surface
 from trpac_core.vision.preview import PreviewConfig
 

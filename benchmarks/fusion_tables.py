@@ -299,7 +299,7 @@ def slim(value: Any) -> Any:
 
 
 def draw(found: dict[str, dict[str, Any]]) -> None:
-    """The page's pictures: both drives in the form of Figures 17 and 19, distributions, coverage, degradation."""
+    """The page's pictures: both drives in the form of Figures 17 and 19, distributions, coverage."""
     PICTURES.mkdir(exist_ok=True)
     for name in ("road_test", "road_test_brakes"):
         sweep = load_sweep(SWEEPS / f"{name}.yaml")
@@ -311,9 +311,6 @@ def draw(found: dict[str, dict[str, Any]]) -> None:
         covered = figures.coverage_figure(table)
         if covered is not None:
             (PICTURES / "coverage.png").write_bytes(covered)
-    if "degradation" in found:
-        for parameter, picture in figures.degradations(found["degradation"]["table"]):
-            (PICTURES / f"{parameter.replace('.', '_')}.png").write_bytes(picture)
 
 
 def main() -> None:

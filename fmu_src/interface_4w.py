@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from trpac_core.dife import GREATEST_THETA
-from trpac_core.four_wheels import WHEELS, FourWheelsConfig
+from trpac_core.four_wheels import FourWheelsConfig
+from trpac_core.vehicle import WHEELS
 
 from .settings import PARAMETERS
 from .signals import INPUTS, OUTPUTS

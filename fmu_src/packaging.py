@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shutil
 import tempfile
 import zipfile
 import zlib
@@ -159,7 +160,17 @@ def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
         If the path holds a character that crashes the wrapper, an entry of the archive leaves the folder, or the
         archive is damaged.
     """
-    folder = Path(tempfile.mkdtemp(prefix="trpac-fmu-")) if folder is None else folder
+    if folder is not None:
+        return _unpacked(archive, folder)
+    made = Path(tempfile.mkdtemp(prefix="trpac-fmu-"))
+    try:
+        return _unpacked(archive, made)
+    except BaseException:
+        shutil.rmtree(made, ignore_errors=True)
+        raise
+
+
+def _unpacked(archive: Path, folder: Path) -> Path:
     path = str(folder.resolve())
     if not SAFE_PATH.fullmatch(path):
         bad = "".join(sorted(set(re.sub(SAFE_PATH, "", path))))

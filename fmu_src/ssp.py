@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
 
+from trpac_core.vehicle import WHEELS
+
 from .interface_4w import TRPAC_ESTIMATOR_4W
 from .interface_plant import REFERENCE_PLANT
 from .packaging import BuildError, write_archive
@@ -24,7 +26,6 @@ STOP_S = 10.0
 """The car has then crossed both borders of the paper's road [s]."""
 
 PLANT, ESTIMATOR, DRIVER = "plant", "estimator", "driver"
-WHEELS = ("fl", "fr", "rl", "rr")
 
 SHOWN = ("TRPAC", "TRPAC_std", "flag", "K_v", "tyre_force")
 """Outputs of the estimator that a tool is to record."""

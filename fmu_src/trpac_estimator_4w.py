@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 from operator import attrgetter
 from typing import Any, ClassVar
 
-from trpac_core.four_wheels import WHEELS, CarEstimate, CarSensors, FourWheels, FourWheelsConfig
+from trpac_core.four_wheels import CarEstimate, CarSensors, FourWheels, FourWheelsConfig
+from trpac_core.vehicle import WHEELS
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.sides import SidesIfe
 

@@ -37,6 +37,7 @@ PLANT_MODULES = (
     "scenarios/__init__.py",
     "scenarios/errors.py",
     "scenarios/files.py",
+    "scenarios/strict.py",
     "scenarios/effects",
     "scenarios/plant/dynamics.py",
     "scenarios/plant/parameters.py",

@@ -12,8 +12,8 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
-from scenarios.files import WHEELS
 from scenarios.runner import ESTIMATORS, Run
+from trpac_core.vehicle import WHEELS
 
 COLOURS = {"IFE": "#d08a00", "DE": "#7fb2e5", "DIFE": "#c0272d"}
 WIDTHS = {"IFE": 1.1, "DE": 3.0, "DIFE": 1.3}

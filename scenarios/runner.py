@@ -14,12 +14,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from fmu_src.packaging import sha256
-from scenarios.files import WHEELS, Scenario
+from scenarios.files import Scenario
 from scenarios.metrics import score_run
 from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.unit_client import parameters, run_unit
+from trpac_core.vehicle import WHEELS
 
 ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
 """The estimators that are compared, and the unit's output that holds each."""

@@ -27,8 +27,9 @@ from fmu_src.units import UNITS
 from scenarios.camera.files import load_camera
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.camera.split import SplitRenderer
-from scenarios.files import WHEELS, load_road, load_vehicle
+from scenarios.files import load_road, load_vehicle
 from trpac_core.car_friction import Friction, car_friction
+from trpac_core.vehicle import WHEELS
 
 HERE = Path(__file__).parent
 ROAD = HERE / "roads" / "split_friction.yaml"

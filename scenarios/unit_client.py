@@ -5,10 +5,12 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from xml.etree.ElementTree import ParseError
 
 import numpy as np
 import pandas as pd
 from fmpy import read_model_description
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
 from fmu_src.packaging import UnitFileError, unpack_unit
@@ -18,6 +20,7 @@ from scenarios.pictures import frame_steps
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
 
+UNIT = "TrpacEstimator"
 OUTPUTS = (
     "TRPAC",
     "K_v",
@@ -101,7 +104,7 @@ def run_unit(
     fmu : Path
         The unit's archive.
     settings : mapping
-        Parameters by variable name; a name that the unit does not have raises KeyError.
+        Parameters by variable name.
     signals : DataFrame
         One row per step with the columns `INPUTS`, in the unit's units.
     frames : DataFrame
@@ -119,22 +122,15 @@ def run_unit(
     Raises
     ------
     ScenarioError
-        If the archive is damaged or cannot be unpacked here.
+        If the archive is damaged, holds another unit, or cannot be unpacked or instantiated here, and if the unit
+        refuses a setting or a step.
     """
     try:
         folder = unpack_unit(fmu)
     except UnitFileError as error:
         raise ScenarioError(str(error)) from error
     try:
-        description = read_model_description(str(folder))
-        references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
-        unit = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="estimator",
-        )
-        unit.instantiate()
+        unit, references = _instantiated(fmu, folder)
         try:
             unit.setupExperiment(startTime=0.0)
             _set(unit, references, settings)
@@ -142,11 +138,35 @@ def run_unit(
             unit.exitInitializationMode()
             outputs = _step_all(unit, references, signals, frames, step_s, progress)
             unit.terminate()
+        except FMICallException as error:
+            raise ScenarioError(
+                f"{fmu}: refuses the scenario's settings or a step ({error}); its own words are above. Their ranges "
+                "stand in docs/fmu_variables.md."
+            ) from error
         finally:
             unit.freeInstance()
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return outputs
+
+
+def _instantiated(fmu: Path, folder: Path) -> tuple[FMU2Slave, dict[str, tuple[int, str]]]:
+    """The unit of an unpacked archive, and reference and type of its variables by name."""
+    try:
+        description = read_model_description(str(folder))
+        name = description.coSimulation.modelIdentifier
+    except (OSError, ValueError, AttributeError, ParseError) as error:
+        raise ScenarioError(f"{fmu}: not a co-simulation unit ({error}).") from error
+    if name != UNIT:
+        raise ScenarioError(f"{fmu}: is {name}; expected {UNIT}.")
+    unit = FMU2Slave(
+        guid=description.guid, unzipDirectory=str(folder), modelIdentifier=name, instanceName="estimator"
+    )
+    try:
+        unit.instantiate()
+    except Exception as error:  # fmpy raises a bare Exception here
+        raise ScenarioError(f"{fmu}: cannot be instantiated ({error}).") from error
+    return unit, {v.name: (v.valueReference, v.type) for v in description.modelVariables}
 
 
 def _set(

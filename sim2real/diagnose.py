@@ -23,7 +23,7 @@ from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order, counts, read_order, without_swing
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
-from sim2real.sources import Sources, read_source, read_sources
+from sim2real.sources import Source, Sources, read_source, read_sources
 from sim2real.telling.findings import Findings, describe
 from sim2real.which.closure import at_the_floor, closing, loud
 from sim2real.which.contest import COUNTER, Contest, Progress, first_round, hold_contest, silent
@@ -80,6 +80,7 @@ def diagnose_files(
     """
     progress("reading", 0, 1)
     sources = read_sources(vehicle, road, fit, holdout, mapping)
+    provenance = _provenance(sources)  # now: the files may be others when the fits are done
     progress("reading", 1, 1)
     drives = [s.drive for s in sources.all]
     model = Simulation(sources.vehicle)
@@ -100,7 +101,7 @@ def diagnose_files(
         said,
         trpac=_estimate(findings, sources),
         warnings=(*(f"{s.log.name}: {text}" for s in sources.all for text in s.log.warnings), *said.warnings),
-        provenance={**_provenance(sources), **said.provenance},
+        provenance={**provenance, **said.provenance},
     )
 
 
@@ -242,16 +243,15 @@ def counter_gap(findings: Findings) -> tuple[Measure, Measure]:
 def _provenance(sources: Sources) -> dict[str, object]:
     return {
         "vehicle": _file(sources.vehicle_path),
-        "fit": [
-            {**_file(s.log.path), "road": _file(s.road_path), "rate_hz": s.log.rate_hz} for s in sources.fit
-        ],
-        "holdout": {
-            **_file(sources.holdout.log.path),
-            "road": _file(sources.holdout.road_path),
-            "rate_hz": sources.holdout.log.rate_hz,
-        },
+        "fit": [_origin(source) for source in sources.fit],
+        "holdout": _origin(sources.holdout),
         "versions": {name: version(name) for name in PACKAGES},
     }
+
+
+def _origin(source: Source) -> dict[str, object]:
+    log = {"path": str(source.log.path), "sha256": source.log.sha256}
+    return {**log, "road": _file(source.road_path), "rate_hz": source.log.rate_hz}
 
 
 def _file(path: Path) -> dict[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import Effect
-from scenarios.files import WHEELS, RoadFile, VehicleFile
+from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant import simulate
 from sim2real.observing.doubt import doubt
 from sim2real.observing.drive import CHANNELS, Drive, make_drive
@@ -19,6 +19,7 @@ from sim2real.observing.observer import Simulation
 from sim2real.result import NextManoeuvre
 from sim2real.which.contest import Entry, Progress, silent
 from sim2real.which.fitting import fit
+from trpac_core.vehicle import WHEELS
 
 Array = NDArray[Any]
 

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import ScenarioError
-from scenarios.files import WHEELS, RoadFile, VehicleFile, load_road, load_vehicle
+from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
 from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
 from sim2real.logs.checks import MIN_DURATION_S
 from sim2real.observing.drive import WHEEL, Drive, awake, backward, grid_step, make_drive
 from sim2real.observing.lattice_trace import find_counter
+from trpac_core.vehicle import WHEELS
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.gap_development import BARE, Case, drives
-from scenarios.files import WHEELS, RoadFile, VehicleFile
+from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant import simulate
 from sim2real.observing.drive import CHANNELS, make_drive
 from sim2real.observing.observer import Simulation
+from trpac_core.vehicle import WHEELS
 
 MODEL = Simulation(BARE)
 STEP_S = 0.008

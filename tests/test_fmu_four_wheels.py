@@ -19,7 +19,8 @@ from fmu_src.packaging import build_unit, sha256
 from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
 from trpac_core.estimator import RoadClass
-from trpac_core.four_wheels import WHEELS, CarSensors, FourWheels, FourWheelsConfig, SideClasses
+from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig, SideClasses
+from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.sides import SidesIfe

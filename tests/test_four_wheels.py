@@ -12,17 +12,10 @@ from test_ife import CAMERA, DRY, SNOW, Masks, Middle
 from test_sides import split_road
 
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
-from trpac_core.four_wheels import (
-    CAR,
-    WHEELS,
-    CarSensors,
-    FourWheels,
-    FourWheelsConfig,
-    SideClasses,
-)
+from trpac_core.four_wheels import CAR, CarSensors, FourWheels, FourWheelsConfig, SideClasses
 from trpac_core.readings import Sensors
 from trpac_core.tyre import force
-from trpac_core.vehicle import Vehicle
+from trpac_core.vehicle import WHEELS, Vehicle
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.sides import SidesIfe
 

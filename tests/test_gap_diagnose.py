@@ -15,13 +15,13 @@ import sim2real
 from benchmarks.gap_development import BARE
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.errors import ScenarioError
-from scenarios.files import WHEELS
 from sim2real.demo import VEHICLE
 from sim2real.diagnose import diagnose, diagnose_files, shrink_on
 from sim2real.observing.drive import CHANNELS, make_drive
 from sim2real.result import Diagnosis, Verdict
 from sim2real.sources import read_sources, split
 from sim2real.telling.report import jsonable
+from trpac_core.vehicle import WHEELS
 
 PAYLOAD = {"mass_offset": {"mass_kg": 180.0}}
 FEW = ("mass_offset", "torque_gain", "torque_lag", "aero_drag", "accelerometer_bias", "tyre_stiffness_offset")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import can
@@ -13,17 +15,19 @@ from hil_fakes import MS, FakeClock
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scenarios.errors import ScenarioError
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.bus import BusSettings, Link, bus_options
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, OUTPUT_MESSAGES, load_codec
 from trpac_hil.dbc_table import TARGET, document
-from trpac_hil.deadlines import Deadlines, WallWatch, wait_until
+from trpac_hil.deadlines import Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
 from trpac_hil.ferry import Ferry, Wire, ferry_ring
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
+from trpac_hil.partner import PLAIN_SCENARIO, Partner, PartnerJob
 from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
 from trpac_hil.realtime import loop_core
 from trpac_hil.records import columns
@@ -95,6 +99,20 @@ def test_a_dbc_file_of_ones_own_may_move_everything_but_must_have_all_signals(tm
     broken.write_text("BO_ nonsense", encoding="utf-8")
     with pytest.raises(HilError, match="cannot be read as DBC"):
         load_codec(broken)
+
+
+def test_a_dbc_file_without_ranges_leaves_what_the_bits_can_hold(tmp_path: Path) -> None:
+    plain = tmp_path / "plain.dbc"
+    plain.write_text(re.sub(r"\[[-0-9.e+]+\|[-0-9.e+]+\]", "[0|0]", DBC_FILE.read_text(encoding="utf-8")))
+    codec = load_codec(plain)
+    for name in INPUT_MESSAGES + OUTPUT_MESSAGES:
+        coded = codec[name]
+        for value in (math.inf, -math.inf, 1e9, -1e9):
+            back, _ = coded.decode(coded.encode(dict.fromkeys(coded.signals, value)))
+            assert not any(math.isnan(got) for got in back.values())
+        for signal, (low, high) in coded.bounds.items():
+            stated = CODEC[name].bounds[signal]
+            assert low <= stated[0] <= stated[1] <= high
 
 
 # Time
@@ -290,6 +308,34 @@ def until_back(link: Link) -> None:
     assert link._seeker is not None
     link._seeker.join(10.0)
     link.receive()
+
+
+@pytest.mark.parametrize("why", [OSError("gone"), ValueError("no such channel"), NotImplementedError()])
+def test_a_lost_bus_is_tried_again_whatever_opening_it_raises(why: Exception) -> None:
+    bus, back = RaisingBus(), RaisingBus()
+    answers: list[RaisingBus | Exception] = [bus, why, why, back]
+
+    def opened() -> RaisingBus:
+        answer = answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    link = Link(opened, unsaid, retry_s=0.0)
+    bus.failing = OSError("Network is down")
+    link.receive()
+    until_back(link)
+    assert link.up
+    assert not answers
+
+
+@pytest.mark.parametrize(("key", "value"), [("scenario", "nowhere.yaml"), ("dbc", "nowhere.dbc")])
+def test_what_a_plant_on_the_bus_refuses_leaves_no_open_bus(key: str, value: str, tmp_path: Path) -> None:
+    job = PartnerJob(PLAIN_SCENARIO, BusSettings("virtual", "none"), DBC_FILE, 1000.0)
+    opened: list[int] = []
+    with pytest.raises((ScenarioError, HilError), match="nowhere"):
+        Partner(replace(job, **{key: tmp_path / value}), lambda: opened.append(1), SystemClock())
+    assert not opened
 
 
 @pytest.mark.parametrize("error", [OSError("Network is down"), can.CanInitializationError("gone")])

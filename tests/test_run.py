@@ -9,10 +9,14 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
+from fmu_src.packaging import build_unit
+from fmu_src.units import UNITS
+from scenarios.errors import ScenarioError
 from scenarios.files import load_scenario
 from scenarios.pictures import frame_name, record
 from scenarios.plant.pipeline import drive
 from scenarios.runner import run_scenario
+from scenarios.unit_client import INPUTS, run_unit
 from trpac_cli.main import app
 
 ROOT = Path(__file__).parents[1]
@@ -152,6 +156,21 @@ def test_a_missing_unit_is_said(scenario_file, tmp_path):
     assert result.exit_code == 2
     assert "none.fmu" in result.stderr
     assert "build_fmu.py" in result.stderr
+
+
+ONE_ROW = pd.DataFrame({name: [1.0] for name in INPUTS})
+NO_FRAMES = pd.DataFrame({"row": [], "path": [], "frame": []})
+
+
+def test_another_unit_of_ours_is_said(tmp_path):
+    archive = build_unit(UNITS["TrpacEstimator4W"], tmp_path / "other.fmu")
+    with pytest.raises(ScenarioError, match=r"other\.fmu: is TrpacEstimator4W; expected TrpacEstimator"):
+        run_unit(archive, {}, ONE_ROW, NO_FRAMES, 0.001)
+
+
+def test_settings_that_the_unit_refuses_are_said(unit_file):
+    with pytest.raises(ScenarioError, match="refuses the scenario's settings or a step"):
+        run_unit(unit_file, {"tyre.longitudinal_stiffness": 1.0}, ONE_ROW, NO_FRAMES, 0.001)
 
 
 def test_an_output_that_is_a_file_is_said_before_the_work(scenario_file, tmp_path):

@@ -13,9 +13,10 @@ import pytest
 from scenarios import split_friction
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.camera.split import SplitRenderer
-from scenarios.files import WHEELS, load_road
+from scenarios.files import load_road
 from scenarios.split_figure import draw_split
 from scenarios.split_friction import ROAD, run
+from trpac_core.vehicle import WHEELS
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife_config import IfeConfig

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -319,6 +320,47 @@ def test_a_folder_of_another_sweep_is_refused(sweep_of, tmp_path):
     Parts(tmp_path / "out", identity(sweep_of())).open()
     with pytest.raises(ScenarioError, match="another sweep"):
         Parts(tmp_path / "out", identity(sweep_of(seed=6))).open()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "named"),
+    [("sweep.json", "[1]", "no sweep's identity"), ("parts/notes.json", "{}", "no run of a sweep")],
+)
+def test_files_of_others_in_the_folder_are_named(sweep_of, tmp_path, name, text, named):
+    Parts(tmp_path / "out", identity(sweep_of())).open()
+    (tmp_path / "out" / name).write_text(text)
+    with pytest.raises(ScenarioError, match=rf"{name}: is {named}"):
+        Parts(tmp_path / "out", identity(sweep_of())).open()
+
+
+def test_an_out_that_is_a_file_ends_before_the_work(tmp_path):
+    path, out = tmp_path / "sweep.yaml", tmp_path / "out"
+    path.write_text(yaml.safe_dump(SHORT))
+    out.write_text("mine")
+    result = CliRunner().invoke(app, ["sweep", str(path), "--out", str(out / "deeper")])
+    assert result.exit_code == 2
+    assert f"{out}: a file" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_failed_runs_are_told_in_order_however_they_ended(monkeypatch, sweep_of, tmp_path):
+    class Failed:
+        status = "error"
+
+    monkeypatch.setattr(
+        execute_module, "_stream", lambda client, sweep, todo: [(k, Failed) for k in todo[::-1]]
+    )
+    monkeypatch.setattr(execute_module, "_why", lambda future: "as was wished")
+    monkeypatch.setattr(execute_module, "connected", lambda scheduler, jobs: nullcontext())
+    _, failures = execute(sweep_of(), tmp_path / "out", None, 1)
+    assert [failure.run for failure in failures] == [0, 1, 2, 3]
+
+
+def test_normal_draws_stay_within_what_their_quantity_can_be(sweep_of):
+    sweep = sweep_of(camera={"source": "class_process", "lost_share": {"normal": [0.01, 0.5]}}, runs=20)
+    drawn = [plan_run(sweep, key).camera.lost_share for key in run_keys(sweep)]
+    assert min(drawn) == 0.0
+    assert 0.0 < max(drawn) <= 1.0
 
 
 def test_a_scheduler_that_does_not_answer_is_said(sweep_of, tmp_path, monkeypatch):

@@ -19,8 +19,8 @@ from benchmarks.table4.scores import blocks_of, confusion, gate, n_w, share, wil
 from benchmarks.table4.sequences import Sequence, majority
 from models.training.rendered import SEED_RANGES
 from scenarios.camera.renderer import Renderer
-from scenarios.files import load_strict
 from scenarios.looks import MODELS
+from scenarios.strict import load_strict
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife_config import IfeConfig

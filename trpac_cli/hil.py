@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +30,8 @@ Interface = Annotated[
     str, typer.Option(help="Any interface of python-can: virtual, udp_multicast, socketcan, pcan, vector ...")
 ]
 Channel = Annotated[
-    str | None, typer.Option(help="Its channel, such as can0; virtual and UDP have a default.")
+    str | None,
+    typer.Option(help="Its channel, such as can1; virtual, UDP and socketcan (can0) have a default."),
 ]
 Options = Annotated[
     list[str] | None,
@@ -40,7 +42,9 @@ Dbc = Annotated[
     typer.Option(help="DBC file with the shipped one's names, but ids, layout and scales of yours."),
 ]
 Rate = Annotated[float, typer.Option(min=100.0, max=1000.0, help="Cycles per second.")]
-Duration = Annotated[float | None, typer.Option(min=0.01, help="Ends by itself after this time [s].")]
+Duration = Annotated[
+    float | None, typer.Option(min=0.01, max=1e6, help="Ends by itself after this time [s].")
+]
 ScenarioOption = Annotated[
     Path | None, typer.Option(help="Car, road and sensor noise of the plant; the paper's by default.")
 ]
@@ -217,7 +221,9 @@ def _parameters(pairs: list[str] | None) -> dict[str, float]:
         try:
             values[name] = float(text)
         except ValueError:
-            raise HilError(f"--parameter {pair}: expected NAME=NUMBER, such as estimator.gamma=10.") from None
+            values[name] = math.nan
+        if not math.isfinite(values[name]):
+            raise HilError(f"--parameter {pair}: expected NAME=NUMBER, such as estimator.gamma=10.")
     return values
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import zipfile
 from dataclasses import replace
@@ -17,7 +16,7 @@ from rich.table import Table
 from scenarios.errors import ScenarioError
 from trpac_cli import fmu as fmu_commands
 from trpac_cli import gap, vision
-from trpac_cli.console import EXIT_INPUT
+from trpac_cli.console import refuse, require_folder
 from trpac_cli.estimate import estimate
 from trpac_cli.hil import hil, hil_plant
 from trpac_cli.sweep import sweep
@@ -68,17 +67,17 @@ def run(
     """
     from scenarios.files import load_scenario
 
+    require_folder("trpac run", out)
     try:
-        _require(fmu, out)
+        _require(fmu)
         chosen = _varied(load_scenario(scenario), seed, stiffness_n)
         with tempfile.TemporaryDirectory(prefix="trpac_") as scratch:
             _run(chosen, fmu, out, Path(scratch))
     except (ScenarioError, OSError) as error:
-        print(f"trpac run: {error}", file=sys.stderr)
-        raise typer.Exit(EXIT_INPUT) from error
+        refuse("trpac run", error)
 
 
-def _require(fmu: Path | None, out: Path) -> None:
+def _require(fmu: Path | None) -> None:
     """Refuse before the work what would fail after it."""
     if fmu is not None and not zipfile.is_zipfile(fmu):
         raise ScenarioError(f"{fmu}: no unit there. Build one: .venv/bin/python build_fmu.py")
@@ -89,8 +88,6 @@ def _require(fmu: Path | None, out: Path) -> None:
             require_whole(fmu)
         except UnitFileError as error:
             raise ScenarioError(str(error)) from error
-    if out.exists() and not out.is_dir():
-        raise ScenarioError(f"{out}: a file. Expected a folder to write into.")
 
 
 def _varied(scenario: Scenario, seed: int | None, stiffness_n: float | None) -> Scenario:

@@ -20,7 +20,7 @@ from rich.progress import (
 from rich.table import Table
 
 from scenarios.errors import ScenarioError
-from trpac_cli.console import EXIT_INPUT
+from trpac_cli.console import refuse, require_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,6 +64,7 @@ def sweep(
     console = Console()
     try:
         _require(scheduler, jobs)
+        require_folder("trpac sweep", out)
         loaded = load_sweep(file)
         with Progress(*columns, console=console) as bars:
             task = bars.add_task("runs", total=None)
@@ -76,9 +77,8 @@ def sweep(
             )
         if not parts.empty():
             _finish(loaded, parts, failures, out, console)
-    except ScenarioError as error:
-        print(f"trpac sweep: {error}", file=sys.stderr)
-        raise typer.Exit(EXIT_INPUT) from error
+    except (ScenarioError, OSError) as error:
+        refuse("trpac sweep", error)
     if failures:
         named = "; ".join(f"run {f.run}: {f.why}" for f in failures[:MOST_NAMED])
         print(

@@ -6,14 +6,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from trpac_cli.console import EXIT_INPUT
+from trpac_cli.console import refuse, require_folder
 
 if TYPE_CHECKING:
     from scenarios.stills import Progress as Told
@@ -45,17 +45,18 @@ def classify(
 
     command = "trpac vision classify"
     if out.is_dir():
-        _refuse(command, f"{out}: a folder. Expected the name of a CSV file to write.")
+        refuse(command, f"{out}: a folder. Expected the name of a CSV file to write.")
+    require_folder(command, out.parent)
     try:
         files, problems = find_pictures(paths)
         with _bar("pictures") as told:
             table, unusable = classify_pictures(files, told)
         problems += unusable
         if table.empty:
-            _refuse(command, _listed("nothing to classify", problems))
+            refuse(command, _listed("nothing to classify", problems))
         write_classes(table, out)
     except (ModelError, OSError) as error:
-        _refuse(command, str(error))
+        refuse(command, error)
     Console().print(f"{len(table)} pictures: {_counted(list(table['class']))}. Table: {out}", soft_wrap=True)
     _finish(command, f"{len(problems)} of the inputs could not be used", problems)
 
@@ -83,14 +84,13 @@ def run(
     from trpac_core.vision.networks import ModelError
 
     command = "trpac vision run"
-    if out.exists() and not out.is_dir():
-        _refuse(command, f"{out}: a file. Expected a folder to write to.")
+    require_folder(command, out)
     try:
         found = Frames.find(frames)
         with _bar("frames") as told:
             drive = run_frames(found, camera, speed_m_s, fps, out, told)
     except (ScenarioError, ModelError, OSError) as error:
-        _refuse(command, str(error))
+        refuse(command, error)
     _show(drive)
     problems = [f"{entry['frame']}: {entry['reason']}" for entry in drive.summary["unreadable"]]
     _finish(command, f"{len(problems)} of {drive.summary['frames']} frames could not be used", problems)
@@ -143,8 +143,3 @@ def _finish(command: str, heading: str, problems: Sequence[str]) -> None:
     if problems:
         print(f"{command}: {_listed(heading, problems)}", file=sys.stderr)
         raise typer.Exit(EXIT_SOME_UNREADABLE)
-
-
-def _refuse(command: str, message: str) -> NoReturn:
-    print(f"{command}: {message}", file=sys.stderr)
-    raise typer.Exit(EXIT_INPUT)

@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from .car_friction import car_friction
 from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
 from .readings import LONGEST_STEP_S, PLAUSIBLE, Sensors
+from .vehicle import WHEELS
 from .vision.results import FrameResult
 from .vision.sides import SidesIfe, SidesState
 from .vision.trajectory import Motion
 
-WHEELS = ("fl", "fr", "rl", "rr")
-"""Order of all fours: front left, front right, rear left, rear right."""
 CAR = "car"
 """Whom a problem of a shared signal concerns."""
 LIFTED_N = 1.0

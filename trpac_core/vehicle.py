@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 GRAVITY_M_S2 = 9.81
 """Standard gravity as the reference plant uses it [m/s^2]."""
+WHEELS = ("fl", "fr", "rl", "rr")
+"""Order of all fours, in arrays and files: front left, front right, rear left, rear right."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ MOST_AT_ONCE = 512
 """Messages that one cycle reads at most; what is left waits for the next one."""
 BUS_ERRORS = (can.CanError, OSError)
 """What interfaces raise when a bus fails."""
+OPENING_ERRORS = (*BUS_ERRORS, ValueError, TypeError, ImportError, NotImplementedError)
+"""What they raise when one cannot be opened."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Link:
         self._seeker: threading.Thread | None = None
         try:
             self._bus: can.BusABC | None = open_bus()
-        except (*BUS_ERRORS, ValueError, TypeError, ImportError, NotImplementedError) as error:
+        except OPENING_ERRORS as error:
             raise HilError(
                 f"The bus cannot be opened: {type(error).__name__}: {error}. Check --interface, --channel and "
                 "--bus-option; docs/hil.md has examples."
@@ -153,7 +155,7 @@ class Link:
         while not self._closing.wait(self._retry_s):
             try:
                 self._found = self._open()
-            except BUS_ERRORS:
+            except OPENING_ERRORS:
                 continue
             return
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cantools
-from cantools.database.can import Message
+from cantools.database.can import Message, Signal
 
 from trpac_hil.errors import HilError
 
@@ -70,12 +70,12 @@ class Coded:
             counters[0].name if counters else "",
             2 ** counters[0].length if counters else 0,
             absent,
-            {s.name: _bounds(s.minimum, s.maximum) for s in message.signals},
+            {s.name: _bounds(s, absent.get(s.name)) for s in message.signals},
             stale_ns,
         )
 
     def encode(self, values: Mapping[str, float], count: int = 0) -> bytes:
-        """Bytes of a message; what is out of range is cut, what is missing or not finite is not available, else 0."""
+        """Bytes of a message; what is out of range is cut, what is missing or NaN is not available, else 0."""
         ready: dict[str, float] = {self.counter: count % self.counts} if self.counts else {}
         for name in self.signals:
             value = values.get(name, math.nan)
@@ -102,8 +102,20 @@ class Coded:
         return values, count
 
 
-def _bounds(low: float | None, high: float | None) -> tuple[float, float]:
-    return (-math.inf if low is None else float(low), math.inf if high is None else float(high))
+def _bounds(signal: Signal, absent: float | None) -> tuple[float, float]:
+    """The range that a signal states, else what its bits can hold but for "not available"."""
+    low, high = -math.inf, math.inf
+    if not signal.is_float:
+        raw = (0, 2**signal.length - 1)
+        if signal.is_signed:
+            raw = (-(2 ** (signal.length - 1)), 2 ** (signal.length - 1) - 1)
+        low, high = sorted(float(value * signal.scale + signal.offset) for value in raw)
+        step = abs(float(signal.scale))
+        low, high = low + step * (low == absent), high - step * (high == absent)
+    return (
+        low if signal.minimum is None else max(low, float(signal.minimum)),
+        high if signal.maximum is None else min(high, float(signal.maximum)),
+    )
 
 
 @dataclass(frozen=True)

@@ -91,11 +91,6 @@ class Inputs:
         heard.values, heard.count, heard.at_ns = values, count, at_ns
         return name
 
-    def forget_counts(self) -> None:
-        """After a pause nothing is known of how many messages are missing."""
-        for heard in self.heard.values():
-            heard.count = -1
-
     def value(self, signal: str, now_ns: int) -> float:
         """The newest value of a signal, NaN where there is none or it is too old."""
         heard = self._message_of[signal]

@@ -12,6 +12,7 @@ import numpy as np
 
 from scenarios.errors import ScenarioError
 from scenarios.files import SensorNoise, load_scenario
+from trpac_core.vehicle import WHEELS
 from trpac_hil.bus import BUS_ERRORS, BusSettings, Link
 from trpac_hil.codec import DBC_FILE, Codec, load_codec
 from trpac_hil.deadlines import Clock, Deadlines, SystemClock, wait_until
@@ -20,7 +21,6 @@ from trpac_hil.ferry import Wire
 from trpac_hil.helper import Control, helper
 from trpac_hil.realtime import raise_priority
 from trpac_hil.shared import Ring
-from trpac_hil.unit import WHEELS
 
 PLAIN_SCENARIO = Path(__file__).parent.parent / "scenarios" / "paper_simulation.yaml"
 SLOW_NS = 10_000_000
@@ -72,16 +72,17 @@ class _Picture:
 class Partner:
     """The plant with its sensors and its camera, and the messages that they send. Raises ScenarioError, HilError."""
 
-    def __init__(self, job: PartnerJob, link: Any, clock: Clock) -> None:
+    def __init__(self, job: PartnerJob, open_link: Callable[[], Any], clock: Clock) -> None:
         scenario = load_scenario(job.scenario)
         self.drive = EndlessDrive(scenario, 1.0 / job.rate_hz)
         self.left_out = 0
-        self._job, self._link, self._clock = job, link, clock
+        self._job, self._clock = job, clock
         self._codec: Codec = load_codec(job.dbc)
         self._noise, self._random = scenario.sensors, np.random.default_rng(scenario.seed)
         self._sent: dict[str, int] = {}
         self._pictures: deque[_Picture] = deque()
         self._next_slow_ns = 0
+        self._link = open_link()  # last: what is refused before leaves no open bus
 
     def run(self, start_ns: int, stop: Callable[[], bool], slots: int | None = None) -> None:
         """Drive in real time until told to stop, or for a number of slots."""
@@ -166,7 +167,7 @@ class Partner:
 
 def open_partner(job: PartnerJob, say: Callable[[str, str], None], wire: Ring | None = None) -> Partner:
     """The plant with its end of the bus, or of a wire to it; raises ScenarioError and HilError."""
-    return Partner(job, Link(job.bus.open, say) if wire is None else Wire(wire), SystemClock())
+    return Partner(job, lambda: Link(job.bus.open, say) if wire is None else Wire(wire), SystemClock())
 
 
 def play(job: PartnerJob, wire: Ring | None, control: Control) -> None:

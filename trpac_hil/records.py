@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from trpac_hil.unit import WHEELS, Wiring
+from trpac_core.vehicle import WHEELS
+from trpac_hil.unit import Wiring
 
 TIME = "time_s"
 

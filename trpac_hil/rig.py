@@ -47,7 +47,6 @@ from trpac_hil.unit import Unit
 LOG, SUMMARY = "log.mf4", "summary.json"
 RUN_UP_NS = 200_000_000
 """From the word to start until slot 0, for all processes to hear it [ns]."""
-PICTURE_ENDINGS = (".jpg", ".jpeg", ".png")
 CLASS_MESSAGE, CLASS_SIGNAL = "RoadClass", "RoadClass_Number"
 
 
@@ -321,7 +320,9 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
         raise HilError("Pictures need a camera file: --camera, such as scenarios/cameras/paper.yaml.")
     if not settings.frames.is_dir():
         raise HilError(f"{settings.frames}: no such folder. Expected a folder of JPEG or PNG pictures.")
-    files = tuple(sorted(p for p in settings.frames.iterdir() if p.suffix.lower() in PICTURE_ENDINGS))
+    from scenarios.stills import pictures_in  # here: a run without pictures loads no networks
+
+    files = tuple(pictures_in(settings.frames))
     if not files:
         raise HilError(f"{settings.frames}: no pictures in this folder. Expected JPEG or PNG files.")
     car = _vehicle(settings)

@@ -14,10 +14,11 @@ from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
+from fmu_src.interface_4w import WHICH_WHEEL
 from fmu_src.packaging import UnitFileError, unpack_unit
+from trpac_core.vehicle import WHEELS
 from trpac_hil.errors import HilError
 
-WHEELS = ("fl", "fr", "rl", "rr")
 NO_CLASS = -1
 WARM_UP_STEPS = 300
 """Steps before the clock starts: the first ones load code and are slow."""
@@ -101,8 +102,6 @@ _OF_THE_CAR = {
     "steering_angle": "SteeringAngle",
 }
 
-WHICH_WHEEL = ("wheel.front", "wheel.left")
-"""Parameters that the unit of four wheels does not have."""
 WIRINGS = ("TrpacEstimator", "TrpacEstimator4W")
 
 
@@ -136,6 +135,7 @@ class Unit:
         self.name = name
         self.wiring = Wiring.of_four() if name.endswith("4W") else Wiring.of_one(wheel)
         self._references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
+        self._parameters = {v.name for v in description.modelVariables if v.causality == "parameter"}
         outputs = _outputs(self.wiring)
         self._reals = [self._references[n][0] for n in outputs[0]]
         self._flags = [self._references[n][0] for n in outputs[1]]
@@ -161,19 +161,23 @@ class Unit:
         self._last = self._read()
 
     def _typed(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Settings as their variables' types; raises HilError for a name that the unit does not have."""
+        """Settings as their variables' types; raises HilError for what is no parameter, or no number of its kind."""
         kinds = {"Integer": int, "Boolean": bool, "Real": float}
-        usable = {name for name, (_, kind) in self._references.items() if kind in kinds}
+        usable = {name for name in self._parameters if self._references[name][1] in kinds}
         unknown = sorted(set(settings) - usable - set(WHICH_WHEEL))
         if unknown:
             raise HilError(
                 f"{self.archive}: has no parameter {', '.join(unknown)}; see docs/fmu_variables.md."
             )
-        return {
-            name: kinds[self._references[name][1]](value)
-            for name, value in settings.items()
-            if name in self._references
-        }
+        known = {name: value for name, value in settings.items() if name in usable}
+        typed = {name: kinds[self._references[name][1]](value) for name, value in known.items()}
+        changed = [name for name, value in known.items() if typed[name] != value]
+        if changed:
+            raise HilError(
+                f"{self.archive}: {changed[0]} is {known[changed[0]]:g}; expected "
+                f"{'0 or 1' if isinstance(typed[changed[0]], bool) else 'a whole number'}."
+            )
+        return typed
 
     def _initialise(self, settings: Mapping[str, Any]) -> None:
         slave = self._instance

@@ -18,10 +18,10 @@ import numpy as np
 from fmu_src.contents import CONTENTS_FILE, Contents, sha256_of
 from fmu_src.guarded_slave import GuardedSlave
 from fmu_src.units import MODELS, ROOT
+from trpac_core.vehicle import WHEELS
 
 STEP_S = 0.001
 STEPS = 200
-WHEELS = ("fl", "fr", "rl", "rr")
 
 Values = Mapping[str, Any]
 

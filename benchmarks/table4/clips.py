@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from models.training.data import Box, Picture, pixel_box, read_manifest
-from scenarios.files import load_strict
+from scenarios.strict import load_strict
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.trajectory import Motion
 

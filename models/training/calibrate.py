@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from scenarios.camera.disturbances import PAPER, disturb
+from trpac_core.vision.networks import calibrated_probabilities
 
 from .data import Image
 
@@ -47,10 +48,8 @@ class Reliability:
 
 
 def probabilities(logits: NDArray[np.float64], temperature: float = 1.0) -> NDArray[np.float64]:
-    """Softmax of logits / T, shape (n, classes)."""
-    scaled = logits / temperature
-    raised = np.exp(scaled - scaled.max(axis=1, keepdims=True))
-    return raised / raised.sum(axis=1, keepdims=True)
+    """Softmax of logits / T, shape (n, classes), as the estimator reckons it."""
+    return calibrated_probabilities(logits, temperature)
 
 
 def cross_entropy(logits: NDArray[np.float64], labels: NDArray[np.int64], temperature: float = 1.0) -> float:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from scenarios.files import load_strict
+from scenarios.strict import load_strict
 from trpac_core.vision.camera import Camera
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]

@@ -210,7 +210,7 @@ def _paint(lines, s, t, foot_s, foot_t):
 
 
 @njit(inline="always", fastmath=True)
-def _asphalt(look, m0, m1, m2, m3, f0, track, oil, repair):
+def _asphalt(look, m0, m1, m2, m3, track, oil, repair):
     """Tone of dry asphalt relative to its albedo: stains, wheel paths, cracks, repairs (grain comes later)."""
     value = ONE + look.stains * (F(1.2) * m0 + F(1.3) * m1 + F(0.5) * m3)
     value += look.wheel_band * track - look.oil_band * oil
@@ -272,7 +272,7 @@ def _road(look, kind, macro, fine, track, oil, repair, bitumen, paint):
     """Reflectance of the road, gloss of its film, and share of standing water."""
     m0, m1, m2, m3 = macro
     f0, f1, f2 = fine
-    value = _asphalt(look, m0, m1, m2, m3, f0, track, oil, repair)
+    value = _asphalt(look, m0, m1, m2, m3, track, oil, repair)
     b, g, r = look.asphalt_b * value, look.asphalt_g * value, look.asphalt_r * value
     if paint > F(0.0):
         paint *= ONE - _step(look.wear * F(1.5) - F(0.55) + F(0.9) * m1 + F(0.8) * f0, F(0.0), HALF)

@@ -10,9 +10,9 @@ from typing import Any
 import yaml
 from pydantic import BaseModel, ConfigDict
 
-from scenarios.files import load_strict
 from scenarios.peers.kalman import KalmanTuning
 from scenarios.peers.slip_slope import SlipSlopeTuning
+from scenarios.strict import load_strict
 
 TUNING_FILE = Path(__file__).with_name("tuning.yaml")
 HEADER = "# Written by `python -m benchmarks.tune_peers tune`; see docs/peers.md.\n"

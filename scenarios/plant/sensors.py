@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from scenarios.files import WHEELS, Scenario, SensorNoise, VehicleFile
+from scenarios.files import Scenario, SensorNoise, VehicleFile
 from scenarios.plant.pipeline import PlantTrajectory
 from trpac_core.tyre import peak_friction
+from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
 

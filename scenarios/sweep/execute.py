@@ -105,7 +105,7 @@ def execute(
                 failures.append(Failure(key.index, _why(future)))
             finished += 1
             progress(finished, len(keys))
-    return parts, failures
+    return parts, sorted(failures, key=lambda failure: failure.run)
 
 
 @contextmanager

@@ -12,7 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from fmu_src.units import UNITS
 from scenarios.effects import suggestion
 from scenarios.errors import ScenarioError
-from scenarios.files import Scenario, SurfaceName, load_scenario, load_strict
+from scenarios.files import Scenario, SurfaceName, load_scenario
+from scenarios.strict import load_strict
 from scenarios.sweep.trackers import problem_of_tracker
 
 
@@ -41,12 +42,12 @@ class Drawn(_Section):
             raise ValueError(f"normal is {self.normal}; expected [mean, standard deviation].")
         return self
 
-    def sample(self, random: np.random.Generator) -> float:
-        """One value."""
+    def sample(self, random: np.random.Generator, within: tuple[float, float]) -> float:
+        """One value; of a normal one what lies beyond the range is drawn at its end."""
         if self.uniform is not None:
             return float(random.uniform(self.uniform[0], self.uniform[1]))
         if self.normal is not None:
-            return float(random.normal(self.normal[0], self.normal[1]))
+            return float(np.clip(random.normal(self.normal[0], self.normal[1]), *within))
         return float(random.choice(np.array(self.choice)))
 
 
@@ -55,14 +56,13 @@ Number = float | Drawn
 
 
 def extremes(number: Number) -> tuple[float, float]:
-    """Lowest and highest that a number can be, a normal one within 4 deviations."""
+    """Lowest and highest that a number says it can be; a normal one says its mean."""
     if not isinstance(number, Drawn):
         return number, number
     if number.uniform is not None:
         return number.uniform[0], number.uniform[1]
     if number.normal is not None:
-        mean, deviation = number.normal
-        return mean - 4.0 * deviation, mean + 4.0 * deviation
+        return number.normal[0], number.normal[0]
     values = number.choice or [0.0]
     return min(values), max(values)
 
@@ -240,8 +240,6 @@ def _out_of_range(name: str, value: Number) -> str | None:
         return None
     low, high = extremes(value)
     least, most = RANGES[name]
-    if isinstance(value, Drawn) and value.normal is not None:
-        low, high = max(low, value.normal[0]), min(high, value.normal[0])
     if least <= low and high <= most:
         return None
     return f"{name} reaches from {low:g} to {high:g}; expected within {least:g} and {most:g}."

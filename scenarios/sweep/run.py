@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
-from scenarios.files import WHEELS, Scenario
+from scenarios.files import Scenario
 from scenarios.looks import image_estimator
 from scenarios.metrics import score_run
 from scenarios.peers import PeerSetup
@@ -26,7 +26,7 @@ from trpac_core.dife import GREATEST_THETA, LEAST_SENSITIVITY, LEAST_THETA
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.readings import Sensors
 from trpac_core.tyre import friction_by_theta
-from trpac_core.vehicle import Vehicle
+from trpac_core.vehicle import WHEELS, Vehicle
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife
 

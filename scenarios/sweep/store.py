@@ -80,6 +80,8 @@ class Parts:
             raise ScenarioError(f"{self._out}: a file. Expected a folder to write into.")
         if known.is_file():
             before = _read(known)
+            if not isinstance(before, dict):
+                raise ScenarioError(f"{known}: is no sweep's identity; delete it and run the sweep again.")
             differs = sorted(k for k in self._identity if before.get(k) != self._identity[k])
             if differs:
                 raise ScenarioError(
@@ -90,6 +92,9 @@ class Parts:
             raise ScenarioError(f"{self._out}: holds parts but no {IDENTITY}; choose another --out.")
         self._folder.mkdir(parents=True, exist_ok=True)
         write_whole(known, json.dumps(self._identity, indent=1).encode())
+        strange = sorted(path.name for path in self._folder.glob("*.json") if not path.stem.isdecimal())
+        if strange:
+            raise ScenarioError(f"{self._folder / strange[0]}: is no run of a sweep; move it elsewhere.")
         return {int(path.stem) for path in self._folder.glob("*.json")}
 
     def keep(self, index: int, rows: list[dict[str, Any]], cpu_s: float) -> None:

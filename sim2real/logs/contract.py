@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenarios.files import WHEELS
+from trpac_core.vehicle import WHEELS
 
 
 @dataclass(frozen=True)
@@ -56,4 +56,3 @@ COLUMNS: dict[str, Column] = {column.name: column for column in _ALL}
 
 REQUIRED = tuple(column.name for column in _ALL if column.required)
 WHEEL_SPEEDS = tuple(f"wheel_speed_{w}_rad_s" for w in WHEELS)
-WHEEL_TORQUES = tuple(f"wheel_torque_{w}_nm" for w in WHEELS)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from scenarios.files import load_strict
+from scenarios.strict import load_strict
 from sim2real.logs.contract import COLUMNS, IMAGE_PATH, TIME
 from sim2real.logs.errors import LogError
 from sim2real.logs.units import factor

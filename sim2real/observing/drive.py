@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from scenarios.files import WHEELS, RoadFile
+from scenarios.files import RoadFile
 from sim2real.observing.lattice import Lattice
 from sim2real.observing.lattice_trace import Trace
+from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
 

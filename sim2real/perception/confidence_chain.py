@@ -95,7 +95,7 @@ def confidence_chain(
     if len(known) < FEWEST_BLOCKS:
         why = f"Only {len(known)} s of image_confidence on the fit logs; {FEWEST_BLOCKS} s are needed."
         if lights[0] is None:
-            return Chain.silent(SIGNAL, pictures, {effect for choice in choices for effect in choice}, why)
+            return Chain.silent(SIGNAL, pictures, [effect for choice in choices for effect in choice], why)
         # the pictures alone still tell their exposure
         known, unseen = make_blocks([]), make_blocks([])
         choices = [c for c in choices if c == ("exposure_shift",)]
@@ -291,5 +291,5 @@ def _unexcited(seen: Seen, choices: Sequence[tuple[str, ...]]) -> dict[str, str]
         why["exposure_shift"] = (
             "Without pictures a moderate exposure error looks like another camera's normal confidence."
         )
-    candidates = {effect for choice in choices for effect in choice}
+    candidates = [effect for choice in choices for effect in choice]
     return {effect: text for effect, text in why.items() if effect in candidates}

@@ -194,7 +194,7 @@ def shift_chain(
     outside = [c for c in CHOICES if set(c) & set(exclude)]
     if not len(known):
         why = "No border between two surfaces shows in the camera's classes on the fit logs."
-        return Chain.silent(SIGNAL, pictures, {effect for choice in choices for effect in choice}, why)
+        return Chain.silent(SIGNAL, pictures, [effect for choice in choices for effect in choice], why)
 
     def fit(effects: tuple[str, ...]) -> ShiftFit:
         return fit_shift(known, effects, height_m, modelled.delay_s, modelled.pitch_rad)

@@ -14,9 +14,9 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
-from scenarios.files import WHEELS
 from sim2real.replay.run import DYNAMICS, OURS, Replay
 from sim2real.telling.figures import AFTER, BEFORE, DPI, FLOOR, MEASURED, STYLE, WIDTH_IN
+from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.files import WHEELS, RoadFile, RoadSegment, VehicleFile
+from scenarios.files import RoadFile, RoadSegment, VehicleFile
 from sim2real.logs import Log, LogError, resample
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive, make_drive
 from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
 from trpac_core.estimator import LOCKED_M_S, EstimatorConfig
-from trpac_core.vehicle import Vehicle
+from trpac_core.vehicle import WHEELS, Vehicle
 
 Array = NDArray[np.float64]
 

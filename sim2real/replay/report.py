@@ -13,10 +13,10 @@ import jinja2
 import numpy as np
 import pandas as pd
 
-from scenarios.files import WHEELS
 from sim2real.replay import figures
 from sim2real.replay.run import DYNAMICS, OURS, Replay
 from sim2real.telling.report import DASH, jsonable
+from trpac_core.vehicle import WHEELS
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 CSV_NAME, SUMMARY_NAME, REPORT_NAME = "estimates.csv", "summary.json", "report.html"

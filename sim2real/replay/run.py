@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.files import WHEELS
 from scenarios.peers import PEER_NAMES, PeerSetup, make_peers
 from sim2real.replay.camera import NO_CAMERA, CameraSide
 from sim2real.replay.inputs import Inputs
@@ -17,6 +16,7 @@ from sim2real.replay.vehicle_level import vehicle_level
 from trpac_core.estimator import Estimate, EstimatorConfig, TrpacEstimator
 from trpac_core.readings import Sensors
 from trpac_core.tyre import peak_friction
+from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

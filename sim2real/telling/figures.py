@@ -17,9 +17,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from scenarios.files import WHEELS
 from sim2real.result import Gap, NextManoeuvre, Trace, Unexplained
 from sim2real.where.equations import QUANTITIES, TWO_SIDED
+from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
-import tempfile
 from base64 import b64encode
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,10 +14,11 @@ import jinja2
 import numpy as np
 
 from scenarios.effects import EFFECTS
-from scenarios.files import WHEELS
+from scenarios.whole_files import written_whole
 from sim2real.how_far.rating import rate
 from sim2real.result import MEANING, Cause, Diagnosis, Interval, NextManoeuvre, Trace, Verdict
 from sim2real.telling import figures
+from trpac_core.vehicle import WHEELS
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 JSON_NAME, REPORT_NAME = "diagnosis.json", "report.html"
@@ -37,7 +36,7 @@ ADDED = {**NEEDED, Verdict.AMBIGUOUS: 1}
 def write_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> tuple[Path, Path]:
     """Write diagnosis.json and report.html into a folder, which is made where it is missing.
 
-    Both are made whole beside the folder first, so it never holds half a result.
+    Both appear together, so the folder never holds half a result.
 
     Raises
     ------
@@ -49,13 +48,9 @@ def write_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> tuple[Path, Pat
         JSON_NAME: json.dumps(jsonable(diagnosis.to_json()), indent=1, allow_nan=False) + "\n",
         REPORT_NAME: render(diagnosis),
     }
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=folder.parent) as scratch:
+    with written_whole(folder) as made:
         for name, text in contents.items():
-            (Path(scratch) / name).write_text(text, encoding="utf-8")
-        folder.mkdir(exist_ok=True)
-        for name in contents:
-            os.replace(Path(scratch) / name, folder / name)
+            (made / name).write_text(text, encoding="utf-8")
     return folder / JSON_NAME, folder / REPORT_NAME
 
 

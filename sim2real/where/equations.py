@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects.torque_gain import FRONT_LESS_REAR
-from scenarios.files import WHEELS
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
 from sim2real.observing.observer import Prediction, Push, Simulation
+from trpac_core.vehicle import WHEELS
 
 Array = NDArray[Any]
 

@@ -71,9 +71,12 @@ class PreviewConfig:
     behind_m: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse negative distances; raises ValueError."""
-        if min(self.P_0_m, self.hold_m, self.resolution_m, self.behind_m) < 0.0:
-            raise ValueError(f"Settings of the displacement stamps: no distance may be negative, got {self}.")
+        """Refuse distances that are negative or not finite; raises ValueError."""
+        distances = (self.P_0_m, self.hold_m, self.resolution_m, self.behind_m)
+        if not all(0.0 <= distance < math.inf for distance in distances):
+            raise ValueError(
+                f"Settings of the displacement stamps: distances are finite and not negative, got {self}."
+            )
 
 
 @dataclass(frozen=True)
