@@ -96,7 +96,7 @@ def diagnose_files(
         found=findings.added(),
     )
     if camera is not None:
-        said = merge(said, camera_side(camera))
+        said = merge(said, camera_side(camera, sources.vehicle, sources.holdout.road))
     return replace(
         said,
         trpac=_estimate(findings, sources),
@@ -271,7 +271,8 @@ def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
         The further log, and where it was driven.
     """
     vehicle = load_vehicle(diagnosis.provenance["vehicle"]["path"])
-    named = diagnosis.causes[: 2 if diagnosis.verdict is Verdict.COMPOUND else 1]
+    most = 2 if diagnosis.verdict is Verdict.COMPOUND else 1
+    named = diagnosis.causes[: max(most, len(diagnosis.together))]
     of_car = [c for c in named if EFFECTS[c.effect].stage != "perception"]
     source = read_source(str(log), road)
     if named and not of_car:

@@ -12,16 +12,30 @@ import numpy as np
 
 from scenarios.effects import EFFECTS
 from scenarios.effects.base import Parameter
+from scenarios.files import RoadFile, VehicleFile
+from sim2real.next_manoeuvre import PROFILES, torque_of
 from sim2real.observing.lattice import Lattice
 from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.perception.shift import SIGNAL as PLACE
-from sim2real.result import Cause, Diagnosis, Gap, Interval, Measure, Place, Unexplained, Verdict
+from sim2real.result import (
+    Cause,
+    Diagnosis,
+    Gap,
+    Interval,
+    Measure,
+    NextManoeuvre,
+    Place,
+    Unexplained,
+    Verdict,
+)
 
 QUIET_SIDE_DOUBT = 0.06
 """Probability that is left to the effects of data that show no gap: some of them would hardly show [-]."""
 UNKNOWN_BELIEF = 0.05
 """Share of the camera's effects in the belief where what they leave says that it is none of them, or not all [-]."""
+SPEEDS = "steady speeds"
+"""Name of the profile that tells effects of the camera chain apart."""
 CERTAIN = 0.97
 """Probability of what a mark that nothing else leaves has shown [-]."""
 
@@ -53,10 +67,13 @@ class Side:
     unexplained: Unexplained | None = None
     sentence: str = ""
     warnings: tuple[str, ...] = ()
+    next_manoeuvre: NextManoeuvre | None = None
 
 
-def camera_side(found: PerceptionFinding) -> Side:
-    """The camera chain's verdict as a side."""
+def camera_side(
+    found: PerceptionFinding, vehicle: VehicleFile | None = None, road: RoadFile | None = None
+) -> Side:
+    """The camera chain's verdict as a side; for a car on a road with what to drive next."""
     singles: dict[str, CameraCandidate] = {}
     for candidate in found.candidates:
         for effect in candidate.effects:
@@ -102,7 +119,19 @@ def camera_side(found: PerceptionFinding) -> Side:
         unexplained=term,
         sentence=f"{_in_numbers(found)} {found.next_step}".strip() if term is None else found.unexplained[0],
         warnings=(*found.warnings, *found.unexplained),
+        next_manoeuvre=None if vehicle is None or road is None else _next(found, vehicle, road),
     )
+
+
+def _next(found: PerceptionFinding, vehicle: VehicleFile, road: RoadFile) -> NextManoeuvre | None:
+    """Two speeds far apart, each held over several borders: what goes with speed is then told from what does not."""
+    if found.verdict is not Verdict.AMBIGUOUS:
+        return None
+    profile = next(p for p in PROFILES if p.name == SPEEDS)
+    time_s, torque_nm = torque_of(profile, vehicle, road)
+    told = tuple(dict.fromkeys(effect for group in found.ambiguous_with for effect in group))
+    sentence = found.next_step or profile.sentence
+    return NextManoeuvre(sentence, profile.initial_speed_m_s, time_s, torque_nm, told, np.nan, np.nan)
 
 
 def _in_numbers(found: PerceptionFinding) -> str:
@@ -213,8 +242,9 @@ def _percent(before: float, after: float) -> Interval:
 
 def merge(main: Diagnosis, side: Side) -> Diagnosis:
     """One diagnosis of two; see the module."""
-    before = _join(main.gap.before, side.before)
-    after = _join(main.gap.after, side.after)
+    quiet = side.verdict is Verdict.NO_GAP, main.verdict is Verdict.NO_GAP
+    before = _join(main.gap.before, side.before, *quiet)
+    after = _join(main.gap.after, side.after, *quiet)
     verdict = _verdict(main, side)
     both = verdict in (Verdict.COMPOUND, Verdict.UNKNOWN) and Verdict.NO_GAP not in (
         main.verdict,
@@ -247,8 +277,10 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         verdict=verdict,
         sentence=sentence,
         gap=Gap(before, after, 1.0 if "wheel_speed" in side.before else main.gap.noise_floor),
-        where=(*side.places, *main.where) if side.verdict is not Verdict.NO_GAP else main.where,
+        where=main.where if quiet[0] else _where(main, side),
         causes=causes,
+        together=_together(main, side) if verdict is Verdict.COMPOUND else (),
+        next_manoeuvre=main.next_manoeuvre or side.next_manoeuvre,
         ambiguous_with=(*main.ambiguous_with, *side.ambiguous_with),
         cannot_rule_out=tuple(dict.fromkeys((*main.cannot_rule_out, *side.cannot_rule_out))),
         # A road that lies elsewhere than simulated disturbs the car's equations too, and not the other way round.
@@ -273,11 +305,7 @@ def _ranked(
     main: Diagnosis, side: Side, main_causes: list[Cause], side_causes: list[Cause], verdict: Verdict
 ) -> tuple[Cause, ...]:
     """Best first; in a compound the named ones before all others. An effect that both judged stands once."""
-    first: list[str] = list(side.named)
-    if main.verdict is Verdict.COMPOUND:
-        first = [*(c.effect for c in main.causes[:2]), *first]
-    elif main.verdict in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS) and main.causes:
-        first = [main.causes[0].effect, *first]
+    first = _together(main, side)
     best: dict[str, Cause] = {}
     for cause in (*main_causes, *side_causes):
         if cause.effect not in best or cause.probability > best[cause.effect].probability:
@@ -290,8 +318,31 @@ def _ranked(
     return tuple(sorted(best.values(), key=key))
 
 
-def _join(measure: Measure, signals: dict[str, float]) -> Measure:
+def _together(main: Diagnosis, side: Side) -> tuple[str, ...]:
+    """Effects that either stands by."""
+    stood = {Verdict.COMPOUND: 2, Verdict.IDENTIFIED: 1, Verdict.AMBIGUOUS: 1}.get(main.verdict, 0)
+    return tuple(dict.fromkeys((*(c.effect for c in main.causes[:stood]), *side.named)))
+
+
+def _where(main: Diagnosis, side: Side) -> tuple[Place, ...]:
+    """Places of both, each share by how much of the whole gap is its side's."""
+    parts = [
+        sum(max(g * g - 1.0, 0.0) for g in gaps.values()) for gaps in (side.before, main.gap.before.signals)
+    ]
+    if not main.where or not sum(parts):
+        return (*side.places, *main.where)
+    of_side = parts[0] / sum(parts)
+    joined = [replace(p, share=of_side * p.share) for p in side.places]
+    joined += [replace(p, share=(1.0 - of_side) * p.share) for p in main.where]
+    return tuple(sorted(joined, key=lambda place: -place.share))
+
+
+def _join(measure: Measure, signals: dict[str, float], side_quiet: bool, main_quiet: bool) -> Measure:
+    """All signals; in the total those of a quiet camera, or of a quiet car beside one that is not, do not count."""
     if not signals:
         return measure
     joined = {**measure.signals, **signals}
-    return Measure(float(np.sqrt(np.mean(np.square(list(joined.values()))))), joined, measure.si)
+    counted = joined
+    if not set(measure.signals) & set(signals):
+        counted = measure.signals if side_quiet else signals if main_quiet else joined
+    return Measure(float(np.sqrt(np.mean(np.square(list(counted.values()))))), joined, measure.si)

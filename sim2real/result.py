@@ -263,6 +263,8 @@ class Diagnosis:
     heat_map: dict[str, dict[str, float]]
     """Subsystem to regime to the share of the gap [-]."""
     causes: tuple[Cause, ...]
+    together: tuple[str, ...] = ()
+    """Effects of a compound that are needed together, where they are more than the first two causes."""
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
     structure: Structure | None = None
     variation: Variation | None = None
@@ -292,6 +294,7 @@ class Diagnosis:
             "where": [asdict(place) for place in self.where],
             "heat_map": self.heat_map,
             "causes": [_cause(cause) for cause in self.causes],
+            "together": list(self.together),
             "ambiguous_with": [list(group) for group in self.ambiguous_with],
             "structure": None if self.structure is None else asdict(self.structure),
             "variation": None if self.variation is None else asdict(self.variation),

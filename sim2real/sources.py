@@ -13,9 +13,12 @@ from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
 from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
 from sim2real.logs.checks import MIN_DURATION_S
-from sim2real.observing.drive import WHEEL, Drive, awake, backward, grid_step, make_drive
+from sim2real.observing.drive import WHEEL, Drive, awake, backward, grid_step, make_drive, untold_torque
 from sim2real.observing.lattice_trace import find_counter
 from trpac_core.vehicle import WHEELS
+
+YAML = (".yaml", ".yml")
+"""How the name of a log's own road ends."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,7 @@ def read_sources(
     if problems or car is None:
         raise ScenarioError("\n".join(dict.fromkeys(problems)))
     *fitted, held = found
-    if any(s.log.path.resolve() == held.log.path.resolve() for s in fitted):
+    if any(s.log.sha256 == held.log.sha256 for s in fitted):
         told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
         held = replace(held, log=held.log.warned(told))
     return Sources(car, vehicle, tuple(fitted), held)
@@ -124,11 +127,23 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     if asleep_s > 0.0:
         left_out = f"the first {asleep_s:.3g} s are left out: nothing tells yet how fast the car is."
         log = log.warned(left_out)
+    untold_s = _untold_s(log)
+    if untold_s > 0.0:
+        log = log.warned(
+            f"{untold_s:.3g} s are left out: a wheel's torque is lost there for long, or just was."
+        )
     back_s = float(backward(drive.time_s, drive.measured[:, WHEEL]).sum() * drive.step_s)
     if back_s > 0.0:
         left_out = f"{back_s:.3g} s are left out: a wheel turns back, or has just done so, which the plant's never do."
         log = log.warned(left_out)
     return Source(log, course, road_path, drive)
+
+
+def _untold_s(log: Log) -> float:
+    step_s = grid_step(log.rate_hz)
+    time_s, signals = resample(log, step_s)
+    torque = np.column_stack([signals[f"wheel_torque_{w}_nm"] for w in WHEELS])
+    return float(untold_torque(time_s, torque).sum() * step_s)
 
 
 def drive_of(log: Log, road: RoadFile) -> Drive:
@@ -140,10 +155,11 @@ def drive_of(log: Log, road: RoadFile) -> Drive:
 
 
 def split(text: str, road: Path | None) -> tuple[Path, Path]:
-    """Log and road of `log.csv@road.yaml`, or of a log alone with the common road."""
-    name, mark, own = text.rpartition("@")
-    if mark and own.endswith((".yaml", ".yml")):
-        return Path(name), Path(own)
+    """Log and road of `log.csv@road.yaml`, or of a log alone with the common road; either path may hold an @."""
+    marks = [i for i, letter in enumerate(text) if letter == "@"] if text.lower().endswith(YAML) else []
+    if marks:
+        mark = next((i for i in marks if Path(text[:i]).is_file()), marks[-1])
+        return Path(text[:mark]), Path(text[mark + 1 :])
     if road is None:
         raise ScenarioError(f"{text}: names no road; expected LOG@ROAD.yaml, or --road for all logs.")
     return Path(text), road

@@ -8,14 +8,19 @@ import made_up_diagnosis as made_up
 import numpy as np
 import pytest
 
+from scenarios.files import RoadFile, load_vehicle
+from sim2real.demo import VEHICLE
 from sim2real.merge import Side, camera_side, counter_side, merge
 from sim2real.observing.lattice import Lattice, Reading
 from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict
-from sim2real.telling.report import jsonable
+from sim2real.telling.report import jsonable, needed, render
 
 TURN = 2.0 * np.pi
+MADE_ROAD = RoadFile.model_validate(
+    {"schema": 1, "segments": [{"start_m": 0.0, "mu_left": 0.9, "mu_right": 0.9, "surface": "dry"}]}
+)
 QUIET = {"image_class": 1.0}
 LOUD = {"image_class": 5.0}
 CAUSE = Cause("camera_latency", 0.95, {}, 1.1, Interval(80.0, 70.0, 85.0, "%"), 10.0)
@@ -147,7 +152,10 @@ def test_the_sentence_tells_of_both():
 
 def test_places_are_those_of_a_side_that_has_a_gap():
     main = main_of(Verdict.IDENTIFIED)
-    assert merge(main, side_of(Verdict.IDENTIFIED)).where == (PLACE, *main.where)
+    joined = merge(main, side_of(Verdict.IDENTIFIED)).where
+    assert {(p.signal, p.regime) for p in joined} == {(p.signal, p.regime) for p in (PLACE, *main.where)}
+    assert sum(p.share for p in joined) <= 1.0 + 1e-9
+    assert [p.share for p in joined] == sorted((p.share for p in joined), reverse=True)
     assert merge(main, side_of(Verdict.NO_GAP)).where == main.where
 
 
@@ -353,3 +361,43 @@ def test_a_road_out_of_place_speaks_before_the_cars_equations(signal, first):
     assert both.sentence.startswith("Something unknown: Odd pictures." if first == "camera" else "More slip.")
     assert "Odd pictures." in both.sentence
     assert "More slip." in both.sentence
+
+
+def test_all_effects_of_a_compound_of_more_than_two_are_told():
+    main = main_of(Verdict.COMPOUND)
+    found = merge(main, side_of(Verdict.IDENTIFIED))
+    named = {"camera_latency", *(c.effect for c in main.causes[:2])}
+    assert set(found.together) == {c.effect for c in needed(found)} == named
+    assert found.to_json()["together"] == list(found.together)
+    assert len(needed(main)) == 2
+
+
+def test_a_quiet_camera_leaves_the_cars_gap_as_it_is_and_the_other_way_round():
+    loud, quiet = main_of(Verdict.IDENTIFIED), main_of(Verdict.NO_GAP)
+    found = merge(loud, side_of(Verdict.NO_GAP))
+    assert (found.gap.before.total, found.gap.after.total) == pytest.approx(
+        (_rms(loud.gap.before.signals), _rms(loud.gap.after.signals))
+    )
+    assert found.gap.before.signals == {**loud.gap.before.signals, **QUIET}
+    found = merge(quiet, side_of(Verdict.IDENTIFIED))
+    assert (found.gap.before.total, found.gap.after.total) == pytest.approx((5.0, 1.0))
+    found = merge(loud, side_of(Verdict.IDENTIFIED))
+    assert found.gap.before.total == pytest.approx(_rms({**loud.gap.before.signals, **LOUD}))
+
+
+def _rms(signals):
+    return np.sqrt(np.mean(np.square(list(signals.values()))))
+
+
+def test_what_a_camera_cannot_tell_apart_comes_with_two_speeds_to_drive():
+    found = finding(Verdict.AMBIGUOUS, LATE, TILTED, causes=("camera_latency",))
+    found = replace(
+        found, ambiguous_with=(("camera_latency", "camera_pitch"),), next_step="Drive 10 and 25 m/s."
+    )
+    told = merge(main_of(Verdict.NO_GAP), camera_side(found, load_vehicle(VEHICLE), MADE_ROAD))
+    profile = told.to_json()["next_manoeuvre"]
+    assert profile["sentence"] == "Drive 10 and 25 m/s."
+    assert profile["separates"] == ["camera_latency", "camera_pitch"]
+    assert np.shape(profile["wheel_torque_nm"]) == (len(profile["time_s"]), 4)
+    assert jsonable(profile)["power_sigma"] is None
+    assert "None" not in render(told)

@@ -1,5 +1,7 @@
 """Logs onto a uniform grid: no delay, no aliasing, no bridging."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -61,16 +63,35 @@ def test_the_logs_own_grid_changes_nothing(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("ratio", "lost"),
-    [(1, {500}), (2, {250}), (3, {166, 167}), (4, {125}), (8, {62, 63}), (10, {50}), (200, {2, 3})],
+    ("ratio", "count"),
+    [(1, 1), (1, 3), (2, 1), (2, 2), (3, 3), (4, 3), (4, 4), (8, 9), (10, 9), (10, 30), (200, 3), (200, 250)],
 )
-def test_lost_samples_are_not_bridged(tmp_path, ratio, lost):
-    """Sample 500 is lost, and with it every value whose box reaches beyond sample 499 from below or 501 from above."""
+def test_what_is_lost_for_longer_than_a_step_is_not_bridged(tmp_path, ratio, count):
+    """Samples from 500 on are lost, and with them every value whose box reaches into what lies between the others."""
     log = read(tmp_path, make_frame(rate_hz=500.0))
-    log.signals["vehicle_speed_m_s"][500] = np.nan
+    log.signals["vehicle_speed_m_s"][500 : 500 + count] = np.nan
     _, signals = resample(log, 0.002 * ratio)
-    assert set(np.flatnonzero(np.isnan(signals["vehicle_speed_m_s"]))) == lost
+    middle = np.arange(len(signals["position_m"])) * ratio
+    half = 0.5 * ratio if ratio > 1 else 0.0
+    lost = (middle + half > 499) & (middle - half < 500 + count) & (count + 1 > ratio)
+    assert np.array_equal(np.isnan(signals["vehicle_speed_m_s"]), lost)
     assert np.isfinite(signals["position_m"]).all()
+
+
+def test_samples_lost_at_random_cost_a_fast_log_little(tmp_path):
+    log = read(tmp_path, make_frame(rate_hz=2000.0))
+    speed = log.signals["vehicle_speed_m_s"]
+    random = np.random.default_rng(1)
+    for share in (0.04, 0.45):
+        holed = np.where(random.random(len(speed)) < share, np.nan, speed)
+        whole, with_holes = (
+            resample(replace(log, signals={**log.signals, "vehicle_speed_m_s": values}), 0.008)[1][
+                "vehicle_speed_m_s"
+            ]
+            for values in (speed, holed)
+        )
+        assert np.isfinite(with_holes[1:-1]).mean() > 0.99
+        np.testing.assert_allclose(with_holes[1:-1], whole[1:-1], atol=0.05)
 
 
 def test_missing_rows_are_lost_samples(tmp_path):
@@ -79,7 +100,7 @@ def test_missing_rows_are_lost_samples(tmp_path):
     lost = np.isnan(signals["vehicle_speed_m_s"])
     assert time_s[lost] == pytest.approx([*np.arange(100, 150) * 0.01, 2.0])
     _, coarse = resample(log, 0.05)
-    assert np.flatnonzero(np.isnan(coarse["vehicle_speed_m_s"])).tolist() == [*range(20, 31), 40]
+    assert np.flatnonzero(np.isnan(coarse["vehicle_speed_m_s"])).tolist() == [*range(20, 31)]
 
 
 def test_classes_are_held_not_averaged(tmp_path):

@@ -250,3 +250,14 @@ def test_the_file_says_which_form_of_an_effect_is_meant(tmp_path):
 def test_a_form_that_is_not_known_is_told(tmp_path, forms, words):
     with pytest.raises(ScenarioError, match=words):
         load_vehicle(changed(VEHICLE, tmp_path, lambda d: d.update(forms=forms)))
+
+
+def test_numbers_with_an_exponent_are_numbers(tmp_path):
+    path = tmp_path / "road.yaml"
+    path.write_text(
+        "schema: 1\nsegments: [{start_m: 0, mu_left: 9e-1, mu_right: 90.e-2, surface: dry}, "
+        "{start_m: 5.0e1, mu_left: .9E0, mu_right: 0.9e+0, surface: dry}]\n"
+    )
+    road = load_road(path)
+    assert [s.start_m for s in road.segments] == [0.0, 50.0]
+    assert {s.mu_left for s in road.segments} == {s.mu_right for s in road.segments} == {0.9}

@@ -219,7 +219,7 @@ def judge(hidden: str, said: Diagnosis) -> str:
     probability = said.causes[rank - 1].probability
     if rank == 1 and said.verdict == "identified":
         return f"The diagnosis is [green]right[/green], with a probability of {percent(probability)}."
-    if any(hidden in name.split("+") for group in said.ambiguous_with for name in group):
+    if any(hidden in group for group in said.ambiguous_with):
         return "The diagnosis has it among those that it [yellow]cannot tell apart[/yellow]."
     return (
         f"The diagnosis is [red]not right[/red]: it says '{said.verdict}' and ranks the hidden effect {rank} of "

@@ -34,6 +34,8 @@ MOVING_M_S = 3.0
 """From this speed on a wheel speed is compared with it [m/s]."""
 WHEEL_PER_METRE = (1.5, 6.5)
 """Wheel speed over ground speed, radius 0.15 to 0.67 m [rad/m]; with km/h, with rpm and with both it lies outside."""
+ROLLING_SHARE = 0.1
+"""Least share of the rows in which a wheel turns so: it may be locked or spin in the others [-]."""
 DISTANCE_M = 10.0
 """From this distance on the position is compared with the integral of speed [m]."""
 DISTANCE_RATIO = (0.5, 2.0)
@@ -166,9 +168,10 @@ def check_wheels(signals: Mapping[str, Array]) -> Iterator[Finding]:
         moving = (np.abs(speed) > MOVING_M_S) & np.isfinite(speed + signals[name])
         if np.count_nonzero(moving) < 2:
             continue
-        ratio = float(np.median(signals[name][moving] / speed[moving]))
-        if not WHEEL_PER_METRE[0] <= ratio <= WHEEL_PER_METRE[1]:
-            off[name] = ratio
+        per_metre = signals[name][moving] / speed[moving]
+        rolling = (per_metre >= WHEEL_PER_METRE[0]) & (per_metre <= WHEEL_PER_METRE[1])
+        if np.mean(rolling) < ROLLING_SHARE:
+            off[name] = float(np.median(per_metre))
     if len(off) == len(WHEEL_SPEEDS) and len({_ratio_hint(ratio) for ratio in off.values()}) == 1:
         yield _wheel_finding("every wheel speed", float(np.median(list(off.values()))))
         return

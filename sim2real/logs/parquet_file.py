@@ -38,6 +38,8 @@ def read_parquet(path: Path, wanted: Wanted) -> Table:
                 text[name] = np.array(cells, dtype=np.str_)
             else:
                 numbers[name] = numbered(cells)
+        elif pa.types.is_null(column.type):  # a column without any value
+            numbers[name] = np.full(table.num_rows, np.nan)
         elif _is_number(column.type):
             numbers[name] = column.cast(pa.float64(), safe=False).to_numpy().astype(np.float64)
         else:

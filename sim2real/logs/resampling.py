@@ -38,7 +38,8 @@ def resample(log: Log, step_s: float) -> tuple[Array, dict[str, Array]]:
     time_s, signals : array of shape (n,), dict of arrays of shape (n,)
         The grid [s] and every signal on it: where the grid is the coarser one the mean over a step that is centred on
         the grid's time, linear interpolation otherwise; classes and frame numbers hold their last value. A value that
-        needs a lost sample, or lies between rows that are missing, is NaN.
+        needs what is lost, or lies between rows that are missing, is NaN; of what comes faster than the grid, what is
+        lost for less than a step of it is bridged.
 
     Raises
     ------
@@ -90,7 +91,7 @@ def onto(time_s: Array, values: Array, at_s: Array, step_s: float) -> Array:
     Returns
     -------
     array, shape (k,)
-        NaN outside the samples' times and wherever a lost sample would be needed.
+        NaN outside the samples' times and wherever what is lost would be needed, see `resample`.
     """
     time_s, values = of_its_own(time_s, values)
     if len(time_s) < 2:
@@ -105,7 +106,8 @@ def onto(time_s: Array, values: Array, at_s: Array, step_s: float) -> Array:
     inside = half > SAME * own
     low, high = at_s[inside] - half[inside], at_s[inside] + half[inside]
     mean = (_area(time_s, values, high) - _area(time_s, values, low)) / (high - low)
-    lost = _lost_time(time_s, values, own)
+    # What is lost for less than a step of the grid is bridged, as it would be between samples of the grid's own rate.
+    lost = _lost_time(time_s, values, max(BROKEN * own, step_s))
     mean[np.interp(high, time_s, lost) - np.interp(low, time_s, lost) > SAME * own] = np.nan
     point[inside] = mean
     return point
@@ -149,8 +151,8 @@ def _area(time_s: Array, values: Array, at_s: Array) -> Array:
     return before[i] + since * (y[i] + 0.5 * slope * since)
 
 
-def _lost_time(time_s: Array, values: Array, own_s: float) -> Array:
-    """Time up to each sample over which the signal is not known [s]."""
+def _lost_time(time_s: Array, values: Array, longest_s: float) -> Array:
+    """Time up to each sample over which the signal is not known: its samples are further apart than this [s]."""
     step = np.diff(time_s)
-    known = np.isfinite(values[1:]) & np.isfinite(values[:-1]) & (step <= BROKEN * own_s)
+    known = np.isfinite(values[1:]) & np.isfinite(values[:-1]) & (step <= longest_s * (1.0 + SAME))
     return np.concatenate(([0.0], np.cumsum(np.where(known, 0.0, step))))

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from scenarios.files import RoadFile
+from sim2real.logs.errors import LogError
+from sim2real.logs.resampling import SLOWEST_S
 from sim2real.observing.lattice import Lattice
 from sim2real.observing.lattice_trace import Trace
 from trpac_core.vehicle import WHEELS
@@ -96,7 +98,7 @@ LEAST_SPEED_M_S = 0.5
 BACKWARD_RAD_S, BACKWARD_S = -1.0, 0.05
 """A wheel that is slower than this, in the median over this time, turns back [rad/s], [s]."""
 RECOVERY_S = 2.0
-"""Until the model has forgotten that a wheel turned back: twice the observer's memory of the car's speed [s]."""
+"""Until the model has forgotten what it was not told: twice the observer's memory of the car's speed [s]."""
 
 
 def make_drive(
@@ -125,13 +127,18 @@ def make_drive(
     """
     measured = np.column_stack([columns[name] for name in CHANNELS]).astype(np.float64)
     torque = np.column_stack([columns[f"wheel_torque_{w}_nm"] for w in WHEELS]).astype(np.float64)
+    untold = untold_torque(time_s, torque)
     for i in range(4):  # a lost sample of a command that is continuous
         lost = ~np.isfinite(torque[:, i])
+        if lost.all():
+            raise LogError(
+                f"{name}: column wheel_torque_{WHEELS[i]}_nm tells nothing at any time of the drive."
+            )
         if lost.any():
             torque[lost, i] = np.interp(time_s[lost], time_s[~lost], torque[~lost, i])
     speed = measured[:, SPEED]
     moving = np.nan_to_num(speed, nan=np.inf) > LEAST_SPEED_M_S
-    moving &= ~backward(time_s, measured[:, WHEEL])
+    moving &= ~(backward(time_s, measured[:, WHEEL]) | untold)
     counted = np.isfinite(measured).any(axis=0) & np.array([name not in without for name in CHANNELS])
     return Drive(name, road, time_s, torque, measured, moving, counted, lattice, trace)
 
@@ -150,7 +157,20 @@ def backward(time_s: Array, wheels: Array) -> NDArray[np.bool_]:
     rows = 2 * round(0.5 * BACKWARD_S / step_s) + 1
     slowest = np.nan_to_num(wheels, nan=np.inf).min(axis=1)
     back = median_filter(slowest, max(rows, 3), mode="nearest") < BACKWARD_RAD_S
-    since = time_s - np.maximum.accumulate(np.where(back, time_s, -np.inf))
+    return _until_forgotten(time_s, back)
+
+
+def untold_torque(time_s: Array, torque_nm: Array) -> NDArray[np.bool_]:
+    """Rows in which a wheel's torque, shape (n, 4), is lost for longer than a line tells, and those after them."""
+    known = np.isfinite(torque_nm)
+    before = np.maximum.accumulate(np.where(known, time_s[:, None], -np.inf), axis=0)
+    after = np.minimum.accumulate(np.where(known, time_s[:, None], np.inf)[::-1], axis=0)[::-1]
+    lost = ~known & (after - before > SLOWEST_S)
+    return _until_forgotten(time_s, np.asarray(lost.any(axis=1)))
+
+
+def _until_forgotten(time_s: Array, bad: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    since = time_s - np.maximum.accumulate(np.where(bad, time_s, -np.inf))
     return np.asarray(since <= RECOVERY_S)
 
 

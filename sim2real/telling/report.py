@@ -121,12 +121,12 @@ def render(diagnosis: Diagnosis) -> str:
 
 def needed(diagnosis: Diagnosis) -> tuple[Cause, ...]:
     """The causes that the verdict says to model: none where it names no single set."""
-    return diagnosis.causes[: NEEDED.get(diagnosis.verdict, 0)]
+    return diagnosis.causes[: max(NEEDED.get(diagnosis.verdict, 0), len(diagnosis.together))]
 
 
 def added(diagnosis: Diagnosis) -> tuple[Cause, ...]:
     """The causes that the gap after is measured with; in an ambiguous verdict the likeliest."""
-    return diagnosis.causes[: ADDED.get(diagnosis.verdict, 0)]
+    return diagnosis.causes[: max(ADDED.get(diagnosis.verdict, 0), len(diagnosis.together))]
 
 
 def leading(diagnosis: Diagnosis) -> tuple[Cause, ...]:
