@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
@@ -111,13 +112,13 @@ class CameraSlave(GuardedSlave):
         self.report("buffers off", Fmi2Status.warning, f"{self.modelName}: {text}")
 
     def optional(self, name: str) -> float | None:
-        """An input that counts as connected from its first value other than 0; None before."""
+        """An input that counts as connected from its first value that is a number other than 0; None before."""
         value: float = self.values[name]
+        if not math.isfinite(value):
+            return value
         if value != 0.0:
             self._connected.add(name)
-        elif name not in self._connected:
-            return None
-        return value
+        return value if name in self._connected else None
 
     def inner_state(self) -> dict[str, Any]:
         """Estimator, frames and connected inputs, JSON-able and exact."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from trpac_core.estimator import RoadClass
 from trpac_core.four_wheels import SideClasses
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.images import MOST_PIXELS, ImageError, check_size, decode_image, raw_bgr_image
+from trpac_core.vision.images import MOST_FILE_BYTES, ImageError, check_size, decode_image, raw_bgr_image
 
 from .settings import BUFFERS_ENABLED
 from .signals import NO_ROAD_CLASS
@@ -41,17 +41,19 @@ BUFFER = "<buffer>"
 IN_MEMORY = "picture in memory"
 """What messages call it."""
 SURFACES = {surface.value: surface for surface in Surface}
-MOST_BYTES = 3 * MOST_PIXELS
-"""Larger buffers are refused unread [bytes]."""
 
 
 @dataclass(frozen=True)
 class FrameState:
-    """The newest frame that was taken: the path it came from, BUS or BUFFER, and whether it could not be used."""
+    """The newest frame that was taken: the path it came from, BUS or BUFFER, and whether it could not be used.
+
+    `path` is the last one that was taken, whatever came after it: a host may leave it set.
+    """
 
     source: str = ""
     frame_id: int = 0
     failed: bool = False
+    path: str = ""
 
 
 def next_frame(
@@ -72,16 +74,17 @@ def next_frame(
     if not source:
         # A picture in memory is set for one step: that none is set now ends nothing.
         if seen.source == BUFFER or (not seen.source and seen.frame_id == frame_id):
-            return seen, None, None
+            return replace(seen, path=""), None, None
         return FrameState("", frame_id, seen.failed), None, None
-    unnumbered = source in (BUS, BUFFER) and frame_id == 0
-    if (source, frame_id) == (seen.source, seen.frame_id) and not unnumbered:
+    by_path = source not in (BUS, BUFFER)
+    if (source, frame_id) == (seen.path if by_path else seen.source, seen.frame_id) and (by_path or frame_id):
         return seen, None, None
+    taken = FrameState(source, frame_id, path=source if by_path else seen.path)
     try:
         frame = _read(source, values, bus)
     except ValueError as error:
-        return FrameState(source, frame_id, failed=True), None, str(error)
-    return FrameState(source, frame_id), frame, None
+        return replace(taken, failed=True), None, str(error)
+    return taken, frame, None
 
 
 def _source(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> str:
@@ -115,8 +118,8 @@ def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
     address = (values["image.base.lo"] & 0xFFFFFFFF) | (values["image.base.hi"] & 0xFFFFFFFF) << 32
     size, width, height = values["image.size"], values["image_width"], values["image_height"]
     raw = width != 0 or height != 0
-    if not 0 < size <= MOST_BYTES:
-        raise ImageError(f"image.size is {size} bytes; expected 1 to {MOST_BYTES}.")
+    if not 0 < size <= MOST_FILE_BYTES:
+        raise ImageError(f"image.size is {size} bytes; expected 1 to {MOST_FILE_BYTES}.")
     if raw:
         check_size(width, height, f"{IN_MEMORY} of image_width x image_height")
         if size != 3 * width * height:

@@ -100,8 +100,8 @@ _VEHICLE_PARAMETERS = (
 )
 
 _ESTIMATOR_PARAMETERS = (
-    _parameter("estimator.K", "1/s", "gains.K", "Bandwidth of the force observer", 1e-3),
-    _parameter("estimator.gamma", "1/s", "gains.gamma", "Rate of the estimator", 0.0),
+    _parameter("estimator.K", "1/s", "gains.K", "Bandwidth of the force observer", 1e-3, 1e6),
+    _parameter("estimator.gamma", "1/s", "gains.gamma", "Rate of the estimator", 0.0, 1e6),
     _parameter(
         "estimator.visual_term",
         "",

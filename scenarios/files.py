@@ -58,18 +58,17 @@ class VehicleFile(_FileModel):
 
     @model_validator(mode="after")
     def _check(self) -> VehicleFile:
-        core = self.to_core()
-        problems = [
-            text
-            for key, values in self.effects.items()
-            for text in problems_of(key, values, core, self.forms.get(key, ""))
-        ]
-        problems += [text for key, form in self.forms.items() for text in self._problems_of_form(key, form)]
-        if self.cog_to_rear_axle_m >= self.wheelbase_m:
-            problems.append(
-                f"cog_to_rear_axle_m is {self.cog_to_rear_axle_m:g}; expected less than wheelbase_m "
-                f"({self.wheelbase_m:g}), since the centre of gravity lies between the axles."
-            )
+        problems = [text for key, form in self.forms.items() for text in self._problems_of_form(key, form)]
+        try:
+            core = self.to_core()
+        except ValueError as error:  # what its effects may be depends on the car
+            problems.append(str(error))
+        else:
+            problems += [
+                text
+                for key, values in self.effects.items()
+                for text in problems_of(key, values, core, self.forms.get(key, ""))
+            ]
         if problems:
             raise ValueError("\n".join(problems))
         return self

@@ -306,12 +306,17 @@ def test_lost_samples_of_the_command_are_bridged():
 # --- what is refused
 
 
-def test_a_log_names_its_road_after_an_at():
+def test_a_log_names_its_road_after_an_at(tmp_path):
     common = Path("common.yaml")
     assert split("a.csv@b.yaml", common) == (Path("a.csv"), Path("b.yaml"))
     assert split("a.csv", common) == (Path("a.csv"), common)
     assert split("me@home/a.csv", common) == (Path("me@home/a.csv"), common)
     assert split("me@home/a.csv@b.yml", None) == (Path("me@home/a.csv"), Path("b.yml"))
+    assert split("a.csv@b.YAML", None) == (Path("a.csv"), Path("b.YAML"))
+    folder = tmp_path / "me@lab"
+    folder.mkdir()
+    (folder / "a.csv").touch()
+    assert split(f"{folder}/a.csv@{folder}/b.yaml", None) == (folder / "a.csv", folder / "b.yaml")
     with pytest.raises(ScenarioError, match=r"a\.csv: names no road; expected LOG@ROAD\.yaml, or --road"):
         split("a.csv", None)
 

@@ -159,6 +159,13 @@ class TestFormats:
         with pytest.raises(LogError, match="column vehicle_speed_m_s holds string; expected numbers"):
             read_log(path)
 
+    def test_a_parquet_column_without_any_value_was_not_measured(self, tmp_path, frame):
+        path = tmp_path / "log.parquet"
+        frame["yaw_rate_rad_s"] = None
+        frame.to_parquet(path)
+        log = read_log(path)
+        assert "yaw_rate_rad_s has no value at all; it is taken as not measured." in " ".join(log.warnings)
+
     def test_damaged_parquet(self, tmp_path, frame):
         path = tmp_path / "log.parquet"
         write_log(frame, path)
@@ -341,6 +348,14 @@ class TestScales:
         assert said.startswith("every wheel speed")
         assert len(said) < 300
         assert "unit:" in said
+
+    @pytest.mark.parametrize(("wheels", "factor"), [(("fl",), 0.0), (("fl", "fr", "rl", "rr"), 2.4)])
+    def test_wheels_that_lock_or_spin_most_of_the_time_are_no_matter_of_units(
+        self, read, frame, wheels, factor
+    ):
+        for w in wheels:
+            frame.loc[: int(0.7 * len(frame)), f"wheel_speed_{w}_rad_s"] *= factor
+        assert read(frame).warnings == ()
 
     def test_two_wheels_in_another_unit_are_named(self, refusal, frame):
         for w in ("fl", "rr"):

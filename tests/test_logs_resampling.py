@@ -10,6 +10,7 @@ from log_maker import make_frame, save
 
 from sim2real.logs import read_log, resample
 from sim2real.logs.resampling import hold, lost_share, onto
+from sim2real.observing.drive import RECOVERY_S
 from sim2real.sources import read_source
 
 STEPS = st.sampled_from([0.001, 0.002, 0.0025, 0.004, 0.01, 0.013, 0.05])
@@ -120,6 +121,22 @@ def test_hold_knows_nothing_before_the_first():
 def test_steps_that_make_no_grid(tmp_path, step_s):
     with pytest.raises(ValueError, match="expected more than 0 and at most the log's 3 s"):
         resample(read(tmp_path, make_frame()), step_s)
+
+
+def test_drives_leave_out_what_follows_a_torque_that_is_lost_for_long(tmp_path):
+    frame = make_frame(rate_hz=500.0, duration_s=12.0)
+    frame.loc[2000:2200, "wheel_torque_rl_nm"] = np.nan
+    frame.loc[4500:4520, "wheel_torque_fl_nm"] = np.nan
+    road = tmp_path / "road.yaml"
+    road.write_text(
+        "schema: 1\nsegments: [{start_m: 0.0, mu_left: 0.9, mu_right: 0.9, surface: dry}]\n", encoding="utf-8"
+    )
+    source = read_source(str(save(frame, tmp_path / "log.csv")), road)
+    left_out = source.drive.time_s[~source.drive.moving]
+    assert left_out.min() == pytest.approx(4.0, abs=0.02)
+    assert left_out.max() == pytest.approx(4.4 + RECOVERY_S, abs=0.02)
+    assert "2.41 s are left out: a wheel's torque is lost there for long, or just was." in source.log.warnings
+    assert np.isfinite(source.drive.torque_nm).all()
 
 
 @pytest.mark.parametrize("every", [2, 3, 5])

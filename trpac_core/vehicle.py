@@ -34,6 +34,14 @@ class Vehicle:
     rolling_resistance: float = 0.0
     """Coefficient of the moment against the wheel's rotation, c F_z R; 0 is Eq. (12) as printed [-]."""
 
+    def __post_init__(self) -> None:
+        """Refuse a centre of gravity that does not lie between the axles; raises ValueError."""
+        if not 0.0 < self.cog_to_rear_axle_m < self.wheelbase_m:
+            raise ValueError(
+                f"cog_to_rear_axle_m is {self.cog_to_rear_axle_m:g}; expected less than wheelbase_m "
+                f"({self.wheelbase_m:g}) and more than 0: the centre of gravity lies between the axles."
+            )
+
     @property
     def cog_to_front_axle_m(self) -> float:
         """Distance from the centre of gravity to the front axle [m]."""

@@ -161,12 +161,12 @@ def _motion(inputs: Inputs, row: int) -> Motion:
     """The car's motion when a picture was taken; a lost sample is taken as standing, or as no change."""
     accel = 0.0 if inputs.accel_m_s2 is None else inputs.accel_m_s2[row]
     speed, acceleration = np.nan_to_num([inputs.speed_m_s[row], accel]).tolist()
-    way_m = float(inputs.position_m[row])
+    way_m, yaw_rate = float(inputs.position_m[row]), float(inputs.yaw_rate_rad_s[row])
     return Motion(
         speed,
         acceleration,
         float(inputs.steering_angle_rad[row]),
-        float(inputs.yaw_rate_rad_s[row]),
+        yaw_rate if np.isfinite(yaw_rate) else None,
         way_m if np.isfinite(way_m) else None,
     )
 

@@ -58,8 +58,10 @@ class Inputs:
         NaN where there is nothing to estimate from: lost samples, and the torque of a locked wheel.
     accel_m_s2 : array, shape (n,), or None
         Accelerometer; None where the log has none of its own.
-    steering_angle_rad, yaw_rate_rad_s : array, shape (n,)
+    steering_angle_rad : array, shape (n,)
         0 where not measured: straight on.
+    yaw_rate_rad_s : array, shape (n,)
+        NaN where not measured: the steering angle tells the curve.
     mu_reference : array, shape (n,), or None
         Measured peak friction under the front wheels [-].
     noise : Noise
@@ -153,7 +155,7 @@ def make_inputs(log: Log, vehicle: VehicleFile) -> Inputs:
         wheel_torque_nm=np.where(locked, np.nan, torque_nm),
         accel_m_s2=columns[CHANNELS[ACCEL]] if drive.counted[ACCEL] else None,
         steering_angle_rad=np.nan_to_num(signals.get("steering_angle_rad", zero)),
-        yaw_rate_rad_s=np.nan_to_num(signals.get("yaw_rate_rad_s", zero)),
+        yaw_rate_rad_s=signals.get("yaw_rate_rad_s", np.full(len(time_s), np.nan)),
         mu_reference=signals.get("mu_reference"),
         noise=_noise(drive, wheels, speed, car.wheel_radius_m),
         warnings=_warnings(log, locked, step_s),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -198,7 +199,7 @@ def readings(inputs: Inputs, wheel: int) -> Sequence[Sensors]:
         inputs.speed_m_s.tolist(),
         inputs.steering_angle_rad.tolist(),
         accel,
-        inputs.yaw_rate_rad_s.tolist(),
+        [None if math.isnan(yaw) else yaw for yaw in inputs.yaw_rate_rad_s.tolist()],
     )
     return [
         Sensors(omega, torque, speed, None, steering, acceleration, yaw)

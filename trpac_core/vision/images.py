@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 import struct
 import zlib
 from pathlib import Path
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 LEAST_SIDE_PX = 64
 MOST_PIXELS = 64_000_000
 """Larger pictures are refused before they are decoded: 64 megapixels."""
+MOST_FILE_BYTES = 3 * MOST_PIXELS
+"""Larger files are refused unread: no picture needs more than its pixels do [bytes]."""
 
 _JPEG_START = b"\xff\xd8\xff"
 _JPEG_END = b"\xff\xd9"
@@ -92,11 +95,21 @@ def raw_bgr_image(
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        there = path.stat()
+        regular = stat.S_ISREG(there.st_mode)
+        data = path.read_bytes() if regular and there.st_size <= MOST_FILE_BYTES else b""
     except FileNotFoundError:
         raise ImageError(f"{path}: no such file. Expected a JPEG or PNG picture; correct the path.") from None
     except (OSError, ValueError) as error:
         raise ImageError(f"{path}: cannot be read ({error}). Expected a JPEG or PNG picture.") from error
+    if not regular:
+        raise ImageError(f"{path}: cannot be read (no file of its own). Expected a JPEG or PNG picture.")
+    if there.st_size > MOST_FILE_BYTES:
+        raise ImageError(
+            f"{path}: {there.st_size / 1e6:.0f} MB; expected a JPEG or PNG picture of at most "
+            f"{MOST_FILE_BYTES / 1e6:.0f} MB."
+        )
+    return data
 
 
 def check_size(width: int, height: int, name: str) -> None:
