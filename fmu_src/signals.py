@@ -43,7 +43,8 @@ INPUTS = (
         Kind.STRING,
         "input",
         "discrete",
-        "Path of the newest camera picture; a changed path or frame_id is a new frame, an empty one is none",
+        "Path of the newest camera picture; a changed path or frame_id is a new frame (the same path again: set a new "
+        "frame_id), an empty one is none",
         start="",
     ),
     Variable(
@@ -128,7 +129,7 @@ OUTPUTS = (
         "discrete",
         "Visual information confidence flag epsilon at the wheel now",
     ),
-    _output("K_v", "1", "Auxiliary gain of the visual term", 0.0),
+    _output("K_v", "1", "Auxiliary gain of the visual term; in 1/s where that is of the form (18)", 0.0),
     Variable(
         "excitation_flag",
         Kind.BOOLEAN,

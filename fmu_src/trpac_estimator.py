@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from trpac_core.estimator import Estimate, EstimatorConfig
 from trpac_core.estimator import TrpacEstimator as Estimator
+from trpac_core.local_speed import local_speeds
 from trpac_core.readings import Sensors
 from trpac_core.vision.ife import Ife
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
@@ -32,20 +33,25 @@ class TrpacEstimator(CameraSlave):
         self, values: Mapping[str, Any], networks: tuple[Segmenter, SurfaceClassifier] | None
     ) -> Estimator:
         """The estimator under these parameters; ValueError where they cannot be applied."""
-        config = configuration(self.variables, values, EstimatorConfig())
+        self._config = config = configuration(self.variables, values, EstimatorConfig())
         return Estimator(config, Ife(config.image_settings, *networks) if networks else None)
 
     def sensors(self) -> Sensors:
-        """The inputs as the estimator's sensors."""
-        values = self.values
+        """The inputs as the estimator's sensors; in a curve the wheel has a speed of its own over the road."""
+        values, config = self.values, self._config
+        speed, steering, yaw = values["vehicle_speed"], values["steering_angle"], self.optional("yaw_rate")
+        if steering or yaw:
+            fl, fr, rl, rr = local_speeds(config.vehicle, speed, steering, yaw)
+            left, right = (fl, fr) if config.front_axle else (rl, rr)
+            speed = left if config.left_side else right
         return Sensors(
             values["wheel_speed"],
             values["wheel_torque"],
-            values["vehicle_speed"],
+            speed,
             self.optional("vertical_load"),
-            values["steering_angle"],
+            steering,
             self.optional("longitudinal_acceleration"),
-            self.optional("yaw_rate"),
+            yaw,
         )
 
     def shown(self, name: str) -> Value:

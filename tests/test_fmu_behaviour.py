@@ -103,6 +103,42 @@ def test_optional_inputs_count_from_their_first_value_other_than_zero(open_unit:
     assert "without load" in loaded.log[0].text
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_an_optional_input_that_was_no_number_once_is_not_connected_for_it(
+    open_unit: Open, value: float
+) -> None:
+    other = open_unit()
+    other.step({**DRIVING, "vertical_load": 0.0}, count=100)
+    unit = open_unit()
+    unit.step({**DRIVING, "vertical_load": value})
+    unit.step({"vertical_load": 0.0}, count=100)
+    assert unit.get("TRPAC_peak") == pytest.approx(other.get("TRPAC_peak"), rel=1e-3)
+    assert [line.status for line in unit.log] == [WARNING]
+
+
+@pytest.mark.parametrize("by", ["yaw_rate", "steering_angle"])
+@pytest.mark.parametrize(("front", "left"), [(True, True), (True, False), (False, True), (False, False)])
+def test_in_a_curve_a_wheel_that_adheres_shows_no_slip(
+    open_unit: Open, by: str, front: bool, left: bool
+) -> None:
+    """Radii about the turning centre on the rear axle's line, by geometry."""
+    radius_m, speed, car = 30.0, 10.0, EstimatorConfig().vehicle
+    beside = radius_m + (-0.5 if left else 0.5) * car.track_m
+    own = beside * speed / radius_m
+    steering = math.atan(car.wheelbase_m / radius_m)
+    if front:  # the wheels are steered alike, so that only the part along them rolls
+        own = own * math.cos(steering) + speed / radius_m * car.wheelbase_m * math.sin(steering)
+    told = {"steering_angle": steering} if by == "steering_angle" or front else {}
+    told |= {"yaw_rate": speed / radius_m} if by == "yaw_rate" else {}
+    unit = open_unit(wheel__front=front, wheel__left=left)
+    unit.step(
+        {"wheel_speed": own / car.wheel_radius_m, "wheel_torque": 0.0, "vehicle_speed": speed, **told},
+        count=300,
+    )
+    assert abs(unit.get("slip")) < 1e-6
+    assert unit.get("TRPAC") == pytest.approx(0.8)
+
+
 # Bad input: the unit goes on, flag down, one log line, fmi2OK
 
 

@@ -13,6 +13,7 @@ from test_sides import split_road
 
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.four_wheels import CAR, CarSensors, FourWheels, FourWheelsConfig, SideClasses
+from trpac_core.local_speed import local_speeds
 from trpac_core.readings import Sensors
 from trpac_core.tyre import force
 from trpac_core.vehicle import WHEELS, Vehicle
@@ -207,10 +208,8 @@ def test_in_a_curve_every_wheel_that_rolls_freely_has_no_slip():
     radius_m, speed = 20.0, 10.0
     half, base = CAR_DATA.track_m / 2.0, CAR_DATA.wheelbase_m
     steering, yaw = math.atan(base / radius_m), speed / radius_m
-    four = FourWheels(FourWheelsConfig())
-    turning = sensors(vehicle_speed_m_s=speed, steering_angle_rad=steering)
-    for given in (turning, turning._replace(yaw_rate_rad_s=yaw)):
-        fl, fr, rl, rr = four._local_speeds(given)
+    for known_yaw in (None, yaw):
+        fl, fr, rl, rr = local_speeds(CAR_DATA, speed, steering, known_yaw)
         assert (rl, rr) == pytest.approx((yaw * (radius_m - half), yaw * (radius_m + half)))
         middle = math.hypot(radius_m, base) * yaw
         assert (fl + fr) / 2.0 == pytest.approx(middle)

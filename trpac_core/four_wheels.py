@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .car_friction import car_friction
 from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
+from .local_speed import local_speeds
 from .readings import LONGEST_STEP_S, PLAUSIBLE, Sensors
 from .vehicle import WHEELS
 from .vision.results import FrameResult
@@ -116,7 +117,6 @@ class FourWheels:
         self._ife = ife
         self._wheels = tuple(TrpacEstimator(config.of_wheel(name)) for name in WHEELS)
         self._car = car = config.wheel.vehicle
-        self._half_track_m, self._wheelbase_m = car.track_m / 2.0, car.wheelbase_m
         front_n, rear_n = car.wheel_load(True), car.wheel_load(False)
         self._static_n = (front_n, front_n, rear_n, rear_n)
         per_m_s2 = car.mass_kg * car.cog_height_m / (car.track_m * car.wheelbase_m)
@@ -161,7 +161,7 @@ class FourWheels:
         omega, torque, speed, _, steering, accel, _, yaw = sensors
         speeds_m_s = (speed, speed, speed, speed)
         if steering or yaw:
-            speeds_m_s = self._local_speeds(sensors)
+            speeds_m_s = local_speeds(self._car, speed, steering, yaw)
         loads_n, given_n = self._loads(sensors)
         estimates, problems = [], []
         for name, wheel, side, wheel_omega, wheel_torque, wheel_m_s, wheel_n in zip(
@@ -234,21 +234,6 @@ class FourWheels:
             and abs(sensors.steering_angle_rad) <= _STEERED
             and abs(sensors.yaw_rate_rad_s or 0.0) <= _TURNING
         )
-
-    def _local_speeds(self, sensors: CarSensors) -> Four:
-        """Speed of the road under each wheel, along the wheel: rigid car that turns about the rear axle's line [m/s].
-
-        Where steering or yaw rate are no good readings the car's speed stands for all: each wheel will say so itself.
-        """
-        _, _, speed, _, steering, _, _, yaw = sensors
-        if not self._motion_known(sensors):
-            return (speed, speed, speed, speed)
-        if yaw is None:
-            yaw = speed * math.tan(steering) / self._wheelbase_m
-        across = yaw * self._half_track_m
-        ahead, aside = math.cos(steering), yaw * self._wheelbase_m * math.sin(steering)
-        left, right = speed - across, speed + across
-        return (left * ahead + aside, right * ahead + aside, left, right)
 
     def _loads(self, sensors: CarSensors) -> tuple[Four, OptionalFour]:
         """Vertical loads for the car's sum, and what the wheels are given of them [N].

@@ -15,6 +15,7 @@ from sim2real.replay.camera import NO_CAMERA, CameraSide
 from sim2real.replay.inputs import Inputs
 from sim2real.replay.vehicle_level import vehicle_level
 from trpac_core.estimator import Estimate, EstimatorConfig, TrpacEstimator
+from trpac_core.local_speed import local_speeds
 from trpac_core.readings import Sensors
 from trpac_core.tyre import peak_friction
 from trpac_core.vehicle import WHEELS
@@ -191,7 +192,7 @@ def _peer_traces(inputs: Inputs, load_n: Array, told: Told) -> dict[str, Trace]:
 
 
 def readings(inputs: Inputs, wheel: int) -> Sequence[Sensors]:
-    """What a wheel's sensors read, row by row; NaN is a lost sample."""
+    """What a wheel's sensors read, row by row, the speed that of the road under the wheel; NaN is a lost sample."""
     accel = [None] * len(inputs) if inputs.accel_m_s2 is None else inputs.accel_m_s2.tolist()
     columns = (
         inputs.wheel_speed_rad_s[:, wheel].tolist(),
@@ -201,8 +202,11 @@ def readings(inputs: Inputs, wheel: int) -> Sequence[Sensors]:
         accel,
         [None if math.isnan(yaw) else yaw for yaw in inputs.yaw_rate_rad_s.tolist()],
     )
+    car = inputs.vehicle
     return [
-        Sensors(omega, torque, speed, None, steering, acceleration, yaw)
+        Sensors(
+            omega, torque, local_speeds(car, speed, steering, yaw)[wheel], None, steering, acceleration, yaw
+        )
         for omega, torque, speed, steering, acceleration, yaw in zip(*columns, strict=True)
     ]
 
