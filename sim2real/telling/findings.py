@@ -318,7 +318,7 @@ def _ambiguous(decision: Decision) -> tuple[tuple[str, ...], ...]:
     if not decision.rivals:
         return ()
     members = [decision.winner, *decision.rivals]
-    return (tuple(dict.fromkeys(key for entry in members for key in entry.ids)),)
+    return (tuple(dict.fromkeys(key for entry in members for key in entry.blamed)),)
 
 
 def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:

@@ -66,8 +66,13 @@ class Entry:
 
     @property
     def name(self) -> str:
-        """Its effects in a word; structural ones are not blamed, and left out."""
-        return "+".join(key for key in self.ids if not EFFECTS[key].structural)
+        """Its effects in a word."""
+        return "+".join(self.blamed)
+
+    @property
+    def blamed(self) -> tuple[str, ...]:
+        """Its effects but structural ones, which are not blamed."""
+        return tuple(key for key in self.ids if not EFFECTS[key].structural)
 
     @property
     def loss_fit(self) -> float:
