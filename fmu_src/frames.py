@@ -74,7 +74,7 @@ def next_frame(
     if not source:
         # A picture in memory is set for one step: that none is set now ends nothing.
         if seen.source == BUFFER or (not seen.source and seen.frame_id == frame_id):
-            return replace(seen, path=""), None, None
+            return replace(seen, path="") if seen.path else seen, None, None
         return FrameState("", frame_id, seen.failed), None, None
     by_path = source not in (BUS, BUFFER)
     if (source, frame_id) == (seen.path if by_path else seen.source, seen.frame_id) and (by_path or frame_id):

@@ -22,7 +22,7 @@ from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order, counts, read_order, without_swing
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
-from sim2real.result import Diagnosis, Measure, TrpacError, Verdict
+from sim2real.result import Diagnosis, Measure, TrpacError, Verdict, added
 from sim2real.sources import Source, Sources, read_source, read_sources
 from sim2real.telling.findings import Findings, describe
 from sim2real.which.closure import at_the_floor, closing, loud
@@ -271,13 +271,12 @@ def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:
         The further log, and where it was driven.
     """
     vehicle = load_vehicle(diagnosis.provenance["vehicle"]["path"])
-    most = 2 if diagnosis.verdict is Verdict.COMPOUND else 1
-    named = diagnosis.causes[: max(most, len(diagnosis.together))]
+    named = added(diagnosis) or diagnosis.causes[:1]
     of_car = [c for c in named if EFFECTS[c.effect].stage != "perception"]
     source = read_source(str(log), road)
     if named and not of_car:
-        added = {c.effect: {name: v.value for name, v in c.parameters.items()} for c in named}
-        return camera_shrink(source.log, source.road, vehicle, added)
+        found = {c.effect: {name: v.value for name, v in c.parameters.items()} for c in named}
+        return camera_shrink(source.log, source.road, vehicle, found)
     model = Simulation(vehicle)
     effects = [
         form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()}) for c in of_car

@@ -28,6 +28,7 @@ from sim2real.result import (
     Place,
     Unexplained,
     Verdict,
+    added,
 )
 
 QUIET_SIDE_DOUBT = 0.06
@@ -320,8 +321,7 @@ def _ranked(
 
 def _together(main: Diagnosis, side: Side) -> tuple[str, ...]:
     """Effects that either stands by."""
-    stood = {Verdict.COMPOUND: 2, Verdict.IDENTIFIED: 1, Verdict.AMBIGUOUS: 1}.get(main.verdict, 0)
-    return tuple(dict.fromkeys((*(c.effect for c in main.causes[:stood]), *side.named)))
+    return tuple(dict.fromkeys((*(c.effect for c in added(main)), *side.named)))
 
 
 def _where(main: Diagnosis, side: Side) -> tuple[Place, ...]:

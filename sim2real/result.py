@@ -252,6 +252,12 @@ class Trace:
     """Standard deviation of its noise."""
 
 
+NEEDED = {Verdict.IDENTIFIED: 1, Verdict.COMPOUND: 2}
+"""How many of the first causes a verdict says to model."""
+ADDED = {**NEEDED, Verdict.AMBIGUOUS: 1}
+"""How many of the first causes the gap after is measured with."""
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """Everything that a diagnosis says; `to_json` is the contract's form, the rest is for the report."""
@@ -264,7 +270,7 @@ class Diagnosis:
     """Subsystem to regime to the share of the gap [-]."""
     causes: tuple[Cause, ...]
     together: tuple[str, ...] = ()
-    """Effects of a compound that are needed together, where they are more than the first two causes."""
+    """Effects of a compound that are needed together, where it is of more than the car's motion alone."""
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
     structure: Structure | None = None
     variation: Variation | None = None
@@ -306,6 +312,16 @@ class Diagnosis:
             "warnings": list(self.warnings),
             "provenance": self.provenance,
         }
+
+
+def needed(diagnosis: Diagnosis) -> tuple[Cause, ...]:
+    """The causes that the verdict says to model: none where it names no single set."""
+    return diagnosis.causes[: max(NEEDED.get(diagnosis.verdict, 0), len(diagnosis.together))]
+
+
+def added(diagnosis: Diagnosis) -> tuple[Cause, ...]:
+    """The causes that the gap after is measured with; in an ambiguous verdict the likeliest."""
+    return diagnosis.causes[: max(ADDED.get(diagnosis.verdict, 0), len(diagnosis.together))]
 
 
 def _cause(cause: Cause) -> dict[str, Any]:

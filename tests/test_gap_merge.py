@@ -14,8 +14,8 @@ from sim2real.merge import Side, camera_side, counter_side, merge
 from sim2real.observing.lattice import Lattice, Reading
 from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
-from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict
-from sim2real.telling.report import jsonable, needed, render
+from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict, needed
+from sim2real.telling.report import jsonable, render
 
 TURN = 2.0 * np.pi
 MADE_ROAD = RoadFile.model_validate(
@@ -370,6 +370,10 @@ def test_all_effects_of_a_compound_of_more_than_two_are_told():
     assert set(found.together) == {c.effect for c in needed(found)} == named
     assert found.to_json()["together"] == list(found.together)
     assert len(needed(main)) == 2
+    counter = merge(main, counter_side(LATTICE, BEFORE, AFTER, excluded=False))
+    four = merge(counter, side_of(Verdict.IDENTIFIED))
+    assert set(four.together) == named | {"wheel_speed_quantisation"}
+    assert len(needed(four)) == 4
 
 
 def test_a_quiet_camera_leaves_the_cars_gap_as_it_is_and_the_other_way_round():

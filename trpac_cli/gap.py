@@ -229,7 +229,8 @@ def judge(hidden: str, said: Diagnosis) -> str:
 
 def _summarise(console: Console, said: Diagnosis) -> None:
     """Verdict, sizes and the first causes on the terminal."""
-    from sim2real.telling.report import added, leading
+    from sim2real.result import added
+    from sim2real.telling.report import leading
 
     gap = said.gap
     sizes = f"gap {gap.before.total:.2f}"

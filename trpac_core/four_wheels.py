@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .car_friction import car_friction
 from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
-from .local_speed import local_speeds
+from .local_speed import local_speeds, motion_known
 from .readings import LONGEST_STEP_S, PLAUSIBLE, Sensors
 from .vehicle import WHEELS
 from .vision.results import FrameResult
@@ -25,9 +25,6 @@ LIFTED_N = 1.0
 """Load of a wheel that lateral acceleration lifts: the tyre's equations need one above 0 [N]."""
 
 _STEEPEST = PLAUSIBLE["longitudinal_acceleration_m_s2"]
-_FASTEST, _TURNING, _STEERED = (
-    PLAUSIBLE[name] for name in ("vehicle_speed_m_s", "yaw_rate_rad_s", "steering_angle_rad")
-)
 
 Four = tuple[float, float, float, float]
 OptionalFour = tuple[float | None, float | None, float | None, float | None]
@@ -210,7 +207,7 @@ class FourWheels:
             return frame or (None, None)
         if self._ife is None:
             raise TypeError("A picture came, but the estimator was made without an image estimator.")
-        if not self._motion_known(sensors):
+        if not motion_known(sensors.vehicle_speed_m_s, sensors.steering_angle_rad, sensors.yaw_rate_rad_s):
             return None, None
         accel = sensors.longitudinal_acceleration_m_s2
         motion = Motion(
@@ -226,14 +223,6 @@ class FourWheels:
     def _as_class(self, result: FrameResult) -> RoadClass:
         """A verdict in the form that a wheel takes: its flag is up where the confidence is above the threshold."""
         return RoadClass(result.surface, result.told_by_bus(self.config.wheel.vision.flag_threshold))
-
-    @staticmethod
-    def _motion_known(sensors: CarSensors) -> bool:
-        return (
-            abs(sensors.vehicle_speed_m_s) <= _FASTEST
-            and abs(sensors.steering_angle_rad) <= _STEERED
-            and abs(sensors.yaw_rate_rad_s or 0.0) <= _TURNING
-        )
 
     def _loads(self, sensors: CarSensors) -> tuple[Four, OptionalFour]:
         """Vertical loads for the car's sum, and what the wheels are given of them [N].

@@ -12,6 +12,12 @@ _FASTEST, _TURNING, _STEERED = (
 )
 
 
+def motion_known(speed_m_s: float, steering_angle_rad: float, yaw_rate_rad_s: float | None) -> bool:
+    """Whether the readings that tell how the car moves are what a road car gives."""
+    turning = yaw_rate_rad_s or 0.0
+    return abs(speed_m_s) <= _FASTEST and abs(steering_angle_rad) <= _STEERED and abs(turning) <= _TURNING
+
+
 def local_speeds(
     car: Vehicle, speed_m_s: float, steering_angle_rad: float, yaw_rate_rad_s: float | None
 ) -> tuple[float, float, float, float]:
@@ -31,10 +37,11 @@ def local_speeds(
     tuple of float
         fl, fr, rl, rr [m/s]. Where a reading is no good the car's speed stands for all: each wheel will say so itself.
     """
-    turning = yaw_rate_rad_s or 0.0
-    if not (abs(speed_m_s) <= _FASTEST and abs(steering_angle_rad) <= _STEERED and abs(turning) <= _TURNING):
+    if not motion_known(speed_m_s, steering_angle_rad, yaw_rate_rad_s):
         return (speed_m_s, speed_m_s, speed_m_s, speed_m_s)
-    yaw = speed_m_s * math.tan(steering_angle_rad) / car.wheelbase_m if yaw_rate_rad_s is None else turning
+    yaw = yaw_rate_rad_s
+    if yaw is None:
+        yaw = speed_m_s * math.tan(steering_angle_rad) / car.wheelbase_m
     across = 0.5 * yaw * car.track_m
     ahead, aside = math.cos(steering_angle_rad), yaw * car.wheelbase_m * math.sin(steering_angle_rad)
     left, right = speed_m_s - across, speed_m_s + across

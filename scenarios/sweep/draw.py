@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.files import RoadFile, RoadSegment, Scenario, SensorNoise
-from scenarios.sweep.files import RANGES, Drawn, RoadDraw, Sweep, drawn_numbers
+from scenarios.sweep.files import RoadDraw, Sweep, drawn_numbers, sample
 from scenarios.sweep.pedal import drive_pedal
 
 STREAMS = ("numbers", "road", "pedal", "noise", "camera")
@@ -136,11 +136,7 @@ def _numbers(sweep: Sweep, key: RunKey, stream: np.random.SeedSequence) -> dict[
     drawn = drawn_numbers(sweep.file)
     values = {}
     for (name, number), own in zip(drawn.items(), stream.spawn(len(drawn)), strict=True):
-        value = (
-            number.sample(np.random.default_rng(own), RANGES[name])
-            if isinstance(number, Drawn)
-            else float(number)
-        )
+        value = sample(name, number, np.random.default_rng(own))
         values[name] = key.level if name == key.parameter else value
     if sweep.file.sensors.noise_known_factor is None and key.parameter != "sensors.noise_known_factor":
         values["sensors.noise_known_factor"] = values["sensors.noise_factor"]

@@ -213,6 +213,11 @@ PER_PULSE = ("pedal.grip_use", "pedal.pulse_s")
 """Drawn anew for every pulse, not once a run."""
 
 
+def sample(name: str, number: Number, random: np.random.Generator) -> float:
+    """One value of a number of this name."""
+    return number.sample(random, RANGES[name]) if isinstance(number, Drawn) else float(number)
+
+
 def drawn_numbers(file: SweepFile) -> dict[str, Number]:
     """Every number that is drawn once a run, by its path in the file."""
     return {name: value for name, value in _numbers(file) if name not in PER_PULSE}

@@ -15,7 +15,7 @@ from scenarios.files import Manoeuvre, Pulse, RoadSegment, Scenario
 from scenarios.plant import dynamics
 from scenarios.plant.parameters import POSITION, SPEED
 from scenarios.plant.pipeline import PlantSetup, make_setup
-from scenarios.sweep.files import RANGES, Drawn, Number, PedalDraw
+from scenarios.sweep.files import PedalDraw, sample
 from trpac_core.vehicle import Vehicle
 
 FIRST_S = 0.02
@@ -53,7 +53,8 @@ def drive_pedal(scenario: Scenario, pedal: PedalDraw, random: np.random.Generato
     pulses: list[Pulse] = []
     while made < scenario.end.time_s and y[POSITION] + to_front_m < scenario.end.position_m:
         here = scenario.road.segment_at(float(y[POSITION]) + to_front_m)
-        use, length_s = _sample(pedal, "grip_use", random), _sample(pedal, "pulse_s", random)
+        use = sample("pedal.grip_use", pedal.grip_use, random)
+        length_s = sample("pedal.pulse_s", pedal.pulse_s, random)
         launch = not pulses and here.surface == "dry"
         torque_nm = _torque_nm(car, here, use, launch, pedal.light_torque_nm)
         end_s = made + max(LAUNCH_S if launch else length_s, 2.0 * RAMP_S)
@@ -68,11 +69,6 @@ def drive_pedal(scenario: Scenario, pedal: PedalDraw, random: np.random.Generato
         pulses.append(pulse)
         begin_s, made = next_s, next_s
     return Manoeuvre(schema=1, name="pulsed by grip", pulses=pulses)
-
-
-def _sample(pedal: PedalDraw, name: str, random: np.random.Generator) -> float:
-    number: Number = getattr(pedal, name)
-    return number.sample(random, RANGES[f"pedal.{name}"]) if isinstance(number, Drawn) else number
 
 
 def _torque_nm(car: Vehicle, here: RoadSegment, use: float, launch: bool, light_nm: float) -> float:

@@ -16,7 +16,17 @@ import numpy as np
 from scenarios.effects import EFFECTS
 from scenarios.whole_files import written_whole
 from sim2real.how_far.rating import rate
-from sim2real.result import MEANING, Cause, Diagnosis, Interval, NextManoeuvre, Trace, Verdict
+from sim2real.result import (
+    MEANING,
+    Cause,
+    Diagnosis,
+    Interval,
+    NextManoeuvre,
+    Trace,
+    Verdict,
+    added,
+    needed,
+)
 from sim2real.telling import figures
 from trpac_core.vehicle import WHEELS
 
@@ -27,10 +37,6 @@ DASH = "–"
 LEADING_FROM = 0.02
 """Probability from which a cause gets a card of its own [-]."""
 MOST_LEADING = 5
-NEEDED = {Verdict.IDENTIFIED: 1, Verdict.COMPOUND: 2}
-"""How many of the first causes a verdict says to model."""
-ADDED = {**NEEDED, Verdict.AMBIGUOUS: 1}
-"""How many of the first causes the gap after is measured with."""
 
 
 def write_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> tuple[Path, Path]:
@@ -117,16 +123,6 @@ def render(diagnosis: Diagnosis) -> str:
         traces=[(t, _picture(figures.trace(t), f"{t.signal} over time")) for t in shown_traces(diagnosis)],
         profile=None if diagnosis.next_manoeuvre is None else profile_csv(diagnosis.next_manoeuvre),
     )
-
-
-def needed(diagnosis: Diagnosis) -> tuple[Cause, ...]:
-    """The causes that the verdict says to model: none where it names no single set."""
-    return diagnosis.causes[: max(NEEDED.get(diagnosis.verdict, 0), len(diagnosis.together))]
-
-
-def added(diagnosis: Diagnosis) -> tuple[Cause, ...]:
-    """The causes that the gap after is measured with; in an ambiguous verdict the likeliest."""
-    return diagnosis.causes[: max(ADDED.get(diagnosis.verdict, 0), len(diagnosis.together))]
 
 
 def leading(diagnosis: Diagnosis) -> tuple[Cause, ...]:

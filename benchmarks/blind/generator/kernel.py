@@ -58,9 +58,9 @@ Array = NDArray[np.floating[Any]]
 GRAVITY = 9.81
 RECORD_STEP_S = 0.001
 LEAST_LAG_S = 0.001
+"""Of a motor whose torque rises at a limited rate: how closely it follows below the limit."""
 STAGES = (0.0, 0.5, 0.5, 1.0)
 """Where in a step the Runge-Kutta method takes the slope [-]."""
-"""Of a motor whose torque rises at a limited rate: how closely it follows below the limit."""
 
 BODY_DAMPING = 0.4
 """Of a body that pitches on its springs, over the critical one [-]."""
