@@ -30,16 +30,13 @@ COMPILING := tests/test_gap_observer.py::test_a_log_without_measurements_is_the_
 
 # Three workers for two cores: some tests wait for processes, rigs and clusters. One thread each: the threads of one's
 # matrix products would wait for the other's. The seed is for random inputs; pytest by itself draws others every time.
-SUITE := $(BIN)/python -m pytest -n 3 --dist loadfile --hypothesis-seed 0
-
+test: CHOSEN := -m "not long"
+test:            ## lint, types and the test suite
+test-all:        ## the same with the tests that take long (twice the time)
 test test-all: export OPENBLAS_NUM_THREADS = 1
-test: $(READY) style  ## lint, types and the test suite
+test test-all: $(READY) style
 	@$(MAKE) --no-print-directory -j 3 types compiled collected
-	$(SUITE) -m "not long"
-
-test-all: $(READY) style  ## the same with the tests that take long (twice the time)
-	@$(MAKE) --no-print-directory -j 3 types compiled collected
-	$(SUITE)
+	$(BIN)/python -m pytest -n 3 --dist loadfile --hypothesis-seed 0 $(CHOSEN)
 
 check: style types  ## lint and types
 

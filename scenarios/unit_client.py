@@ -5,14 +5,13 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from xml.etree.ElementTree import ParseError
 
 import numpy as np
 import pandas as pd
-from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
+from fmu_src.opening import opened_unit
 from fmu_src.packaging import UnitFileError, unpack_unit
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario, ScenarioError
@@ -130,7 +129,11 @@ def run_unit(
     except UnitFileError as error:
         raise ScenarioError(str(error)) from error
     try:
-        unit, references = _instantiated(fmu, folder)
+        try:
+            unit, description = opened_unit(fmu, folder, [UNIT], "estimator")
+        except UnitFileError as error:
+            raise ScenarioError(str(error)) from error
+        references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
         try:
             unit.setupExperiment(startTime=0.0)
             _set(unit, references, settings)
@@ -148,25 +151,6 @@ def run_unit(
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return outputs
-
-
-def _instantiated(fmu: Path, folder: Path) -> tuple[FMU2Slave, dict[str, tuple[int, str]]]:
-    """The unit of an unpacked archive, and reference and type of its variables by name."""
-    try:
-        description = read_model_description(str(folder))
-        name = description.coSimulation.modelIdentifier
-    except (OSError, ValueError, AttributeError, ParseError) as error:
-        raise ScenarioError(f"{fmu}: not a co-simulation unit ({error}).") from error
-    if name != UNIT:
-        raise ScenarioError(f"{fmu}: is {name}; expected {UNIT}.")
-    unit = FMU2Slave(
-        guid=description.guid, unzipDirectory=str(folder), modelIdentifier=name, instanceName="estimator"
-    )
-    try:
-        unit.instantiate()
-    except Exception as error:  # fmpy raises a bare Exception here
-        raise ScenarioError(f"{fmu}: cannot be instantiated ({error}).") from error
-    return unit, {v.name: (v.valueReference, v.type) for v in description.modelVariables}
 
 
 def _set(

@@ -13,7 +13,7 @@ import numpy as np
 from scenarios.effects import EFFECTS
 from scenarios.effects.base import Parameter
 from scenarios.files import RoadFile, VehicleFile
-from sim2real.next_manoeuvre import PROFILES, torque_of
+from sim2real.next_manoeuvre import STEADY_SPEEDS, torque_of
 from sim2real.observing.lattice import Lattice
 from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
@@ -35,8 +35,6 @@ QUIET_SIDE_DOUBT = 0.06
 """Probability that is left to the effects of data that show no gap: some of them would hardly show [-]."""
 UNKNOWN_BELIEF = 0.05
 """Share of the camera's effects in the belief where what they leave says that it is none of them, or not all [-]."""
-SPEEDS = "steady speeds"
-"""Name of the profile that tells effects of the camera chain apart."""
 CERTAIN = 0.97
 """Probability of what a mark that nothing else leaves has shown [-]."""
 
@@ -128,11 +126,10 @@ def _next(found: PerceptionFinding, vehicle: VehicleFile, road: RoadFile) -> Nex
     """Two speeds far apart, each held over several borders: what goes with speed is then told from what does not."""
     if found.verdict is not Verdict.AMBIGUOUS:
         return None
-    profile = next(p for p in PROFILES if p.name == SPEEDS)
-    time_s, torque_nm = torque_of(profile, vehicle, road)
+    time_s, torque_nm = torque_of(STEADY_SPEEDS, vehicle, road)
     told = tuple(dict.fromkeys(effect for group in found.ambiguous_with for effect in group))
-    sentence = found.next_step or profile.sentence
-    return NextManoeuvre(sentence, profile.initial_speed_m_s, time_s, torque_nm, told, np.nan, np.nan)
+    sentence = found.next_step or STEADY_SPEEDS.sentence
+    return NextManoeuvre(sentence, STEADY_SPEEDS.initial_speed_m_s, time_s, torque_nm, told, np.nan, np.nan)
 
 
 def _in_numbers(found: PerceptionFinding) -> str:
@@ -243,19 +240,16 @@ def _percent(before: float, after: float) -> Interval:
 
 def merge(main: Diagnosis, side: Side) -> Diagnosis:
     """One diagnosis of two; see the module."""
-    quiet = side.verdict is Verdict.NO_GAP, main.verdict is Verdict.NO_GAP
-    before = _join(main.gap.before, side.before, *quiet)
-    after = _join(main.gap.after, side.after, *quiet)
+    side_quiet, main_quiet = side.verdict is Verdict.NO_GAP, main.verdict is Verdict.NO_GAP
+    before = _join(main.gap.before, side.before, side_quiet, main_quiet)
+    after = _join(main.gap.after, side.after, side_quiet, main_quiet)
     verdict = _verdict(main, side)
-    both = verdict in (Verdict.COMPOUND, Verdict.UNKNOWN) and Verdict.NO_GAP not in (
-        main.verdict,
-        side.verdict,
-    )
+    both = verdict in (Verdict.COMPOUND, Verdict.UNKNOWN) and not (side_quiet or main_quiet)
     main_causes, side_causes = list(main.causes), list(side.causes)
     if both:
         main_causes = [replace(c, probability=0.5 * c.probability) for c in main_causes]
         side_causes = [replace(c, probability=0.5 * c.probability) for c in side_causes]
-    elif side.verdict is Verdict.NO_GAP:
+    elif side_quiet:
         left = min(max(0.0, 1.0 - sum(c.probability for c in main_causes)), QUIET_SIDE_DOUBT)
         total = max(sum(c.probability for c in side_causes), 1e-12)
         side_causes = [replace(c, probability=c.probability * min(1.0, left / total)) for c in side_causes]
@@ -266,19 +260,19 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
     causes = _ranked(main, side, main_causes, side_causes, verdict)
     misplaced = side.unexplained is not None and side.unexplained.signal == PLACE
     sentence = main.sentence
-    if side.verdict is not Verdict.NO_GAP:
+    if not side_quiet:
         blamed = "" if side.unexplained else " and ".join(side.named)
         told = f"{blamed or 'Something unknown'}: {side.sentence}".strip(": ")
         beside = f"{main.sentence} Beside it, {told}"
         if misplaced:
             beside = f"{told} The car's equations show a gap too, which a road out of place may cause: {main.sentence}"
-        sentence = told if main.verdict is Verdict.NO_GAP else beside
+        sentence = told if main_quiet else beside
     return replace(
         main,
         verdict=verdict,
         sentence=sentence,
         gap=Gap(before, after, 1.0 if "wheel_speed" in side.before else main.gap.noise_floor),
-        where=main.where if quiet[0] else _where(main, side),
+        where=main.where if side_quiet else _where(main, side),
         causes=causes,
         together=_together(main, side) if verdict is Verdict.COMPOUND else (),
         next_manoeuvre=main.next_manoeuvre or side.next_manoeuvre,

@@ -43,15 +43,18 @@ class Profile:
     shares: tuple[float, ...]
 
 
+STEADY_SPEEDS = Profile(
+    "steady speeds",
+    "Hold 8 m/s, then 25 m/s, five seconds each.",
+    8.0,
+    (0, 4, 4.5, 7.5, 8, 12),
+    (0.05, 0.05, 1, 1, 0.08, 0.08),
+)
+"""It also tells effects of the camera chain apart: borders that are crossed fast and slowly."""
+
 PROFILES = (
     Profile("coast-down", "Coast down from 30 m/s without any torque.", 30.0, (0.0, 12.0), (0.0, 0.0)),
-    Profile(
-        "steady speeds",
-        "Hold 8 m/s, then 25 m/s, five seconds each.",
-        8.0,
-        (0, 4, 4.5, 7.5, 8, 12),
-        (0.05, 0.05, 1, 1, 0.08, 0.08),
-    ),
+    STEADY_SPEEDS,
     Profile(
         "steady acceleration",
         "Accelerate from 3 m/s with half torque for ten seconds.",

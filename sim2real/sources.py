@@ -17,6 +17,8 @@ from sim2real.observing.drive import WHEEL, Drive, awake, backward, grid_step, m
 from sim2real.observing.lattice_trace import find_counter
 from trpac_core.vehicle import WHEELS
 
+Array = NDArray[np.float64]
+
 YAML = (".yaml", ".yml")
 """How the name of a log's own road ends."""
 
@@ -30,9 +32,9 @@ class Source:
     road_path: Path
     drive: Drive
 
-    def on_rows(self, signal: str) -> NDArray[np.float64]:
+    def on_rows(self, signal: str) -> Array:
         """A signal of the log on the drive's rows: the last ones, where the drive begins as its sensors wake."""
-        return resample(self.log, grid_step(self.log.rate_hz))[1][signal][-len(self.drive) :]
+        return on_grid(self.log)[1][signal][-len(self.drive) :]
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,8 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
         problems.append(str(error))
     if course is None or log is None:
         raise ScenarioError("\n".join(problems))
-    whole = drive_of(log, course)
+    grid = on_grid(log)
+    whole = drive_of(log, course, grid)
     drive = awake(whole)
     if not drive.moving.any():
         raise ScenarioError(
@@ -127,7 +130,7 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     if asleep_s > 0.0:
         left_out = f"the first {asleep_s:.3g} s are left out: nothing tells yet how fast the car is."
         log = log.warned(left_out)
-    untold_s = _untold_s(log)
+    untold_s = _untold_s(*grid)
     if untold_s > 0.0:
         log = log.warned(
             f"{untold_s:.3g} s are left out: a wheel's torque is lost there for long, or just was."
@@ -139,19 +142,21 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     return Source(log, course, road_path, drive)
 
 
-def _untold_s(log: Log) -> float:
-    step_s = grid_step(log.rate_hz)
-    time_s, signals = resample(log, step_s)
+def _untold_s(time_s: Array, signals: dict[str, Array]) -> float:
     torque = np.column_stack([signals[f"wheel_torque_{w}_nm"] for w in WHEELS])
-    return float(untold_torque(time_s, torque).sum() * step_s)
+    return float(untold_torque(time_s, torque).sum() * (time_s[1] - time_s[0]))
 
 
-def drive_of(log: Log, road: RoadFile) -> Drive:
-    """All of a log on the diagnosis' grid, with what its wheel speeds tell of a counter at their own rate."""
-    time_s, signals = resample(log, grid_step(log.rate_hz))
+def on_grid(log: Log) -> tuple[Array, dict[str, Array]]:
+    """Time [s] and signals of a log on the diagnosis' grid."""
+    return resample(log, grid_step(log.rate_hz))
+
+
+def drive_of(log: Log, road: RoadFile, grid: tuple[Array, dict[str, Array]]) -> Drive:
+    """All of a log `on_grid`, with what its wheel speeds tell of a counter at their own rate."""
     wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
     lattice, trace = find_counter(log.time_s, wheels)
-    return make_drive(log.name, road, time_s, signals, log.derived, lattice, trace)
+    return make_drive(log.name, road, *grid, log.derived, lattice, trace)
 
 
 def split(text: str, road: Path | None) -> tuple[Path, Path]:

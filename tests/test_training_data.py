@@ -26,6 +26,7 @@ from models.training import (
     textures,
 )
 from models.training.__main__ import main
+from trpac_core.vision.networks import calibrated_probabilities
 
 ROOT = Path(__file__).parents[1]
 
@@ -380,7 +381,7 @@ def test_temperature_is_found_again(true_temperature, seed):
     """Labels drawn from softmax(logits / T) lead back to T within the sampling error."""
     rng = np.random.default_rng(seed)
     logits = rng.normal(0, 3, (6000, 3)) * true_temperature / 2
-    chances = calibrate.probabilities(logits, true_temperature).cumsum(axis=1)
+    chances = calibrated_probabilities(logits, true_temperature).cumsum(axis=1)
     labels = (rng.random((6000, 1)) > chances).sum(axis=1).clip(0, 2)
     found = calibrate.learn_temperature(logits, labels)
     assert found == pytest.approx(true_temperature, rel=0.12)

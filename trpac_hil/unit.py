@@ -8,13 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree.ElementTree import ParseError
 
-from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
 from fmu_src.interface_4w import WHICH_WHEEL
+from fmu_src.opening import opened_unit
 from fmu_src.packaging import UnitFileError, unpack_unit
 from trpac_core.vehicle import WHEELS
 from trpac_hil.errors import HilError
@@ -126,12 +125,11 @@ class Unit:
 
     def _open(self, settings: Mapping[str, Any], wheel: str) -> None:
         try:
-            description = read_model_description(str(self._folder))
-            name = description.coSimulation.modelIdentifier
-        except (OSError, ValueError, AttributeError, ParseError) as error:
-            raise HilError(f"{self.archive}: not a co-simulation unit ({error}).") from error
-        if name not in WIRINGS:
-            raise HilError(f"{self.archive}: is {name}; expected {' or '.join(WIRINGS)}.")
+            slave, description = opened_unit(self.archive, self._folder, WIRINGS, "hil")
+        except UnitFileError as error:
+            raise HilError(str(error)) from error
+        self._slave = slave
+        name = description.coSimulation.modelIdentifier
         self.name = name
         self.wiring = Wiring.of_four() if name.endswith("4W") else Wiring.of_one(wheel)
         self._references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
@@ -142,17 +140,6 @@ class Unit:
         self._frame_id = self._references["frame_id"][0]
         self._classes = [self._references[c][0] for c, _ in self.wiring.sides]
         self._confidences = [self._references[c][0] for _, c in self.wiring.sides]
-        slave = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=str(self._folder),
-            modelIdentifier=name,
-            instanceName="hil",
-        )
-        try:
-            slave.instantiate(loggingOn=False)
-        except Exception as error:  # fmpy raises a bare Exception here
-            raise HilError(f"{self.archive}: cannot be instantiated ({error}).") from error
-        self._slave = slave
         known = self._typed(settings)
         self._initialise(known)
         self._warm_up()

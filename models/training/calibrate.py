@@ -47,14 +47,9 @@ class Reliability:
         return float(np.nanmax(np.abs(self.confidence - self.accuracy)))
 
 
-def probabilities(logits: NDArray[np.float64], temperature: float = 1.0) -> NDArray[np.float64]:
-    """Softmax of logits / T, shape (n, classes), as the estimator reckons it."""
-    return calibrated_probabilities(logits, temperature)
-
-
 def cross_entropy(logits: NDArray[np.float64], labels: NDArray[np.int64], temperature: float = 1.0) -> float:
     """Mean negative log probability of the true class at temperature T [nat]."""
-    chosen = probabilities(logits, temperature)[np.arange(len(labels)), labels]
+    chosen = calibrated_probabilities(logits, temperature)[np.arange(len(labels)), labels]
     return float(-np.log(np.maximum(chosen, 1e-300)).mean())
 
 
@@ -71,7 +66,7 @@ def reliability(
     logits: NDArray[np.float64], labels: NDArray[np.int64], temperature: float = 1.0, bins: int = BINS
 ) -> Reliability:
     """Mean confidence and accuracy in equal bins of confidence."""
-    found = probabilities(logits, temperature)
+    found = calibrated_probabilities(logits, temperature)
     confidence, right = found.max(axis=1), found.argmax(axis=1) == labels
     index = np.minimum((confidence * bins).astype(np.int64), bins - 1)
     count = np.bincount(index, minlength=bins)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibrate import probabilities
+from trpac_core.vision.networks import calibrated_probabilities
+
 from .patches import PatchSet
 
 Z_95 = 1.959964
@@ -73,7 +74,7 @@ def picture_verdicts(
     logits: NDArray[np.float64], patches: PatchSet, temperature: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """True class of each picture, and the one found: of the largest mean log probability of its patches."""
-    logs = np.log(np.maximum(probabilities(logits, temperature), 1e-12))
+    logs = np.log(np.maximum(calibrated_probabilities(logits, temperature), 1e-12))
     numbers, first, index = np.unique(patches.pictures, return_index=True, return_inverse=True)
     summed = np.zeros((len(numbers), logits.shape[1]))
     np.add.at(summed, index, logs)

@@ -18,7 +18,7 @@ from sim2real.observing.drive import Drive, awake
 from sim2real.observing.evidence import Evidence, gather
 from sim2real.observing.observer import Simulation
 from sim2real.result import Measure
-from sim2real.sources import drive_of
+from sim2real.sources import drive_of, on_grid
 
 FOLDER = Path(__file__).parent
 MAPPINGS = FOLDER.parent / "mappings"
@@ -117,7 +117,7 @@ def _drive(name: str, mapping: str, window: Window, data: Path) -> Drive:
     own = FOLDER / name / mapping
     columns = load_mapping(own if own.exists() else MAPPINGS / mapping)
     log = read_log(data / window.log, columns).window(window.from_s, window.to_s)
-    return awake(drive_of(log, load_road(FOLDER / name / window.road)))
+    return awake(drive_of(log, load_road(FOLDER / name / window.road), on_grid(log)))
 
 
 def budget(found: list[Stage]) -> list[Measure]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive, make_
 from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
 from trpac_core.estimator import LOCKED_M_S, EstimatorConfig
+from trpac_core.local_speed import local_speeds
 from trpac_core.vehicle import WHEELS, Vehicle
 
 Array = NDArray[np.float64]
@@ -95,6 +98,17 @@ class Inputs:
     def moving(self) -> NDArray[np.bool_]:
         """Rows in which slip can be told: the car is faster than the estimator's floor."""
         return np.nan_to_num(self.speed_m_s) > EstimatorConfig.floor_m_s
+
+    @cached_property
+    def local_speed_m_s(self) -> Array:
+        """Speed of the road under each wheel, shape (n, 4): in a curve the wheels' are unlike [m/s]."""
+        motion = np.column_stack([self.speed_m_s, self.steering_angle_rad, self.yaw_rate_rad_s]).tolist()
+        return np.array(
+            [
+                local_speeds(self.vehicle, v, angle, None if math.isnan(yaw) else yaw)
+                for v, angle, yaw in motion
+            ]
+        )
 
     def load_n(self) -> Array:
         """Vertical loads as the estimators without a load sensor reckon them, shape (n, 4) [N]."""

@@ -15,7 +15,6 @@ from sim2real.replay.camera import NO_CAMERA, CameraSide
 from sim2real.replay.inputs import Inputs
 from sim2real.replay.vehicle_level import vehicle_level
 from trpac_core.estimator import Estimate, EstimatorConfig, TrpacEstimator
-from trpac_core.local_speed import local_speeds
 from trpac_core.readings import Sensors
 from trpac_core.tyre import peak_friction
 from trpac_core.vehicle import WHEELS
@@ -197,16 +196,13 @@ def readings(inputs: Inputs, wheel: int) -> Sequence[Sensors]:
     columns = (
         inputs.wheel_speed_rad_s[:, wheel].tolist(),
         inputs.wheel_torque_nm[:, wheel].tolist(),
-        inputs.speed_m_s.tolist(),
+        inputs.local_speed_m_s[:, wheel].tolist(),
         inputs.steering_angle_rad.tolist(),
         accel,
         [None if math.isnan(yaw) else yaw for yaw in inputs.yaw_rate_rad_s.tolist()],
     )
-    car = inputs.vehicle
     return [
-        Sensors(
-            omega, torque, local_speeds(car, speed, steering, yaw)[wheel], None, steering, acceleration, yaw
-        )
+        Sensors(omega, torque, speed, None, steering, acceleration, yaw)
         for omega, torque, speed, steering, acceleration, yaw in zip(*columns, strict=True)
     ]
 
