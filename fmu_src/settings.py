@@ -10,6 +10,14 @@ from enum import Enum
 from trpac_core.dife import GREATEST_THETA, VisualTerm
 from trpac_core.estimator import EstimatorConfig
 from trpac_core.vision.classes import Surface
+from trpac_core.vision.ife_config import (
+    FARTHEST_CENTRE,
+    LEAST_GRID_M,
+    LEAST_STEP_M,
+    MOST_PATCHES,
+    MOST_WAY_M,
+    STEEPEST_SIGMOID,
+)
 
 from .fields import field_value
 from .variables import Kind, Variable
@@ -348,17 +356,25 @@ _IMAGE_PARAMETERS = (
             f"image.{group}_{end}",
             "m",
             f"vision.ranges_m.{place}.{index}",
-            f"The {group} group looks {end} this way of the wheel",
+            f"The {group} group looks {end} this way ahead",
             0.0,
+            MOST_WAY_M,
         )
         for place, group in enumerate(_GROUPS)
         for index, end in enumerate(("from", "to"))
     ),
     *(
-        _parameter(f"image.patches_{group}", "", f"vision.b.{place}", f"Patches of the {group} group", 2)
+        _parameter(
+            f"image.patches_{group}",
+            "",
+            f"vision.b.{place}",
+            f"Patches of the {group} group",
+            2,
+            MOST_PATCHES,
+        )
         for place, group in enumerate(_GROUPS)
     ),
-    _parameter("image.grid", "m", "vision.a_m", "Grid size a", 1e-3),
+    _parameter("image.grid", "m", "vision.a_m", "Grid size a", LEAST_GRID_M),
     _parameter(
         "image.roi_width", "m", "vision.roi_width_m", "Width of road that a patch shows, in the mean", 0.05
     ),
@@ -369,7 +385,9 @@ _IMAGE_PARAMETERS = (
         "A group's widest patch is wider by this, its narrowest narrower",
         1.0,
     ),
-    _parameter("image.track_step", "m", "vision.step_m", "Distance between the track's ellipses", 0.01),
+    _parameter(
+        "image.track_step", "m", "vision.step_m", "Distance between the track's ellipses", LEAST_STEP_M
+    ),
     _parameter("image.k1", "m/s", "vision.k1", "Growth of the track's uncertainty along, below k2", 1e-12),
     _parameter("image.k2", "m/s", "vision.k2", "Growth of the track's uncertainty across", 1e-12),
     _parameter(
@@ -381,10 +399,20 @@ _IMAGE_PARAMETERS = (
     ),
     _parameter("image.sigma", "1", "vision.weight_law.sigma", "Relaxation of the evidence weights", 0.0, 1.0),
     _parameter(
-        "image.sigmoid_centre", "1", "vision.weight_law.sigmoid_centre", "Centre of the weights' sigmoid"
+        "image.sigmoid_centre",
+        "1",
+        "vision.weight_law.sigmoid_centre",
+        "Centre of the weights' sigmoid",
+        -FARTHEST_CENTRE,
+        FARTHEST_CENTRE,
     ),
     _parameter(
-        "image.sigmoid_slope", "1", "vision.weight_law.sigmoid_slope", "Slope of the weights' sigmoid"
+        "image.sigmoid_slope",
+        "1",
+        "vision.weight_law.sigmoid_slope",
+        "Slope of the weights' sigmoid",
+        0.0,
+        STEEPEST_SIGMOID,
     ),
     _parameter("image.seed", "", "vision.seed", "Seed of the drawing of patches", 0),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -74,7 +75,13 @@ def pictures_in(folder: Path) -> list[Path]:
     files = (
         p for p in folder.iterdir() if p.suffix.lower() in PICTURE_ENDINGS and not p.name.startswith(".")
     )
-    return sorted((p for p in files if p.is_file()), key=counting_order)
+    # What is no file, as a link that leads nowhere, is to be told of, not passed over.
+    return sorted((p for p in files if not p.is_dir()), key=counting_order)
+
+
+def printable(text: str) -> str:
+    """A name or sentence as it can be written: a file's name need not be text, and then holds a mark instead."""
+    return os.fsencode(text).decode("utf-8", "replace")
 
 
 def counting_order(path: Path) -> tuple[list[tuple[int, int, str]], str]:
@@ -109,9 +116,11 @@ def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tup
         try:
             probabilities = networks.probabilities(upright(file), str(file))
             surface = Surface(int(probabilities.argmax()))
-            rows.append((str(file), surface.label, float(probabilities.max()), *probabilities.tolist()))
+            rows.append(
+                (printable(str(file)), surface.label, float(probabilities.max()), *probabilities.tolist())
+            )
         except ImageError as error:
-            problems.append(str(error))
+            problems.append(printable(str(error)))
         progress(done, len(files))
     return pd.DataFrame(rows, columns=list(CLASSIFY_COLUMNS)), problems
 

@@ -21,7 +21,7 @@ from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.film import Film, Strip, dark, shown
 from scenarios.looks import MODELS
-from scenarios.stills import PICTURE_ENDINGS, Progress, pictures_in, scratch_for, silent
+from scenarios.stills import PICTURE_ENDINGS, Progress, pictures_in, printable, scratch_for, silent
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
@@ -31,9 +31,10 @@ from trpac_core.vision.trajectory import Motion
 from trpac_core.vision.voting import Voting, VotingConfig
 
 FRAME_COLUMNS = ("frame", "class", "P_fusion", "p_util", "Q_v", "flag", "voting_class", "ms")
-HIGHEST_FPS = 1000.0
+LOWEST_FPS, HIGHEST_FPS = 0.01, 1000.0
+FASTEST_M_S = 150.0
 PACKAGES = ("numpy", "onnxruntime", "opencv-python-headless", "trpac-fmu")
-FRAMES_CSV, SUMMARY, FILM, STRIP = "frames.csv", "summary.json", "annotated.mp4", "strip.jpg"
+WRITTEN = FRAMES_CSV, SUMMARY, FILM, STRIP = "frames.csv", "summary.json", "annotated.mp4", "strip.jpg"
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,9 @@ class Frames:
         if self.files:
             for file in self.files:
                 try:
-                    yield file.name, decode_image(file)
+                    yield printable(file.name), decode_image(file)
                 except ImageError as error:
-                    yield file.name, error
+                    yield printable(file.name), error
             return
         capture = _open_video(self.path)
         try:
@@ -107,6 +108,8 @@ def _open_video(path: Path) -> cv2.VideoCapture:
         raise ScenarioError(
             f"{path}: not a video that can be decoded. Convert it to MP4, or to a folder of pictures."
         )
+    # The camera file is of the pixels as stored, as with pictures.
+    capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
     return capture
 
 
@@ -131,7 +134,7 @@ def run_frames(
     camera_file : Path
         camera.yaml.
     speed_m_s, fps : float
-        Speed of the car, at least 0 [m/s]; frames per second, above 0.
+        Speed of the car [m/s]; frames per second.
     out : Path
         Folder for frames.csv, annotated.mp4, strip.jpg and summary.json, which appear together at the end.
     progress : callable
@@ -147,10 +150,12 @@ def run_frames(
         If the folder cannot be written.
     """
     _check_numbers(speed_m_s, fps)
-    if out.resolve() == frames.path.resolve():
+    if frames.path.resolve() in (out.resolve(), *((out / name).resolve() for name in WRITTEN)):
         raise ScenarioError(
-            f"{out}: holds the frames. Expected another folder: the next run would take the strip for one."
+            f"{out}: holds the frames. Expected another folder: the run would write among them, or over them."
         )
+    if folders := [name for name in WRITTEN if (out / name).is_dir()]:
+        raise ScenarioError(f"{out / folders[0]}: a folder. Expected none: a file of that name is written.")
     camera = load_camera(camera_file)
     segmenter, classifier = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
     watcher = _Watcher(
@@ -168,7 +173,7 @@ def run_frames(
             try:
                 row, shown = watcher.look(number, name, image, caption)
             except ImageError as error:
-                unreadable.append({"frame": name, "reason": str(error)})
+                unreadable.append({"frame": name, "reason": printable(str(error))})
                 row, shown = (name, "", None, None, None, 0, "", None), dark(film.size, caption)
             rows.append(row)
             film.add(shown)
@@ -187,10 +192,10 @@ def run_frames(
 
 def _check_numbers(speed_m_s: float, fps: float) -> None:
     problems = []
-    if not (np.isfinite(speed_m_s) and speed_m_s >= 0.0):
-        problems.append(f"speed {speed_m_s:g} m/s; expected a number of at least 0")
-    if not (np.isfinite(fps) and 0.0 < fps <= HIGHEST_FPS):
-        problems.append(f"{fps:g} frames per second; expected a number above 0 and at most {HIGHEST_FPS:g}")
+    if not 0.0 <= speed_m_s <= FASTEST_M_S:
+        problems.append(f"speed {speed_m_s:g} m/s; expected 0 to {FASTEST_M_S:g}")
+    if not LOWEST_FPS <= fps <= HIGHEST_FPS:
+        problems.append(f"{fps:g} frames per second; expected {LOWEST_FPS:g} to {HIGHEST_FPS:g}")
     if problems:
         raise ScenarioError(f"Motion: {'; '.join(problems)}.")
 

@@ -108,7 +108,8 @@ def diagnose_files(
 def _estimate(findings: Findings, sources: Sources) -> TrpacError | None:
     """What the found effects do to the estimator's own error."""
     held = sources.holdout
-    reference = held.on_rows("mu_reference") if "mu_reference" in held.log.signals else None
+    measured = "mu_reference" in held.log.signals and "mu_reference" not in held.log.derived
+    reference = held.on_rows("mu_reference") if measured else None
     return trpac_error(sources.vehicle, held.drive, findings.added(), reference)
 
 

@@ -6,6 +6,7 @@ verdict, and the whole is their sum: two gaps at once are a compound.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,10 +14,11 @@ import numpy as np
 from scenarios.effects import EFFECTS
 from scenarios.effects.base import Parameter
 from scenarios.files import RoadFile, VehicleFile
-from sim2real.next_manoeuvre import STEADY_SPEEDS, torque_of
+from sim2real.next_manoeuvre import BRAKING, STEADY_SPEEDS, torque_of
 from sim2real.observing.lattice import Lattice
 from sim2real.perception.chain import DECISIVE
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
+from sim2real.perception.friction import OFFSET
 from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.result import (
     Cause,
@@ -73,38 +75,22 @@ def camera_side(
     found: PerceptionFinding, vehicle: VehicleFile | None = None, road: RoadFile | None = None
 ) -> Side:
     """The camera chain's verdict as a side; for a car on a road with what to drive next."""
-    singles: dict[str, CameraCandidate] = {}
-    for candidate in found.candidates:
+    alone = {c.effects[0]: c for c in found.candidates if len(c.effects) == 1}
+    told: dict[str, CameraCandidate] = {}
+    blamed = [c for c in found.candidates if set(c.effects) == set(found.causes)]
+    for candidate in (*blamed, *alone.values(), *found.candidates):
         for effect in candidate.effects:
-            singles.setdefault(effect, candidate)
+            told.setdefault(effect, candidate)
     share = _shares(found)
     causes = [
-        Cause(
-            effect=effect,
-            probability=share.get(effect, 0.0),
-            parameters=_own(effect, candidate),
-            gap_after=candidate.after.total,
-            shrink_percent=candidate.shrink_percent,
-            fit_bic=-2.0 * candidate.gain_fit + candidate.size * float(np.log(max(candidate.effective, 2.0))),
-            evidence_for=candidate.evidence_for,
-            evidence_against=candidate.evidence_against,
-            excited=candidate.excited,
-        )
-        for effect, candidate in singles.items()
+        _cause(effect, share.get(effect, 0.0), candidate, alone.get(effect, candidate))
+        for effect, candidate in told.items()
     ]
     term = None
-    if found.verdict is Verdict.UNKNOWN and found.unexplained:
+    if found.verdict is Verdict.UNKNOWN and found.odd:
+        odd, none = found.odd[0], np.array([])
         term = Unexplained(
-            "camera",
-            found.odd_signal,
-            "place",
-            "-",
-            "",
-            "",
-            0.0,
-            np.array([]),
-            np.array([]),
-            found.unexplained[0],
+            "camera", odd.signal, odd.depends_on, "-", odd.sign, odd.shape, np.nan, none, none, odd.sentence
         )
     return Side(
         verdict=found.verdict,
@@ -116,20 +102,36 @@ def camera_side(
         cannot_rule_out=tuple(found.cannot_rule_out),
         places=found.places,
         unexplained=term,
-        sentence=f"{_in_numbers(found)} {found.next_step}".strip() if term is None else found.unexplained[0],
+        sentence=f"{_in_numbers(found)} {found.next_step}".strip() if term is None else term.sentence,
         warnings=(*found.warnings, *found.unexplained),
         next_manoeuvre=None if vehicle is None or road is None else _next(found, vehicle, road),
     )
 
 
+def _cause(effect: str, probability: float, told: CameraCandidate, alone: CameraCandidate) -> Cause:
+    """An effect as a cause: as the candidate tells it that stands, or it alone, with the gap that it alone leaves."""
+    return Cause(
+        effect=effect,
+        probability=probability,
+        parameters=_own(effect, told),
+        gap_after=alone.after.total,
+        shrink_percent=alone.shrink_percent,
+        fit_bic=-2.0 * alone.gain_fit + alone.size * float(np.log(max(alone.effective, 2.0))),
+        evidence_for=told.evidence_for,
+        evidence_against=(*told.evidence_against, *_at_bound(effect, told)),
+        excited=told.excited,
+    )
+
+
 def _next(found: PerceptionFinding, vehicle: VehicleFile, road: RoadFile) -> NextManoeuvre | None:
-    """Two speeds far apart, each held over several borders: what goes with speed is then told from what does not."""
+    """Two speeds over the same borders, or braking on each surface where class values are in doubt."""
     if found.verdict is not Verdict.AMBIGUOUS:
         return None
-    time_s, torque_nm = torque_of(STEADY_SPEEDS, vehicle, road)
     told = tuple(dict.fromkeys(effect for group in found.ambiguous_with for effect in group))
-    sentence = found.next_step or STEADY_SPEEDS.sentence
-    return NextManoeuvre(sentence, STEADY_SPEEDS.initial_speed_m_s, time_s, torque_nm, told, np.nan, np.nan)
+    profile = BRAKING if OFFSET in told else STEADY_SPEEDS
+    time_s, torque_nm = torque_of(profile, vehicle, road)
+    sentence = found.next_step or profile.sentence
+    return NextManoeuvre(sentence, profile.initial_speed_m_s, time_s, torque_nm, told, np.nan, np.nan)
 
 
 def _in_numbers(found: PerceptionFinding) -> str:
@@ -139,8 +141,11 @@ def _in_numbers(found: PerceptionFinding) -> str:
         return ""
     values = ", ".join(
         f"{name} {value.value:.3g} {value.unit}".removesuffix(" -")
-        for name, value in blamed.parameters.items()
+        for effect in blamed.effects
+        for name, value in _own(effect, blamed).items()
     )
+    if not np.isfinite(blamed.after.total):
+        return f"with {values}; the hold-out does not tell how far the camera's gap shrinks."
     return (
         f"with {values} the camera's gap goes from {found.before.total:.1f} to {found.after.total:.1f} times the noise "
         "floor."
@@ -170,6 +175,15 @@ def _own(effect: str, candidate: CameraCandidate) -> dict[str, Interval]:
         for p in EFFECTS[effect].parameters()
         if p.name in candidate.parameters
     }
+
+
+def _at_bound(effect: str, candidate: CameraCandidate) -> tuple[str, ...]:
+    """Which of its parameters were found beyond what vehicle.yaml takes."""
+    return tuple(
+        f"{name} lies at its bound: more of it is not thought plausible, so look for another cause."
+        for name, value in _own(effect, candidate).items()
+        if value.value != candidate.parameters[name].value
+    )
 
 
 def _within(estimate: Interval, parameter: Parameter) -> Interval:
@@ -246,6 +260,12 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
     verdict = _verdict(main, side)
     both = verdict in (Verdict.COMPOUND, Verdict.UNKNOWN) and not (side_quiet or main_quiet)
     main_causes, side_causes = list(main.causes), list(side.causes)
+    if side.before and not set(side.before) & set(main.gap.before.signals):
+        of_main, of_side = main.gap.before.signals, side.before
+        if not main_quiet or side_quiet:
+            side_causes = [_alone(c, {} if side_quiet else of_side, of_main) for c in side_causes]
+        if not side_quiet:
+            main_causes = [_alone(c, {} if main_quiet else of_main, of_side) for c in main_causes]
     if both:
         main_causes = [replace(c, probability=0.5 * c.probability) for c in main_causes]
         side_causes = [replace(c, probability=0.5 * c.probability) for c in side_causes]
@@ -273,6 +293,7 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         sentence=sentence,
         gap=Gap(before, after, 1.0 if "wheel_speed" in side.before else main.gap.noise_floor),
         where=main.where if side_quiet else _where(main, side),
+        heat_map=main.heat_map if side_quiet else _heat_map(main, side),
         causes=causes,
         together=_together(main, side) if verdict is Verdict.COMPOUND else (),
         next_manoeuvre=main.next_manoeuvre or side.next_manoeuvre,
@@ -282,6 +303,22 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         unexplained=side.unexplained if misplaced else main.unexplained or side.unexplained,
         warnings=(*main.warnings, *side.warnings),
     )
+
+
+def _alone(cause: Cause, own: Mapping[str, float], other: Mapping[str, float]) -> Cause:
+    """A cause with the gap that it alone leaves of both halves' signals; without any of its own that of the other."""
+    rest, count = sum(g * g for g in other.values()), len(own) + len(other)
+    mine = sum(g * g for g in own.values())
+    before = float(np.sqrt((mine + rest) / count))
+
+    def shrink(own_percent: float) -> float:
+        left = mine * (1.0 - own_percent / 100.0) ** 2 + rest
+        return 100.0 * (1.0 - float(np.sqrt(left / count)) / before)
+
+    alone = float(np.sqrt((cause.gap_after**2 * len(own) + rest) / count)) if own else before
+    value, of_own = 100.0 * (1.0 - alone / before), cause.shrink_percent
+    low, high = min(shrink(of_own.low), value), max(shrink(of_own.high), value)
+    return replace(cause, gap_after=alone, shrink_percent=Interval(value, low, high, "%"))
 
 
 def _verdict(main: Diagnosis, side: Side) -> Verdict:
@@ -320,15 +357,31 @@ def _together(main: Diagnosis, side: Side) -> tuple[str, ...]:
 
 def _where(main: Diagnosis, side: Side) -> tuple[Place, ...]:
     """Places of both, each share by how much of the whole gap is its side's."""
-    parts = [
-        sum(max(g * g - 1.0, 0.0) for g in gaps.values()) for gaps in (side.before, main.gap.before.signals)
-    ]
-    if not main.where or not sum(parts):
+    of_side = _share_of(main, side)
+    if not main.where or not np.isfinite(of_side):
         return (*side.places, *main.where)
-    of_side = parts[0] / sum(parts)
     joined = [replace(p, share=of_side * p.share) for p in side.places]
     joined += [replace(p, share=(1.0 - of_side) * p.share) for p in main.where]
     return tuple(sorted(joined, key=lambda place: -place.share))
+
+
+def _heat_map(main: Diagnosis, side: Side) -> dict[str, dict[str, float]]:
+    """The car's, each share of the whole gap; what is left to 1 is the other side's."""
+    of_side = _share_of(main, side)
+    if not np.isfinite(of_side):
+        return main.heat_map
+    return {
+        part: {regime: (1.0 - of_side) * share for regime, share in row.items()}
+        for part, row in main.heat_map.items()
+    }
+
+
+def _share_of(main: Diagnosis, side: Side) -> float:
+    """The side's share of the squares of both beyond noise [-]; NaN where neither has any."""
+    of_side, of_main = (
+        sum(max(g * g - 1.0, 0.0) for g in gaps.values()) for gaps in (side.before, main.gap.before.signals)
+    )
+    return of_side / (of_side + of_main) if of_side + of_main else float("nan")
 
 
 def _join(measure: Measure, signals: dict[str, float], side_quiet: bool, main_quiet: bool) -> Measure:

@@ -52,6 +52,15 @@ STEADY_SPEEDS = Profile(
 )
 """It also tells effects of the camera chain apart: borders that are crossed fast and slowly."""
 
+BRAKING = Profile(
+    "brake to the limit",
+    "Accelerate to 20 m/s, then press the brake slowly until the wheels are about to lock, and let go; twice.",
+    18.0,
+    (0, 1, 2, 2.2, 5.5, 5.7, 7, 7.2, 10, 10.2, 12),
+    (0.5, 0.5, 0, -0.2, -1.0, 0, 0.8, -0.2, -1.0, 0, 0),
+)
+"""It also tells whose friction value is wrong: the tyres show the road's."""
+
 PROFILES = (
     Profile("coast-down", "Coast down from 30 m/s without any torque.", 30.0, (0.0, 12.0), (0.0, 0.0)),
     STEADY_SPEEDS,
@@ -76,13 +85,7 @@ PROFILES = (
         (0, 5, 10, 12),
         (0, 1, 0, 0),
     ),
-    Profile(
-        "brake to the limit",
-        "Accelerate to 20 m/s, then press the brake slowly until the wheels are about to lock, and let go; twice.",
-        18.0,
-        (0, 1, 2, 2.2, 5.5, 5.7, 7, 7.2, 10, 10.2, 12),
-        (0.5, 0.5, 0, -0.2, -1.0, 0, 0.8, -0.2, -1.0, 0, 0),
-    ),
+    BRAKING,
     Profile(
         "pulses at two speeds",
         "Short full-torque pulses at 5 m/s, and again at higher speed, with one tip-out between.",

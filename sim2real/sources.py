@@ -91,11 +91,27 @@ def read_sources(
             problems.append(str(error))
     if problems or car is None:
         raise ScenarioError("\n".join(dict.fromkeys(problems)))
-    *fitted, held = found
+    *fitted, held = told_apart(found)
     if any(s.log.sha256 == held.log.sha256 for s in fitted):
         told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
         held = replace(held, log=held.log.warned(told))
     return Sources(car, vehicle, tuple(fitted), held)
+
+
+def told_apart(sources: Sequence[Source]) -> list[Source]:
+    """The sources with names of their own: files of one name in several folders get their folder's, else a number."""
+
+    def named(source: Source, name: str) -> Source:
+        return replace(source, log=replace(source.log, name=name), drive=replace(source.drive, name=name))
+
+    names = [s.log.name for s in sources]
+    longer = [f"{s.log.path.resolve().parent.name}/{s.log.name}" for s in sources]
+    names = [long if names.count(name) > 1 else name for name, long in zip(names, longer, strict=True)]
+    numbered = [
+        f"{name} ({names[: i + 1].count(name)})" if names.count(name) > 1 else name
+        for i, name in enumerate(names)
+    ]
+    return [named(s, name) for s, name in zip(sources, numbered, strict=True)]
 
 
 def read_source(text: str, road: Path | None, columns: Mapping | None = None) -> Source:

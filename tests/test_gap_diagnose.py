@@ -352,6 +352,19 @@ def test_a_diagnosis_needs_a_log_to_fit_to(folder):
         read_sources(folder / "vehicle.yaml", folder / "dry.yaml", [], f"{folder}/holdout.csv")
 
 
+def test_logs_of_one_name_are_told_apart(folder, tmp_path):
+    logs = []
+    for day in ("mon", "tue"):
+        (tmp_path / day).mkdir()
+        logs.append(tmp_path / day / "log.csv")
+        write_log(noisy(clean(pulses(4.0), 13.0), len(logs)), logs[-1])
+    fit = [*map(str, logs), str(logs[0]), f"{folder}/fit_1.csv"]
+    found = read_sources(folder / "vehicle.yaml", folder / "dry.yaml", fit, f"{folder}/holdout.csv")
+    names = [s.log.name for s in found.all]
+    assert names == ["mon/log.csv (1)", "tue/log.csv", "mon/log.csv (2)", "fit_1.csv", "holdout.csv"]
+    assert [s.drive.name for s in found.all] == names
+
+
 def test_a_log_without_a_needed_column_names_it(folder, tmp_path):
     drive = noisy(clean(pulses(4.0), 13.0))
     write_log(drive, tmp_path / "bad.csv", wheel_torque_rl_nm=None)

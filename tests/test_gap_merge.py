@@ -12,7 +12,7 @@ from scenarios.files import RoadFile, load_vehicle
 from sim2real.demo import VEHICLE
 from sim2real.merge import Side, camera_side, counter_side, merge
 from sim2real.observing.lattice import Lattice, Reading
-from sim2real.perception.chain import DECISIVE
+from sim2real.perception.chain import DECISIVE, Oddity
 from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
 from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict, needed
 from sim2real.telling.report import jsonable, render
@@ -279,6 +279,10 @@ BOTH = candidate(
 )  # fmt: skip
 
 
+def odd(sentence, signal="image_place"):
+    return Oddity(signal, sentence, "weather", "late", "in tunnels")
+
+
 def finding(verdict, *candidates, causes=(), **more):
     values = {
         "before": Measure(6.0, {"image_place": 6.0}),
@@ -287,8 +291,7 @@ def finding(verdict, *candidates, causes=(), **more):
         "cannot_rule_out": {},
         "places": (),
         "next_step": "",
-        "unexplained": (),
-        "odd_signal": "",
+        "odd": (),
         "warnings": (),
     }
     return PerceptionFinding(verdict=verdict, causes=causes, candidates=candidates, **{**values, **more})
@@ -301,8 +304,9 @@ def test_a_cameras_candidates_become_causes():
     assert late.probability > 0.7 > tilted.probability
     assert late.probability + tilted.probability < 1.0
     assert late.parameters == {"delay_s": Interval(0.2, 0.15, 0.25, "s")}
-    # the first candidate that has an effect speaks for it: of a pair's parameters, its own
-    assert tilted.parameters == {"pitch_rad": Interval(0.01, -0.1, 0.1, "rad")}
+    # alone, not beside a latency that does its work
+    assert tilted.parameters == {"pitch_rad": Interval(0.02, 0.0, 0.04, "rad")}
+    assert tilted.gap_after == TILTED.after.total
     assert side.named == ("camera_latency",)
     assert (side.before, side.after) == ({"image_place": 6.0}, {"image_place": 1.2})
 
@@ -324,12 +328,17 @@ def test_a_candidate_that_explains_no_more_than_nothing_is_not_probable():
 
 
 def test_what_the_camera_cannot_explain_is_told():
-    side = camera_side(finding(Verdict.UNKNOWN, TILTED, unexplained=("Classes change in tunnels.",)))
+    side = camera_side(finding(Verdict.UNKNOWN, TILTED, odd=(odd("Classes change in tunnels."),)))
     assert side.unexplained is not None
     assert side.unexplained.sentence == "Classes change in tunnels."
     assert side.unexplained.subsystem == "camera"
+    assert (side.unexplained.depends_on, side.unexplained.sign, side.unexplained.shape) == (
+        "weather",
+        "late",
+        "in tunnels",
+    )
     known = camera_side(
-        finding(Verdict.IDENTIFIED, LATE, causes=("camera_latency",), unexplained=("Beside it.",))
+        finding(Verdict.IDENTIFIED, LATE, causes=("camera_latency",), odd=(odd("Beside it."),))
     )
     assert known.unexplained is None
     assert "Beside it." in known.warnings
@@ -353,8 +362,8 @@ def test_a_road_out_of_place_speaks_before_the_cars_equations(signal, first):
         "tyre", "wheel_speed", "slip", "-", "", "", 0.5, np.array([]), np.array([]), "More slip."
     )
     main = replace(main_of(Verdict.UNKNOWN), unexplained=term, sentence="More slip.")
-    odd = finding(Verdict.UNKNOWN, TILTED, unexplained=("Odd pictures.",), odd_signal=signal)
-    both = merge(main, camera_side(odd))
+    pictures = finding(Verdict.UNKNOWN, TILTED, odd=(odd("Odd pictures.", signal),))
+    both = merge(main, camera_side(pictures))
     assert both.verdict is Verdict.UNKNOWN
     assert both.unexplained is not None
     assert both.unexplained.subsystem == first
@@ -405,3 +414,64 @@ def test_what_a_camera_cannot_tell_apart_comes_with_two_speeds_to_drive():
     assert np.shape(profile["wheel_torque_nm"]) == (len(profile["time_s"]), 4)
     assert jsonable(profile)["power_sigma"] is None
     assert "None" not in render(told)
+
+
+# --- alone, and where
+
+
+def test_a_cause_alone_leaves_the_other_halfs_gap():
+    main, side = main_of(Verdict.IDENTIFIED), side_of(Verdict.IDENTIFIED)
+    of_car = list(main.gap.before.signals.values())
+    found = {c.effect: c for c in merge(main, side).causes}
+    late, before = found["camera_latency"], merge(main, side).gap.before.total
+    expected = np.sqrt((sum(g * g for g in of_car) + CAUSE.gap_after**2) / (len(of_car) + 1))
+    assert late.gap_after == pytest.approx(expected)
+    assert late.shrink_percent.value == pytest.approx(100.0 * (1.0 - late.gap_after / before))
+    assert late.shrink_percent.low <= late.shrink_percent.value <= late.shrink_percent.high
+    relaxed = found["tyre_relaxation"]
+    own = main.causes[0].gap_after
+    assert relaxed.gap_after == pytest.approx(
+        np.sqrt((own**2 * len(of_car) + LOUD["image_class"] ** 2) / (len(of_car) + 1))
+    )
+
+
+def test_what_a_quiet_half_could_have_shrinks_nothing():
+    camera_alone = merge(main_of(Verdict.NO_GAP), side_of(Verdict.IDENTIFIED))
+    of_car = next(c for c in camera_alone.causes if c.effect == "tyre_relaxation")
+    assert of_car.gap_after == pytest.approx(camera_alone.gap.before.total)
+    assert of_car.shrink_percent.value == pytest.approx(0.0)
+    car_alone = merge(main_of(Verdict.IDENTIFIED), side_of(Verdict.NO_GAP))
+    of_camera = next(c for c in car_alone.causes if c.effect == "camera_latency")
+    assert of_camera.gap_after == pytest.approx(car_alone.gap.before.total)
+
+
+def test_the_heat_map_leaves_the_cameras_share_to_the_camera():
+    main = main_of(Verdict.IDENTIFIED)
+    found = merge(main, side_of(Verdict.IDENTIFIED))
+    of_side = sum(p.share for p in found.where if p.subsystem == "camera") / PLACE.share
+    total = sum(share for row in main.heat_map.values() for share in row.values())
+    left = sum(share for row in found.heat_map.values() for share in row.values())
+    assert left == pytest.approx((1.0 - of_side) * total)
+    assert merge(main, side_of(Verdict.NO_GAP)).heat_map == main.heat_map
+
+
+def test_an_estimate_beyond_its_bound_is_told_in_the_sentence_as_in_the_file():
+    wide = candidate(("motion_blur",), 30.0, exposure_s=Interval(0.25, 0.1, 0.5, "s"))
+    side = camera_side(finding(Verdict.IDENTIFIED, wide, causes=("motion_blur",)))
+    assert "exposure_s 0.2 s" in side.sentence
+    assert any("at its bound" in text for text in side.causes[0].evidence_against)
+
+
+def test_class_values_are_told_apart_by_braking():
+    vehicle, values = load_vehicle(VEHICLE), ("class_friction_offset", "friction_offset")
+    found = finding(
+        Verdict.AMBIGUOUS,
+        candidate(values[:1], 10.0, dry=Interval(0.7, 0.6, 0.8)),
+        candidate(values[1:], 9.0, factor=Interval(0.9, 0.8, 1.0)),
+        causes=values[:1],
+        ambiguous_with=(values,),
+        next_step="Brake to the limit on each surface.",
+    )
+    planned = camera_side(found, vehicle, MADE_ROAD).next_manoeuvre
+    assert planned.sentence.startswith("Brake to the limit")
+    assert planned.wheel_torque_nm.min() < 0.5 * -planned.wheel_torque_nm.max()

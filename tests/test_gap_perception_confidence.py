@@ -103,6 +103,17 @@ def test_pictures_tell_overexposed_from_underexposed(tmp_path, stops):
     assert "stops from usual" in " ".join(candidate(finding, "exposure_shift").evidence_for)
 
 
+@pytest.mark.parametrize("stops", [-3.0, 3.0])
+def test_pictures_of_the_hold_out_alone_tell_the_sign(tmp_path, stops):
+    logs = [picture_drive(tmp_path, stops, seed, f"d{seed}") for seed in range(3)]
+    logs[:2] = [replace(log, image_path=None) for log in logs[:2]]
+    finding = diagnose_perception(logs[:2], logs[2], [road(seed=i) for i in range(3)], BARE)
+    assert finding.causes == ("exposure_shift",)
+    found = candidate(finding, "exposure_shift")
+    assert np.sign(found.parameters["stops"].value) == np.sign(stops)
+    assert not any("names no pictures" in text for text in found.evidence_against)
+
+
 def test_pictures_that_cannot_be_read_are_said(tmp_path):
     logs = [picture_drive(tmp_path, 0.0, seed, f"d{seed}") for seed in range(3)]
     for file in (tmp_path / "d0").iterdir():

@@ -349,6 +349,13 @@ def test_distorted_lens():
 def test_wrong_settings_are_reported_together():
     with pytest.raises(ValueError, match=r"side must be.*0 < k1 < k2.*sigma"):
         IfeConfig(side="middle", k1=1.0, weight_law=WeightLaw(sigma=2.0))
+    for law in (
+        WeightLaw(0.5, 1.0, 2000.0),
+        WeightLaw(sigmoid_slope=-1.0),
+        WeightLaw(sigmoid_centre=float("nan")),
+    ):
+        with pytest.raises(ValueError, match="sigmoid"):
+            IfeConfig(weight_law=law)
 
 
 def test_patches_are_judged_in_the_scene_of_their_picture_unless_left_out():

@@ -144,6 +144,13 @@ class TestFormats:
         frame.iloc[6, 3] = np.nan
         assert_same(read_log(tmp_path / "log.csv"), frame)
 
+    @pytest.mark.parametrize("cell", ["", "nan", "NA", "null"])
+    def test_a_lost_picture_is_none(self, tmp_path, cell):
+        named = make_frame(camera=True)
+        named.loc[3, "image_path"] = cell
+        named.to_csv(tmp_path / "log.csv", index=False)
+        assert read_log(tmp_path / "log.csv").image_path[3] == ""
+
     def test_parquet_types(self, tmp_path, frame):
         path = tmp_path / "log.parquet"
         table = pa.Table.from_pandas(frame, preserve_index=False)

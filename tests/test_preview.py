@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -117,6 +118,20 @@ def test_creeping_car_does_not_pile_up_stamps_nor_drag_the_first_along():
     assert state.stamps[0].X_lb_m == 2.5
     for position in (2.6, 3.3, 5.4):
         assert frame_at(state, position) == pytest.approx((position - 2.5) * 1000, abs=25)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_car_that_shunts_does_not_pile_up_stamps(seed):
+    rng = np.random.default_rng(seed)
+    there_and_back = 0.3 * np.sin(np.linspace(0.0, 60.0, 6000)) + 1e-3 * rng.standard_normal(6000)
+    rolling_back = -0.00025 * np.arange(6000)
+    for positions in (there_and_back, rolling_back):
+        state = drive(positions.tolist(), speed_m_s=0.0)
+        assert len(state.stamps) <= np.ptp(positions) / CONFIG.resolution_m + 2
+        begins = sorted(stamp.X_lb_m for stamp in state.stamps)
+        assert np.diff(begins).min(initial=1.0) >= CONFIG.resolution_m - 1e-12
+        newest = frame_at(state, positions[-1] + CONFIG.P_0_m + CONFIG.resolution_m)
+        assert newest == 5999.0
 
 
 @given(st.lists(st.floats(0.0, 1.5), min_size=1, max_size=30), st.floats(0.0, 40.0))

@@ -16,6 +16,7 @@ from trpac_core.vision.trajectory import (
     position_covariance,
     reckon,
     speed_along,
+    way_beside,
     wheel_track,
 )
 
@@ -40,6 +41,20 @@ def test_held_steering_keeps_a_front_wheel_on_its_circle(steering_rad, lateral_m
     radius = np.hypot(WHEELBASE_M, 1.0 / curvature - lateral_m)
     assert np.hypot(*(track - centre).T) == pytest.approx(np.full(40, radius))
     assert track[0] == pytest.approx([0.0, lateral_m])
+
+
+@pytest.mark.parametrize("radius_m", [-8.0, -30.0, 10.0, 1e9])
+def test_the_way_to_a_place_is_the_way_at_which_the_wheel_is_beside_it(radius_m):
+    motion = Motion(4.0, steering_angle_rad=float(np.arctan(WHEELBASE_M / radius_m)))
+    tracks = [reckon(motion, **{**SETTINGS, "lateral_m": y}) for y in (HALF_TRACK_M, -HALF_TRACK_M)]
+    way = np.linspace(2.6, 11.4, 37)
+    for side_m in (HALF_TRACK_M, -HALF_TRACK_M):
+        track = wheel_track(way, 1.0 / radius_m, WHEELBASE_M, side_m)
+        across = np.gradient(track, axis=0)[:, ::-1] * [-1.0, 1.0]
+        beside = track + 0.1 * across / np.hypot(*across.T)[:, None]
+        assert way_beside(tracks, track) == pytest.approx(way, abs=1e-2)
+        assert way_beside(tracks, beside) == pytest.approx(way, abs=2e-2)
+    assert way_beside(tracks, np.empty((0, 2))).shape == (0,)
 
 
 def test_track_agrees_with_the_bicycle_model_about_the_centre_of_gravity():

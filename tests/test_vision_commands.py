@@ -1,6 +1,7 @@
 """`trpac vision`: single pictures and drives through the command line, on the shipped networks."""
 
 import json
+import os
 import struct
 
 import cv2
@@ -364,15 +365,85 @@ def test_an_unusable_frame_is_listed_and_leaves_the_memory_alone(folder, camera_
 
 def test_a_video_is_read_frame_by_frame(camera_file, tmp_path, pictures):
     video = tmp_path / "drive.mp4"
-    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"mp4v"), 20.0, (480, 300))
-    for image in pictures:
-        writer.write(image)
-    writer.release()
+    write_film(video, pictures)
     result = drive(video, camera_file, tmp_path / "out")
     assert result.exit_code == 0, result.stderr
     table = pd.read_csv(tmp_path / "out" / "frames.csv", dtype={"frame": str})
     assert list(table["frame"]) == [f"{number:06d}" for number in range(6)]
     assert list(table["class"]) == ["dry"] * 3 + ["snow_ice"] * 3
+
+
+def write_film(video, pictures):
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"mp4v"), 20.0, (480, 300))
+    for image in pictures:
+        writer.write(image)
+    writer.release()
+
+
+def test_a_turn_noted_in_a_video_is_not_applied(tmp_path, pictures):
+    """The camera file is of the pixels as stored, as with pictures."""
+    plain, noted = tmp_path / "plain.mp4", tmp_path / "noted.mp4"
+    write_film(plain, pictures[:2])
+    data = plain.read_bytes()
+    at = data.index(bytes.fromhex("00010000" + "00" * 12 + "00010000"), data.index(b"tkhd"))
+    half_turn = struct.pack(">9i", -65536, 0, 0, 0, -65536, 0, 480 << 16, 300 << 16, 1 << 30)
+    noted.write_bytes(data[:at] + half_turn + data[at + 36 :])
+    capture = cv2.VideoCapture(str(noted), cv2.CAP_FFMPEG)
+    assert capture.get(cv2.CAP_PROP_ORIENTATION_META) == 180.0
+    for (_, stored), (_, read) in zip(Frames.find(plain), Frames.find(noted), strict=True):
+        np.testing.assert_array_equal(stored, read)
+
+
+def test_a_film_is_not_written_over_itself(folder, camera_file, tmp_path):
+    out = tmp_path / "out"
+    assert drive(folder, camera_file, out).exit_code == 0
+    before = (out / "annotated.mp4").read_bytes()
+    result = drive(out / "annotated.mp4", camera_file, out)
+    assert result.exit_code == 2
+    assert "holds the frames" in result.stderr
+    assert (out / "annotated.mp4").read_bytes() == before
+
+
+def test_a_name_that_is_no_text_is_written_with_a_mark(camera_file, tmp_path, pictures):
+    folder = tmp_path / "odd"
+    folder.mkdir()
+    cv2.imwrite(str(folder / "a.png"), pictures[0])
+    (folder / "a.png").rename(os.fsdecode(os.fsencode(folder) + b"/b\xff.png"))
+    result = trpac("classify", folder, "--out", tmp_path / "classes.csv")
+    assert result.exit_code == 0, result.stderr
+    assert pd.read_csv(tmp_path / "classes.csv")["file"].tolist() == [
+        f"{folder}/b\N{REPLACEMENT CHARACTER}.png"
+    ]
+    result = drive(folder, camera_file, tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    assert pd.read_csv(tmp_path / "out" / "frames.csv")["frame"].tolist() == [
+        "b\N{REPLACEMENT CHARACTER}.png"
+    ]
+
+
+def test_a_link_that_leads_nowhere_is_named_and_counts_as_a_frame(camera_file, tmp_path, pictures):
+    folder = tmp_path / "annexed"
+    folder.mkdir()
+    for number in (1, 3):
+        cv2.imwrite(str(folder / f"{number}.png"), pictures[0])
+    (folder / "2.png").symlink_to("nowhere")
+    result = trpac("classify", folder, "--out", tmp_path / "classes.csv")
+    assert result.exit_code == 1
+    assert "2.png" in result.stderr
+    assert drive(folder, camera_file, tmp_path / "out").exit_code == 1
+    frames = pd.read_csv(tmp_path / "out" / "frames.csv", dtype=str, keep_default_na=False)
+    assert frames["frame"].tolist() == ["1.png", "2.png", "3.png"]
+
+
+@pytest.mark.parametrize("out", ["frames/f_8.png", "pipe", "x" * 300])
+def test_classify_does_not_write_over_what_is_no_table(folder, tmp_path, out):
+    os.mkfifo(tmp_path / "pipe")
+    before = (folder / "f_8.png").read_bytes()
+    result = trpac("classify", folder, "--out", tmp_path / out)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("trpac vision classify: ")
+    assert (folder / "f_8.png").read_bytes() == before
+    assert not (tmp_path / "pipe").is_file()
 
 
 @pytest.mark.parametrize(
@@ -385,7 +456,11 @@ def test_a_video_is_read_frame_by_frame(camera_file, tmp_path, pictures):
         ({"camera_file": "missing.yaml"}, "missing.yaml"),
         ({"camera_file": "wrong.yaml"}, "height_m"),
         ({"camera_file": "square.yaml"}, "none of 6 frames could be used"),
-        ({"speed_m_s": "nan", "fps": 0}, "expected a number of at least 0; 0 frames per second"),
+        ({"speed_m_s": "nan", "fps": 0}, "expected 0 to 150; 0 frames per second; expected 0.01 to 1000"),
+        ({"speed_m_s": 1e200, "fps": 1e-6}, "1e+200 m/s; expected 0 to 150; 1e-06 frames"),
+        ({"camera_file": "far.yaml"}, "distortion"),
+        ({"out": "x" * 300}, "File name too long"),
+        ({"out": "occupied"}, "summary.json: a folder"),
         ({"out": "camera.yaml"}, "a file. Expected a folder"),
         ({"out": "frames"}, "holds the frames"),
         ({"out": "camera.yaml/below/it"}, "camera.yaml"),
@@ -397,6 +472,8 @@ def test_unusable_input_is_one_message_and_leaves_no_trace(folder, camera_file, 
     values = yaml.safe_load(camera_file.read_text())
     (tmp_path / "square.yaml").write_text(yaml.safe_dump(values | {"height_px": 480}))
     (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(values | {"height_m": -1.0}))
+    (tmp_path / "far.yaml").write_text(yaml.safe_dump(values | {"distortion": [1e308, 0.0, 0.0, 0.0, 1e308]}))
+    (tmp_path / "occupied" / "summary.json").mkdir(parents=True)
     arguments = {"frames": folder, "camera_file": camera_file, "out": tmp_path / "out"}
     arguments |= {
         key: tmp_path / value if isinstance(value, str) else value for key, value in changes.items()

@@ -37,7 +37,10 @@ def bars() -> Iterator[Told]:
 
 def require_folder(command: str, out: Path) -> None:
     """Refuse before the work what would fail after it."""
-    there = next(p for p in (out, *out.absolute().parents) if p.exists())
+    try:
+        there = next(p for p in (out, *out.absolute().parents) if p.exists())
+    except OSError as error:  # a name that is too long, a folder that may not be entered
+        refuse(command, error)
     if not there.is_dir():
         refuse(command, f"{there}: a file. Expected a folder to write into.")
     if not os.access(there, os.W_OK | os.X_OK):

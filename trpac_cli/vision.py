@@ -44,11 +44,13 @@ def classify(
     from trpac_core.vision.networks import ModelError
 
     command = "trpac vision classify"
-    if out.is_dir():
-        refuse(command, f"{out}: a folder. Expected the name of a CSV file to write.")
     require_folder(command, out.parent)
     try:
+        if out.exists() and not out.is_file():
+            refuse(command, f"{out}: no plain file. Expected the name of a CSV file to write.")
         files, problems = find_pictures(paths)
+        if out.resolve() in {file.resolve() for file in files}:
+            refuse(command, f"{out}: one of the pictures. Expected the name of a CSV file to write.")
         with _bar("pictures") as told:
             table, unusable = classify_pictures(files, told)
         problems += unusable

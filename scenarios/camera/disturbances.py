@@ -1,6 +1,6 @@
 """Disturbances of the camera's pictures: the paper's set, by the library that the paper used [25].
 
-Section 4.2 of Tian et al. 2022: motion blur on every frame, random brightness and random contrast on 70 % of them;
+Section 5.1 of Tian et al. 2022: motion blur on every frame, random brightness and random contrast on 70 % of them;
 abnormal exposure and road shadows are the other degradations that it names (Figure 3).
 """
 

@@ -12,7 +12,12 @@ from scenarios.strict import load_strict
 from trpac_core.vision.camera import Camera
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
-Positive = Annotated[float, Field(gt=0.0)]
+Focal = Annotated[float, Field(ge=10.0, le=1e6)]
+Point = Annotated[float, Field(ge=-1e5, le=1e5)]
+Distortion = Annotated[float, Field(ge=-1e3, le=1e3)]
+Height = Annotated[float, Field(ge=0.1, le=20.0)]
+Place = Annotated[float, Field(ge=-50.0, le=50.0)]
+Rate = Annotated[float, Field(ge=0.01, le=1e4)]
 Angle = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
 
@@ -24,18 +29,18 @@ class CameraFile(BaseModel):
     schema_: Literal[1] = Field(alias="schema")
     width_px: Pixels
     height_px: Pixels
-    fx_px: Positive
-    fy_px: Positive
-    cx_px: float
-    cy_px: float
-    distortion: Annotated[list[float], Field(min_length=5, max_length=5)]
-    height_m: Positive
-    x_from_front_axle_m: float
-    y_m: float
+    fx_px: Focal
+    fy_px: Focal
+    cx_px: Point
+    cy_px: Point
+    distortion: Annotated[list[Distortion], Field(min_length=5, max_length=5)]
+    height_m: Height
+    x_from_front_axle_m: Place
+    y_m: Place
     pitch_rad: Angle
     yaw_rad: Angle
     roll_rad: Angle
-    fps: Positive
+    fps: Rate
 
 
 def load_camera(path: str | Path) -> Camera:

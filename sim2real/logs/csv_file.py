@@ -35,7 +35,8 @@ def read_csv(path: Path, wanted: Wanted) -> Table:
             continue
         cells = [record[i].strip() for record in records] if name in wanted.numbers | wanted.text else []
         if name in wanted.text:
-            labels[name] = np.array(cells, dtype=np.str_)
+            told = ["" if cell.lower() in MISSING else cell for cell in cells]
+            labels[name] = np.array(told, dtype=np.str_)
         elif name in wanted.numbers:
             values, bad = _numbers(cells, name in wanted.identifiers)
             findings += _bad_cells(name, cells, rows, bad)

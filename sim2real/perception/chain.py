@@ -29,6 +29,27 @@ def price(*effective: float) -> float:
 
 
 @dataclass(frozen=True)
+class Oddity:
+    """A gap that no effect of the library makes.
+
+    Attributes
+    ----------
+    signal : str
+        What shows it.
+    sentence : str
+        All of it, for a person to act on.
+    depends_on, sign, shape : str
+        What it goes with, to which side, and how, in words.
+    """
+
+    signal: str
+    sentence: str
+    depends_on: str
+    sign: str
+    shape: str
+
+
+@dataclass(frozen=True)
 class Account:
     """One way to account for a signal.
 
@@ -95,10 +116,10 @@ class Chain:
         Effect to the reason why these logs could not show it.
     next_step : str
         What would tell its look-alikes apart.
-    unexplained : str
-        What no account explains, in a sentence; empty where nothing.
-    errs : str
-        What it shows that is a gap unless bad pictures make the classes err, in a sentence; empty where nothing.
+    unexplained : Oddity or None
+        What no account explains.
+    errs : Oddity or None
+        What it shows that is a gap unless bad pictures make the classes err.
     noticed : float
         Rest in standard deviations up to which it is too small to matter, however little the signal scatters [-].
     quiet : bool
@@ -113,8 +134,8 @@ class Chain:
     places: tuple[Place, ...] = ()
     unexcited: dict[str, str] = field(default_factory=dict)
     next_step: str = ""
-    unexplained: str = ""
-    errs: str = ""
+    unexplained: Oddity | None = None
+    errs: Oddity | None = None
     noticed: float = 0.0
     quiet: bool = False
 

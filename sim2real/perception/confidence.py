@@ -90,19 +90,22 @@ class Signs:
         Share of results that name another class than road.yaml; NaN where not known [-].
     light : Light or None
         How the pictures are exposed; None where they are not known.
+    modelled : float
+        Mean loss of confidence that the simulation has already, which makes classes err as well [-].
     """
 
     class_error: float
     light: Light | None
+    modelled: float = 0.0
 
     def log_likelihood(self, loss: Array, stops: Array) -> Array:
-        """Under mean losses of confidence and exposure errors, same shape [nats].
+        """Under further mean losses of confidence and exposure errors, same shape [nats].
 
         Bad pictures may make classes err up to a share that goes with the loss, and need not: chains differ.
         """
         total = np.zeros(np.shape(loss))
         if self.class_error > 0.0:
-            explained = 1.0 - (1.0 - USUAL_ERROR) * np.exp(-np.maximum(loss, 0.0))
+            explained = 1.0 - (1.0 - USUAL_ERROR) * np.exp(-np.maximum(loss + self.modelled, 0.0))
             total -= 0.5 * (np.maximum(np.log(self.class_error / explained), 0.0) / ERROR_SPREAD) ** 2
         return total if self.light is None else total + self.light.log_likelihood(stops)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.perception.blocks import BLOCK_S, Blocks, make_blocks
-from sim2real.perception.chain import DECISIVE, Account, Chain, price
+from sim2real.perception.chain import DECISIVE, Account, Chain, Oddity, price
 from sim2real.perception.confidence import (
     NORMAL_CONFIDENCE,
     NORMAL_SPREAD,
@@ -19,11 +19,11 @@ from sim2real.perception.confidence import (
     fit_confidence,
     read_model,
 )
-from sim2real.perception.conflicts import by_road, class_error, confusion_in_words
+from sim2real.perception.conflicts import by_road, class_error, odd_confusion
 from sim2real.perception.frames import Modelled, Results
-from sim2real.perception.patterns import FEWEST_OF_CLASS, pattern_in_words
+from sim2real.perception.patterns import FEWEST_OF_CLASS, odd_pattern
 from sim2real.perception.pictures import NORMAL_LIGHT_EV, Light
-from sim2real.result import Place
+from sim2real.result import Interval, Place
 
 Array = NDArray[np.float64]
 
@@ -57,6 +57,21 @@ class Seen:
     light_unseen: Light | None
 
     @property
+    def light(self) -> Light | None:
+        """What tells over- from underexposure: the pictures of the fit logs, else the hold-out's."""
+        return self.signs.light if self.signs.light is not None else self.light_unseen
+
+    def signed(self, fit: ConfidenceFit) -> ConfidenceFit:
+        """A fit with the sign that the hold-out's pictures have where the fit logs name none."""
+        stops = fit.stops
+        if "exposure_shift" not in fit.effects or self.signs.light is not None or self.light_unseen is None:
+            return fit
+        size = np.array([stops.value, -stops.value])
+        if np.diff(self.light_unseen.log_likelihood(size))[0] <= 0.0:
+            return fit
+        return replace(fit, stops=Interval(-stops.value, -stops.high, -stops.low, stops.unit))
+
+    @property
     def together(self) -> Blocks:
         """All blocks."""
         pairs = ((getattr(self.known, f.name), getattr(self.unseen, f.name)) for f in fields(Blocks))
@@ -86,7 +101,9 @@ def confidence_chain(
     """The confidence's account; None where no log has camera results."""
     if not fitted and held_out is None:
         return None
-    known = make_blocks(fitted).less(modelled.exposure_s, modelled.stops)
+    whole = make_blocks(fitted)
+    known = whole.less(modelled.exposure_s, modelled.stops)
+    taken = float((whole.loss - known.loss).mean()) if len(whole) else 0.0
     unseen = make_blocks([] if held_out is None else [held_out]).less(modelled.exposure_s, modelled.stops)
     choices = [c for c in CHOICES if not set(c) & set(exclude)]
     pictures = sum(
@@ -100,12 +117,13 @@ def confidence_chain(
         known, unseen = make_blocks([]), make_blocks([])
         choices = [c for c in choices if c == ("exposure_shift",)]
     # mistakes that are made with good pictures say nothing of bad ones
-    errors = float("nan") if confusion_in_words(fitted) else class_error(fitted)
-    model, signs = read_model(known), Signs(errors, lights[0])
+    errors = float("nan") if odd_confusion(fitted) else class_error(fitted)
+    model, signs = read_model(known), Signs(errors, lights[0], taken)
     seen = Seen(known, unseen, signs, lights[1])
 
     def fit(effects: tuple[str, ...]) -> ConfidenceFit:
-        return fit_confidence(known, signs, model, effects, modelled.exposure_s, modelled.stops)
+        found = fit_confidence(known, signs, model, effects, modelled.exposure_s, modelled.stops)
+        return seen.signed(found)
 
     plain, fits = fit(()), [fit(choice) for choice in choices]
     accounts = [_account(f, plain, seen, model) for f in (plain, *fits)]
@@ -129,7 +147,7 @@ def confidence_chain(
     if stands.effects == ("motion_blur",) and np.subtract(*_slow_and_fast(stands, known)[1]) > -SLIGHT:
         chain, stands = replace(chain, quiet=True), plain
     every_log = [*fitted, *([held_out] if held_out else [])]
-    pattern = pattern_in_words(seen.together, stands, _restlessness(every_log, model, modelled))
+    pattern = odd_pattern(seen.together, stands, _restlessness(every_log, model, modelled))
     needed = [a for a in outside if a.score > chain.best().score + DECISIVE and not chain.quiet]
     if needed and not pattern:
         pattern = _of_no_effect(max(needed, key=lambda account: account.score))
@@ -158,14 +176,14 @@ def _is_quiet(nothing: Account, others: Sequence[Account]) -> bool:
     return best.score < BEYOND_DOUBT or best.gain_holdout < AGAINST
 
 
-def _of_no_effect(needed: Account) -> str:
+def _of_no_effect(needed: Account) -> Oddity:
     """What the confidence does that no effect of the library has it do."""
-    what = (
-        "how the confidence goes with speed"
-        if "motion_blur" in needed.effects
-        else "how low the confidence is"
-    )
-    return f"No effect of the library explains {what}. {needed.evidence_for[0]}"
+    blurred = "motion_blur" in needed.effects
+    what = "how the confidence goes with speed" if blurred else "how low the confidence is"
+    told = f"No effect of the library explains {what}. {needed.evidence_for[0]}"
+    if blurred:
+        return Oddity(SIGNAL, told, "speed", "less where fast", "falls with it")
+    return Oddity(SIGNAL, told, "nothing that was measured", "less", "alike at all speeds")
 
 
 def _account(f: ConfidenceFit, nothing: ConfidenceFit, seen: Seen, model: ConfidenceModel) -> Account:
@@ -232,8 +250,7 @@ def _evidence(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
             sentences.append(
                 f"The class is not road.yaml's in {100.0 * seen.signs.class_error:.0f} % of the results."
             )
-        if seen.signs.light is not None:
-            light = seen.signs.light
+        if (light := seen.light) is not None:
             sentences.append(
                 f"{light.count} pictures: road {light.level_ev - NORMAL_LIGHT_EV:+.1f} stops from usual, "
                 f"{100.0 * light.white_share:.1f} % white, {100.0 * light.black_share:.1f} % black."
@@ -255,7 +272,7 @@ def _doubts(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
             "How strongly confidence answers is measured on the shipped networks; another chain's may differ by a "
             "factor of two, to blur of seven, which the interval holds."
         )
-    if "exposure_shift" in f.effects and seen.signs.light is None:
+    if "exposure_shift" in f.effects and seen.light is None:
         doubts.append("The log names no pictures: over- and underexposure cannot be told apart.")
     return tuple(doubts)
 
@@ -287,7 +304,7 @@ def _unexcited(seen: Seen, choices: Sequence[tuple[str, ...]]) -> dict[str, str]
         why["motion_blur"] = (
             f"Speed varies by {spread:.1f} m/s only: confidence cannot show a fall with speed."
         )
-    if seen.signs.light is None:
+    if seen.light is None:
         why["exposure_shift"] = (
             "Without pictures a moderate exposure error looks like another camera's normal confidence."
         )

@@ -9,11 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import RoadSegment
+from sim2real.perception.chain import Oddity
 from sim2real.perception.crossings import rough_shift
 from sim2real.perception.frames import Results
 from trpac_core.vision.classes import Surface
 
 Array = NDArray[np.float64]
+
+SIGNAL = "image_place"
 
 MARGIN_M = 5.0
 """Way after and before a border that is left out: there a shift shows, not a conflict [m]."""
@@ -46,8 +49,8 @@ def class_error(results: Sequence[Results]) -> float:
     return float(every.mean()) if len(every) else float("nan")
 
 
-def confusion_in_words(results: Sequence[Results]) -> str:
-    """The gap that one surface is taken for another with good pictures, in a sentence; empty where none is."""
+def odd_confusion(results: Sequence[Results]) -> Oddity | None:
+    """The gap that one surface is taken for another with good pictures; None where none is."""
     seen: dict[Surface, list[tuple[NDArray[np.int64], Array]]] = {}
     for one, segment, inside in _laid_over(results):
         known = inside & (one.confidence > 0.0)
@@ -58,19 +61,20 @@ def confusion_in_words(results: Sequence[Results]) -> str:
     }
     every = np.concatenate([sure for _, sure in of.values()]) if of else np.empty(0)
     if not len(every) or np.exp(every.mean()) < SURE:
-        return ""
+        return None
     for true, (classes, sure) in sorted(of.items()):
         wrong = classes != true
         if len(classes) < FEWEST_OF_SURFACE or wrong.mean() < CONFUSED:
             continue
         if wrong.all() or sure[wrong].mean() > sure[~wrong].mean() - AS_SURE:
             other = Surface(int(np.bincount(classes[wrong]).argmax()))
-            return (
+            told = (
                 f"The camera is as sure as ever, but names another class in {100.0 * wrong.mean():.0f} % of its "
                 f"results where road.yaml has {true.label}, mostly {other.label}: does it take one surface for "
                 "another, or is road.yaml out of date?"
             )
-    return ""
+            return Oddity(SIGNAL, told, "surface", f"{other.label} for {true.label}", "whatever the picture")
+    return None
 
 
 def streak_m(results: Sequence[Results]) -> float:
@@ -113,15 +117,16 @@ def class_conflicts(results: Sequence[Results]) -> tuple[Conflict, ...]:
     return tuple(found)
 
 
-def conflicts_in_words(conflicts: Sequence[Conflict]) -> str:
-    """The gap that conflicts are, in a sentence; empty where they may be chance, or road.yaml's own slip."""
+def odd_conflicts(conflicts: Sequence[Conflict]) -> Oddity | None:
+    """The gap that conflicts are; None where they may be chance, or road.yaml's own slip."""
     logs = {conflict.log for conflict in conflicts}
     if len(conflicts) < MANY or len(logs) < SEVERAL_LOGS:
-        return ""
-    return (
+        return None
+    told = (
         f"The camera keeps seeing another class than road.yaml on {len(conflicts)} stretches in {len(logs)} logs: does "
         f"it repeat old results, or take one surface for another? {conflicts[0].sentence}"
     )
+    return Oddity(SIGNAL, told, "place", "another class", "for whole stretches")
 
 
 def _other_class(one: Results, segment: RoadSegment, inside: NDArray[np.bool_]) -> Surface | None:

@@ -7,7 +7,7 @@ sure the camera is (`perception_confidence`), and what a friction reference says
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -15,17 +15,16 @@ import numpy as np
 from scenarios.effects import Effect
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
-from sim2real.perception.chain import Account, Chain
+from sim2real.perception.chain import Account, Chain, Oddity
 from sim2real.perception.confidence_chain import confidence_chain
-from sim2real.perception.conflicts import class_conflicts, conflicts_in_words, confusion_in_words
+from sim2real.perception.conflicts import class_conflicts, odd_conflicts, odd_confusion
 from sim2real.perception.frames import Modelled, read_results
 from sim2real.perception.friction import SIGNAL as REFERENCE
 from sim2real.perception.friction import friction_chain
 from sim2real.perception.mounting import Mounting
 from sim2real.perception.pictures import read_light
-from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.perception.shift import shift_chain
-from sim2real.perception.stuck import stuck_in_words
+from sim2real.perception.stuck import odd_repeats
 from sim2real.result import Interval, Measure, Place, Verdict
 from trpac_core.vision.camera import Camera
 
@@ -41,6 +40,8 @@ TYPICAL = 0.75
 """Quantile that is taken for it: a few odd borders or stretches depend on nothing, a whole class of road does."""
 MAKE_CLASSES_ERR = {"exposure_shift", "motion_blur"}
 """Effects under which classes may be wrong for whole stretches."""
+READINGS = ("image_class", "image_confidence", "mu_reference")
+"""What only a camera or a friction sensor can tell: a mapping that computes them tells nothing."""
 BOOTSTRAP = 400
 QUANTILES = (0.025, 0.975)
 
@@ -115,10 +116,8 @@ class PerceptionFinding:
         Where the hold-out shows the gap most.
     next_step : str
         What to drive to tell apart what is ambiguous; empty where nothing is.
-    unexplained : tuple of str
+    odd : tuple of Oddity
         What no effect of the library explains.
-    odd_signal : str
-        Which signal the first of these is about; empty where all is explained.
     warnings : tuple of str
         Damage of the columns, and conflicts of class with road.yaml.
     """
@@ -132,9 +131,13 @@ class PerceptionFinding:
     cannot_rule_out: dict[str, str]
     places: tuple[Place, ...]
     next_step: str
-    unexplained: tuple[str, ...]
-    odd_signal: str
+    odd: tuple[Oddity, ...]
     warnings: tuple[str, ...]
+
+    @property
+    def unexplained(self) -> tuple[str, ...]:
+        """What no effect of the library explains, in sentences."""
+        return tuple(one.sentence for one in self.odd)
 
 
 def diagnose_perception(
@@ -172,6 +175,7 @@ def diagnose_perception(
     PerceptionFinding or None
         None where nothing of the camera chain is measured.
     """
+    logs_fit, log_holdout = [_as_read(log) for log in logs_fit], _as_read(log_holdout)
     known, camera = camera is not None, Camera() if camera is None else camera
     further_m = 0.0 if known else vehicle.to_core().cog_to_front_axle_m + camera.x_from_front_axle_m
     read = [
@@ -205,8 +209,17 @@ def diagnose_perception(
     chains = [chain for chain in judged if chain is not None]
     if not chains:
         return None
-    odd = (confusion_in_words(every), stuck_in_words(every))
-    return _conclude(chains, conflicts_in_words(conflicts), odd, tuple(warnings), seed)
+    blurred = modelled.exposure_s > 0.0 or modelled.stops != 0.0
+    errs = None if blurred else odd_conflicts(conflicts)
+    if blurred:
+        chains = [replace(chain, errs=None) for chain in chains]
+    return _conclude(chains, errs, (odd_confusion(every), odd_repeats(every)), tuple(warnings), seed)
+
+
+def _as_read(log: Log) -> Log:
+    """The log without readings that a mapping computed."""
+    made = log.derived.intersection(READINGS)
+    return replace(log, signals={k: v for k, v in log.signals.items() if k not in made}) if made else log
 
 
 def camera_shrink(
@@ -231,26 +244,25 @@ def camera_shrink(
 
 
 def _conclude(
-    chains: Sequence[Chain], conflict: str, further: Sequence[str], warnings: tuple[str, ...], seed: int
+    chains: Sequence[Chain],
+    conflict: Oddity | None,
+    further: Sequence[Oddity | None],
+    warnings: tuple[str, ...],
+    seed: int,
 ) -> PerceptionFinding:
     """Each signal's best account, and what they make together.
 
-    `conflict` is what classes say against road.yaml, which bad pictures may cause; `further` is what they may not. All
-    may be empty.
+    `conflict` is what classes say against road.yaml, which bad pictures may cause; `further` is what they may not.
     """
     best = [chain.best() for chain in chains]
     rivals = [chain.rivals() for chain in chains]
     nothing = [chain.nothing for chain in chains]
-    odd = [
-        (chain.signal, text)
-        for chain, account in zip(chains, best, strict=True)
-        if (text := _unexplained(chain, account))
-    ]
+    odd = [one for pair in zip(chains, best, strict=True) if (one := _unexplained(*pair)) is not None]
     causes = tuple(dict.fromkeys(effect for account in best for effect in account.effects))
-    errs = conflict or next((chain.errs for chain in chains if chain.errs), "")
+    errs = conflict or next((chain.errs for chain in chains if chain.errs), None)
     if errs and not set(causes) & MAKE_CLASSES_ERR:
-        odd.append((PLACE, errs))
-    odd += [(PLACE, text) for text in further if text]
+        odd.append(errs)
+    odd += [one for one in further if one is not None]
     ambiguous = tuple(
         dict.fromkeys(
             tuple(dict.fromkeys((*account.effects, *(e for r in others for e in r.effects))))
@@ -261,18 +273,18 @@ def _conclude(
     unexcited = {
         effect: why for chain in chains for effect, why in chain.unexcited.items() if effect not in causes
     }
+    verdict = _verdict(causes, bool(ambiguous), bool(odd))
     return PerceptionFinding(
-        verdict=_verdict(causes, bool(ambiguous), bool(odd)),
+        verdict=verdict,
         causes=causes,
         candidates=_candidates(chains, best, unexcited, seed),
         before=_measure(chains, nothing),
-        after=_measure(chains, best),
+        after=_measure(chains, nothing if verdict is Verdict.UNKNOWN else best),
         ambiguous_with=ambiguous,
         cannot_rule_out=unexcited,
         places=_places(chains, best),
         next_step=" ".join(chain.next_step for chain, others in zip(chains, rivals, strict=True) if others),
-        unexplained=tuple(text for _, text in odd),
-        odd_signal=odd[0][0] if odd else "",
+        odd=tuple(odd),
         warnings=warnings,
     )
 
@@ -287,21 +299,22 @@ def _verdict(causes: tuple[str, ...], ambiguous: bool, unexplained: bool) -> Ver
     return Verdict.IDENTIFIED if causes else Verdict.NO_GAP
 
 
-def _unexplained(chain: Chain, account: Account) -> str:
-    """What a signal's best account leaves, in a sentence; empty where it leaves noise."""
+def _unexplained(chain: Chain, account: Account) -> Oddity | None:
+    """What a signal's best account leaves; None where it leaves noise."""
     if chain.unexplained:
         return chain.unexplained
     if not len(account.z):
-        return ""
+        return None
     typical = float(np.hypot(np.quantile(np.abs(account.z), TYPICAL), np.sqrt(account.excess)))
     least = UNEXPLAINED_REFERENCE if chain.signal == REFERENCE else UNEXPLAINED
     most = AN_EIGHTH * (chain.nothing.left() ** 2 - 1.0)
     if account.effects and account.left() ** 2 - 1.0 <= most:
         least = max(least, AT_MOST)
     if typical < max(least, chain.noticed):
-        return ""
+        return None
     named = " and ".join(account.effects) or "the simulation as it is"
-    return f"{chain.signal}: {named} leaves {typical:.1f} times the noise on the hold-out."
+    told = f"{chain.signal}: {named} leaves {typical:.1f} times the noise on the hold-out."
+    return Oddity(chain.signal, told, "nothing that was looked at", "both ways", "no pattern found")
 
 
 def _measure(chains: Sequence[Chain], accounts: Sequence[Account]) -> Measure:
@@ -311,7 +324,7 @@ def _measure(chains: Sequence[Chain], accounts: Sequence[Account]) -> Measure:
 
 
 def _total(sizes: Collection[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(list(sizes))))) if sizes else 0.0
+    return float(np.sqrt(np.mean(np.square(list(sizes))))) if sizes else float("nan")
 
 
 def _places(chains: Sequence[Chain], best: Sequence[Account]) -> tuple[Place, ...]:
@@ -319,7 +332,7 @@ def _places(chains: Sequence[Chain], best: Sequence[Account]) -> tuple[Place, ..
     size = {
         c.signal: c.nothing.left() ** 2
         for c, a in zip(chains, best, strict=True)
-        if a.effects or _unexplained(c, a)
+        if a.effects or _unexplained(c, a) is not None
     }
     whole = sum(size.values())
     return tuple(
@@ -350,6 +363,11 @@ def _candidate(
     accounts = [changed.get(at, chain.nothing) for at, chain in enumerate(chains)]
     own = [(chains[at], account) for at, account in changed.items()]
     effects = tuple(effect for _, account in own for effect in account.effects)
+    unseen = [chain.signal for chain, account in own if not len(account.z)]
+    unknown = (
+        f"The hold-out has nothing of {' and '.join(unseen)}: by how much the gap shrinks there is not known."
+    )
+    nan = float("nan")
     return CameraCandidate(
         effects=effects,
         signal=" and ".join(chain.signal for chain, _ in own),
@@ -360,11 +378,12 @@ def _candidate(
         effective=sum(chain.effective for chain, _ in own),
         score=sum(account.score for _, account in own),
         parameters={name: value for _, account in own for name, value in account.parameters.items()},
-        after=_measure(chains, accounts),
-        shrink_percent=_shrink(chains, accounts, seed),
+        after=Measure(nan) if unseen else _measure(chains, accounts),
+        shrink_percent=Interval(nan, nan, nan, "%") if unseen else _shrink(chains, accounts, seed),
         evidence_for=tuple(text for _, account in own for text in account.evidence_for),
         evidence_against=tuple(text for _, account in own for text in account.evidence_against)
-        + tuple(unexcited[effect] for effect in effects if effect in unexcited),
+        + tuple(unexcited[effect] for effect in effects if effect in unexcited)
+        + ((unknown,) if unseen else ()),
         excited=not any(effect in unexcited for effect in effects),
     )
 
@@ -373,8 +392,6 @@ def _shrink(chains: Sequence[Chain], accounts: Sequence[Account], seed: int) -> 
     """Shrink of the total with a 95 % interval, by resampling the hold-out's observations [%]."""
     generator = np.random.default_rng(seed)
     seen = [(c.nothing, a) for c, a in zip(chains, accounts, strict=True) if len(a.z)]
-    if not seen:
-        return Interval(0.0, 0.0, 0.0, "%")
     old = np.zeros(BOOTSTRAP + 1)
     new = np.zeros(BOOTSTRAP + 1)
     for nothing, account in seen:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.perception.chain import price
+from sim2real.perception.chain import Oddity, price
 from sim2real.perception.crossings import Crossings
 from sim2real.perception.likelihood import likeliest, scale_under
 
@@ -42,11 +42,14 @@ class Law:
         Largest constant and rate that are looked for.
     words : str
         What it says, with the rate in it.
+    depends_on : str
+        What it varies with.
     """
 
     basis: Callable[[Crossings], tuple[Array, Array]]
     most: tuple[float, float]
     words: str
+    depends_on: str
 
 
 BY_WAY = Law(
@@ -54,26 +57,29 @@ BY_WAY = Law(
     (5.0, 0.05),
     "The changes of class lie beside road.yaml's borders by about {rate:+.1%} of the way since the log's begin: is the "
     "scale of position_m wrong, or does it drift?",
+    "way since the log's begin",
 )
 BY_TIME = Law(
     lambda c: (c.speed_m_s, c.speed_m_s * c.since_s),
     (1.0, 0.05),
     "The changes of class come late by about {rate:+.2%} of the time since the log's begin: does the camera's clock "
     "run at another rate than the logger's?",
+    "time since the log's begin",
 )
 BY_PUSH = Law(
     lambda c: (np.ones(len(c)), c.accel_m_s2),
     (5.0, 2.0),
     "The changes of class lie beside road.yaml's borders by about {rate:+.2f} m for each m/s² of acceleration: are the "
     "stamps carried on at the last speed?",
+    "acceleration",
 )
 
 
 @dataclass(frozen=True)
 class Drift:
-    """A shift by another law: what it says, and the scale of the errors that it leaves [-]."""
+    """A shift by another law, and the scale of the errors that it leaves [-]."""
 
-    words: str
+    odd: Oddity
     scale: float
 
 
@@ -98,7 +104,11 @@ def find_drift(known: Crossings, unseen: Crossings, plain: float, best: float) -
         score = float(likeliest(every, shift, shifted=True)) - plain - price(len(every), len(every))
         changes_m = np.ptp(rate * law.basis(every)[1])
         if changes_m >= LEAST_CHANGE_M and score > least:
-            found, least = Drift(law.words.format(rate=rate), scale_under(every, shift)), score
+            way = "later" if rate > 0.0 else "earlier"
+            odd = Oddity(
+                "image_place", law.words.format(rate=rate), law.depends_on, way, "in proportion to it"
+            )
+            found, least = Drift(odd, scale_under(every, shift)), score
     return found
 
 

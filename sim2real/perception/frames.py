@@ -129,7 +129,7 @@ def read_results(
         None where the log has no perception columns, or no usable row in them.
     """
     missing = [name for name in NEEDED if name not in log.signals]
-    if len(missing) == len(NEEDED):
+    if len(missing) == len(NEEDED) and not {"image_confidence", "frame_id"} & set(log.signals):
         return None, ()
     if missing:
         return None, (
@@ -203,15 +203,22 @@ def _one_row_per_result(log: Log) -> tuple[pd.DataFrame, list[str]]:
         }
     )
     warnings: list[str] = []
-    key = ["id"]
+    stamp = ["from", "to"]
     if rows["id"].nunique() < STUCK_RESULTS:
-        key = ["from", "to"]
-        if rows[key].drop_duplicates().shape[0] > STUCK_RESULTS:
+        if rows[stamp].drop_duplicates().shape[0] > STUCK_RESULTS:
             why = "is missing" if rows["id"].isna().all() else "does not change"
             warnings.append(f"{log.name}: frame_id {why}; a new stamp is taken for a new result.")
-    rows = rows[rows[key].notna().all(axis=1)]
-    new = (rows[key] != rows[key].shift()).any(axis=1)
-    return rows.groupby(new.cumsum()).first(), warnings
+        rows["id"] = np.nan
+    rows["picture"] = rows["picture"].replace("", None)
+    rows = rows[rows["id"].notna() | rows[stamp].notna().all(axis=1)]
+    before = rows.shift()
+    # where a frame_id is lost, a new stamp is a new result
+    numbered = rows["id"].notna() & before["id"].notna()
+    stamped = rows[stamp].notna().all(axis=1) & before[stamp].notna().all(axis=1)
+    moved = stamped & (rows[stamp] != before[stamp]).any(axis=1)
+    new = np.where(numbered, rows["id"] != before["id"], moved)
+    found = rows.groupby(np.cumsum(new)).first()
+    return found.assign(picture=found["picture"].fillna("")), warnings
 
 
 def _plausible(table: pd.DataFrame, log: Log) -> tuple[pd.DataFrame, list[str]]:

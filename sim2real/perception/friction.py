@@ -20,9 +20,9 @@ from scenarios.effects import Effect
 from scenarios.effects.class_friction_offset import ClassFrictionOffset
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
-from sim2real.perception.chain import DECISIVE, Account, Chain, price
+from sim2real.perception.chain import DECISIVE, Account, Chain, Oddity, price
 from sim2real.perception.frames import Modelled
-from sim2real.perception.late_reference import lateness_in_words
+from sim2real.perception.late_reference import odd_lateness
 from sim2real.perception.stretches import (
     OF_ROAD_FILE,
     SIMULATED,
@@ -207,7 +207,8 @@ def friction_chain(
     if _follows_road(known, fits[1]):
         fits = fits[:1]
     accounts = [_account(fit, plain, known, unseen) for fit in (plain, *fits)]
-    outside = [account for account in accounts if set(account.effects) & set(exclude)]
+    left_out = {*exclude, OFFSET} if not camera else set(exclude)
+    outside = [account for account in accounts if set(account.effects) & left_out]
     accounts = [account for account in accounts if account not in outside]
     chain = Chain(
         SIGNAL,
@@ -220,14 +221,23 @@ def friction_chain(
         next_step=NEXT_STEP,
         quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
     )
-    late = lateness_in_words((*fitted[0], held_out[0]), (*fitted[1], held_out[1]), vehicle)
+    late = odd_lateness((*fitted[0], held_out[0]), (*fitted[1], held_out[1]), vehicle)
     if late:
         return replace(chain, unexplained=late)
     # Values per class, and a factor on all, are free curves too: where only they do, no effect of the library does.
     needed = [account for account in outside if account.score > chain.best().score + DECISIVE]
     if needed:
-        told = max(needed, key=lambda account: account.score).evidence_for[0]
-        return replace(chain, unexplained=f"No effect of the library explains {SIGNAL}. {told}")
+        told = max(needed, key=lambda account: account.score)
+        sentence = f"No effect of the library explains {SIGNAL}. {told.evidence_for[0]}"
+        of_class = OFFSET in told.effects
+        odd = Oddity(
+            SIGNAL,
+            sentence,
+            "surface" if of_class else "friction of road.yaml",
+            "other than simulated",
+            "a value per surface" if of_class else "one factor",
+        )
+        return replace(chain, unexplained=odd)
     return chain
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sim2real.perception.chain import Oddity
 from sim2real.perception.crossings import Crossings
 
 Array = NDArray[np.float64]
@@ -17,8 +18,8 @@ EARLY_SHARE = 0.2
 """As many that are too early, by the same measure, against those that are late: mistakes err both ways [-]."""
 
 
-def hanging_in_words(rest_m: Array, crossings: Crossings) -> str:
-    """The gap that a camera is which hands out old pictures now and then, in a sentence; empty where it does not.
+def odd_hanging(rest_m: Array, crossings: Crossings) -> Oddity | None:
+    """The gap that a camera is which hands out old pictures now and then; None where it does not.
 
     Parameters
     ----------
@@ -31,8 +32,9 @@ def hanging_in_words(rest_m: Array, crossings: Crossings) -> str:
     open_m = 0.5 * (high - low) + 0.25 * (crossings.low_length_m + crossings.high_length_m)
     late, early = rest_m - open_m > LATE_M, -rest_m - open_m > LATE_M
     if late.sum() < max(FEWEST, LEAST_SHARE * len(crossings)) or early.sum() > EARLY_SHARE * late.sum():
-        return ""
-    return (
+        return None
+    told = (
         f"At {late.sum()} of {len(crossings)} borders the class changes late, by up to {rest_m.max():.0f} m, and at "
         "the others on time: does the camera hand out old pictures now and then?"
     )
+    return Oddity("image_place", told, "time", "late", "now and then")

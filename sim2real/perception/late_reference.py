@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
+from sim2real.perception.chain import Oddity
 from trpac_core.vision.classes import Surface
 
 Array = NDArray[np.float64]
@@ -41,20 +42,21 @@ class Course:
     on: Array
 
 
-def lateness_in_words(logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile) -> str:
-    """The gap that a late reference is, in a sentence; empty where it is in time, or has nothing to be late for."""
+def odd_lateness(logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile) -> Oddity | None:
+    """The gap that a late reference is; None where it is in time, or has nothing to be late for."""
     courses = list(_courses(logs, roads, vehicle))
     if sum(len(c.reference) for c in courses) < FEWEST or not any(_changes(c) for c in courses):
-        return ""
+        return None
     left = {(dead, lag): _left(courses, dead, lag) for dead, lag in product(DEAD_TIMES_S, FILTERS_S)}
     dead, lag = min(left, key=lambda key: left[key])
     at_once = min(left[0.0, one] for one in FILTERS_S)
     if dead < max(LATE_S, lag) or left[dead, lag] > EXPLAINS * at_once:
-        return ""
-    return (
+        return None
+    told = (
         f"mu_reference follows the road {dead:.1f} s late: its levels change only then, which no filter does. When is "
         "it worked out, and what time is it stamped with?"
     )
+    return Oddity("mu_reference", told, "time", "late", "a dead time")
 
 
 def _courses(logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile) -> Iterator[Course]:

@@ -6,10 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.perception.blocks import Blocks
+from sim2real.perception.chain import Oddity
 from sim2real.perception.confidence import NORMAL_CONFIDENCE, ConfidenceFit
 from trpac_core.vision.classes import Surface
 
 Array = NDArray[np.float64]
+
+SIGNAL = "image_confidence"
 
 SHAKEN_SHARE, SHAKEN_BY = 0.3, 0.15
 """Share of the variance of what blur and exposure leave that goes with acceleration, and the fall of the confidence's
@@ -33,8 +36,8 @@ RESTLESS = 0.155
 which on it is a gap of its own: chains that nothing disturbs were within 0.15 [-]."""
 
 
-def pattern_in_words(blocks: Blocks, fit: ConfidenceFit, deviation: float) -> str:
-    """The gap that a confidence is which goes with what no effect has it go, in a sentence; empty where it does not.
+def odd_pattern(blocks: Blocks, fit: ConfidenceFit, deviation: float) -> Oddity | None:
+    """The gap that a confidence is which goes with what no effect has it go; None where it does not.
 
     Parameters
     ----------
@@ -66,81 +69,87 @@ def _levels(loss: Array, blocks: Blocks) -> Array:
     return level
 
 
-def _shaken(rest: Array, blocks: Blocks) -> str:
+def _shaken(rest: Array, blocks: Blocks) -> Oddity | None:
     """Whether it falls where the car brakes or pulls, for those look alike from within the car."""
     accel = blocks.accel_m_s2
     if len(blocks) < FEWEST_CREEPING or not rest.std() or not accel.std():
-        return ""
+        return None
     design = np.column_stack([np.ones(len(blocks)), np.maximum(accel, 0.0), np.maximum(-accel, 0.0)])
     solution, *_ = np.linalg.lstsq(design, rest, rcond=None)
     share = 1.0 - np.var(rest - design @ solution) / np.var(rest)
     hard = float(np.quantile(np.abs(accel), 0.95))
     pulling, braking = hard * solution[1:]
     if share < SHAKEN_SHARE or max(pulling, braking) < SHAKEN_BY:
-        return ""
-    return (
+        return None
+    told = (
         f"The confidence falls with acceleration, by a factor of {np.exp(max(pulling, braking)):.1f} at {hard:.1f} "
         f"m/s²; that is {100.0 * share:.0f} % of what it does beside speed and class: is the camera's bracket loose?"
     )
+    return Oddity(SIGNAL, told, "acceleration", "less", "in proportion to its size")
 
 
-def _unsure_when_slow(rest: Array, blocks: Blocks) -> str:
+def _unsure_when_slow(rest: Array, blocks: Blocks) -> Oddity | None:
     """Whether it falls where the car is slow, which is the reverse of blur."""
     speed = blocks.speed_m_s
     if len(blocks) < FEWEST_CREEPING or not rest.std() or not speed.std():
-        return ""
+        return None
     slope, share = np.polyfit(speed, rest, 1)[0], np.corrcoef(speed, rest)[0, 1] ** 2
     slow, fast = np.quantile(speed, (0.1, 0.9))
     falls_by = -slope * (fast - slow)
     if share < SLOW_SHARE or falls_by < SLOW_BY:
-        return ""
-    return (
+        return None
+    told = (
         f"The confidence is less by a factor of {np.exp(falls_by):.1f} at {slow:.0f} m/s than at {fast:.0f} m/s, the "
         "reverse of blur: what does the camera need the speed for?"
     )
+    return Oddity(SIGNAL, told, "speed", "less where slow", "in proportion to it")
 
 
-def _shunned(loss: Array, blocks: Blocks) -> str:
+def _shunned(loss: Array, blocks: Blocks) -> Oddity | None:
     level = {
         int(c): float(loss[blocks.classes == c].mean())
         for c in np.unique(blocks.classes)
         if (blocks.classes == c).sum() >= FEWEST_OF_CLASS
     }
     if len(level) < 2:
-        return ""
+        return None
     worst, best = max(level, key=lambda c: level[c]), min(level, key=lambda c: level[c])
     low, high = np.exp(-level[worst]), np.exp(-level[best])
     if level[worst] - level[best] < SHUNNED_BY or high - low < SHUNNED_SHARE:
-        return ""
+        return None
     names = {int(s): s.label for s in Surface}
-    return (
+    told = (
         f"The confidence is {low:.2f} on {names[worst]} and {high:.2f} on {names[best]}, at one speed: what dazzles or "
         "covers the camera there?"
     )
+    return Oddity(SIGNAL, told, "surface", f"less on {names[worst]}", "a level per surface")
 
 
-def _creeping(rest: Array, blocks: Blocks) -> str:
+def _creeping(rest: Array, blocks: Blocks) -> Oddity | None:
     changes = []
     for log in np.unique(blocks.log):
         time_s, loss = blocks.time_s[blocks.log == log], rest[blocks.log == log]
         if len(loss) < FEWEST_CREEPING or not loss.std():
-            return ""
+            return None
         slope, correlation = np.polyfit(time_s, loss, 1)[0], np.corrcoef(time_s, loss)[0, 1]
         if abs(correlation) < CREEPS:
-            return ""
+            return None
         changes.append(slope * np.ptp(time_s))
     if len(changes) < 2 or np.ptp(np.sign(changes)) or np.min(np.abs(changes)) < CREEPS_BY:
-        return ""
-    return (
-        f"The confidence {'falls' if changes[0] > 0.0 else 'rises'} over every log, by a factor of "
+        return None
+    way = "falls" if changes[0] > 0.0 else "rises"
+    told = (
+        f"The confidence {way} over every log, by a factor of "
         f"{np.exp(np.median(np.abs(changes))):.1f}, at one speed and on one class: does the lens fog, or the light go?"
     )
+    return Oddity(SIGNAL, told, "time", way, "steadily over every log")
 
 
-def _restless(blocks: Blocks, deviation: float) -> str:
+def _restless(blocks: Blocks, deviation: float) -> Oddity | None:
     if not len(blocks) or deviation * np.exp(-blocks.loss.mean()) < RESTLESS * NORMAL_CONFIDENCE:
-        return ""
-    return (
+        return None
+    told = (
         f"The confidence comes and goes by a factor of {np.exp(deviation):.1f} from second to second, on one "
         "class at one speed: what stands in the camera's way at times, or shines into it?"
     )
+    return Oddity(SIGNAL, told, "time", "comes and goes", "from second to second")

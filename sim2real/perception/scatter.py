@@ -14,10 +14,13 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from sim2real.perception.chain import Oddity
 from sim2real.perception.crossings import Crossings
 
 Array = NDArray[np.float64]
 Pairs = list[tuple[int, int]]
+
+SIGNAL, BOTH_WAYS = "image_place", "both ways"
 
 FEWEST = 4
 """Crossings from which on scatter is looked at."""
@@ -33,8 +36,8 @@ CLIPPED = 3.0
 """Errors count up to so many times their median size: one misread border is no pattern [-]."""
 
 
-def scatter_in_words(scale_m: float, rest_m: Array, crossings: Crossings, streak_m: float) -> str:
-    """The gap that scatter is, in a sentence; empty where it is none.
+def odd_scatter(scale_m: float, rest_m: Array, crossings: Crossings, streak_m: float) -> Oddity | None:
+    """The gap that scatter is; None where it is none.
 
     Parameters
     ----------
@@ -49,21 +52,24 @@ def scatter_in_words(scale_m: float, rest_m: Array, crossings: Crossings, streak
     """
     low, high = crossings.bracket(0.5)
     if len(crossings) < FEWEST:
-        return ""
+        return None
     open_m = float(np.median(high - low + crossings.low_length_m))
     if scale_m < max(SCATTERED_M, OF_BRACKET * open_m):
-        return ""
+        return None
     again, along = _passed_again(crossings), _neighbours(crossings)
     lies = f"The changes of class lie about {scale_m:.1f} m beside road.yaml's borders, with no common shift or delay"
     if _alike(rest_m, again) > AGAIN_ALIKE:
-        return (
+        told = (
             f"{lies}, the same each time that a border is passed: are the borders where road.yaml has them?"
         )
+        return Oddity(SIGNAL, told, "place", BOTH_WAYS, "the same each time that a border is passed")
     if _alike(rest_m, along) > NEIGHBOURS_ALIKE:
-        return f"{lies}, and neighbours alike: does position_m drift, or does the delay?"
+        told = f"{lies}, and neighbours alike: does position_m drift, or does the delay?"
+        return Oddity(SIGNAL, told, "place or time", BOTH_WAYS, "alike at neighbouring borders")
     if len(again) < FEWEST_PAIRS and scale_m >= max(SCATTERED_ALONE_M, open_m, streak_m):
-        return f"{lies}: are the borders where road.yaml has them, and does position_m drift?"
-    return ""
+        told = f"{lies}: are the borders where road.yaml has them, and does position_m drift?"
+        return Oddity(SIGNAL, told, "place or time", BOTH_WAYS, "from border to border")
+    return None
 
 
 def _alike(rest_m: Array, pairs: Pairs) -> float:

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from sim2real.perception.chain import DECISIVE, Account, Chain, price
+from sim2real.perception.chain import DECISIVE, Account, Chain, Oddity, price
 from sim2real.perception.conflicts import streak_m
 from sim2real.perception.crossings import Crossings, find_crossings
 from sim2real.perception.drifting import find_drift
 from sim2real.perception.frames import Modelled, Results
-from sim2real.perception.hanging import hanging_in_words
+from sim2real.perception.hanging import odd_hanging
 from sim2real.perception.likelihood import (
     ERROR_M,
     SCALES,
@@ -30,7 +30,7 @@ from sim2real.perception.likelihood import (
     share_price,
 )
 from sim2real.perception.mounting import Mounting
-from sim2real.perception.scatter import scatter_in_words
+from sim2real.perception.scatter import odd_scatter
 from sim2real.result import Interval, Place
 
 Array = NDArray[np.float64]
@@ -221,7 +221,7 @@ def shift_chain(
         tuple(accounts[1:]),
         places=_places(accounts[0], unseen),
         next_step=NEXT_STEP,
-        errs=hanging_in_words(closest.rest_m(every, height_m), every),
+        errs=odd_hanging(closest.rest_m(every, height_m), every),
         quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0 and not sure,
     )
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
@@ -232,7 +232,7 @@ def shift_chain(
             nothing=nothing,
             accounts=tuple(rest),
             places=_places(nothing, unseen),
-            unexplained=drift.words,
+            unexplained=drift.odd,
             quiet=False,
         )
     for choice, other in zip(outside, others, strict=True):
@@ -242,7 +242,7 @@ def shift_chain(
     if stands.effects and stands.left() ** 2 - 1.0 <= MOSTLY * (accounts[0].left() ** 2 - 1.0):
         return chain
     seen = [*fitted, *([] if held_out is None else [held_out])]
-    scatter = scatter_in_words(scale * ERROR_M, closest.rest_m(every, height_m), every, streak_m(seen))
+    scatter = odd_scatter(scale * ERROR_M, closest.rest_m(every, height_m), every, streak_m(seen))
     return replace(chain, unexplained=scatter)
 
 
@@ -252,12 +252,20 @@ def _leaves_its_stamp(f: ShiftFit, crossings: Crossings, height_m: float) -> boo
     return bool(np.median(np.abs(f.shift(crossings, height_m)) - half_m) > 0.0)
 
 
-def _another_law(best: Account, choice: tuple[str, ...]) -> str:
+def _another_law(best: Account, choice: tuple[str, ...]) -> Oddity:
     """What a shift is that goes with speed in a way that no effect of the library has."""
     laws = {"camera_latency": "goes with speed", "camera_pitch": "does not depend on speed"}
     law = " and partly ".join(laws[effect] for effect in choice)
     blamed = " and ".join(best.effects) or "no effect of the library"
-    return f"The changes of class are shifted along the road by what {law}, not as {blamed} would have it."
+    told = f"The changes of class are shifted along the road by what {law}, not as {blamed} would have it."
+    late = "camera_latency" in choice
+    return Oddity(
+        SIGNAL,
+        told,
+        "speed" if late else "nothing that was measured",
+        "along the road",
+        "in proportion to it" if late else "a constant distance",
+    )
 
 
 def _account(
@@ -301,8 +309,10 @@ def _seen(known: Crossings) -> tuple[str, ...]:
             f"{len(known)} borders, all passed at about {speed.mean():.0f} m/s, appear {np.median(beyond):+.2f} m "
             "along the road.",
         )
-    slow, fast = speed <= np.median(speed), speed > np.median(speed)
-    fast = fast if fast.any() else ~slow
+    fast = speed > np.median(speed)
+    if not fast.any():  # most were passed at the top speed
+        fast = speed == speed.max()
+    slow = ~fast
     return (
         f"{len(known)} borders appear {np.median(beyond[slow]):+.2f} m along the road at {speed[slow].mean():.0f} m/s "
         f"and {np.median(beyond[fast]):+.2f} m at {speed[fast].mean():.0f} m/s.",

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sim2real.perception.chain import Oddity
 from sim2real.perception.frames import Results
 
 LEAST_REPEATS = 8
@@ -17,30 +18,36 @@ LEAST_WAY_M = 1.0
 """Way driven meanwhile: a car that stands sees the same [m]."""
 
 
-def stuck_in_words(results: Sequence[Results]) -> str:
-    """The gap that repeated results are, in a sentence; empty where there are none.
+def odd_repeats(results: Sequence[Results]) -> Oddity | None:
+    """The gap that repeated results are; None where there are none.
 
-    A confidence that other results have too is rounded or at its limit: it may well come several times in a row.
+    A confidence that other results have too is rounded or at its limit: it may well come several times in a row. So
+    does one of a chain that gives each surface its own: elsewhere it has to change from result to result.
     """
     times = [(one, first, last) for one in results for first, last in _repeats(one)]
     if len(times) < LEAST_TIMES:
-        return ""
+        return None
     one, first, last = max(times, key=lambda t: t[0].time_s[t[2]] - t[0].time_s[t[1]])
-    return (
+    told = (
         f"The camera repeats a result to the last digit {len(times)} times, the longest in {one.log} from "
         f"{one.time_s[first]:.2f} to {one.time_s[last]:.2f} s: does it freeze?"
     )
+    return Oddity("image_confidence", told, "time", "the same to the last digit", "for a while, now and then")
 
 
 def _repeats(one: Results) -> list[tuple[int, int]]:
     """First and last result of each run that is one result repeated."""
     begins, ends = _runs(one.confidence, one.classes)
-    long = ends - begins + 1 >= LEAST_REPEATS
+    lengths = ends - begins + 1
+    long = lengths >= LEAST_REPEATS
+    if lengths[~long].sum() < LEAST_REPEATS:
+        return []
     driven_m = np.interp(one.time_s, one.drive_time_s, one.drive_position_m)
     return [
         (first, last)
         for first, last in zip(begins[long].tolist(), ends[long].tolist(), strict=True)
         if (one.confidence == one.confidence[first]).sum() == last - first + 1
+        and one.confidence[first] < 1.0
         and driven_m[last] - driven_m[first] >= LEAST_WAY_M
     ]
 

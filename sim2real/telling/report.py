@@ -209,7 +209,7 @@ def _pictures(diagnosis: Diagnosis) -> dict[str, Picture]:
     if diagnosis.heat_map:
         heat = figures.heat_map(diagnosis.heat_map)
         made["heat"] = _picture(heat, "Share of the gap by subsystem and regime of driving")
-    if diagnosis.unexplained is not None:
+    if diagnosis.unexplained is not None and len(diagnosis.unexplained.x):
         term = diagnosis.unexplained
         made["term"] = _picture(figures.missing_term(term), f"The missing term over {term.depends_on}")
     if diagnosis.next_manoeuvre is not None:

@@ -30,7 +30,7 @@ from .regions import (
 )
 from .results import FrameResult, FrameView, GroupResult, GroupView
 from .scene import scene_of
-from .trajectory import Ellipses, Motion, reckon
+from .trajectory import Ellipses, Motion, reckon, way_beside
 
 MASK_THRESHOLD = 0.5
 """Probability above which a mask's cell counts as drivable, or as shadow [-]."""
@@ -234,7 +234,8 @@ class Ife:
         ground_m = corners.ground_m[drawn]
         widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, len(drawn))
         widths = roi_widths_px(camera, ground_m, widths_m)
-        return Region(corners, corners.pixel[drawn], ground_m[:, 0], widths, ellipses, len(drawn))
+        ahead_m = way_beside(tracks, ground_m) if config.use_trajectory else ground_m[:, 0]
+        return Region(corners, corners.pixel[drawn], ahead_m, widths, ellipses, len(drawn))
 
     def _tracks(self, motion: Motion, groups: int) -> list[Ellipses]:
         config = self.config

@@ -17,6 +17,8 @@ MOST_WAY_M, MOST_WIDTH_M, MOST_PATCHES = 200.0, 40.0, 500
 LEAST_GRID_M, LEAST_STEP_M = 0.005, 0.01
 MOST_DEVIATION_M, MOST_GROWTH_M_S = 2.0, 0.01
 """Beyond these a frame would cost minutes or all memory, and nothing would be gained [m], [m/s]."""
+STEEPEST_SIGMOID, FARTHEST_CENTRE = 100.0, 1.0
+"""A steeper sigmoid, or one centred beyond what shares can be, gives all classes the same weight, or none any [-]."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +34,8 @@ class IfeConfig:
     side : {'left', 'right', 'both'}
         Front wheels whose tracks are looked at.
     ranges_m : tuple of 3 pairs
-        Ways of the wheel that the near, middle and far group cover; the first starts at the preview distance
-        [m].
+        Ways of the rear axle over which the wheels' near, middle and far group lie; the first starts at the preview
+        distance [m].
     a_m : float
         Grid size a [m].
     b : tuple of 3 ints
@@ -127,6 +129,9 @@ class IfeConfig:
             and max(self.roi_width_m * self.roi_spread, 2.0 * self.strip_half_width_m) <= MOST_WIDTH_M,
             "roi_spread must be 1 (all patches alike) or more": self.roi_spread >= 1.0,
             "sigma must lie in [0, 1]": 0.0 <= self.weight_law.sigma <= 1.0,
+            f"the weights' sigmoid must have a slope in [0, {STEEPEST_SIGMOID:g}] and its centre within "
+            f"+-{FARTHEST_CENTRE:g}": 0.0 <= self.weight_law.sigmoid_slope <= STEEPEST_SIGMOID
+            and abs(self.weight_law.sigmoid_centre) <= FARTHEST_CENTRE,
             "least_mass must lie in [0, 1]": 0.0 <= self.least_mass <= 1.0,
             "seed must not be negative": self.seed >= 0,
             "groups_looked_at must be 1, 2 or 3": 1 <= self.groups_looked_at <= len(GROUP_NAMES),

@@ -11,8 +11,8 @@ the tiling is read as:
 * A result holds from its X_lb until the X_lb of the next frame, at most `hold_m` beyond its X_ub; then there is a
   gap: no result. The default is the depth of the near group, the stretch of road that the result was taken from.
 * Where several stamps cover a position, the newest frame wins.
-* Frames less than `resolution_m` apart share one stamp, with the newest result: a standing car does not pile up
-  stamps.
+* Frames less than `resolution_m` apart share one stamp, with the newest result: a car that stands, or shunts to and
+  fro, does not pile up stamps.
 """
 
 from __future__ import annotations
@@ -106,8 +106,7 @@ class PreviewState:
             Stamp(X_lb, X_ub, Outcome(Surface(surface), Q_v, flag, captured_s))
             for X_lb, X_ub, surface, Q_v, flag, captured_s in data["stamps"]
         )
-        ascending = all(older.X_lb_m <= newer.X_lb_m for older, newer in pairwise(stamps))
-        return cls(stamps, data["captured_at_m"], ascending)
+        return cls(stamps, data["captured_at_m"], _ascend(stamps))
 
 
 def add_frame(
@@ -140,13 +139,27 @@ def add_frame(
     else:
         length = max(0.0, position_m - state.captured_at_m)
     newest = Stamp(X_lb, X_lb + length, outcome)
-    kept = state.stamps
-    captured_at_m = position_m
-    if kept and 0.0 <= X_lb - kept[-1].X_lb_m < config.resolution_m:
-        newest = Stamp(kept[-1].X_lb_m, max(kept[-1].X_ub_m, newest.X_ub_m), outcome)
-        kept = kept[:-1]
-    ascending = state.ascending and (not kept or kept[-1].X_lb_m <= newest.X_lb_m)
-    return PreviewState((*kept, newest), captured_at_m, ascending)
+    kept, shared = _apart(state, X_lb, config.resolution_m)
+    if shared:
+        begin_m = min(stamp.X_lb_m for stamp in shared)
+        newest = Stamp(begin_m, max(newest.X_ub_m, *(stamp.X_ub_m for stamp in shared)), outcome)
+    ascending = state.ascending or (bool(shared) and _ascend(kept))
+    ascending = ascending and (not kept or kept[-1].X_lb_m <= newest.X_lb_m)
+    return PreviewState((*kept, newest), position_m, ascending)
+
+
+def _apart(
+    state: PreviewState, X_lb_m: float, resolution_m: float
+) -> tuple[tuple[Stamp, ...], tuple[Stamp, ...]]:
+    """The stamps that begin elsewhere than a new one, and those that it shares a place with."""
+    if state.ascending and (not state.stamps or X_lb_m - state.stamps[-1].X_lb_m >= resolution_m):
+        return state.stamps, ()
+    shared = tuple(s for s in state.stamps if abs(X_lb_m - s.X_lb_m) < resolution_m)
+    return tuple(s for s in state.stamps if s not in shared) if shared else state.stamps, shared
+
+
+def _ascend(stamps: tuple[Stamp, ...]) -> bool:
+    return all(older.X_lb_m <= newer.X_lb_m for older, newer in pairwise(stamps))
 
 
 def covering(state: PreviewState, config: PreviewConfig, position_m: float) -> Outcome | None:

@@ -8,6 +8,7 @@ uncertainty does.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,7 +68,7 @@ class Ellipses:
     Attributes
     ----------
     distance_m : array, shape (n,)
-        Way of the wheel to each centre [m].
+        Way of the rear axle to each centre [m].
     centre_m : array, shape (n, 2)
         x and y [m].
     covariance_m2 : array, shape (n, 2, 2)
@@ -82,6 +83,15 @@ class Ellipses:
         """The ellipses whose centres lie in [from, to) along the way [m]."""
         chosen = (self.distance_m >= from_m) & (self.distance_m < to_m)
         return Ellipses(self.distance_m[chosen], self.centre_m[chosen], self.covariance_m2[chosen])
+
+    def way_m(self, points_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Way to the place on the track that is beside each point, and how far that is from it, shapes (n,) [m]."""
+        beside = points_m[:, None] - self.centre_m
+        nearest = np.argmin((beside**2).sum(axis=2), axis=1)
+        along = np.gradient(self.centre_m, self.distance_m, axis=0)[nearest]
+        off = beside[np.arange(len(points_m)), nearest]
+        further = (off * along).sum(axis=1) / (along**2).sum(axis=1)
+        return self.distance_m[nearest] + further, np.hypot(*(off - further[:, None] * along).T)
 
     def outlines_m(self, corners: int = 32) -> NDArray[np.float64]:
         """Points on the 95 % outlines, shape (n, corners, 2) [m]."""
@@ -175,6 +185,12 @@ def position_covariance(
     return covariances
 
 
+def way_beside(tracks: Sequence[Ellipses], points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Way at which the wheels reach each point, by the track that leads past it closest, shape (n,) [m]."""
+    ways, off = (np.stack(told) for told in zip(*(track.way_m(points_m) for track in tracks), strict=True))
+    return ways[off.argmin(axis=0), np.arange(len(points_m))]
+
+
 def reckon(
     motion: Motion,
     *,
@@ -187,7 +203,7 @@ def reckon(
     start_deviation_m: float,
 ) -> Ellipses:
     """Confidence ellipses of one front wheel up to the horizon, one per distance step (section 3.2)."""
-    distance_m = np.arange(0.0, horizon_m + step_m / 2.0, step_m)
+    distance_m = np.arange(0.0, max(horizon_m, step_m) + step_m / 2.0, step_m)
     centre_m = wheel_track(distance_m, path_curvature(motion, wheelbase_m), wheelbase_m, lateral_m)
     covariance_m2 = position_covariance(speed_along(distance_m, motion), step_m, k1, k2, start_deviation_m)
     return Ellipses(distance_m, centre_m, covariance_m2)
