@@ -9,6 +9,7 @@ from enum import Enum
 
 from trpac_core.dife import GREATEST_THETA, VisualTerm
 from trpac_core.estimator import EstimatorConfig
+from trpac_core.excitation import K_V_LIMIT
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife_config import (
     FARTHEST_CENTRE,
@@ -190,6 +191,7 @@ _ESTIMATOR_PARAMETERS = (
             f"scheduler.K_v_values.{place}",
             f"K_v of the set '{size}'",
             0.0,
+            K_V_LIMIT,
         )
         for place, size in enumerate(("small", "medium", "big"))
     ),

@@ -198,6 +198,7 @@ def after_snow(theta_img, metres, flicker_every_m=None):
 
 def test_another_class_that_stands_ends_the_rest():
     """Another class is another road: what the tyre showed before no longer speaks for it."""
+    assert OTHER_CLASS_M == 4.0, "twice what one picture's verdict reaches"
     assert after_snow(0.8, OTHER_CLASS_M - 0.05) == 0.5
     assert after_snow(0.8, OTHER_CLASS_M + 0.3) > 0.5
 

@@ -138,6 +138,41 @@ def test_tyres_that_resist_more_in_front_hold_the_car_by_each_axles_load():
     assert settled_acceleration(run) == pytest.approx(expected, rel=2e-3)
 
 
+def settled_slips(run):
+    """Of the front and the rear left wheel at the end, signed [-]."""
+    rim = run.wheel_speed_rad_s[-1, [0, 2]] * RADIUS
+    return rim / run.speed_m_s[-1] - 1.0
+
+
+def test_brakes_that_drag_more_in_front_slow_the_front_wheels_more():
+    values = {"brake_drag": {"torque_nm": 40.0, "unlike": 0.5}}
+    run = drive(car_with({"brake_drag": "axles unlike"}, **values), 0.0, 1.5, 25.0)
+    front, rear = settled_slips(run)
+    spun_nm = -INERTIA * settled_acceleration(run) / RADIUS
+    assert front < rear < 0.0
+    assert front / rear == pytest.approx((60.0 - spun_nm) / (20.0 - spun_nm), rel=0.02)
+
+
+def test_front_wheels_of_more_inertia_take_more_of_their_torque_for_themselves():
+    values = {"wheel_inertia_offset": {"inertia_kg_m2": 2.0, "unlike": 0.5}}
+    run = drive(car_with({"wheel_inertia_offset": "axles unlike"}, **values), 200.0, 1.5, 10.0)
+    spin_up = settled_acceleration(run) / RADIUS
+    front, rear = settled_slips(run)
+    assert front / rear == pytest.approx((200.0 - 3.0 * spin_up) / (200.0 - 1.0 * spin_up), rel=0.02)
+
+
+def test_a_tyre_that_softens_with_its_load_never_pushes():
+    """Hard braking on much load transfer takes the rear wheels' load: their stiffness goes, and stays one."""
+    car = car_with(
+        {"tyre_stiffness_offset": "with load"},
+        tyre_stiffness_offset={"stiffness_n": 50_000.0, "by_load": 1.5},
+        load_transfer={"cog_height_m": 0.9},
+    )
+    run = drive(car, -1500.0, 1.0, 25.0)
+    assert np.diff(run.speed_m_s).min() > -1.3 * G * np.diff(run.time_s).max()
+    assert (run.vertical_load_n >= 0.0).all()
+
+
 def test_axles_of_unlike_radius_roll_at_unlike_speeds():
     values = {"wheel_radius_offset": {"radius_m": 0.3, "unlike": 0.01}}
     run = drive(car_with({"wheel_radius_offset": "axles unlike"}, **values), 0.0, 1.0, 20.0)

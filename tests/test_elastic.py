@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trpac_core.elastic import AS_TOLD, ElasticModel, learned
+from trpac_core.elastic import AS_TOLD, CORRELATED, SETTLING, ElasticModel, learned
 from trpac_core.tyre import INITIAL_SLOPE
 
 LOAD_N, C_X = 3400.0, 50_000.0
@@ -67,6 +67,31 @@ def test_told_to_learn_nothing_it_learns_nothing():
     line, v = taught(AS_TOLD, ratio=0.02, compliance=0.1)
     assert line == AS_TOLD.start
     assert line.offset(v)[0] == line.compliance() == 0.0
+
+
+def test_a_reading_is_taken_as_by_kalmans_formula():
+    line, v = taught(seconds=0.5)
+    force_n, slip, deviation, change = 0.03 * LOAD_N, 0.004, 1e-4, 2e-4
+    P = np.array([[line.bb, line.br, line.bc], [line.br, line.rr, line.rc], [line.bc, line.rc, line.cc]])
+    elastic = force_n / (1.27 * C_X)
+    H = np.array([1.0 / v, 1.0, elastic])
+    noise = CORRELATED * deviation**2 + (MODEL.force_doubt_n / (1.27 * C_X)) ** 2 + (SETTLING * change) ** 2
+    total = H @ P @ H + noise
+    gain = P @ H / total
+    off = slip - (line.b / v + line.r + (1.0 + line.c) * elastic)
+    after = learned(line, MODEL, slip, v, force_n, LOAD_N, C_X, deviation, change)
+    assert abs(off) < 3.0 * np.sqrt(total)
+    assert after[:3] == pytest.approx(np.array(line[:3]) + gain * off)
+    expected = P - np.outer(gain, H @ P)
+    assert after[3:] == pytest.approx(expected[np.triu_indices(3)])
+
+
+def test_speed_signals_that_drift_are_known_less_from_second_to_second():
+    line, _ = taught()
+    later = line.drifted(MODEL, 30.0)
+    assert later.bb == pytest.approx(line.bb + 30.0 * MODEL.speed_drift_m_s**2)
+    assert later._replace(bb=line.bb) == line
+    assert line.drifted(MODEL, 1e9).bb == pytest.approx(max(line.bb, MODEL.speed_bias_m_s**2))
 
 
 def test_covariance_stays_one():

@@ -58,7 +58,7 @@ class Bench:
     def __post_init__(self) -> None:
         self.bus = FakeBus(CODEC, lambda cycle: driving())
         self.ring = Ring(len(columns(self.unit.wiring)), 5000)
-        self.placing = Placing(PreviewConfig(), 0.05, 0.5, len(self.unit.wiring.sides))
+        self.placing = Placing(PreviewConfig(), 0.05, len(self.unit.wiring.sides))
         self.sight = Sight(self.placing, 1000 * MS, self.unit.wiring.side_names)
         self.events = Events(lambda time_s, text: self.told.append(text), lambda: 0.0)
         self.inputs = Inputs(CODEC, INPUT_MESSAGES, self.events.say)

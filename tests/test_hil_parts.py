@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 import re
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +18,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.errors import ScenarioError
+from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.bus import BusSettings, Link, bus_options
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, OUTPUT_MESSAGES, load_codec
@@ -29,8 +33,9 @@ from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
 from trpac_hil.partner import PLAIN_SCENARIO, Partner, PartnerJob
 from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
-from trpac_hil.realtime import loop_core
+from trpac_hil.realtime import as_before, loop_core, pin
 from trpac_hil.records import columns
+from trpac_hil.rig import HilSettings, Rig, _vision
 from trpac_hil.shared import Ring
 from trpac_hil.spread import Spread
 from trpac_hil.unit import Wiring
@@ -214,7 +219,7 @@ def result(number: int, captured_ns: int, arrived_ns: int, surface: Surface | No
 
 
 def placing() -> Placing:
-    return Placing(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, 0.5, sides=1)
+    return Placing(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, sides=1)
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.06, 0.12])
@@ -487,3 +492,43 @@ def test_the_log_appears_whole_and_nothing_else_is_left(tmp_path: Path) -> None:
             assert mdf.get(column).samples.tolist() == rows[:, place].tolist()
             assert mdf.get(column).timestamps.tolist() == rows[:, 0].tolist()
         assert mdf.get("wheel_torque_fl_nm").unit == "N.m"
+
+
+def test_priority_and_cores_are_given_back():
+    """Another run of the same process chooses anew, and its helpers keep off its own core only."""
+    cores = os.sched_getaffinity(0)
+    with as_before():
+        pin(min(cores))
+        assert os.sched_getaffinity(0) == {min(cores)}
+    assert os.sched_getaffinity(0) == cores
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER
+
+
+def deaf(control):
+    """A helper that does not look whether it is to stop."""
+    control.ready()
+    time.sleep(600.0)
+
+
+def test_a_helper_that_does_not_stop_is_ended():
+    rig = Rig()
+    rig.add("camera", deaf, ...)
+    rig.wait_until_ready()
+    begun = time.monotonic()
+    rig.end(patience_s=0.3)
+    assert time.monotonic() - begun < 30.0
+
+
+def test_pictures_are_judged_by_the_units_parameters(tmp_path):
+    told = {
+        "image.least_mass": 0.9,
+        "image.patches_near": 6.0,
+        "image.flag_threshold": 0.4,
+        "vehicle.track": 1.7,
+    }
+    settings = HilSettings(tmp_path, BusSettings("virtual", "none"), parameters=told)
+    camera = Camera()
+    vision = _vision(settings, camera)
+    assert (vision.least_mass, vision.b[0], vision.flag_threshold) == (0.9, 6, 0.4)
+    assert (vision.track_m, vision.camera) == (1.7, camera)
+    assert _vision(replace(settings, parameters={}), camera) == IfeConfig(camera=camera)

@@ -24,7 +24,7 @@ def slope_of(exponent, noise, seed=1):
     for slip in SLIPS[:400]:
         elastic = slip / (1.0 - slip) * CAR.longitudinal_stiffness_n / LOAD_N
         theta = 0.3 * (elastic / 0.3) ** exponent * math.exp(noise * rng.standard_normal())
-        state = followed(state, elastic, theta, noise)
+        state = followed(state, elastic, theta, noise, 0.01)
     return state
 
 
@@ -44,7 +44,7 @@ def test_what_noise_alone_may_make_of_it_is_no_mismatch():
 def test_an_even_pedal_tells_nothing_of_the_slope():
     state = Following()
     for _ in range(500):
-        state = followed(state, 0.3, 0.3, 0.02)
+        state = followed(state, 0.3, 0.3, 0.02, 0.01)
     assert state.share() == 0.0
     assert state.variance == 1.0
 

@@ -53,7 +53,7 @@ def test_derivatives_agree_with_finite_differences(theta, slip, load, stiffness)
 def test_inverse_returns_the_theta_that_made_the_force(theta, slip, load, stiffness):
     sliding = theta * load * (1.0 - slip) / (2.0 * stiffness * slip)
     friction = tyre.used_friction(theta, slip, load, stiffness)
-    found = tyre.theta_from_friction(friction, slip, load, stiffness)
+    found = tyre.tyre_at_slip(slip, load, stiffness).theta(friction)
     if sliding < 0.999:
         assert found == pytest.approx(theta, rel=1e-5)
     elif sliding > 1.001 and found is not None:
@@ -65,12 +65,12 @@ def test_inverse_returns_the_theta_that_made_the_force(theta, slip, load, stiffn
 def test_inverse_agrees_with_brent(friction, slip, load, stiffness):
     upper = 2.0 * stiffness * slip / (1.0 - slip) / load
     if tyre.used_friction(upper, slip, load, stiffness) <= friction:
-        assert tyre.theta_from_friction(friction, slip, load, stiffness) is None
+        assert tyre.tyre_at_slip(slip, load, stiffness).theta(friction) is None
         return
     wanted = brentq(
         lambda theta: tyre.used_friction(theta, slip, load, stiffness) - friction, 0.0, upper, xtol=1e-13
     )
-    assert tyre.theta_from_friction(friction, slip, load, stiffness) == pytest.approx(wanted, abs=1e-7)
+    assert tyre.tyre_at_slip(slip, load, stiffness).theta(friction) == pytest.approx(wanted, abs=1e-7)
 
 
 @given(THETA, LOAD, st.floats(10_000.0, 120_000.0))

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
-from .observer import advanced_state, settled_state
+from .observer import advanced_state, observed_force, settled_state
 from .sight import (
     GREATEST_THETA,
     LEAST_SENSITIVITY,
@@ -24,7 +24,7 @@ from .sight import (
     place_of_mean,
     shown,
 )
-from .steady import NOTHING, Steady, held, quickened, same_slip
+from .steady import NOTHING, Steady, faded, held, quickened, same_slip
 from .tyre import elastic_friction, force, sensitivity_of
 
 __all__ = [
@@ -180,6 +180,12 @@ def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains)
     return state._replace(s=s)
 
 
+def unread(state: FusionState, passed_s: float, way_m: float) -> FusionState:
+    """The state after a time and a way in which nothing could be read."""
+    unseen_m = min(state.unseen_m + way_m, NEVER_SEEN_M)
+    return state._replace(unseen_m=unseen_m, steady=faded(state.steady, passed_s))
+
+
 def _unaided(
     state: FusionState,
     inputs: WheelInputs,
@@ -206,7 +212,7 @@ def _unaided(
     if not inputs[8]:
         s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
         return _new(Unaided, (theta_hat, s, model_n, model_n, None, 0.0, NOTHING, None))
-    force_n = model_n - inertia / radius_m * (s + K * omega)  # Eq. (14), see `observed_force`
+    force_n = observed_force(model_n, s, omega, K, inertia, radius_m)
     theta_tyre, sensitivity, place = None, 0.0, None
     theta_next, by_theta_n, theta_rate = theta_hat, 0.0, 0.0
     if asked:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .camera_side import RoadUnderWheel, take_frame
 from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
-from .dife import FusionState, Outcome, Wheel, dynamics_step, fused_step, settled
+from .dife import FusionState, Outcome, Wheel, dynamics_step, fused_step, settled, unread
 from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
 from .mismatch import followed
@@ -175,7 +175,7 @@ class TrpacEstimator:
         else:
             # A signal that changes more rarely than the unit steps must not be cut at its jumps: so the speed is
             # differentiated by its distance from its own filter, and only that is bounded.
-            slope = (sensors.vehicle_speed_m_s - lagged) / self.config.acceleration_filter_s
+            slope = (sensors.vehicle_speed_m_s - lagged) * rates.differentiator_1_s
             acceleration = min(max(slope, -GREATEST_ACCELERATION_M_S2), GREATEST_ACCELERATION_M_S2)
             lagged += rates.acceleration_share * (sensors.vehicle_speed_m_s - lagged)
         load_n = sensors.vertical_load_n
@@ -321,7 +321,7 @@ class TrpacEstimator:
         torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0
         if theta_tyre is not None and friction > max(torque_friction, _LEAST_FRICTION):
             noise = reading_noise(friction, tyre, noise_share, torque_friction)
-            state.following = followed(state.following, tyre.elastic, theta_tyre, noise)
+            state.following = followed(state.following, tyre.elastic, theta_tyre, noise, passed_s)
             following = state.following.share()
         line_share = math.sqrt(state.line.slip_variance(size, speed_m_s)) / size
         evidence = Evidence(theta_tyre, friction, tyre, line_share, noise_share, torque_friction, following)
@@ -389,8 +389,14 @@ class TrpacEstimator:
         way_m = state.speed_m_s * passed_s
         state.time_s += passed_s
         state.position_m += way_m
-        theta = state.fusion.theta_hat
-        state.variance = wandered(self.config.confidence, state.variance, theta, way_m)
+        theta, model = state.fusion.theta_hat, self.config.confidence
+        state.variance = wandered(model, state.variance, theta, way_m)
+        state.fusion = unread(state.fusion, passed_s, way_m)
+        state.dynamics = unread(state.dynamics, passed_s, way_m)
+        if step_s > LONGEST_STEP_S:
+            state.variance = unknown_variance(model, theta)
+            state.fusion = FusionState(theta, state.fusion.s)
+            state.dynamics = FusionState(state.dynamics.theta_hat, state.dynamics.s)
         state.lag, state.settled = 0.0, False
         outcome = self._road.at(state.preview, state.position_m - self._setback_m)
         theta_seen, Q_v, age_s = self._last.TRPAC_image, 0.0, -1.0

@@ -12,6 +12,7 @@ from .dife import FusionState, Gains
 from .elastic import ElasticLine, ElasticModel
 from .excitation import FuzzyScheduler
 from .mismatch import Following
+from .observer import seen_at
 from .readings import (
     GREATEST_ACCELERATION_M_S2,
     JUMP_M_S,
@@ -258,6 +259,10 @@ class Rates:
     """How far the speed may be from its filter [m/s]."""
     most_rim_m_s: float
     """How far the rim's speed may be from its filter [m/s]."""
+    ahead: float
+    """Share of the way over the step at which the force observer sees what changes evenly over it [-]."""
+    differentiator_1_s: float
+    """Acceleration by the speed's distance from the filter that differentiates it [1/s]."""
 
     @classmethod
     def at(cls, config: EstimatorConfig, step_s: float, before_s: float) -> Rates:
@@ -267,12 +272,16 @@ class Rates:
         share = sensor_share or filter_share(before_s, config.sensor_filter_s)
         gain = math.sqrt(share / (2.0 - share))
         noise_m_s = config.sliding_speed_noise_m_s * gain
+        acceleration_share = filter_share(step_s, config.acceleration_filter_s)
         return cls(
             step_s,
             sensor_share,
-            filter_share(step_s, config.acceleration_filter_s),
+            acceleration_share,
             gain,
             noise_m_s,
             most_m_s=JUMP_M_S + GREATEST_ACCELERATION_M_S2 * step_s,
             most_rim_m_s=RIM_JUMP_M_S + RIM_ACCELERATION_M_S2 * step_s,
+            ahead=seen_at(config.gains.K * step_s),
+            # On an even rise a discrete filter lags by step over share, not by its time constant.
+            differentiator_1_s=acceleration_share / step_s if step_s else 1.0 / config.acceleration_filter_s,
         )

@@ -17,11 +17,10 @@ from typing import NamedTuple
 
 from .elastic import CONTRADICTED, CORRELATED, REJECTED
 
-MEAN_SHARE = 0.02
-"""Share of the way to a reading that the running means go: half a second, a stroke of the pedal, at 100 readings a
-second [-]."""
-FORGETTING = 1e-4
-"""Growth of the slope's variance with a reading: another part of the curve may be as told [-]."""
+MEAN_S = 0.5
+"""Time constant of the running means: a stroke of the pedal [s]."""
+FORGETTING_1_S = 0.01
+"""Growth of the slope's variance with time: another part of the curve may be as told [1/s]."""
 _new = tuple.__new__
 
 
@@ -39,7 +38,9 @@ class Following(NamedTuple):
         return min(max(least, 0.0), 1.0)
 
 
-def followed(before: Following, elastic: float, theta_tyre: float, noise: float) -> Following:
+def followed(
+    before: Following, elastic: float, theta_tyre: float, noise: float, passed_s: float
+) -> Following:
     """The slope after one more reading.
 
     Parameters
@@ -50,6 +51,8 @@ def followed(before: Following, elastic: float, theta_tyre: float, noise: float)
         X / F_z and theta(lambda, F_hat), above 0 [-].
     noise : float
         Relative standard deviation of that theta through noise, in one reading [-].
+    passed_s : float
+        Time since the reading before [s].
     """
     slope, variance, log_elastic, log_theta = before
     now_elastic, now_theta = math.log(elastic), math.log(theta_tyre)
@@ -61,5 +64,5 @@ def followed(before: Following, elastic: float, theta_tyre: float, noise: float)
     if total > 0.0 and surprise * surprise < REJECTED * REJECTED * total:
         gain = variance * along / total
         slope, variance = slope + gain * surprise, variance * (1.0 - gain * along)
-    grown = min(1.0, variance + FORGETTING)
-    return _new(Following, (slope, grown, log_elastic + MEAN_SHARE * along, log_theta + MEAN_SHARE * off))
+    grown, share = min(1.0, variance + FORGETTING_1_S * passed_s), -math.expm1(-passed_s / MEAN_S)
+    return _new(Following, (slope, grown, log_elastic + share * along, log_theta + share * off))

@@ -50,6 +50,15 @@ def settled_state(
     return (model_force_n - force_n) * radius_m / inertia_kg_m2 - gain * wheel_speed_rad_s
 
 
+def seen_at(x: float) -> float:
+    """Share of the way over a step at which an input that changes evenly counts for Eq. (15), x = K dt. [-].
+
+    The mean of t / dt over the step, weighted as the observer forgets, with exp(-K (dt - t)): half of the way for short
+    steps, the end of long ones.
+    """
+    return 0.5 + x / 12.0 if x < 1e-4 else 1.0 / -math.expm1(-x) - 1.0 / x
+
+
 def advanced_state(
     s: float,
     model_force_n: float,
@@ -75,8 +84,8 @@ def advanced_state(
     theta_rate_1_s : float
         theta_hat' over the step [1/s].
     wheel_torque_nm, wheel_speed_rad_s : float
-        Their means over the step [N m], [rad/s]: with those of its start the inertia's share of a wheel that gains
-        speed would be counted K dt / (1 - exp(-K dt)) times.
+        Where they are `seen_at` of the step [N m], [rad/s]: with those of its start the inertia's share of a wheel that
+        gains speed would be counted K dt / (1 - exp(-K dt)) times.
     gain, inertia_kg_m2, radius_m, step_s : float
         K [1/s], I [kg m^2], R [m] and the step [s].
     """

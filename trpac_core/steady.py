@@ -74,6 +74,12 @@ def held(before: Steady, slip: float, friction: float, rise: float, noise: float
     )
 
 
+def faded(before: Steady, passed_s: float) -> Steady:
+    """The means after a time without readings: as if so much less had gone into them."""
+    held_s = (before.held_s if before.held_s < MEMORY_S else MEMORY_S) - passed_s
+    return before._replace(held_s=held_s) if held_s > 0.0 else NOTHING
+
+
 def same_slip(first: Steady, second: Steady) -> bool:
     """Whether both are means of the same slip over the same time, whatever their used friction."""
     return first[0] == second[0] and first[2] == second[2] and first[3] == second[3]

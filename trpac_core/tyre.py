@@ -188,26 +188,6 @@ def friction_by_slip(theta: float, slip: float, load_n: float, longitudinal_stif
     )
 
 
-def theta_from_friction(
-    friction: float, slip: float, load_n: float, longitudinal_stiffness_n: float
-) -> float | None:
-    """The inverse theta(lambda, F) of the tyre: the one theta below L = 1 that gives this used friction.
-
-    Parameters
-    ----------
-    friction : float
-        Used friction abs(F_x) / F_z [-].
-    slip, load_n, longitudinal_stiffness_n : float
-        As in `used_friction`.
-
-    Returns
-    -------
-    float or None
-        Theta [-]; None where no theta gives it: at L >= 1 the force no longer depends on theta.
-    """
-    return tyre_at_slip(slip, load_n, longitudinal_stiffness_n).theta(friction)
-
-
 def onset_elastic(theta: float, sensitivity: float) -> float:
     """X / F_z at which d mu / d theta reaches a sensitivity: from here on the tyre shows theta [-].
 

@@ -73,12 +73,12 @@ def wheel_inputs(
         omega = before_omega + share * (omega - before_omega)
         torque_nm = before_nm + share * (torque_nm - before_nm)
         speed_m_s = before_m_s + share * (speed_m_s - before_m_s)
-        # The mean over the step to come of signals that go on as they came.
+        # Signals that go on as they came, where the observer sees them over the step to come.
         before_s = state.step_s
         ratio = step_s / before_s if before_s else 0.0
-        half = 0.5 * (ratio if ratio < MOST_AHEAD else MOST_AHEAD)
-        omega_ahead = omega + half * (omega - before_omega)
-        torque_ahead_nm = torque_nm + half * (torque_nm - before_nm)
+        ahead = rates.ahead * (ratio if ratio < MOST_AHEAD else MOST_AHEAD)
+        omega_ahead = omega + ahead * (omega - before_omega)
+        torque_ahead_nm = torque_nm + ahead * (torque_nm - before_nm)
     rim_m_s = omega * radius_m
     read_slip = signed = signed_slip(rim_m_s, speed_m_s, floor_m_s)
     size = direction = deviation = 0.0

@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from trpac_core.vision.camera import Camera
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError, decode_image
@@ -67,14 +66,12 @@ class CameraJob:
     ----------
     source : Source
         Pictures.
-    camera : Camera
-        Lens and mounting.
+    vision : IfeConfig
+        Settings of the image estimator: camera, car, and what the unit's parameters `image.*` say.
     fps : float
         Pictures per second.
     sides : tuple of str
         Tracks that are asked for: 'left', 'right', or both in this order.
-    track_m, wheelbase_m : float
-        Of the car [m].
     threads : int
         Of each network; 1 leaves the loop its core.
     core : int or None
@@ -82,11 +79,9 @@ class CameraJob:
     """
 
     source: Source
-    camera: Camera
+    vision: IfeConfig
     fps: float
     sides: tuple[str, ...] = ("left",)
-    track_m: float = 1.356
-    wheelbase_m: float = 2.305
     threads: int = 1
     core: int | None = None
 
@@ -97,7 +92,6 @@ class Eyes:
 
     job: CameraJob
     state: Any = field(init=False)
-    flag_threshold: float = field(init=False)
     _ife: Any = field(init=False)
 
     def __post_init__(self) -> None:
@@ -107,10 +101,7 @@ class Eyes:
             Segmenter(MODELS / "segmenter.onnx", job.threads),
             SurfaceClassifier(MODELS / "surface.onnx", job.threads),
         )
-        config = IfeConfig(
-            camera=job.camera, track_m=job.track_m, wheelbase_m=job.wheelbase_m, groups_looked_at=1
-        )
-        self.flag_threshold = config.flag_threshold
+        config = replace(job.vision, groups_looked_at=1)
         if len(job.sides) == 2:
             self._ife, self.state = SidesIfe(config, *networks), SidesState()
         else:
@@ -176,5 +167,5 @@ def _verdicts(job: CameraJob, eyes: Eyes, number: int, motion: Numbers, control:
     return [
         number
         for result in seen
-        for number in (float(result.surface), result.told_by_bus(eyes.flag_threshold))
+        for number in (float(result.surface), result.told_by_bus(job.vision.flag_threshold))
     ]

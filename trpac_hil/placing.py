@@ -111,12 +111,10 @@ class Placed:
 class Placing:
     """Stamps of the results on the road, for each side that the unit asks for."""
 
-    def __init__(
-        self, config: PreviewConfig, frame_interval_s: float, flag_threshold: float, sides: int
-    ) -> None:
+    def __init__(self, config: PreviewConfig, frame_interval_s: float, sides: int) -> None:
         self.counts = Placed()
         self.newest: CameraResult | None = None
-        self._config, self._interval_s, self._threshold = config, frame_interval_s, flag_threshold
+        self._config, self._interval_s = config, frame_interval_s
         self._states = [PreviewState()] * sides
         self._failed = [False] * sides
 
@@ -149,8 +147,8 @@ class Placing:
     ) -> PreviewState:
         state = prune(self._states[side], self._config, odometer.position_m)
         if verdict is not None:
-            flag = verdict.Q_v > self._threshold
-            outcome = Outcome(verdict.surface, verdict.Q_v, flag, captured_s)
+            # Whether it counts says the unit, by its own threshold.
+            outcome = Outcome(verdict.surface, verdict.Q_v, True, captured_s)
         elif state.stamps:
             outcome = Outcome(state.stamps[-1].outcome.surface, 0.0, False, captured_s)
         else:

@@ -7,7 +7,7 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 SWITCH_INTERVAL_S = 2e-4
@@ -73,6 +73,21 @@ def lower_priority() -> None:
     """Make a process beside the loop give way to it."""
     if hasattr(os, "nice"):
         os.nice(HELPER_NICENESS)
+
+
+@contextmanager
+def as_before() -> Iterator[None]:
+    """Give priority and cores back at the end: another run of this process is to choose anew."""
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
+    policy = (os.sched_getscheduler(0), os.sched_getparam(0)) if hasattr(os, "sched_getscheduler") else None
+    try:
+        yield
+    finally:
+        if policy is not None:
+            with suppress(PermissionError):
+                os.sched_setscheduler(0, *policy)
+        if cores is not None:
+            os.sched_setaffinity(0, cores)
 
 
 def loop_core(told: int | None, realtime: bool) -> int | None:

@@ -8,18 +8,24 @@ import signal
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.packaging import build_unit
+from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
+from fmu_src.variables import Kind
 from scenarios.camera.files import load_camera
 from scenarios.files import load_scenario, load_vehicle
 from scenarios.unit_client import car_parameters
+from trpac_core.estimator import EstimatorConfig
 from trpac_core.vehicle import Vehicle
+from trpac_core.vision.camera import Camera
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.bus import BusSettings, Link
@@ -36,7 +42,7 @@ from trpac_hil.loop import Loop
 from trpac_hil.mdf import SCRATCH_PREFIX
 from trpac_hil.partner import PartnerJob, play
 from trpac_hil.placing import UNIT_PREVIEW, Placing
-from trpac_hil.realtime import loop_core, memory_mb, pin, raise_priority, undisturbed
+from trpac_hil.realtime import as_before, loop_core, memory_mb, pin, raise_priority, undisturbed
 from trpac_hil.recorder import LOG_FAILED, ROWS_KEPT, RecorderJob, record
 from trpac_hil.records import columns
 from trpac_hil.shared import Numbers, Ring
@@ -45,6 +51,8 @@ from trpac_hil.summary import summarise, write_summary
 from trpac_hil.unit import Unit
 
 LOG, SUMMARY = "log.mf4", "summary.json"
+PATIENCE_S = 60.0
+"""How long a helper that has been told to stop may go on before it is ended [s]."""
 RUN_UP_NS = 200_000_000
 """From the word to start until slot 0, for all processes to hear it [ns]."""
 CLASS_MESSAGE, CLASS_SIGNAL = "RoadClass", "RoadClass_Number"
@@ -177,21 +185,26 @@ class Rig:
                     f"dead {control.name}", f"The process of the {control.name} has died. On without it."
                 )
 
-    def end(self, control: Control | None = None) -> dict[str, Any]:
-        """Stop all, wait for them, and return what one of them said last, by kind."""
+    def end(self, control: Control | None = None, patience_s: float = PATIENCE_S) -> dict[str, Any]:
+        """Stop all, wait for them, and return what one of them said last, by kind.
+
+        One that is still at work after `patience_s` is ended; the recorder, which may have a long log to write, is
+        waited for as long as it says something.
+        """
         for each, _ in self._helpers:
             each.stop()
         said: dict[str, Any] = {}
         for each, process in self._helpers:
-            while True:
-                heard = each.heard()
-                if each is control:
-                    said |= dict(heard)
+            until_s = time.monotonic() + patience_s
+            while process.is_alive():
+                if heard := each.heard():
+                    until_s = time.monotonic() + patience_s
+                    said |= dict(heard) if each is control else {}
                 process.join(0.1)
-                if not process.is_alive():
-                    if each is control:
-                        said |= dict(each.heard())
-                    break
+                if time.monotonic() > until_s:
+                    process.kill()
+            if each is control:
+                said |= dict(each.heard())
         self._helpers.clear()
         return said
 
@@ -230,7 +243,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
     ring = Ring(len(columns(unit.wiring)), ROWS_KEPT)
     recorder = rig.add("recorder", record, _recorder_job(settings, unit), ring, ..., words)
     stale_ns = codec[CLASS_MESSAGE].stale_ns.get(CLASS_SIGNAL, 1_000_000_000)
-    placing = Placing(preview, 1.0 / settings.fps, IfeConfig.flag_threshold, sides)
+    placing = Placing(preview, 1.0 / settings.fps, sides)
     sight = Sight(placing, stale_ns, unit.wiring.side_names)
     if seen is not None:
         results, motion = Ring(result_columns(sides), RESULTS_KEPT), Numbers(len(MOTION))
@@ -239,6 +252,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
     over = threading.Event()
     thread = _plant(settings, rig, events, over, stack)
     rig.wait_until_ready()
+    stack.enter_context(as_before())
     system = _system(settings)
     inputs = Inputs(codec, INPUT_MESSAGES, events.say, settings.counters)
     period_ns = round(1e9 / settings.rate_hz)
@@ -325,16 +339,25 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
     files = tuple(pictures_in(settings.frames))
     if not files:
         raise HilError(f"{settings.frames}: no pictures in this folder. Expected JPEG or PNG files.")
-    car = _vehicle(settings)
     return CameraJob(
         Folder(files),
-        load_camera(settings.camera),
+        _vision(settings, load_camera(settings.camera)),
         settings.fps,
         unit.wiring.side_names,
-        car.track_m,
-        car.wheelbase_m,
         settings.camera_threads,
         settings.core,
+    )
+
+
+def _vision(settings: HilSettings, camera: Camera) -> IfeConfig:
+    """The image estimator's settings by the unit's parameters, which the unit itself has taken already."""
+    told = _parameters(settings)
+    variables = [v for v in TRPAC_ESTIMATOR if v.name.startswith("image.") and v.causality == "parameter"]
+    kinds = {Kind.INTEGER: int, Kind.BOOLEAN: bool, Kind.REAL: float}
+    values = {v.name: kinds[v.kind](told.get(v.name, v.start)) for v in variables if v.source}
+    vision = configuration([v for v in variables if v.source], values, EstimatorConfig()).vision
+    return replace(
+        vision, camera=camera, track_m=told["vehicle.track"], wheelbase_m=told["vehicle.wheelbase"]
     )
 
 

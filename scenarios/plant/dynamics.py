@@ -84,6 +84,9 @@ RELEASE_SPEED_M_S = 1.0
 LEAST_RELAXATION = 0.1
 """Share of its length that is left of a tyre's relaxation where the load leaves it, or where it slides [-]."""
 
+LEAST_STIFFNESS = 0.1
+"""Share that is left of a stiffness that goes with the load where the load leaves the tyre: less would push [-]."""
+
 INITIAL_SLOPE = 1.27
 """Slope of the force by slip without any, in units of C_x: the tyre's shape there [-]."""
 
@@ -364,7 +367,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             if slip_lags:
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
-            stiffness_n = _tyre_stiffness(i, p) * (1.0 + p.stiffness_by_load * more)
+            stiffness_n = _tyre_stiffness(i, p) * max(1.0 + p.stiffness_by_load * more, LEAST_STIFFNESS)
             tyre = tyre_force(theta, abs(acting), load_n, stiffness_n)
             if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
                 tyre = reshaped(tyre, abs(acting), theta * load_n, load_n, p)

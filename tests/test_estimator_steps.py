@@ -1,0 +1,148 @@
+"""What the estimator says does not depend on how a host cuts time into steps, nor on gaps in its readings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from trpac_core import tyre
+from trpac_core.confidence import unknown_variance
+from trpac_core.dife import NEVER_SEEN_M
+from trpac_core.elastic import AS_TOLD, ElasticModel
+from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.observer import seen_at
+from trpac_core.readings import Sensors
+from trpac_core.steady import NOTHING, Steady, faded
+from trpac_core.vehicle import Vehicle
+from trpac_core.vision.classes import Surface
+
+NAN = math.nan
+SMOOTH = Vehicle(rolling_resistance=0.0)
+LOAD_N = SMOOTH.wheel_load(True)
+C_X, RADIUS_M, INERTIA = SMOOTH.longitudinal_stiffness_n, SMOOTH.wheel_radius_m, SMOOTH.wheel_inertia_kg_m2
+UNFILTERED = EstimatorConfig(vehicle=SMOOTH, sensor_filter_s=1e-6, elastic=AS_TOLD)
+STEPS_S = [0.001, 0.01, 0.02, 0.05, 0.1]
+
+
+@pytest.mark.parametrize("x", [1e-6, 1e-3, 0.06, 1.0, 30.0])
+def test_the_observer_sees_an_even_change_where_its_memory_lies(x):
+    weight = quad(lambda u: math.exp(-x * (1.0 - u)), 0.0, 1.0)[0]
+    assert seen_at(x) == pytest.approx(
+        quad(lambda u: u * math.exp(-x * (1.0 - u)), 0.0, 1.0)[0] / weight, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("step_s", STEPS_S)
+def test_a_wheel_that_gains_speed_shows_the_force_of_its_tyre(step_s):
+    """At a held slip under an even acceleration; what turns the wheel itself is no force on the road."""
+    slip, a_m_s2, theta = 0.03, 4.0, 0.4
+    force_n = tyre.force(theta, slip, LOAD_N, C_X, 1.0)
+    spin_up = a_m_s2 / RADIUS_M / (1.0 - slip)
+    torque_nm = force_n * RADIUS_M + INERTIA * spin_up
+    estimator = TrpacEstimator(replace(UNFILTERED, theta_initial=theta))
+    for time_s in np.arange(0.0, 3.0, step_s):
+        v = 8.0 + a_m_s2 * time_s
+        said = estimator.step(step_s, Sensors(v / RADIUS_M / (1.0 - slip), torque_nm, v, LOAD_N, 0.0, a_m_s2))
+    assert INERTIA * spin_up / RADIUS_M > 0.03 * force_n
+    assert said.tyre_force_n == pytest.approx(force_n, rel=2e-3)
+    assert said.TRPAC == pytest.approx(theta, rel=5e-3)
+
+
+@pytest.mark.parametrize("step_s", STEPS_S)
+def test_a_torque_that_rises_evenly_is_followed_by_the_observers_time_constant(step_s):
+    estimator, gain = TrpacEstimator(UNFILTERED), UNFILTERED.gains.K
+    slope_nm_s = 100.0
+    for time_s in np.arange(0.0, 3.0, step_s):
+        torque_nm = slope_nm_s * time_s
+        said = estimator.step(step_s, Sensors(10.0 / RADIUS_M, torque_nm, 10.0, LOAD_N))
+    assert said.tyre_force_n == pytest.approx((torque_nm - slope_nm_s / gain) / RADIUS_M, abs=0.05)
+
+
+@pytest.mark.parametrize("step_s", STEPS_S)
+def test_a_differentiated_speed_gives_the_load_of_its_acceleration(step_s):
+    told, found = TrpacEstimator(EstimatorConfig()), TrpacEstimator(EstimatorConfig())
+    for time_s in np.arange(0.0, 2.0, step_s):
+        v = 5.0 + 4.0 * time_s
+        at = Sensors(v / RADIUS_M, 0.0, v)
+        loads = [
+            one.step(step_s, sensors).load_n
+            for one, sensors in ((told, replace(at, longitudinal_acceleration_m_s2=4.0)), (found, at))
+        ]
+    assert loads[1] == pytest.approx(loads[0], abs=1.0)
+
+
+# --- gaps
+
+
+def sliding(theta, slip=0.04):
+    force_n = tyre.force(theta, slip, LOAD_N, C_X, 1.0)
+    return Sensors(10.0 / RADIUS_M / (1.0 - slip), force_n * RADIUS_M, 10.0, LOAD_N)
+
+
+def driven(estimator, sensors, seconds, frame=None):
+    for _ in range(round(seconds / 0.001)):
+        said = estimator.step(0.001, sensors, frame)
+        frame = None
+    return said
+
+
+def test_what_was_read_before_a_gap_does_not_speak_for_the_road_behind_it():
+    after_gap, fresh = (TrpacEstimator(EstimatorConfig(vehicle=SMOOTH)) for _ in range(2))
+    driven(after_gap, sliding(0.5), 1.5)
+    driven(after_gap, replace(sliding(0.5), wheel_torque_nm=NAN), 3.0)
+    start = after_gap.state()["state"]["fusion"][0]
+    fresh = TrpacEstimator(EstimatorConfig(vehicle=SMOOTH, theta_initial=start))
+    for part_s in (0.05, 0.05, 0.1):
+        found, expected = (driven(one, sliding(0.3), part_s).TRPAC for one in (after_gap, fresh))
+        assert found == pytest.approx(expected, abs=0.01)
+
+
+def test_way_without_readings_is_way_unseen():
+    estimator = TrpacEstimator(EstimatorConfig(vehicle=SMOOTH))
+    driven(estimator, sliding(0.3), 1.0)
+    driven(estimator, replace(sliding(0.3), wheel_speed_rad_s=NAN), 5.0)
+    state = estimator.state()["state"]
+    assert state["fusion"][2] == pytest.approx(50.0, rel=1e-6)
+    assert state["dynamics"][2] == pytest.approx(50.0, rel=1e-6)
+
+
+def test_a_single_lost_sample_leaves_the_means_nearly_as_good():
+    long = Steady(0.03, 0.4, 0.0, 5.0)
+    assert faded(long, 0.001) == long._replace(held_s=pytest.approx(0.199))
+    assert faded(long, 0.2) == faded(NOTHING, 0.001) == NOTHING
+
+
+def test_a_step_over_which_nobody_knows_the_way_leaves_nothing_known():
+    estimator = TrpacEstimator(EstimatorConfig(vehicle=SMOOTH))
+    sure = driven(estimator, sliding(0.3), 1.5)
+    lost = estimator.step(60.0, sliding(0.3))
+    assert lost.TRPAC == sure.TRPAC
+    unknown = math.sqrt(unknown_variance(EstimatorConfig().confidence, sure.TRPAC))
+    assert sure.TRPAC_std < 0.5 * unknown
+    assert lost.TRPAC_std == pytest.approx(unknown)
+    assert estimator.state()["state"]["fusion"][2] == NEVER_SEEN_M
+    assert driven(estimator, Sensors(10.0 / RADIUS_M, 0.0, 10.0), 0.01).TRPAC_std > 0.9 * unknown
+
+
+# --- the camera's gate
+
+
+@pytest.mark.parametrize(("confidence", "flag"), [(0.5, False), (math.nextafter(0.5, 1.0), True)])
+def test_a_class_counts_above_the_threshold_only(confidence, flag):
+    estimator = TrpacEstimator(EstimatorConfig())
+    cruise = Sensors(10.0 / RADIUS_M, 0.0, 10.0)
+    assert driven(estimator, cruise, 0.26, RoadClass(Surface.WET, confidence)).flag is flag
+
+
+def test_a_camera_that_pulls_the_estimate_leaves_the_observed_force_alone():
+    """Last term of Eq. (15): the tyre model's force goes with theta_hat, the road's does not."""
+    estimator = TrpacEstimator(replace(UNFILTERED, elastic=ElasticModel(), theta_initial=0.8))
+    force_n = tyre.force(0.9, 0.0235, LOAD_N, C_X, 1.0)
+    steady = Sensors(10.0 / RADIUS_M / (1.0 - 0.0235), force_n * RADIUS_M, 10.0, LOAD_N)
+    told = [estimator.step(0.001, steady, RoadClass(Surface.SNOW_ICE, 0.95)) for _ in range(2000)]
+    assert told[-1].TRPAC < 0.75
+    assert max(abs(said.tyre_force_n - force_n) for said in told) < 0.01
