@@ -338,6 +338,17 @@ class TestTime:
         frame["time_s"] += np.random.default_rng(1).uniform(-0.0049, 0.0049, len(frame))
         assert "expected a constant or slightly jittered rate" in refusal(frame)[0]
 
+    @pytest.mark.parametrize("share", [0.1, 0.3])
+    def test_rows_left_out_of_an_even_clock_are_lost_samples(self, read, share):
+        """As a rig writes it that leaves out the cycles for which it comes too late."""
+        whole = make_frame(1000.0, duration_s=3.0)
+        kept = whole[np.random.default_rng(4).uniform(size=len(whole)) >= share]
+        kept = kept.assign(time_s=kept["time_s"] + np.random.default_rng(5).uniform(-5e-5, 5e-5, len(kept)))
+        log = read(kept)
+        assert log.rate_hz == pytest.approx(1000.0, rel=0.03)
+        assert len(log) == len(kept)
+        assert "more than half a step" in log.warnings[0]
+
     def test_gaps_are_listed_and_short_ones_told(self, read, frame):
         log = read(frame.drop(index=[50, *range(100, 130)]))
         assert log.gaps == ((0.99, 1.3),)

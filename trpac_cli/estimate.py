@@ -89,7 +89,8 @@ def _error_table(errors: dict[str, Any]) -> Table:
         title="TRPAC_peak against mu_reference", title_justify="left", box=SIMPLE_HEAD, pad_edge=False
     )
     for heading in ("estimator", "rows", "time [s]", "mean abs. error", "within 2 std"):
-        table.add_column(heading, justify="left" if heading in ("estimator", "rows") else "right")
+        left = heading in ("estimator", "rows")
+        table.add_column(escape(heading), justify="left" if left else "right")
     for name, sets in errors.items():
         if not isinstance(sets, dict):
             continue

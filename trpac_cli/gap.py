@@ -74,7 +74,7 @@ def diagnose(
     vehicle_speed_m_s: {column: VehSpd, unit: km/h}. Ready-made ones lie in
     sim2real/mappings, all that they can say is in docs/logs.md.
 
-    No logs at hand? trpac gap demo --out out/demo makes some.
+    No logs at hand? trpac gap demo --out out/gap_demo makes some.
 
     Exit codes: 0 with a diagnosis, 2 unusable input.
     """
@@ -123,7 +123,7 @@ def demo(
     torque_lag, tyre_relaxation, tyre_stiffness_offset, vehicle_speed_scale,
     wheel_radius_offset, wheel_speed_delay.
 
-    Example: trpac gap demo --out out/demo --seed 4
+    Example: trpac gap demo --out out/gap_demo --seed 4
 
     Exit codes: 0 done, whether the diagnosis is right or not; 2 the folder cannot be used.
     """

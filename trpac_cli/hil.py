@@ -43,7 +43,7 @@ Dbc = Annotated[
 ]
 Rate = Annotated[float, typer.Option(min=100.0, max=1000.0, help="Cycles per second.")]
 Duration = Annotated[
-    float | None, typer.Option(min=0.01, max=1e6, help="Ends by itself after this time [s].")
+    float | None, typer.Option(min=0.01, max=1e6, help="Ends by itself after this time \\[s].")
 ]
 ScenarioOption = Annotated[
     Path | None, typer.Option(help="Car, road and sensor noise of the plant; the paper's by default.")
@@ -156,7 +156,7 @@ def hil_plant(
         float, typer.Option(min=0.0, max=200.0, help="Results per second of a camera on the bus; 0: none.")
     ] = 20.0,
     camera_delay_s: Annotated[
-        float, typer.Option(min=0.0, max=2.0, help="From a picture to its result on the bus [s].")
+        float, typer.Option(min=0.0, max=2.0, help="From a picture to its result on the bus \\[s].")
     ] = 0.06,
 ) -> None:
     """Play the reference plant on a CAN bus in real time, as the car for trpac hil; end with Ctrl-C.

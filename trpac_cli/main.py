@@ -5,11 +5,13 @@ from __future__ import annotations
 import tempfile
 import zipfile
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -25,7 +27,8 @@ if TYPE_CHECKING:
     from scenarios.files import Scenario
 
 app = typer.Typer(
-    help="Tyre-road adhesion from dynamics and camera: run scenarios, see how the gains come about.",
+    help="Tyre-road adhesion from dynamics and camera: run scenarios, estimate on recorded logs, diagnose the gap "
+    "between simulation and log, judge pictures, run beside a rig.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -39,9 +42,20 @@ app.command()(hil)
 app.command("hil-plant")(hil_plant)
 
 
+def _tell_version(asked: bool) -> None:
+    if asked:
+        print(f"trpac {version('trpac-fmu')}")
+        raise typer.Exit
+
+
 @app.callback()
-def _root() -> None:
-    """Makes the commands subcommands, even while there is one alone."""
+def _root(
+    told: Annotated[
+        bool,
+        typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    """What holds for all commands."""
 
 
 @app.command()
@@ -150,7 +164,7 @@ def _score_table(summary: dict) -> Table:
         "excited [s]",
     )
     for heading in headings:
-        table.add_column(heading, justify="left" if heading == "estimator" else "right")
+        table.add_column(escape(heading), justify="left" if heading == "estimator" else "right")
     for name, score in score_rows(summary):
         table.add_row(
             name,
@@ -177,7 +191,7 @@ def gains() -> None:
     point, delivered = DesignPoint(), Gains()
     table = Table(title=f"Designed gains (delivered: K {delivered.K:g} 1/s, gamma {delivered.gamma:g} 1/s)")
     for heading in ("C_x [kN]", "K [1/s]", "gamma [1/s]", "deviation of theta_hat [-]"):
-        table.add_column(heading, justify="right")
+        table.add_column(escape(heading), justify="right")
     for stiffness_n in (20_000.0, 40_000.0, 50_000.0, 60_000.0):
         design = design_gains(point, Vehicle(longitudinal_stiffness_n=stiffness_n))
         row = (stiffness_n / 1e3, design.K, design.gamma, design.theta_deviation)

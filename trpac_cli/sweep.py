@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -130,7 +131,8 @@ def _shown(summary: dict[str, Any]) -> Table:
         "within 0.02 [s]",
         "in 2 std",
     ):
-        table.add_column(heading, justify="left" if heading in ("level", "estimator") else "right")
+        left = heading in ("level", "estimator")
+        table.add_column(escape(heading), justify="left" if left else "right", overflow="fold")
     for level in summary["levels"]:
         where = f"{level['parameter']} {level['level']:g}" if level["parameter"] else ""
         for name, found in level["estimators"].items():

@@ -25,6 +25,8 @@ GAP_S = 0.25
 """Longer pieces without rows are gaps; shorter ones are lost samples."""
 IRREGULAR_SHARE = 0.05
 """Share of steps off by more than half a step from which on a log has no rate any more."""
+WHOLE = 0.25
+"""A step this close to a whole number of them, two or more, has rows of an even clock left out [steps]."""
 LOST_SHARE = 0.5
 """Share of lost samples from which on a required column is refused."""
 LOST_WARNING = 0.05
@@ -108,7 +110,9 @@ def _step_findings(step: Array, row: Row) -> Iterator[Finding]:
     irregular = np.flatnonzero(np.abs(step - median) > (BROKEN - 1.0) * median * (1.0 + 1e-6)) + 1
     if len(irregular) == 0:
         return
-    fatal = len(irregular) > IRREGULAR_SHARE * len(step)
+    steps = step[irregular - 1] / median
+    left_out = (steps > BROKEN) & (np.abs(steps - np.round(steps)) <= WHOLE)
+    fatal = np.count_nonzero(~left_out) > IRREGULAR_SHARE * len(step)
     yield Finding(
         f"column {TIME}: {rows_text(irregular, row)} is more than half a step ({median * 500:.3g} ms) off its time "
         f"after the row above{'; expected a constant or slightly jittered rate.' if fatal else '.'}",

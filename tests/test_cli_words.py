@@ -1,0 +1,62 @@
+"""What the command line says: units survive, a missing package is one sentence, the version is told."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.metadata import version
+
+import click
+import pytest
+import typer
+from rich.text import Text
+from typer.testing import CliRunner
+
+from trpac_cli.main import app
+
+
+def commands(command: click.Command, path: str = "trpac"):
+    """Every command with its path."""
+    yield path, command
+    for name, below in getattr(command, "commands", {}).items():
+        yield from commands(below, f"{path} {name}")
+
+
+WORDS = [
+    pytest.param(text, id=f"{path} {parameter.name if parameter else ''}".strip())
+    for path, command in commands(typer.main.get_command(app))
+    for parameter, text in (
+        (None, command.help),
+        *((parameter, getattr(parameter, "help", None)) for parameter in command.params),
+    )
+    if text and "[" in text
+]
+
+
+@pytest.mark.parametrize("text", WORDS)
+def test_units_in_brackets_are_no_markup(text):
+    assert Text.from_markup(text).plain == text.replace("\\[", "[")
+
+
+def test_units_in_tables_are_no_markup():
+    shown = CliRunner().invoke(app, ["gains"]).output
+    assert "C_x [kN]" in shown
+    assert "K [1/s]" in shown
+
+
+def test_the_version_is_told():
+    result = CliRunner().invoke(app, ["--version"])
+    assert (result.exit_code, result.output) == (0, f"trpac {version('trpac-fmu')}\n")
+
+
+@pytest.mark.parametrize(
+    ("missing", "arguments"), [("typer", ["--help"]), ("dask", ["sweep", "no.yaml", "--out", "no"])]
+)
+def test_a_missing_package_is_one_sentence(missing, arguments, tmp_path):
+    code = f"import sys; sys.modules[{missing!r}] = None; from trpac_cli.entry import main; main()"
+    run = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 2
+    assert run.stderr.startswith(f"trpac: needs the package that brings '{missing}'")
+    assert run.stderr.count("\n") == 1
