@@ -437,9 +437,12 @@ def test_a_cause_alone_leaves_the_other_halfs_gap():
 
 def test_what_a_quiet_half_could_have_shrinks_nothing():
     camera_alone = merge(main_of(Verdict.NO_GAP), side_of(Verdict.IDENTIFIED))
-    of_car = next(c for c in camera_alone.causes if c.effect == "tyre_relaxation")
-    assert of_car.gap_after == pytest.approx(camera_alone.gap.before.total)
-    assert of_car.shrink_percent.value == pytest.approx(0.0)
+    theirs = {c.effect for c in main_of(Verdict.NO_GAP).causes}
+    of_car = [c for c in camera_alone.causes if c.effect in theirs]
+    assert of_car
+    for cause in of_car:
+        assert cause.gap_after == pytest.approx(camera_alone.gap.before.total)
+        assert cause.shrink_percent.value == pytest.approx(0.0)
     car_alone = merge(main_of(Verdict.IDENTIFIED), side_of(Verdict.NO_GAP))
     of_camera = next(c for c in car_alone.causes if c.effect == "camera_latency")
     assert of_camera.gap_after == pytest.approx(car_alone.gap.before.total)

@@ -43,7 +43,8 @@ def test_an_odometer_with_a_wrong_scale_is_named(share):
     finding = diagnose(Camera(), 3, speeds=UP_AND_DOWN, damage=told_by(share))
     assert says(finding, "is the scale of position_m wrong"), finding.unexplained
     assert any(f"{share:+.1%}"[:4] in text for text in finding.unexplained), finding.unexplained
-    assert finding.odd_signal == "image_place"
+    assert finding.odd[0].signal == "image_place"
+    assert finding.odd[0].sign == ("later" if share > 0.0 else "earlier")
     assert finding.before.signals["image_place"] > 3.0
 
 
@@ -103,7 +104,8 @@ def test_the_rate_of_a_growing_shift_is_found():
     plain = float(likeliest(known.joined(unseen), np.zeros(32), shifted=False))
     found = find_drift(known, unseen, plain, 0.0)
     assert found is not None
-    assert "+1.0% of the way" in found.words
+    assert "+1.0% of the way" in found.odd.sentence
+    assert (found.odd.depends_on, found.odd.sign) == ("way since the log's begin", "later")
     assert found.scale == 1.0
 
 
