@@ -161,6 +161,16 @@ def test_pitch_geometry_is_the_projection_through_two_cameras(pitch, distance):
     assert seen_distance_m(np.array(distance), file.height_m, pitch) == pytest.approx(truly, rel=1e-6)
 
 
+@pytest.mark.parametrize("pitch", [-0.06, 0.06])
+def test_either_end_of_a_stretch_is_seen_where_the_pitched_camera_looks(pitch):
+    frames = plain_frames(roll(25.0), CAR, 20.0, Camera(), np.random.default_rng(0))
+    stamped, height_m = frames.stamped_m, frames.camera_height_m
+    seen = EFFECTS["camera_pitch"](pitch).perceive(frames).seen_m
+    assert np.ptp(stamped, axis=1) == pytest.approx(25.0 / 20.0, rel=1e-3)
+    assert seen == pytest.approx(height_m / np.tan(np.arctan(height_m / stamped) + pitch))
+    assert (np.sign(stamped - seen) == np.sign(pitch)).all()
+
+
 def test_pitch_towards_the_sky_stays_finite():
     assert np.isfinite(seen_distance_m(np.array([2.9, 100.0]), 1.4, -0.4)).all()
 

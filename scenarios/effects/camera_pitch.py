@@ -47,15 +47,14 @@ def seen_distance_m(
 class CameraPitch(Effect):
     """A camera that looks down more (or less) than its file says.
 
-    Nose down it sees road nearer than stamped, so every change of class appears later along the road. The stamp's near
-    end lies at the preview distance whatever the speed, and the whole stretch is taken to shift as that end does: by a
-    distance that does not depend on speed.
+    Nose down it sees road nearer than stamped, so every change of class appears later along the road. Stamps begin at
+    the preview distance whatever the speed, so by a distance that hardly depends on speed.
     """
 
     id = "camera_pitch"
     stage = "perception"
     subsystem = "camera"
-    equation = "near end seen = h / tan(atan(h / near end stamped) + pitch); the stretch shifts with it"
+    equation = "end seen = h / tan(atan(h / end stamped) + pitch), either end of a stretch"
     source = "Geometry of a pinhole camera over a flat road, Eqs. (5) and (6) of Tian et al. (2022)"
     excited_by = "passing borders of surfaces at two or more speeds"
     look_alikes = ("camera_latency",)
@@ -73,6 +72,5 @@ class CameraPitch(Effect):
         """The stretch seen is not the one stamped."""
         if self.pitch_rad == 0.0:
             return frames
-        near_m = frames.stamped_m[:, 0]
-        shift_m = near_m - seen_distance_m(near_m, frames.camera_height_m, self.pitch_rad)
-        return replace(frames, seen_m=frames.stamped_m - shift_m[:, None])
+        seen_m = seen_distance_m(frames.stamped_m, frames.camera_height_m, self.pitch_rad)
+        return replace(frames, seen_m=seen_m)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from scenarios.effects.camera_pitch import seen_distance_m
 from scenarios.perception import surfaces_at
-from sim2real.perception.frames import Results
+from sim2real.perception.frames import LEAST_AHEAD_M, Results
 
 Array = NDArray[np.float64]
 
@@ -134,7 +134,8 @@ def _wrong(one: Results) -> NDArray[np.intp]:
 
 def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:
     """Rows of the crossings of one drive, looked for about where a rough shift puts them."""
-    middle = 0.5 * (one.from_m + one.to_m)
+    middle, length = 0.5 * (one.from_m + one.to_m), one.to_m - one.from_m
+    usual_m = np.median(length)
     shift = one.driven_m(one.time_s, np.array([age_s]))[:, 0] + way_m
     rows = []
     segments = one.road.segments
@@ -165,10 +166,11 @@ def _of_one(one: Results, age_s: float, way_m: float) -> list[tuple]:
                 border - one.begin_m,
                 one.from_m[i] - border,
                 one.from_m[j] - border,
-                one.to_m[i] - one.from_m[i],
-                one.to_m[j] - one.from_m[j],
+                length[i],
+                length[j],
                 one.driven_m(one.time_s[[at]], AGES_S)[0],
-                one.ahead_m,
+                # stamps begin at one distance: the longer they are, the farther ahead is their middle
+                max(one.ahead_m + 0.5 * (0.5 * (length[i] + length[j]) - usual_m), LEAST_AHEAD_M),
             )
         )
     return rows
