@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -39,6 +40,7 @@ def _row(v: Variable) -> str:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     for name, target in TARGETS.items():
         target.write_text(table(name, UNITS[name].variables), encoding="utf-8")
         print(target)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import scenarios.effects as effects_module
-from scenarios.effects import EFFECTS, Effect, catalogue, make_effect
+from scenarios.effects import EFFECTS, FORMS, Effect, catalogue, make_effect
 from scenarios.effects.base import Stage, Subsystem, parameter
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
@@ -67,6 +67,18 @@ def test_neutral_values_reproduce_the_base_plant_bit_for_bit(effect_id):
     assert_same(run, base)
     assert make_log(run, car_with(**{effect_id: neutral})).equals(make_log(base, car_with()))
     assert EFFECTS[effect_id].neutral(NOMINAL) == make_effect(effect_id, neutral, NOMINAL)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [form for forms in FORMS.values() for form in forms[1:]],
+    ids=lambda form: f"{form.id}-{form.form}",
+)
+def test_every_form_at_its_neutral_values_is_the_base_plant_bit_for_bit(form, monkeypatch):
+    plain = car_with()
+    base = drive_through_everything(plain)
+    monkeypatch.setattr(VehicleFile, "make_effects", lambda self: [form.neutral(NOMINAL)])
+    assert_same(drive_through_everything(plain), base)
 
 
 @pytest.mark.parametrize("effect_id", IN_THE_LOG)

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 
 from trpac_core import tyre
-from trpac_core.confidence import unknown_variance
+from trpac_core.confidence import unknown_variance, wandered
 from trpac_core.dife import NEVER_SEEN_M
 from trpac_core.elastic import AS_TOLD, ElasticModel
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
@@ -146,3 +146,23 @@ def test_a_camera_that_pulls_the_estimate_leaves_the_observed_force_alone():
     told = [estimator.step(0.001, steady, RoadClass(Surface.SNOW_ICE, 0.95)) for _ in range(2000)]
     assert told[-1].TRPAC < 0.75
     assert max(abs(said.tyre_force_n - force_n) for said in told) < 0.01
+
+
+def test_a_class_farther_off_than_the_one_before_makes_the_estimate_less_sure():
+    """The road may be another: as after `class_change_m` of way on which nothing was seen."""
+    config = EstimatorConfig(vehicle=SMOOTH, theta_initial=0.75)
+    estimator, cruise = TrpacEstimator(config), Sensors(10.0 / RADIUS_M, 0.0, 10.0)
+    estimator._state.variance = 0.01
+    driven(estimator, cruise, 0.4, RoadClass(Surface.DRY, 0.9))
+    before = estimator.state()["state"]
+    driven(estimator, cruise, 0.25, RoadClass(Surface.SNOW_ICE, 0.9))
+    at_border = estimator.state()["state"]
+    assert at_border["fusion"][3] == 0.8, "the wheel is not there yet"
+    after = driven(estimator, cruise, 0.002)
+    model = config.confidence
+    way_m = 10.0 * 0.002 + model.class_change_m
+    expected = wandered(model, at_border["variance"], at_border["fusion"][0], way_m)
+    assert after.TRPAC_image == 0.2
+    assert estimator.state()["state"]["variance"] == pytest.approx(expected, rel=1e-2)
+    assert at_border["variance"] < 0.5 * expected
+    assert before["variance"] < at_border["variance"]

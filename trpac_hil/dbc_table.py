@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 from cantools.database.can import Message, Signal
@@ -50,5 +51,6 @@ def _row(signal: Signal) -> str:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     TARGET.write_text(document(), encoding="utf-8")
     print(TARGET)

@@ -5,6 +5,7 @@ python -m scenarios.effects.catalogue      # writes docs/effects.md
 
 from __future__ import annotations
 
+import argparse
 from inspect import getdoc
 from pathlib import Path
 
@@ -87,5 +88,6 @@ def _value(declared: Value, value: float) -> str:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     PAGE.write_text(page(), encoding="utf-8")
     print(f"wrote {PAGE}")

@@ -112,7 +112,7 @@ def _step_findings(step: Array, row: Row) -> Iterator[Finding]:
         return
     steps = step[irregular - 1] / median
     left_out = (steps > BROKEN) & (np.abs(steps - np.round(steps)) <= WHOLE)
-    fatal = np.count_nonzero(~left_out) > IRREGULAR_SHARE * len(step)
+    fatal = bool(np.count_nonzero(~left_out) > IRREGULAR_SHARE * len(step))
     yield Finding(
         f"column {TIME}: {rows_text(irregular, row)} is more than half a step ({median * 500:.3g} ms) off its time "
         f"after the row above{'; expected a constant or slightly jittered rate.' if fatal else '.'}",

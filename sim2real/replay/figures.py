@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 
 from sim2real.replay.run import DYNAMICS, OURS, Replay
 from sim2real.telling.figures import AFTER, BEFORE, DPI, FLOOR, MEASURED, STYLE, WIDTH_IN
+from trpac_core.tyre import INITIAL_SLOPE
 from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
@@ -156,11 +157,19 @@ def curve(done: Replay) -> bytes:
                 alpha=0.5,
                 label=wheel,
             )
-        axis.set_xlim(0.0, _largest(done.slip[rows]))
-        axis.set_ylim(0.0, min(_largest(done.used_friction[rows]), 1.5))
+        most_slip, most_friction = _largest(done.slip[rows]), min(_largest(done.used_friction[rows]), 1.5)
+        # The load is the wheels' mean: the line is to be held beside the points, not through them.
+        load_n = float(np.nanmean(done.traces[OURS].load_n[rows]))
+        told = INITIAL_SLOPE * done.inputs.vehicle.longitudinal_stiffness_n / load_n
+        end = min(most_slip, most_friction / told)
+        axis.plot(
+            [0.0, end], [0.0, told * end], color=MEASURED, lw=1.0, ls=(0, (4, 3)), label="1.27 C_x / F_z"
+        )
+        axis.set_xlim(0.0, most_slip)
+        axis.set_ylim(0.0, most_friction)
         axis.set_xlabel("slip [-]")
         axis.set_ylabel("used friction [-]")
-        axis.legend(loc="lower right", fontsize=8, ncols=4, markerscale=6)
+        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8, ncols=5, markerscale=6)
         figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
         plt.close(figure)
     return buffer.getvalue()
