@@ -150,7 +150,7 @@ def run_frames(
         If the folder cannot be written.
     """
     _check_numbers(speed_m_s, fps)
-    if frames.path.resolve() in (out.resolve(), *((out / name).resolve() for name in WRITTEN)):
+    if os.path.realpath(frames.path) in map(os.path.realpath, (out, *(out / name for name in WRITTEN))):
         raise ScenarioError(
             f"{out}: holds the frames. Expected another folder: the run would write among them, or over them."
         )

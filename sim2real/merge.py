@@ -31,6 +31,7 @@ from sim2real.result import (
     Unexplained,
     Verdict,
     added,
+    at_bound_in_words,
 )
 
 QUIET_SIDE_DOUBT = 0.06
@@ -180,7 +181,7 @@ def _own(effect: str, candidate: CameraCandidate) -> dict[str, Interval]:
 def _at_bound(effect: str, candidate: CameraCandidate) -> tuple[str, ...]:
     """Which of its parameters were found beyond what vehicle.yaml takes."""
     return tuple(
-        f"{name} lies at its bound: more of it is not thought plausible, so look for another cause."
+        at_bound_in_words(name)
         for name, value in _own(effect, candidate).items()
         if value.value != candidate.parameters[name].value
     )

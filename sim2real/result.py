@@ -314,6 +314,11 @@ class Diagnosis:
         }
 
 
+def at_bound_in_words(name: str) -> str:
+    """What is said against an estimate that lies at its bound."""
+    return f"{name} lies at its bound: more of it is not thought plausible, so look for another cause."
+
+
 def needed(diagnosis: Diagnosis) -> tuple[Cause, ...]:
     """The causes that the verdict says to model: none where it names no single set."""
     return diagnosis.causes[: max(NEEDED.get(diagnosis.verdict, 0), len(diagnosis.together))]

@@ -230,6 +230,7 @@ def test_a_counter_that_was_left_out_of_the_library_is_unknown():
     assert side.unexplained.subsystem == "wheel_speed_sensor"
     assert "multiples of 3.272 rad/s" in side.unexplained.sentence
     assert "40 ms" in side.unexplained.sentence
+    assert "a staircase" in render(merge(main_of(Verdict.NO_GAP), side))
     found = merge(main_of(Verdict.NO_GAP), side)
     assert found.verdict is Verdict.UNKNOWN
     assert found.gap.after.signals["wheel_speed"] == 17.0
@@ -332,6 +333,7 @@ def test_what_the_camera_cannot_explain_is_told():
     assert side.unexplained is not None
     assert side.unexplained.sentence == "Classes change in tunnels."
     assert side.unexplained.subsystem == "camera"
+    assert "in tunnels" in render(merge(main_of(Verdict.NO_GAP), side))
     assert (side.unexplained.depends_on, side.unexplained.sign, side.unexplained.shape) == (
         "weather",
         "late",

@@ -16,6 +16,7 @@ from camera_drives import (
     changed,
     diagnose,
     drive,
+    log_of,
     road,
 )
 
@@ -55,6 +56,24 @@ def test_class_errors_of_a_modelled_effect_are_no_gap(camera, effects):
     assert effect in judged(read).causes
     modelled = judged(read, car=car_with(**effects))
     assert (modelled.verdict, modelled.causes) == (Verdict.NO_GAP, ()), modelled.unexplained
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [{"motion_blur": {"exposure_s": 0.001}}, {"exposure_shift": {"stops": 0.1}}],
+    ids=["blur", "stops"],
+)
+def test_a_modelled_effect_that_takes_next_to_nothing_excuses_no_wrong_class(effects):
+    """Old pictures now and then, beside a shutter that is open for a millisecond as every one is."""
+
+    def hanging(log, for_s=1.4, every_s=4.0):
+        since = np.mod(log.time_s, every_s)
+        begun = np.searchsorted(log.time_s, log.time_s - since)
+        old = log.signals["image_class"][np.minimum(begun, len(log) - 1)]
+        return changed(log, image_class=np.where(since < for_s, old, log.signals["image_class"]))
+
+    finding = diagnose(Camera(wrong=0.01), 1, damage=hanging, vehicle=car_with(**effects))
+    assert finding.verdict is Verdict.UNKNOWN
 
 
 @pytest.mark.parametrize("confidence", [1.0, 0.95])
@@ -139,6 +158,33 @@ def test_single_lost_frame_ids_split_no_result():
     part, _ = read_results(changed(log, frame_id=numbers), ROAD, BARE, vision.Camera())
     assert len(part) == len(whole)
     np.testing.assert_array_equal(part.from_m, whole.from_m)
+
+
+@pytest.mark.parametrize(
+    ("ids", "stamps", "results"),
+    [
+        ([1, 1, 1, None, 2, 2, 3], [5, 5, None, 6, 6, 6, 7], 3),
+        ([2, 2, None, 3, 4], [5, 5, 5, 5, 5], 3),
+        ([None, None, None, None, 4, 5], [5, 5, 6, 6, 7, 8], 4),
+        ([1, None, None, 2, None, 3], [5, None, None, 6, None, 7], 3),
+    ],
+)
+def test_results_are_told_apart_by_what_is_left_of_number_and_stamp(ids, stamps, results):
+    rows = len(ids)
+    numbers, near = np.array(ids, dtype=float), np.array(stamps, dtype=float)
+    short = log_of(
+        0.1 * np.arange(rows),
+        {
+            "position_m": np.linspace(0.0, 1.0, rows),
+            "vehicle_speed_m_s": np.full(rows, 2.0),
+            "frame_id": numbers,
+            "image_class": np.where(np.isfinite(numbers) | np.isfinite(near), 0.0, np.nan),
+            "image_from_m": near,
+            "image_to_m": near + 1.0,
+        },
+    )
+    found, _ = read_results(short, ROAD, BARE, vision.Camera())
+    assert len(found) == results
 
 
 def test_a_picture_may_be_named_in_any_row_of_its_result():

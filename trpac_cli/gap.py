@@ -248,7 +248,7 @@ def _summarise(console: Console, said: Diagnosis) -> None:
 
 
 def _cause_table(said: Diagnosis) -> Table:
-    from sim2real.telling.report import estimate, percent
+    from sim2real.telling.report import estimate, number, percent
 
     table = Table(title="Causes, likeliest first", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("effect", no_wrap=True)
@@ -262,7 +262,7 @@ def _cause_table(said: Diagnosis) -> Table:
             cause.effect,
             percent(cause.probability),
             values,
-            f"{cause.gap_after:.2f}",
-            f"{cause.shrink_percent.value:.0f} %",
+            number(cause.gap_after),
+            percent(0.01 * cause.shrink_percent.value),
         )
     return table

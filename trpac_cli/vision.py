@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -49,7 +50,7 @@ def classify(
         if out.exists() and not out.is_file():
             refuse(command, f"{out}: no plain file. Expected the name of a CSV file to write.")
         files, problems = find_pictures(paths)
-        if out.resolve() in {file.resolve() for file in files}:
+        if os.path.realpath(out) in {os.path.realpath(file) for file in files}:
             refuse(command, f"{out}: one of the pictures. Expected the name of a CSV file to write.")
         with _bar("pictures") as told:
             table, unusable = classify_pictures(files, told)

@@ -272,16 +272,18 @@ class Rates:
         share = sensor_share or filter_share(before_s, config.sensor_filter_s)
         gain = math.sqrt(share / (2.0 - share))
         noise_m_s = config.sliding_speed_noise_m_s * gain
-        acceleration_share = filter_share(step_s, config.acceleration_filter_s)
+        lag_s = step_s or before_s
         return cls(
             step_s,
             sensor_share,
-            acceleration_share,
+            filter_share(step_s, config.acceleration_filter_s),
             gain,
             noise_m_s,
             most_m_s=JUMP_M_S + GREATEST_ACCELERATION_M_S2 * step_s,
             most_rim_m_s=RIM_JUMP_M_S + RIM_ACCELERATION_M_S2 * step_s,
             ahead=seen_at(config.gains.K * step_s),
             # On an even rise a discrete filter lags by step over share, not by its time constant.
-            differentiator_1_s=acceleration_share / step_s if step_s else 1.0 / config.acceleration_filter_s,
+            differentiator_1_s=filter_share(lag_s, config.acceleration_filter_s) / lag_s
+            if lag_s
+            else 1.0 / config.acceleration_filter_s,
         )

@@ -52,7 +52,7 @@ def followed(
     noise : float
         Relative standard deviation of that theta through noise, in one reading [-].
     passed_s : float
-        Time since the reading before [s].
+        Time that this reading stands for [s].
     """
     slope, variance, log_elastic, log_theta = before
     now_elastic, now_theta = math.log(elastic), math.log(theta_tyre)

@@ -76,7 +76,9 @@ def held(before: Steady, slip: float, friction: float, rise: float, noise: float
 
 def faded(before: Steady, passed_s: float) -> Steady:
     """The means after a time without readings: as if so much less had gone into them."""
-    held_s = (before.held_s if before.held_s < MEMORY_S else MEMORY_S) - passed_s
+    if passed_s == 0.0:
+        return before
+    held_s = min(before.held_s, _LONGEST_S) - passed_s * _LONGEST_S / MEMORY_S
     return before._replace(held_s=held_s) if held_s > 0.0 else NOTHING
 
 

@@ -188,8 +188,7 @@ class Rig:
     def end(self, control: Control | None = None, patience_s: float = PATIENCE_S) -> dict[str, Any]:
         """Stop all, wait for them, and return what one of them said last, by kind.
 
-        One that is still at work after `patience_s` is ended; the recorder, which may have a long log to write, is
-        waited for as long as it says something.
+        One that is still at work after `patience_s` is ended, but for the recorder: a long log takes long to write.
         """
         for each, _ in self._helpers:
             each.stop()
@@ -197,11 +196,10 @@ class Rig:
         for each, process in self._helpers:
             until_s = time.monotonic() + patience_s
             while process.is_alive():
-                if heard := each.heard():
-                    until_s = time.monotonic() + patience_s
-                    said |= dict(heard) if each is control else {}
+                heard = each.heard()
+                said |= dict(heard) if each is control else {}
                 process.join(0.1)
-                if time.monotonic() > until_s:
+                if each.name != "recorder" and time.monotonic() > until_s:
                     process.kill()
             if each is control:
                 said |= dict(each.heard())

@@ -172,7 +172,7 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         intervals={name: (i["low"], i["high"]) for name, i in first["parameters"].items()},
         groups=tuple(frozenset(group) for group in said["ambiguous_with"]),
         named_subsystem=unexplained.get("subsystem") if isinstance(unexplained, dict) else None,
-        predicted_shrink=float(first.get("shrink_percent", {}).get("value", math.nan)),
+        predicted_shrink=_number(first.get("shrink_percent", {}).get("value")),
         achieved_shrink=_number(result.get("achieved_shrink_percent")),
         seconds=_number(usage.get("seconds", result.get("wall_s"))),
         memory_gib=_number(usage.get("peak_bytes")) / 2**30,

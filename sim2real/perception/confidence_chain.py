@@ -101,9 +101,7 @@ def confidence_chain(
     """The confidence's account; None where no log has camera results."""
     if not fitted and held_out is None:
         return None
-    whole = make_blocks(fitted)
-    known = whole.less(modelled.exposure_s, modelled.stops)
-    taken = float((whole.loss - known.loss).mean()) if len(whole) else 0.0
+    known = make_blocks(fitted).less(modelled.exposure_s, modelled.stops)
     unseen = make_blocks([] if held_out is None else [held_out]).less(modelled.exposure_s, modelled.stops)
     choices = [c for c in CHOICES if not set(c) & set(exclude)]
     pictures = sum(
@@ -118,7 +116,7 @@ def confidence_chain(
         choices = [c for c in choices if c == ("exposure_shift",)]
     # mistakes that are made with good pictures say nothing of bad ones
     errors = float("nan") if odd_confusion(fitted) else class_error(fitted)
-    model, signs = read_model(known), Signs(errors, lights[0], taken)
+    model, signs = read_model(known), Signs(errors, lights[0], modelled_loss(fitted, modelled))
     seen = Seen(known, unseen, signs, lights[1])
 
     def fit(effects: tuple[str, ...]) -> ConfidenceFit:
@@ -152,6 +150,14 @@ def confidence_chain(
     if needed and not pattern:
         pattern = _of_no_effect(max(needed, key=lambda account: account.score))
     return replace(chain, unexplained=pattern)
+
+
+def modelled_loss(results: Sequence[Results], modelled: Modelled) -> float:
+    """What blur and exposure that are modelled take of the confidence's logarithm, the mean over some results [-]."""
+    blocks = make_blocks(results)
+    if not len(blocks):
+        return 0.0
+    return float((blocks.loss - blocks.less(modelled.exposure_s, modelled.stops).loss).mean())
 
 
 def _restlessness(results: Sequence[Results], model: ConfidenceModel, modelled: Modelled) -> float:

@@ -16,7 +16,7 @@ from scenarios.effects import Effect
 from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
 from sim2real.perception.chain import Account, Chain, Oddity
-from sim2real.perception.confidence_chain import confidence_chain
+from sim2real.perception.confidence_chain import NOTICED, confidence_chain, modelled_loss
 from sim2real.perception.conflicts import class_conflicts, odd_conflicts, odd_confusion
 from sim2real.perception.frames import Modelled, read_results
 from sim2real.perception.friction import SIGNAL as REFERENCE
@@ -107,7 +107,8 @@ class PerceptionFinding:
     candidates : tuple of CameraCandidate
         Every one tried, best score first.
     before, after : Measure
-        Gap on the hold-out as simulated, and with the causes [noise floors]; the floor is 1 per signal.
+        Gap on the hold-out as simulated, and with the causes, of which an unknown gap has none [noise floors]; the
+        floor is 1 per signal. NaN where the hold-out has nothing of the camera.
     ambiguous_with : tuple of tuple of str
         Sets that these logs cannot tell apart.
     cannot_rule_out : dict
@@ -209,7 +210,7 @@ def diagnose_perception(
     chains = [chain for chain in judged if chain is not None]
     if not chains:
         return None
-    blurred = modelled.exposure_s > 0.0 or modelled.stops != 0.0
+    blurred = bool(every) and modelled_loss(every, modelled) > NOTICED
     errs = None if blurred else odd_conflicts(conflicts)
     if blurred:
         chains = [replace(chain, errs=None) for chain in chains]

@@ -133,8 +133,8 @@ def read_results(
         return None, ()
     if missing:
         return None, (
-            f"{log.name}: the camera's results are left out: {', '.join(missing)} is missing; expected all of "
-            f"{', '.join(NEEDED)}.",
+            f"{log.name}: the camera's results are left out: {', '.join(missing)} is missing or computed; expected all "
+            f"of {', '.join(NEEDED)}.",
         )
     table, warnings = _one_row_per_result(log)
     table, more = _plausible(table, log)
@@ -211,12 +211,13 @@ def _one_row_per_result(log: Log) -> tuple[pd.DataFrame, list[str]]:
         rows["id"] = np.nan
     rows["picture"] = rows["picture"].replace("", None)
     rows = rows[rows["id"].notna() | rows[stamp].notna().all(axis=1)]
-    before = rows.shift()
-    # where a frame_id is lost, a new stamp is a new result
-    numbered = rows["id"].notna() & before["id"].notna()
-    stamped = rows[stamp].notna().all(axis=1) & before[stamp].notna().all(axis=1)
-    moved = stamped & (rows[stamp] != before[stamp]).any(axis=1)
-    new = np.where(numbered, rows["id"] != before["id"], moved)
+    # where a frame_id is lost, it is that of the rows with the same stamp, else a new stamp is a new result
+    held = rows[stamp].ffill()
+    of_stamp = (held != held.shift()).any(axis=1).cumsum()
+    ids = rows.groupby(of_stamp)["id"].ffill()
+    ids = ids.groupby(of_stamp).bfill()
+    numbered = ids.notna() & ids.shift().notna()
+    new = np.where(numbered, ids != ids.shift(), of_stamp != of_stamp.shift())
     found = rows.groupby(np.cumsum(new)).first()
     return found.assign(picture=found["picture"].fillna("")), warnings
 

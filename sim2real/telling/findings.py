@@ -30,6 +30,7 @@ from sim2real.result import (
     Unexplained,
     Variation,
     Verdict,
+    at_bound_in_words,
 )
 from sim2real.telling import sentences
 from sim2real.telling.estimates import as_means, at_bound, is_excited, joint, over_forms
@@ -241,9 +242,7 @@ def _cause(
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
     for name in at_bound(best):
-        contra.append(
-            f"{name} lies at its bound: more of it is not thought plausible, so look for another cause."
-        )
+        contra.append(at_bound_in_words(name))
     if shrunk.high <= 1.0:
         contra.append("Does not shrink the gap on the hold-out.")
     return Cause(

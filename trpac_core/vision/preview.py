@@ -155,7 +155,7 @@ def _apart(
     if state.ascending and (not state.stamps or X_lb_m - state.stamps[-1].X_lb_m >= resolution_m):
         return state.stamps, ()
     shared = tuple(s for s in state.stamps if abs(X_lb_m - s.X_lb_m) < resolution_m)
-    return tuple(s for s in state.stamps if s not in shared) if shared else state.stamps, shared
+    return tuple(s for s in state.stamps if abs(X_lb_m - s.X_lb_m) >= resolution_m), shared
 
 
 def _ascend(stamps: tuple[Stamp, ...]) -> bool:
