@@ -100,9 +100,12 @@ class CameraSlave(GuardedSlave):
             self._frame = replace(self._frame, failed=True)
             estimate = self._estimator.step(step_s, sensors, frame_failed=True)
         if problem:
-            self.report("frame", Fmi2Status.warning, f"{self.modelName}: {problem}")
+            sort = "class" if problem.startswith("road_class") else "picture"
+            self.report(f"frame {sort}", Fmi2Status.warning, f"{self.modelName}: {problem}")
         for kind, text in self.problems(estimate):
-            self.report(f"sensors {kind}", Fmi2Status.warning, f"{self.modelName}: {text}")
+            # A problem begins with what it is about: "wheel_speed_rad_s is ...", "The car rolls backwards ...".
+            about = text.partition(" is ")[0]
+            self.report(f"sensors {kind} {about}", Fmi2Status.warning, f"{self.modelName}: {text}")
 
     def _tell_buffers_off(self) -> None:
         text = (

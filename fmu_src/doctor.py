@@ -108,8 +108,8 @@ def examine(path: Path, python: str = sys.executable) -> Examination:
     contents, (*of_file, described) = look_at_file(path)
     intact = all(finding.state is not State.PROBLEM for finding in of_file)
     findings = [*of_file, described]
-    modules = dict(contents.packages) if contents else {}
-    probed = _probe(python, sorted(modules))
+    modules = dict(contents.packages) if contents else None
+    probed = _probe(python, sorted(modules or {}))
     findings += _python(probed, modules)
     if intact:
         findings.append(_trial(path, python))
@@ -219,7 +219,7 @@ def _probe(python: str, modules: list[str]) -> Python:
     )
 
 
-def _python(python: Python, modules: dict[str, str]) -> list[Finding]:
+def _python(python: Python, modules: dict[str, str] | None) -> list[Finding]:
     version = ".".join(map(str, python.version))
     text = f"{python.command}, version {version}, prefix {python.prefix}"
     least, tested = (".".join(map(str, v)) for v in (LEAST_PYTHON, TESTED_PYTHON))
@@ -229,13 +229,15 @@ def _python(python: Python, modules: dict[str, str]) -> list[Finding]:
         found = Finding("python", State.NOTE, f"{text}; the unit was tested with {tested} alone")
     else:
         found = Finding("python", State.OK, text)
+    if modules is None:
+        return [found, Finding("packages", State.NOTE, "the file does not say what it needs")]
     missing = [f"{modules[m]} ({why})" for m, (good, why) in python.packages.items() if not good]
     if missing:
         names = " ".join(modules[module] for module, (good, _) in python.packages.items() if not good)
         mend = f"{python.command} -m pip install {names}"
         return [found, Finding("packages", State.PROBLEM, f"cannot be imported: {'; '.join(missing)}", mend)]
     if not modules:
-        return [found, Finding("packages", State.NOTE, "the file does not say what it needs")]
+        return [found, Finding("packages", State.OK, "it needs none")]
     there = ", ".join(f"{modules[module]} {text}".strip() for module, (_, text) in python.packages.items())
     return [found, Finding("packages", State.OK, there)]
 

@@ -144,7 +144,8 @@ class GuardedSlave(Fmi2Slave):
         }
         self._settable = self._inputs_and_parameters
         self._reported: set[str] = set()
-        self._ready = False
+        self._ready = self._looked_at = False
+        self._initialising = self._stale = False
         try:
             self.prepare()
         except Exception as error:
@@ -187,7 +188,16 @@ class GuardedSlave(Fmi2Slave):
     def _view(self, name: str) -> Value:
         if name not in self.views:
             raise KeyError(name)
-        return self.shown(name) if self._ready else self._starts[name]
+        return self.shown(name) if self._ready or self._looked_at else self._starts[name]
+
+    def _look_ahead(self) -> None:
+        """Work the outputs out by what is set so far, for a host that reads them while it initialises."""
+        self._stale = False
+        try:
+            self.initialise()
+        except ValueError:  # told when the initialisation ends, if it is so still
+            return
+        self._looked_at = True
 
     def clear_volatile(self) -> None:
         """Forget the inputs that hold for one step only."""
@@ -205,8 +215,14 @@ class GuardedSlave(Fmi2Slave):
     # FMI callbacks
 
     @guarded(_nothing)
+    def enter_initialization_mode(self) -> None:
+        """From now on outputs can be read."""
+        self._initialising = self._stale = True
+
+    @guarded(_nothing)
     def exit_initialization_mode(self) -> None:
         """Apply the parameters; what is wrong with them is logged, and each step is then discarded."""
+        self._initialising = self._stale = False
         self._settable = self._inputs
         try:
             self.initialise()
@@ -220,6 +236,8 @@ class GuardedSlave(Fmi2Slave):
     def do_step(self, current_time: float, step_size: float) -> bool:
         """One communication step; False (fmi2Discard) only where nothing could be computed."""
         if not self._ready:
+            text = f"{self.modelName}: a step was asked for before the initialisation has ended well; it is discarded."
+            self.report("not ready", Fmi2Status.error, text)
             return False
         self.step(step_size)
         return True
@@ -230,6 +248,7 @@ class GuardedSlave(Fmi2Slave):
 
     def _set(self, kind: Kind, references: list[int], values: list[Any]) -> None:
         names, settable = self._names[kind], self._settable
+        self._stale = self._initialising
         for reference, value in zip(references, values, strict=True):
             name = names.get(reference)
             if name in settable:
@@ -244,6 +263,8 @@ class GuardedSlave(Fmi2Slave):
                 )
 
     def _get(self, kind: Kind, references: list[int]) -> list[Any]:
+        if self._stale:
+            self._look_ahead()
         names, values = self._names[kind], self.values
         try:
             return [values[names[reference]] for reference in references]
@@ -349,13 +370,18 @@ class GuardedSlave(Fmi2Slave):
             self._refuse_state("its variables are not those of this unit")
             return
         if content["ready"]:
-            self.restore_inner_state(content["values"], content["inner"])
+            try:
+                self.restore_inner_state(content["values"], content["inner"])
+            except ValueError as error:  # a file that it names is another now, or gone
+                self._refuse_state(str(error))
+                return
         self._settable = self._inputs if content["initialised"] else self._inputs_and_parameters
         self.values = Held(content["values"], self._view)
         self._ready = content["ready"]
 
     def _refuse_state(self, reason: str) -> None:
-        self.report("state", Fmi2Status.error, f"{self.modelName}: the state was not restored: {reason}.")
+        text = f"{self.modelName}: the state was not restored: {reason.removesuffix('.')}."
+        self.report(f"state {reason}", Fmi2Status.error, text)
 
     @staticmethod
     def _fmu_state_to_bytes(state: bytes) -> bytes:

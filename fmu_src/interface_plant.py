@@ -151,7 +151,7 @@ _PARAMETERS = (
     _parameter("vehicle.wheelbase", "m", "Wheelbase", 2.305, 0.1, source="wheelbase_m"),
     _parameter("vehicle.track", "m", "Track width", 1.356, 0.1, source="track_m"),
     _parameter(
-        "vehicle.cog_height", "m", "Height of the centre of gravity", 0.54, 0.0, source="cog_height_m"
+        "vehicle.cog_height", "m", "Height of the centre of gravity", 0.54, 0.0, 1.5, source="cog_height_m"
     ),
     _parameter(
         "vehicle.cog_to_rear_axle",
@@ -165,8 +165,8 @@ _PARAMETERS = (
     _parameter(
         "vehicle.wheel_inertia", "kg.m2", "Inertia I of a wheel", 1.2, 1e-3, source="wheel_inertia_kg_m2"
     ),
-    _parameter("vehicle.drag_area", "m2", "Drag coefficient times frontal area", 0.65, 0.0),
-    _parameter("tyre.rolling_resistance", "1", "Rolling resistance coefficient", 0.0065, 0.0, 1.0),
+    _parameter("vehicle.drag_area", "m2", "Drag coefficient times frontal area", 0.65, 0.0, 5.0),
+    _parameter("tyre.rolling_resistance", "1", "Rolling resistance coefficient", 0.0065, 0.0, 0.3),
     _parameter(
         "tyre.longitudinal_stiffness",
         "N",

@@ -46,7 +46,6 @@ IMAGE_TYPE = "application/octet-stream"
 LOG_CATEGORIES = {
     "logStatusWarning": "An input that could not be used; the last good estimate is held.",
     "logStatusError": "A parameter, a call or a state that could not be used.",
-    "logAll": "All messages.",
 }
 
 
@@ -103,8 +102,11 @@ def model_description(
     outputs = [place for place, v in enumerate(variables, start=1) if v.causality == "output"]
     for group in ("Outputs", "InitialUnknowns"):
         entries = SubElement(structure, group)
+        # Within a step outputs stay what the step before has made of the inputs: no input reaches them at once. At the
+        # start they depend on the parameters, which is what leaving the attribute out means.
+        known = {"dependencies": ""} if group == "Outputs" else {}
         for place in outputs:
-            SubElement(entries, "Unknown", {"index": str(place)})
+            SubElement(entries, "Unknown", {"index": str(place), **known})
     indent(root)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
 

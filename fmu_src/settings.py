@@ -15,8 +15,11 @@ from trpac_core.vision.ife_config import (
     FARTHEST_CENTRE,
     LEAST_GRID_M,
     LEAST_STEP_M,
+    MOST_DEVIATION_M,
+    MOST_GROWTH_M_S,
     MOST_PATCHES,
     MOST_WAY_M,
+    MOST_WIDTH_M,
     STEEPEST_SIGMOID,
 )
 
@@ -187,9 +190,9 @@ _ESTIMATOR_PARAMETERS = (
     *(
         _parameter(
             f"scheduler.K_v_{size}",
-            "1",
+            "1/s",
             f"scheduler.K_v_values.{place}",
-            f"K_v of the set '{size}'",
+            f"K_v of the set '{size}', in 1/s as the visual term is in form (18)",
             0.0,
             K_V_LIMIT,
         )
@@ -378,7 +381,12 @@ _IMAGE_PARAMETERS = (
     ),
     _parameter("image.grid", "m", "vision.a_m", "Grid size a", LEAST_GRID_M),
     _parameter(
-        "image.roi_width", "m", "vision.roi_width_m", "Width of road that a patch shows, in the mean", 0.05
+        "image.roi_width",
+        "m",
+        "vision.roi_width_m",
+        "Width of road that a patch shows, in the mean",
+        0.05,
+        MOST_WIDTH_M,
     ),
     _parameter(
         "image.roi_spread",
@@ -391,13 +399,16 @@ _IMAGE_PARAMETERS = (
         "image.track_step", "m", "vision.step_m", "Distance between the track's ellipses", LEAST_STEP_M
     ),
     _parameter("image.k1", "m/s", "vision.k1", "Growth of the track's uncertainty along, below k2", 1e-12),
-    _parameter("image.k2", "m/s", "vision.k2", "Growth of the track's uncertainty across", 1e-12),
+    _parameter(
+        "image.k2", "m/s", "vision.k2", "Growth of the track's uncertainty across", 1e-12, MOST_GROWTH_M_S
+    ),
     _parameter(
         "image.start_deviation",
         "m",
         "vision.start_deviation_m",
         "Standard deviation of the wheel's place",
         1e-3,
+        MOST_DEVIATION_M,
     ),
     _parameter("image.sigma", "1", "vision.weight_law.sigma", "Relaxation of the evidence weights", 0.0, 1.0),
     _parameter(

@@ -129,7 +129,7 @@ OUTPUTS = (
         "discrete",
         "Visual information confidence flag epsilon at the wheel now",
     ),
-    _output("K_v", "1", "Auxiliary gain of the visual term; in 1/s where that is of the form (18)", 0.0),
+    _output("K_v", "1/s", "Auxiliary gain of the visual term in form (18); without unit in form (17)", 0.0),
     Variable(
         "excitation_flag",
         Kind.BOOLEAN,

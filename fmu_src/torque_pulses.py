@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
@@ -11,6 +10,9 @@ from .guarded_slave import GuardedSlave
 from .interface_pulses import TORQUE_PULSES, WHEELS
 from .parameters import check_parameters
 from .variables import Variable
+
+LONGEST_STEP_S = 10.0
+"""As of the other units: beyond it the host has lost its clock [s]."""
 
 
 class TorquePulses(GuardedSlave):
@@ -25,12 +27,12 @@ class TorquePulses(GuardedSlave):
         self._publish()
 
     def step(self, step_s: float) -> None:
-        """Let time pass; a step below 0 or not finite moves nothing."""
-        if math.isfinite(step_s) and step_s >= 0.0:
+        """Let time pass; a step below 0, above 10 s or not finite moves nothing."""
+        if 0.0 <= step_s <= LONGEST_STEP_S:
             self._time_s += step_s
             self._publish()
         else:
-            text = f"step size is {step_s} s, expected 0 or more. No time has passed."
+            text = f"step size is {step_s} s, expected 0 to {LONGEST_STEP_S:g} s. No time has passed."
             self.report("step", Fmi2Status.warning, f"{self.modelName}: {text}")
 
     def _publish(self) -> None:

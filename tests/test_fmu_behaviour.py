@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmu_unit import DRIVING, STEP_S, Unit
 from road_picture import road_picture
 
@@ -286,7 +287,7 @@ def test_bad_parameters_are_all_named_and_every_step_is_discarded(
 
 
 def test_parameters_that_contradict_each_other_are_refused(open_unit: Open) -> None:
-    unit = open_unit(image__k1=1.0, image__k2=0.5)
+    unit = open_unit(image__k1=0.005, image__k2=0.001)
     assert "k1 < k2" in unit.log[0].text
 
 
@@ -573,3 +574,63 @@ def test_two_instances_do_not_touch_each_other(open_unit: Open) -> None:
     second.free()
     first.step(SLIPPERY)
     assert first.get("flag")
+
+
+def test_outputs_can_be_read_while_the_host_initialises(open_unit: Open) -> None:
+    """A master hands them on before the first step: a controller must not take a friction of 0 from it."""
+    unit = open_unit()
+    unit.reset()
+    unit.slave.setupExperiment(startTime=0.0)
+    unit.slave.enterInitializationMode()
+    for initial in (0.5, 0.7):
+        unit.set({"estimator.theta_initial": initial})
+        early = unit.outputs()
+        assert early["TRPAC"] == initial
+        assert early["frame_age"] == -1.0
+    unit.slave.exitInitializationMode()
+    assert unit.outputs() == early
+    assert unit.log == []
+
+
+def test_outputs_read_under_parameters_that_cannot_be_are_told_at_the_end_alone(open_unit: Open) -> None:
+    unit = open_unit()
+    unit.reset()
+    unit.slave.setupExperiment(startTime=0.0)
+    unit.slave.enterInitializationMode()
+    unit.set({"vehicle.mass": -1.0})
+    unit.outputs()
+    assert unit.log == []
+    unit.slave.exitInitializationMode()
+    assert [line.status for line in unit.log] == [ERROR]
+
+
+def test_each_signal_is_told_of_once_and_hides_no_other(open_unit: Open) -> None:
+    unit = open_unit()
+    flag_up(unit)
+    for bad in (
+        {"vehicle_speed": -5.0},
+        {"vehicle_speed": 1e9},
+        {"vehicle_speed": 15.0, "wheel_speed": math.nan},
+        {"wheel_speed": 52.0, "road_class": 7},
+        {"road_class": -1, "image_path": "/nowhere.png", "frame_id": 5},
+    ):
+        unit.step(bad, count=3)
+    told = [line.text for line in unit.log]
+    words = (
+        "rolls backwards",
+        "vehicle_speed_m_s is 1e+09",
+        "wheel_speed_rad_s is nan",
+        "road_class is 7",
+        "nowhere",
+    )
+    assert len(told) == len(words), told
+    for word, text in zip(words, told, strict=True):
+        assert word in text
+
+
+def test_a_step_before_the_initialisation_is_told(open_unit: Open) -> None:
+    unit = open_unit()
+    unit.reset()
+    with pytest.raises(FMICallException):
+        unit.step()
+    assert "before the initialisation has ended" in unit.log[0].text

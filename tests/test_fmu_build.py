@@ -237,6 +237,13 @@ def test_description_says_units_ranges_and_abilities(unit_file: Path) -> None:
     assert ability.canHandleVariableCommunicationStepSize
     torque = next(unit for unit in description.unitDefinitions if unit.name == "N.m").baseUnit
     assert (torque.kg, torque.m, torque.s) == (1, 2, -2)
+    assert by_name["K_v"].unit == by_name["scheduler.K_v_big"].unit == "1/s"
+    outputs = [v.name for v in description.modelVariables if v.causality == "output"]
+    assert [unknown.variable.name for unknown in description.outputs] == outputs
+    assert all(unknown.dependencies == [] for unknown in description.outputs), (
+        "no input reaches an output at once"
+    )
+    assert all(unknown.dependencies is None for unknown in description.initialUnknowns)
 
 
 @pytest.mark.e2e

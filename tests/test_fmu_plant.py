@@ -139,6 +139,8 @@ def test_torque_pulses_are_trapezia_in_turn_and_their_state_is_exact(pulses_fold
     assert again == [seen[round(index * STEP_S, 3)] for index in range(701, 1501)]
     unit.step(step_s=math.nan)
     assert (unit.get("wheel_torque.fl"), unit.get("wheel_torque.rr")) == again[-1]
+    unit.step(step_s=20.0)
+    assert (unit.get("wheel_torque.fl"), unit.get("wheel_torque.rr")) == again[-1]
     assert [line.status for line in unit.log] == [WARNING]
     unit.free()
 
@@ -262,3 +264,32 @@ def test_a_car_whose_numbers_are_no_numbers_is_refused(
     unit = open_plant(vehicle__mass=mass_kg)
     assert [line.status for line in unit.log] == told
     assert all(math.isfinite(value) for value in unit.outputs().values())
+
+
+@pytest.mark.e2e
+def test_a_plant_that_is_read_while_it_initialises_stands_where_it_will(open_plant: Open) -> None:
+    unit = open_plant()
+    unit.reset()
+    unit.slave.setupExperiment(startTime=0.0)
+    unit.slave.enterInitializationMode()
+    unit.set({"initial.vehicle_speed": 22.0})
+    early = unit.outputs()
+    assert early["vehicle_speed"] == 22.0
+    assert early["vertical_load.fl"] > 1000.0
+    unit.slave.exitInitializationMode()
+    assert unit.outputs() == early
+
+
+@pytest.mark.e2e
+def test_a_state_whose_road_is_gone_is_refused_as_such(open_plant: Open, tmp_path: Path) -> None:
+    road = tmp_path / "road.yaml"
+    road.write_bytes(ROAD.read_bytes())
+    unit = open_plant(road_path=str(road))
+    state = unit.slave.getFMUstate()
+    unit.step(count=5)
+    before = unit.outputs()
+    road.unlink()
+    unit.slave.setFMUstate(state)
+    assert unit.outputs() == before
+    assert "the state was not restored" in unit.log[-1].text
+    assert "fault of the unit" not in unit.log[-1].text

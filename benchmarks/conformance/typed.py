@@ -17,7 +17,7 @@ class TypedValues:
 
     def _typed(self, values: Values, kind: str) -> None:
         if not values:
-            raise NotOfferedError(f"the unit has no {kind} that can be set")
+            raise NotOfferedError(f"the unit has no {kind} input")
         self._set_and_get(values)
 
     def _real(self) -> None:
