@@ -45,7 +45,7 @@ class Profile:
 
 STEADY_SPEEDS = Profile(
     "steady speeds",
-    "Hold 8 m/s, then 25 m/s, five seconds each.",
+    "Hold 8 m/s, then after three seconds at full torque the speed that this gives, four seconds each.",
     8.0,
     (0, 4, 4.5, 7.5, 8, 12),
     (0.05, 0.05, 1, 1, 0.08, 0.08),
@@ -54,7 +54,7 @@ STEADY_SPEEDS = Profile(
 
 BRAKING = Profile(
     "brake to the limit",
-    "Accelerate to 20 m/s, then press the brake slowly until the wheels are about to lock, and let go; twice.",
+    "From 18 m/s press the brake slowly until the wheels are about to lock, let go, and again from what speed is left.",
     18.0,
     (0, 1, 2, 2.2, 5.5, 5.7, 7, 7.2, 10, 10.2, 12),
     (0.5, 0.5, 0, -0.2, -1.0, 0, 0.8, -0.2, -1.0, 0, 0),
@@ -105,6 +105,7 @@ def propose(
     road: RoadFile,
     noise: Noise,
     now_sigma: float,
+    step_s: float,
     progress: Progress = silent,
 ) -> NextManoeuvre:
     """The profile that tells two fitted entries apart best.
@@ -121,6 +122,8 @@ def propose(
         Of the sensors.
     now_sigma : float
         Their distance on the data at hand.
+    step_s : float
+        Of the rows that the noise is told for [s].
     progress : callable
         Told the stage, and how much of how much is done.
     """
@@ -128,7 +131,7 @@ def propose(
     for number, profile in enumerate(PROFILES):
         time_s, torque = torque_of(profile, model.vehicle, road)
         power = min(
-            separation(model, truth, rival, road, noise, profile, time_s, torque)
+            separation(model, truth, rival, road, noise, profile, time_s, torque, step_s)
             for truth, rival in ((a, b), (b, a))
             if not set(truth.ids) < set(rival.ids)  # a pair holds its members: it never differs from them
         )
@@ -182,9 +185,12 @@ def separation(
     profile: Profile,
     time_s: Array,
     torque: Array,
+    step_s: float,
 ) -> float:
     """Distance that is left when the rival is fitted to what the truth would do, in standard deviations."""
-    drive = imagined(model, truth, road, profile, time_s, torque)
+    on_grid = np.arange(0.0, time_s[-1], step_s)
+    torque = np.column_stack([np.interp(on_grid, time_s, of_wheel) for of_wheel in torque.T])
+    drive = imagined(model, truth, road, profile, torque, step_s)
     sure = replace(noise, widening=widening(doubt(model, drive), noise.sigma))
     evidence = Evidence((drive,), (sure,))
     refit = fit(rival.fitted.candidate, evidence, rival.fitted.x)
@@ -192,14 +198,14 @@ def separation(
 
 
 def imagined(
-    model: Simulation, entry: Entry, road: RoadFile, profile: Profile, time_s: Array, torque: Array
+    model: Simulation, entry: Entry, road: RoadFile, profile: Profile, torque: Array, step_s: float
 ) -> Drive:
-    """The drive as a car with the entry's effects would do it, without noise."""
+    """The drive as a car with the entry's effects would do it, without noise, in steps of the noise's rows."""
     found = entry.fitted
     effects: list[Effect] = list(model.with_effects(*found.candidate.effects(found.x)).effects)
     forms = {e.id: e.form for e in effects if e.form}
     car = model.vehicle.model_copy(update={"effects": {e.id: asdict(e) for e in effects}, "forms": forms})
-    run = simulate(car, road, torque, STEP_S, profile.initial_speed_m_s, 0.0)
+    run = simulate(car, road, torque, step_s, profile.initial_speed_m_s, 0.0)
     columns = dict(
         zip(
             CHANNELS,

@@ -205,7 +205,7 @@ class Unexplained:
     sign, shape : str
         In words: "opposes motion", "grows with its square".
     share : float
-        How much of the unexplained part this term takes on the hold-out [-].
+        How much of the unexplained part this term takes on all logs, to which it is fitted [-]; NaN where none is.
     x, y : array, shape (n,)
         The term over the quantity, to be drawn.
     sentence : str

@@ -13,12 +13,24 @@ from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
 from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
 from sim2real.logs.checks import MIN_DURATION_S
-from sim2real.observing.drive import WHEEL, Drive, awake, backward, grid_step, make_drive, untold_torque
+from sim2real.observing.drive import (
+    SPEED,
+    WHEEL,
+    Drive,
+    awake,
+    backward,
+    grid_step,
+    make_drive,
+    untold_torque,
+)
 from sim2real.observing.lattice_trace import find_counter
 from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
 
+TURNS, LEAST_TURNING_S = 0.005, 1.0
+"""A wheel is so much faster or slower than the car, by its yaw rate, from which on it turns [-], and for how long that
+is told [s]."""
 YAML = (".yaml", ".yml")
 """How the name of a log's own road ends."""
 
@@ -91,11 +103,28 @@ def read_sources(
             problems.append(str(error))
     if problems or car is None:
         raise ScenarioError("\n".join(dict.fromkeys(problems)))
-    *fitted, held = told_apart(found)
+    *fitted, held = (with_turns_told(source, car) for source in told_apart(found))
     if any(s.log.sha256 == held.log.sha256 for s in fitted):
         told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
         held = replace(held, log=held.log.warned(told))
     return Sources(car, vehicle, tuple(fitted), held)
+
+
+def with_turns_told(source: Source, vehicle: VehicleFile) -> Source:
+    """The source with a warning where its yaw rate tells of curves, which the model does not drive."""
+    log, drive = source.log, source.drive
+    if "yaw_rate_rad_s" not in log.signals:
+        return source
+    apart_m_s = 0.5 * vehicle.track_m * np.abs(source.on_rows("yaw_rate_rad_s"))
+    turns = drive.moving & (apart_m_s > TURNS * np.nan_to_num(drive.measured[:, SPEED], nan=np.inf))
+    turning_s = float(turns.sum() * drive.step_s)
+    if turning_s < LEAST_TURNING_S:
+        return source
+    told = (
+        f"the car turns in {turning_s:.3g} s of it; the model drives straight on, so a curve is told as anything else, "
+        "as wheel sensors of one side. Leave such stretches out where they are many."
+    )
+    return replace(source, log=log.warned(told))
 
 
 def told_apart(sources: Sequence[Source]) -> list[Source]:

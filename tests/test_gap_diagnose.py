@@ -365,6 +365,17 @@ def test_logs_of_one_name_are_told_apart(folder, tmp_path):
     assert [s.drive.name for s in found.all] == names
 
 
+@pytest.mark.parametrize(("yaw_rate", "turns"), [(0.005, False), (0.2, True)])
+def test_curves_are_told_where_the_yaw_rate_is_measured(folder, tmp_path, yaw_rate, turns):
+    drive = noisy(clean(pulses(4.0), 13.0))
+    write_log(drive, tmp_path / "curve.csv", yaw_rate_rad_s=np.full(len(drive), yaw_rate))
+    found = read_sources(
+        folder / "vehicle.yaml", folder / "dry.yaml", [f"{tmp_path}/curve.csv"], f"{folder}/holdout.csv"
+    )
+    assert any("the car turns in 4" in text for text in found.fit[0].log.warnings) is turns
+    assert not any("turns" in text for text in found.holdout.log.warnings)
+
+
 def test_a_log_without_a_needed_column_names_it(folder, tmp_path):
     drive = noisy(clean(pulses(4.0), 13.0))
     write_log(drive, tmp_path / "bad.csv", wheel_torque_rl_nm=None)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_drives import BARE, MODEL, clean, noisy, pulses, random_drives, remeasured, rms
+from gap_drives import BARE, MODEL, clean, noisy, pulses, random_drives, remeasured, rms, trace
 from long import beyond
 
 from benchmarks.gap_development import SEVERITY, Levels
@@ -18,7 +18,7 @@ from sim2real.observing.robust import ROBUST_FROM, loss, robust, robust_weight
 from sim2real.result import Verdict
 from sim2real.telling.estimates import FORM_SHARE, intervals
 from sim2real.which import selection
-from sim2real.which.contest import COUNTER, first_round, hold_contest
+from sim2real.which.contest import COUNTER, _telling, first_round, hold_contest
 from sim2real.which.fitting import MOST_STARTS, Candidate, fit
 from sim2real.which.pairs import add_pairs, add_partners, promising_pairs
 from sim2real.which.selection import decide, needs_pairs
@@ -85,11 +85,11 @@ def test_what_does_not_count_weighs_nothing(calm):
         assert (rows[-100:] != 0.0).mean() > 0.99
 
 
-def test_the_longest_drive_alone():
+def test_the_first_round_is_held_on_the_longest_log_unless_the_gap_lies_in_another():
     drives = [noisy(clean(pulses(t), 12.0)) for t in (3.0, 5.0, 4.0)]
-    longest = gather(MODEL, drives).longest()
-    assert longest.drives == (drives[1],)
-    assert longest.whitened(longest.residuals(MODEL)).size == drives[1].measured.size
+    assert _telling(MODEL, gather(MODEL, drives)).drives == (drives[1],)
+    heavy = noisy(clean(pulses(4.0), 12.0, effects={"mass_offset": {"mass_kg": 300.0}}))
+    assert _telling(MODEL, gather(MODEL, [*drives, heavy])).drives == (heavy,)
 
 
 def test_the_loss_is_a_square_for_noise_and_grows_with_the_size_of_outliers():
@@ -429,3 +429,23 @@ def test_a_pair_is_tried_with_other_partners(heavy_contest):
 def test_the_models_own_car_is_the_benchmarks():
     """The drives of this file have no effect that the model has already."""
     assert BARE.effects == {}
+
+
+def test_an_effect_that_the_shorter_log_alone_excites_is_found():
+    """A long gentle drive beside it must not spoil what braking to the limit tells."""
+    slippery = {"friction_offset": {"factor": 0.75}}
+    gentle = trace((0, 60), (9, 60), (10, -80), (15, -80), (16, 50), (20, 50), duration_s=20.0)
+    to_the_limit = trace(
+        (0, 0), (0.5, 0), (1.5, -400), (2.2, -1000), (2.4, 0), (3.0, 300), (5.5, 300), (6.0, 0), (7.0, -500),
+        (7.8, -1000), (8, 0), duration_s=9.0,
+    )  # fmt: skip
+    logs = [
+        noisy(clean(torque, speed, effects=slippery), seed)
+        for seed, (torque, speed) in enumerate([(gentle, 12.0), (to_the_limit, 22.0), (to_the_limit, 20.0)])
+    ]
+    exclude = only(
+        "friction_offset", "rolling_resistance", "mass_offset", "tyre_stiffness_offset", "torque_gain"
+    )
+    decision = find(MODEL, logs[:2], logs[2], exclude=exclude, jobs=2).decision
+    assert decision.winner.ids == ("friction_offset",)
+    assert decision.winner.fitted.x == pytest.approx([0.75], abs=0.01)

@@ -14,11 +14,11 @@ from sim2real.how_far import gap
 from sim2real.observing.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
 from sim2real.observing.evidence import Evidence, gather, residuals
 from sim2real.observing.noise import Noise
-from sim2real.result import Interval
 from sim2real.telling import estimates
-from sim2real.telling.estimates import at_bound, is_excited
+from sim2real.telling.estimates import at_bound, intervals, is_excited
 from sim2real.where import localise
 from sim2real.where.localise import REGIMES, Blocks, blocks, equation_shares, heat_map, places, regimes
+from sim2real.which.contest import as_it_is, enter
 from sim2real.which.fitting import Candidate, fit
 
 
@@ -168,11 +168,35 @@ def test_intervals_cover_and_are_no_wider_than_said(colour):
     )
 
 
-def test_an_effect_that_is_far_from_its_absence_is_seen_however_wide_its_interval():
-    noticeable = 0.01
-    assert is_excited(Interval(0.5, 0.45, 0.55, "s"), 0.0, noticeable)
-    assert is_excited(Interval(0.0, -0.01, 0.01, "s"), 0.0, noticeable)
-    assert not is_excited(Interval(0.05, -0.01, 0.11, "s"), 0.0, noticeable)
+def entered(key, drive, start):
+    """An effect alone, fitted to a drive and held to it."""
+    logs = known(drive)
+    return enter(Candidate(MODEL, (key,), (0,)), logs, logs, np.array([start]), 4)
+
+
+def test_what_the_logs_exclude_sharply_was_excited_whatever_else_is_wrong():
+    """A heavy car leaves a gap in which anything is uncertain alone; beside the mass it is not."""
+    heavy = noisy(clean(pulses(8.0), 14.0, effects={"mass_offset": {"mass_kg": 300.0}}))
+    mass = entered("mass_offset", heavy, 250.0)
+    bias = entered("accelerometer_bias", heavy, 0.1)
+    assert is_excited(mass, mass)
+    assert is_excited(bias, mass)
+
+
+def test_what_never_shows_was_not_excited():
+    standstill = noisy(clean(0.0 * pulses(6.0), 20.0))
+    logs = known(standstill)
+    null = as_it_is(MODEL, logs, logs)
+    assert not is_excited(entered("torque_gain", standstill, 1.1), null)
+    assert is_excited(entered("accelerometer_bias", standstill, 0.1), null)
+
+
+def test_a_parameter_without_any_slope_may_be_anything():
+    drive = noisy(clean(pulses(6.0), 14.0))
+    found = entered("torque_gain", drive, 1.1).fitted
+    blind = replace(found, jacobian=0.0 * found.jacobian)
+    ((_, low, high),) = intervals(blind, known(drive))
+    assert (low, high) == tuple(float(bound[0]) for bound in found.candidate.bounds)
 
 
 def test_intervals_stay_within_the_bounds(tame):

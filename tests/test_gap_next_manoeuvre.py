@@ -62,7 +62,9 @@ def proposed(request) -> Proposed:
     contest = hold_contest(MODEL, fit_to, held, first_round(MODEL, fit_to, case.exclude))
     assert decide(contest, fit_to, held).verdict is Verdict.AMBIGUOUS
     entries = {e.ids[0]: e for e in contest.singles}
-    profile = propose(MODEL, entries[case.effect], entries[case.rival], DRY, held.noises[0], 1.0)
+    profile = propose(
+        MODEL, entries[case.effect], entries[case.rival], DRY, held.noises[0], 1.0, held.drives[0].step_s
+    )
     return Proposed(case, logs, contest, held, profile)
 
 

@@ -201,6 +201,8 @@ def _tell_truth(console: Console, case: Case, truth: Truth, said: Diagnosis) -> 
     )
     found = next((c for c in said.causes if c.effect == truth.effect), None)
     for name, interval in found.parameters.items() if found else ():
+        if name not in truth.parameters:  # a form of the effect with more to it than was hidden
+            continue
         value = truth.parameters[name]
         side = "inside" if interval.low <= value <= interval.high else "outside"
         console.print(

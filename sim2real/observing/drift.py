@@ -48,21 +48,24 @@ def read_drift(drives: Sequence[Drive], noises: Sequence[Noise], residuals: Sequ
     """
     excess = []
     for seconds in LENGTHS_S:
-        sums = []
+        sums, whites = [], []
         for drive, noise, rest in zip(drives, noises, residuals, strict=True):
             scale = np.sqrt((1.0 + noise.correlation[WHEEL]) / (1.0 - noise.correlation[WHEEL]))
             z = (noise.whitened(rest) * noise.widening)[:, WHEEL] * np.mean(scale)
             left_less_right = (z[:, 0::2] - z[:, 1::2]) / np.sqrt(2.0)
             found = block_sums(np.nan_to_num(left_less_right), drive.rows_in(seconds))
             sums.append(np.where(found == 0.0, np.nan, found))
-            white = np.mean(scale) ** 2
+            whites.append(np.mean(scale) ** 2)
+        # each log's own, by how much it has a say in the spread
+        white = np.average(whites, weights=[len(found) for found in sums])
         axles = _spread(np.concatenate(sums)) - white
         known = np.maximum(axles[np.isfinite(axles)], 0.0)
         if not len(known):
             return np.zeros(len(DRIFT_S))
         excess.append(min(float(np.mean(known)), ALIKE * float(known.min())))
-    rows = np.array([drives[0].rows_in(seconds) for seconds in LENGTHS_S])
-    makes = np.array([[_of_blocks(n, drives[0].step_s / tau) for tau in DRIFT_S] for n in rows])
+    longest = max(drives, key=len)
+    rows = np.array([longest.rows_in(seconds) for seconds in LENGTHS_S])
+    makes = np.array([[_of_blocks(n, longest.step_s / tau) for tau in DRIFT_S] for n in rows])
     weight = 1.0 / rows  # longer blocks are fewer, and hold more
     squares, _ = nnls(makes * weight[:, None], np.array(excess) * weight)
     return np.asarray(np.sqrt(squares * min(1.0, MOST_DRIFT**2 / max(float(squares.sum()), 1e-12))))

@@ -62,10 +62,6 @@ class Evidence:
         """Each drive alone."""
         return [Evidence((d,), (n,)) for d, n in zip(self.drives, self.noises, strict=True)]
 
-    def longest(self) -> Evidence:
-        """The longest drive alone."""
-        return max(self.each(), key=lambda log: len(log.drives[0]))
-
     @cached_property
     def parts(self) -> tuple[slice, ...]:
         """Where each drive's residuals stand in `whitened`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.robust import robust_weight
@@ -14,11 +15,13 @@ from sim2real.which.fitting import Fit
 from sim2real.which.goodness import noise_margin
 from sim2real.which.varying import KNOT_S
 
+Array = NDArray[np.float64]
+
 AT_BOUND = 1e-3
 """An estimate this close to a bound, in shares of the range, lies at it [-]."""
 EXCITED_SHARE = 4.0 / 3.0
-"""A parameter is seen when its interval's half width is below this many noticeable changes of it, or leaves its absence
-out [-]."""
+"""An effect is seen when the half width of its first parameter is below this many noticeable changes of it, or leaves
+its absence out [-]."""
 STRETCH_S = 4.0 * KNOT_S
 """Time after which a varying value has forgotten itself [s]."""
 INTERVAL_FACTOR = 5.0
@@ -29,6 +32,8 @@ SCORE_BLOCK_S = 5.0
 FORM_SHARE = 0.05
 """Nor narrower than this share of how far the parameter is from its effect's absence: by so much the forms that one
 effect may have read the same parameter apart [-]."""
+LEAST_SLOPE = 1e-6
+"""Norm of the residuals' answer to a noticeable change below which there is none [standard deviations]."""
 LEAST_HALF_WIDTH = 0.01
 """No interval is narrower than this share of a noticeable change to either side: grids and integrators differ [-]."""
 
@@ -61,6 +66,7 @@ def intervals(found: Fit, evidence: Evidence) -> list[tuple[float, float, float]
     sandwich = bread @ meat @ bread
     variance = np.maximum(np.diag(sandwich), np.diag(bread))
     half = np.hypot(1.96 * INTERVAL_FACTOR * np.sqrt(variance), LEAST_HALF_WIDTH) * scale
+    half[_without_slope(scaled)] = np.inf
     half = np.hypot(half, FORM_SHARE * (found.x - found.candidate.neutral))
     half = np.hypot(half, found.candidate.open_share * found.x)
     low, high = found.candidate.bounds
@@ -112,10 +118,27 @@ def as_means(values: dict[str, Interval], varied: Varied, found: Fit, effect: st
     return out
 
 
-def is_excited(first: Interval, neutral: float, noticeable: float) -> bool:
-    """Whether an effect's first parameter is seen."""
-    narrow = 0.5 * (first.high - first.low) < EXCITED_SHARE * noticeable
-    return narrow or not first.low <= neutral <= first.high
+def is_excited(entry: Entry, stands: Entry) -> bool:
+    """Whether the logs could have shown an effect: by its own slopes, and what the account that stands leaves.
+
+    What it alone leaves would not do: a gap that is another's makes anything uncertain.
+    """
+    found = entry.fitted
+    first = int(np.flatnonzero(np.isfinite(found.candidate.open_share))[0])
+    scaled = found.jacobian * found.candidate.scale
+    if _without_slope(scaled)[first]:
+        return False
+    weight = robust_weight(stands.z_fit)
+    bread = np.linalg.pinv(scaled.T @ (scaled * weight[:, None]), rcond=1e-10)
+    left = max(stands.loss_fit / max(float(weight.sum()), 1.0), 1.0)
+    half = float(1.96 * INTERVAL_FACTOR * np.sqrt(bread[first, first] * left))
+    off = abs(found.x[first] - found.candidate.neutral[first]) / found.candidate.scale[first]
+    return half < EXCITED_SHARE or off > half
+
+
+def _without_slope(scaled: Array) -> NDArray[np.bool_]:
+    """Parameters whose noticeable changes the logs do not answer to at all."""
+    return np.sqrt((scaled**2).sum(axis=0)) < LEAST_SLOPE
 
 
 def at_bound(found: Fit) -> list[str]:

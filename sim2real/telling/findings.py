@@ -103,10 +103,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     heat: dict[str, dict[str, float]] = {}
     if decision.verdict is not Verdict.NO_GAP:
         progress("equations", 0, 1)
-        terms, unexplained = _terms(found, held, jobs)
+        terms, unexplained, suspect = _terms(found, held, jobs)
         progress("equations", 1, 1)
         if unexplained:
-            unexplained = seen_alone(_most_telling(found, unexplained, swing), gap.before)
+            unexplained = _most_telling(found, unexplained, swing)
+            unexplained = unexplained if suspect else seen_alone(unexplained, gap.before)
         subsystem = unexplained.subsystem if unexplained else _subsystem(decision, terms)
         taken = loss(held.whitened(before)) - loss(held.whitened(after))
         places, heat = _where(found, held, before, terms, subsystem, taken)
@@ -139,24 +140,30 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     )
 
 
-def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unexplained | None]:
-    """Free terms, best first, and what they say of a gap that no effect explains."""
+def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unexplained | None, bool]:
+    """Free terms, best first, what they say of a gap that no effect explains, and whether one sensor is suspected."""
     decision = found.decision
     if decision.verdict is not Verdict.UNKNOWN:
-        return fit_terms(
-            found.model, held.drives, held.noises, jobs, equations=WHOLE_CAR, quantities=OF_THE_MOTION
-        ), None
+        return (
+            fit_terms(
+                found.model, held.drives, held.noises, jobs, equations=WHOLE_CAR, quantities=OF_THE_MOTION
+            ),
+            None,
+            False,
+        )
     drives, noises = all_logs(found.fit_to, held)
     suspect = None
     if decision.left_open:  # the gap lies where the rows are doubtful
         noises = tuple(replace(n, widening=np.ones_like(n.widening)) for n in noises)
     else:
         suspect = lone_sensor(found.model, found.fit_to, held)
+    if suspect and "time" not in suspect.quantities:  # a sensor may fail for a while
+        suspect = replace(suspect, quantities=(*suspect.quantities, "time"))
     terms = fit_terms(found.model, drives, noises, jobs, equations=(suspect,) if suspect else EQUATIONS)
     terms = with_refined(found.model, drives, noises, terms, jobs)
     if not suspect:
         terms = finer(found.model, drives[-1:], noises[-1:], terms, jobs)
-    return terms, characterise(terms, suspect)
+    return terms, characterise(terms, suspect), suspect is not None
 
 
 def _most_telling(found: Findings, term: Unexplained, swing: Unexplained | None) -> Unexplained:
@@ -211,12 +218,8 @@ def _cause(
     values = values or {name: value for (_, name), value in alone.items()}
     if found.decision.varied and key in found.decision.winner.ids:
         values = as_means(values, found.decision.varied, told.fitted, key)
-    told_first = int(np.flatnonzero(np.isfinite(best.candidate.open_share))[0])
-    excited = is_excited(
-        list(alone.values())[told_first],
-        float(best.candidate.neutral[told_first]),
-        float(best.candidate.scale[told_first]),
-    )
+    unknown = found.decision.verdict is Verdict.UNKNOWN or found.decision.winner.fit is None
+    excited = is_excited(entry, found.contest.null if unknown else found.decision.winner)
     fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
     shrunk = shrink(held, before, after, seed)
@@ -327,7 +330,7 @@ def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:
     a, b = decision.winner, decision.rivals[0]
     now = float(np.sqrt(abs(b.loss - a.loss)))
     drive, noise = found.holdout.drives[0], found.holdout.noises[0]
-    return propose(found.model, a, b, drive.road, noise, now, progress)
+    return propose(found.model, a, b, drive.road, noise, now, drive.step_s, progress)
 
 
 def _traces(found: Findings, held: Evidence, added: Simulation) -> tuple[Trace, ...]:

@@ -30,14 +30,19 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
     share = 1.0 - best.loss / max(best.null_loss, 1e-12)
     shape, sign = shape_of(best), sign_of(best)
     wanted = _wanted(best, sign, shape)
+    # what the tyres give by the place is what the road gives
+    by_place = best.equation.key == "tyre" and best.quantity == "position"
+    subsystem = "road" if by_place else best.equation.subsystem
     sentence = (
-        f"The {best.equation.subsystem.replace('_', ' ')}'s equation ({best.equation.key}) {wanted}. "
+        f"The {subsystem.replace('_', ' ')}'s equation ({best.equation.key}) {wanted}. "
         f"Such a term takes {100.0 * share:.0f} % of the misfit."
     )
     if suspect:
         sentence = f"Without the {suspect.key.removesuffix(' sensor')}'s signal all else agrees. {sentence}"
+    if best.equation.key == "axles":
+        sentence += " Another split of the torque does so, or tyres of one axle unlike the other's."
     return Unexplained(
-        best.equation.subsystem,
+        subsystem,
         best.equation.signal,
         best.quantity,
         best.equation.unit,

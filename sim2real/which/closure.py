@@ -1,8 +1,9 @@
 """The gap itself, doubtful rows included: whether there is one, and whether the cause closes it.
 
 The misfit averages over blocks and lets rows count less where even the right model cannot foretell, near the grip
-limit above all. So a wrong effect may pass it, where most of the gap lies just there. The gap itself counts every row:
-what a cause leaves of it beyond the noise floor, as energy, has to be the lesser part by far.
+limit above all. So a wrong effect may pass it, where most of the gap lies just there. The gap itself is of single rows,
+each in its own standard deviation, doubts of the prediction included: what a cause leaves of it beyond the noise floor,
+as energy, has to be the lesser part by far.
 """
 
 from __future__ import annotations

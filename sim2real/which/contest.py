@@ -41,6 +41,9 @@ WHEELS_APART, WHEEL_VALUES = 3.0, 11
 """A wheel's own value is sought up to this many noticeable changes from the mean, among so many values."""
 FIRST_ROUND_STEPS = 4
 """Steps of the first round's fits."""
+TELLS_MORE = 3.0
+"""The first round is held on the longest log, unless the model as it is leaves so many times its loss on another: the
+gap then lies there, and what the longest does not excite would never be fitted [-]."""
 
 
 @dataclass(frozen=True)
@@ -231,8 +234,7 @@ def first_round(
 
     A form with more parameters than the effect's first one starts from where that ended, if that was among the best.
     """
-    one_log = fit_to.longest()
-
+    one_log = _telling(model, fit_to)
     candidates = [
         Candidate(model, (key,), (form,))
         for key, kinds in FORMS.items()
@@ -250,6 +252,15 @@ def first_round(
         if c not in plain and c.ids in ranked[:FURTHER_FORMS]
     ]
     return sorted([*found, *run_all(more, jobs, progress, "forms, first round")], key=lambda fit: fit.loss)
+
+
+def _telling(model: Simulation, fit_to: Evidence) -> Evidence:
+    """The log that the first round is held on."""
+    logs = fit_to.each()
+    longest = max(range(len(logs)), key=lambda i: len(logs[i].drives[0]))
+    losses = [loss(log.whitened(log.residuals(model))) for log in logs]
+    most = int(np.argmax(losses))
+    return logs[most if losses[most] > TELLS_MORE * losses[longest] else longest]
 
 
 def _near_and_far(candidate: Candidate) -> Array:
