@@ -199,6 +199,10 @@ def test_a_parameter_without_any_slope_may_be_anything():
     assert (low, high) == tuple(float(bound[0]) for bound in found.candidate.bounds)
 
 
+def places_of(drive, part, subsystem):
+    return places(drive, part, {subsystem: part})
+
+
 def test_intervals_stay_within_the_bounds(tame):
     held = known(tame)
     for effect in ("brake_drag", "torque_lag", "rolling_resistance"):
@@ -297,7 +301,7 @@ def parted(**off):
 
 
 def test_a_place_is_a_signal_a_regime_and_a_window(tame):
-    (found,) = places(tame, parted(accel_x=([1, 2, 3], 10.0)), "accelerometer")
+    (found,) = places_of(tame, parted(accel_x=([1, 2, 3], 10.0)), "accelerometer")
     assert (found.signal, found.subsystem, found.regime) == ("accel_x", "accelerometer", "coast")
     assert (found.from_s, found.to_s) == (0.2, 0.8)
     assert found.share == 1.0
@@ -305,7 +309,7 @@ def test_a_place_is_a_signal_a_regime_and_a_window(tame):
 
 
 def test_places_end_where_the_regime_does_and_where_it_is_good_again(tame):
-    found = places(tame, parted(vehicle_speed=([1, 3, 4, 5, 6, 9], 8.0)), "vehicle")
+    found = places_of(tame, parted(vehicle_speed=([1, 3, 4, 5, 6, 9], 8.0)), "vehicle")
     spans = sorted((p.from_s, p.to_s) for p in found)
     assert spans == [(0.2, 1.0), (1.0, 1.4), (1.8, 2.0)] or spans == [
         (0.2, 0.4),
@@ -317,7 +321,7 @@ def test_places_end_where_the_regime_does_and_where_it_is_good_again(tame):
 
 
 def test_places_are_ranked_by_their_share(tame):
-    found = places(tame, parted(accel_x=([1], 5.0), wheel_speed=([7], 20.0)), "tyre")
+    found = places_of(tame, parted(accel_x=([1], 5.0), wheel_speed=([7], 20.0)), "tyre")
     assert [p.signal for p in found] == ["wheel_speed", "accel_x"]
     assert found[0].share > 0.9
 
@@ -325,14 +329,14 @@ def test_places_are_ranked_by_their_share(tame):
 def test_noise_is_no_place(tame):
     noise = known(tame).noises[0]
     drawn = noise.draw(len(tame), np.random.default_rng(2))
-    found = places(tame, blocks(tame, noise, MODEL.predict(tame), drawn), "tyre")
+    found = places_of(tame, blocks(tame, noise, MODEL.predict(tame), drawn), "tyre")
     assert sum(p.to_s - p.from_s for p in found) < 0.1 * tame.time_s[-1]
 
 
 def test_a_biased_accelerometer_is_placed_there_all_the_time(tame):
     rest = residuals(MODEL.with_effects(AccelerometerBias(0.4)), tame)
     noise = known(tame).noises[0]
-    found = places(tame, blocks(tame, noise, MODEL.predict(tame), rest), "accelerometer")
+    found = places_of(tame, blocks(tame, noise, MODEL.predict(tame), rest), "accelerometer")
     assert {p.signal for p in found if p.share > 0.02} == {"accel_x"}
 
 
@@ -372,3 +376,13 @@ def test_the_part_of_the_car_that_the_cause_lies_in_has_the_most_of_the_heat_map
     said = diagnose(MODEL, logs[:1], logs[1], exclude=exclude)
     shares = {part: sum(row.values()) for part, row in said.heat_map.items()}
     assert max(shares, key=lambda part: shares[part]) == "powertrain"
+
+
+def test_a_place_is_of_the_part_that_is_missed_there_most(tame):
+    both = parted(accel_x=([1, 2], 10.0), wheel_speed=([6, 7], 10.0))
+    without = {
+        "accelerometer": parted(accel_x=([1, 2], 9.0), wheel_speed=([6], 2.0)),
+        "wheel_speed_sensor": parted(accel_x=([1], 3.0), wheel_speed=([6, 7], 9.0)),
+    }
+    found = {place.signal: place.subsystem for place in places(tame, both, without)}
+    assert found == {"accel_x": "accelerometer", "wheel_speed": "wheel_speed_sensor"}

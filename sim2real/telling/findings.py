@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -108,9 +108,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         if unexplained:
             unexplained = _most_telling(found, unexplained, swing)
             unexplained = unexplained if suspect else seen_alone(unexplained, gap.before)
-        subsystem = unexplained.subsystem if unexplained else _subsystem(decision, terms)
-        taken = loss(held.whitened(before)) - loss(held.whitened(after))
-        places, heat = _where(found, held, before, terms, subsystem, taken)
+        missing = _missing(found, held, before)
+        if unexplained or not missing:
+            likeliest = terms[0].equation.subsystem if terms else ""
+            missing = {unexplained.subsystem if unexplained else likeliest: before}
+        places, heat = _where(found, held, before, after, terms, missing)
     return Diagnosis(
         verdict=decision.verdict,
         sentence=" ".join(
@@ -276,33 +278,45 @@ def _variation(decision: Decision) -> Variation | None:
     )
 
 
-def _subsystem(decision: Decision, terms: Sequence[Term]) -> str:
-    if decision.verdict is Verdict.UNKNOWN or decision.winner.fit is None:
-        return terms[0].equation.subsystem if terms else ""
-    return EFFECTS[decision.winner.ids[0]].subsystem
+def _missing(found: Findings, held: Evidence, before: Sequence[Array]) -> dict[str, Sequence[Array]]:
+    """Subsystem to what the verdict leaves without its effects there; empty where it blames nothing."""
+    parts = dict.fromkeys(EFFECTS[effect.id].subsystem for effect in found.added())
+    if len(parts) == 1:
+        return dict.fromkeys(parts, before)
+    return {
+        part: held.residuals(
+            found.model.with_effects(
+                *(e for e in found.added() if EFFECTS[e.id].subsystem != part), *found.structure()
+            )
+        )
+        for part in parts
+    }
 
 
 def _where(
     found: Findings,
     held: Evidence,
     before: Sequence[Array],
+    after: Sequence[Array],
     terms: Sequence[Term],
-    subsystem: str,
-    taken: float,
+    missing: Mapping[str, Sequence[Array]],
 ) -> tuple[tuple[Place, ...], dict[str, dict[str, float]]]:
-    """Places and heat map; what the verdict adds is a term of its subsystem too, and takes `taken` off the loss."""
-    null = sum(term.null_loss for term in terms[:1])
-    shares = localise.equation_shares(
-        [(subsystem, taken), *((t.equation.subsystem, null - t.loss) for t in terms)]
-    )
-    parts = [
-        localise.blocks(drive, noise, found.model.predict(drive), rest)
-        for drive, noise, rest in zip(held.drives, held.noises, before, strict=True)
-    ]
+    """Places and heat map; what the verdict adds is a term of its subsystem too, by what is missed without it."""
+
+    def of_logs(rests: Sequence[Array]) -> list[localise.Blocks]:
+        each = zip(held.drives, held.noises, rests, strict=True)
+        return [
+            localise.blocks(drive, noise, found.model.predict(drive), rest) for drive, noise, rest in each
+        ]
+
+    null, left = sum(term.null_loss for term in terms[:1]), loss(held.whitened(after))
+    taken = [(part, loss(held.whitened(rests)) - left) for part, rests in missing.items()]
+    shares = localise.equation_shares([*taken, *((t.equation.subsystem, null - t.loss) for t in terms)])
+    parts, without = of_logs(before), {part: of_logs(rests) for part, rests in missing.items()}
     places = tuple(
         place
-        for drive, part in zip(held.drives, parts, strict=True)
-        for place in localise.places(drive, part, subsystem)
+        for i, (drive, part) in enumerate(zip(held.drives, parts, strict=True))
+        for place in localise.places(drive, part, {name: logs[i] for name, logs in without.items()})
     )
     return places, localise.heat_map(parts, shares)
 

@@ -6,7 +6,7 @@ of the car is given one in turn, and what its best term takes off the misfit is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,9 +115,19 @@ def heat_map(found: Sequence[Blocks], shares: dict[str, float]) -> dict[str, dic
     return {sub: {name: share * e / total for name, e in energy.items()} for sub, share in shares.items()}
 
 
-def places(drive: Drive, part: Blocks, subsystem: str) -> tuple[Place, ...]:
-    """Windows in which a signal is off, those with the most of the gap first."""
+def places(drive: Drive, part: Blocks, without: Mapping[str, Blocks]) -> tuple[Place, ...]:
+    """Windows in which a signal is off, those with the most of the gap first.
+
+    Parameters
+    ----------
+    drive, part : Drive, Blocks
+        The drive, and what the model as it is leaves of it.
+    without : mapping
+        Subsystem to what the verdict leaves of the drive without its effect there: a window is of the one that is
+        missed most. One subsystem alone has them all.
+    """
     excess = np.maximum(part.z**2 - 1.0, 0.0)
+    missed = {subsystem: np.maximum(left.z**2 - 1.0, 0.0) for subsystem, left in without.items()}
     total = max(float(excess.sum()), 1e-12)
     out = []
     for name, channels in GROUPS.items():
@@ -127,10 +137,11 @@ def places(drive: Drive, part: Blocks, subsystem: str) -> tuple[Place, ...]:
         off = np.abs(part.z[:, channels]).max(axis=1) > NOTABLE
         for begin, end in _runs(off, part.regime):
             share = float(per_block[begin:end].sum() / total)
+            window = (slice(begin, end), channels)
             out.append(
                 Place(
                     name,
-                    subsystem,
+                    max(missed, key=lambda subsystem: float(missed[subsystem][window].sum())),
                     str(part.regime[begin]),
                     round(float(part.from_s[begin]), 3),
                     round(float(part.to_s[end - 1]), 3),
