@@ -21,8 +21,10 @@ ESTIMATOR_PACKAGES = {"numpy": "numpy", "cv2": "opencv-python-headless", "onnxru
 ESTIMATOR_FILES = (
     "camera_slave.py",
     "estimate_outputs.py",
+    "estimator_parameter.py",
     "fields.py",
     "frames.py",
+    "image_settings.py",
     "parameters.py",
     "settings.py",
     "signals.py",

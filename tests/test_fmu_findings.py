@@ -258,8 +258,8 @@ def test_5_every_callback_that_the_wrapper_calls_is_guarded() -> None:
         *("_get_fmu_state", "_set_fmu_state"),
     )
     unguarded = [name for name in called if not hasattr(getattr(GuardedSlave, name), "__wrapped__")]
-    # These two are pythonfmu's own and have an empty body.
-    assert unguarded == ["setup_experiment", "enter_initialization_mode"]
+    # It is pythonfmu's own and has an empty body.
+    assert unguarded == ["setup_experiment"]
 
 
 def test_ctrl_c_within_a_step_reaches_the_host_and_the_unit_survives(unit_folder: Path) -> None:

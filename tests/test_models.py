@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from models.training import data, patches, scores
-from models.training.calibrate import probabilities
 from models.training.picture_looks import rendered_looks
 from models.training.rendered import SEED_RANGES, draw_worlds
 from models.training.segmenter_data import masked_sample, painted_views, plain_view
 from scenarios.stills import classify_pictures
+from trpac_core.vision.networks import calibrated_probabilities
 from trpac_core.vision.onnx_runtime import ort
 
 ROOT = Path(__file__).parents[1]
@@ -164,7 +164,7 @@ def test_colour_order_matters(surface):
 
 def test_temperature_keeps_the_class_and_makes_probabilities(surface):
     logits = logits_of(surface, random_patches(200))
-    calibrated = probabilities(logits, temperature_of(surface))
+    calibrated = calibrated_probabilities(logits, temperature_of(surface))
     assert calibrated.sum(axis=1) == pytest.approx(1.0)
     assert (calibrated.argmax(axis=1) == logits.argmax(axis=1)).all()
 

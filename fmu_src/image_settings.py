@@ -1,0 +1,127 @@
+"""Parameters of the unit's camera side: lens and mounting, and the image estimator's settings."""
+
+from __future__ import annotations
+
+from trpac_core.vision.ife_config import (
+    FARTHEST_CENTRE,
+    LEAST_GRID_M,
+    LEAST_STEP_M,
+    MOST_DEVIATION_M,
+    MOST_GROWTH_M_S,
+    MOST_PATCHES,
+    MOST_WAY_M,
+    MOST_WIDTH_M,
+    STEEPEST_SIGMOID,
+)
+
+from .estimator_parameter import parameter
+
+CAMERA_PARAMETERS = (
+    parameter("camera.width", "", "vision.camera.width_px", "Width of the picture in pixels", 64),
+    parameter("camera.height", "", "vision.camera.height_px", "Height of the picture in pixels", 64),
+    parameter("camera.fx", "px", "vision.camera.fx_px", "Focal length, horizontal", 1.0),
+    parameter("camera.fy", "px", "vision.camera.fy_px", "Focal length, vertical", 1.0),
+    parameter("camera.cx", "px", "vision.camera.cx_px", "Principal point, column"),
+    parameter("camera.cy", "px", "vision.camera.cy_px", "Principal point, row"),
+    *(
+        parameter(f"camera.{term}", "1", f"vision.camera.distortion.{place}", f"Lens distortion {term}")
+        for place, term in enumerate(("k1", "k2", "p1", "p2", "k3"))
+    ),
+    parameter("camera.height_above_road", "m", "vision.camera.height_m", "Height above the road", 0.01),
+    parameter(
+        "camera.x_from_front_axle", "m", "vision.camera.x_from_front_axle_m", "Position, forward positive"
+    ),
+    parameter("camera.y", "m", "vision.camera.y_m", "Position, left positive"),
+    parameter("camera.pitch", "rad", "vision.camera.pitch_rad", "Pitch, nose down positive", -1.5, 1.5),
+    parameter("camera.yaw", "rad", "vision.camera.yaw_rad", "Yaw, left positive", -1.5, 1.5),
+    parameter("camera.roll", "rad", "vision.camera.roll_rad", "Roll, right side down positive", -1.5, 1.5),
+    parameter("camera.fps", "1/s", "vision.camera.fps", "Pictures per second", 0.01),
+)
+
+_GROUPS = ("near", "middle", "far")
+
+IMAGE_PARAMETERS = (
+    parameter(
+        "image.flag_threshold", "1", "vision.flag_threshold", "Q_v above which the flag is set", 0.0, 1.0
+    ),
+    parameter(
+        "image.least_mass",
+        "1",
+        "vision.least_mass",
+        "Least mass m_0 of the class for the flag to be set",
+        0.0,
+        1.0,
+    ),
+    *(
+        parameter(
+            f"image.{group}_{end}",
+            "m",
+            f"vision.ranges_m.{place}.{index}",
+            f"The {group} group looks {end} this way ahead",
+            0.0,
+            MOST_WAY_M,
+        )
+        for place, group in enumerate(_GROUPS)
+        for index, end in enumerate(("from", "to"))
+    ),
+    *(
+        parameter(
+            f"image.patches_{group}",
+            "",
+            f"vision.b.{place}",
+            f"Patches of the {group} group",
+            2,
+            MOST_PATCHES,
+        )
+        for place, group in enumerate(_GROUPS)
+    ),
+    parameter("image.grid", "m", "vision.a_m", "Grid size a", LEAST_GRID_M),
+    parameter(
+        "image.roi_width",
+        "m",
+        "vision.roi_width_m",
+        "Width of road that a patch shows, in the mean",
+        0.05,
+        MOST_WIDTH_M,
+    ),
+    parameter(
+        "image.roi_spread",
+        "1",
+        "vision.roi_spread",
+        "A group's widest patch is wider by this, its narrowest narrower",
+        1.0,
+    ),
+    parameter(
+        "image.track_step", "m", "vision.step_m", "Distance between the track's ellipses", LEAST_STEP_M
+    ),
+    parameter("image.k1", "m/s", "vision.k1", "Growth of the track's uncertainty along, below k2", 1e-12),
+    parameter(
+        "image.k2", "m/s", "vision.k2", "Growth of the track's uncertainty across", 1e-12, MOST_GROWTH_M_S
+    ),
+    parameter(
+        "image.start_deviation",
+        "m",
+        "vision.start_deviation_m",
+        "Standard deviation of the wheel's place",
+        1e-3,
+        MOST_DEVIATION_M,
+    ),
+    parameter("image.sigma", "1", "vision.weight_law.sigma", "Relaxation of the evidence weights", 0.0, 1.0),
+    parameter(
+        "image.sigmoid_centre",
+        "1",
+        "vision.weight_law.sigmoid_centre",
+        "Centre of the weights' sigmoid",
+        -FARTHEST_CENTRE,
+        FARTHEST_CENTRE,
+    ),
+    parameter(
+        "image.sigmoid_slope",
+        "1",
+        "vision.weight_law.sigmoid_slope",
+        "Slope of the weights' sigmoid",
+        0.0,
+        STEEPEST_SIGMOID,
+    ),
+    parameter("image.seed", "", "vision.seed", "Seed of the drawing of patches", 0),
+)
