@@ -15,7 +15,7 @@ from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
 
 from .contents import require_as_built
-from .frames import BusClass, FrameState, in_memory, next_frame
+from .frames import BUS, BusClass, FrameState, in_memory, next_frame
 from .guarded_slave import GuardedSlave
 from .settings import BUFFERS_ENABLED
 
@@ -100,11 +100,11 @@ class CameraSlave(GuardedSlave):
             self._frame = replace(self._frame, failed=True)
             estimate = self._estimator.step(step_s, sensors, frame_failed=True)
         if problem:
-            sort = "class" if problem.startswith("road_class") else "picture"
+            sort = "class" if self._frame.source == BUS else "picture"
             self.report(f"frame {sort}", Fmi2Status.warning, f"{self.modelName}: {problem}")
         for kind, text in self.problems(estimate):
-            # A problem begins with what it is about: "wheel_speed_rad_s is ...", "The car rolls backwards ...".
-            about = text.partition(" is ")[0]
+            # A problem begins with what it is about, "wheel_speed_rad_s is ...", and so does each of several.
+            about = [part.partition(" is ")[0] for part in text.split("; ")]
             self.report(f"sensors {kind} {about}", Fmi2Status.warning, f"{self.modelName}: {text}")
 
     def _tell_buffers_off(self) -> None:

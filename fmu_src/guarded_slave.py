@@ -192,7 +192,7 @@ class GuardedSlave(Fmi2Slave):
 
     def _look_ahead(self) -> None:
         """Work the outputs out by what is set so far, for a host that reads them while it initialises."""
-        self._stale = False
+        self._stale = self._looked_at = False
         try:
             self.initialise()
         except ValueError:  # told when the initialisation ends, if it is so still
@@ -229,6 +229,7 @@ class GuardedSlave(Fmi2Slave):
         except ValueError as error:
             message = f"{self.modelName} cannot be initialised: {error} Every step will be discarded."
             self.report("initialise", Fmi2Status.error, message)
+            self._looked_at = False
         else:
             self._ready = True
 
@@ -236,8 +237,9 @@ class GuardedSlave(Fmi2Slave):
     def do_step(self, current_time: float, step_size: float) -> bool:
         """One communication step; False (fmi2Discard) only where nothing could be computed."""
         if not self._ready:
-            text = f"{self.modelName}: a step was asked for before the initialisation has ended well; it is discarded."
-            self.report("not ready", Fmi2Status.error, text)
+            if self._settable is not self._inputs:  # else it has been told what is wrong
+                text = f"{self.modelName}: a step was asked for before the initialisation has ended; it is discarded."
+                self.report("not ready", Fmi2Status.error, text)
             return False
         self.step(step_size)
         return True
@@ -377,7 +379,8 @@ class GuardedSlave(Fmi2Slave):
                 return
         self._settable = self._inputs if content["initialised"] else self._inputs_and_parameters
         self.values = Held(content["values"], self._view)
-        self._ready = content["ready"]
+        self._ready, self._looked_at = content["ready"], False
+        self._initialising = self._stale = not content["initialised"]
 
     def _refuse_state(self, reason: str) -> None:
         text = f"{self.modelName}: the state was not restored: {reason.removesuffix('.')}."

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
@@ -29,8 +30,10 @@ from trpac_core.vehicle import WHEELS
 Array = NDArray[np.float64]
 
 TURNS, LEAST_TURNING_S = 0.005, 1.0
-"""A wheel is so much faster or slower than the car, by its yaw rate, from which on it turns [-], and for how long that
-is told [s]."""
+"""A wheel is so much faster or slower than the car, by its yaw rate averaged over the second, from which on it turns
+[-], and for how long in all that is told [s]."""
+LEAST_APART_M_S = 0.02
+"""Less is the noise of a slow car's yaw rate [m/s]."""
 YAML = (".yaml", ".yml")
 """How the name of a log's own road ends."""
 
@@ -115,13 +118,18 @@ def with_turns_told(source: Source, vehicle: VehicleFile) -> Source:
     log, drive = source.log, source.drive
     if "yaw_rate_rad_s" not in log.signals:
         return source
-    apart_m_s = 0.5 * vehicle.track_m * np.abs(source.on_rows("yaw_rate_rad_s"))
-    turns = drive.moving & (apart_m_s > TURNS * np.nan_to_num(drive.measured[:, SPEED], nan=np.inf))
+    rows = drive.rows_in(LEAST_TURNING_S)
+    yaw, speed = (
+        uniform_filter1d(np.nan_to_num(values), rows, mode="nearest")
+        for values in (source.on_rows("yaw_rate_rad_s"), drive.measured[:, SPEED])
+    )
+    apart_m_s = 0.5 * vehicle.track_m * np.abs(yaw)
+    turns = drive.moving & (apart_m_s > np.maximum(TURNS * speed, LEAST_APART_M_S))
     turning_s = float(turns.sum() * drive.step_s)
     if turning_s < LEAST_TURNING_S:
         return source
     told = (
-        f"the car turns in {turning_s:.3g} s of it; the model drives straight on, so a curve is told as anything else, "
+        f"the car turns in {turning_s:.0f} s of it; the model drives straight on, so a curve is told as anything else, "
         "as wheel sensors of one side. Leave such stretches out where they are many."
     )
     return replace(source, log=log.warned(told))

@@ -634,3 +634,23 @@ def test_a_step_before_the_initialisation_is_told(open_unit: Open) -> None:
     with pytest.raises(FMICallException):
         unit.step()
     assert "before the initialisation has ended" in unit.log[0].text
+
+
+def test_a_state_restored_while_the_host_initialises_is_what_is_read(open_unit: Open) -> None:
+    """And one that was saved there is read by what is set from then on, not by where the unit had come."""
+    unit = open_unit()
+    flag_up(unit)
+    driven, state = unit.outputs(), unit.slave.getFMUstate()
+    unit.reset()
+    unit.slave.setupExperiment(startTime=0.0)
+    unit.slave.enterInitializationMode()
+    early = unit.slave.getFMUstate()
+    unit.slave.setFMUstate(state)
+    assert unit.outputs() == driven
+    unit.step(SLIPPERY)
+    later = unit.outputs()
+    unit.step(SLIPPERY, count=50)
+    unit.slave.setFMUstate(early)
+    unit.set({"estimator.theta_initial": 0.6})
+    assert unit.get("TRPAC") == 0.6
+    assert later["flag"]

@@ -368,7 +368,8 @@ def test_logs_of_one_name_are_told_apart(folder, tmp_path):
 @pytest.mark.parametrize(("yaw_rate", "turns"), [(0.005, False), (0.2, True)])
 def test_curves_are_told_where_the_yaw_rate_is_measured(folder, tmp_path, yaw_rate, turns):
     drive = noisy(clean(pulses(4.0), 13.0))
-    write_log(drive, tmp_path / "curve.csv", yaw_rate_rad_s=np.full(len(drive), yaw_rate))
+    noise = 0.02 * np.random.default_rng(1).standard_normal(len(drive))
+    write_log(drive, tmp_path / "curve.csv", yaw_rate_rad_s=yaw_rate + noise)
     found = read_sources(
         folder / "vehicle.yaml", folder / "dry.yaml", [f"{tmp_path}/curve.csv"], f"{folder}/holdout.csv"
     )

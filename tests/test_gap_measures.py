@@ -191,6 +191,16 @@ def test_what_never_shows_was_not_excited():
     assert is_excited(entered("accelerometer_bias", standstill, 0.1), null)
 
 
+def test_a_parameter_of_little_slope_beside_one_of_much_is_as_wide_as_alone():
+    drive = noisy(clean(pulses(6.0), 14.0))
+    found = entered("torque_gain", drive, 1.1).fitted
+    weight = np.ones(len(found.z))
+    little = 1e-6 * np.random.default_rng(0).standard_normal((len(found.z), 1))
+    much = 1e3 * np.random.default_rng(1).standard_normal((len(found.z), 1))
+    alone = estimates._inverse(little, weight)[0, 0]
+    assert estimates._inverse(np.hstack([little, much]), weight)[0, 0] == pytest.approx(alone, rel=0.05)
+
+
 def test_a_parameter_without_any_slope_may_be_anything():
     drive = noisy(clean(pulses(6.0), 14.0))
     found = entered("torque_gain", drive, 1.1).fitted

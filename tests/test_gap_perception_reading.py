@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -74,6 +75,28 @@ def test_a_modelled_effect_that_takes_next_to_nothing_excuses_no_wrong_class(eff
 
     finding = diagnose(Camera(wrong=0.01), 1, damage=hanging, vehicle=car_with(**effects))
     assert finding.verdict is Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize("column", [None, "computed"])
+def test_a_modelled_blur_excuses_wrong_classes_where_no_confidence_is_measured(column):
+    def without(log):
+        if column is None:
+            return changed(log, image_confidence=None)
+        return replace(log, derived=frozenset({"image_confidence"}))
+
+    def confused(log):
+        place = 0.5 * (log.signals["image_from_m"] + log.signals["image_to_m"])
+        seen = log.signals["image_class"].copy()
+        for one, after in pairwise(ROAD.segments[3:40:4]):
+            seen[(place > one.start_m) & (place < min(one.start_m + 30.0, after.start_m))] = (
+                int(one.surface_class) + 1
+            ) % 3
+        return changed(log, image_class=seen)
+
+    read = [without(confused(x)) for x in logs(Camera())]
+    assert judged(read).verdict is Verdict.UNKNOWN
+    blurred = car_with(motion_blur={"exposure_s": 0.15})
+    assert "keeps seeing another class" not in " ".join(judged(read, car=blurred).unexplained)
 
 
 @pytest.mark.parametrize("confidence", [1.0, 0.95])

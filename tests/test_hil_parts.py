@@ -532,3 +532,20 @@ def test_pictures_are_judged_by_the_units_parameters(tmp_path):
     assert (vision.least_mass, vision.b[0], vision.flag_threshold) == (0.9, 6, 0.4)
     assert (vision.track_m, vision.camera) == (1.7, camera)
     assert _vision(replace(settings, parameters={}), camera) == IfeConfig(camera=camera)
+
+
+def slow(control):
+    """A recorder that takes its time to write a long log, and says nothing meanwhile."""
+    control.ready()
+    while not control.stopped:
+        time.sleep(0.01)
+    time.sleep(1.5)
+    control.tell("done", "written")
+
+
+def test_the_recorder_is_given_the_time_that_a_long_log_takes():
+    rig = Rig()
+    recorder = rig.add("recorder", slow, ...)
+    rig.wait_until_ready()
+    rig.start(0)
+    assert rig.end(recorder, patience_s=0.2) == {"done": "written"}

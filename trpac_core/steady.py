@@ -75,10 +75,11 @@ def held(before: Steady, slip: float, friction: float, rise: float, noise: float
 
 
 def faded(before: Steady, passed_s: float) -> Steady:
-    """The means after a time without readings: as if so much less had gone into them."""
+    """The means after a time without readings, as if so much less had gone into them; none after their memory."""
     if passed_s == 0.0:
         return before
-    held_s = min(before.held_s, _LONGEST_S) - passed_s * _LONGEST_S / MEMORY_S
+    held_s = min(before.held_s, _LONGEST_S)
+    held_s -= passed_s * max(held_s / MEMORY_S, 1.0)
     return before._replace(held_s=held_s) if held_s > 0.0 else NOTHING
 
 

@@ -57,7 +57,7 @@ def columns(wiring: Wiring) -> tuple[Column, ...]:
         *(Column(f"image_confidence{s}", "1", f"Q_v{t}") for s, t in sides),
         Column("TRPAC", "1", "fused estimate, as sent"),
         Column("TRPAC_std", "1", "its standard deviation"),
-        Column("K_v", "1", "visual gain"),
+        Column("K_v", "1/s", "visual gain"),
         Column("flag", "", "visual confidence flag", "u1"),
         Column("excitation_flag", "", "the fused estimate runs", "u1"),
         Column("TRPAC_dynamics", "1", "estimate without the camera"),

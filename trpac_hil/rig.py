@@ -51,7 +51,7 @@ from trpac_hil.summary import summarise, write_summary
 from trpac_hil.unit import Unit
 
 LOG, SUMMARY = "log.mf4", "summary.json"
-PATIENCE_S = 60.0
+PATIENCE_S, RECORDERS_PATIENCE_S = 60.0, 3600.0
 """How long a helper that has been told to stop may go on before it is ended [s]."""
 RUN_UP_NS = 200_000_000
 """From the word to start until slot 0, for all processes to hear it [ns]."""
@@ -188,18 +188,20 @@ class Rig:
     def end(self, control: Control | None = None, patience_s: float = PATIENCE_S) -> dict[str, Any]:
         """Stop all, wait for them, and return what one of them said last, by kind.
 
-        One that is still at work after `patience_s` is ended, but for the recorder: a long log takes long to write.
+        One that is still at work after `patience_s` is ended; the recorder, which may have a long log to write, after
+        an hour.
         """
         for each, _ in self._helpers:
             each.stop()
         said: dict[str, Any] = {}
         for each, process in self._helpers:
-            until_s = time.monotonic() + patience_s
+            patient_s = RECORDERS_PATIENCE_S if each.name == "recorder" else patience_s
+            until_s = time.monotonic() + patient_s
             while process.is_alive():
                 heard = each.heard()
                 said |= dict(heard) if each is control else {}
                 process.join(0.1)
-                if each.name != "recorder" and time.monotonic() > until_s:
+                if time.monotonic() > until_s:
                     process.kill()
             if each is control:
                 said |= dict(each.heard())

@@ -57,7 +57,10 @@ def read_drift(drives: Sequence[Drive], noises: Sequence[Noise], residuals: Sequ
             sums.append(np.where(found == 0.0, np.nan, found))
             whites.append(np.mean(scale) ** 2)
         # each log's own, by how much it has a say in the spread
-        white = np.average(whites, weights=[len(found) for found in sums])
+        say = [np.count_nonzero(np.isfinite(found)) for found in sums]
+        if not any(say):
+            return np.zeros(len(DRIFT_S))
+        white = np.average(whites, weights=say)
         axles = _spread(np.concatenate(sums)) - white
         known = np.maximum(axles[np.isfinite(axles)], 0.0)
         if not len(known):

@@ -116,7 +116,10 @@ def confidence_chain(
         choices = [c for c in choices if c == ("exposure_shift",)]
     # mistakes that are made with good pictures say nothing of bad ones
     errors = float("nan") if odd_confusion(fitted) else class_error(fitted)
-    model, signs = read_model(known), Signs(errors, lights[0], modelled_loss(fitted, modelled))
+    model, signs = (
+        read_model(known),
+        Signs(errors, lights[0], float(np.nan_to_num(modelled_loss(fitted, modelled)))),
+    )
     seen = Seen(known, unseen, signs, lights[1])
 
     def fit(effects: tuple[str, ...]) -> ConfidenceFit:
@@ -153,10 +156,13 @@ def confidence_chain(
 
 
 def modelled_loss(results: Sequence[Results], modelled: Modelled) -> float:
-    """What blur and exposure that are modelled take of the confidence's logarithm, the mean over some results [-]."""
+    """What blur and exposure that are modelled take of the confidence's logarithm, the mean over some results [-].
+
+    NaN where no confidence is measured.
+    """
     blocks = make_blocks(results)
     if not len(blocks):
-        return 0.0
+        return float("nan")
     return float((blocks.loss - blocks.less(modelled.exposure_s, modelled.stops).loss).mean())
 
 

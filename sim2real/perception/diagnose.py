@@ -210,7 +210,9 @@ def diagnose_perception(
     chains = [chain for chain in judged if chain is not None]
     if not chains:
         return None
-    blurred = bool(every) and modelled_loss(every, modelled) > NOTICED
+    lost = modelled_loss(every, modelled)
+    unmeasured = np.isnan(lost) and (modelled.exposure_s > 0.0 or modelled.stops != 0.0)
+    blurred = unmeasured or lost > NOTICED
     errs = None if blurred else odd_conflicts(conflicts)
     if blurred:
         chains = [replace(chain, errs=None) for chain in chains]

@@ -54,7 +54,7 @@ def intervals(found: Fit, evidence: Evidence) -> list[tuple[float, float, float]
     jacobian = found.jacobian
     scale = found.candidate.scale
     scaled = jacobian * scale
-    bread = np.linalg.pinv(scaled.T @ (scaled * weight[:, None]), rcond=1e-10)
+    bread = _inverse(scaled, weight)
     meat = np.zeros_like(bread)
     for part, drive in zip(evidence.parts, evidence.drives, strict=True):
         channels = drive.measured.shape[1]
@@ -129,11 +129,18 @@ def is_excited(entry: Entry, stands: Entry) -> bool:
     if _without_slope(scaled)[first]:
         return False
     weight = robust_weight(stands.z_fit)
-    bread = np.linalg.pinv(scaled.T @ (scaled * weight[:, None]), rcond=1e-10)
-    left = max(stands.loss_fit / max(float(weight.sum()), 1.0), 1.0)
+    bread = _inverse(scaled, weight)
+    left = max(stands.loss_fit / max(int(np.count_nonzero(stands.z_fit)), 1), 1.0)
     half = float(1.96 * INTERVAL_FACTOR * np.sqrt(bread[first, first] * left))
     off = abs(found.x[first] - found.candidate.neutral[first]) / found.candidate.scale[first]
     return half < EXCITED_SHARE or off > half
+
+
+def _inverse(scaled: Array, weight: Array) -> Array:
+    """Inverse of the information, parameters of unlike slopes brought to one size first."""
+    size = np.maximum(np.sqrt((scaled**2).sum(axis=0)), LEAST_SLOPE)
+    even = scaled / size
+    return np.asarray(np.linalg.pinv(even.T @ (even * weight[:, None]), rcond=1e-10) / np.outer(size, size))
 
 
 def _without_slope(scaled: Array) -> NDArray[np.bool_]:

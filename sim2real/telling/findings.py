@@ -37,7 +37,7 @@ from sim2real.telling.estimates import as_means, at_bound, is_excited, joint, ov
 from sim2real.where import localise
 from sim2real.where.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
 from sim2real.where.terms import Term, finer, fit_terms, with_refined
-from sim2real.where.unknown import characterise, seen_alone
+from sim2real.where.unknown import characterise, seen_alone, subsystem_of
 from sim2real.which import sluggish
 from sim2real.which.contest import Contest, Entry, Progress
 from sim2real.which.goodness import fitness
@@ -110,7 +110,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
             unexplained = unexplained if suspect else seen_alone(unexplained, gap.before)
         missing = _missing(found, held, before)
         if unexplained or not missing:
-            likeliest = terms[0].equation.subsystem if terms else ""
+            likeliest = subsystem_of(terms[0]) if terms else ""
             missing = {unexplained.subsystem if unexplained else likeliest: before}
         places, heat = _where(found, held, before, after, terms, missing)
     return Diagnosis(
@@ -220,8 +220,7 @@ def _cause(
     values = values or {name: value for (_, name), value in alone.items()}
     if found.decision.varied and key in found.decision.winner.ids:
         values = as_means(values, found.decision.varied, told.fitted, key)
-    unknown = found.decision.verdict is Verdict.UNKNOWN or found.decision.winner.fit is None
-    excited = is_excited(entry, found.contest.null if unknown else found.decision.winner)
+    excited = is_excited(entry, _stands(found))
     fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
     shrunk = shrink(held, before, after, seed)
@@ -264,6 +263,14 @@ def _cause(
     )
 
 
+def _stands(found: Findings) -> Entry:
+    """The account that stands: the winner, varying where it does, or the model as it is."""
+    decision = found.decision
+    if decision.verdict is Verdict.UNKNOWN or decision.winner.fit is None:
+        return found.contest.null
+    return decision.varied.entry if decision.varied else decision.winner
+
+
 def _variation(decision: Decision) -> Variation | None:
     """How the cause varies, where it does; of two, the one that varies more against its size."""
     varied = decision.varied
@@ -285,9 +292,7 @@ def _missing(found: Findings, held: Evidence, before: Sequence[Array]) -> dict[s
         return dict.fromkeys(parts, before)
     return {
         part: held.residuals(
-            found.model.with_effects(
-                *(e for e in found.added() if EFFECTS[e.id].subsystem != part), *found.structure()
-            )
+            found.model.with_effects(*(e for e in found.added() if EFFECTS[e.id].subsystem != part))
         )
         for part in parts
     }
@@ -311,7 +316,7 @@ def _where(
 
     null, left = sum(term.null_loss for term in terms[:1]), loss(held.whitened(after))
     taken = [(part, loss(held.whitened(rests)) - left) for part, rests in missing.items()]
-    shares = localise.equation_shares([*taken, *((t.equation.subsystem, null - t.loss) for t in terms)])
+    shares = localise.equation_shares([*taken, *((subsystem_of(t), null - t.loss) for t in terms)])
     parts, without = of_logs(before), {part: of_logs(rests) for part, rests in missing.items()}
     places = tuple(
         place

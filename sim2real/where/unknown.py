@@ -30,9 +30,7 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
     share = 1.0 - best.loss / max(best.null_loss, 1e-12)
     shape, sign = shape_of(best), sign_of(best)
     wanted = _wanted(best, sign, shape)
-    # what the tyres give by the place is what the road gives
-    by_place = best.equation.key == "tyre" and best.quantity == "position"
-    subsystem = "road" if by_place else best.equation.subsystem
+    subsystem = subsystem_of(best)
     sentence = (
         f"The {subsystem.replace('_', ' ')}'s equation ({best.equation.key}) {wanted}. "
         f"Such a term takes {100.0 * share:.0f} % of the misfit."
@@ -52,6 +50,12 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
         *best.drawn,
         sentence,
     )
+
+
+def subsystem_of(term: Term) -> str:
+    """Where a term belongs: what the tyres give by the place is what the road gives."""
+    by_place = term.equation.key == "tyre" and term.quantity == "position"
+    return "road" if by_place else term.equation.subsystem
 
 
 def _wanted(term: Term, sign: str, shape: str) -> str:
