@@ -132,7 +132,7 @@ def is_excited(entry: Entry, stands: Entry) -> bool:
     bread = _inverse(scaled, weight)
     left = max(stands.loss_fit / max(int(np.count_nonzero(stands.z_fit)), 1), 1.0)
     half = float(1.96 * INTERVAL_FACTOR * np.sqrt(bread[first, first] * left))
-    off = abs(found.x[first] - found.candidate.neutral[first]) / found.candidate.scale[first]
+    off = float(abs(found.x[first] - found.candidate.neutral[first]) / found.candidate.scale[first])
     return half < EXCITED_SHARE or off > half
 
 
