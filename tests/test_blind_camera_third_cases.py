@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 from camera_stand_ins import check_log, digest_of
-from long import beyond
+from long import beyond, long
 
 from benchmarks.blind import runner
 from benchmarks.blind.generator import driver
@@ -72,6 +72,7 @@ NAMES = [
 
 
 @pytest.mark.parametrize("name", beyond(6, NAMES))
+@long
 def test_files_keep_the_contract_and_the_secret(name, tmp_path):
     made = make_case(CASES[name], 1, TENTH, THIRD)
     made.write(tmp_path)
@@ -168,6 +169,7 @@ SECOND_DIGESTS = {
 
 
 @pytest.mark.parametrize("name", beyond(3, SECOND_DIGESTS))
+@long
 def test_the_second_familys_cases_stay_what_they_were(name, tmp_path):
     spec = {spec.name: spec for spec in table("camera", TENTH, CameraFamily.SECOND)}[name]
     assert digest_of(make_case(spec, 1, TENTH, CameraFamily.SECOND), tmp_path) == SECOND_DIGESTS[name]

@@ -315,6 +315,7 @@ def limit():
 @pytest.mark.parametrize(
     "chosen", newest((effect, form) for effect, forms in EFFECT_FORMS.items() for form in forms)
 )
+@long
 def test_a_neutral_effect_is_the_nominal_car_in_every_form(chosen, limit):
     effect, form = chosen
     neutral = effect_in({effect: form}, effect).apply(limit.world, NEUTRAL[effect])
@@ -324,6 +325,7 @@ def test_a_neutral_effect_is_the_nominal_car_in_every_form(chosen, limit):
 @pytest.mark.parametrize(
     "chosen", newest((effect, form) for effect, forms in EFFECT_FORMS.items() for form in forms)
 )
+@long
 def test_the_severest_effect_shows_in_every_form(chosen, limit):
     effect = effect_in(dict([chosen]), chosen[0])
     given = effect.at(CAR, np.random.default_rng(0))(1.0)
@@ -338,6 +340,7 @@ def test_resistance_is_the_coefficient_times_the_weight(chosen):
 
 
 @pytest.mark.parametrize("chosen", forms_of("mass_offset"))
+@long
 def test_payload_adds_to_the_mass_and_keeps_the_wheelbase(chosen):
     world = with_form(*chosen, mass_kg=300.0)
     gained = [roll(w, 10.0, 4.0, 150.0)[-1, V] - 10.0 for w in (world, nominal(CAR, Road()))]
@@ -417,6 +420,7 @@ def test_sensors_are_late_by_the_delay_on_average(chosen, delay):
 
 
 @pytest.mark.parametrize("chosen", forms_of("wheel_speed_quantisation"))
+@long
 def test_counts_are_whole_and_keep_the_mean_speed(chosen):
     path = roll(nominal(CAR, Road()), 20.3, 20.0)
     world = with_form(*chosen, teeth=96.0, window_s=0.02)
@@ -430,6 +434,7 @@ def test_counts_are_whole_and_keep_the_mean_speed(chosen):
 
 
 @pytest.mark.parametrize("foreign", numbered(FOREIGN.values()))
+@long
 def test_foreign_tyres_have_the_slope_and_the_peak(foreign):
     own = foreign.draw(np.random.default_rng(0))
     world = nominal(CAR, Road())
@@ -446,12 +451,14 @@ def test_foreign_tyres_have_the_slope_and_the_peak(foreign):
 
 
 @pytest.mark.parametrize("foreign", numbered(FOREIGN.values()))
+@long
 def test_a_foreign_share_of_nothing_is_the_nominal_tyre(foreign, limit):
     none = foreign.apply(limit.world, share=0.0, **foreign.draw(np.random.default_rng(0)))
     assert limit.is_nominal(none)
 
 
 @pytest.mark.parametrize("noisy", beyond(9, NOISES.values()), ids=range(len(NOISES)))
+@long
 def test_noise_of_every_kind_has_its_size(noisy):
     noise = Noise(0.05, 0.02, 0.1, 0.0, 0.4, 0.01, 0.0, 0.0)
     values = noisy(noise, np.arange(400_000) * 2e-3, np.random.default_rng(0))
@@ -483,6 +490,7 @@ def test_digits_take_no_more_than_the_noise(digits):
 
 @pytest.mark.parametrize("rich", [True, False])
 @pytest.mark.parametrize("chosen", newest(("driver", name) for name in STYLES))
+@long
 def test_every_driver_stays_within_the_car_and_excites_what_he_should(chosen, rich):
     world = nominal(CAR, Road((0.0, 60.0, 120.0), (0.9, 0.3, 0.9)) if rich else Road())
     done = drive(CAR, world, rich, 30.0, np.random.default_rng(6), STYLES[chosen[1]])
@@ -511,6 +519,7 @@ own and not on this drive."""
 
 
 @pytest.mark.parametrize("name", numbered(SHOWN_IN_DRIVING))
+@long
 def test_further_deviations_show(name, limit):
     entry = OUTSIDES[TENTH][name]
     assert limit.shows(entry.apply(limit.world, entry.at(CAR, np.random.default_rng(0))(1.0)))

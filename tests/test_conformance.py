@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from foreign_clients import need_client
+from long import beyond
 
 from benchmarks.conformance.cases import CASES
 from benchmarks.conformance.clients import CLIENTS
@@ -46,7 +47,7 @@ def test_a_document_is_read_as_it_was_written() -> None:
 
 
 @pytest.mark.e2e
-@pytest.mark.parametrize("client", SHORT)
+@pytest.mark.parametrize("client", beyond(3, SHORT))
 def test_a_short_run_gives_the_documents_cells(bench: Bench, client: str) -> None:
     need_client(CLIENTS[client].package)
     cells = run_cells(bench, client, UNIT, SHORT[client])

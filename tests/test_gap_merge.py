@@ -230,7 +230,6 @@ def test_a_counter_that_was_left_out_of_the_library_is_unknown():
     assert side.unexplained.subsystem == "wheel_speed_sensor"
     assert "multiples of 3.272 rad/s" in side.unexplained.sentence
     assert "40 ms" in side.unexplained.sentence
-    assert "a staircase" in render(merge(main_of(Verdict.NO_GAP), side))
     found = merge(main_of(Verdict.NO_GAP), side)
     assert found.verdict is Verdict.UNKNOWN
     assert found.gap.after.signals["wheel_speed"] == 17.0

@@ -3,6 +3,7 @@
 import sys
 
 import pytest
+from long import beyond, long
 
 from scenarios.effects import EFFECTS
 from scenarios.errors import ScenarioError
@@ -69,7 +70,7 @@ def test_a_step_that_a_case_has_not_is_refused_with_those_that_it_has(
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("name", LEFT)
+@pytest.mark.parametrize("name", beyond(3, LEFT))
 def test_diagnosed_steps_shrink_the_gap_of_the_holdout(logs, name):
     found = stages(name, logs)
     first, *_, last = budget(found)
@@ -99,6 +100,7 @@ def test_the_hybrids_drag_is_the_parameter_files(logs):
 
 
 @pytest.mark.data
+@long
 def test_the_city_cars_weight_and_drag_are_found(logs):
     """631 kg are what its file says, the log's wheel loads 748 kg: mass, or the torque that looks like it."""
     stage = stages("carsim_city", logs)[0]

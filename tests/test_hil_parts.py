@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import can
+import hil_bodies
 import numpy as np
 import pytest
 from asammdf import MDF
@@ -504,15 +505,9 @@ def test_priority_and_cores_are_given_back():
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
 
 
-def deaf(control):
-    """A helper that does not look whether it is to stop."""
-    control.ready()
-    time.sleep(600.0)
-
-
 def test_a_helper_that_does_not_stop_is_ended():
     rig = Rig()
-    rig.add("camera", deaf, ...)
+    rig.add("camera", hil_bodies.deaf, ...)
     rig.wait_until_ready()
     begun = time.monotonic()
     rig.end(patience_s=0.3)
@@ -534,18 +529,9 @@ def test_pictures_are_judged_by_the_units_parameters(tmp_path):
     assert _vision(replace(settings, parameters={}), camera) == IfeConfig(camera=camera)
 
 
-def slow(control):
-    """A recorder that takes its time to write a long log, and says nothing meanwhile."""
-    control.ready()
-    while not control.stopped:
-        time.sleep(0.01)
-    time.sleep(1.5)
-    control.tell("done", "written")
-
-
 def test_the_recorder_is_given_the_time_that_a_long_log_takes():
     rig = Rig()
-    recorder = rig.add("recorder", slow, ...)
+    recorder = rig.add("recorder", hil_bodies.slow, ...)
     rig.wait_until_ready()
     rig.start(0)
     assert rig.end(recorder, patience_s=0.2) == {"done": "written"}

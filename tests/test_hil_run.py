@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from asammdf import MDF
 from fmu_unit import Unit as Client
+from long import long
 from typer.testing import CliRunner
 
 from fmu_src.packaging import unpack_unit
@@ -292,6 +293,7 @@ def test_a_full_disk_costs_the_log_and_not_the_run() -> None:
     assert "No space left" in ear.said[0][1]
 
 
+@long
 def test_a_helper_that_cannot_begin_is_one_sentence(unit_file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "frames"
     folder.mkdir()

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from long import long
 
 from models.training import data, patches, scores
 from models.training.picture_looks import rendered_looks
@@ -190,6 +191,7 @@ def test_files_name_no_place_of_their_making(name):
         assert trace not in content
 
 
+@long
 def test_rendered_worlds_never_seen_are_classified(surface, held_out):
     """Floor 0.65: the card's 0.80 on all test worlds less three standard errors of 36 views of 12 worlds.
 

@@ -194,7 +194,7 @@ def oracle_car(effects):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", beyond(3, [*list(CASES)[-1:], *list(CASES)[:-1]]))
 def test_agrees_with_an_independent_stiff_solver(case):
     effects, knots, segments, speed, position = CASES[case]
     times, torques = zip(*knots, strict=True)
