@@ -248,7 +248,7 @@ def test_gap_of_a_delay_is_its_way_over_the_spread_of_a_border():
 # --- cases
 
 
-@pytest.mark.parametrize("name", beyond(4, [spec.name for spec in table("camera_small")]))
+@pytest.mark.parametrize("name", beyond(2, [spec.name for spec in table("camera_small")]))
 def test_files_keep_the_contract_and_the_secret(name, tmp_path, monkeypatch):
     monkeypatch.setattr(camera_case, "drive", rolled)
     made = make_case(CASES[name], 1, TENTH)

@@ -61,14 +61,14 @@ def test_instances_in_threads_do_what_each_does_alone(unit_folder: Path) -> None
     assert in_threads(unit_folder, 0)["same_as_alone"]
 
 
-@pytest.mark.parametrize("unit", ["TrpacEstimator", "TrpacEstimator4W"])
+@pytest.mark.parametrize("unit", beyond(1, ["TrpacEstimator4W", "TrpacEstimator"]))
 def test_random_inputs_and_calls(unit: str) -> None:
     result = run_kind(unit, SEED, 300)
     assert result["shown"] == []
     assert result["taken_down"] >= 5, "rubbish has met flags that were up"
 
 
-@pytest.mark.parametrize("kind", beyond(5, QUICK_KINDS))
+@pytest.mark.parametrize("kind", beyond(3, QUICK_KINDS))
 def test_damaged_files(kind: str) -> None:
     assert run_kind(kind, SEED, 60)["shown"] == []
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from long import beyond
 
 from benchmarks.conformance.cases import CASES, write_pictures
 from benchmarks.conformance.operations import Unit
@@ -55,7 +56,7 @@ def drive(unit: Unit, name: str, pictures: tuple[Path, Path], start: int, stop: 
     return trace
 
 
-@pytest.mark.parametrize("name", ["TrpacEstimator", "TrpacEstimator4W"])
+@pytest.mark.parametrize("name", beyond(1, ["TrpacEstimator", "TrpacEstimator4W"]))
 def test_resumed_in_another_process_it_goes_on_as_if_nothing_had_been(
     name: str, pictures: tuple[Path, Path], unit_folder: Path, unit_folder_4w: Path
 ) -> None:

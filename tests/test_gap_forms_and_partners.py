@@ -303,7 +303,7 @@ def test_a_pair_is_found_in_the_forms_that_it_does_best_in(a_load_behind_and_sof
 
 
 @pytest.mark.parametrize("verdict", [Verdict.COMPOUND, Verdict.UNKNOWN])
-@pytest.mark.parametrize("varies", [False, True])
+@pytest.mark.parametrize("varies", beyond(1, [False, True]))
 def test_causes_are_told_with_the_parameters_of_their_form(a_load_behind_and_soft_tyres, verdict, varies):
     """Together a pair's in its forms; where it is not blamed each cause in the one that it does best in alone."""
     paired, fit_to, held, truth = a_load_behind_and_soft_tyres

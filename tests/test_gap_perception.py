@@ -83,13 +83,16 @@ def test_faults_of_several_signals_are_a_compound():
 
 @pytest.mark.parametrize(
     ("faults", "effect"),
-    [
-        ({"delay_s": 0.15}, "camera_latency"),
-        ({"distance_m": 1.0}, "camera_pitch"),
-        ({"blur_s": 0.04}, "motion_blur"),
-        ({"dimmed": 0.4}, "exposure_shift"),
-        ({"offset": (0.0, -0.2, 0.0)}, "class_friction_offset"),
-    ],
+    beyond(
+        2,
+        [
+            ({"distance_m": 1.0}, "camera_pitch"),
+            ({"dimmed": 0.4}, "exposure_shift"),
+            ({"delay_s": 0.15}, "camera_latency"),
+            ({"blur_s": 0.04}, "motion_blur"),
+            ({"offset": (0.0, -0.2, 0.0)}, "class_friction_offset"),
+        ],
+    ),
 )
 def test_an_excluded_effect_is_never_named(faults, effect):
     roads = [road(seed=i) for i in range(3)]
