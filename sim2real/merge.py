@@ -71,6 +71,26 @@ class Side:
     warnings: tuple[str, ...] = ()
     next_manoeuvre: NextManoeuvre | None = None
 
+    @property
+    def asks(self) -> bool:
+        """Whether it only asks: an effect that may as well be none."""
+        alone = {(effect,) for effect in self.named}
+        return self.verdict is Verdict.AMBIGUOUS and set(self.ambiguous_with) == alone
+
+    def put_off(self) -> Side:
+        """The side without its question, which is left as a warning."""
+        return replace(
+            self,
+            verdict=Verdict.NO_GAP,
+            named=(),
+            after=self.before,
+            ambiguous_with=(),
+            cannot_rule_out=tuple(dict.fromkeys((*self.cannot_rule_out, *self.named))),
+            places=(),
+            sentence="",
+            warnings=(*self.warnings, f"{' and '.join(self.named)}? {self.sentence}"),
+        )
+
 
 def camera_side(
     found: PerceptionFinding, vehicle: VehicleFile | None = None, road: RoadFile | None = None
@@ -128,7 +148,11 @@ def _next(found: PerceptionFinding, vehicle: VehicleFile, road: RoadFile) -> Nex
     """Two speeds over the same borders, or braking on each surface where class values are in doubt."""
     if found.verdict is not Verdict.AMBIGUOUS:
         return None
-    told = tuple(dict.fromkeys(effect for group in found.ambiguous_with for effect in group))
+    # one effect or none is for no drive to tell
+    groups = [group for group in found.ambiguous_with if len(group) > 1]
+    told = tuple(dict.fromkeys(effect for group in groups for effect in group))
+    if not told:
+        return None
     profile = BRAKING if OFFSET in told else STEADY_SPEEDS
     time_s, torque_nm = torque_of(profile, vehicle, road)
     sentence = found.next_step or profile.sentence
@@ -255,6 +279,8 @@ def _percent(before: float, after: float) -> Interval:
 
 def merge(main: Diagnosis, side: Side) -> Diagnosis:
     """One diagnosis of two; see the module."""
+    if side.asks and main.verdict is not Verdict.NO_GAP:  # a gap is not joined to one that may be none
+        side = side.put_off()
     side_quiet, main_quiet = side.verdict is Verdict.NO_GAP, main.verdict is Verdict.NO_GAP
     before = _join(main.gap.before, side.before, side_quiet, main_quiet)
     after = _join(main.gap.after, side.after, side_quiet, main_quiet)

@@ -167,7 +167,7 @@ def any_camera(seed, **faults):
         wrong=float(rng.uniform(0.0, 0.1)),
         share=float(rng.choice([0.0, 0.5, 1.0])),
         flicker_m=float(rng.choice([0.0, 0.05, 0.2])),
-        confidence=float(rng.uniform(0.7, 0.98)),
+        confidence=float(rng.uniform(0.82, 0.98)),
         roughness=float(rng.uniform(0.0, 0.1)),
     )
     return replace(plain, **faults)

@@ -417,6 +417,35 @@ def test_what_a_camera_cannot_tell_apart_comes_with_two_speeds_to_drive():
     assert "None" not in render(told)
 
 
+DARK = candidate(("exposure_shift",), 1.5, stops=Interval(1.5, -4.0, 4.0, "stops"))
+ASKED = finding(
+    Verdict.AMBIGUOUS,
+    DARK,
+    causes=("exposure_shift",),
+    ambiguous_with=(("exposure_shift",),),
+    next_step="Record the pictures.",
+)
+
+
+def test_an_effect_that_may_as_well_be_none_is_asked_about():
+    told = merge(main_of(Verdict.NO_GAP), camera_side(ASKED, load_vehicle(VEHICLE), MADE_ROAD))
+    assert (told.verdict, told.causes[0].effect) == (Verdict.AMBIGUOUS, "exposure_shift")
+    assert told.next_manoeuvre is None  # no drive tells
+    assert told.sentence.endswith("Record the pictures.")
+    assert "cannot tell exposure_shift from a car without it." in render(told)
+
+
+@pytest.mark.parametrize("verdict", [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.COMPOUND])
+def test_beside_a_gap_of_the_car_a_question_is_a_warning(verdict):
+    main = main_of(verdict)
+    told = merge(main, camera_side(ASKED))
+    assert told.verdict is verdict
+    assert told.causes[0].effect == main.causes[0].effect
+    assert told.ambiguous_with == main.ambiguous_with
+    assert "exposure_shift" in told.cannot_rule_out
+    assert any(text.startswith("exposure_shift? ") for text in told.warnings)
+
+
 # --- alone, and where
 
 

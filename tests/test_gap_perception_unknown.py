@@ -162,9 +162,9 @@ def test_a_class_that_the_fit_logs_hardly_have_sets_its_own_level():
     learnt = blocks_of([0] * 10 + [1], [0.1] * 10 + [0.6])
     seen = blocks_of([0] * 5 + [1] * 5, [0.1] * 5 + [0.25] * 5)
     plain = ConfidenceFit((), 0.0, 0.0, 0.0, Interval(0.0, 0.0, 0.0), Interval(0.0, 0.0, 0.0))
-    z, _ = rest_of(seen, learnt, plain, ConfidenceModel(0.03, 1.0))
+    z = rest_of(seen, learnt, plain, ConfidenceModel(0.03, 1.0))
     assert z == pytest.approx(np.zeros(10), abs=1e-9)
-    lower, _ = rest_of(blocks_of([0] * 5, [0.25] * 5), learnt, plain, ConfidenceModel(0.03, 1.0))
+    lower = rest_of(blocks_of([0] * 5, [0.25] * 5), learnt, plain, ConfidenceModel(0.03, 1.0))
     assert lower == pytest.approx(np.full(5, 5.0))
 
 

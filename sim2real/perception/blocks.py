@@ -51,6 +51,10 @@ class Blocks:
         modelled = self.speed_m_s * exposure_s / TOLERATED_SMEAR_M + (stops / TOLERATED_STOPS) ** 2
         return replace(self, loss=self.loss - modelled)
 
+    def raised(self, by: float) -> Blocks:
+        """The blocks with a confidence whose logarithm is more by so much."""
+        return replace(self, loss=self.loss - by)
+
 
 def make_blocks(results: Sequence[Results]) -> Blocks:
     """Blocks of the results of some drives."""

@@ -124,6 +124,9 @@ class Chain:
         Rest in standard deviations up to which it is too small to matter, however little the signal scatters [-].
     quiet : bool
         Whether the hold-out shows no gap at all: what the fit logs happen to have is blamed on nothing.
+    asked : tuple of str
+        Effects that would account for a signal that is not as usual as a whole, which no more of it would settle:
+        where nothing is decisive they stand, as a question, with "as simulated" as their rival.
     """
 
     signal: str
@@ -138,6 +141,7 @@ class Chain:
     errs: Oddity | None = None
     noticed: float = 0.0
     quiet: bool = False
+    asked: tuple[str, ...] = ()
 
     @classmethod
     def silent(cls, signal: str, observations: int, effects: Collection[str], why: str) -> Chain:
@@ -146,7 +150,7 @@ class Chain:
         return cls(signal, observations, 0.0, nothing, (), unexcited=dict.fromkeys(effects, why))
 
     def best(self) -> Account:
-        """The account that stands: with more effects only where that is decisive, and none where all is quiet."""
+        """The account that stands: with more effects only where that is decisive or asked, none where all is quiet."""
         best = self.nothing
         if self.quiet:
             return best
@@ -154,16 +158,19 @@ class Chain:
             margin = DECISIVE if len(account.effects) > len(best.effects) else 0.0
             if account.score > best.score + margin:
                 best = account
-        return best
+        if best.effects or not self.asked:
+            return best
+        return max((best, *(a for a in self.accounts if a.effects == self.asked)), key=lambda a: a.score)
 
     def rivals(self) -> tuple[Account, ...]:
-        """Other accounts of as many effects that the best one does not beat decisively."""
+        """Other accounts that the best one does not beat decisively: of as many effects, and "as simulated"."""
         best = self.best()
         return tuple(
             a
-            for a in self.accounts
+            for a in (self.nothing, *self.accounts)
             if a is not best
             and best.effects
-            and len(a.effects) == len(best.effects)
+            and len(a.effects) in (0, len(best.effects))
             and best.score - a.score < DECISIVE
+            and a.score >= self.nothing.score
         )

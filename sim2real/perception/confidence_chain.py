@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from sim2real.perception.blocks import BLOCK_S, Blocks, make_blocks
 from sim2real.perception.chain import DECISIVE, Account, Chain, Oddity, price
+from sim2real.perception.clear import taken_by_borders
 from sim2real.perception.confidence import (
     NORMAL_CONFIDENCE,
     NORMAL_SPREAD,
+    USUAL_SPREAD,
     ConfidenceFit,
     ConfidenceModel,
     Signs,
@@ -30,6 +32,10 @@ Array = NDArray[np.float64]
 SIGNAL = "image_confidence"
 CHOICES = (("motion_blur",), ("exposure_shift",), ("motion_blur", "exposure_shift"))
 NEXT_STEP = "Drive the same surface slowly and fast, with the pictures recorded."
+RECORD = (
+    "Record the pictures (image_path): no drive without them tells a wrong exposure from a camera that is always as "
+    "unsure."
+)
 LEAST_SPEED_SPREAD_M_S = 1.5
 """Standard deviation of speed below which blur cannot show as a fall with speed [m/s]."""
 NOTABLE, MOST_PLACES = 2.0, 4
@@ -101,12 +107,14 @@ def confidence_chain(
     """The confidence's account; None where no log has camera results."""
     if not fitted and held_out is None:
         return None
+    every_log = [*fitted, *([held_out] if held_out else [])]
     known = make_blocks(fitted).less(modelled.exposure_s, modelled.stops)
     unseen = make_blocks([] if held_out is None else [held_out]).less(modelled.exposure_s, modelled.stops)
+    # of what is normal a level tells on clear road
+    borders = taken_by_borders(every_log)
+    known, unseen = known.raised(borders), unseen.raised(borders)
     choices = [c for c in CHOICES if not set(c) & set(exclude)]
-    pictures = sum(
-        int(np.isfinite(one.confidence).sum()) for one in (*fitted, *([held_out] if held_out else []))
-    )
+    pictures = sum(int(np.isfinite(one.confidence).sum()) for one in every_log)
     if len(known) < FEWEST_BLOCKS:
         why = f"Only {len(known)} s of image_confidence on the fit logs; {FEWEST_BLOCKS} s are needed."
         if lights[0] is None:
@@ -140,15 +148,17 @@ def confidence_chain(
         unexcited=_unexcited(seen, choices),
         next_step=NEXT_STEP,
         noticed=NOTICED / model.deviation,
+        asked=("exposure_shift",) if _is_unusual(seen, plain) else (),
     )
     every = (*chain.accounts, *outside)
     if len(unseen) >= FEWEST_BLOCKS and _is_quiet(chain.nothing, every):
         chain = replace(chain, quiet=True)
+    if any(rival is chain.nothing for rival in chain.rivals()):
+        chain = replace(chain, next_step=RECORD)
     stands = next(f for f in (plain, *fits) if f.effects == chain.best().effects)
     if stands.effects == ("motion_blur",) and np.subtract(*_slow_and_fast(stands, known)[1]) > -SLIGHT:
         chain, stands = replace(chain, quiet=True), plain
-    every_log = [*fitted, *([held_out] if held_out else [])]
-    pattern = odd_pattern(seen.together, stands, _restlessness(every_log, model, modelled))
+    pattern = odd_pattern(seen.together.raised(-borders), stands, _restlessness(every_log, model, modelled))
     needed = [a for a in outside if a.score > chain.best().score + DECISIVE and not chain.quiet]
     if needed and not pattern:
         pattern = _of_no_effect(max(needed, key=lambda account: account.score))
@@ -180,6 +190,11 @@ def _restlessness(results: Sequence[Results], model: ConfidenceModel, modelled: 
     )
 
 
+def _is_unusual(seen: Seen, plain: ConfidenceFit) -> bool:
+    """Whether the level is lower than that of chains that were seen, and no picture tells why."""
+    return seen.light is None and level_of(seen.known, plain) > NORMAL_RANGE * USUAL_SPREAD
+
+
 def _is_quiet(nothing: Account, others: Sequence[Account]) -> bool:
     """Whether no account makes the hold-out's gap smaller, nor has all logs together speak for it beyond doubt."""
     if min((account.left() for account in others), default=0.0) <= QUIET * nothing.left():
@@ -205,7 +220,9 @@ def _account(f: ConfidenceFit, nothing: ConfidenceFit, seen: Seen, model: Confid
     gain_fit = f.log_likelihood - nothing.log_likelihood
     # a level is one observation, however long it holds: other chains' normal levels are what it is held against
     seconds = len(seen.together) / model.memory
-    z, level = rest_of(seen.unseen, seen.known, f, model)
+    level = level_of(seen.known, f) / (
+        USUAL_SPREAD if not f.effects and _is_unusual(seen, f) else NORMAL_SPREAD
+    )
     return Account(
         f.effects,
         f.size,
@@ -213,25 +230,22 @@ def _account(f: ConfidenceFit, nothing: ConfidenceFit, seen: Seen, model: Confid
         gain_fit,
         seen.log_likelihood(f, model) - seen.log_likelihood(nothing, model) - gain_fit,
         parameters,
-        z,
+        rest_of(seen.unseen, seen.known, f, model),
         max(level**2 + seen.deviance(f) - NORMAL_RANGE**2, 0.0),
         evidence_for=_evidence(f, seen),
         evidence_against=_doubts(f, seen),
     )
 
 
-def rest_of(
-    blocks: Blocks, learnt: Blocks, fit: ConfidenceFit, model: ConfidenceModel
-) -> tuple[Array, float]:
-    """What a fit leaves of blocks, about the level of each class on the blocks that it learnt from.
+def level_of(learnt: Blocks, fit: ConfidenceFit) -> float:
+    """By how much a fit leaves the confidence's logarithm below a normal one's [-]."""
+    return float((learnt.loss - fit.loss(learnt)).mean() + np.log(NORMAL_CONFIDENCE)) if len(learnt) else 0.0
 
-    Returns
-    -------
-    array, shape (n,), and float
-        Per block in its standard deviations, and the learnt level in standard deviations of the normal one [-].
-    """
+
+def rest_of(blocks: Blocks, learnt: Blocks, fit: ConfidenceFit, model: ConfidenceModel) -> Array:
+    """What a fit leaves of blocks, about the level of each class on the blocks that it learnt from, shape (n,) [-]."""
     if not len(learnt):
-        return np.empty(0), 0.0
+        return np.empty(0)
     rest, known = blocks.loss - fit.loss(blocks), learnt.loss - fit.loss(learnt)
     level = np.zeros(len(blocks))
     for c in np.unique(blocks.classes):
@@ -240,8 +254,7 @@ def rest_of(
         level[blocks.classes == c] = (
             learnt_of if len(learnt_of) >= FEWEST_OF_CLASS else rest[blocks.classes == c]
         ).mean()
-    off = (known.mean() + np.log(NORMAL_CONFIDENCE)) / NORMAL_SPREAD
-    return (rest - level) / model.deviation, float(off)
+    return (rest - level) / model.deviation
 
 
 def _evidence(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
@@ -255,8 +268,8 @@ def _evidence(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
     if "exposure_shift" in f.effects:
         if len(blocks):
             sentences.append(
-                f"Confidence is {np.exp(-blocks.loss.mean()):.2f}; normal is taken as {NORMAL_CONFIDENCE:g} "
-                f"({np.exp(np.log(NORMAL_CONFIDENCE) - 2.0 * NORMAL_SPREAD):.2f} to 1)."
+                f"Confidence is {np.exp(-blocks.loss.mean()):.2f} on clear road; normal is taken as "
+                f"{NORMAL_CONFIDENCE:g} ({np.exp(np.log(NORMAL_CONFIDENCE) - NORMAL_RANGE * USUAL_SPREAD):.2f} to 1)."
             )
         if np.isfinite(seen.signs.class_error):
             sentences.append(

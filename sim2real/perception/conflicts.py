@@ -85,7 +85,7 @@ def streak_m(results: Sequence[Results]) -> float:
     if class_error(results) > HARDLY_READ:
         return float("inf")
     wrong_m, runs = 0.0, 0
-    for one, place_m in _places(results):
+    for one, place_m in places_of(results):
         wrong = np.zeros(len(one), dtype=np.bool_)
         for segment, inside in _inside(one, place_m):
             wrong |= inside & (one.classes != segment.surface_class)
@@ -138,7 +138,7 @@ def _other_class(one: Results, segment: RoadSegment, inside: NDArray[np.bool_]) 
 
 def _laid_over(results: Sequence[Results]) -> Iterator[tuple[Results, RoadSegment, NDArray[np.bool_]]]:
     """Results over the road as they fit best: each log, each segment, and which of its results lie well within."""
-    for one, place_m in _places(results):
+    for one, place_m in places_of(results):
         for segment, inside in _inside(one, place_m):
             yield one, segment, inside
 
@@ -146,7 +146,7 @@ def _laid_over(results: Sequence[Results]) -> Iterator[tuple[Results, RoadSegmen
 def by_road(results: Sequence[Results]) -> tuple[Results, ...]:
     """The results, laid over the road as they fit best, with road.yaml's class; near borders without a confidence."""
     out = []
-    for one, place_m in _places(results):
+    for one, place_m in places_of(results):
         classes, confidence = one.classes.copy(), np.full(len(one), np.nan)
         for segment, inside in _inside(one, place_m):
             classes[inside], confidence[inside] = segment.surface_class, one.confidence[inside]
@@ -154,7 +154,7 @@ def by_road(results: Sequence[Results]) -> tuple[Results, ...]:
     return tuple(out)
 
 
-def _places(results: Sequence[Results]) -> Iterator[tuple[Results, Array]]:
+def places_of(results: Sequence[Results]) -> Iterator[tuple[Results, Array]]:
     """Each log, and where its results lie on the road as they fit best together [m]."""
     if not results:
         return

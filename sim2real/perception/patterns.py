@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sim2real.perception.blocks import Blocks
 from sim2real.perception.chain import Oddity
-from sim2real.perception.confidence import NORMAL_CONFIDENCE, ConfidenceFit
+from sim2real.perception.confidence import ConfidenceFit
 from trpac_core.vision.classes import Surface
 
 Array = NDArray[np.float64]
@@ -31,8 +31,8 @@ CREEPS, CREEPS_BY = 0.6, 0.2
 chains that nothing disturbs were within 0.3 and 0.07 [-]."""
 FEWEST_CREEPING = 10
 """Blocks of a log that can tell."""
-RESTLESS = 0.155
-"""Standard deviation of the confidence from second to second on one class at one speed, in shares of a normal one, from
+RESTLESS = 0.155 * 0.9
+"""Standard deviation of the confidence from second to second on one class at one speed, in shares of 1, from
 which on it is a gap of its own: chains that nothing disturbs were within 0.15 [-]."""
 
 
@@ -146,7 +146,7 @@ def _creeping(rest: Array, blocks: Blocks) -> Oddity | None:
 
 
 def _restless(blocks: Blocks, deviation: float) -> Oddity | None:
-    if not len(blocks) or deviation * np.exp(-blocks.loss.mean()) < RESTLESS * NORMAL_CONFIDENCE:
+    if not len(blocks) or deviation * np.exp(-blocks.loss.mean()) < RESTLESS:
         return None
     told = (
         f"The confidence comes and goes by a factor of {np.exp(deviation):.1f} from second to second, on one "
