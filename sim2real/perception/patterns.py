@@ -31,7 +31,7 @@ CREEPS, CREEPS_BY = 0.6, 0.2
 chains that nothing disturbs were within 0.3 and 0.07 [-]."""
 FEWEST_CREEPING = 10
 """Blocks of a log that can tell."""
-RESTLESS = 0.155 * 0.9
+RESTLESS = 0.14
 """Standard deviation of the confidence from second to second on one class at one speed, in shares of 1, from
 which on it is a gap of its own: chains that nothing disturbs were within 0.15 [-]."""
 
