@@ -44,7 +44,7 @@ def surface():
 @pytest.fixture(scope="module")
 def held_out():
     """Pictures and patches of worlds of the test seeds."""
-    return draw_worlds("test", WORLDS, PATCHES_PER_VIEW, lambda: None)
+    return draw_worlds("test", WORLDS, PATCHES_PER_VIEW, 1, lambda: None)
 
 
 def logits_of(network, images):

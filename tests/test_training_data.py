@@ -22,7 +22,6 @@ from models.training import (
     rendered,
     scores,
     segmenter_data,
-    teacher,
     textures,
 )
 from models.training.__main__ import main
@@ -131,19 +130,20 @@ def test_wide_looks_span_most_of_the_wide_box_and_no_more(made_up, monkeypatch):
 
 
 def test_left_out_sources_are_absent_from_patches_and_outliers(made_up, monkeypatch):
-    pytest.importorskip("torch")
+    pytest.importorskip("torch", reason="the training extra is not installed")
     import argparse
 
     from models.training import surface_run
 
     monkeypatch.setattr(surface_run, "OUTLIERS", {"train": 160, "val": 80})
     rendered_part = patches.patch_set([([np.full((64, 96, 3), GREY, np.uint8)], 0, "rendered")])
-    given = argparse.Namespace(teacher=None, without=("seq_extreme",), worlds=None, effort=0.5)
-    material = surface_run.gather(
-        given, data.read_manifest(made_up), {"train": rendered_part, "val": rendered_part}, None
-    )
+    given = argparse.Namespace(without=("seq_extreme",), effort=0.5)
+    pictures = data.read_manifest(made_up)
+    material = surface_run.gather(given, pictures, {"train": rendered_part, "val": rendered_part})
     assert set(material.patches.sources) == {"condition_web", "drivable_camvid/train", "rendered"}
     assert {split: len(part) for split, part in material.outliers.items()} == {"train": 80, "val": 80}
+    for cut in surface_run._cuts(given, surface_run.used(given, pictures)):
+        assert set(cut.sources) == {"condition_web", "drivable_camvid/train"}
 
 
 def test_outliers_repeat_by_seed_and_differ_from_one_another(made_up):
@@ -176,13 +176,6 @@ def test_colours_have_the_hue_and_saturation_asked_for():
         colour = textures.coloured(rng, (hue, hue), (0.6, 0.6))
         np.testing.assert_allclose(np.delete(colour, channel), 0.4, atol=1e-9)
         assert colour[channel] == pytest.approx(1.0)
-
-
-def test_areas_of_the_teachers_cells_are_shared_out_whole():
-    weights = teacher._area_weights(14, 4)
-    assert weights.shape == (4, 14)
-    assert weights.sum(axis=1) == pytest.approx(np.ones(4))
-    assert weights.sum(axis=0) == pytest.approx(np.full(14, 4 / 14))
 
 
 def test_overlaid_clips_are_used_inside_their_limits_only():

@@ -30,26 +30,27 @@ def main(arguments: list[str] | None = None) -> int:
         "--only",
         choices=("segmenter", "surface", "scene", "picture"),
         help="train one network, the other files stay; scene: only what a scene adds to the surface network that lies "
-        "with its card in --out; picture: the picture network from the --trunk, beside the two others in --out",
+        "with its card in --out; picture: the picture network, beside the two others in --out",
     )
     parser.add_argument(
         "--effort", type=float, default=1.0, help="share of the usual steps and rendered worlds (default: 1)"
     )
     parser.add_argument("--threads", type=int, default=2, help="processor threads (default: 2)")
     parser.add_argument(
-        "--worlds",
+        "--device",
+        default="cpu",
+        help="where the classifiers are trained: cpu, or cuda, which does not repeat to the last bit (default: cpu)",
+    )
+    parser.add_argument(
+        "--kept",
         type=Path,
-        help="folder that keeps the rendered pictures and the teacher's features; delete it when the renderer changes",
+        help="folder that keeps what takes long, rendered worlds and networks after each stage, and is read where they "
+        "are there; delete it when the renderer or the recipe changes",
     )
     parser.add_argument(
         "--teacher",
         type=Path,
         help="MobileNetV2 as 8-bit .tflite that guides the surface classifier's features",
-    )
-    parser.add_argument(
-        "--trunk",
-        type=Path,
-        help="file that keeps the net after its first stage (the teacher's features); read if it is there",
     )
     parser.add_argument(
         "--without",

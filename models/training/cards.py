@@ -21,7 +21,7 @@ from .scores import ClassScore, wilson_interval
 if TYPE_CHECKING:
     from .calibrate import Reliability
     from .scene_run import Judged
-    from .surface_run import Outcome
+    from .surface_run import Outcome, Stage
     from .train_segmenter import SegmentationScore
 
 CLASSES = [surface.label for surface in Surface]
@@ -92,7 +92,7 @@ Rendered pictures, three places in each world, half of the worlds with the weath
 def time_text(facts: RunFacts, train_s: float) -> str:
     """How long training took, and with what."""
     threads = "one processor thread" if facts.threads == 1 else f"{facts.threads} processor threads"
-    return f"Training took {train_s:.0f} s by the clock with {threads}, no accelerator, on a machine with other work."
+    return f"{train_s:.0f} s by the clock with {threads}, on a machine with other work."
 
 
 def versions_text(facts: RunFacts) -> str:
@@ -138,9 +138,7 @@ def calibration_table(
     return table(["patches", "n", *header], rows)
 
 
-def surface_card(
-    facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: float, train_patches: int
-) -> str:
+def surface_card(facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: float, stage: Stage) -> str:
     """Card of surface.onnx."""
     temperature, reliabilities, entropies = outcome.temperature, outcome.reliabilities, outcome.entropies
     picture_scores, patch_scores = outcome.picture_scores, outcome.patch_scores
@@ -157,9 +155,7 @@ def surface_card(
         else "In a first stage, without labels, linear maps of the middle maps and of the embedding had to match what\n"
         "blocks 4 to 12 of MobileNetV2 1.0 / 224 (ImageNet weights, Apache-2.0) see: mean and deviation of each\n"
         "channel, and 4 x 6 cells of blocks 9 and 12. They kept half their weight in the second stage, which learns\n"
-        "the classes, on the patches that the teacher has seen: the first cut of the real pictures and the first\n"
-        "rendered worlds. Neither that network nor the linear maps are in the file. A first stage that was read from\n"
-        "a file is not in the time below: it took 26 min on one busy processor."
+        "the classes. Neither that network nor the linear maps are in the file."
     )
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
     return f"""\
@@ -179,7 +175,7 @@ feed one linear layer.
 
 ## Training
 
-{train_patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
+{stage.patches} patches of undisturbed pictures, real and rendered; blur, strong exposure and shadows stay out.
 Patches are 3:2 to 3:1 wide before they are squeezed to the input, from 48 pixels to nearly the whole width of the road.
 They are mirrored, shifted, zoomed by up to 12 % and seen with the resolution, gain, gamma and white balance of other
 cameras (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones, whose worlds
@@ -187,7 +183,7 @@ have drawn theirs already). {left_out}Classes are drawn equally often and source
 fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
 weights.
 {teacher}
-{time_text(facts, train_s)}
+Second stage: {stage.told()}. All together, but for what was kept: {time_text(facts, train_s)}
 {versions_text(facts)}
 
 `readable` is a head of its own, taught last, which leaves the rest as it is: road of all sources, undisturbed and

@@ -109,13 +109,13 @@ class Segmenter(nn.Module):
 class HalvingDepthwise(nn.Conv2d):
     """Depthwise 3x3 convolution of stride 2.
 
-    In training it is computed at every pixel and thinned: the same values, but on a processor the gradient of the
+    In training on a processor it is computed at every pixel and thinned: the same values, but there the gradient of the
     stride takes several times as long as that of the pixels thrown away.
     """
 
     def forward(self, x: Tensor) -> Tensor:
         """Feature maps in, feature maps of half the size out."""
-        if not self.training:
+        if not self.training or x.is_cuda:
             return super().forward(x)
         whole = functional.conv2d(x, self.weight, None, 1, 1, 1, self.groups)
         return whole[:, :, ::2, ::2].contiguous(memory_format=torch.channels_last)

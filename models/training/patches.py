@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from trpac_core.vision.regions import cut_box, cut_patch
 
-from .augment import camera_look
 from .data import Image, Picture, family_of, pixel_box
 
 CALIBRATION_PER_SOURCE = 240
@@ -64,9 +63,6 @@ LEAST_ROADS = (0.95, 0.7)
 CAMERA_SPREAD, RENDERED_SPREAD = 0.4, 0.2
 """Gain, gamma and white balance of other undisturbed cameras, as a share [-]; of rendered ones, whose worlds have drawn
 theirs already: what brightness tells of snow and asphalt is not to be washed out twice."""
-
-COARSE_SHARE, COARSE_SCALES = 0.4, (0.3, 1.0)
-"""Share of the training looks that come from a coarser camera, and its resolution [-]."""
 
 WEB_STRETCH = (1.2, 1.5)
 """Width over height that the squared web stills had before, roughly [-]."""
@@ -250,25 +246,3 @@ def draw_weights(patches: PatchSet) -> NDArray[np.float64]:
 def camera_spreads(patches: PatchSet) -> NDArray[np.float64]:
     """How far the cameras of each patch may differ, shape (n,) [-]."""
     return np.where(patches.sources == "rendered", RENDERED_SPREAD, CAMERA_SPREAD)
-
-
-def augmented(rng: np.random.Generator, patch: Image, mirror: bool, spread: float) -> Image:
-    """A patch shifted a little, mirrored or not, and seen by another undisturbed camera, see `camera_look`."""
-    height, width = patch.shape[:2]
-    shift_x, shift_y = rng.integers(-8, 9), rng.integers(-5, 6)
-    zoom = np.exp(rng.uniform(-0.12, 0.12))
-    flip = -1.0 if mirror else 1.0
-    move = np.array(
-        [
-            [flip * zoom, 0.0, (1.0 - flip * zoom) * (width - 1) / 2 + shift_x],
-            [0.0, zoom, (1.0 - zoom) * (height - 1) / 2 + shift_y],
-        ]
-    )
-    moved = cv2.warpAffine(patch, move, (width, height), borderMode=cv2.BORDER_REFLECT_101)
-    if rng.random() < COARSE_SHARE:
-        factor = rng.uniform(*COARSE_SCALES)
-        small = cv2.resize(
-            moved, (round(factor * width), round(factor * height)), interpolation=cv2.INTER_AREA
-        )
-        moved = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
-    return camera_look(rng, np.asarray(moved, np.uint8), spread)

@@ -14,13 +14,14 @@ from .rendered import FIRST_SCENE_WORLD, SEED_RANGES
 
 if TYPE_CHECKING:
     from .picture_scores import Scores
+    from .surface_run import Stage
 
 
 def picture_card(
     found: Mapping[str, Scores],
     *,
     looks: PatchSet,
-    steps: int,
+    stage: Stage,
     given: argparse.Namespace,
     sha256: str,
     temperature: float,
@@ -65,13 +66,12 @@ too. The mean of their logits over T is added to the mean log probability of the
 
 ## Training
 
-From the first stage of the surface network{teacher}; {steps} steps of its second stage, drawn by the same shares of
+From the first stage of the surface network{teacher}; {stage.told()}, drawn by the same shares of
 classes and sources. {left_out}{real} looks at real pictures and {len(looks) - real} at rendered worlds of one class
 (seeds from {first}), undisturbed, at places and sizes about those that are judged, seen by cameras of other gain, gamma
 and white balance (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones). Of the clips
 that have the weather written into them only what lies below the text is shown. Seed {given.seed}; {train_s:.0f} s by
-the clock with {given.threads} processor thread(s) on a machine with other work, rendering and the teacher's part
-included unless they were kept. Command: `python -m models.training --only picture --data DIR --trunk TRUNK`.
+the clock for what was not kept. Command: `python -m models.training --only picture --data DIR`.
 
 T makes the true classes of the validation pictures likeliest beside the patches, every source counted alike. Data,
 splits and versions: [surface.md](surface.md).

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import cards
 from .annotate import annotate, sha256_of
-from .data import Picture, of_split
+from .data import Picture
 from .export import export_picture
 from .nets import SurfaceNet
 from .patches import PatchSet, joined
@@ -18,24 +18,27 @@ from .picture_card import picture_card
 from .picture_looks import rendered_looks, training_looks
 from .picture_scores import Scores, calibrated
 from .rendered import FIRST_SCENE_WORLD, SEED_RANGES, load_patches, save_patches
-from .surface_run import Steps, ask_teacher
-from .train_surface import Taught, learn_classes
+from .surface_run import Stage, Steps, first_stage, kept, second_stage, used
 
-PICTURE_STEPS = 1000
+PICTURE_STEPS = 375
 WORLDS = 480
 CUTTING_SEED = 31
 
 
 def ship_picture(
-    given: argparse.Namespace, trunk: Taught, pictures: Sequence[Picture], steps: Steps
+    given: argparse.Namespace, pictures: Sequence[Picture], worlds: PatchSet, steps: Steps
 ) -> dict[str, Scores]:
     """Train from the first stage of the surface network, calibrate beside the two others in the folder, write card."""
     start = time.monotonic()
     looks = gather(given, pictures, steps)
-    teacher = ask_teacher(given, looks, steps) if given.teacher else None
     count = max(2, round(given.effort * PICTURE_STEPS))
-    with steps("training the picture network", count) as report:
-        taught = learn_classes(trunk, looks, teacher, steps=count, seed=given.seed, report=report)
+
+    def train() -> Stage:
+        trunk = first_stage(given, pictures, worlds, steps)
+        return second_stage(given, trunk, looks, steps, count=count, what="picture network")
+
+    stage = kept(given, "picture", given.without, train)
+    taught = stage.taught
     file = given.out / "picture.onnx"
     export_picture(taught.net, 1.0, file)
     train_s = time.monotonic() - start
@@ -44,7 +47,7 @@ def ship_picture(
     text = picture_card(
         found,
         looks=looks,
-        steps=count,
+        stage=stage,
         given=given,
         sha256=sha256_of(file),
         temperature=temperature,
@@ -59,12 +62,16 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
     """Looks at the training pictures, and at worlds that the surface network has not seen."""
     count = max(6, round(given.effort * WORLDS))
     first = SEED_RANGES["train"].start + FIRST_SCENE_WORLD
-    real = [picture for picture in of_split(pictures, "train") if picture.family not in given.without]
-    return joined([training_looks(real, CUTTING_SEED), _rendered(given, range(first, first + count), steps)])
+    return joined(
+        [
+            training_looks(used(given, pictures), CUTTING_SEED),
+            _rendered(given, range(first, first + count), steps),
+        ]
+    )
 
 
 def _rendered(given: argparse.Namespace, seeds: Sequence[int], steps: Steps) -> PatchSet:
-    file = given.worlds / f"looks-{len(seeds)}.npz" if given.worlds else None
+    file = given.kept / f"looks-{len(seeds)}.npz" if given.kept else None
     if file and file.is_file():
         return load_patches(file)
     with steps("rendering worlds for whole pictures", len(seeds)) as report:

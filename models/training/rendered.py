@@ -114,21 +114,34 @@ def world_views(seed: int, scale: float, camera: Camera | None = None) -> Iterat
 
 
 def draw_worlds(
-    split: str, count: int, patches_per_view: int, report: Callable[[], None]
+    split: str, count: int, patches_per_view: int, processes: int, report: Callable[[], None]
 ) -> tuple[list[Sample], PatchSet]:
     """Whole pictures and patches of the first `count` worlds of a split; `report` is called after each world."""
     samples: list[Sample] = []
     cut: list[Cut] = []
-    for view in split_views(split, count, report):
-        samples.append(view_sample(view))
-        cut.append(view_patches(view, patches_per_view))
+    see = partial(_sample_and_patches, split=split, count=patches_per_view)
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        for views in pool.map(see, range(count)):
+            samples += [sample for sample, _ in views]
+            cut += [patches for _, patches in views]
+            report()
     return samples, rendered_patches(cut)
+
+
+def _sample_and_patches(number: int, split: str, count: int) -> list[tuple[Sample, Cut]]:
+    cv2.setNumThreads(1)
+    return [(view_sample(view), view_patches(view, count)) for view in _split_world(split, number)]
+
+
+def _split_world(split: str, number: int) -> Iterator[View]:
+    """Views of one world of a split, by a camera of its own."""
+    return world_views(SEED_RANGES[split][number], FULL_SCALE if number % 4 == 0 else REDUCED_SCALE)
 
 
 def split_views(split: str, count: int, report: Callable[[], None]) -> Iterator[View]:
     """Views of the first `count` worlds of a split, each world by a camera of its own."""
-    for number, seed in enumerate(SEED_RANGES[split][:count]):
-        yield from world_views(seed, FULL_SCALE if number % 4 == 0 else REDUCED_SCALE)
+    for number in range(count):
+        yield from _split_world(split, number)
         report()
 
 

@@ -41,12 +41,11 @@ from .rendered import (
 )
 from .scene_run import ship_scene
 from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
-from .surface_run import Steps, kept_trunk, train_and_ship
+from .surface_run import Steps, train_and_ship
 from .train_segmenter import score_segmenter, train_segmenter
-from .train_surface import Taught
 
 WORLDS = {"train": 480, "val": 36, "test": 60}
-FURTHER_WORLDS, FURTHER_PATCHES_PER_VIEW = 2520, 6
+FURTHER_WORLDS, FURTHER_PATCHES_PER_VIEW = 3078, 6
 """Worlds after the first training ones, for the surface classifier alone: many looks, few patches of each."""
 SEGMENTER_STEPS = 1300
 
@@ -69,29 +68,23 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
     check_trainable(pictures)
     _keep_memory()
     torch.set_num_threads(given.threads)
-    torch.use_deterministic_algorithms(mode=True)
+    torch.use_deterministic_algorithms(mode=given.device == "cpu")
     with _progress() as progress:
         worlds = {split: max(3, round(given.effort * count)) for split, count in WORLDS.items()}
         steps = partial(_steps, progress)
         if given.only == "scene":
             _scene(progress, given, pictures, worlds, steps)
             return
-        if given.only == "picture":
-            _picture(progress, given, kept_trunk(given), pictures, steps)
-            return
         further = max(3, round(given.effort * FURTHER_WORLDS))
         start = time.monotonic()
-        rendered = _render(progress, worlds, given.worlds)
+        rendered = _render(progress, worlds, given)
         patches = {split: part.patches for split, part in rendered.items()}
-        if given.only != "segmenter":
-            patches["further"] = _render_further(progress, worlds["train"], further, given)
-            worlds["train"] += further
         shown = [Path(word).name if "/" in word else word for word in arguments]
         facts = cards.RunFacts(
             command=" ".join(["python -m models.training", *shown]),
             seed=given.seed,
             pictures=pictures,
-            worlds=worlds,
+            worlds={**worlds, "train": worlds["train"] + (0 if given.only == "segmenter" else further)},
             seeds={split: f"from {SEED_RANGES[split][0]}" for split in worlds},
             render_s=time.monotonic() - start,
             threads=given.threads,
@@ -99,13 +92,14 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
             without=tuple(given.without),
         )
         given.out.mkdir(parents=True, exist_ok=True)
-        if given.only != "surface":
+        if given.only in (None, "segmenter"):
             _segmenter(progress, given, facts, rendered)
-        if given.only != "segmenter":
-            trunk = train_and_ship(given, facts, patches, progress, steps)
+        if given.only in (None, "surface"):
+            draw = partial(_render_further, progress, worlds["train"], further, given)
+            train_and_ship(given, facts, patches, draw, progress, steps)
             _scene(progress, given, pictures, worlds, steps)
-        if given.only is None:
-            _picture(progress, given, trunk, pictures, steps)
+        if given.only in (None, "picture"):
+            _picture(progress, given, pictures, patches["train"], steps)
 
 
 def _scene(
@@ -122,10 +116,14 @@ def _scene(
 
 
 def _picture(
-    progress: Progress, given: argparse.Namespace, trunk: Taught, pictures: Sequence[Picture], steps: Steps
+    progress: Progress,
+    given: argparse.Namespace,
+    pictures: Sequence[Picture],
+    worlds: PatchSet,
+    steps: Steps,
 ) -> None:
     """The picture network, beside the two others that lie in the folder."""
-    found = ship_picture(given, trunk, pictures, steps)
+    found = ship_picture(given, pictures, worlds, steps)
     progress.console.print(
         cards.class_table({name: scores.together for name, scores in found.items()}), markup=False
     )
@@ -139,17 +137,17 @@ def _keep_memory() -> None:
             mallopt(parameter, value)
 
 
-def _render(progress: Progress, worlds: dict[str, int], store: Path | None) -> dict[str, Rendered]:
+def _render(progress: Progress, worlds: dict[str, int], given: argparse.Namespace) -> dict[str, Rendered]:
     task = progress.add_task("rendering worlds", total=sum(worlds.values()), note="")
     rendered = {}
     for split, count in worlds.items():
-        file = store / f"{split}-{count}.npz" if store else None
+        file = given.kept / f"{split}-{count}.npz" if given.kept else None
         if file and file.is_file():
             rendered[split] = Rendered(*load_worlds(file))
             progress.advance(task, count)
             continue
         rendered[split] = Rendered(
-            *draw_worlds(split, count, PATCHES_PER_VIEW[split], lambda: progress.advance(task))
+            *draw_worlds(split, count, PATCHES_PER_VIEW[split], given.threads, lambda: progress.advance(task))
         )
         if file:
             save_worlds(file, rendered[split].samples, rendered[split].patches)
@@ -158,7 +156,7 @@ def _render(progress: Progress, worlds: dict[str, int], store: Path | None) -> d
 
 def _render_further(progress: Progress, first: int, count: int, given: argparse.Namespace) -> PatchSet:
     """Patches of `count` training worlds from the `first` on."""
-    file = given.worlds / f"further-{first}-{count}.npz" if given.worlds else None
+    file = given.kept / f"further-{first}-{count}.npz" if given.kept else None
     if file and file.is_file():
         return load_patches(file)
     task = progress.add_task("rendering further worlds", total=count, note="")

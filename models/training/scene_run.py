@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from trpac_core.vision.scene import SceneHead, scene_numbers, scene_of
 from . import calibrate, cards, scores
 from .annotate import annotate, sha256_of
 from .cards import SCENE_BEGIN, SCENE_END
-from .data import Picture, judged_groups, of_split
+from .data import Picture, judged_groups
 from .patches import draw_weights, judged_patches, thinned, training_patches
 from .rendered import (
     FIRST_SCENE_WORLD,
@@ -30,7 +31,8 @@ from .rendered import (
     split_views,
     view_patches,
 )
-from .scene_set import SceneSet, all_of, scenes_of_pictures, scenes_of_views
+from .scene_set import SceneSet, all_of, load_scenes, save_scenes, scenes_of_pictures, scenes_of_views
+from .surface_run import used
 
 WORLDS, PATCHES_PER_WORLD_VIEW = 480, 6
 LOOKS = 2
@@ -60,7 +62,7 @@ def ship_scene(
     head = learn_head(classifier, train, given.seed)
     annotate(file, {"scene": head.to_text()})
     classifier = SurfaceClassifier(file, given.threads)
-    judged = judged_sets(pictures, worlds, steps)
+    judged = judged_sets(given, pictures, worlds, steps)
     temperature, reliabilities = calibrated(classifier, judged, given.seed)
     annotate(file, {"temperature": f"{temperature:.6f}"})
     calibrate.draw_reliability(
@@ -78,17 +80,32 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
     """What it learns from: patches of the training pictures, and of worlds that the network has not seen."""
     count = max(6, round(given.effort * WORLDS))
     first = SEED_RANGES["train"].start + FIRST_SCENE_WORLD
-    with steps("rendering worlds for the scene", count) as report:
-        done = iter(range(1, count + 1))
-        views = draw_further_worlds(
-            range(first, first + count),
-            PATCHES_PER_WORLD_VIEW,
-            given.threads,
-            lambda: report(next(done), np.nan),
-        )
-    real = [picture for picture in of_split(pictures, "train") if picture.family not in given.without]
+
+    def draw() -> SceneSet:
+        with steps("rendering worlds for the scene", count) as report:
+            done = iter(range(1, count + 1))
+            views = draw_further_worlds(
+                range(first, first + count),
+                PATCHES_PER_WORLD_VIEW,
+                given.threads,
+                lambda: report(next(done), np.nan),
+            )
+        return scenes_of_views(views)
+
+    real = used(given, pictures)
     cut = training_patches(real, CUTTING_SEED)
-    return all_of([scenes_of_pictures(cut, real), scenes_of_views(views)])
+    return all_of([scenes_of_pictures(cut, real), _kept(given, f"scenes-{count}", draw)])
+
+
+def _kept(given: argparse.Namespace, name: str, draw: Callable[[], SceneSet]) -> SceneSet:
+    """Rendered patches in their scenes, from their file in the command line's folder, or drawn (and kept there)."""
+    file = given.kept / f"{name}.npz" if given.kept else None
+    if file and file.is_file():
+        return load_scenes(file)
+    found = draw()
+    if file:
+        save_scenes(file, found)
+    return found
 
 
 def learn_head(classifier: SurfaceClassifier, train: SceneSet, seed: int) -> SceneHead:
@@ -128,13 +145,16 @@ def regression(
     return found[: m * k].reshape(m, k), found[m * k :]
 
 
-def judged_sets(pictures: Sequence[Picture], worlds: dict[str, int], steps: Steps) -> dict[str, SceneSet]:
+def judged_sets(
+    given: argparse.Namespace, pictures: Sequence[Picture], worlds: dict[str, int], steps: Steps
+) -> dict[str, SceneSet]:
     """Validation and test sets by name, as on the card."""
     judged = {
         name: scenes_of_pictures(judged_patches(some), some) for name, some in judged_groups(pictures).items()
     }
     for split in ("val", "test"):
-        judged[f"rendered {split}"] = _rendered_set(split, worlds[split], steps)
+        draw = partial(_rendered_set, split, worlds[split], steps)
+        judged[f"rendered {split}"] = _kept(given, f"scenes-{split}-{worlds[split]}", draw)
     return judged
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,3 +93,18 @@ def scenes_of_views(views: Sequence[tuple[Image, Cut]]) -> SceneSet:
 def all_of(sets: Sequence[SceneSet]) -> SceneSet:
     """Several sets as one."""
     return SceneSet(joined([part.patches for part in sets]), np.concatenate([part.scenes for part in sets]))
+
+
+def save_scenes(file: Path, scenes: SceneSet) -> None:
+    """Keep a set in a .npz file."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(".part.npz")
+    np.savez(part, scenes=scenes.scenes, **vars(scenes.patches))
+    part.replace(file)
+
+
+def load_scenes(file: Path) -> SceneSet:
+    """A set kept by `save_scenes`."""
+    with np.load(file) as kept:
+        patches = PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))
+        return SceneSet(patches, kept["scenes"])

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import copy
-import hashlib
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -17,12 +17,12 @@ from rich.progress import Progress
 
 from . import calibrate, cards, scores
 from .annotate import sha256_of
-from .data import Image, Picture, family_of, judged_groups, of_split
+from .data import Image, Picture, judged_groups, of_split
 from .export import export_surface
 from .nets import SurfaceNet
 from .outliers import outlier_patches
 from .patches import PatchSet, joined, judged_patches, thinned, training_patches
-from .teacher import TeacherError, TeacherFeatures, teacher_features
+from .teacher import Teacher
 from .train_surface import (
     Report,
     Taught,
@@ -35,13 +35,13 @@ from .train_surface import (
     verdicts_of,
 )
 
-TRUNK_STEPS, CLASS_STEPS = 1500, 4000
+TRUNK_STEPS, CLASS_STEPS = 3000, 3000
 TRUNK_SOURCES = ("condition_web", "dry_udacity", "rendered")
 """Sources of the first stage: none on which a leave-one-out score is taken, so that one trunk serves all of those."""
 
 CUTTING_SEED = 1
-FURTHER_CUTS = 2
-"""How often real pictures are cut anew, at other places, for the second stage: the teacher is not asked about these."""
+CUTS = 8
+"""How often the real pictures are cut, each time at other places."""
 
 READING_STEPS = 2000
 OUTLIERS = {"train": 12000, "val": 1600}
@@ -54,10 +54,9 @@ Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 @dataclass(frozen=True)
 class Material:
-    """What the classifier learns from; the teacher's features are those of the first patches."""
+    """What the classifier's heads learn from."""
 
     patches: PatchSet
-    teacher: TeacherFeatures | None
     outliers: dict[str, Image]
 
 
@@ -78,26 +77,18 @@ def train_and_ship(
     given: argparse.Namespace,
     facts: cards.RunFacts,
     rendered: dict[str, PatchSet],
+    further: Callable[[], PatchSet],
     progress: Progress,
     steps: Steps,
-) -> Taught:
+) -> None:
     """Train as the command line asks, write surface.onnx, its card and the reliability diagram.
 
-    Returns
-    -------
-    Taught
-        The net after its first stage.
+    `further` draws the patches of further worlds, of which only the second stage learns.
     """
     start = time.monotonic()
-    material = gather(given, facts.pictures, rendered, steps)
-    trunk = _trunk(given, material, steps)
-    student = copy.deepcopy(trunk)
-    count = max(2, round(given.effort * CLASS_STEPS))
-    with steps("training the surface classifier", count) as report:
-        taught = learn_classes(
-            student, material.patches, material.teacher, steps=count, seed=given.seed, report=report
-        )
-    net = taught.net
+    stage = _classes(given, facts.pictures, rendered["train"], further, steps)
+    net = stage.taught.net
+    material = gather(given, facts.pictures, rendered)
     learn_heads(net, material, given.seed, given.effort)
     train_s = time.monotonic() - start
     outcome = judge(net, _judged_sets(facts.pictures, rendered), material.outliers["val"], given.seed)
@@ -106,103 +97,124 @@ def train_and_ship(
     calibrate.draw_reliability(
         *outcome.reliabilities["validation, both"], outcome.temperature, given.out / "reliability.png"
     )
-    text = cards.surface_card(
-        facts, outcome, sha256=sha256_of(path), train_s=train_s, train_patches=len(material.patches)
-    )
+    text = cards.surface_card(facts, outcome, sha256=sha256_of(path), train_s=train_s, stage=stage)
     cards.write_card(path.with_suffix(".md"), text)
     progress.console.print(cards.class_table(outcome.picture_scores), markup=False)
-    return trunk
 
 
-def gather(
-    given: argparse.Namespace, pictures: Sequence[Picture], rendered: dict[str, PatchSet], steps: Steps
-) -> Material:
-    """Training patches with the teacher's features, and outliers; sources that the command line leaves out are absent.
-
-    What is cut does not depend on the seed of the training, so that the teacher need be asked once only.
-    """
-    every = of_split(pictures, "train")
-    patches = joined([training_patches(every, CUTTING_SEED), rendered["train"]])
-    teacher = ask_teacher(given, patches, steps) if given.teacher else None
-    cuts = round(min(given.effort, 1.0) * FURTHER_CUTS)
-    further = [training_patches(every, CUTTING_SEED + 1 + number) for number in range(cuts)]
-    patches = joined([patches, *further, *([rendered["further"]] if "further" in rendered else [])])
-    kept = np.array([family_of(str(source)) not in given.without for source in patches.sources])
+def gather(given: argparse.Namespace, pictures: Sequence[Picture], rendered: dict[str, PatchSet]) -> Material:
+    """Patches for the heads, and outliers; sources that the command line leaves out are absent."""
+    seen = used(given, pictures)
+    patches = joined([training_patches(seen, CUTTING_SEED), rendered["train"]])
     rng = np.random.default_rng(CUTTING_SEED)
-    seen = [picture for picture in every if picture.family not in given.without]
     count = {split: max(80, round(min(given.effort, 1.0) * most)) for split, most in OUTLIERS.items()}
     outliers = {
-        "train": outlier_patches(rng, seen, patches.patches[kept], count["train"]),
+        "train": outlier_patches(rng, seen, patches.patches, count["train"]),
         "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, count["val"]),
     }
-    if teacher is not None:
-        teacher = teacher.where(kept[: len(teacher)])
-    return Material(patches.where(kept), teacher, outliers)
+    return Material(patches, outliers)
 
 
-def ask_teacher(given: argparse.Namespace, patches: PatchSet, steps: Steps) -> TeacherFeatures:
-    """The teacher's features, kept beside the rendered worlds where there is a folder for those."""
-    if not given.teacher.is_file():
-        raise TeacherError(f"{given.teacher}: not found; leave --teacher out to train without one")
-    digest = hashlib.sha256(patches.patches.tobytes() + given.teacher.read_bytes()).hexdigest()[:12]
-    file = given.worlds / f"teacher-{digest}.npz" if given.worlds else None
+def used(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[Picture]:
+    """The training pictures but for the sources that the command line leaves out."""
+    return [picture for picture in of_split(pictures, "train") if picture.family not in given.without]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A net after a stage of its training, and how it came about."""
+
+    taught: Taught
+    patches: int
+    steps: int
+    seconds: float
+    device: str
+
+    def told(self) -> str:
+        """The effort in words, for the card."""
+        return f"{self.steps} steps on {self.patches} patches, {self.seconds:.0f} s on {self.device}"
+
+
+def trained(given: argparse.Namespace, patches: PatchSet, steps: int, train: Callable[..., Taught]) -> Stage:
+    """One stage, timed; `train` is `learn_features` or `learn_classes` but for what the command line says."""
+    device = torch.device(given.device)
+    name = torch.cuda.get_device_name() if device.type == "cuda" else f"{given.threads} processor thread(s)"
+    start = time.monotonic()
+    taught = train(patches=patches, steps=steps, seed=given.seed, device=device)
+    return Stage(taught, len(patches), steps, time.monotonic() - start, name)
+
+
+def kept(given: argparse.Namespace, name: str, without: Sequence[str], train: Callable[[], Stage]) -> Stage:
+    """A stage from its file in the folder of the command line, or trained (and kept there)."""
+    left_out = "".join(f"-without-{source}" for source in sorted(without))
+    file = given.kept / f"{name}-{given.seed}{left_out}.pt" if given.kept else None
     if file and file.is_file():
-        with np.load(file) as kept:
-            return TeacherFeatures(kept["pooled"], kept["maps"])
-    with steps("asking the teacher", len(patches)) as report:
-        features = teacher_features(given.teacher, patches.patches, lambda done: report(done, np.nan))
+        found = torch.load(file, weights_only=True)
+        taught = new_student(given.seed)
+        taught.parts().load_state_dict(found.pop("weights"))
+        taught.parts().eval()
+        return Stage(taught, **found)
+    stage = train()
     if file:
-        part = file.with_suffix(".part.npz")
-        np.savez(part, pooled=features.pooled, maps=features.maps)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part")
+        told = {name: value for name, value in vars(stage).items() if name != "taught"}
+        torch.save({"weights": stage.taught.parts().state_dict(), **told}, part)
         part.replace(file)
-    return features
+    return stage
 
 
-def _trunk(given: argparse.Namespace, material: Material, steps: Steps) -> Taught:
-    """The first stage's net: read from its file where there is one, else trained (and kept)."""
-    if material.teacher is None or (given.trunk and given.trunk.is_file()):
-        return kept_trunk(given)
-    student = new_student(given.seed)
-    seen = np.arange(len(material.patches)) < len(material.teacher)
-    chosen = seen & np.isin(material.patches.sources, TRUNK_SOURCES)
-    count = max(2, round(given.effort * TRUNK_STEPS))
-    with steps("learning the teacher's features", count) as report:
-        trunk = learn_features(
-            student,
-            material.patches.where(chosen),
-            material.teacher.where(chosen[seen]),
-            steps=count,
-            seed=given.seed,
-            report=report,
-        )
-    if given.trunk:
-        part = given.trunk.with_suffix(".part")
-        torch.save(torch.nn.ModuleList(trunk).state_dict(), part)
-        part.replace(given.trunk)
-    return trunk
-
-
-def kept_trunk(given: argparse.Namespace) -> Taught:
-    """The first stage's net from its file; without a teacher an untrained one.
-
-    Raises
-    ------
-    TeacherError
-        There is a teacher but no such file.
-    """
-    student = new_student(given.seed)
+def first_stage(
+    given: argparse.Namespace, pictures: Sequence[Picture], worlds: PatchSet, steps: Steps
+) -> Taught:
+    """The net that sees what the teacher sees; without a teacher an untrained one."""
     if given.teacher is None:
-        return student
-    if not (given.trunk and given.trunk.is_file()):
-        raise TeacherError(
-            "with a teacher the picture network starts from the first stage of the surface network: name its file, "
-            f"which `--only surface --trunk FILE` keeps, with --trunk (given: {given.trunk})"
-        )
-    kept = torch.load(given.trunk, weights_only=True)
-    heads = ("0.softening", "0.reading", "0.disturbed")  # learned last, in other forms at times
-    kept = {name: value for name, value in kept.items() if not name.startswith(heads)}
-    torch.nn.ModuleList(student).load_state_dict(kept, strict=False)
-    return student
+        return new_student(given.seed)
+    teacher = Teacher.read(given.teacher)
+    count = max(2, round(given.effort * TRUNK_STEPS))
+
+    def train() -> Stage:
+        chosen = [picture for picture in of_split(pictures, "train") if picture.source in TRUNK_SOURCES]
+        patches = joined([*_cuts(given, chosen), worlds])
+        with steps("learning the teacher's features", count) as report:
+            learn = partial(learn_features, new_student(given.seed), teacher=teacher, report=report)
+            return trained(given, patches, count, learn)
+
+    return kept(given, "first_stage", (), train).taught
+
+
+def second_stage(
+    given: argparse.Namespace, trunk: Taught, patches: PatchSet, steps: Steps, *, count: int, what: str
+) -> Stage:
+    """A copy of the first stage's net, taught the classes."""
+    teacher = Teacher.read(given.teacher) if given.teacher else None
+    with steps(f"training the {what}", count) as report:
+        learn = partial(learn_classes, copy.deepcopy(trunk), teacher=teacher, report=report)
+        return trained(given, patches, count, learn)
+
+
+def _classes(
+    given: argparse.Namespace,
+    pictures: Sequence[Picture],
+    worlds: PatchSet,
+    further: Callable[[], PatchSet],
+    steps: Steps,
+) -> Stage:
+    """The net after its second stage."""
+    count = max(2, round(given.effort * CLASS_STEPS))
+
+    def train() -> Stage:
+        trunk = first_stage(given, pictures, worlds, steps)
+        patches = joined([*_cuts(given, used(given, pictures)), worlds, further()])
+        return second_stage(given, trunk, patches, steps, count=count, what="surface classifier")
+
+    return kept(given, "classes", given.without, train)
+
+
+def _cuts(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[PatchSet]:
+    """Patches of these pictures, cut several times."""
+    count = max(1, round(min(given.effort, 1.0) * CUTS))
+    return [training_patches(pictures, CUTTING_SEED + number) for number in range(count)]
 
 
 def learn_heads(net: SurfaceNet, material: Material, seed: int, effort: float) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
 
 INPUT_PX = 224
 GLOSS_LAYERS = {
@@ -30,88 +30,111 @@ MAP_LAYERS = (148, 159)
 MAP_CELLS = (4, 6)
 """Rows and columns of the handed-on maps."""
 
+AT_ONCE = 64
+"""Patches that the teacher sees in one run while its features are standardised."""
+
 
 class TeacherError(ValueError):
     """The teacher file cannot be used."""
 
 
 @dataclass(frozen=True)
-class TeacherFeatures:
-    """What the teacher sees in patches, standardised, aligned along the first axis.
+class Layer:
+    """One operation: from which tensors to which, and between which values its output saturates.
 
-    Attributes
-    ----------
-    pooled : float16, shape (n, 896)
-        Mean and deviation of each channel of GLOSS_LAYERS.
-    maps : float16, shape (n, 160, 4, 6)
-        Maps of MAP_LAYERS.
+    `weights` is empty for a sum or a border; `border` is left, right, top, bottom [px].
+    """
+
+    inputs: tuple[int, ...]
+    output: int
+    weights: str
+    stride: int
+    groups: int
+    border: tuple[int, int, int, int]
+    limits: tuple[float, float]
+
+
+class Teacher(nn.Module):
+    """Layers of an 8-bit network up to the last that is handed on, computed in floating point on any device.
+
+    The outputs saturate where the 8-bit ones do, which holds ReLU6 too: no activation need be known.
     """
 
     POOLED: ClassVar[int] = 2 * sum(channels for _, channels in GLOSS_LAYERS.values())
     MAPS: ClassVar[int] = sum(GLOSS_LAYERS[index][1] for index in MAP_LAYERS)
 
-    pooled: NDArray[np.float16]
-    maps: NDArray[np.float16]
+    def __init__(self, layers: tuple[Layer, ...], weights: dict[str, Tensor], first: tuple[int, float, int]):
+        """Of layers with their weights and biases; `first` is the input's tensor, scale and zero point."""
+        super().__init__()
+        self.layers, self.first = layers, first
+        for name, value in weights.items():
+            self.register_buffer(name, value)
+        for name, size in (("pooled", (self.POOLED,)), ("maps", (self.MAPS, 1, 1))):
+            self.register_buffer(f"{name}_mean", torch.zeros(size))
+            self.register_buffer(f"{name}_deviation", torch.ones(size))
 
-    def __len__(self) -> int:
-        return len(self.pooled)
+    @classmethod
+    def read(cls, model: Path) -> Self:
+        """MobileNetV2 1.0 / 224 from a TensorFlow Lite file with 8-bit weights (uint8 RGB input).
 
-    def where(self, chosen: NDArray[np.bool_]) -> TeacherFeatures:
-        """The chosen patches' features alone."""
-        return TeacherFeatures(self.pooled[chosen], self.maps[chosen])
+        Raises
+        ------
+        TeacherError
+            The file is missing or holds another network.
+        """
+        if not model.is_file():
+            raise TeacherError(f"{model}: not found; leave --teacher out to train without one")
+        return cls(*_read(model))
+
+    def forward(self, patches: Tensor) -> tuple[Tensor, Tensor]:
+        """Standardised features of uint8 BGR patches (n, h, w, 3).
+
+        Returns
+        -------
+        pooled : shape (n, 896)
+            Mean and deviation of each channel of GLOSS_LAYERS.
+        maps : shape (n, 160, 4, 6)
+            Maps of MAP_LAYERS.
+        """
+        pooled, maps = self._features(patches)
+        return (pooled - self.pooled_mean) / self.pooled_deviation, (
+            maps - self.maps_mean
+        ) / self.maps_deviation
+
+    @torch.no_grad()
+    def standardise(self, patches: Tensor) -> None:
+        """Let each feature's mean be 0 and its deviation 1 over these patches, uint8 (n, h, w, 3)."""
+        found = [self._features(some) for some in patches.split(AT_ONCE)]
+        pooled, maps = (torch.cat(parts) for parts in zip(*found, strict=True))
+        self.pooled_mean, self.pooled_deviation = pooled.mean(0), pooled.std(0).clamp_min(1e-3)
+        self.maps_mean = maps.mean((0, 2, 3))[:, None, None]
+        self.maps_deviation = maps.std((0, 2, 3)).clamp_min(1e-3)[:, None, None]
+
+    def tensors(self, patches: Tensor) -> dict[int, Tensor]:
+        """Maps of each of GLOSS_LAYERS, (n, channels, side, side), by the file's number of the tensor."""
+        source, scale, zero = self.first
+        rgb = patches.permute(0, 3, 1, 2).flip(1).float()
+        large = functional.interpolate(rgb, (INPUT_PX, INPUT_PX), mode="bilinear", align_corners=False)
+        values = {source: (large - zero) * scale}
+        for layer in self.layers:
+            inputs = [functional.pad(values[index], layer.border) for index in layer.inputs]
+            if layer.weights:
+                weight, bias = getattr(self, layer.weights), getattr(self, f"{layer.weights}_bias")
+                found = functional.conv2d(inputs[0], weight, bias, layer.stride, groups=layer.groups)
+            else:
+                found = sum(inputs[1:], inputs[0])
+            values[layer.output] = found.clamp(*layer.limits)
+        return {index: values[index].float() for index in GLOSS_LAYERS}
+
+    def _features(self, patches: Tensor) -> tuple[Tensor, Tensor]:
+        seen = self.tensors(patches)
+        pooled = [part for x in seen.values() for part in (x.mean((2, 3)), x.flatten(2).std(2, correction=0))]
+        maps = [functional.adaptive_avg_pool2d(seen[index], MAP_CELLS) for index in MAP_LAYERS]
+        return torch.cat(pooled, 1), torch.cat(maps, 1)
 
 
-def teacher_features(
-    model: Path, patches: NDArray[np.uint8], report: Callable[[int], None] = lambda done: None
-) -> TeacherFeatures:
-    """The teacher's features of each patch.
-
-    Parameters
-    ----------
-    model : Path
-        MobileNetV2 1.0 / 224 as a TensorFlow Lite file with 8-bit weights (uint8 RGB input).
-    patches : uint8, shape (n, height, width, 3)
-        BGR patches.
-    report : callable
-        Called with the number of patches done.
-    """
-    interpreter, source, scales = _load(model)
-    rows, columns = (_area_weights(GLOSS_LAYERS[MAP_LAYERS[0]][0], cells) for cells in MAP_CELLS)
-    pooled, maps = [], []
-    for row, patch in enumerate(patches):
-        large = cv2.resize(patch, (INPUT_PX, INPUT_PX), interpolation=cv2.INTER_LINEAR)
-        interpreter.set_tensor(source, large[None, :, :, ::-1])
-        interpreter.invoke()
-        found = {
-            index: (interpreter.get_tensor(index)[0].astype(np.float32) - zero) * scale
-            for index, (scale, zero) in scales.items()
-        }
-        pooled.append(
-            np.concatenate(
-                [part for layer in found.values() for part in (layer.mean((0, 1)), layer.std((0, 1)))]
-            )
-        )
-        cells = [np.einsum("ij,jkc,lk->cil", rows, found[index], columns) for index in MAP_LAYERS]
-        maps.append(np.concatenate(cells).astype(np.float16))
-        report(row + 1)
-    return TeacherFeatures(
-        _standard(np.stack(pooled), (0,)), _standard(np.stack(maps).astype(np.float32), (0, 2, 3))
-    )
-
-
-def _area_weights(side: int, cells: int) -> NDArray[np.float32]:
-    """Share of each of `side` pixels in each of fewer cells, shape (cells, side)."""
-    unit = np.eye(side, dtype=np.float32)
-    return np.asarray(cv2.resize(unit, (side, cells), interpolation=cv2.INTER_AREA), np.float32)
-
-
-def _standard(features: NDArray[np.float32], axes: tuple[int, ...]) -> NDArray[np.float16]:
-    centred = features - features.mean(axis=axes, keepdims=True)
-    return (centred / np.maximum(centred.std(axis=axes, keepdims=True), 1e-3)).astype(np.float16)
-
-
-def _load(model: Path):  # type: ignore[no-untyped-def]
-    """The interpreter, its input's index, and scale and zero point of each layer that is handed on."""
+def _read(model: Path) -> tuple[tuple[Layer, ...], dict[str, Tensor], tuple[int, float, int]]:
+    """Layers, weights and input of the network in a file."""
     from ai_edge_litert.interpreter import Interpreter  # type: ignore[import-untyped]
 
     interpreter = Interpreter(str(model), num_threads=1, experimental_preserve_all_tensors=True)
@@ -122,5 +145,58 @@ def _load(model: Path):  # type: ignore[no-untyped-def]
             raise TeacherError(
                 f"{model}: tensor {index} is not of shape {(1, side, side, channels)}; expected MobileNetV2 1.0 / 224"
             )
-    scales = {index: details[index]["quantization"] for index in GLOSS_LAYERS}
-    return interpreter, interpreter.get_input_details()[0]["index"], scales
+    layers: list[Layer] = []
+    weights: dict[str, Tensor] = {}
+    source = interpreter.get_input_details()[0]["index"]
+    first = source
+    for operation in interpreter._get_ops_details():
+        kind, output = operation["op_name"], int(operation["outputs"][0])
+        if kind == "QUANTIZE":
+            first = output
+            continue
+        layer = _layer(kind, [int(index) for index in operation["inputs"]], output, details)
+        layers.append(layer)
+        if layer.weights:
+            weights |= _weights(layer, [int(i) for i in operation["inputs"][1:]], interpreter, details)
+        if output == max(GLOSS_LAYERS):
+            break
+    scale, zero = details[source]["quantization"]
+    return tuple(layers), weights, (first, float(scale), int(zero))
+
+
+def _layer(kind: str, inputs: list[int], output: int, details: dict[int, Any]) -> Layer:
+    """One operation, with the stride and the border that its shapes tell."""
+    if kind not in ("CONV_2D", "DEPTHWISE_CONV_2D", "ADD", "PAD"):
+        raise TeacherError(f"operation {kind} in the teacher's first layers; expected MobileNetV2 1.0 / 224")
+    before, after = (details[index]["shape"][1] for index in (inputs[0], output))
+    convolved = kind.endswith("CONV_2D")
+    kernel = details[inputs[1]]["shape"][1] if convolved else 1
+    stride = round(before / after) if convolved else 1
+    missing = max((after - 1) * stride + kernel - before, 0)
+    border = (missing // 2, missing - missing // 2) if kind != "PAD" else (0, missing)
+    scale, zero = details[output]["quantization"]
+    return Layer(
+        inputs=tuple(inputs if kind == "ADD" else inputs[:1]),
+        output=output,
+        weights=f"layer_{output}" if convolved else "",
+        stride=stride,
+        groups=int(details[inputs[0]]["shape"][3]) if kind == "DEPTHWISE_CONV_2D" else 1,
+        border=border * 2,
+        limits=(float(scale) * (-128 - zero), float(scale) * (127 - zero)),
+    )
+
+
+def _weights(
+    layer: Layer, constants: list[int], interpreter: Any, details: dict[int, Any]
+) -> dict[str, Tensor]:
+    """Weights and bias of a convolution in floating point, in the order of axes that torch has."""
+    found = []
+    for index in constants:
+        known = details[index]["quantization_parameters"]
+        axis, values = known["quantized_dimension"], interpreter.get_tensor(index).astype(np.float32)
+        shape = [-1 if number == axis else 1 for number in range(values.ndim)]
+        values = (values - known["zero_points"].reshape(shape)) * known["scales"].reshape(shape)
+        found.append(torch.from_numpy(values.astype(np.float32)))
+    weight, bias = found
+    turned = weight.permute(3, 0, 1, 2) if layer.groups > 1 else weight.permute(0, 3, 1, 2)
+    return {layer.weights: turned.contiguous(), f"{layer.weights}_bias": bias}

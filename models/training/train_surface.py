@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, Self
 
 import numpy as np
 import torch
@@ -17,12 +14,15 @@ from torch.nn import functional
 
 from .calibrate import cross_entropy
 from .data import Image
+from .looks import seen_anew
 from .nets import SurfaceNet
-from .patches import PatchSet, augmented, camera_spreads, draw_weights
-from .teacher import MAP_CELLS, TeacherFeatures
+from .patches import PatchSet, camera_spreads, draw_weights
+from .teacher import MAP_CELLS, Teacher
 
-BATCH = 96
-LEARNING_RATE = 3e-3
+BATCH, HINTED = 256, 96
+"""Patches of a step, and those of them that the teacher sees too; the first stage draws these alone."""
+FIRST_RATE, CLASS_RATE = 3e-3, 2.5e-3
+"""Learning rates of the two stages."""
 WEIGHT_DECAY = 2e-2
 AVERAGING = 0.998
 """Decay of the running average of the weights; the average is what ships."""
@@ -31,12 +31,8 @@ MAP_WEIGHT, POOLED_WEIGHT = 1.0, 1.0
 """Weights of the teacher's maps and pooled features in the first stage."""
 HINT_SHARE = 0.5
 """Share of both beside the cross-entropy in the second stage."""
-HALF_PRECISION = torch.backends.cpu.get_cpu_capability() == "AVX512"
-"""Whether maps are computed in bfloat16: there it saves a third of a step's time. Weights and losses keep 32 bits."""
-FIRST_LAYERS_UNTIL = 0.5
-"""Share of the second stage after which the first layers stay as they are; a quarter of a step's time is saved then."""
-AHEAD = 3
-"""Batches drawn while the net still learns from earlier ones."""
+STANDARDISED = 64
+"""Patches over which the teacher's features are standardised."""
 READING_RATE = 2e-3
 DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3, 0.5, 0.5
 """The head that tells disturbed patches must hold on roads never seen, so it is kept weak."""
@@ -51,27 +47,14 @@ class Taught(NamedTuple):
     maps: nn.Conv2d
     pooled: nn.Linear
 
-    def parameters(self) -> list[nn.Parameter]:
-        """All that is trained."""
-        return [parameter for part in self for parameter in part.parameters() if parameter.requires_grad]
+    def parts(self) -> nn.ModuleList:
+        """All three as one module."""
+        return nn.ModuleList(self)
 
-    def train(self) -> nn.ModuleList:
-        """All modules, in training."""
-        return nn.ModuleList(self).train()
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Drawn patches and what is known of them.
-
-    `taught` are the places of those that the teacher has seen; `pooled` and `maps` are its features of these.
-    """
-
-    patches: Tensor
-    labels: Tensor
-    taught: Tensor
-    pooled: Tensor
-    maps: Tensor
+    def to(self, device: torch.device) -> Self:
+        """The same, moved to a device."""
+        self.parts().to(device)
+        return self
 
 
 def new_student(seed: int) -> Taught:
@@ -79,126 +62,131 @@ def new_student(seed: int) -> Taught:
     torch.manual_seed(seed)
     net = SurfaceNet()
     middle = net.STAGES[1][0]
-    return Taught(
-        net, nn.Conv2d(middle, TeacherFeatures.MAPS, 1), nn.Linear(net.EMBEDDING, TeacherFeatures.POOLED)
-    )
+    return Taught(net, nn.Conv2d(middle, Teacher.MAPS, 1), nn.Linear(net.EMBEDDING, Teacher.POOLED))
 
 
 def learn_features(
-    student: Taught, patches: PatchSet, teacher: TeacherFeatures, *, steps: int, seed: int, report: Report
+    student: Taught,
+    patches: PatchSet,
+    teacher: Teacher,
+    *,
+    steps: int,
+    seed: int,
+    device: torch.device,
+    report: Report,
 ) -> Taught:
     """First stage: the net learns to see what the teacher sees; no label is used."""
     shares = np.full(len(patches), 1.0 / len(patches))
-    return _train(student, patches, teacher, shares, steps, seed, report, hint=1.0, classes=0.0)
+    drawer = Drawer(patches, shares, HINTED, seed, device)
+    return _train(student, drawer, teacher.to(device), steps, FIRST_RATE, report, hint=1.0, classes=0.0)
 
 
 def learn_classes(
     student: Taught,
     patches: PatchSet,
-    teacher: TeacherFeatures | None,
+    teacher: Teacher | None,
     *,
     steps: int,
     seed: int,
+    device: torch.device,
     report: Report,
 ) -> Taught:
-    """Second stage: the classes.
-
-    Where there is a teacher its features of the patches that it has seen, the first ones, are kept in view.
-    """
+    """Second stage: the classes. Where there is a teacher its features are kept in view."""
+    drawer = Drawer(patches, draw_weights(patches), BATCH, seed, device)
     hint = 0.0 if teacher is None else HINT_SHARE
-    return _train(
-        student, patches, teacher, draw_weights(patches), steps, seed, report, hint=hint, classes=1.0
-    )
+    teacher = None if teacher is None else teacher.to(device)
+    return _train(student, drawer, teacher, steps, CLASS_RATE, report, hint=hint, classes=1.0)
+
+
+class Drawer:
+    """Training patches on a device, drawn by their shares and seen anew each time."""
+
+    def __init__(
+        self, patches: PatchSet, shares: NDArray[np.float64], batch: int, seed: int, device: torch.device
+    ):
+        self.generator = torch.Generator(device).manual_seed(seed)
+        self.batch = batch
+        self.patches = torch.from_numpy(patches.patches).to(device)
+        self.labels = torch.from_numpy(patches.labels).to(device)
+        self.spreads = torch.from_numpy(camera_spreads(patches)).float().to(device)
+        self.shares = torch.from_numpy(shares).to(device)
+
+    def draw(self, count: int) -> tuple[Tensor, Tensor]:
+        """Looks, uint8 (count, h, w, 3), and their class indices (count,)."""
+        chosen = torch.multinomial(self.shares, count, replacement=True, generator=self.generator)
+        return seen_anew(self.generator, self.patches[chosen], self.spreads[chosen]), self.labels[chosen]
 
 
 def _train(
     student: Taught,
-    patches: PatchSet,
-    teacher: TeacherFeatures | None,
-    shares: NDArray[np.float64],
+    drawer: Drawer,
+    teacher: Teacher | None,
     steps: int,
-    seed: int,
+    rate: float,
     report: Report,
     *,
     hint: float,
     classes: float,
 ) -> Taught:
-    """One learning-rate cycle; the running average of the weights comes back."""
-    rng = np.random.default_rng(seed)
-    torch.manual_seed(seed)
-    student.net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-    modules = student.train()
-    average = torch.optim.swa_utils.AveragedModel(modules, avg_fn=_running_average, use_buffers=True)
-    rate = LEARNING_RATE if hint == 1.0 or teacher is None else LEARNING_RATE / 2
-    optimiser = torch.optim.AdamW(student.parameters(), lr=rate, weight_decay=WEIGHT_DECAY)
+    """One learning-rate cycle; the running average of the weights comes back, on the processor."""
+    device = drawer.patches.device
+    torch.manual_seed(drawer.generator.initial_seed())
+    modules = student.parts().to(device).train()
+    if device.type == "cpu":
+        student.net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    if teacher is not None:
+        teacher.standardise(drawer.draw(STANDARDISED)[0])
+    average = torch.optim.swa_utils.AveragedModel(modules, multi_avg_fn=_running_average, use_buffers=True)
+    optimiser = torch.optim.AdamW(
+        modules.parameters(), lr=rate, weight_decay=WEIGHT_DECAY, fused=device.type == "cuda"
+    )
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, total_steps=steps, pct_start=0.15)
-    spreads = camera_spreads(patches)
-    batches = _drawn_ahead(lambda: _draw(rng, patches, teacher, shares, spreads), steps)
-    for step, batch in enumerate(batches):
-        if classes and step == round(FIRST_LAYERS_UNTIL * steps):
-            student.net.first_layers.requires_grad_(requires_grad=False).eval()
-        loss = _loss(student, batch, hint if teacher is not None else 0.0, classes)
+    for step in range(steps):
+        loss = _loss(student, *drawer.draw(drawer.batch), teacher, hint, classes)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
-        torch.nn.utils.clip_grad_norm_(student.parameters(), 5.0)
+        torch.nn.utils.clip_grad_norm_(modules.parameters(), 5.0)
         optimiser.step()
         schedule.step()
         average.update_parameters(modules)
-        report(step + 1, float(loss.detach()))
-    net, maps, pooled = average.module.eval()
+        report(step + 1, float(loss.detach()) if step % 10 == 0 else np.nan)
+    net, maps, pooled = average.module.to("cpu").eval()
     return Taught(net, maps, pooled)
 
 
-def _drawn_ahead(draw: Callable[[], Batch], count: int) -> Iterator[Batch]:
-    """Batches in order, drawn by a thread of their own."""
-    with ThreadPoolExecutor(1) as drawer:
-        waiting = deque(drawer.submit(draw) for _ in range(min(AHEAD, count)))
-        for number in range(count):
-            batch = waiting.popleft().result()
-            if number + AHEAD < count:
-                waiting.append(drawer.submit(draw))
-            yield batch
-
-
-def _draw(
-    rng: np.random.Generator,
-    patches: PatchSet,
-    teacher: TeacherFeatures | None,
-    shares: NDArray[np.float64],
-    spreads: NDArray[np.float64],
-) -> Batch:
-    chosen = rng.choice(len(patches), size=BATCH, p=shares)
-    mirrored = rng.random(BATCH) < 0.5
-    views = [
-        augmented(rng, patches.patches[index], mirror, spreads[index])
-        for index, mirror in zip(chosen, mirrored, strict=True)
-    ]
-    if teacher is None:
-        taught = pooled = maps = torch.empty(0)
+@torch.no_grad()
+def _running_average(averages: list[Tensor], current: list[Tensor], steps: Tensor | int) -> None:
+    """Exponential running average in place, which forgets the first steps faster: short trainings have no others."""
+    decay = min(AVERAGING, (1.0 + int(steps)) / (10.0 + int(steps)))
+    if torch.is_floating_point(averages[0]):
+        torch._foreach_lerp_(averages, current, 1.0 - decay)
     else:
-        seen = chosen < len(teacher)
-        taught = torch.from_numpy(np.flatnonzero(seen))
-        pooled = torch.from_numpy(teacher.pooled[chosen[seen]].astype(np.float32))
-        maps = torch.from_numpy(teacher.maps[chosen[seen]].astype(np.float32))
-        maps = torch.where(torch.from_numpy(mirrored[seen])[:, None, None, None], maps.flip(3), maps)
-    labels = torch.from_numpy(patches.labels[chosen])
-    return Batch(torch.from_numpy(np.stack(views)), labels, taught, pooled, maps)
+        torch._foreach_copy_(averages, current)
 
 
-def _loss(student: Taught, batch: Batch, hint: float, classes: float) -> Tensor:
-    with torch.autocast("cpu", dtype=torch.bfloat16, enabled=HALF_PRECISION):
-        middle, last = student.net.maps(batch.patches)
+def half_precision(device: torch.device) -> torch.autocast:
+    """Maps in bfloat16 where that is faster; weights and losses keep 32 bits."""
+    faster = device.type == "cuda" or torch.backends.cpu.get_cpu_capability() == "AVX512"
+    return torch.autocast(device.type, dtype=torch.bfloat16, enabled=faster)
+
+
+def _loss(
+    student: Taught, looks: Tensor, labels: Tensor, teacher: Teacher | None, hint: float, classes: float
+) -> Tensor:
+    with half_precision(looks.device):
+        middle, last = student.net.maps(looks)
     middle, last = middle.float(), last.float()
     embedding = student.net.pool(middle, last)
-    loss = torch.zeros(())
+    loss = torch.zeros((), device=looks.device)
     if classes:
         logits = student.net.classifier(student.net.dropout(embedding))
-        loss = loss + classes * functional.cross_entropy(logits, batch.labels)
-    if hint and len(batch.taught):
-        middle, embedding = middle[batch.taught], embedding[batch.taught]
-        seen = functional.adaptive_avg_pool2d(student.maps(middle), MAP_CELLS)
-        loss = loss + hint * MAP_WEIGHT * functional.mse_loss(seen, batch.maps)
-        loss = loss + hint * POOLED_WEIGHT * functional.mse_loss(student.pooled(embedding), batch.pooled)
+        loss = loss + classes * functional.cross_entropy(logits, labels)
+    if teacher is not None:
+        with torch.no_grad(), half_precision(looks.device):
+            pooled, maps = teacher(looks[:HINTED])
+        seen = functional.adaptive_avg_pool2d(student.maps(middle[:HINTED]), MAP_CELLS)
+        loss = loss + hint * MAP_WEIGHT * functional.mse_loss(seen, maps)
+        loss = loss + hint * POOLED_WEIGHT * functional.mse_loss(student.pooled(embedding[:HINTED]), pooled)
     return loss
 
 
@@ -257,12 +245,6 @@ def learn_softening(net: SurfaceNet, patches: Image, labels: NDArray[np.int64]) 
 
     found = minimize(entropy, (0.0, 0.0), method="Nelder-Mead")
     return torch.tensor(max(float(found.x[0]), 0.0))
-
-
-def _running_average(average: Tensor, current: Tensor, steps: Tensor | int) -> Tensor:
-    """Exponential running average that forgets the first steps faster."""
-    decay = min(AVERAGING, (1.0 + int(steps)) / (10.0 + int(steps)))
-    return decay * average + (1.0 - decay) * current
 
 
 @torch.no_grad()
