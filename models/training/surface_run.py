@@ -35,8 +35,8 @@ from .train_surface import (
     verdicts_of,
 )
 
-TRUNK_STEPS, CLASS_STEPS = 3000, 3000
-TRUNK_SOURCES = ("condition_web", "dry_udacity", "rendered")
+FIRST_STEPS, CLASS_STEPS = 3000, 3000
+FIRST_SOURCES = ("condition_web", "dry_udacity", "rendered")
 """Sources of the first stage: none on which a leave-one-out score is taken, so that one trunk serves all of those."""
 
 CUTTING_SEED = 1
@@ -171,10 +171,10 @@ def first_stage(
     if given.teacher is None:
         return new_student(given.seed)
     teacher = Teacher.read(given.teacher)
-    count = max(2, round(given.effort * TRUNK_STEPS))
+    count = max(2, round(given.effort * FIRST_STEPS))
 
     def train() -> Stage:
-        chosen = [picture for picture in of_split(pictures, "train") if picture.source in TRUNK_SOURCES]
+        chosen = [picture for picture in of_split(pictures, "train") if picture.source in FIRST_SOURCES]
         patches = joined([*_cuts(given, chosen), worlds])
         with steps("learning the teacher's features", count) as report:
             learn = partial(learn_features, new_student(given.seed), teacher=teacher, report=report)

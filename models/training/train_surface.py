@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -31,7 +31,7 @@ MAP_WEIGHT, POOLED_WEIGHT = 1.0, 1.0
 """Weights of the teacher's maps and pooled features in the first stage."""
 HINT_SHARE = 0.5
 """Share of both beside the cross-entropy in the second stage."""
-STANDARDISED = 64
+STANDARDISED = 2048
 """Patches over which the teacher's features are standardised."""
 READING_RATE = 2e-3
 DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3, 0.5, 0.5
@@ -50,11 +50,6 @@ class Taught(NamedTuple):
     def parts(self) -> nn.ModuleList:
         """All three as one module."""
         return nn.ModuleList(self)
-
-    def to(self, device: torch.device) -> Self:
-        """The same, moved to a device."""
-        self.parts().to(device)
-        return self
 
 
 def new_student(seed: int) -> Taught:
