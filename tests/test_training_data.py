@@ -142,7 +142,7 @@ def test_left_out_sources_are_absent_from_patches_and_outliers(made_up, monkeypa
     material = surface_run.gather(given, pictures, {"train": rendered_part, "val": rendered_part})
     assert set(material.patches.sources) == {"condition_web", "drivable_camvid/train", "rendered"}
     assert {split: len(part) for split, part in material.outliers.items()} == {"train": 80, "val": 80}
-    for cut in surface_run._cuts(given, surface_run.used(given, pictures)):
+    for cut in surface_run._cuts(given, data.trained_on(pictures, given.without)):
         assert set(cut.sources) == {"condition_web", "drivable_camvid/train"}
 
 

@@ -203,6 +203,11 @@ def of_split(pictures: Iterable[Picture], split: str, *, masked: bool | None = N
     ]
 
 
+def trained_on(pictures: Iterable[Picture], without: Sequence[str]) -> list[Picture]:
+    """The training pictures but for the families that are left out."""
+    return [picture for picture in of_split(pictures, "train") if picture.family not in without]
+
+
 def judged_groups(pictures: Sequence[Picture]) -> dict[str, list[Picture]]:
     """Validation and test pictures by the set that they are judged in; test pictures of other cameras apart."""
     validation, test = of_split(pictures, "val"), of_split(pictures, "test")

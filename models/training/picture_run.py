@@ -10,7 +10,7 @@ import numpy as np
 
 from . import cards
 from .annotate import annotate, sha256_of
-from .data import Picture
+from .data import Picture, trained_on
 from .export import export_picture
 from .nets import SurfaceNet
 from .patches import PatchSet, joined
@@ -18,7 +18,7 @@ from .picture_card import picture_card
 from .picture_looks import rendered_looks, training_looks
 from .picture_scores import Scores, calibrated
 from .rendered import FIRST_SCENE_WORLD, SEED_RANGES, load_patches, save_patches
-from .surface_run import Stage, Steps, first_stage, kept, second_stage, used
+from .surface_run import Stage, Steps, first_stage, kept, second_stage
 
 PICTURE_STEPS = 375
 WORLDS = 480
@@ -64,7 +64,7 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
     first = SEED_RANGES["train"].start + FIRST_SCENE_WORLD
     return joined(
         [
-            training_looks(used(given, pictures), CUTTING_SEED),
+            training_looks(trained_on(pictures, given.without), CUTTING_SEED),
             _rendered(given, range(first, first + count), steps),
         ]
     )

@@ -21,7 +21,7 @@ from trpac_core.vision.scene import SceneHead, scene_numbers, scene_of
 from . import calibrate, cards, scores
 from .annotate import annotate, sha256_of
 from .cards import SCENE_BEGIN, SCENE_END
-from .data import Picture, judged_groups
+from .data import Picture, judged_groups, trained_on
 from .patches import draw_weights, judged_patches, thinned, training_patches
 from .rendered import (
     FIRST_SCENE_WORLD,
@@ -32,7 +32,6 @@ from .rendered import (
     view_patches,
 )
 from .scene_set import SceneSet, all_of, load_scenes, save_scenes, scenes_of_pictures, scenes_of_views
-from .surface_run import used
 
 WORLDS, PATCHES_PER_WORLD_VIEW = 480, 6
 LOOKS = 2
@@ -92,7 +91,7 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
             )
         return scenes_of_views(views)
 
-    real = used(given, pictures)
+    real = trained_on(pictures, given.without)
     cut = training_patches(real, CUTTING_SEED)
     return all_of([scenes_of_pictures(cut, real), _kept(given, f"scenes-{count}", draw)])
 

@@ -17,7 +17,7 @@ from rich.progress import Progress
 
 from . import calibrate, cards, scores
 from .annotate import sha256_of
-from .data import Image, Picture, judged_groups, of_split
+from .data import Image, Picture, judged_groups, of_split, trained_on
 from .export import export_surface
 from .nets import SurfaceNet
 from .outliers import outlier_patches
@@ -104,7 +104,7 @@ def train_and_ship(
 
 def gather(given: argparse.Namespace, pictures: Sequence[Picture], rendered: dict[str, PatchSet]) -> Material:
     """Patches for the heads, and outliers; sources that the command line leaves out are absent."""
-    seen = used(given, pictures)
+    seen = trained_on(pictures, given.without)
     patches = joined([training_patches(seen, CUTTING_SEED), rendered["train"]])
     rng = np.random.default_rng(CUTTING_SEED)
     count = {split: max(80, round(min(given.effort, 1.0) * most)) for split, most in OUTLIERS.items()}
@@ -113,11 +113,6 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], rendered: dic
         "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, count["val"]),
     }
     return Material(patches, outliers)
-
-
-def used(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[Picture]:
-    """The training pictures but for the sources that the command line leaves out."""
-    return [picture for picture in of_split(pictures, "train") if picture.family not in given.without]
 
 
 @dataclass(frozen=True)
@@ -205,7 +200,7 @@ def _classes(
 
     def train() -> Stage:
         trunk = first_stage(given, pictures, worlds, steps)
-        patches = joined([*_cuts(given, used(given, pictures)), worlds, further()])
+        patches = joined([*_cuts(given, trained_on(pictures, given.without)), worlds, further()])
         return second_stage(given, trunk, patches, steps, count=count, what="surface classifier")
 
     return kept(given, "classes", given.without, train)
