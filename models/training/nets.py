@@ -206,11 +206,6 @@ class SurfaceNet(nn.Module):
         self.disturbed = nn.Linear(self.EMBEDDING, 1)
         self.softening = nn.Parameter(torch.tensor(0.0), requires_grad=False)
 
-    @property
-    def first_layers(self) -> nn.ModuleList:
-        """The layers that see edges and grain, at the finest maps."""
-        return nn.ModuleList([self.stem, self.stages[0]])
-
     def maps(self, patches: Tensor) -> tuple[Tensor, Tensor]:
         """Middle (n, 240, 8, 12) and last (n, 384, 4, 6) maps of uint8 patches (n, 64, 96, 3)."""
         middle = self.stages[1](self.stages[0](self.stem(normalise(patches))))
