@@ -8,7 +8,7 @@ from tiny_onnx import write_classifier
 from models.training import scene_run
 from models.training.cards import SCENE_BEGIN, SCENE_END
 from models.training.patches import PatchSet
-from models.training.scene_set import SceneSet, all_of, apart, scenes_of_views
+from models.training.scene_set import SceneSet, all_of, apart, load_scenes, save_scenes, scenes_of_views
 from trpac_core.vision.networks import SurfaceClassifier
 from trpac_core.vision.scene import NUMBERS
 
@@ -106,3 +106,13 @@ def test_a_card_gets_its_section_hash_and_temperature_anew():
     assert "old words" not in told
     assert told.count(SCENE_BEGIN) == told.count(SCENE_END) == told.count("## Limits") == 1
     assert scene_run.with_section(told, "new words", "f" * 64, 1.25) == told
+
+
+def test_kept_scenes_come_back_as_they_were(tmp_path):
+    made = scene_set([10, 90, 200], [40, 50, 60], labels=[0, 1, 2])
+    save_scenes(tmp_path / "kept" / "scenes.npz", made)
+    again = load_scenes(tmp_path / "kept" / "scenes.npz")
+    np.testing.assert_array_equal(again.scenes, made.scenes)
+    for name, values in vars(made.patches).items():
+        np.testing.assert_array_equal(getattr(again.patches, name), values)
+    assert [file.name for file in (tmp_path / "kept").iterdir()] == ["scenes.npz"], "no part is left behind"

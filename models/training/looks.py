@@ -56,7 +56,7 @@ def _moved(generator: torch.Generator, planes: Tensor) -> Tensor:
 
 
 def _coarsened(generator: torch.Generator, planes: Tensor) -> Tensor:
-    """Some of the patches reduced and enlarged again; the batch is drawn, so which come first tells nothing."""
+    """The first of the patches reduced and enlarged again; those are what a teacher sees where it sees few."""
     size = planes.shape[2:]
     parts = list(planes.tensor_split([round(COARSE_SHARE * len(planes))]))
     low, high = COARSE_SCALES

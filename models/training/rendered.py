@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -255,18 +255,28 @@ def rendered_patches(found: Sequence[Cut]) -> PatchSet:
     return patch_set(groups)
 
 
-def save_patches(file: Path, patches: PatchSet) -> None:
-    """Keep patches in a .npz file."""
+def keep_arrays(file: Path, **arrays: Any) -> None:
+    """Write a .npz file, whole or not at all."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_suffix(".part.npz")
-    np.savez(part, **vars(patches))
+    np.savez(part, **arrays)
     part.replace(file)
+
+
+def patches_in(kept: Mapping[str, Any]) -> PatchSet:
+    """The patches of an open .npz file."""
+    return PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))
+
+
+def save_patches(file: Path, patches: PatchSet) -> None:
+    """Keep patches in a .npz file."""
+    keep_arrays(file, **vars(patches))
 
 
 def load_patches(file: Path) -> PatchSet:
     """Patches kept by `save_patches`."""
     with np.load(file) as kept:
-        return PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))
+        return patches_in(kept)
 
 
 def save_worlds(file: Path, samples: list[Sample], patches: PatchSet) -> None:
@@ -275,10 +285,7 @@ def save_worlds(file: Path, samples: list[Sample], patches: PatchSet) -> None:
         name: np.stack([getattr(sample, name) for sample in samples])
         for name in ("image", "drivable", "shadow")
     }
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(".part.npz")
-    np.savez(part, **planes, **vars(patches))  # type: ignore[arg-type]
-    part.replace(file)
+    keep_arrays(file, **planes, **vars(patches))
 
 
 def load_worlds(file: Path) -> tuple[list[Sample], PatchSet]:
@@ -286,4 +293,4 @@ def load_worlds(file: Path) -> tuple[list[Sample], PatchSet]:
     with np.load(file) as kept:
         planes = zip(kept["image"], kept["drivable"], kept["shadow"], strict=True)
         samples = [Sample(image, drivable, shadow, "rendered") for image, drivable, shadow in planes]
-        return samples, PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))
+        return samples, patches_in(kept)

@@ -17,7 +17,7 @@ from .augment import camera_look
 from .calibrate import noised
 from .data import Image, Picture
 from .patches import PatchSet, camera_spreads, joined
-from .rendered import Cut, rendered_patches
+from .rendered import Cut, keep_arrays, patches_in, rendered_patches
 
 AT_ONCE = 256
 """Patches that the network judges in one run."""
@@ -97,14 +97,10 @@ def all_of(sets: Sequence[SceneSet]) -> SceneSet:
 
 def save_scenes(file: Path, scenes: SceneSet) -> None:
     """Keep a set in a .npz file."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(".part.npz")
-    np.savez(part, scenes=scenes.scenes, **vars(scenes.patches))
-    part.replace(file)
+    keep_arrays(file, scenes=scenes.scenes, **vars(scenes.patches))
 
 
 def load_scenes(file: Path) -> SceneSet:
     """A set kept by `save_scenes`."""
     with np.load(file) as kept:
-        patches = PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))
-        return SceneSet(patches, kept["scenes"])
+        return SceneSet(patches_in(kept), kept["scenes"])
