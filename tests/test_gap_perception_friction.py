@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.signal
 from camera_drives import (
     BARE,
     BLIND,
@@ -96,6 +97,33 @@ def test_a_few_stretches_off_on_the_fit_logs_are_nothing_where_the_hold_out_has_
         for i, r in enumerate(roads)
     ]
     assert diagnose_perception(logs[:2], logs[2], roads, BARE).causes == ()
+
+
+@pytest.mark.parametrize("off", [0.1, 0.11])
+def test_one_class_that_is_off_by_little_more_than_references_are_is_asked_about(off):
+    """No unknown cause is needed where the class's value accounts for it, if only just."""
+    finding = diagnose(Camera(offset=(off, 0.0, 0.0)), duration_s=60.0)
+    assert (finding.verdict, finding.causes) == (Verdict.AMBIGUOUS, ("class_friction_offset",))
+    estimate = candidate(finding, "class_friction_offset").parameters["dry"]
+    assert estimate.low <= USUAL[0] + off <= estimate.high
+
+
+def slow(log):
+    """The log of a friction sensor that filters, 0.35 s, and tells four times a second."""
+    share = 1.0 - np.exp(-0.01 / 0.35)
+    values = log.signals["mu_reference"]
+    filtered = scipy.signal.lfilter([share], [1.0, share - 1.0], values, zi=[(1.0 - share) * values[0]])[0]
+    return changed(log, mu_reference=filtered[np.arange(len(filtered)) // 25 * 25])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_reference_that_settles_slowly_is_no_gap_on_short_stretches(seed):
+    """On 14 m at 8 to 14 m/s a part of them ends before it has settled; those tell nothing."""
+    patches = {"spacing_m": 14.0, "speeds": (8.0, 14.0), "damage": slow}
+    assert diagnose(Camera(), seed, **patches).verdict is Verdict.NO_GAP
+    finding = diagnose(Camera(offset=(0.0, -0.2, 0.0)), seed, **patches)
+    assert (finding.verdict, finding.causes) == (Verdict.IDENTIFIED, ("class_friction_offset",))
+    assert candidate(finding, "class_friction_offset").parameters["wet"].value == pytest.approx(0.4, abs=0.03)
 
 
 def test_a_class_that_was_not_driven_on_is_left_open():

@@ -162,9 +162,8 @@ class Chain:
             return best
         return max((best, *(a for a in self.accounts if a.effects == self.asked)), key=lambda a: a.score)
 
-    def rivals(self) -> tuple[Account, ...]:
-        """Other accounts that the best one does not beat decisively: of as many effects, and "as simulated"."""
-        best = self.best()
+    def rivals(self, best: Account) -> tuple[Account, ...]:
+        """Other accounts that this one does not beat decisively: of as many effects, and "as simulated"."""
         return tuple(
             a
             for a in (self.nothing, *self.accounts)

@@ -153,7 +153,7 @@ def confidence_chain(
     every = (*chain.accounts, *outside)
     if len(unseen) >= FEWEST_BLOCKS and _is_quiet(chain.nothing, every):
         chain = replace(chain, quiet=True)
-    if any(rival is chain.nothing for rival in chain.rivals()):
+    if any(rival is chain.nothing for rival in chain.rivals(chain.best())):
         chain = replace(chain, next_step=RECORD)
     stands = next(f for f in (plain, *fits) if f.effects == chain.best().effects)
     if stands.effects == ("motion_blur",) and np.subtract(*_slow_and_fast(stands, known)[1]) > -SLIGHT:

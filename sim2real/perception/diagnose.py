@@ -257,8 +257,8 @@ def _conclude(
 
     `conflict` is what classes say against road.yaml, which bad pictures may cause; `further` is what they may not.
     """
-    best = [chain.best() for chain in chains]
-    rivals = [chain.rivals() for chain in chains]
+    best = [_standing(chain) for chain in chains]
+    rivals = [chain.rivals(account) for chain, account in zip(chains, best, strict=True)]
     nothing = [chain.nothing for chain in chains]
     odd = [one for pair in zip(chains, best, strict=True) if (one := _unexplained(*pair)) is not None]
     causes = tuple(dict.fromkeys(effect for account in best for effect in account.effects))
@@ -300,6 +300,15 @@ def _verdict(causes: tuple[str, ...], ambiguous: bool, unexplained: bool) -> Ver
     if len(causes) > 1:
         return Verdict.COMPOUND
     return Verdict.IDENTIFIED if causes else Verdict.NO_GAP
+
+
+def _standing(chain: Chain) -> Account:
+    """The chain's best account; where as simulated leaves too much, one that is worth its price and does not."""
+    best = chain.best()
+    if best.effects or chain.unexplained or _unexplained(chain, best) is None:
+        return best
+    able = [a for a in chain.accounts if a.score > 0.0 and _unexplained(chain, a) is None]
+    return max(able, key=lambda account: account.score, default=best)
 
 
 def _unexplained(chain: Chain, account: Account) -> Oddity | None:

@@ -22,7 +22,7 @@ from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
 from sim2real.perception.chain import DECISIVE, Account, Chain, Oddity, price
 from sim2real.perception.frames import Modelled
-from sim2real.perception.late_reference import odd_lateness
+from sim2real.perception.late_reference import answer_of, odd_lateness
 from sim2real.perception.stretches import (
     OF_ROAD_FILE,
     SIMULATED,
@@ -192,11 +192,13 @@ def friction_chain(
     Beside class_friction_offset it holds an account of friction_offset, which the dynamics judge too. `camera` says
     whether the logs have a camera's results.
     """
-    known = find_stretches(*fitted, vehicle, found)
-    unseen = find_stretches([held_out[0]], [held_out[1]], vehicle, found)
-    measured = [log for log in (*fitted[0], held_out[0]) if "mu_reference" in log.signals]
+    every = (*fitted[0], held_out[0])
+    measured = [log for log in every if "mu_reference" in log.signals]
     if not measured:
         return None
+    answer = answer_of(every, (*fitted[1], held_out[1]), vehicle)
+    known = find_stretches(*fitted, vehicle, answer, found)
+    unseen = find_stretches([held_out[0]], [held_out[1]], vehicle, answer, found)
     rows = sum(int(np.isfinite(log.signals["mu_reference"]).sum()) for log in measured)
     if not len(known):
         why = "mu_reference covers no stretch of one surface on the fit logs."
@@ -221,7 +223,7 @@ def friction_chain(
         next_step=NEXT_STEP,
         quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
     )
-    late = odd_lateness((*fitted[0], held_out[0]), (*fitted[1], held_out[1]), vehicle)
+    late = odd_lateness(answer)
     if late:
         return replace(chain, unexplained=late)
     # Values per class, and a factor on all, are free curves too: where only they do, no effect of the library does.

@@ -26,6 +26,8 @@ FILTERS_S = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
 """Dead times and time constants that are tried [s]."""
 LATE_S = 0.45
 """Dead time from which on a reference is late: held values and moving means look like up to 0.3 s [s]."""
+SETTLED_LAGS = 3.0
+"""Time constants after which a filtered reference has settled, to a twentieth of the change [-]."""
 EXPLAINS = 0.5
 """Share of what filters alone leave that a dead time may leave."""
 MOST_OFF = 0.3
@@ -42,19 +44,46 @@ class Course:
     on: Array
 
 
-def odd_lateness(logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile) -> Oddity | None:
-    """The gap that a late reference is; None where it is in time, or has nothing to be late for."""
+@dataclass(frozen=True)
+class Answer:
+    """How a reference answers a change of road: after a dead time, then through a first-order filter.
+
+    Attributes
+    ----------
+    dead_s, lag_s : float
+        Dead time and time constant [s].
+    is_late : bool
+        Whether the dead time is one that no filter, mean or held value looks like.
+    """
+
+    dead_s: float = 0.0
+    lag_s: float = 0.0
+    is_late: bool = False
+
+    @property
+    def settles_s(self) -> float:
+        """Time after a border until it tells of the road after it [s]."""
+        return self.dead_s + SETTLED_LAGS * self.lag_s
+
+
+def answer_of(logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile) -> Answer:
+    """The answer that all logs' references show; an immediate one where there is nothing to answer to."""
     courses = list(_courses(logs, roads, vehicle))
     if sum(len(c.reference) for c in courses) < FEWEST or not any(_changes(c) for c in courses):
-        return None
+        return Answer()
     left = {(dead, lag): _left(courses, dead, lag) for dead, lag in product(DEAD_TIMES_S, FILTERS_S)}
     dead, lag = min(left, key=lambda key: left[key])
     at_once = min(left[0.0, one] for one in FILTERS_S)
-    if dead < max(LATE_S, lag) or left[dead, lag] > EXPLAINS * at_once:
+    return Answer(float(dead), lag, dead >= max(LATE_S, lag) and left[dead, lag] <= EXPLAINS * at_once)
+
+
+def odd_lateness(answer: Answer) -> Oddity | None:
+    """The gap that a late reference is; None where it is in time."""
+    if not answer.is_late:
         return None
     told = (
-        f"mu_reference follows the road {dead:.1f} s late: its levels change only then, which no filter does. When is "
-        "it worked out, and what time is it stamped with?"
+        f"mu_reference follows the road {answer.dead_s:.1f} s late: its levels change only then, which no filter does. "
+        "When is it worked out, and what time is it stamped with?"
     )
     return Oddity("mu_reference", told, "time", "late", "a dead time")
 

@@ -16,6 +16,7 @@ from scenarios.effects import Effect
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant.pipeline import make_setup
 from sim2real.logs import Log
+from sim2real.perception.late_reference import Answer
 from trpac_core.tyre import peak_friction
 
 Array = NDArray[np.float64]
@@ -111,14 +112,21 @@ class Stretches:
 
 
 def find_stretches(
-    logs: Sequence[Log], roads: Sequence[RoadFile], vehicle: VehicleFile, found: Sequence[Effect] = ()
+    logs: Sequence[Log],
+    roads: Sequence[RoadFile],
+    vehicle: VehicleFile,
+    answer: Answer,
+    found: Sequence[Effect] = (),
 ) -> Stretches:
-    """Stretches of some drives that have a friction reference; `found` are effects that the dynamics show."""
+    """Stretches of some drives that have a friction reference, where it has settled.
+
+    `answer` is how the reference answers a change of road; `found` are effects that the dynamics show.
+    """
     rows = [
         row
         for log, road in zip(logs, roads, strict=True)
         if "mu_reference" in log.signals
-        for row in _of_one(log, road, vehicle, found)
+        for row in _of_one(log, road, vehicle, answer, found)
     ]
     columns = list(zip(*rows, strict=True)) if rows else [()] * 7
     numbers = [np.array(c, dtype=np.float64) for c in columns[1:]]
@@ -133,7 +141,9 @@ def find_stretches(
     )
 
 
-def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile, found: Sequence[Effect]) -> list[tuple]:
+def _of_one(
+    log: Log, road: RoadFile, vehicle: VehicleFile, answer: Answer, found: Sequence[Effect]
+) -> list[tuple]:
     core = vehicle.to_core()
     simulated = _simulated(road, vehicle, found)
     front_m = log.signals["position_m"] + core.cog_to_front_axle_m
@@ -141,11 +151,12 @@ def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile, found: Sequence[Effe
     rows = []
     for segment, begin, end, friction in zip(road.segments, starts[:-1], starts[1:], simulated, strict=True):
         inside = (front_m > begin + BORDER_M) & (front_m < end - BORDER_M)
+        inside &= log.time_s >= _settled_from(log.time_s, front_m, begin, answer)
         inside &= np.isfinite(log.signals["mu_reference"])
         if np.count_nonzero(inside) < FEWEST_ROWS:
             continue
         values = log.signals["mu_reference"][inside]
-        # A reference is filtered, or late: at first it still tells of the stretch before.
+        # It may settle more slowly than all logs together say: what still moves in a stretch counts as its error.
         settled, newest = values[len(values) // 2 :], values[3 * len(values) // 4 :]
         wander = float(settled.std() / np.sqrt(min(len(settled), 10)))
         moving = abs(float(np.median(newest) - np.median(settled)))
@@ -161,6 +172,14 @@ def _of_one(log: Log, road: RoadFile, vehicle: VehicleFile, found: Sequence[Effe
             )
         )
     return rows
+
+
+def _settled_from(time_s: Array, front_m: Array, begin_m: float, answer: Answer) -> float:
+    """When the reference tells of a segment; of the one that a log begins in it does so at once [s]."""
+    ahead = np.flatnonzero(front_m > begin_m)
+    if not len(ahead) or np.isnan(front_m[: ahead[0]]).all():
+        return float(-np.inf)
+    return float(time_s[ahead[0]] + answer.settles_s)
 
 
 def _simulated(road: RoadFile, vehicle: VehicleFile, found: Sequence[Effect]) -> Array:
