@@ -56,19 +56,20 @@ def _moved(generator: torch.Generator, planes: Tensor) -> Tensor:
 
 
 def _coarsened(generator: torch.Generator, planes: Tensor) -> Tensor:
-    """The first of the patches reduced and enlarged again; those are what a teacher sees where it sees few."""
+    """Some of the patches, anywhere among them, reduced and enlarged again: a teacher may see but the first few."""
     size = planes.shape[2:]
-    parts = list(planes.tensor_split([round(COARSE_SHARE * len(planes))]))
+    order = torch.randperm(len(planes), generator=generator, device=generator.device)
     low, high = COARSE_SCALES
     scales = low + (high - low) * 0.5 * (1.0 + _uniform(generator, COARSE_CAMERAS))
-    coarse = []
-    for some, scale in zip(parts[0].tensor_split(COARSE_CAMERAS), scales.tolist(), strict=True):
+    seen = planes.clone()
+    cameras = order[: round(COARSE_SHARE * len(planes))].tensor_split(COARSE_CAMERAS)
+    for some, scale in zip(cameras, scales.tolist(), strict=True):
         if len(some):
             small = functional.interpolate(
-                some, [round(scale * side) for side in size], mode="bilinear", antialias=True
+                planes[some], [round(scale * side) for side in size], mode="bilinear", antialias=True
             )
-            coarse.append(functional.interpolate(small, list(size), mode="bilinear"))
-    return torch.cat([*coarse, parts[1]])
+            seen[some] = functional.interpolate(small, list(size), mode="bilinear")
+    return seen
 
 
 def _by_cameras(generator: torch.Generator, planes: Tensor, spreads: Tensor) -> Tensor:
