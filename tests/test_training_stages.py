@@ -52,6 +52,15 @@ def test_looks_are_mirrored_half_of_the_time_and_move_within_their_limits(monkey
     assert (border - 48).abs().max() >= looks.SHIFT_PX[0] - 2, "shifts are not drawn from their whole range"
 
 
+def test_coarse_looks_lie_anywhere_in_a_batch(monkeypatch):
+    """A teacher that sees the first 96 of 256 must see looks of both kinds, in their shares."""
+    monkeypatch.setattr(looks, "COARSE_SCALES", (0.3, 0.6))
+    noise = 255.0 * torch.rand(256, 3, 64, 96, generator=generator(3))
+    coarse = (looks._coarsened(generator(4), noise) != noise).flatten(1).any(dim=1)
+    assert coarse.float().mean() == pytest.approx(looks.COARSE_SHARE, abs=1 / 256)
+    assert coarse[:96].float().mean() == pytest.approx(looks.COARSE_SHARE, abs=0.15)
+
+
 def layer(**changes):
     fields = {
         "inputs": (0,),
