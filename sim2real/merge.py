@@ -17,7 +17,7 @@ from scenarios.files import RoadFile, VehicleFile
 from sim2real.next_manoeuvre import BRAKING, STEADY_SPEEDS, torque_of
 from sim2real.observing.lattice import Lattice
 from sim2real.perception.chain import DECISIVE
-from sim2real.perception.diagnose import CameraCandidate, PerceptionFinding
+from sim2real.perception.finding import CameraCandidate, PerceptionFinding
 from sim2real.perception.friction import OFFSET
 from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.result import (
