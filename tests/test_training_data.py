@@ -16,6 +16,7 @@ from models.training import (
     augment,
     calibrate,
     data,
+    keeping,
     outliers,
     patches,
     picture_looks,
@@ -269,6 +270,35 @@ def test_rendered_seeds_of_the_splits_are_disjoint():
     assert set(rendered.SEED_RANGES) == {"train", "val", "test"}
 
 
+def test_what_a_folder_keeps_is_made_once(tmp_path):
+    made = []
+
+    def make():
+        made.append(len(made))
+        return rendered.rendered_patches([[(np.full((64, 96, 3), len(made), np.uint8), 2)]])
+
+    def ask(folder):
+        found = keeping.kept_or_made(
+            folder, "some.npz", load=rendered.load_patches, make=make, save=rendered.save_patches
+        )
+        return int(found.patches[0, 0, 0, 0])
+
+    assert [ask(tmp_path / "new"), ask(tmp_path / "new"), ask(None), ask(None)] == [1, 1, 2, 3]
+    assert [file.name for file in (tmp_path / "new").iterdir()] == ["some.npz"]
+
+
+def test_a_file_that_cannot_be_written_leaves_the_one_before(tmp_path):
+    def fails(part):
+        part.write_bytes(b"half")
+        raise OSError("No space left on device")
+
+    file = tmp_path / "kept.npz"
+    file.write_bytes(b"whole")
+    with pytest.raises(OSError, match="No space"):
+        keeping.keep_whole(file, fails)
+    assert file.read_bytes() == b"whole"
+
+
 def test_kept_worlds_come_back_as_they_were(tmp_path):
     rng = np.random.default_rng(2)
     planes = rng.integers(0, 2, (2, 2, 24, 40)).astype(np.uint8)
@@ -279,7 +309,7 @@ def test_kept_worlds_come_back_as_they_were(tmp_path):
     cut = rendered.rendered_patches(
         [[(np.full((64, 96, 3), 9, np.uint8), 2)], [(np.zeros((64, 96, 3), np.uint8), 0)]]
     )
-    rendered.save_worlds(tmp_path / "kept" / "test-2.npz", samples, cut)
+    rendered.save_worlds(tmp_path / "kept" / "test-2.npz", (samples, cut))
     kept, kept_cut = rendered.load_worlds(tmp_path / "kept" / "test-2.npz")
     for sample, again in zip(samples, kept, strict=True):
         assert all(

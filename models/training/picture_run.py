@@ -12,6 +12,7 @@ from . import cards
 from .annotate import annotate, sha256_of
 from .data import Picture, trained_on
 from .export import export_picture
+from .keeping import kept_or_made
 from .nets import SurfaceNet
 from .patches import PatchSet, joined
 from .picture_card import picture_card
@@ -71,15 +72,13 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
 
 
 def _rendered(given: argparse.Namespace, seeds: Sequence[int], steps: Steps) -> PatchSet:
-    file = given.kept / f"looks-{len(seeds)}.npz" if given.kept else None
-    if file and file.is_file():
-        return load_patches(file)
-    with steps("rendering worlds for whole pictures", len(seeds)) as report:
-        done = iter(range(1, len(seeds) + 1))
-        looks = rendered_looks(seeds, given.threads, lambda: report(next(done), np.nan))
-    if file:
-        save_patches(file, looks)
-    return looks
+    def draw() -> PatchSet:
+        with steps("rendering worlds for whole pictures", len(seeds)) as report:
+            done = iter(range(1, len(seeds) + 1))
+            return rendered_looks(seeds, given.threads, lambda: report(next(done), np.nan))
+
+    name = f"looks-{len(seeds)}.npz"
+    return kept_or_made(given.kept, name, load=load_patches, make=draw, save=save_patches)
 
 
 def _parameters(net: SurfaceNet) -> int:

@@ -21,6 +21,7 @@ from trpac_core.vision.regions import roi_box, roi_width_px
 from trpac_core.vision.scene import scene_of
 
 from .data import IGNORE, Image
+from .keeping import keep_arrays
 from .patches import ASPECTS, PatchSet, patch_set, reduced
 from .segmenter_data import SIZE, Sample
 
@@ -255,14 +256,6 @@ def rendered_patches(found: Sequence[Cut]) -> PatchSet:
     return patch_set(groups)
 
 
-def keep_arrays(file: Path, **arrays: Any) -> None:
-    """Write a .npz file, whole or not at all."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(".part.npz")
-    np.savez(part, **arrays)
-    part.replace(file)
-
-
 def patches_in(kept: Mapping[str, Any]) -> PatchSet:
     """The patches of an open .npz file."""
     return PatchSet(*(kept[name] for name in ("patches", "labels", "sources", "pictures")))
@@ -279,8 +272,9 @@ def load_patches(file: Path) -> PatchSet:
         return patches_in(kept)
 
 
-def save_worlds(file: Path, samples: list[Sample], patches: PatchSet) -> None:
-    """Keep drawn worlds in a .npz file, so that a second training need not draw them again."""
+def save_worlds(file: Path, worlds: tuple[list[Sample], PatchSet]) -> None:
+    """Keep drawn worlds in a .npz file."""
+    samples, patches = worlds
     planes = {
         name: np.stack([getattr(sample, name) for sample in samples])
         for name in ("image", "drivable", "shadow")

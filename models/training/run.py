@@ -26,6 +26,7 @@ from . import cards
 from .annotate import sha256_of
 from .data import Picture, check_trainable, of_split, read_manifest
 from .export import export_segmenter
+from .keeping import kept_or_made
 from .patches import PatchSet
 from .picture_run import ship_picture
 from .rendered import (
@@ -137,39 +138,36 @@ def _keep_memory() -> None:
             mallopt(parameter, value)
 
 
-def _render(progress: Progress, worlds: dict[str, int], given: argparse.Namespace) -> dict[str, Rendered]:
-    task = progress.add_task("rendering worlds", total=sum(worlds.values()), note="")
-    rendered = {}
-    for split, count in worlds.items():
-        file = given.kept / f"{split}-{count}.npz" if given.kept else None
-        if file and file.is_file():
-            rendered[split] = Rendered(*load_worlds(file))
-            progress.advance(task, count)
-            continue
-        rendered[split] = Rendered(
-            *draw_worlds(split, count, PATCHES_PER_VIEW[split], given.threads, lambda: progress.advance(task))
+def _render(progress: Progress, counts: dict[str, int], given: argparse.Namespace) -> dict[str, Rendered]:
+    task = progress.add_task("rendering worlds", total=sum(counts.values()), note="")
+    rendered, done = {}, 0
+    for split, count in counts.items():
+        report = partial(progress.advance, task)
+        draw = partial(draw_worlds, split, count, PATCHES_PER_VIEW[split], given.threads, report)
+        worlds = kept_or_made(
+            given.kept, f"{split}-{count}.npz", load=load_worlds, make=draw, save=save_worlds
         )
-        if file:
-            save_worlds(file, rendered[split].samples, rendered[split].patches)
+        rendered[split] = Rendered(*worlds)
+        done += count
+        progress.update(task, completed=done)
     return rendered
 
 
 def _render_further(progress: Progress, first: int, count: int, given: argparse.Namespace) -> PatchSet:
     """Patches of `count` training worlds from the `first` on."""
-    file = given.kept / f"further-{first}-{count}.npz" if given.kept else None
-    if file and file.is_file():
-        return load_patches(file)
-    task = progress.add_task("rendering further worlds", total=count, note="")
-    seen = draw_further_worlds(
-        SEED_RANGES["train"][first : first + count],
-        FURTHER_PATCHES_PER_VIEW,
-        given.threads,
-        lambda: progress.advance(task),
-    )
-    patches = rendered_patches([cut for _, cut in seen])
-    if file:
-        save_patches(file, patches)
-    return patches
+
+    def draw() -> PatchSet:
+        task = progress.add_task("rendering further worlds", total=count, note="")
+        seen = draw_further_worlds(
+            SEED_RANGES["train"][first : first + count],
+            FURTHER_PATCHES_PER_VIEW,
+            given.threads,
+            lambda: progress.advance(task),
+        )
+        return rendered_patches([cut for _, cut in seen])
+
+    name = f"further-{first}-{count}.npz"
+    return kept_or_made(given.kept, name, load=load_patches, make=draw, save=save_patches)
 
 
 def _segmenter(

@@ -22,6 +22,7 @@ from . import calibrate, cards, scores
 from .annotate import annotate, sha256_of
 from .cards import SCENE_BEGIN, SCENE_END
 from .data import Picture, judged_groups, trained_on
+from .keeping import kept_or_made
 from .patches import draw_weights, judged_patches, thinned, training_patches
 from .rendered import (
     FIRST_SCENE_WORLD,
@@ -93,18 +94,8 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
 
     real = trained_on(pictures, given.without)
     cut = training_patches(real, CUTTING_SEED)
-    return all_of([scenes_of_pictures(cut, real), _kept(given, f"scenes-{count}", draw)])
-
-
-def _kept(given: argparse.Namespace, name: str, draw: Callable[[], SceneSet]) -> SceneSet:
-    """Rendered patches in their scenes, from their file in the command line's folder, or drawn (and kept there)."""
-    file = given.kept / f"{name}.npz" if given.kept else None
-    if file and file.is_file():
-        return load_scenes(file)
-    found = draw()
-    if file:
-        save_scenes(file, found)
-    return found
+    drawn = kept_or_made(given.kept, f"scenes-{count}.npz", load=load_scenes, make=draw, save=save_scenes)
+    return all_of([scenes_of_pictures(cut, real), drawn])
 
 
 def learn_head(classifier: SurfaceClassifier, train: SceneSet, seed: int) -> SceneHead:
@@ -153,7 +144,10 @@ def judged_sets(
     }
     for split in ("val", "test"):
         draw = partial(_rendered_set, split, worlds[split], steps)
-        judged[f"rendered {split}"] = _kept(given, f"scenes-{split}-{worlds[split]}", draw)
+        name = f"scenes-{split}-{worlds[split]}.npz"
+        judged[f"rendered {split}"] = kept_or_made(
+            given.kept, name, load=load_scenes, make=draw, save=save_scenes
+        )
     return judged
 
 

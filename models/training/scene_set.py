@@ -16,8 +16,9 @@ from trpac_core.vision.scene import SCENE_HEIGHT_PX, SCENE_WIDTH_PX, scene_of
 from .augment import camera_look
 from .calibrate import noised
 from .data import Image, Picture
+from .keeping import keep_arrays
 from .patches import PatchSet, camera_spreads, joined
-from .rendered import Cut, keep_arrays, patches_in, rendered_patches
+from .rendered import Cut, patches_in, rendered_patches
 
 AT_ONCE = 256
 """Patches that the network judges in one run."""

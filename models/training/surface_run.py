@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -19,6 +20,7 @@ from . import calibrate, cards, scores
 from .annotate import sha256_of
 from .data import Image, Picture, judged_groups, of_split, trained_on
 from .export import export_surface
+from .keeping import keep_whole, kept_or_made
 from .nets import SurfaceNet
 from .outliers import outlier_patches
 from .patches import PatchSet, joined, judged_patches, thinned, training_patches
@@ -141,22 +143,22 @@ def trained(given: argparse.Namespace, patches: PatchSet, steps: int, train: Cal
 
 def kept(given: argparse.Namespace, name: str, without: Sequence[str], train: Callable[[], Stage]) -> Stage:
     """A stage from its file in the folder of the command line, or trained (and kept there)."""
-    left_out = "".join(f"-without-{source}" for source in sorted(without))
-    file = given.kept / f"{name}-{given.seed}{left_out}.pt" if given.kept else None
-    if file and file.is_file():
+
+    def load(file: Path) -> Stage:
         found = torch.load(file, weights_only=True)
         taught = new_student(given.seed)
         taught.parts().load_state_dict(found.pop("weights"))
         taught.parts().eval()
         return Stage(taught, **found)
-    stage = train()
-    if file:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part")
+
+    def save(file: Path, stage: Stage) -> None:
         told = {name: value for name, value in vars(stage).items() if name != "taught"}
-        torch.save({"weights": stage.taught.parts().state_dict(), **told}, part)
-        part.replace(file)
-    return stage
+        content = {"weights": stage.taught.parts().state_dict(), **told}
+        keep_whole(file, lambda part: torch.save(content, part))
+
+    left_out = "".join(f"-without-{source}" for source in sorted(without))
+    file = f"{name}-{given.seed}{left_out}.pt"
+    return kept_or_made(given.kept, file, load=load, make=train, save=save)
 
 
 def first_stage(
