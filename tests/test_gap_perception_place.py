@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from camera_drives import (
     BARE,
+    BLIND,
     FRONT_M,
     SLOW_AND_FAST,
     SPEEDS,
@@ -21,6 +22,7 @@ from camera_drives import (
 from long import beyond
 
 from sim2real.perception.diagnose import diagnose_perception
+from sim2real.perception.frames import of_one_camera, read_results
 from sim2real.result import Verdict
 from trpac_core.vision.camera import Camera as Lens
 
@@ -126,6 +128,32 @@ def test_results_that_arrive_late_with_the_right_stamp_leave_the_angle_alone(arr
     assert estimate.low <= pitch <= estimate.high
     assert estimate.value == pytest.approx(pitch, abs=0.006)
     assert diagnose(Camera(preview_m=ahead_m), 3, damage=late).verdict is Verdict.NO_GAP
+
+
+def nearly_one_speed_each(ahead_m, arrives_s):
+    """Roads and logs of a camera whose results arrive late and whose stamps, 0.5 m long, scatter by 1 m."""
+    camera = Camera(preview_m=ahead_m + FRONT_M - 0.4, fps=10.0, stamp_m=0.5)
+    roads, logs = [], []
+    for number, speeds in enumerate([(14.0, 18.0), (18.0, 22.0), (22.0, 26.0)]):
+        roads.append(road(seed=number))
+        log = drive(roads[-1], camera, speeds, seed=number)
+        then = np.round(np.interp(log.time_s - arrives_s, log.time_s, np.arange(len(log.time_s)))).astype(int)
+        off = np.random.default_rng(number).standard_normal(1000)
+        result = np.nan_to_num(log.signals["frame_id"][then]).astype(int)
+        late = {name: log.signals[name][then] for name in BLIND}
+        late |= {name: late[name] + off[result] for name in ("image_from_m", "image_to_m")}
+        logs.append(changed(log, **late))
+    return roads, logs
+
+
+def test_logs_driven_at_nearly_one_speed_each_tell_together_how_far_the_camera_looks():
+    """A log's own distance is off by up to a metre, and an angle's shift with it, which then looks like a delay."""
+    roads, logs = nearly_one_speed_each(ahead_m=9.0, arrives_s=0.1)
+    read = [read_results(log, r, BARE, Lens())[0] for log, r in zip(logs, roads, strict=True)]
+    assert np.ptp([one.ahead_m for one in read]) > 0.8
+    alike, odd = of_one_camera(read)
+    assert [one.ahead_m for one in alike] == pytest.approx([9.25] * 3, abs=0.35)
+    assert odd == ()
 
 
 def test_a_delay_and_an_angle_together_are_a_compound():

@@ -60,7 +60,8 @@ class Account:
     size : int
         Number of parameters.
     price : float
-        Half the logarithm of the independent observations behind each parameter, summed, after Schwarz [nats].
+        Half the logarithm of the independent observations behind each parameter, summed, after Schwarz, and what values
+        cost that are hardly ever met [nats].
     gain_fit, gain_holdout : float
         Over the simulation as it is, on the logs fitted to and on the hold-out at the same parameters [nats].
     parameters : dict

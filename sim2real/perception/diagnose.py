@@ -19,7 +19,7 @@ from sim2real.perception.chain import Account, Chain, Oddity
 from sim2real.perception.confidence_chain import NOTICED, confidence_chain, modelled_loss
 from sim2real.perception.conflicts import class_conflicts, odd_conflicts, odd_confusion
 from sim2real.perception.finding import CameraCandidate, PerceptionFinding
-from sim2real.perception.frames import Modelled, read_results
+from sim2real.perception.frames import Modelled, of_one_camera, read_results
 from sim2real.perception.friction import SIGNAL as REFERENCE
 from sim2real.perception.friction import friction_chain
 from sim2real.perception.mounting import Mounting
@@ -90,16 +90,17 @@ def diagnose_perception(
         for log, road in zip((*logs_fit, log_holdout), roads, strict=True)
     ]
     warnings = [text for _, texts in read for text in texts]
-    fitted = [(one, log) for (one, _), log in zip(read[:-1], logs_fit, strict=True) if one is not None]
-    held_out, modelled = read[-1][0], Modelled.of(vehicle)
-    results = [one for one, _ in fitted]
-    light, more = read_light(results, [log.image_folder for _, log in fitted])
+    every, odd_distance = of_one_camera([one for one, _ in read if one is not None])
+    held_out = every[-1] if read[-1][0] is not None else None
+    results = every if held_out is None else every[:-1]
+    folders = [log.image_folder for (one, _), log in zip(read[:-1], logs_fit, strict=True) if one is not None]
+    modelled = Modelled.of(vehicle)
+    light, more = read_light(results, folders)
     light_unseen, yet_more = read_light(
         [] if held_out is None else [held_out], [log_holdout.image_folder][: held_out is not None]
     )
-    every = [*results, *([held_out] if held_out is not None else [])]
     conflicts = class_conflicts(every)
-    warnings += [*more, *yet_more, *(conflict.sentence for conflict in conflicts)]
+    warnings += [*odd_distance, *more, *yet_more, *(conflict.sentence for conflict in conflicts)]
     judged = (
         shift_chain(results, held_out, modelled, Mounting(camera.height_m, further_m), exclude),
         confidence_chain(results, held_out, (light, light_unseen), modelled, exclude),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -74,8 +75,10 @@ class Results:
         When the result arrived, and the speed then [s], [m/s].
     from_m, to_m : array, shape (n,)
         Its stamp [m].
+    beyond_m : array, shape (n,)
+        Distance of its stamp's middle from the lens by the camera file when it arrived [m].
     ahead_m : float
-        Distance of the stamps' middle from the lens by the camera file when the picture was taken, the median [m].
+        The same when the picture was taken, the median [m].
     classes : array, shape (n,)
         Class index.
     confidence : array, shape (n,)
@@ -92,6 +95,7 @@ class Results:
     speed_m_s: Array
     from_m: Array
     to_m: Array
+    beyond_m: Array
     ahead_m: float
     classes: NDArray[np.intp]
     confidence: Array
@@ -147,14 +151,7 @@ def read_results(
     speed_m_s = np.interp(time_s, clock, speed)
     lens_m = vehicle.to_core().cog_to_front_axle_m + camera.x_from_front_axle_m
     middle_m = 0.5 * (table["from"].to_numpy() + table["to"].to_numpy())
-    beyond_m = middle_m - np.interp(time_s, drive_time_s, position_m)
-    ahead_m = _ahead_when_taken(beyond_m, speed_m_s) - lens_m
-    if ahead_m < LEAST_AHEAD_M:
-        warnings.append(
-            f"{log.name}: stamps lie {ahead_m:.1f} m ahead of the lens; the pitch is reckoned for "
-            f"{USUAL_AHEAD_M:g} m instead."
-        )
-        ahead_m = USUAL_AHEAD_M
+    beyond_m = middle_m - np.interp(time_s, drive_time_s, position_m) - lens_m
     results = Results(
         log=log.name,
         road=road,
@@ -162,7 +159,8 @@ def read_results(
         speed_m_s=speed_m_s,
         from_m=table["from"].to_numpy(),
         to_m=table["to"].to_numpy(),
-        ahead_m=ahead_m,
+        beyond_m=beyond_m,
+        ahead_m=_ahead_when_taken(_thinned(beyond_m), _thinned(speed_m_s)),
         classes=table["class"].to_numpy().astype(np.intp),
         confidence=table["confidence"].to_numpy(),
         picture=table["picture"].to_numpy().astype(np.str_),
@@ -172,18 +170,42 @@ def read_results(
     return results, tuple(warnings)
 
 
+def of_one_camera(results: Sequence[Results]) -> tuple[list[Results], tuple[str, ...]]:
+    """The results of several logs at the distance that all of them tell together, and what is odd about it.
+
+    A log alone, driven at nearly one speed, cannot say how long results take to arrive, nor how far the camera looks.
+    """
+    if not results:
+        return [], ()
+    ahead_m = _ahead_when_taken(
+        np.concatenate([_thinned(one.beyond_m) for one in results]),
+        np.concatenate([_thinned(one.speed_m_s) for one in results]),
+    )
+    if ahead_m >= LEAST_AHEAD_M:
+        return [replace(one, ahead_m=ahead_m) for one in results], ()
+    told = (
+        f"The camera's stamps lie {ahead_m:.1f} m ahead of the lens; the pitch is reckoned for {USUAL_AHEAD_M:g} m "
+        "instead."
+    )
+    return [replace(one, ahead_m=USUAL_AHEAD_M) for one in results], (told,)
+
+
+def _thinned(values: Array) -> Array:
+    """As many of them as tell enough, evenly."""
+    return values[np.linspace(0, len(values) - 1, min(len(values), MOST_STAMPS)).astype(np.intp)]
+
+
 def _ahead_when_taken(beyond_m: Array, speed_m_s: Array) -> float:
-    """How far beyond the car stamps lie when their pictures are taken [m].
+    """How far beyond the lens stamps lie when their pictures are taken [m].
 
     A result arrives some time after its picture, and the car has come nearer to the stamp by then, the more the faster
     it is: how the distance falls with speed is that time.
     """
     from scipy.stats import theilslopes  # here, since its import is slow
 
-    few = np.linspace(0, len(beyond_m) - 1, min(len(beyond_m), MOST_STAMPS)).astype(np.intp)
     worked_s = 0.0
-    if speed_m_s[few].std() >= LEAST_SPEED_SPREAD_M_S:
-        slope = float(theilslopes(beyond_m[few], speed_m_s[few]).slope)
+    if speed_m_s.std() >= LEAST_SPEED_SPREAD_M_S:
+        slope = float(theilslopes(beyond_m, speed_m_s).slope)
         worked_s = min(max(-slope, 0.0), LONGEST_WORK_S)
     return float(np.median(beyond_m + worked_s * speed_m_s))
 

@@ -36,6 +36,8 @@ from sim2real.result import Interval, Place
 Array = NDArray[np.float64]
 
 DELAYS_S, PITCHES_RAD = (0.0, 1.0), (-0.4, 0.4)
+USUAL_PITCH_RAD = 0.15
+"""Standard deviation of what mountings are off: an angle of twice that explains little that a delay does not [rad]."""
 GRID, GRID_OF_TWO, ZOOMS = 41, 25, 3
 """Points per axis of the search over one parameter, and over two; how often it is drawn closer about what matters."""
 SIGNAL = "image_place"
@@ -280,10 +282,11 @@ def _account(
         f.log_likelihood_of(seen, height_m) - nothing.log_likelihood_of(seen, height_m)
         for seen in (known, every)
     )
+    off = f.pitch_rad.value - nothing.pitch_rad.value
     return Account(
         f.effects,
         f.size,
-        price(*[len(every)] * f.size),
+        price(*[len(every)] * f.size) + 0.5 * (off / USUAL_PITCH_RAD) ** 2,
         known_gain,
         gain - known_gain,
         parameters,
