@@ -78,7 +78,7 @@ class Results:
     beyond_m : array, shape (n,)
         Distance of its stamp's middle from the lens by the camera file when it arrived [m].
     ahead_m : float
-        The same when the picture was taken, the median [m].
+        The same when the picture was taken, the median; as `of_one_camera` finds it, before that when it arrived [m].
     classes : array, shape (n,)
         Class index.
     confidence : array, shape (n,)
@@ -160,7 +160,7 @@ def read_results(
         from_m=table["from"].to_numpy(),
         to_m=table["to"].to_numpy(),
         beyond_m=beyond_m,
-        ahead_m=_ahead_when_taken(_thinned(beyond_m), _thinned(speed_m_s)),
+        ahead_m=float(np.median(beyond_m)),
         classes=table["class"].to_numpy().astype(np.intp),
         confidence=table["confidence"].to_numpy(),
         picture=table["picture"].to_numpy().astype(np.str_),
