@@ -60,6 +60,26 @@ def test_a_camera_that_hands_out_old_pictures_now_and_then_is_a_gap(seed):
     assert any("old" in text for text in finding.unexplained)
 
 
+def test_a_camera_that_errs_for_metres_everywhere_does_not_hang():
+    """Five of 51 borders are late by it and one early, which it does between borders as well."""
+
+    def streaky(log, share=0.11, mean_m=6.0):
+        rng = np.random.default_rng(int(log.signals["vehicle_speed_m_s"].sum()) + 40_001)
+        number, begin = log.signals["frame_id"], log.signals["image_from_m"]
+        first = np.flatnonzero(np.diff(number, prepend=number[0] - 1.0) > 0.0)
+        place, classes = begin[first], log.signals["image_class"][first]
+        at = np.nanmin(place)
+        while at < np.nanmax(place):
+            at += rng.exponential(mean_m / share)
+            inside = (place > at) & (place < at + rng.exponential(mean_m)) & (classes >= 0.0)
+            classes[inside] = (classes[inside] + rng.integers(1, 3)) % 3.0
+        row = np.searchsorted(first, np.arange(len(log)), side="right") - 1
+        return changed(log, image_class=classes[row])
+
+    finding = diagnose(Camera(fps=20.0, wrong=0.0), 2, damage=streaky)
+    assert finding.verdict is Verdict.NO_GAP, finding.unexplained
+
+
 def test_a_late_camera_that_is_fast_for_a_while_does_not_hang():
     """Its few fast borders lie far beyond the many slow ones, but not beyond its delay."""
     finding = diagnose(Camera(delay_s=0.6), seed=1, speeds=(6.0, 6.0, 6.0, 6.0, 6.0, 25.0))

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from sim2real.perception.chain import Oddity
-from sim2real.perception.crossings import Crossings
+from sim2real.perception.conflicts import class_error
+from sim2real.perception.crossings import LEAST_ERROR, Crossings
+from sim2real.perception.frames import Results
 
 Array = NDArray[np.float64]
 
 LATE_M = 3.0
 """By how much a change of class lies beyond all that its bracket and stamps leave open, to be far too late [m]."""
-FEWEST, LEAST_SHARE = 4, 0.08
-"""Borders with a late change, and their share of all, from which on they are no chance mistakes."""
-EARLY_SHARE = 0.2
-"""As many that are too early, by the same measure, against those that are late: mistakes err both ways [-]."""
+LEAST_SHARE = 0.08
+"""Share of all borders whose change is late from which on they matter [-]."""
+CHANCE = 0.01
+"""How often mistakes may come out so: both ways alike, and as often as the camera makes them elsewhere [-]."""
 
 
-def odd_hanging(rest_m: Array, crossings: Crossings) -> Oddity | None:
+def odd_hanging(rest_m: Array, crossings: Crossings, results: Sequence[Results]) -> Oddity | None:
     """The gap that a camera is which hands out old pictures now and then; None where it does not.
 
     Parameters
@@ -27,14 +32,27 @@ def odd_hanging(rest_m: Array, crossings: Crossings) -> Oddity | None:
         By how far each change of class lies beyond its border, shifted as fits best [m].
     crossings : Crossings
         k of them.
+    results : sequence of Results
+        All that show them, for how often the camera errs away from borders.
     """
     low, high = crossings.bracket(0.5)
     open_m = 0.5 * (high - low) + 0.25 * (crossings.low_length_m + crossings.high_length_m)
-    late, early = rest_m - open_m > LATE_M, -rest_m - open_m > LATE_M
-    if late.sum() < max(FEWEST, LEAST_SHARE * len(crossings)) or early.sum() > EARLY_SHARE * late.sum():
+    beside_m = np.sign(rest_m) * np.maximum(np.abs(rest_m) - open_m, 0.0)
+    far = int((beside_m > LATE_M).sum())
+    if far < max(1.0, LEAST_SHARE * len(crossings)) or not _mostly_late(beside_m[beside_m != 0.0]):
+        return None
+    mistaken = max(np.nan_to_num(class_error(results, later=True)), LEAST_ERROR)
+    if bdtrc(far - 1, len(crossings), mistaken) > CHANCE:
         return None
     told = (
-        f"At {late.sum()} of {len(crossings)} borders the class changes late, by up to {rest_m.max():.0f} m, and at "
+        f"At {far} of {len(crossings)} borders the class changes late, by up to {rest_m.max():.0f} m, and at "
         "the others on time: does the camera hand out old pictures now and then?"
     )
     return Oddity("image_place", told, "time", "late", "now and then")
+
+
+def _mostly_late(beside_m: Array) -> bool:
+    """Whether errors that are as often early would hardly come out so late, by Wilcoxon's signed ranks."""
+    from scipy.stats import wilcoxon  # here, since its import is slow
+
+    return bool(wilcoxon(beside_m, alternative="greater").pvalue < CHANCE)

@@ -191,7 +191,8 @@ def shift_chain(
     if not fitted and held_out is None:
         return None
     known, unseen = find_crossings(fitted), find_crossings([] if held_out is None else [held_out])
-    pictures = sum(map(len, fitted)) + (0 if held_out is None else len(held_out))
+    seen = [*fitted, *([] if held_out is None else [held_out])]
+    pictures = sum(map(len, seen))
     choices = [c for c in CHOICES if not set(c) & set(exclude)]
     outside = [c for c in CHOICES if set(c) & set(exclude)]
     if not len(known):
@@ -223,7 +224,7 @@ def shift_chain(
         tuple(accounts[1:]),
         places=_places(accounts[0], unseen),
         next_step=NEXT_STEP,
-        errs=odd_hanging(closest.rest_m(every, height_m), every),
+        errs=odd_hanging(closest.rest_m(every, height_m), every, seen),
         quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0 and not sure,
     )
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
@@ -243,7 +244,6 @@ def shift_chain(
     stands = chain.best()
     if stands.effects and stands.left() ** 2 - 1.0 <= MOSTLY * (accounts[0].left() ** 2 - 1.0):
         return chain
-    seen = [*fitted, *([] if held_out is None else [held_out])]
     scatter = odd_scatter(scale * ERROR_M, closest.rest_m(every, height_m), every, streak_m(seen))
     return replace(chain, unexplained=scatter)
 
