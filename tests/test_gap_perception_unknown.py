@@ -60,8 +60,9 @@ def test_a_camera_that_hands_out_old_pictures_now_and_then_is_a_gap(seed):
     assert any("old" in text for text in finding.unexplained)
 
 
-def test_a_camera_that_errs_for_metres_everywhere_does_not_hang():
-    """Five of 51 borders are late by it and one early, which it does between borders as well."""
+@pytest.mark.parametrize(("spacing_m", "seed"), [(20.0, 1), (40.0, 2)])
+def test_a_camera_that_errs_for_metres_everywhere_is_no_gap(spacing_m, seed):
+    """Short stretches are wholly wrong, or five of 51 borders late and one early: chance, of so many."""
 
     def streaky(log, share=0.11, mean_m=6.0):
         rng = np.random.default_rng(int(log.signals["vehicle_speed_m_s"].sum()) + 40_001)
@@ -76,7 +77,7 @@ def test_a_camera_that_errs_for_metres_everywhere_does_not_hang():
         row = np.searchsorted(first, np.arange(len(log)), side="right") - 1
         return changed(log, image_class=classes[row])
 
-    finding = diagnose(Camera(fps=20.0, wrong=0.0), 2, damage=streaky)
+    finding = diagnose(Camera(fps=20.0, wrong=0.0), seed, damage=streaky, spacing_m=spacing_m)
     assert finding.verdict is Verdict.NO_GAP, finding.unexplained
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import pdtrc
 
 from scenarios.files import RoadSegment
 from sim2real.perception.chain import Oddity
@@ -22,7 +23,9 @@ MARGIN_M = 5.0
 """Way after and before a border that is left out: there a shift shows, not a conflict [m]."""
 FEWEST = 5
 MANY, SEVERAL_LOGS = 3, 2
-"""Conflicts, and logs that have them, from which on they are a gap: chance mistakes in streaks make one or two."""
+"""Conflicts, and logs that have them, from which on they are a gap, and no slip of road.yaml's."""
+CHANCE = 0.01
+"""How often streaks of mistakes, as the camera makes them elsewhere, may be as many conflicts [-]."""
 MOSTLY = 0.7
 """Share of a segment's results that name one other class, from which on they are no chance mistakes."""
 CONFUSED, FEWEST_OF_SURFACE = 0.3, 30
@@ -79,10 +82,11 @@ def odd_confusion(results: Sequence[Results]) -> Oddity | None:
     return None
 
 
-def streak_m(results: Sequence[Results]) -> float:
+def streak_m(results: Sequence[Results], conflicts: bool = True) -> float:
     """Way over which a camera that errs goes on doing so, the mean away from borders; 0 where it never errs [m].
 
-    Infinite where it errs so often that borders cannot be told from mistakes.
+    Infinite where it errs so often that borders cannot be told from mistakes. `conflicts`: also on segments that mostly
+    show one other class.
     """
     if class_error(results) > HARDLY_READ:
         return float("inf")
@@ -90,7 +94,8 @@ def streak_m(results: Sequence[Results]) -> float:
     for one, place_m in places_of(results):
         wrong = np.zeros(len(one), dtype=np.bool_)
         for segment, inside in _inside(one, place_m):
-            wrong |= inside & (one.classes != segment.surface_class)
+            if conflicts or _other_class(one, segment, inside) is None:
+                wrong |= inside & (one.classes != segment.surface_class)
         wrong_m += float(np.abs(np.gradient(place_m))[wrong].sum()) if len(one) > 1 else 0.0
         runs += int(wrong[0]) + int((wrong[1:] & ~wrong[:-1]).sum())
     return wrong_m / runs if runs else 0.0
@@ -119,16 +124,32 @@ def class_conflicts(results: Sequence[Results]) -> tuple[Conflict, ...]:
     return tuple(found)
 
 
-def odd_conflicts(conflicts: Sequence[Conflict]) -> Oddity | None:
-    """The gap that conflicts are; None where they may be chance, or road.yaml's own slip."""
+def odd_conflicts(conflicts: Sequence[Conflict], results: Sequence[Results]) -> Oddity | None:
+    """The gap that conflicts of some results are; None where they may be chance, or road.yaml's own slip."""
     logs = {conflict.log for conflict in conflicts}
     if len(conflicts) < MANY or len(logs) < SEVERAL_LOGS:
+        return None
+    if pdtrc(len(conflicts) - 1, _expected(results)) > CHANCE:
         return None
     told = (
         f"The camera keeps seeing another class than road.yaml on {len(conflicts)} stretches in {len(logs)} logs: does "
         f"it repeat old results, or take one surface for another? {conflicts[0].sentence}"
     )
     return Oddity(SIGNAL, told, "place", "another class", "for whole stretches")
+
+
+def _expected(results: Sequence[Results]) -> float:
+    """Conflicts that streaks of mistakes make by chance, one each, their lengths as waiting times are [-].
+
+    Such a streak covers `MOSTLY` of a segment if it is there at its begin, or comes soon after, and lasts for so long.
+    """
+    error, mean_m = class_error(results), streak_m(results, conflicts=False)
+    if not error * mean_m > 0.0:
+        return 0.0
+    seen = (place_m[inside] for one, place_m in places_of(results) for _, inside in _inside(one, place_m))
+    way_m = np.array([np.ptp(places) for places in seen if len(places) >= FEWEST])
+    spans = way_m / mean_m
+    return float((error * (1.0 + (1.0 - MOSTLY) * spans) * np.exp(-MOSTLY * spans)).sum())
 
 
 def _other_class(one: Results, segment: RoadSegment, inside: NDArray[np.bool_]) -> Surface | None:

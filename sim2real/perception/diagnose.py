@@ -120,7 +120,7 @@ def diagnose_perception(
     lost = modelled_loss(every, modelled)
     unmeasured = np.isnan(lost) and (modelled.exposure_s > 0.0 or modelled.stops != 0.0)
     blurred = unmeasured or lost > NOTICED
-    errs = None if blurred else odd_conflicts(conflicts)
+    errs = None if blurred else odd_conflicts(conflicts, every)
     if blurred:
         chains = [replace(chain, errs=None) for chain in chains]
     return _conclude(chains, errs, (odd_confusion(every), odd_repeats(every)), tuple(warnings), seed)
