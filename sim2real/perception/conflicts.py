@@ -25,7 +25,7 @@ FEWEST = 5
 MANY, SEVERAL_LOGS = 3, 2
 """Conflicts, and logs that have them, from which on they are a gap, and no slip of road.yaml's."""
 CHANCE = 0.01
-"""How often streaks of mistakes, as the camera makes them elsewhere, may be as many conflicts [-]."""
+"""How often mistakes, as the camera makes them elsewhere, may by chance look like a gap that is found [-]."""
 MOSTLY = 0.7
 """Share of a segment's results that name one other class, from which on they are no chance mistakes."""
 CONFUSED, FEWEST_OF_SURFACE = 0.3, 30
@@ -49,7 +49,7 @@ def class_error(results: Sequence[Results], later: bool = False) -> float:
     for one, segment, inside in _laid_over(results):
         if _other_class(one, segment, inside) is None:
             told = one.classes[inside]
-            wrong.append(told[later * (len(told) // 2) :] != segment.surface_class)
+            wrong.append(told[len(told) // 2 if later else 0 :] != segment.surface_class)
     every = np.concatenate(wrong)
     return float(every.mean()) if len(every) else float("nan")
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtrc
 
 from sim2real.perception.chain import Oddity
-from sim2real.perception.conflicts import class_error
+from sim2real.perception.conflicts import CHANCE, class_error
 from sim2real.perception.crossings import LEAST_ERROR, Crossings
 from sim2real.perception.frames import Results
 
@@ -19,8 +19,6 @@ LATE_M = 3.0
 """By how much a change of class lies beyond all that its bracket and stamps leave open, to be far too late [m]."""
 LEAST_SHARE = 0.08
 """Share of all borders whose change is late from which on they matter [-]."""
-CHANCE = 0.01
-"""How often mistakes may come out so: both ways alike, and as often as the camera makes them elsewhere [-]."""
 
 
 def odd_hanging(rest_m: Array, crossings: Crossings, results: Sequence[Results]) -> Oddity | None:
