@@ -173,6 +173,8 @@ def find(
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)
     decision = held_to_itself(loud(decision, base, fit_to, held), contest, fit_to, held)
     decision = closing(held_to_curves(decision, contest, base, fit_to, held, jobs), base, held)
+    if decision.left_open:
+        decision = nothing_but_wandering(decision, contest, base, fit_to, held)
     return Findings(base, fit_to, held, contest, decision, lattice, order)
 
 

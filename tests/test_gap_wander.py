@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured, road_of
+from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured, road_of, trace
 from long import beyond
 
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import find
-from sim2real.observing.drive import ACCEL, SPEED
+from sim2real.observing.drive import ACCEL, SPEED, WHEEL
 from sim2real.observing.noise import Noise
 from sim2real.result import Verdict
 from sim2real.telling.findings import describe
@@ -35,6 +35,33 @@ def wandering(drive, channel, share, tau_s, seed):
     return remeasured(drive, measured)
 
 
+def drifting(drive, sigma, share, tau_s, seed):
+    """The drive with all sensors drifting by a share of their noise."""
+    slow = Noise(np.ones(7), np.full(7, np.exp(-STEP_S / tau_s)), np.ones((1, 7)))
+    off = slow.draw(len(drive), np.random.default_rng(500 + seed))
+    return remeasured(drive, drive.measured + share * sigma * off)
+
+
+def humming(drive, share, pitch_hz, seed):
+    """The drive with a hum in each wheel's sensor, of so many times its noise and a phase of its own."""
+    phases = np.random.default_rng(700 + seed).uniform(0.0, 2.0 * np.pi, 4)
+    measured = drive.measured.copy()
+    hums = np.sin(2.0 * np.pi * pitch_hz * drive.time_s[:, None] + phases)
+    measured[:, WHEEL] += share * SIGMA[WHEEL] * hums
+    return remeasured(drive, measured)
+
+
+def gentle(duration_s, rng):
+    """A little torque now and then, shape (n, 4) [N m]."""
+    points, time_s = [(0.0, 0.0)], 0.0
+    while time_s < duration_s:
+        on = time_s + rng.uniform(1.0, 4.0)
+        time_s = on + rng.uniform(1.5, 3.0)
+        torque = rng.uniform(5.0, 18.0)
+        points += [(on, 0.0), (on + 0.1, torque), (time_s, torque), (time_s + 0.1, 0.0)]
+    return trace(*points, duration_s=duration_s)
+
+
 def logs(change):
     drives = [clean(pulses(20.0), v0, ROAD) for v0 in (9.0, 13.0)]
     return [change(noisy(drive, seed), seed) for seed, drive in enumerate(drives)]
@@ -52,6 +79,33 @@ def test_a_sensor_that_wanders_within_its_noise_is_no_gap(channel, name, tau_s):
     assert found.decision.verdict is Verdict.NO_GAP
     assert name in found.decision.wandering
     assert "as sensors do by themselves" in describe(found, seed=0, jobs=1, progress=silent).sentence
+
+
+def test_what_an_effect_takes_off_a_hum_is_not_held_against_a_wandering_speed():
+    """A relaxation length filters the wheels' hum, and takes an eighth off the loss with it: off noise."""
+    drives = [clean(pulses(20.0), v0, ROAD) for v0 in (5.0, 8.0)]
+    fit, holdout = (
+        wandering(humming(noisy(drive, 10 + i), 2.5, 16.0, 10 + i), SPEED, 0.9, 0.5, 10 + i)
+        for i, drive in enumerate(drives)
+    )
+    found = find(MODEL, [fit], holdout, exclude=set(EFFECTS) - {"tyre_relaxation"})
+    null, (relaxation,) = found.contest.null, found.contest.singles
+    assert relaxation.loss < 0.95 * null.loss
+    assert found.decision.verdict is Verdict.NO_GAP
+    assert "vehicle_speed" in found.decision.wandering
+
+
+def test_no_gap_where_an_effect_leaves_open_what_drifting_sensors_do():
+    """Sensors that drift beside precise wheels move all wheels alike, and the wheels' inertia filters some of it."""
+    sigma = np.array([0.0265, 0.03, 0.0185, 0.0185, 0.0185, 0.0185, 0.0255])
+    rng = np.random.default_rng(0)
+    drives = [clean(gentle(30.0, rng), v0) for v0 in (15.0, 12.0)]
+    fit, holdout = (drifting(noisy(drive, i, sigma), sigma, 0.37, 3.0, i) for i, drive in enumerate(drives))
+    found = find(MODEL, [fit], holdout, exclude=set(EFFECTS) - {"wheel_inertia_offset", "mass_offset"})
+    inertia = found.contest.singles[0]
+    assert inertia.loss < 0.9 * found.contest.null.loss, "an effect has to seem worth blaming"
+    assert found.decision.verdict is Verdict.NO_GAP
+    assert found.decision.wandering
 
 
 @pytest.mark.long

@@ -38,20 +38,25 @@ def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     misfit = fitness(null, fit_to, holdout).misfit
     if misfit > LONE_MISFIT or rare_share(null, fit_to, holdout):
         return False
-    real = _not_negligible(contest)
     if misfit > NO_GAP_MISFIT:
-        return nothing_gains(contest)
+        return nothing_gains(contest, fit_to, holdout)
     most = (QUIET_GAIN if misfit <= QUIET_MISFIT else NO_GAP_GAIN) + DRIFT_GAIN * _drifting(fit_to, holdout)
-    gaining = [e for e in real if e.loss < (1.0 - most) * null.loss]
+    return _none_takes(most, contest, fit_to, holdout)
+
+
+def nothing_gains(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
+    """Whether no effect takes anything that counts of what the model as it is leaves."""
+    return _none_takes(LONE_GAIN, contest, fit_to, holdout)
+
+
+def _none_takes(most: float, contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
+    """Whether no effect takes more than this share off the loss, or takes it off a hum of the wheels' sensors alone."""
+    null = contest.null
+    gaining = [e for e in _not_negligible(contest) if e.loss < (1.0 - most) * null.loss]
     if not gaining:
         return True
     floor = (1.0 - most) * _quiet_loss(null, null, fit_to, holdout)
     return all(_quiet_loss(e, null, fit_to, holdout) >= floor for e in gaining)
-
-
-def nothing_gains(contest: Contest) -> bool:
-    """Whether no effect takes anything that counts of what the model as it is leaves."""
-    return all(e.loss >= (1.0 - LONE_GAIN) * contest.null.loss for e in _not_negligible(contest))
 
 
 def _not_negligible(contest: Contest) -> list[Entry]:

@@ -44,8 +44,14 @@ minute a wandering has its bad seconds or has none [-]."""
 def nothing_but_wandering(
     decision: Decision, contest: Contest, model: Simulation, fit_to: Evidence, holdout: Evidence
 ) -> Decision:
-    """The decision, `no_gap` in place of `unknown` where no effect takes anything that counts, and sensors wander."""
-    if decision.verdict is not Verdict.UNKNOWN or not nothing_gains(contest):
+    """The decision, `no_gap` in place of `unknown` where sensors wander.
+
+    No effect may take anything that counts, or the one that takes most leaves the gap open: it moves a little with what
+    the sensors do.
+    """
+    if decision.verdict is not Verdict.UNKNOWN:
+        return decision
+    if not (decision.left_open or nothing_gains(contest, fit_to, holdout)):
         return decision
     said = _said_of_calm(contest, contest.null, model, SENSORS, fit_to, holdout)
     return said if said and said.verdict is Verdict.NO_GAP else decision
