@@ -180,9 +180,15 @@ def _in_numbers(found: PerceptionFinding) -> str:
 def _shares(found: PerceptionFinding) -> dict[str, float]:
     """Probability per effect from the scores of what was tried; "as simulated" scores 0.
 
-    A further effect has to earn what it takes for one to stand beside another.
+    A further effect has to earn what it takes for one to stand beside another. Where effects are named, those of
+    signals that stand by none, as too small to matter, are no likelier than that all is as simulated.
     """
+    named = {*found.causes, *(effect for group in found.ambiguous_with for effect in group)}
+    telling = {c.signal for c in found.candidates if named.issuperset(c.effects)}
     scores = np.array([0.0, *(c.score - DECISIVE * (len(c.effects) - 1) for c in found.candidates)])
+    idle = np.array([False, *(c.signal not in telling for c in found.candidates)])
+    if telling and idle.any():
+        scores[idle] -= max(scores[idle].max(), 0.0)
     weight = np.exp(scores - scores.max())
     weight /= weight.sum()
     belief = UNKNOWN_BELIEF if found.verdict is Verdict.UNKNOWN else CERTAIN

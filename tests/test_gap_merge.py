@@ -322,6 +322,18 @@ def test_a_pair_that_does_not_stand_lends_its_second_effect_little():
     assert min(c.probability for c in both.causes) > 0.45
 
 
+def test_what_its_own_signal_does_not_stand_by_is_less_probable_than_what_is_named():
+    """A blur that is traced, but too small to matter, beside class values that are asked about."""
+    blur = replace(candidate(("motion_blur",), 11.4), signal="image_confidence")
+    bright = replace(candidate(("exposure_shift",), 9.0), signal="image_confidence")
+    values = replace(candidate(("class_friction_offset",), 2.4), signal="mu_reference")
+    asked = (("class_friction_offset",),)
+    found = finding(Verdict.AMBIGUOUS, blur, bright, values, causes=asked[0], ambiguous_with=asked)
+    causes = camera_side(found).causes
+    assert [c.effect for c in causes] == ["class_friction_offset", "motion_blur", "exposure_shift"]
+    assert causes[0].probability > 0.7
+
+
 def test_a_candidate_that_explains_no_more_than_nothing_is_not_probable():
     side = camera_side(finding(Verdict.NO_GAP, candidate(("motion_blur",), -4.0)))
     assert side.causes[0].probability < 0.05

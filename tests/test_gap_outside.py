@@ -25,7 +25,7 @@ from sim2real.which.fitting import FULL_STEPS, Candidate
 from sim2real.which.goodness import Fitness, fitness
 from sim2real.which.law import held_to_curves
 from sim2real.which.quiet import NO_GAP_MISFIT
-from sim2real.which.selection import EXPLAINED_MISFIT, PAIR_MISFIT, Decision
+from sim2real.which.selection import EXPLAINED_MISFIT, PAIR_MISFIT, Decision, decide
 
 DURATION_S = 16.0
 
@@ -197,6 +197,19 @@ def test_what_is_rare_but_far_beyond_noise_is_a_gap(nominal, faults, verdict):
     assert (found.decision.rare > 0.0) is (verdict is Verdict.UNKNOWN)
     sentence = describe(found, seed=0, jobs=1, progress=silent).sentence
     assert ("% of the logs' time" in sentence) is (verdict is Verdict.UNKNOWN)
+
+
+def test_no_effect_is_blamed_that_leaves_what_is_rare(nominal):
+    """All wheels read 0.25 rad/s less for a tenth of a second, in one log to fit alone: the hold-out has no gap."""
+    measured = nominal.measured.copy()
+    for begin in 100 + 100 * np.arange(10):
+        measured[begin : begin + 12, WHEEL] -= 0.25
+    logs = [noisy(remeasured(nominal, measured), 0), *(noisy(nominal, seed) for seed in (1, 2))]
+    found = find(MODEL, logs[:2], logs[2], exclude=only("aero_drag", "rolling_resistance"))
+    assert found.decision.before.misfit < NO_GAP_MISFIT
+    decision = decide(found.contest, found.fit_to, found.holdout)
+    assert decision.rare
+    assert decision.verdict is Verdict.UNKNOWN
 
 
 # --- an effect whose work a free curve does as well

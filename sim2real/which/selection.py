@@ -55,6 +55,8 @@ INSTEAD_SHARE = 0.8
 """One without any effect that does this much of it, too: the effect was never needed [-]."""
 LONE_BELIEF = 0.2
 """Probability that an effect of the library is the cause though a fault outside it explains more [-]."""
+RARE_LEFT = 0.5
+"""Share of the blocks far beyond noise that an effect may leave where nothing else speaks of a gap [-]."""
 FLOOR_MISFIT = 1.5
 """Above this misfit an entry is worth a second effect's try [-]."""
 
@@ -150,12 +152,17 @@ class Decision:
 
 
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
-    """Verdict of a contest; what one wheel alone explains better is no effect of the whole car."""
+    """Verdict of a contest; what one wheel alone explains better is no effect of the whole car.
+
+    Nor is an effect blamed that leaves most of what is rare where nothing else speaks of a gap.
+    """
     said = _decide(contest, fit_to, holdout)
     if said.before.misfit <= NO_GAP_MISFIT:
         said = replace(said, rare=rare_share(contest.null, fit_to, holdout))
     if said.verdict in (Verdict.NO_GAP, Verdict.UNKNOWN):
         return said
+    if said.rare and rare_share(said.winner, fit_to, holdout) > RARE_LEFT * said.rare:
+        return doubted(said, LONE_BELIEF)
     margin = noise_margin(said.winner, fit_to, holdout)
     if contest.lone > said.winner.loss - margin:
         return said
