@@ -39,17 +39,12 @@ def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     if misfit > LONE_MISFIT or rare_share(null, fit_to, holdout):
         return False
     if misfit > NO_GAP_MISFIT:
-        return nothing_gains(contest, fit_to, holdout)
+        return none_takes(LONE_GAIN, contest, fit_to, holdout)
     most = (QUIET_GAIN if misfit <= QUIET_MISFIT else NO_GAP_GAIN) + DRIFT_GAIN * _drifting(fit_to, holdout)
-    return _none_takes(most, contest, fit_to, holdout)
+    return none_takes(most, contest, fit_to, holdout)
 
 
-def nothing_gains(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
-    """Whether no effect takes anything that counts of what the model as it is leaves."""
-    return _none_takes(LONE_GAIN, contest, fit_to, holdout)
-
-
-def _none_takes(most: float, contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
+def none_takes(most: float, contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether no effect takes more than this share off the loss, or takes it off a hum of the wheels' sensors alone."""
     null = contest.null
     gaining = [e for e in _not_negligible(contest) if e.loss < (1.0 - most) * null.loss]

@@ -24,7 +24,7 @@ from sim2real.result import Verdict
 from sim2real.which.closure import floors
 from sim2real.which.contest import Contest, Entry
 from sim2real.which.goodness import block_squares
-from sim2real.which.quiet import LONE_GAIN, nothing_gains
+from sim2real.which.quiet import LONE_GAIN, QUIET_GAIN, none_takes
 from sim2real.which.selection import Decision, decide
 
 Array = NDArray[np.float64]
@@ -46,12 +46,12 @@ def nothing_but_wandering(
 ) -> Decision:
     """The decision, `no_gap` in place of `unknown` where sensors wander.
 
-    No effect may take anything that counts, or the one that takes most leaves the gap open: it moves a little with what
-    the sensors do.
+    No effect may take anything that counts; where the one that does leaves the gap open, it may take what noise leaves
+    room for: it moves a little with what the sensors do.
     """
     if decision.verdict is not Verdict.UNKNOWN:
         return decision
-    if not (decision.left_open or nothing_gains(contest, fit_to, holdout)):
+    if not none_takes(QUIET_GAIN if decision.left_open else LONE_GAIN, contest, fit_to, holdout):
         return decision
     said = _said_of_calm(contest, contest.null, model, SENSORS, fit_to, holdout)
     return said if said and said.verdict is Verdict.NO_GAP else decision
