@@ -15,6 +15,7 @@ from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant import simulate
 from scenarios.plant.sensors import sense
 from sim2real.observing.drive import CHANNELS, Drive, grid_step, make_drive
+from sim2real.observing.lattice import fast_spread
 from sim2real.observing.lattice_trace import find_counter
 
 Array = NDArray[np.float64]
@@ -154,10 +155,11 @@ def _drive(case: Case, car: VehicleFile, rng: np.random.Generator, name: str) ->
     }
     wheels = [table[f"wheel_speed_{w}_rad_s"] for w in ("fl", "fr", "rl", "rr")]
     lattice, trace = find_counter(time, wheels)
+    spread = fast_spread(time, wheels)
     factor = max(round(grid_step(case.rate_hz) * case.rate_hz), 1)
     n = len(time) // factor
     time, table = _means(time, n, factor), {key: _means(values, n, factor) for key, values in table.items()}
-    return make_drive(name, road, time, table, lattice=lattice, trace=trace)
+    return make_drive(name, road, time, table, lattice=lattice, trace=trace, spread_rad_s=spread)
 
 
 def _means(values: Array, n: int, factor: int) -> Array:

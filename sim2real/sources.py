@@ -24,6 +24,7 @@ from sim2real.observing.drive import (
     make_drive,
     untold_torque,
 )
+from sim2real.observing.lattice import fast_spread
 from sim2real.observing.lattice_trace import find_counter
 from trpac_core.vehicle import WHEELS
 
@@ -209,7 +210,7 @@ def drive_of(log: Log, road: RoadFile, grid: tuple[Array, dict[str, Array]]) -> 
     """All of a log `on_grid`, with what its wheel speeds tell of a counter at their own rate."""
     wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
     lattice, trace = find_counter(log.time_s, wheels)
-    return make_drive(log.name, road, *grid, log.derived, lattice, trace)
+    return make_drive(log.name, road, *grid, log.derived, lattice, trace, fast_spread(log.time_s, wheels))
 
 
 def split(text: str, road: Path | None) -> tuple[Path, Path]:

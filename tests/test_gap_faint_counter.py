@@ -189,6 +189,17 @@ def test_no_counter_is_as_fine_as_it_would_have_to_be():
     assert COUNTER not in [e.ids[0] for e in found.contest.singles]
 
 
+def test_steps_are_hidden_by_the_noise_of_the_rows_as_logged():
+    """Four rows are averaged on the grid of the diagnosis; noise and all."""
+    teeth, window_s = 4096.0, 0.01
+    step = TURN / (teeth * window_s)
+    drives = counted_logs(teeth, window_s, 0.4 * step)
+    found = find(MODEL, drives[:-1], drives[-1], exclude=TAKEN_OUT)
+    assert not any(d.lattice or d.trace for d in drives)
+    assert all(0.4 * step < d.spread_rad_s < 2.0 * step for d in drives)
+    assert COUNTER in [e.ids[0] for e in found.contest.singles]
+
+
 def test_what_counts_over_a_window_is_a_mean_of_it():
     """The oracle of these tests against the angle itself: the mean speed of a full window, to one tooth."""
     time_s, speed = driving()

@@ -65,6 +65,9 @@ class Drive:
         What a pulse-counting sensor left in the wheel speeds, as logged.
     trace : Trace or None
         What is left of such a lattice where noise hides it.
+    spread_rad_s : float
+        What in the wheel speeds as logged is faster than the motion, as a standard deviation; NaN where that is not
+        known [rad/s].
     swing : array, shape (n, 7), or None
         What was taken off `measured` since it repeats with the wheels' angle, see `sim2real.observing.orders`.
     """
@@ -78,6 +81,7 @@ class Drive:
     counted: NDArray[np.bool_]
     lattice: Lattice | None = None
     trace: Trace | None = None
+    spread_rad_s: float = np.nan
     swing: Array | None = None
 
     @property
@@ -109,6 +113,7 @@ def make_drive(
     without: frozenset[str] = frozenset(),
     lattice: Lattice | None = None,
     trace: Trace | None = None,
+    spread_rad_s: float = np.nan,
 ) -> Drive:
     """Channels of a log that is on a uniform grid.
 
@@ -124,6 +129,8 @@ def make_drive(
         Columns that are not evidence of their own (computed from others); they still tell where on the road the car is.
     lattice, trace : Lattice, Trace, optional
         Found in the wheel speeds at the log's own rate.
+    spread_rad_s : float
+        Of what is fast in them there [rad/s].
     """
     measured = np.column_stack([columns[name] for name in CHANNELS]).astype(np.float64)
     torque = np.column_stack([columns[f"wheel_torque_{w}_nm"] for w in WHEELS]).astype(np.float64)
@@ -140,7 +147,7 @@ def make_drive(
     moving = np.nan_to_num(speed, nan=np.inf) > LEAST_SPEED_M_S
     moving &= ~(backward(time_s, measured[:, WHEEL]) | untold)
     counted = np.isfinite(measured).any(axis=0) & np.array([name not in without for name in CHANNELS])
-    return Drive(name, road, time_s, torque, measured, moving, counted, lattice, trace)
+    return Drive(name, road, time_s, torque, measured, moving, counted, lattice, trace, spread_rad_s)
 
 
 def backward(time_s: Array, wheels: Array) -> NDArray[np.bool_]:

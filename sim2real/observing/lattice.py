@@ -216,6 +216,12 @@ def read_wheels(time_s: Array, wheels: Sequence[Array]) -> Wheels | None:
     return Wheels(values, motion, step_s, spread) if spread > 0.0 else None
 
 
+def fast_spread(time_s: Array, wheels: Sequence[Array]) -> float:
+    """Standard deviation of what in logged wheel speeds is faster than the motion [rad/s]; NaN of too few."""
+    read = read_wheels(time_s, wheels)
+    return np.nan if read is None else read.spread_rad_s
+
+
 def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:
     """The lattice that all wheel speeds lie on, or None.
 

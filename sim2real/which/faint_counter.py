@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 DELAY = "wheel_speed_delay"
 """What such a counter passes for."""
 HIDDEN = 2.0
-"""Steps of up to this many standard deviations of the wheel speeds leave no trace [-]."""
+"""Steps of up to this many standard deviations of the wheel speeds as logged leave no trace [-]."""
 FINEST_TEETH = 5000.0
 """A counter that would need more pulses per revolution to leave no trace is none [-]."""
 MOST_BELIEF = 0.4
@@ -124,7 +124,9 @@ def beside_a_counter(
 
 def _counter_as_late(delay: Entry, model: Simulation, fit_to: Evidence, holdout: Evidence) -> Entry | None:
     """The counter that does best, fitted from a delay's age; None where it would have to be finer than any is."""
-    sigma = min(float(n.sigma[WHEEL].max()) for n in all_logs(fit_to, holdout)[1])
+    # steps leave their trace in the rows as logged: on the grid of the diagnosis these are averaged, noise and all
+    seen = zip(*all_logs(fit_to, holdout), strict=True)
+    sigma = min(float(np.fmax(drive.spread_rad_s, noise.sigma[WHEEL].max())) for drive, noise in seen)
     age_s = float(delay.fitted.x[0])
     if HIDDEN * sigma * age_s * FINEST_TEETH < 2.0 * np.pi:
         return None
