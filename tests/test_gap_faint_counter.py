@@ -190,7 +190,7 @@ def test_no_counter_is_as_fine_as_it_would_have_to_be():
 
 
 def test_steps_are_hidden_by_the_noise_of_the_rows_as_logged():
-    """Four rows are averaged on the grid of the diagnosis; noise and all."""
+    """Four rows are averaged on the grid of the diagnosis, noise and all."""
     teeth, window_s = 4096.0, 0.01
     step = TURN / (teeth * window_s)
     drives = counted_logs(teeth, window_s, 0.4 * step)

@@ -26,20 +26,22 @@ OTHERS = set(EFFECTS) - {
 }
 
 
+def slow(drive, tau_s, seed):
+    """What forgets within `tau_s`, of unit variance, shape (n, 7)."""
+    noise = Noise(np.ones(7), np.full(7, np.exp(-STEP_S / tau_s)), np.ones((1, 7)))
+    return noise.draw(len(drive), np.random.default_rng(seed))
+
+
 def wandering(drive, channel, share, tau_s, seed):
     """The drive with a sensor that wanders by a share of its noise, in standard deviations."""
-    slow = Noise(np.ones(7), np.full(7, np.exp(-STEP_S / tau_s)), np.ones((1, 7)))
-    off = slow.draw(len(drive), np.random.default_rng(100 + seed))[:, channel]
     measured = drive.measured.copy()
-    measured[:, channel] += share * SIGMA[channel] * off
+    measured[:, channel] += share * SIGMA[channel] * slow(drive, tau_s, 100 + seed)[:, channel]
     return remeasured(drive, measured)
 
 
 def drifting(drive, sigma, share, tau_s, seed):
     """The drive with all sensors drifting by a share of their noise."""
-    slow = Noise(np.ones(7), np.full(7, np.exp(-STEP_S / tau_s)), np.ones((1, 7)))
-    off = slow.draw(len(drive), np.random.default_rng(500 + seed))
-    return remeasured(drive, drive.measured + share * sigma * off)
+    return remeasured(drive, drive.measured + share * sigma * slow(drive, tau_s, 500 + seed))
 
 
 def humming(drive, share, pitch_hz, seed):
