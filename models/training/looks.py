@@ -56,7 +56,7 @@ def _moved(generator: torch.Generator, planes: Tensor) -> Tensor:
 
 
 def _coarsened(generator: torch.Generator, planes: Tensor) -> Tensor:
-    """Some of the patches, anywhere among them, reduced and enlarged again: a teacher may see but the first few."""
+    """Some of the patches, anywhere among them, reduced and enlarged again."""
     size = planes.shape[2:]
     order = torch.randperm(len(planes), generator=generator, device=generator.device)
     low, high = COARSE_SCALES

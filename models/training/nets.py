@@ -1,13 +1,17 @@
-"""The networks: a two-task segmenter and a ShuffleNet surface classifier, of patches or of whole pictures.
+"""The networks: a two-task segmenter, and a surface classifier of patches or of whole pictures.
 
 Both take BGR uint8 pictures with channels last; normalisation is part of the graph.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+
+from .trunk import Trunk
 
 PIXEL_MEAN, PIXEL_DEVIATION = 110.0, 60.0
 """Round figures for road pictures; the same for the three channels, so that grey stays grey."""
@@ -106,40 +110,24 @@ class Segmenter(nn.Module):
         return self.drivable(maps), self.shadow(maps)
 
 
-class HalvingDepthwise(nn.Conv2d):
-    """Depthwise 3x3 convolution of stride 2.
-
-    In training on a processor it is computed at every pixel and thinned: the same values, but there the gradient of the
-    stride takes several times as long as that of the pixels thrown away.
-    """
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Feature maps in, feature maps of half the size out."""
-        if not self.training or x.is_cuda:
-            return super().forward(x)
-        whole = functional.conv2d(x, self.weight, None, 1, 1, 1, self.groups)
-        return whole[:, :, ::2, ::2].contiguous(memory_format=torch.channels_last)
-
-
 class ShuffleUnit(nn.Module):
     """Unit of ShuffleNet: grouped 1x1, shuffle, depthwise 3x3, grouped 1x1 (Zhang et al. 2018, figure 2).
 
     With stride 2 the average-pooled input is concatenated, as there; else the unit is residual.
     """
 
-    def __init__(self, channels_in: int, channels_out: int, groups: int, stride: int, *, first: bool = False):
+    def __init__(self, channels_in: int, channels_out: int, groups: int, stride: int):
         super().__init__()
         self.stride, self.groups = stride, groups
         branch_out = channels_out - channels_in if stride == 2 else channels_out
         middle = channels_out // 4 // groups * groups
         self.squeeze = nn.Sequential(
-            nn.Conv2d(channels_in, middle, 1, groups=1 if first else groups, bias=False),
+            nn.Conv2d(channels_in, middle, 1, groups=groups, bias=False),
             nn.BatchNorm2d(middle),
             nn.ReLU(inplace=True),
         )
-        convolution = HalvingDepthwise if stride == 2 else nn.Conv2d
         self.depthwise = nn.Sequential(
-            convolution(middle, middle, 3, stride, 1, groups=middle, bias=False), nn.BatchNorm2d(middle)
+            nn.Conv2d(middle, middle, 3, stride, 1, groups=middle, bias=False), nn.BatchNorm2d(middle)
         )
         self.expand = nn.Sequential(
             nn.Conv2d(middle, branch_out, 1, groups=groups, bias=False), nn.BatchNorm2d(branch_out)
@@ -148,9 +136,6 @@ class ShuffleUnit(nn.Module):
     def shuffle(self, x: Tensor) -> Tensor:
         """Deal the channels of each group to all groups."""
         channels, height, width = x.shape[1:]
-        if self.training:  # in the order of memory that training uses: channels last
-            dealt = x.permute(0, 2, 3, 1).reshape(-1, height, width, self.groups, channels // self.groups)
-            return dealt.transpose(3, 4).reshape(-1, height, width, channels).permute(0, 3, 1, 2)
         grouped = x.reshape(-1, self.groups, channels // self.groups, height, width)
         return grouped.transpose(1, 2).reshape(-1, channels, height, width)
 
@@ -170,63 +155,58 @@ def pooled(maps: Tensor) -> Tensor:
 
 
 class SurfaceNet(nn.Module):
-    """ShuffleNet with three groups for 64 x 96 patches; middle and last maps feed the classifier.
+    """Pretrained trunk and units of ShuffleNet for 64 x 96 patches; their maps' means and deviations are classified.
 
-    Texture and gloss live in the middle maps, hence their mean and deviation beside the last stage's. Beside the
-    classes it says whether a patch shows readable road at all, and it softens the logits of patches that look
-    disturbed; neither changes the class.
+    Texture and gloss live in the middle maps, hence all four are read. Beside the classes it says whether a patch
+    shows readable road at all, and it softens the logits of patches that look disturbed; neither changes the class.
     """
 
-    GROUPS = 3
-    STAGES = ((96, 3), (240, 6), (384, 2))
-    EMBEDDING = 2 * (240 + 384)
+    GROUPS = 4
+    LAST = 240
+    """Channels of the units of ShuffleNet on top of the trunk."""
+    EMBEDDING = 2 * (sum(Trunk.READ.values()) + LAST)
     READING = 64
     """Width of the head that tells readable road."""
     MOST_DISTURBED = 4.0
     """Limit of the logit that a patch is disturbed, to both sides, beyond which the softening stays as it is."""
 
-    def __init__(self, classes: int = 3, dropout: float = 0.3):
+    def __init__(self, classes: int = 3, dropout: float = 0.3, *, pretrained: bool = False):
         super().__init__()
-        self.stem = ConvUnit(3, 24, stride=2)
-        stages = []
-        channels_in = 24
-        for index, (channels, units) in enumerate(self.STAGES):
-            layers = [ShuffleUnit(channels_in, channels, self.GROUPS, 2, first=index == 0)]
-            layers += [ShuffleUnit(channels, channels, self.GROUPS, 1) for _ in range(units - 1)]
-            stages.append(nn.Sequential(*layers))
-            channels_in = channels
-        self.stages = nn.ModuleList(stages)
+        self.trunk = Trunk(pretrained=pretrained)
+        channels = Trunk.READ[Trunk.BLOCKS - 1]
+        self.units = nn.Sequential(
+            ShuffleUnit(channels, self.LAST, self.GROUPS, 2),
+            ShuffleUnit(self.LAST, self.LAST, self.GROUPS, 1),
+        )
+        self.norm = nn.BatchNorm1d(self.EMBEDDING, affine=False)
         self.dropout = nn.Dropout(dropout)
         self.classifier = nn.Linear(self.EMBEDDING, classes)
-        self.reading_norm = nn.BatchNorm1d(self.EMBEDDING)
         self.reading = nn.Sequential(
             nn.Linear(self.EMBEDDING, self.READING), nn.ReLU(), nn.Linear(self.READING, 1)
         )
-        self.disturbed_norm = nn.BatchNorm1d(self.EMBEDDING)
         self.disturbed = nn.Linear(self.EMBEDDING, 1)
         self.softening = nn.Parameter(torch.tensor(0.0), requires_grad=False)
 
-    def maps(self, patches: Tensor) -> tuple[Tensor, Tensor]:
-        """Middle (n, 240, 8, 12) and last (n, 384, 4, 6) maps of uint8 patches (n, 64, 96, 3)."""
-        middle = self.stages[1](self.stages[0](self.stem(normalise(patches))))
-        return middle, self.stages[2](middle)
+    def maps(self, patches: Tensor) -> list[Tensor]:
+        """Maps of the trunk and of the units on top of it, of uint8 patches (n, 64, 96, 3)."""
+        read = self.trunk(patches)
+        return [*read, self.units(read[-1])]
 
     def embed(self, patches: Tensor) -> Tensor:
-        """Pooled features of uint8 patches (n, 64, 96, 3), shape (n, EMBEDDING)."""
-        return self.pool(*self.maps(patches))
+        """Pooled features of uint8 patches (n, 64, 96, 3), each around zero, shape (n, EMBEDDING)."""
+        return self.pool(self.maps(patches))
 
-    @staticmethod
-    def pool(middle: Tensor, last: Tensor) -> Tensor:
-        """Mean and deviation of both maps, shape (n, EMBEDDING)."""
-        return torch.cat((pooled(middle), pooled(last)), dim=1)
+    def pool(self, maps: Sequence[Tensor]) -> Tensor:
+        """Mean and deviation of each channel, standardised, shape (n, EMBEDDING)."""
+        return self.norm(torch.cat([pooled(each) for each in maps], dim=1))
 
     def readable(self, embedding: Tensor) -> Tensor:
         """Logit that a patch shows readable road, shape (n,)."""
-        return self.reading(self.reading_norm(embedding))[:, 0]
+        return self.reading(embedding)[:, 0]
 
     def disturbance(self, embedding: Tensor) -> Tensor:
         """Logit that a patch is blurred, badly exposed or otherwise disturbed, shape (n,)."""
-        return self.disturbed(self.disturbed_norm(embedding))[:, 0]
+        return self.disturbed(embedding)[:, 0]
 
     def soft_logits(self, embedding: Tensor) -> Tensor:
         """Logits (n, classes), smaller the more disturbed a patch looks: `softening` is the slope."""

@@ -44,7 +44,6 @@ def picture_card(
         for name, scores in found.items()
     ]
     boxes = "; ".join(" ".join(f"{100 * edge:.0f}" for edge in box) for box in LOOKS)
-    teacher = "" if given.teacher is None else f", guided by the features of {given.teacher.name} as there"
     left_out = f"Left out: {', '.join(given.without)}. " if given.without else ""
     real = int((looks.sources != "rendered").sum())
     first = SEED_RANGES["train"].start + FIRST_SCENE_WORLD
@@ -66,7 +65,7 @@ too. The mean of their logits over T is added to the mean log probability of the
 
 ## Training
 
-From the first stage of the surface network{teacher}; {stage.told()}, drawn by the same shares of
+From the pretrained trunk, as the surface network; {stage.told()}, drawn by the same shares of
 classes and sources. {left_out}{real} looks at real pictures and {len(looks) - real} at rendered worlds of one class
 (seeds from {first}), undisturbed, at places and sizes about those that are judged, seen by cameras of other gain, gamma
 and white balance (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones). Of the clips

@@ -19,29 +19,21 @@ from .picture_card import picture_card
 from .picture_looks import rendered_looks, training_looks
 from .picture_scores import Scores, calibrated
 from .rendered import FIRST_SCENE_WORLD, SEED_RANGES, load_patches, save_patches
-from .surface_run import Stage, Steps, first_stage, kept, second_stage
+from .surface_run import Steps, kept_stage
 
 PICTURE_STEPS = 375
 WORLDS = 480
 CUTTING_SEED = 31
 
 
-def ship_picture(
-    given: argparse.Namespace, pictures: Sequence[Picture], worlds: PatchSet, steps: Steps
-) -> dict[str, Scores]:
-    """Train from the first stage of the surface network, calibrate beside the two others in the folder, write card."""
+def ship_picture(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps) -> dict[str, Scores]:
+    """Train, calibrate beside the two others in the folder, write card."""
     start = time.monotonic()
     looks = gather(given, pictures, steps)
     count = max(2, round(given.effort * PICTURE_STEPS))
-
-    def train() -> Stage:
-        trunk = first_stage(given, pictures, worlds, steps)
-        return second_stage(given, trunk, looks, steps, count=count, what="picture network")
-
-    stage = kept(given, "picture", given.without, train)
-    taught = stage.taught
+    stage = kept_stage(given, "picture", steps, count=count, what="picture network", patches=lambda: looks)
     file = given.out / "picture.onnx"
-    export_picture(taught.net, 1.0, file)
+    export_picture(stage.net, 1.0, file)
     train_s = time.monotonic() - start
     found, temperature = calibrated(given.out, pictures)
     annotate(file, {"temperature": f"{temperature:.6f}"})
@@ -53,7 +45,7 @@ def ship_picture(
         sha256=sha256_of(file),
         temperature=temperature,
         train_s=train_s,
-        parameters=_parameters(taught.net),
+        parameters=_parameters(stage.net),
     )
     cards.write_card(file.with_suffix(".md"), text)
     return found

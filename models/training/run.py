@@ -89,7 +89,6 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
             seeds={split: f"from {SEED_RANGES[split][0]}" for split in worlds},
             render_s=time.monotonic() - start,
             threads=given.threads,
-            teacher=given.teacher and given.teacher.name,
             without=tuple(given.without),
         )
         given.out.mkdir(parents=True, exist_ok=True)
@@ -100,7 +99,7 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
             train_and_ship(given, facts, patches, draw, progress, steps)
             _scene(progress, given, pictures, worlds, steps)
         if given.only in (None, "picture"):
-            _picture(progress, given, pictures, patches["train"], steps)
+            _picture(progress, given, pictures, steps)
 
 
 def _scene(
@@ -120,11 +119,10 @@ def _picture(
     progress: Progress,
     given: argparse.Namespace,
     pictures: Sequence[Picture],
-    worlds: PatchSet,
     steps: Steps,
 ) -> None:
     """The picture network, beside the two others that lie in the folder."""
-    found = ship_picture(given, pictures, worlds, steps)
+    found = ship_picture(given, pictures, steps)
     progress.console.print(
         cards.class_table({name: scores.together for name, scores in found.items()}), markup=False
     )

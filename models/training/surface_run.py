@@ -1,14 +1,12 @@
-"""One training of the surface classifier: patches, teacher, both stages, calibration, reading head, card."""
+"""One training of the surface classifier: patches, classes, further heads, calibration, card."""
 
 from __future__ import annotations
 
 import argparse
-import copy
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,22 +22,18 @@ from .keeping import keep_whole, kept_or_made
 from .nets import SurfaceNet
 from .outliers import outlier_patches
 from .patches import PatchSet, joined, judged_patches, thinned, training_patches
-from .teacher import Teacher
 from .train_surface import (
+    BATCH,
     Report,
-    Taught,
     learn_classes,
     learn_disturbed,
-    learn_features,
     learn_reading,
     learn_softening,
-    new_student,
+    new_net,
     verdicts_of,
 )
 
-FIRST_STEPS, CLASS_STEPS = 3000, 3000
-FIRST_SOURCES = ("condition_web", "dry_udacity", "rendered")
-"""Sources of the first stage: none on which a leave-one-out score is taken, so that one trunk serves all of those."""
+CLASS_STEPS = 1200
 
 CUTTING_SEED = 1
 CUTS = 8
@@ -89,7 +83,7 @@ def train_and_ship(
     """
     start = time.monotonic()
     stage = _classes(given, facts.pictures, rendered["train"], further, steps)
-    net = stage.taught.net
+    net = stage.net
     material = gather(given, facts.pictures, rendered)
     learn_heads(net, material, given.seed, given.effort)
     train_s = time.monotonic() - start
@@ -119,9 +113,9 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], rendered: dic
 
 @dataclass(frozen=True)
 class Stage:
-    """A net after a stage of its training, and how it came about."""
+    """A net that has learned its classes, and how that came about."""
 
-    taught: Taught
+    net: SurfaceNet
     patches: int
     steps: int
     seconds: float
@@ -129,65 +123,47 @@ class Stage:
 
     def told(self) -> str:
         """The effort in words, for the card."""
-        return f"{self.steps} steps on {self.patches} patches, {self.seconds:.0f} s on {self.device}"
+        return (
+            f"{self.steps} steps of {BATCH} on {self.patches} patches, {self.seconds:.0f} s on {self.device}"
+        )
 
 
-def trained(given: argparse.Namespace, patches: PatchSet, steps: int, train: Callable[..., Taught]) -> Stage:
-    """One stage, timed; `train` is `learn_features` or `learn_classes` but for what the command line says."""
-    device = torch.device(given.device)
-    name = torch.cuda.get_device_name() if device.type == "cuda" else f"{given.threads} processor thread(s)"
-    start = time.monotonic()
-    taught = train(patches=patches, steps=steps, seed=given.seed, device=device)
-    return Stage(taught, len(patches), steps, time.monotonic() - start, name)
-
-
-def kept(given: argparse.Namespace, name: str, without: Sequence[str], train: Callable[[], Stage]) -> Stage:
-    """A stage from its file in the folder of the command line, or trained (and kept there)."""
+def kept_stage(
+    given: argparse.Namespace,
+    name: str,
+    steps: Steps,
+    *,
+    count: int,
+    what: str,
+    patches: Callable[[], PatchSet],
+) -> Stage:
+    """A net from its file in the folder of the command line, or trained on `patches()` for `count` steps and kept."""
 
     def load(file: Path) -> Stage:
         found = torch.load(file, weights_only=True)
-        taught = new_student(given.seed)
-        taught.parts().load_state_dict(found.pop("weights"))
-        taught.parts().eval()
-        return Stage(taught, **found)
+        net = SurfaceNet()
+        net.load_state_dict(found.pop("weights"))
+        return Stage(net.eval(), **found)
 
     def save(file: Path, stage: Stage) -> None:
-        told = {name: value for name, value in vars(stage).items() if name != "taught"}
-        content = {"weights": stage.taught.parts().state_dict(), **told}
+        told = {name: value for name, value in vars(stage).items() if name != "net"}
+        content = {"weights": stage.net.state_dict(), **told}
         keep_whole(file, lambda part: torch.save(content, part))
 
-    left_out = "".join(f"-without-{source}" for source in sorted(without))
+    def train() -> Stage:
+        seen = patches()
+        device = torch.device(given.device)
+        on = torch.cuda.get_device_name() if device.type == "cuda" else f"{given.threads} processor thread(s)"
+        start = time.monotonic()
+        with steps(f"training the {what}", count) as report:
+            net = learn_classes(
+                new_net(given.seed), seen, steps=count, seed=given.seed, device=device, report=report
+            )
+        return Stage(net, len(seen), count, time.monotonic() - start, on)
+
+    left_out = "".join(f"-without-{source}" for source in sorted(given.without))
     file = f"{name}-{given.seed}{left_out}.pt"
     return kept_or_made(given.kept, file, load=load, make=train, save=save)
-
-
-def first_stage(
-    given: argparse.Namespace, pictures: Sequence[Picture], worlds: PatchSet, steps: Steps
-) -> Taught:
-    """The net that sees what the teacher sees; without a teacher an untrained one."""
-    if given.teacher is None:
-        return new_student(given.seed)
-    teacher = Teacher.read(given.teacher)
-    count = max(2, round(given.effort * FIRST_STEPS))
-
-    def train() -> Stage:
-        chosen = [picture for picture in of_split(pictures, "train") if picture.source in FIRST_SOURCES]
-        patches = joined([*_cuts(given, chosen), worlds])
-        with steps("learning the teacher's features", count) as report:
-            learn = partial(learn_features, new_student(given.seed), teacher=teacher, report=report)
-            return trained(given, patches, count, learn)
-
-    return kept(given, "first_stage", (), train).taught
-
-
-def second_stage(
-    given: argparse.Namespace, trunk: Taught, patches: PatchSet, steps: Steps, *, count: int, what: str
-) -> Stage:
-    """A copy of the first stage's net, taught the classes."""
-    teacher = Teacher.read(given.teacher) if given.teacher else None
-    with steps(f"training the {what}", count) as report:
-        learn = partial(learn_classes, copy.deepcopy(trunk), teacher=teacher, report=report)
-        return trained(given, patches, count, learn)
 
 
 def _classes(
@@ -197,15 +173,13 @@ def _classes(
     further: Callable[[], PatchSet],
     steps: Steps,
 ) -> Stage:
-    """The net after its second stage."""
+    """The net with its classes learned."""
     count = max(2, round(given.effort * CLASS_STEPS))
 
-    def train() -> Stage:
-        trunk = first_stage(given, pictures, worlds, steps)
-        patches = joined([*_cuts(given, trained_on(pictures, given.without)), worlds, further()])
-        return second_stage(given, trunk, patches, steps, count=count, what="surface classifier")
+    def patches() -> PatchSet:
+        return joined([*_cuts(given, trained_on(pictures, given.without)), worlds, further()])
 
-    return kept(given, "classes", given.without, train)
+    return kept_stage(given, "classes", steps, count=count, what="surface classifier", patches=patches)
 
 
 def _cuts(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[PatchSet]:

@@ -1,15 +1,14 @@
-"""Training of the surface classifier on undisturbed patches, in two stages, and of its reading head."""
+"""Training of the surface classifier on undisturbed patches, and of its further heads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional
 
 from .calibrate import cross_entropy
@@ -17,22 +16,14 @@ from .data import Image
 from .looks import seen_anew
 from .nets import SurfaceNet
 from .patches import PatchSet, camera_spreads, draw_weights
-from .teacher import MAP_CELLS, Teacher
 
-BATCH, HINTED = 256, 96
-"""Patches of a step, and those of them that the teacher sees too; the first stage draws these alone."""
-FIRST_RATE, CLASS_RATE = 3e-3, 2.5e-3
-"""Learning rates of the two stages."""
+BATCH = 256
+"""Patches of a step."""
+TRUNK_RATE, RATE = 1e-3, 2.5e-3
+"""Learning rates of what has learned before, and of the rest."""
 WEIGHT_DECAY = 2e-2
 AVERAGING = 0.998
 """Decay of the running average of the weights; the average is what ships."""
-
-MAP_WEIGHT, POOLED_WEIGHT = 1.0, 1.0
-"""Weights of the teacher's maps and pooled features in the first stage."""
-HINT_SHARE = 0.5
-"""Share of both beside the cross-entropy in the second stage."""
-STANDARDISED = 2048
-"""Patches over which the teacher's features are standardised."""
 READING_RATE = 2e-3
 DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3, 0.5, 0.5
 """The head that tells disturbed patches must hold on roads never seen, so it is kept weak."""
@@ -40,57 +31,44 @@ DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3,
 Report = Callable[[int, float], None]
 
 
-class Taught(NamedTuple):
-    """A net with the linear maps by which its features are held against the teacher's; only the net ships."""
-
-    net: SurfaceNet
-    maps: nn.Conv2d
-    pooled: nn.Linear
-
-    def parts(self) -> nn.ModuleList:
-        """All three as one module."""
-        return nn.ModuleList(self)
-
-
-def new_student(seed: int) -> Taught:
-    """An untrained net with its maps to the teacher's features."""
+def new_net(seed: int) -> SurfaceNet:
+    """A net with its pretrained trunk, the rest untrained."""
     torch.manual_seed(seed)
-    net = SurfaceNet()
-    middle = net.STAGES[1][0]
-    return Taught(net, nn.Conv2d(middle, Teacher.MAPS, 1), nn.Linear(net.EMBEDDING, Teacher.POOLED))
-
-
-def learn_features(
-    student: Taught,
-    patches: PatchSet,
-    teacher: Teacher,
-    *,
-    steps: int,
-    seed: int,
-    device: torch.device,
-    report: Report,
-) -> Taught:
-    """First stage: the net learns to see what the teacher sees; no label is used."""
-    shares = np.full(len(patches), 1.0 / len(patches))
-    drawer = Drawer(patches, shares, HINTED, seed, device)
-    return _train(student, drawer, teacher.to(device), steps, FIRST_RATE, report, hint=1.0, classes=0.0)
+    return SurfaceNet(pretrained=True)
 
 
 def learn_classes(
-    student: Taught,
-    patches: PatchSet,
-    teacher: Teacher | None,
-    *,
-    steps: int,
-    seed: int,
-    device: torch.device,
-    report: Report,
-) -> Taught:
-    """Second stage: the classes. Where there is a teacher its features are kept in view."""
+    net: SurfaceNet, patches: PatchSet, *, steps: int, seed: int, device: torch.device, report: Report
+) -> SurfaceNet:
+    """The net taught the classes in one learning-rate cycle: the running average of its weights, on the processor.
+
+    `patches` are drawn by `draw_weights`, each time as another camera sees them.
+    """
     drawer = Drawer(patches, draw_weights(patches), BATCH, seed, device)
-    hint = 0.0 if teacher is None else HINT_SHARE
-    teacher = None if teacher is None else teacher.to(device)
-    return _train(student, drawer, teacher, steps, CLASS_RATE, report, hint=hint, classes=1.0)
+    torch.manual_seed(seed)
+    net = net.to(device).train()
+    if device.type == "cpu":
+        net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    average = torch.optim.swa_utils.AveragedModel(net, multi_avg_fn=_running_average, use_buffers=True)
+    learned = [p for p in net.trunk.parameters() if p.requires_grad]
+    new = [p for name, p in net.named_parameters() if p.requires_grad and not name.startswith("trunk.")]
+    rates = [TRUNK_RATE, RATE]
+    optimiser = torch.optim.AdamW(
+        [{"params": part, "lr": rate} for part, rate in zip((learned, new), rates, strict=True)],
+        weight_decay=WEIGHT_DECAY,
+        fused=device.type == "cuda",
+    )
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rates, total_steps=steps, pct_start=0.15)
+    for step in range(steps):
+        loss = _loss(net, *drawer.draw(drawer.batch))
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
+        optimiser.step()
+        schedule.step()
+        average.update_parameters(net)
+        report(step + 1, float(loss.detach()) if step % 10 == 0 else np.nan)
+    return average.module.to("cpu").eval()
 
 
 class Drawer:
@@ -112,43 +90,6 @@ class Drawer:
         return seen_anew(self.generator, self.patches[chosen], self.spreads[chosen]), self.labels[chosen]
 
 
-def _train(
-    student: Taught,
-    drawer: Drawer,
-    teacher: Teacher | None,
-    steps: int,
-    rate: float,
-    report: Report,
-    *,
-    hint: float,
-    classes: float,
-) -> Taught:
-    """One learning-rate cycle; the running average of the weights comes back, on the processor."""
-    device = drawer.patches.device
-    torch.manual_seed(drawer.generator.initial_seed())
-    modules = student.parts().to(device).train()
-    if device.type == "cpu":
-        student.net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-    if teacher is not None:
-        teacher.standardise(drawer.draw(STANDARDISED)[0])
-    average = torch.optim.swa_utils.AveragedModel(modules, multi_avg_fn=_running_average, use_buffers=True)
-    optimiser = torch.optim.AdamW(
-        modules.parameters(), lr=rate, weight_decay=WEIGHT_DECAY, fused=device.type == "cuda"
-    )
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, total_steps=steps, pct_start=0.15)
-    for step in range(steps):
-        loss = _loss(student, *drawer.draw(drawer.batch), teacher, hint, classes)
-        optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(modules.parameters(), 5.0)
-        optimiser.step()
-        schedule.step()
-        average.update_parameters(modules)
-        report(step + 1, float(loss.detach()) if step % 10 == 0 else np.nan)
-    net, maps, pooled = average.module.to("cpu").eval()
-    return Taught(net, maps, pooled)
-
-
 @torch.no_grad()
 def _running_average(averages: list[Tensor], current: list[Tensor], steps: Tensor | int) -> None:
     """Exponential running average in place, which forgets the first steps faster: short trainings have no others."""
@@ -165,24 +106,11 @@ def half_precision(device: torch.device) -> torch.autocast:
     return torch.autocast(device.type, dtype=torch.bfloat16, enabled=faster)
 
 
-def _loss(
-    student: Taught, looks: Tensor, labels: Tensor, teacher: Teacher | None, hint: float, classes: float
-) -> Tensor:
+def _loss(net: SurfaceNet, looks: Tensor, labels: Tensor) -> Tensor:
     with half_precision(looks.device):
-        middle, last = student.net.maps(looks)
-    middle, last = middle.float(), last.float()
-    embedding = student.net.pool(middle, last)
-    loss = torch.zeros((), device=looks.device)
-    if classes:
-        logits = student.net.classifier(student.net.dropout(embedding))
-        loss = loss + classes * functional.cross_entropy(logits, labels)
-    if teacher is not None:
-        with torch.no_grad(), half_precision(looks.device):
-            pooled, maps = teacher(looks[:HINTED])
-        seen = functional.adaptive_avg_pool2d(student.maps(middle[:HINTED]), MAP_CELLS)
-        loss = loss + hint * MAP_WEIGHT * functional.mse_loss(seen, maps)
-        loss = loss + hint * POOLED_WEIGHT * functional.mse_loss(student.pooled(embedding[:HINTED]), pooled)
-    return loss
+        maps = net.maps(looks)
+    embedding = net.pool([each.float() for each in maps])
+    return functional.cross_entropy(net.classifier(net.dropout(embedding)), labels)
 
 
 def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, steps: int, seed: int) -> None:
@@ -195,8 +123,7 @@ def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, steps: i
     features = torch.cat([embeddings(net, readable), embeddings(net, outliers)])
     labels = torch.cat([torch.ones(len(readable)), torch.zeros(len(outliers))])
     weights = torch.where(labels > 0, 0.5 / len(readable), 0.5 / len(outliers))
-    head = nn.ModuleList([net.reading_norm, net.reading]).train()
-    optimiser = torch.optim.AdamW(head.parameters(), lr=READING_RATE, weight_decay=WEIGHT_DECAY)
+    optimiser = torch.optim.AdamW(net.reading.parameters(), lr=READING_RATE, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
     for chosen in torch.multinomial(weights, steps * 512, replacement=True).view(steps, 512):
         loss = functional.binary_cross_entropy_with_logits(net.readable(features[chosen]), labels[chosen])
@@ -212,11 +139,10 @@ def learn_disturbed(net: SurfaceNet, clear: Image, disturbed: Image, *, seed: in
     torch.manual_seed(seed)
     features = torch.cat([embeddings(net, clear), embeddings(net, disturbed)])
     labels = torch.cat([torch.zeros(len(clear)), torch.ones(len(disturbed))])
-    head = nn.ModuleList([net.disturbed_norm, net.disturbed]).train()
-    optimiser = torch.optim.AdamW(head.parameters(), lr=DISTURBED_RATE, weight_decay=DISTURBED_DECAY)
+    optimiser = torch.optim.AdamW(net.disturbed.parameters(), lr=DISTURBED_RATE, weight_decay=DISTURBED_DECAY)
     for _ in range(DISTURBED_STEPS):
         chosen = torch.randint(len(features), (512,))
-        seen = functional.dropout(net.disturbed_norm(features[chosen]), DISTURBED_DROPOUT)
+        seen = functional.dropout(features[chosen], DISTURBED_DROPOUT)
         loss = functional.binary_cross_entropy_with_logits(net.disturbed(seen)[:, 0], labels[chosen])
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
