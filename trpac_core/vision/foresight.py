@@ -1,4 +1,4 @@
-"""Road seen before it is near: patches of the middle group count once more when their ground comes into the near group.
+"""Road seen before it is near: patches of the middle group have their say when their ground comes into the near group.
 
 Water shows in what it mirrors, and the flatter the look, the more it mirrors: from 6 m a wet road is told from a dry
 one more surely than from 3 m. The way driven says where the ground of an earlier look is by now.
@@ -17,6 +17,9 @@ from .classes import Surface
 
 LOOK_EVERY_M = 0.4
 """Way between the looks that are remembered: closer ones show the same, and a car that stands must not add any [m]."""
+
+BEHIND_M = 2.0
+"""Road nearer than the near group of which a remembered patch still has a say [m]."""
 
 
 @dataclass(frozen=True)
@@ -59,19 +62,30 @@ def due(looks: Sequence[Look], at_m: float) -> bool:
     return all(abs(look.at_m - at_m) >= LOOK_EVERY_M for look in looks)
 
 
-def recalled(looks: Sequence[Look], at_m: float, range_m: tuple[float, float]) -> NDArray[np.float64]:
-    """Probabilities of the remembered patches that lie in [from, to) ahead of the front wheels now, shape (n, 3)."""
-    low, high = range_m
+def recalled(
+    looks: Sequence[Look], at_m: float, reach_m: tuple[float, float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far ahead of the front wheels the remembered patches lie that are within [from, to) now, and what they show.
+
+    Returns
+    -------
+    array, shape (n,)
+        [m]
+    array, shape (n, 3)
+        Probabilities [-].
+    """
+    low, high = reach_m
     found = [
-        triple
+        (way_m - at_m, *triple)
         for look in looks
         for way_m, triple in zip(look.ways_m, look.probabilities, strict=True)
         if low <= way_m - at_m < high
     ]
-    return np.array(found) if found else np.empty((0, len(Surface)))
+    table = np.reshape(np.array(found, np.float64), (len(found), 1 + len(Surface)))
+    return table[:, 0], table[:, 1:]
 
 
 def within_reach(looks: Sequence[Look], at_m: float, reach_m: tuple[float, float]) -> tuple[Look, ...]:
-    """The looks of which a patch lies in [from, to) ahead of the front wheels now: the others will not be near."""
+    """The looks of which a patch lies in [from, to) ahead of the front wheels now: the others have no say."""
     low, high = reach_m
     return tuple(look for look in looks if any(low <= way_m - at_m < high for way_m in look.ways_m))

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .classes import Surface
 from .evidence import EvidenceState, basic_probability, combine, update_weights, visual_confidence
-from .foresight import Look, due, recalled, within_reach
+from .foresight import BEHIND_M, Look, due, recalled, within_reach
 from .ife_config import GROUP_NAMES, SIDES, IfeConfig
 from .images import ImageError
+from .neighbours import among_neighbours
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
 from .regions import (
     Corners,
@@ -42,8 +43,8 @@ lowest of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
 LEAST_READABLE = 0.5
 """Probability of readable road below which a patch is left out [-]."""
 
-PATCHES_AHEAD = 3
-"""Patches of a look that is remembered: about ten looks pass through the near group's ground [-]."""
+PATCHES_AHEAD = 6
+"""Patches of a look that is remembered [-]."""
 
 
 @dataclass(frozen=True)
@@ -195,16 +196,14 @@ class Ife:
 
     def judge(self, state: IfeState, motion: Motion, regions: list[Region]) -> tuple[IfeState, FrameResult]:
         """The state after a frame and its verdict, from the classified regions of `look`."""
-        near_m, at_m = self.config.ranges_m[0], motion.way_m
-        looks = state.looks if self.config.use_foresight and at_m is not None else ()
-        before = recalled(looks, at_m or 0.0, near_m)
+        looks = self._remembered(state, motion, regions[-1])
+        near, before = self._along_the_road(regions[0], looks, motion)
         verdicts = [
-            self._fuse(index, state.evidence[index], region, before if index == 0 else before[:0])
+            self._fuse(
+                index, state.evidence[index], *((near, before) if index == 0 else (region, before[:0]))
+            )
             for index, region in enumerate(regions[: self.config.groups_looked_at])
         ]
-        if at_m is not None and self._remembers(state, motion):
-            looks = (*looks, Look.of(at_m, regions[-1].ahead_m, regions[-1].probabilities))
-        looks = within_reach(looks, at_m or 0.0, (near_m[0], self.config.ranges_m[1][1]))
         after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
         result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)
         return IfeState(after, state.frame_count + 1, looks), result
@@ -212,6 +211,34 @@ class Ife:
     def _remembers(self, state: IfeState, motion: Motion) -> bool:
         """Whether what the middle group shows in this frame is to be remembered."""
         return self.config.use_foresight and motion.way_m is not None and due(state.looks, motion.way_m)
+
+    def _remembered(self, state: IfeState, motion: Motion, last: Region) -> tuple[Look, ...]:
+        """The looks that still have a say, with this frame's (`last`) where it is to be remembered."""
+        at_m = motion.way_m
+        if at_m is None or not self.config.use_foresight:
+            return ()
+        looks = state.looks
+        if self._remembers(state, motion):
+            looks = (*looks, Look.of(at_m, last.ahead_m, last.probabilities))
+        return within_reach(looks, at_m, self._reach_m)
+
+    @property
+    def _reach_m(self) -> tuple[float, float]:
+        """Where remembered patches have a say [m]."""
+        return self.config.ranges_m[0][0] - BEHIND_M, self.config.ranges_m[1][1]
+
+    def _along_the_road(
+        self, near: Region, looks: tuple[Look, ...], motion: Motion
+    ) -> tuple[Region, NDArray[np.float64]]:
+        """The near group's patches, and what was seen before of its ground, each among its neighbours on the road."""
+        ahead_m, before = recalled(looks, motion.way_m or 0.0, self._reach_m)
+        if not looks:
+            return near, before
+        places_m = np.concatenate((near.ahead_m, ahead_m))
+        probabilities = among_neighbours(places_m, np.concatenate((near.probabilities, before)))
+        low, high = self.config.ranges_m[0]
+        own, before = np.split(probabilities, [len(near.ahead_m)])
+        return replace(near, probabilities=own), before[(low <= ahead_m) & (ahead_m < high)]
 
     def _region(
         self,

@@ -1,0 +1,95 @@
+"""Patches along the road: read forwards and backwards as every sequence of classes, counted out one by one, says."""
+
+from __future__ import annotations
+
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from trpac_core.vision.neighbours import (
+    CELL_M,
+    CHANGES_PER_M,
+    LEAST_PROBABILITY,
+    SAY,
+    among_neighbours,
+)
+
+DRY, WET = (0.9, 0.08, 0.02), (0.1, 0.85, 0.05)
+
+places = st.lists(st.floats(-3.0, 8.0), min_size=1, max_size=12)
+triples = st.tuples(*[st.floats(0.0, 1.0)] * 3).filter(lambda p: sum(p) > 0.1)
+
+
+def drawn(data, ahead_m):
+    found = np.array(data.draw(st.lists(triples, min_size=len(ahead_m), max_size=len(ahead_m))))
+    return found / found.sum(axis=1, keepdims=True)
+
+
+def counted(ahead_m, probabilities):
+    """Sum over all sequences of classes of the cells, each as likely as its changes and what is seen make it."""
+    cells = np.floor(np.array(ahead_m) / CELL_M).astype(int)
+    cells -= cells.min()
+    likely = probabilities.clip(LEAST_PROBABILITY)
+    likely = (likely / likely.sum(axis=1, keepdims=True)) ** SAY
+    stay, change = 1.0 - CHANGES_PER_M * CELL_M, CHANGES_PER_M * CELL_M / 2.0
+    found = np.zeros((cells.max() + 1, 3))
+    for classes in product(range(3), repeat=len(found)):
+        weight = np.prod([stay if a == b else change for a, b in pairwise(classes)])
+        weight *= np.prod([triple[classes[cell]] for cell, triple in zip(cells, likely, strict=True)])
+        found[np.arange(len(found)), classes] += weight
+    return (found / found.sum(axis=1, keepdims=True))[cells]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_it_is_the_sum_over_all_sequences_of_classes(seed):
+    rng = np.random.default_rng(seed)
+    ahead_m = rng.uniform(2.0, 2.0 + 7 * CELL_M, 6)
+    probabilities = rng.dirichlet((0.5, 0.5, 0.5), 6)
+    assert_allclose(among_neighbours(ahead_m, probabilities), counted(ahead_m, probabilities), rtol=1e-9)
+
+
+@given(places, st.data())
+def test_probabilities_stay_such_whatever_is_seen(ahead_m, data):
+    found = among_neighbours(np.array(ahead_m), drawn(data, ahead_m))
+    assert found.shape == (len(ahead_m), 3)
+    assert np.isfinite(found).all()
+    assert (found >= 0.0).all()
+    assert_allclose(found.sum(axis=1), 1.0)
+
+
+@given(places, st.data())
+def test_neither_the_order_of_patches_nor_of_classes_matters(ahead_m, data):
+    ahead_m = np.array(ahead_m)
+    probabilities = drawn(data, ahead_m)
+    order = np.array(data.draw(st.permutations(range(len(ahead_m)))))
+    classes = list(data.draw(st.permutations(range(3))))
+    found = among_neighbours(ahead_m[order], probabilities[order][:, classes])
+    assert_allclose(found, among_neighbours(ahead_m, probabilities)[order][:, classes], atol=1e-12)
+
+
+def test_the_road_around_mends_a_lone_mistake_and_leaves_a_border():
+    ahead_m = np.arange(0.1, 6.0, 0.25)
+    dry_then_wet = np.array([DRY if x < 3.0 else WET for x in ahead_m])
+    mistaken = dry_then_wet.copy()
+    mistaken[4] = WET
+    found = among_neighbours(ahead_m, mistaken).argmax(axis=1)
+    assert (found == dry_then_wet.argmax(axis=1)).all()
+
+
+def test_what_lies_far_off_says_less():
+    """A doubtful patch hears a sure one the less the further it is: the road may have changed between."""
+    doubtful = (0.34, 0.33, 0.33)
+    heard = [
+        among_neighbours(np.array([0.0, far_m]), np.array([doubtful, WET]))[0, 1]
+        for far_m in (0.3, 3.0, 30.0, 3000.0)
+    ]
+    assert np.all(np.diff(heard) < 0.0)
+    assert heard[-1] == pytest.approx(1.0 / 3.0, abs=0.01)
+
+
+def test_nothing_seen_is_nothing_said():
+    assert among_neighbours(np.empty(0), np.empty((0, 3))).shape == (0, 3)

@@ -1,0 +1,61 @@
+"""What patches along the road show together: a surface goes on, and changes at one place.
+
+The road is a chain of cells whose class seldom changes, and each patch has a say in its own cell: a hidden Markov
+chain, read forwards and backwards. Road behind and ahead speaks for the road between, and a border lies where it fits
+best what is seen on both sides of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+CELL_M = 0.25
+"""Length of a cell [m]."""
+CHANGES_PER_M = 0.01
+"""How often the class changes [1/m]."""
+SAY = 0.3
+"""Share of a patch's log probabilities that counts [-]: patches of one road and light are wrong together."""
+LEAST_PROBABILITY = 0.02
+"""No patch says that a class is less likely [-]."""
+
+
+def among_neighbours(ahead_m: NDArray[np.float64], probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Probabilities of each patch's ground by all that is seen of the road, its own patch included.
+
+    Parameters
+    ----------
+    ahead_m : array, shape (n,)
+        Where the patches lie along the way [m].
+    probabilities : array, shape (n, 3)
+        Calibrated probabilities of each by itself [-].
+
+    Returns
+    -------
+    array, shape (n, 3)
+        Of sum 1 each [-].
+    """
+    if not len(ahead_m):
+        return probabilities
+    cells = np.floor(ahead_m / CELL_M).astype(int)
+    cells -= cells.min()
+    likely = probabilities.clip(LEAST_PROBABILITY)
+    likely = np.log(likely / likely.sum(axis=1, keepdims=True))
+    seen = np.zeros((cells.max() + 1, probabilities.shape[1]))
+    np.add.at(seen, cells, SAY * likely)
+    seen = np.exp(seen - seen.max(axis=1, keepdims=True))
+    from_behind, from_ahead = _passed_on(seen), _passed_on(seen[::-1])[::-1]
+    known = from_behind * seen * from_ahead
+    return np.asarray((known / known.sum(axis=1, keepdims=True))[cells])
+
+
+def _passed_on(seen: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Probabilities of each cell's class by the cells before it, from their likelihoods, both of shape (m, k)."""
+    k = seen.shape[1]
+    change = CHANGES_PER_M * CELL_M / (k - 1)
+    passed = np.full(seen.shape, 1.0 / k)
+    for number in range(1, len(seen)):
+        known = passed[number - 1] * seen[number - 1]
+        known /= known.sum()
+        passed[number] = change + (1.0 - k * change) * known
+    return passed
