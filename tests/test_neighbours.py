@@ -14,11 +14,12 @@ from trpac_core.vision.neighbours import (
     CELL_M,
     CHANGES_PER_M,
     LEAST_PROBABILITY,
+    OWN_SHARE,
     SAY,
     among_neighbours,
 )
 
-DRY, WET = (0.9, 0.08, 0.02), (0.1, 0.85, 0.05)
+DRY, WET, DOUBTFUL = (0.9, 0.08, 0.02), (0.1, 0.85, 0.05), (0.3, 0.6, 0.1)
 
 places = st.lists(st.floats(-3.0, 8.0), min_size=1, max_size=12)
 triples = st.tuples(*[st.floats(0.0, 1.0)] * 3).filter(lambda p: sum(p) > 0.1)
@@ -41,7 +42,8 @@ def counted(ahead_m, probabilities):
         weight = np.prod([stay if a == b else change for a, b in pairwise(classes)])
         weight *= np.prod([triple[classes[cell]] for cell, triple in zip(cells, likely, strict=True)])
         found[np.arange(len(found)), classes] += weight
-    return (found / found.sum(axis=1, keepdims=True))[cells]
+    found /= found.sum(axis=1, keepdims=True)
+    return OWN_SHARE * probabilities + (1.0 - OWN_SHARE) * found[cells]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -75,16 +77,15 @@ def test_the_road_around_mends_a_lone_mistake_and_leaves_a_border():
     ahead_m = np.arange(0.1, 6.0, 0.25)
     dry_then_wet = np.array([DRY if x < 3.0 else WET for x in ahead_m])
     mistaken = dry_then_wet.copy()
-    mistaken[4] = WET
+    mistaken[4] = DOUBTFUL
     found = among_neighbours(ahead_m, mistaken).argmax(axis=1)
     assert (found == dry_then_wet.argmax(axis=1)).all()
 
 
 def test_what_lies_far_off_says_less():
     """A doubtful patch hears a sure one the less the further it is: the road may have changed between."""
-    doubtful = (0.34, 0.33, 0.33)
     heard = [
-        among_neighbours(np.array([0.0, far_m]), np.array([doubtful, WET]))[0, 1]
+        among_neighbours(np.array([0.0, far_m]), np.array([(1 / 3, 1 / 3, 1 / 3), WET]))[0, 1]
         for far_m in (0.3, 3.0, 30.0, 3000.0)
     ]
     assert np.all(np.diff(heard) < 0.0)

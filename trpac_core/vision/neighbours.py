@@ -20,8 +20,13 @@ LEAST_PROBABILITY = 0.02
 """No patch says that a class is less likely [-]."""
 
 
+OWN_SHARE = 0.5
+"""How much of a patch's probabilities stays its own [-]: what all patches of a road agree on may be wrong, and the
+chain alone would be sure of it."""
+
+
 def among_neighbours(ahead_m: NDArray[np.float64], probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Probabilities of each patch's ground by all that is seen of the road, its own patch included.
+    """Probabilities of each patch, half of them those that its place has by all that is seen of the road.
 
     Parameters
     ----------
@@ -46,7 +51,8 @@ def among_neighbours(ahead_m: NDArray[np.float64], probabilities: NDArray[np.flo
     seen = np.exp(seen - seen.max(axis=1, keepdims=True))
     from_behind, from_ahead = _passed_on(seen), _passed_on(seen[::-1])[::-1]
     known = from_behind * seen * from_ahead
-    return np.asarray((known / known.sum(axis=1, keepdims=True))[cells])
+    known /= known.sum(axis=1, keepdims=True)
+    return np.asarray(OWN_SHARE * probabilities + (1.0 - OWN_SHARE) * known[cells])
 
 
 def _passed_on(seen: NDArray[np.float64]) -> NDArray[np.float64]:
