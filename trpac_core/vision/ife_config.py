@@ -85,7 +85,7 @@ class IfeConfig:
     strip_half_width_m: float = 4.0
     weight_law: WeightLaw = field(default_factory=WeightLaw)
     flag_threshold: float = 0.5
-    least_mass: float = 0.725
+    least_mass: float = 0.8
     seed: int = 0
     groups_looked_at: int = len(GROUP_NAMES)
     use_trajectory: bool = True
