@@ -55,6 +55,12 @@ EXTREME_LIMITS: tuple[Box, ...] = (
 )
 """Parts of the overlaid clips that are free of text, path dots and bonnet; their road boxes lie inside."""
 
+CLEAR_PARTS: dict[str, tuple[Box, ...]] = {
+    "seq_extreme": ((0.07, 0.43, 0.55, 0.87), (0.45, 0.43, 0.93, 0.87)),
+}
+"""Parts of a picture below what an instrument has written into it and above the bonnet, to which one would crop it;
+other families are shown whole."""
+
 MIN_EACH_CLASS = 1
 """Pictures of each class that the training and the validation split must hold at least."""
 
@@ -98,6 +104,15 @@ class Picture:
     def family(self) -> str:
         """See `family_of`."""
         return family_of(self.source)
+
+    def clear_parts(self) -> list[Image]:
+        """What one would show of the picture: all of it, or its parts without text and bonnet."""
+        image = self.image()
+        found = []
+        for box in CLEAR_PARTS.get(self.family, ((0.0, 0.0, 1.0, 1.0),)):
+            left, top, right, bottom = pixel_box(box, image)
+            found.append(np.ascontiguousarray(image[top:bottom, left:right]))
+        return found
 
     @property
     def wide_box(self) -> Box | None:

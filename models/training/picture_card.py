@@ -77,7 +77,8 @@ splits and versions: [surface.md](surface.md).
 
 ## Scores on pictures
 
-What the command says: refused pictures are not among them.
+What the command says: refused pictures are not among them. Of the clips that have the weather written into them, the
+two parts of a picture without text and bonnet are judged, as the command asks to crop them.
 
 {table([*header, "confusion, rows true"], rows)}
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from scenarios.stills import StillNetworks, patch_logs, upright
+from scenarios.stills import StillNetworks, patch_logs
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.images import ImageError
 
@@ -79,19 +79,18 @@ def learned_share(validation: Sequence[Verdicts]) -> float:
 
 
 def verdicts(networks: StillNetworks, pictures: Sequence[Picture]) -> Verdicts:
-    """What the networks say of pictures; those that the command refuses are left out."""
+    """What the networks say of pictures, cropped as one is asked to; those that the command refuses are left out."""
     labels, patches, whole = [], [], []
     for picture in pictures:
-        image = upright(picture.path)
-        try:
-            logs = patch_logs(
-                image, networks.segmenter.segment(image), networks.classifier, str(picture.path)
-            )
-        except ImageError:
-            continue
-        labels.append(int(picture.surface))
-        patches.append(logs)
-        whole.append(networks.picture.logits(image))
+        for image in picture.clear_parts():
+            masks = networks.segmenter.segment(image)
+            try:
+                logs = patch_logs(image, masks, networks.classifier, str(picture.path))
+            except ImageError:
+                continue
+            labels.append(int(picture.surface))
+            patches.append(logs)
+            whole.append(networks.picture.logits(image))
     shape = (len(labels), len(Surface))
     return Verdicts(np.array(labels, np.int64), np.reshape(patches, shape), np.reshape(whole, shape))
 
