@@ -18,7 +18,7 @@ from trpac_core.vision.classes import CLASS_THETA, Surface
 pytestmark = pytest.mark.e2e
 
 SPEED_M_S = DRIVING["vehicle_speed"]
-FRAMES = 24
+FRAMES = 36
 FRAME_STEPS = round(1.0 / Camera().fps / STEP_S)
 WAY_M = SPEED_M_S * FRAMES * FRAME_STEPS * STEP_S
 
@@ -69,11 +69,12 @@ def test_a_road_of_one_surface_is_seen_as_such(
 def test_swapped_pictures_swap_what_the_unit_says(
     open_unit: Callable[..., Unit], pictures: dict[Surface, list[Path]]
 ) -> None:
-    half = FRAMES // 2
+    """Early enough for all road that was remembered from the first pictures to be behind at the end."""
+    swap = FRAMES // 3
     dry, snow = pictures[Surface.DRY], pictures[Surface.SNOW_ICE]
-    onto_snow = drive(open_unit(), dry[:half] + snow[half:])
-    onto_dry = drive(open_unit(), snow[:half] + dry[half:])
-    seen = [(trace[half]["TRPAC_image"], trace[-1]["TRPAC_image"]) for trace in (onto_snow, onto_dry)]
+    onto_snow = drive(open_unit(), dry[:swap] + snow[swap:])
+    onto_dry = drive(open_unit(), snow[:swap] + dry[swap:])
+    seen = [(trace[swap]["TRPAC_image"], trace[-1]["TRPAC_image"]) for trace in (onto_snow, onto_dry)]
     high, low = CLASS_THETA[Surface.DRY], CLASS_THETA[Surface.SNOW_ICE]
     assert seen == [(high, low), (low, high)]
 
