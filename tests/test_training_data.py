@@ -188,6 +188,19 @@ def test_overlaid_clips_are_used_inside_their_limits_only():
         assert any(inside)
 
 
+def test_clips_with_text_are_shown_below_it_and_above_the_bonnet_others_whole(made_up):
+    """Text lies in rows 0 to 145, the bonnet below row 320 of 360."""
+    pictures = data.read_manifest(made_up)
+    overlaid, whole = (
+        next(p for p in pictures if p.family == name) for name in ("seq_extreme", "condition_web")
+    )
+    parts = overlaid.clear_parts()
+    assert [part.shape for part in parts] == [(158, 307, 3)] * 2
+    for part, columns in zip(parts, (np.s_[45:352], np.s_[288:595]), strict=True):
+        np.testing.assert_array_equal(part, overlaid.image()[155:313, columns])
+    np.testing.assert_array_equal(whole.clear_parts(), [whole.image()])
+
+
 def test_stills_are_used_in_their_lower_centre_only():
     (box,) = data.ROAD_BOXES["condition_web"]
     assert box == (0.20, 0.60, 0.80, 0.95)
