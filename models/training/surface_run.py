@@ -79,7 +79,7 @@ def train_and_ship(
 ) -> None:
     """Train as the command line asks, write surface.onnx, its card and the reliability diagram.
 
-    `further` draws the patches of further worlds, of which only the second stage learns.
+    `further` draws the patches of further worlds, of which the classes are learned, and no more.
     """
     start = time.monotonic()
     stage = _classes(given, facts.pictures, rendered["train"], further, steps)
