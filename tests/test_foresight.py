@@ -88,7 +88,7 @@ def drive(config, classifier, ways_m, border_m=100.0, before=WET):
 
 def test_what_was_plain_from_afar_mends_a_verdict_from_near():
     _, results = drive(CONFIG, Grazing(), np.arange(0.0, 6.0, 0.5))
-    assert [r.surface for r in results[-6:]] == [WET] * 6
+    assert [r.surface for r in results] == [WET] * len(results), "from the first frame's own look ahead on"
     assert [r.near.n_roi for r in results] == [4] * len(results), "no more bodies of evidence"
     _, without = drive(replace(CONFIG, use_foresight=False), Grazing(), np.arange(0.0, 6.0, 0.5))
     assert {r.surface for r in without} == {DRY}

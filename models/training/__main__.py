@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--kept",
         type=Path,
-        help="folder that keeps what takes long, rendered worlds and networks after each stage, and is read where they "
+        help="folder that keeps what takes long, rendered worlds and trained networks, and is read where they "
         "are there; delete it when the renderer or the recipe changes",
     )
     parser.add_argument(

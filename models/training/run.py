@@ -76,30 +76,43 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
         if given.only == "scene":
             _scene(progress, given, pictures, worlds, steps)
             return
-        further = max(3, round(given.effort * FURTHER_WORLDS))
-        start = time.monotonic()
-        rendered = _render(progress, worlds, given)
-        patches = {split: part.patches for split, part in rendered.items()}
-        shown = [Path(word).name if "/" in word else word for word in arguments]
-        facts = cards.RunFacts(
-            command=" ".join(["python -m models.training", *shown]),
-            seed=given.seed,
-            pictures=pictures,
-            worlds={**worlds, "train": worlds["train"] + (0 if given.only == "segmenter" else further)},
-            seeds={split: f"from {SEED_RANGES[split][0]}" for split in worlds},
-            render_s=time.monotonic() - start,
-            threads=given.threads,
-            without=tuple(given.without),
-        )
         given.out.mkdir(parents=True, exist_ok=True)
-        if given.only in (None, "segmenter"):
-            _segmenter(progress, given, facts, rendered)
-        if given.only in (None, "surface"):
-            draw = partial(_render_further, progress, worlds["train"], further, given)
-            train_and_ship(given, facts, patches, draw, progress, steps)
-            _scene(progress, given, pictures, worlds, steps)
+        if given.only != "picture":
+            _patch_networks(progress, given, arguments, pictures, worlds, steps)
         if given.only in (None, "picture"):
             _picture(progress, given, pictures, steps)
+
+
+def _patch_networks(
+    progress: Progress,
+    given: argparse.Namespace,
+    arguments: Sequence[str],
+    pictures: Sequence[Picture],
+    worlds: dict[str, int],
+    steps: Steps,
+) -> None:
+    """The segmenter and the surface network, which learn from the same rendered worlds."""
+    further = max(3, round(given.effort * FURTHER_WORLDS))
+    start = time.monotonic()
+    rendered = _render(progress, worlds, given)
+    patches = {split: part.patches for split, part in rendered.items()}
+    shown = [Path(word).name if "/" in word else word for word in arguments]
+    facts = cards.RunFacts(
+        command=" ".join(["python -m models.training", *shown]),
+        seed=given.seed,
+        pictures=pictures,
+        worlds={**worlds, "train": worlds["train"] + (0 if given.only == "segmenter" else further)},
+        seeds={split: f"from {SEED_RANGES[split][0]}" for split in worlds},
+        render_s=time.monotonic() - start,
+        threads=given.threads,
+        without=tuple(given.without),
+    )
+    if given.only in (None, "segmenter"):
+        _segmenter(progress, given, facts, rendered)
+    if given.only in (None, "surface"):
+        draw = partial(_render_further, progress, worlds["train"], further, given)
+        train_and_ship(given, facts, patches, draw, progress, steps)
+        _scene(progress, given, pictures, worlds, steps)
 
 
 def _scene(

@@ -44,7 +44,7 @@ def learn_classes(
 
     `patches` are drawn by `draw_weights`, each time as another camera sees them.
     """
-    drawer = Drawer(patches, draw_weights(patches), BATCH, seed, device)
+    drawer = Drawer(patches, seed, device)
     torch.manual_seed(seed)
     net = net.to(device).train()
     if device.type == "cpu":
@@ -60,7 +60,7 @@ def learn_classes(
     )
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rates, total_steps=steps, pct_start=0.15)
     for step in range(steps):
-        loss = _loss(net, *drawer.draw(drawer.batch))
+        loss = _loss(net, *drawer.draw(BATCH))
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
@@ -72,17 +72,14 @@ def learn_classes(
 
 
 class Drawer:
-    """Training patches on a device, drawn by their shares and seen anew each time."""
+    """Training patches on a device, drawn by `draw_weights` and seen anew each time."""
 
-    def __init__(
-        self, patches: PatchSet, shares: NDArray[np.float64], batch: int, seed: int, device: torch.device
-    ):
+    def __init__(self, patches: PatchSet, seed: int, device: torch.device):
         self.generator = torch.Generator(device).manual_seed(seed)
-        self.batch = batch
         self.patches = torch.from_numpy(patches.patches).to(device)
         self.labels = torch.from_numpy(patches.labels).to(device)
         self.spreads = torch.from_numpy(camera_spreads(patches)).float().to(device)
-        self.shares = torch.from_numpy(shares).to(device)
+        self.shares = torch.from_numpy(draw_weights(patches)).to(device)
 
     def draw(self, count: int) -> tuple[Tensor, Tensor]:
         """Looks, uint8 (count, h, w, 3), and their class indices (count,)."""

@@ -33,14 +33,16 @@ class Trunk(nn.Module):
             network.load_state_dict(torch.load(file, weights_only=True))
         self.stem = nn.Sequential(network._conv_stem, network._bn0, nn.ReLU6())
         self.blocks = nn.ModuleList(list(network._blocks)[: self.BLOCKS])
-        for part in (self.stem, *self.blocks[: self.FROZEN]):
-            part.requires_grad_(False)
+        self._frozen().requires_grad_(False)
+
+    def _frozen(self) -> nn.ModuleList:
+        """What stays as it is."""
+        return nn.ModuleList([self.stem, *self.blocks[: self.FROZEN]])
 
     def train(self, mode: bool = True) -> Trunk:
         """As of any module, but the frozen blocks are always at rest."""
         super().train(mode)
-        for part in (self.stem, *self.blocks[: self.FROZEN]):
-            part.eval()
+        self._frozen().eval()
         return self
 
     def forward(self, patches: Tensor) -> list[Tensor]:

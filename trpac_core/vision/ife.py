@@ -198,11 +198,10 @@ class Ife:
         """The state after a frame and its verdict, from the classified regions of `look`."""
         looks = self._remembered(state, motion, regions[-1])
         near, before = self._along_the_road(regions[0], looks, motion)
-        verdicts = [
-            self._fuse(
-                index, state.evidence[index], *((near, before) if index == 0 else (region, before[:0]))
-            )
-            for index, region in enumerate(regions[: self.config.groups_looked_at])
+        verdicts = [self._fuse(0, state.evidence[0], near, before)]
+        verdicts += [
+            self._fuse(index, state.evidence[index], regions[index], before[:0])
+            for index in range(1, self.config.groups_looked_at)
         ]
         after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
         result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)

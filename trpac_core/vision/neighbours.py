@@ -18,8 +18,6 @@ SAY = 0.3
 """Share of a patch's log probabilities that counts [-]: patches of one road and light are wrong together."""
 LEAST_PROBABILITY = 0.02
 """No patch says that a class is less likely [-]."""
-
-
 OWN_SHARE = 0.5
 """How much of a patch's probabilities stays its own [-]: what all patches of a road agree on may be wrong, and the
 chain alone would be sure of it."""
