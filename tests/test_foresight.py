@@ -67,6 +67,22 @@ def test_what_is_remembered_stays_bounded_however_the_car_moves(steps_m):
         assert len(looks) <= 1 + (STILL_HEARD_M[1] - STILL_HEARD_M[0] + 3.0) / LOOK_EVERY_M
 
 
+def test_a_patch_counts_where_its_middle_shows_the_road_though_the_picture_ends_nearer():
+    image, low = road(3.1), CAMERA.height_px
+    usable = np.ones((160, 256), bool)
+    (near,) = Ife(CONFIG, Masks(), Middle()).look(
+        IfeState(), image, Motion(10.0), CAMERA, Masks().masks, usable
+    )
+    cut = (near.centres_px[:, 1] + near.widths_px / 3.0) > low
+    assert 0 < cut.sum() < len(cut), "a patch that the picture's end shifts, and one that it does not"
+    own_m = CAMERA.image_to_ground(near.centres_px)[:, 0]
+    assert_allclose(near.ahead_m[~cut], own_m[~cut], atol=0.02)
+    assert (near.ahead_m[cut] > own_m[cut] + 0.02).all()
+    shown = Middle().verdicts(np.stack(near.patches)).logits.argmax(axis=1)
+    far = np.abs(near.ahead_m - 3.1) > 0.05
+    assert_array_equal(shown[far] == SNOW, near.ahead_m[far] > 3.1)
+
+
 class Grazing(Middle):
     """Takes wet road for dry where a patch comes from the four of the near group, as a network may."""
 

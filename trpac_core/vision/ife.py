@@ -28,6 +28,7 @@ from .regions import (
     roi_box,
     roi_widths_px,
     sample,
+    shown_ground_m,
 )
 from .results import FrameResult, FrameView, GroupResult, GroupView
 from .scene import scene_of
@@ -264,8 +265,10 @@ class Ife:
         ground_m = corners.ground_m[drawn]
         widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, len(drawn))
         widths = roi_widths_px(camera, ground_m, widths_m)
-        ahead_m = way_beside(tracks, ground_m) if config.use_trajectory else ground_m[:, 0]
-        return Region(corners, corners.pixel[drawn], ahead_m, widths, ellipses, len(drawn))
+        centres_px = corners.pixel[drawn]
+        shown_m = shown_ground_m(camera, ground_m, centres_px, widths)
+        ahead_m = way_beside(tracks, shown_m) if config.use_trajectory else shown_m[:, 0]
+        return Region(corners, centres_px, ahead_m, widths, ellipses, len(drawn))
 
     def _tracks(self, motion: Motion, groups: int) -> list[Ellipses]:
         config = self.config

@@ -198,6 +198,39 @@ def roi_box(
     return left, top, left + columns, top + rows
 
 
+def shown_ground_m(
+    camera: Camera,
+    ground_m: NDArray[np.float64],
+    centres_px: NDArray[np.float64],
+    widths_px: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Ground in the middle of the regions around ground points: at the picture's edge they are shifted inwards.
+
+    Parameters
+    ----------
+    camera : Camera
+        Of the picture's own size.
+    ground_m : array, shape (n, 2)
+        The points, x and y in vehicle axes; they stand for a middle above the horizon [m].
+    centres_px : array, shape (n, 2)
+        Their pixels [px].
+    widths_px : array, shape (n,)
+        Widths of the regions: see `roi_widths_px` [px].
+
+    Returns
+    -------
+    array, shape (n, 2)
+        [m]
+    """
+    boxes = [
+        roi_box(camera.width_px, camera.height_px, centre, width)
+        for centre, width in zip(centres_px, widths_px, strict=True)
+    ]
+    left_top, right_bottom = np.split(np.array(boxes, np.float64).reshape(-1, 4), 2, axis=1)
+    middle_m = camera.image_to_ground((left_top + right_bottom - 1.0) / 2.0)
+    return np.where(np.isnan(middle_m), ground_m, middle_m)
+
+
 def cut_patch(
     image: NDArray[np.uint8], centre_px: Sequence[float] | NDArray[np.float64], width_px: float
 ) -> NDArray[np.uint8]:
