@@ -95,7 +95,12 @@ def test_training_leaves_the_first_blocks_and_their_statistics_as_they_are():
 
 def test_a_net_comes_back_from_its_file_and_is_not_trained_again(tmp_path, monkeypatch):
     given = argparse.Namespace(
-        kept=tmp_path / "kept", seed=3, device="cpu", threads=2, without=("seq_extreme",)
+        kept=tmp_path / "kept",
+        seed=3,
+        device="cpu",
+        threads=2,
+        without=("seq_extreme",),
+        other_weather=False,
     )
     monkeypatch.setattr(surface_run, "learn_classes", lambda net, patches, **others: net.eval())
 

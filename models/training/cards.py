@@ -51,6 +51,7 @@ class RunFacts:
     render_s: float
     threads: int
     without: tuple[str, ...] = ()
+    other_weather: bool = False
     versions: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -150,6 +151,8 @@ def surface_card(facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: flo
     )
     calibration = calibration_table(reliabilities, temperature)
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
+    if facts.other_weather:
+        left_out += "Dry dash pictures were shown wet and under snow too (`models/training/weathered.py`). "
     return f"""\
 # surface.onnx
 

@@ -101,6 +101,11 @@ class Picture:
         return np.asarray(mask, dtype=np.uint8)
 
     @property
+    def origin(self) -> str:
+        """What it counts as among the sources of its class."""
+        return self.source
+
+    @property
     def family(self) -> str:
         """See `family_of`."""
         return family_of(self.source)

@@ -48,6 +48,7 @@ SOURCE_SHARES = {
     "drivable_lums": 0.4,
     "seq_dry_yolop": 0.3,
     "dry_udacity": 0.4,
+    "weathered": 1.5,
 }
 """Relative share of each source among the drawn patches of a class.
 
@@ -212,7 +213,7 @@ def training_patches(pictures: Iterable[Picture], seed: int) -> PatchSet:
         (
             random_patches(rng, picture, PATCHES_PER_PICTURE.get(picture.source, OTHER_SOURCES)),
             int(picture.surface),
-            picture.source,
+            picture.origin,
         )
         for picture in pictures
     )
