@@ -10,6 +10,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import cv2
@@ -18,6 +19,7 @@ import numpy as np
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from trpac_core.vision import ife as ife_module
+from trpac_core.vision import region as region_module
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
@@ -26,11 +28,15 @@ from trpac_core.vision.images import decode_image
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.trajectory import Motion
 
-STAGES = {
-    "track": ["reckon"],
-    "regions": ["corners_in_ellipses", "classify_corners", "sample", "roi_widths_px"],
-    "patches": ["cut_patch"],
-    "fuse": ["update_weights", "basic_probability", "combine"],
+STAGES: dict[str, dict[ModuleType, list[str]]] = {
+    "track": {ife_module: ["reckon"]},
+    "lines": {ife_module: ["lines_across"]},
+    "regions": {
+        ife_module: ["corners_in_ellipses", "classify_corners", "sample"],
+        region_module: ["roi_widths_px", "roi_boxes"],
+    },
+    "patches": {region_module: ["cut_box"]},
+    "fuse": {ife_module: ["among_neighbours", "update_weights", "basic_probability", "combine"]},
 }
 WARM_UP = 5
 STEP_M = 0.5
@@ -88,9 +94,10 @@ def main() -> None:
     estimator = Ife(IfeConfig(side=options.side, groups_looked_at=options.groups), segmenter, classifier)
     segmenter.segment = watch.wrap("resize_and_segment", segmenter.segment)  # type: ignore[method-assign]
     classifier.verdicts = watch.wrap("classify", classifier.verdicts)  # type: ignore[method-assign]
-    for stage, names in STAGES.items():
-        for name in names:
-            setattr(ife_module, name, watch.wrap(stage, getattr(ife_module, name)))
+    for stage, modules in STAGES.items():
+        for module, names in modules.items():
+            for name in names:
+                setattr(module, name, watch.wrap(stage, getattr(module, name)))
 
     state, n_roi, decode_ms = IfeState(), 0, []
     for frame in range(WARM_UP + options.frames):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from scenarios.looks import MODELS
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import LEAST_CONTRAST, LEAST_READABLE, usable_road
+from trpac_core.vision.ife import LEAST_READABLE, usable_road
 from trpac_core.vision.images import ImageError, decode_image
 from trpac_core.vision.networks import (
     PatchClassifier,
@@ -27,6 +27,7 @@ from trpac_core.vision.networks import (
     SurfaceClassifier,
     calibrated_probabilities,
 )
+from trpac_core.vision.region import LEAST_CONTRAST
 from trpac_core.vision.regions import cut_box
 from trpac_core.vision.scene import scene_of
 

@@ -73,11 +73,10 @@ def test_a_patch_counts_where_its_middle_shows_the_road_though_the_picture_ends_
     (near,) = Ife(CONFIG, Masks(), Middle()).look(
         IfeState(), image, Motion(10.0), CAMERA, Masks().masks, usable
     )
-    cut = (near.centres_px[:, 1] + near.widths_px / 3.0) > low
+    cut = near.boxes[:, 3] == low
     assert 0 < cut.sum() < len(cut), "a patch that the picture's end shifts, and one that it does not"
-    own_m = CAMERA.image_to_ground(near.centres_px)[:, 0]
-    assert_allclose(near.ahead_m[~cut], own_m[~cut], atol=0.02)
-    assert (near.ahead_m[cut] > own_m[cut] + 0.02).all()
+    middle_m = CAMERA.image_to_ground((near.boxes[:, :2] + near.boxes[:, 2:] - 1.0) / 2.0)[:, 0]
+    assert_allclose(near.ahead_m, middle_m, atol=0.02)
     shown = Middle().verdicts(np.stack(near.patches)).logits.argmax(axis=1)
     far = np.abs(near.ahead_m - 3.1) > 0.05
     assert_array_equal(shown[far] == SNOW, near.ahead_m[far] > 3.1)

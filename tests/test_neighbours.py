@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 
 from trpac_core.vision.neighbours import (
     CELL_M,
+    CHANGES_AT_LINE,
     CHANGES_PER_M,
     LEAST_PROBABILITY,
     OWN_SHARE,
@@ -30,16 +31,19 @@ def drawn(data, ahead_m):
     return found / found.sum(axis=1, keepdims=True)
 
 
-def counted(ahead_m, probabilities):
+def counted(ahead_m, probabilities, lines_m=()):
     """Sum over all sequences of classes of the cells, each as likely as its changes and what is seen make it."""
-    cells = np.floor(np.array(ahead_m) / CELL_M).astype(int)
-    cells -= cells.min()
+    first, last = (int(np.floor(end / CELL_M)) for end in (min(ahead_m), max(ahead_m)))
+    ends = {CELL_M * number: CHANGES_PER_M * CELL_M for number in range(first + 1, last + 1)}
+    ends |= {line: CHANGES_AT_LINE for line in lines_m if min(ahead_m) < line <= max(ahead_m)}
+    cells = [sum(end <= ahead for end in ends) for ahead in ahead_m]
+    changes = [ends[end] for end in sorted(ends)]
     likely = probabilities.clip(LEAST_PROBABILITY)
     likely = (likely / likely.sum(axis=1, keepdims=True)) ** SAY
-    stay, change = 1.0 - CHANGES_PER_M * CELL_M, CHANGES_PER_M * CELL_M / 2.0
-    found = np.zeros((cells.max() + 1, 3))
+    found = np.zeros((len(ends) + 1, 3))
     for classes in product(range(3), repeat=len(found)):
-        weight = np.prod([stay if a == b else change for a, b in pairwise(classes)])
+        steps = zip(pairwise(classes), changes, strict=True)
+        weight = np.prod([1.0 - change if a == b else change / 2.0 for (a, b), change in steps])
         weight *= np.prod([triple[classes[cell]] for cell, triple in zip(cells, likely, strict=True)])
         found[np.arange(len(found)), classes] += weight
     found /= found.sum(axis=1, keepdims=True)
@@ -47,11 +51,22 @@ def counted(ahead_m, probabilities):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_it_is_the_sum_over_all_sequences_of_classes(seed):
+@pytest.mark.parametrize("lines_m", [(), (2.6,), (2.0, 2.55, 3.1)])
+def test_it_is_the_sum_over_all_sequences_of_classes(seed, lines_m):
     rng = np.random.default_rng(seed)
-    ahead_m = rng.uniform(2.0, 2.0 + 7 * CELL_M, 6)
+    ahead_m = rng.uniform(2.05, 2.0 + 6 * CELL_M, 6)
     probabilities = rng.dirichlet((0.5, 0.5, 0.5), 6)
-    assert_allclose(among_neighbours(ahead_m, probabilities), counted(ahead_m, probabilities), rtol=1e-9)
+    found = among_neighbours(ahead_m, probabilities, lines_m)
+    assert_allclose(found, counted(ahead_m, probabilities, lines_m), rtol=1e-9)
+
+
+def test_a_class_ends_rather_at_a_line():
+    """A doubtful patch between two surfaces goes with those that no line parts it from."""
+    ahead_m = np.array([2.1, 2.4, 2.7, 3.2, 3.6, 3.9])
+    probabilities = np.array([DRY, DRY, DRY, (0.45, 0.45, 0.1), WET, WET])
+    before, after = (among_neighbours(ahead_m, probabilities, [line])[3] for line in (2.9, 3.4))
+    assert before[1] > after[1] + 0.05
+    assert after.argmax() == 0
 
 
 @given(places, st.data())

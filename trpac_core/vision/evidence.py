@@ -59,7 +59,9 @@ def update_weights(state: EvidenceState, classes: NDArray[np.intp], law: WeightL
 
 
 def basic_probability(
-    probabilities: NDArray[np.float64], weights: tuple[float, float, float]
+    probabilities: NDArray[np.float64],
+    weights: tuple[float, float, float],
+    say: NDArray[np.float64] | float = 1.0,
 ) -> NDArray[np.float64]:
     """Mean evidence of the patches, each weighted by the weight of its own class, normalised: Eq. (8).
 
@@ -69,13 +71,15 @@ def basic_probability(
         Calibrated probabilities of each patch [-].
     weights : tuple of 3 floats
         Evidence weights [-].
+    say : array, shape (n,), optional
+        How much road each patch stands for; as printed, as much as any other [-].
 
     Returns
     -------
     array, shape (3,)
         Basic probability assignment m_0, of sum 1 [-].
     """
-    patch_weights = np.array(weights)[probabilities.argmax(axis=1)]
+    patch_weights = np.array(weights)[probabilities.argmax(axis=1)] * say
     mean = patch_weights @ probabilities / patch_weights.sum()
     return mean / mean.sum()
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,32 +16,24 @@ from .evidence import EvidenceState, basic_probability, combine, update_weights,
 from .foresight import BEHIND_M, Look, due, recalled, within_reach
 from .ife_config import GROUP_NAMES, SIDES, IfeConfig
 from .images import ImageError
+from .lines import KNOWN_WITHIN_M, lines_across
 from .neighbours import among_neighbours
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
-from .regions import (
-    Corners,
-    classify_corners,
-    corners_in_ellipses,
-    corners_in_strip,
-    cut_patch,
-    roi_box,
-    roi_widths_px,
-    sample,
-    shown_ground_m,
-)
+from .region import Region, Way
+from .regions import classify_corners, corners_in_ellipses, corners_in_strip, sample
 from .results import FrameResult, FrameView, GroupResult, GroupView
 from .scene import scene_of
-from .trajectory import Ellipses, Motion, reckon, way_beside
+from .trajectory import Ellipses, Motion, path_curvature, reckon
 
 MASK_THRESHOLD = 0.5
 """Probability above which a mask's cell counts as drivable, or as shadow [-]."""
 
-LEAST_CONTRAST = 1.0
-"""Standard deviation of a patch's grey levels below which it shows no road but a covered, blinded or dark camera. The
-lowest of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
-
 LEAST_READABLE = 0.5
 """Probability of readable road below which a patch is left out [-]."""
+
+BEFORE_NEAR_M, HIDDEN_M = 0.5, 0.3
+"""Road before the near group on which lines are looked for, and road of its own up to which the picture's end may hide
+one that was seen before [m]."""
 
 PATCHES_AHEAD = 3
 """Patches of a look that is remembered: six save no more, and cost time [-]."""
@@ -55,10 +46,11 @@ class IfeState:
     evidence: tuple[EvidenceState, ...] = (EvidenceState(),) * len(GROUP_NAMES)
     frame_count: int = 0
     looks: tuple[Look, ...] = ()
+    lines_m: tuple[float, ...] = ()
 
     def elsewhere(self) -> IfeState:
         """The state of a car that may be anywhere by now: no road ahead is known."""
-        return replace(self, looks=())
+        return replace(self, looks=(), lines_m=())
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
@@ -66,56 +58,15 @@ class IfeState:
             "weights": [list(group.weights) for group in self.evidence],
             "frame_count": self.frame_count,
             "looks": [look.to_json() for look in self.looks],
+            "lines_m": list(self.lines_m),
         }
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> IfeState:
         """The state that `to_json` wrote."""
         evidence = tuple(EvidenceState((dry, wet, snow_ice)) for dry, wet, snow_ice in data["weights"])
-        return cls(evidence, int(data["frame_count"]), tuple(Look.from_json(look) for look in data["looks"]))
-
-
-@dataclass(frozen=True)
-class Region:
-    """One group on its way: its corners, the patches drawn from them, and what those that can be read show."""
-
-    corners: Corners
-    centres_px: NDArray[np.float64]
-    ahead_m: NDArray[np.float64]
-    widths_px: NDArray[np.float64]
-    ellipses: tuple[Ellipses, ...]
-    drawn: int
-    patches: tuple[NDArray[np.uint8], ...] = ()
-    probabilities: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, len(Surface))))
-
-    def seen_in(self, image: NDArray[np.uint8]) -> Region:
-        """The region with the patches cut, those without contrast left out."""
-        cut = tuple(
-            cut_patch(image, centre, width)
-            for centre, width in zip(self.centres_px, self.widths_px, strict=True)
-        )
-        contrast = np.array([cv2.meanStdDev(patch)[1].max() for patch in cut])
-        return replace(self, patches=cut).keeping(contrast >= LEAST_CONTRAST)
-
-    def keeping(self, kept: NDArray[np.bool_]) -> Region:
-        """The region with some of its patches."""
-        return replace(
-            self,
-            centres_px=self.centres_px[kept],
-            ahead_m=self.ahead_m[kept],
-            widths_px=self.widths_px[kept],
-            patches=tuple(patch for patch, keep in zip(self.patches, kept, strict=True) if keep),
-        )
-
-    @property
-    def p_util(self) -> float:
-        """Share of the road looked at that is of use [-]: corners that are usable, times patches that can be read.
-
-        The paper's is the first alone; the second takes covered lenses, walls and night skies below the flag's gate:
-        `docs/camera_scores.md` tells what it holds back.
-        """
-        read = len(self.probabilities) / self.drawn if self.drawn else 1.0
-        return self.corners.p_util * read
+        looks = tuple(Look.from_json(look) for look in data["looks"])
+        return cls(evidence, int(data["frame_count"]), looks, tuple(data["lines_m"]))
 
 
 class Ife:
@@ -186,27 +137,28 @@ class Ife:
         """
         groups, ahead = self.config.groups_looked_at, self._remembers(state, motion)
         tracks = self._tracks(motion, max(groups, 1 + ahead)) if self.config.use_trajectory else []
+        way = self._way(state, image, motion, camera, tracks)
         wanted = [(index, index, self.config.b[index]) for index in range(groups)]
         wanted += [(1, len(GROUP_NAMES), PATCHES_AHEAD)] * ahead
         return [
-            self._region(index, (state.frame_count, draw), count, tracks, camera, masks, usable).seen_in(
-                image
-            )
+            self._region(index, (state.frame_count, draw), count, way, camera, masks, usable).seen_in(image)
             for index, draw, count in wanted
         ]
 
     def judge(self, state: IfeState, motion: Motion, regions: list[Region]) -> tuple[IfeState, FrameResult]:
         """The state after a frame and its verdict, from the classified regions of `look`."""
         looks = self._remembered(state, motion, regions[-1])
-        near, before = self._along_the_road(regions[0], looks, motion)
-        verdicts = [self._fuse(0, state.evidence[0], near, before)]
-        verdicts += [
-            self._fuse(index, state.evidence[index], regions[index], before[:0])
-            for index in range(1, self.config.groups_looked_at)
-        ]
+        near, before, say = self._along_the_road(regions[0], looks, motion)
+        verdicts = [self._fuse(0, state.evidence[0], near, before, say)]
+        for index in range(1, self.config.groups_looked_at):
+            own = regions[index]
+            say = own.say(own.ahead_m, np.ones(len(own.ahead_m), np.bool_))
+            own = replace(own, probabilities=own.by_section(own.ahead_m, own.probabilities, say))
+            verdicts.append(self._fuse(index, state.evidence[index], own, before[:0], say))
         after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
         result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)
-        return IfeState(after, state.frame_count + 1, looks), result
+        lines_m = regions[0].way.lines_from(motion.way_m)
+        return IfeState(after, state.frame_count + 1, looks, lines_m), result
 
     def _remembers(self, state: IfeState, motion: Motion) -> bool:
         """Whether what the middle group shows in this frame is to be remembered."""
@@ -229,30 +181,39 @@ class Ife:
 
     def _along_the_road(
         self, near: Region, looks: tuple[Look, ...], motion: Motion
-    ) -> tuple[Region, NDArray[np.float64]]:
-        """The near group's patches, and what was seen before of its ground, each among its neighbours on the road."""
+    ) -> tuple[Region, NDArray[np.float64], NDArray[np.float64]]:
+        """The near group's patches, and what was seen before of its ground, each among its neighbours on the road.
+
+        The last array says how much ground each of both stands for.
+        """
         ahead_m, before = recalled(looks, motion.way_m or 0.0, self._reach_m)
-        if not looks:
-            return near, before
+        own = len(near.ahead_m)
         places_m = np.concatenate((near.ahead_m, ahead_m))
-        probabilities = among_neighbours(places_m, np.concatenate((near.probabilities, before)))
+        probabilities = np.concatenate((near.probabilities, before))
+        if looks:
+            probabilities = among_neighbours(places_m, probabilities, near.way.lines_m)
         low, high = self.config.ranges_m[0]
-        own, before = np.split(probabilities, [len(near.ahead_m)])
-        return replace(near, probabilities=own), before[(low <= ahead_m) & (ahead_m < high)]
+        inside = (low <= places_m) & (places_m < high)
+        inside[:own] = True
+        say = near.say(places_m, inside)
+        probabilities = near.by_section(places_m, probabilities, say)
+        heard = say[own:] > 0.0
+        near = replace(near, probabilities=probabilities[:own])
+        return near, probabilities[own:][heard], np.concatenate((say[:own], say[own:][heard]))
 
     def _region(
         self,
         index: int,
         draw: tuple[int, int],
         count: int,
-        tracks: list[Ellipses],
+        way: Way,
         camera: Camera,
         masks: RoadMasks,
         usable: NDArray[np.bool_],
     ) -> Region:
         config = self.config
         low, high = config.ranges_m[index]
-        ellipses = tuple(track.within(low, high) for track in tracks)
+        ellipses = tuple(track.within(low, high) for track in way.tracks)
         if config.use_trajectory:
             corners = classify_corners(corners_in_ellipses(ellipses, config.a_m), camera, usable)
         else:
@@ -260,15 +221,34 @@ class Ife:
             # Without ellipses the group is the drivable road: what lies beside it is no loss of usable area.
             road = classify_corners(ground, camera, masks.drivable > MASK_THRESHOLD)
             corners = classify_corners(road.ground_m[road.usable], camera, usable)
-        key = (config.seed, *draw, list(SIDES).index(config.side))
-        drawn = sample(corners, count, key)
-        ground_m = corners.ground_m[drawn]
+        drawn = sample(corners, count, (config.seed, *draw, list(SIDES).index(config.side)))
         widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, len(drawn))
-        widths = roi_widths_px(camera, ground_m, widths_m)
-        centres_px = corners.pixel[drawn]
-        shown_m = shown_ground_m(camera, ground_m, centres_px, widths)
-        ahead_m = way_beside(tracks, shown_m) if config.use_trajectory else shown_m[:, 0]
-        return Region(corners, centres_px, ahead_m, widths, ellipses, len(drawn))
+        return Region.around(corners, drawn, widths_m, way, ellipses, camera)
+
+    def _way(
+        self,
+        state: IfeState,
+        image: NDArray[np.uint8],
+        motion: Motion,
+        camera: Camera,
+        tracks: list[Ellipses],
+    ) -> Way:
+        """The way with the lines across it up to the middle group's end, seen in this frame or passed since.
+
+        A line is one of the road where it was seen before at the same place: the rear of a car ahead is not.
+        """
+        config = self.config
+        if not config.use_lines or motion.way_m is None:
+            return Way(tuple(tracks))
+        known_m = np.array(state.lines_m) - motion.way_m
+        near_m, end_m = config.ranges_m[0][0], config.ranges_m[1][1]
+        curvature = path_curvature(motion, config.wheelbase_m)
+        searched_m = (max(near_m - BEFORE_NEAR_M, 0.0), end_m)
+        seen_m = lines_across(image, camera, searched_m, curvature, config.wheelbase_m, known_m)
+        same = np.abs(seen_m[:, None] - known_m) <= KNOWN_WITHIN_M
+        again = same.any(axis=1)
+        hidden_m = known_m[~same.any(axis=0) & (known_m >= self._reach_m[0]) & (known_m < near_m + HIDDEN_M)]
+        return Way(tuple(tracks), np.sort(np.append(hidden_m, seen_m[again])), seen_m[~again])
 
     def _tracks(self, motion: Motion, groups: int) -> list[Ellipses]:
         config = self.config
@@ -308,7 +288,12 @@ class Ife:
         ]
 
     def _fuse(
-        self, index: int, before: EvidenceState, region: Region, seen_before: NDArray[np.float64]
+        self,
+        index: int,
+        before: EvidenceState,
+        region: Region,
+        seen_before: NDArray[np.float64],
+        say: NDArray[np.float64],
     ) -> tuple[EvidenceState, GroupResult]:
         """Evidence weights and verdict of one group, Eqs. (7) to (10).
 
@@ -320,7 +305,7 @@ class Ife:
         if n_roi > 1:
             after = update_weights(before, probabilities.argmax(axis=1), config.weight_law)
             weights = after.weights if config.weight_evidence else EvidenceState().weights
-            mass = basic_probability(probabilities, weights)
+            mass = basic_probability(probabilities, weights, say)
             m_0, fused = float(mass.max()), combine(mass, n_roi)
         else:
             m_0 = 0.0
@@ -381,14 +366,10 @@ def _view(
     for region in regions:
         outlines = [ellipses.outlines_m() for ellipses in region.ellipses]
         stacked = np.concatenate(outlines) if outlines else np.empty((0, 32, 2))
-        boxes = [
-            roi_box(camera.width_px, camera.height_px, centre, width)
-            for centre, width in zip(region.centres_px, region.widths_px, strict=True)
-        ]
         groups.append(
             GroupView(
                 camera.ground_to_image(stacked.reshape(-1, 2)).reshape(stacked.shape),
-                np.array(boxes, dtype=np.int64).reshape(-1, 4),
+                region.boxes,
                 region.probabilities,
             )
         )

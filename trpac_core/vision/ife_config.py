@@ -94,6 +94,7 @@ class IfeConfig:
     weight_evidence: bool = True
     use_scene: bool = True
     use_foresight: bool = True
+    use_lines: bool = True
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict themselves, all at once; raises ValueError."""

@@ -18,6 +18,8 @@ LEAST_ROI_WIDTH_PX = 48
 """Narrower regions hold too little texture; they are widened to this [px]."""
 
 ROI_ASPECT = PATCH_WIDTH_PX / PATCH_HEIGHT_PX
+MOST_ASPECT = 3.0
+"""Width over height up to which the network has learned from regions [-]."""
 _PROBE_M = 0.1
 
 
@@ -198,36 +200,57 @@ def roi_box(
     return left, top, left + columns, top + rows
 
 
-def shown_ground_m(
+def roi_boxes(
     camera: Camera,
-    ground_m: NDArray[np.float64],
     centres_px: NDArray[np.float64],
     widths_px: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Ground in the middle of the regions around ground points: at the picture's edge they are shifted inwards.
+    rows_px: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """Regions around pixels, none of them across the rows at which its road ends.
 
     Parameters
     ----------
     camera : Camera
         Of the picture's own size.
-    ground_m : array, shape (n, 2)
-        The points, x and y in vehicle axes; they stand for a middle above the horizon [m].
     centres_px : array, shape (n, 2)
-        Their pixels [px].
+        Columns and rows [px].
     widths_px : array, shape (n,)
-        Widths of the regions: see `roi_widths_px` [px].
+        Widths: see `roi_widths_px` [px].
+    rows_px : array, shape (n, 2)
+        Rows between which each region's road lies, from above [px]. A region is shifted to lie between them, and made
+        lower, and narrower in the end, where they leave no room; where they leave too little, it lies across.
 
     Returns
     -------
-    array, shape (n, 2)
-        [m]
+    array, shape (n, 4)
+        Left, top, right, bottom [px].
     """
     boxes = [
-        roi_box(camera.width_px, camera.height_px, centre, width)
-        for centre, width in zip(centres_px, widths_px, strict=True)
+        _between(roi_box(camera.width_px, camera.height_px, centre, width), camera.height_px, *ends)
+        for centre, width, ends in zip(centres_px, widths_px, rows_px, strict=True)
     ]
-    left_top, right_bottom = np.split(np.array(boxes, np.float64).reshape(-1, 4), 2, axis=1)
-    middle_m = camera.image_to_ground((left_top + right_bottom - 1.0) / 2.0)
+    return np.array(boxes, np.int64).reshape(-1, 4)
+
+
+def _between(
+    box: tuple[int, int, int, int], picture_height_px: int, upper_px: float, lower_px: float
+) -> tuple[int, int, int, int]:
+    left, top, right, bottom = box
+    first, end = int(np.ceil(max(upper_px, 0.0))), int(np.floor(min(lower_px, picture_height_px)))
+    rows = min(bottom - top, end - first)
+    columns = min(right - left, round(MOST_ASPECT * rows))
+    if columns < LEAST_ROI_WIDTH_PX:
+        return box
+    top, left = min(max(top, first), end - rows), left + (right - left - columns) // 2
+    return left, top, left + columns, top + rows
+
+
+def middle_ground_m(
+    camera: Camera, ground_m: NDArray[np.float64], boxes: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Ground in the middle of regions, shape (n, 2); the point a region was laid around if that is no ground [m]."""
+    middle_px = np.asarray(boxes[:, :2] + boxes[:, 2:] - 1, np.float64) / 2.0
+    middle_m = camera.image_to_ground(middle_px)
     return np.where(np.isnan(middle_m), ground_m, middle_m)
 
 

@@ -1,0 +1,206 @@
+"""One group of road ahead: its ground, the patches drawn from it, and how much ground each of them stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import Camera
+from .classes import Surface
+from .evidence import combine
+from .regions import Corners, cut_box, middle_ground_m, project, roi_boxes, roi_widths_px
+from .trajectory import Ellipses, way_beside
+
+LEAST_CONTRAST = 1.0
+"""Standard deviation of a patch's grey levels below which it shows no road but a covered, blinded or dark camera. The
+lowest of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
+
+BODIES_OF_SECTION = 2
+"""Bodies of evidence as which Eq. (7) combines the patches on one side of a line: they share light, camera and road."""
+
+CORNERS_THINNED = 20
+"""One of so many corners tells how much ground lies between two lines [-]."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """The wheels' way, and the lines that cross it.
+
+    Attributes
+    ----------
+    tracks : tuple of Ellipses
+        Of the wheels; without any, the way leads straight ahead.
+    lines_m : array, shape (n,)
+        Where lines cross the road, ascending [m].
+    doubtful_m : array, shape (m,)
+        Where something looked like one for the first time [m].
+    """
+
+    tracks: tuple[Ellipses, ...]
+    lines_m: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    doubtful_m: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+
+    def lines_from(self, way_m: float | None) -> tuple[float, ...]:
+        """All lines as ways of the front wheels, which have come so far; none where that is not known [m]."""
+        return () if way_m is None else tuple((way_m + np.append(self.lines_m, self.doubtful_m)).tolist())
+
+    def to(self, ground_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far along the way ground points lie, shape (n,) [m]."""
+        return way_beside(self.tracks, ground_m) if self.tracks and len(ground_m) else ground_m[:, 0]
+
+    def section(self, places_m: NDArray[np.float64]) -> NDArray[np.intp]:
+        """How many lines lie before each place on the way, shape (n,)."""
+        return np.searchsorted(self.lines_m, places_m, side="right")
+
+    def rows_of_ends_px(self, ground_m: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+        """Rows of the lines beyond and before each ground point, shape (n, 2); infinite where there is none [px]."""
+        rows_px = np.full((len(ground_m), 2), (-np.inf, np.inf))
+        if len(self.lines_m) and len(ground_m):
+            places_m = self.to(ground_m)
+            before = self.section(places_m)
+            ends_m = np.concatenate(([-np.inf], self.lines_m, [np.inf]))
+            for column, end_m in enumerate((ends_m[before + 1], ends_m[before])):
+                known = np.isfinite(end_m)
+                on_line_m = ground_m[known] + np.outer((end_m - places_m)[known], (1.0, 0.0))
+                rows_px[known, column] = project(on_line_m, camera)[:, 1]
+        return rows_px
+
+
+@dataclass(frozen=True)
+class Region:
+    """One group on its way: its corners, the patches drawn from them, and what those that can be read show.
+
+    Attributes
+    ----------
+    corners : Corners
+        The group's ground.
+    way : Way
+        On which it lies.
+    ellipses : tuple of Ellipses
+        Of the wheels in it.
+    drawn : int
+        Patches that were drawn.
+    boxes : array of int, shape (n, 4)
+        Of those left: left, top, right, bottom [px].
+    ahead_m : array, shape (n,)
+        Where the middle of each lies on the way [m].
+    patches : tuple of n arrays of uint8, shape (64, 96, 3)
+        BGR.
+    probabilities : array, shape (n, 3)
+        Calibrated [-].
+    """
+
+    corners: Corners
+    way: Way
+    ellipses: tuple[Ellipses, ...]
+    drawn: int
+    boxes: NDArray[np.int64]
+    ahead_m: NDArray[np.float64]
+    patches: tuple[NDArray[np.uint8], ...] = ()
+    probabilities: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, len(Surface))))
+
+    @classmethod
+    def around(
+        cls,
+        corners: Corners,
+        drawn: NDArray[np.intp],
+        widths_m: NDArray[np.float64],
+        way: Way,
+        ellipses: Sequence[Ellipses],
+        camera: Camera,
+    ) -> Region:
+        """A region with patches of these widths around the corners drawn, each on its side of the way's lines."""
+        ground_m = corners.ground_m[drawn]
+        widths_px = roi_widths_px(camera, ground_m, widths_m)
+        ends_px = way.rows_of_ends_px(ground_m, camera)
+        boxes = roi_boxes(camera, corners.pixel[drawn], widths_px, ends_px)
+        ahead_m = way.to(middle_ground_m(camera, ground_m, boxes))
+        return cls(corners, way, tuple(ellipses), len(drawn), boxes, ahead_m)
+
+    def seen_in(self, image: NDArray[np.uint8]) -> Region:
+        """The region with the patches cut, those without contrast left out."""
+        cut = tuple(cut_box(image, (left, top, right, bottom)) for left, top, right, bottom in self.boxes)
+        contrast = np.array([cv2.meanStdDev(patch)[1].max() for patch in cut])
+        return replace(self, patches=cut).keeping(contrast >= LEAST_CONTRAST)
+
+    def keeping(self, kept: NDArray[np.bool_]) -> Region:
+        """The region with some of its patches."""
+        return replace(
+            self,
+            boxes=self.boxes[kept],
+            ahead_m=self.ahead_m[kept],
+            patches=tuple(patch for patch, keep in zip(self.patches, kept, strict=True) if keep),
+        )
+
+    @property
+    def p_util(self) -> float:
+        """Share of the road looked at that is of use [-]: corners that are usable, times patches that can be read.
+
+        The paper's is the first alone; the second takes covered lenses, walls and night skies below the flag's gate:
+        `docs/camera_scores.md` tells what it holds back.
+        """
+        read = len(self.probabilities) / self.drawn if self.drawn else 1.0
+        return self.corners.p_util * read
+
+    def say(self, places_m: NDArray[np.float64], inside: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """How much of the group's ground each patch stands for: those on one side of a line share what lies there.
+
+        Parameters
+        ----------
+        places_m : array, shape (n,)
+            Where patches lie on the way, the region's own first [m].
+        inside : array of bool, shape (n,)
+            Which of them count as the group's. Where none lies on a side, the closest to the line does.
+
+        Returns
+        -------
+        array, shape (n,)
+            In corners, 0 where a patch has no say; 1 for each of the group's where no line crosses the way [-].
+        """
+        if not len(self.way.lines_m):
+            return inside.astype(np.float64)
+        thinned_m = self.way.to(self.corners.ground_m[::CORNERS_THINNED])
+        ground = np.bincount(self.way.section(np.concatenate((thinned_m, self.ahead_m))))
+        sections = self.way.section(places_m)
+        said = np.zeros(len(places_m))
+        for section in np.flatnonzero(ground).tolist():
+            there = sections == section
+            heard = there & inside
+            if there.any() and not heard.any():
+                line_m = self.way.lines_m[max(section - 1, 0)]
+                heard[np.where(there, np.abs(places_m - line_m), np.inf).argmin()] = True
+            said[heard] = ground[section] / max(np.count_nonzero(heard), 1)
+        return said
+
+    def by_section(
+        self, places_m: NDArray[np.float64], probabilities: NDArray[np.float64], say: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """What each patch shows, combined with those heard on its side of a line where the group has more than one.
+
+        Half the ground is to weigh as half the ground, also where one of two surfaces is told less surely.
+
+        Parameters
+        ----------
+        places_m, probabilities : array, shapes (n,), (n, 3)
+            Where patches lie on the way [m], and what they show [-].
+        say : array, shape (n,)
+            See `say`.
+
+        Returns
+        -------
+        array, shape (n, 3)
+            Of sum 1 each [-].
+        """
+        sections = self.way.section(places_m)
+        heard = np.unique(sections[say > 0.0])
+        if len(heard) < 2:
+            return probabilities
+        combined = probabilities.copy()
+        for section in heard:
+            there = sections == section
+            combined[there] = combine(probabilities[there & (say > 0.0)].mean(axis=0), BODIES_OF_SECTION)
+        return combined
