@@ -100,7 +100,6 @@ def test_a_net_comes_back_from_its_file_and_is_not_trained_again(tmp_path, monke
         device="cpu",
         threads=2,
         without=("seq_extreme",),
-        other_weather=False,
     )
     monkeypatch.setattr(surface_run, "learn_classes", lambda net, patches, **others: net.eval())
 

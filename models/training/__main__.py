@@ -56,13 +56,6 @@ def main(arguments: list[str] | None = None) -> int:
         choices=LEFT_OUT,
         help=f"sources left out of the surface classifier's training, to be judged on them: {', '.join(LEFT_OUT)}",
     )
-    parser.add_argument(
-        "--other-weather",
-        action="store_true",
-        help="show the surface classifier the dry dash pictures wet and under snow too: for a camera of which there "
-        "are dry pictures alone (its horizon goes into weathered.STANDPOINTS). It finds more wet roads, and takes "
-        "more dry ones of other cameras for wet",
-    )
     given = parser.parse_args(arguments)
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:

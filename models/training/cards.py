@@ -51,7 +51,6 @@ class RunFacts:
     render_s: float
     threads: int
     without: tuple[str, ...] = ()
-    other_weather: bool = False
     versions: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -151,8 +150,6 @@ def surface_card(facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: flo
     )
     calibration = calibration_table(reliabilities, temperature)
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
-    if facts.other_weather:
-        left_out += "Dry dash pictures were shown wet and under snow too (`models/training/weathered.py`). "
     return f"""\
 # surface.onnx
 
@@ -175,7 +172,8 @@ one linear layer.
 Patches are 3:2 to 3:1 wide before they are squeezed to the input, from 48 pixels to nearly the whole width of the road.
 They are mirrored, shifted, zoomed by up to 12 % and seen with the resolution, gain, gamma and white balance of other
 cameras (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones, whose worlds
-have drawn theirs already). {left_out}Classes are drawn equally often and sources within a class by
+have drawn theirs already). Dry pictures of four dash cameras are shown wet and under snow too
+(`models/training/weathered.py`). {left_out}Classes are drawn equally often and sources within a class by
 fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
 weights.
 The trunk learns at two fifths of the others' rate, its first {net.trunk.FROZEN} blocks not at all, nor the statistics

@@ -106,7 +106,6 @@ def _patch_networks(
         render_s=time.monotonic() - start,
         threads=given.threads,
         without=tuple(given.without),
-        other_weather=given.other_weather,
     )
     if given.only in (None, "segmenter"):
         _segmenter(progress, given, facts, rendered)

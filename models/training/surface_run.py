@@ -40,7 +40,7 @@ CUTTING_SEED = 1
 CUTS = 8
 """How often the real pictures are cut, each time at other places."""
 WEATHERS = 4
-"""How often the dry ones among them are shown in other weather where that is asked for, each time in another way."""
+"""How often the dry ones among them are shown in other weather, each time in another way."""
 
 READING_STEPS = 2000
 OUTLIERS = {"train": 12000, "val": 1600}
@@ -165,7 +165,7 @@ def kept_stage(
         return Stage(net, len(seen), count, time.monotonic() - start, on)
 
     left_out = "".join(f"-without-{source}" for source in sorted(given.without))
-    file = f"{name}-{given.seed}{left_out}{'-other-weather' if given.other_weather else ''}.pt"
+    file = f"{name}-{given.seed}{left_out}.pt"
     return kept_or_made(given.kept, file, load=load, make=train, save=save)
 
 
@@ -186,14 +186,14 @@ def _classes(
 
 
 def _cuts(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[PatchSet]:
-    """Patches of these pictures, cut several times, and of the dry ones in other weather where that is asked for."""
+    """Patches of these pictures, cut several times, and of the dry ones in other weather."""
     share = min(given.effort, 1.0)
     seeds = [CUTTING_SEED + number for number in range(max(1, round(share * CUTS)))]
-    cut = [training_patches(pictures, seed) for seed in seeds]
-    if given.other_weather:
-        weathers = seeds[: max(1, round(share * WEATHERS))]
-        cut += [training_patches(weathered(pictures, seed), seed) for seed in weathers]
-    return cut
+    weathers = seeds[: max(1, round(share * WEATHERS))]
+    return [
+        *(training_patches(pictures, seed) for seed in seeds),
+        *(training_patches(weathered(pictures, seed), seed) for seed in weathers),
+    ]
 
 
 def learn_heads(net: SurfaceNet, material: Material, seed: int, effort: float) -> None:

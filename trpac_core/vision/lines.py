@@ -113,7 +113,8 @@ def _bands(
     """Logarithm of the road's brightness along the way, shape (n, BANDS) [-]."""
     columns = BANDS * COLUMNS_OF_BAND
     aside_m = ((np.arange(columns) + 0.5) / columns * 2.0 - 1.0) * HALF_WIDTH_M
-    ground_m = np.stack([wheel_track(ways_m, curvature_1_m, wheelbase_m, y) for y in aside_m], axis=1)
+    middle_m, left_m = (wheel_track(ways_m, curvature_1_m, wheelbase_m, y)[:, None] for y in (0.0, 1.0))
+    ground_m = middle_m + aside_m[:, None] * (left_m - middle_m)
     pixels = project(ground_m.reshape(-1, 2), camera).reshape(len(ways_m), columns, 2).astype(np.float32)
     road = cv2.remap(image, pixels[..., 0], pixels[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     bright = np.log(road.mean(axis=2, dtype=np.float32) + np.float32(DARK))
