@@ -15,11 +15,13 @@ from test_ife import CAMERA, DRY, PAINT, SNOW, WET, Masks, Middle, paint
 
 from trpac_core.vision.evidence import basic_probability, combine
 from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.lines import KNOWN_WITHIN_M
 from trpac_core.vision.networks import PatchVerdicts
 from trpac_core.vision.region import BODIES_OF_SECTION, Region, Way
 from trpac_core.vision.regions import MOST_ASPECT, Corners, roi_box, roi_boxes
 from trpac_core.vision.trajectory import Motion
 
+REACH_M = (0.5, 7.5)
 ROAD = np.ones((160, 256), bool)
 
 
@@ -166,3 +168,16 @@ def test_lines_are_looked_for_from_standstill_too():
     state, result = Ife(CONFIG, Masks(), Middle()).process(IfeState(), road(4.0), Motion(0.0, way_m=0.0))
     assert_allclose(state.lines_m, [4.0], atol=0.05)
     assert result.near.n_roi == 4
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=12), st.integers(0, 2**32 - 1))
+def test_remembered_lines_stay_few_however_the_car_moves(steps_m, seed):
+    rng, small = np.random.default_rng(seed), CAMERA.scaled(0.1)
+    ife, state, way_m = Ife(replace(CONFIG, camera=small), Masks(), Middle()), IfeState(), 0.0
+    for step_m in steps_m:
+        way_m += step_m
+        rows = rng.integers(0, 256, (small.height_px, 1, 1))
+        image = np.broadcast_to(rows, (small.height_px, small.width_px, 3)).astype(np.uint8)
+        state, _ = ife.process(state, np.ascontiguousarray(image), at(way_m))
+        assert len(state.lines_m) <= (REACH_M[1] - REACH_M[0]) / KNOWN_WITHIN_M
+        assert all(way_m + REACH_M[0] <= line < way_m + REACH_M[1] for line in state.lines_m)

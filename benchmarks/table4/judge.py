@@ -31,6 +31,7 @@ VARIANTS: dict[str, Changes] = {
     "several widths": {"roi_spread": 1.7},
     "patches alone": {"use_scene": False},
     "no foresight": {"use_foresight": False},
+    "no lines": {"use_lines": False},
 }
 VOTING = "voting"
 DISTURBANCE_SEED = 5_000_000
