@@ -124,7 +124,7 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--data", type=Path, help="folder of real road pictures; none: rendered drives only")
     parser.add_argument("--models", type=Path, default=ROOT / "models", help="folder of both networks")
-    parser.add_argument("--drives", type=int, default=36, help="rendered drives of 30 frames")
+    parser.add_argument("--drives", type=int, default=96, help="rendered drives of 30 frames")
     parser.add_argument(
         "--out", type=Path, default=Path("out/patch_width"), help="where these and the figure are kept"
     )

@@ -176,6 +176,7 @@ NOT_OFFERED = {
     "vision.calibrate",
     "vision.weight_evidence",
     "vision.use_foresight",
+    "vision.use_lines",
     "vision.use_scene",
     "elastic.coasting",
     "elastic.gentle",
