@@ -30,7 +30,8 @@ def shown(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArra
             )
             for group in result.view.groups
         )
-        result = replace(result, view=replace(result.view, groups=groups))
+        lines_px = factor * result.view.lines_px
+        result = replace(result, view=replace(result.view, groups=groups, lines_px=lines_px))
     return _at_width(annotate(image, result, caption), FILM_PX)
 
 

@@ -23,6 +23,7 @@ from trpac_core.vision.trajectory import Motion
 MODELS = Path(__file__).resolve().parents[1] / "models"
 CLASS_BGR = {Surface.DRY: (60, 160, 240), Surface.WET: (230, 140, 40), Surface.SNOW_ICE: (220, 80, 200)}
 ROAD_BGR, SHADOW_BGR = (90, 200, 90), (200, 90, 90)
+LINE_BGR = (0, 230, 255)
 FLAG_DOWN_BGR = (60, 60, 230)
 NEAR_LINE_PX, FAR_LINE_PX = 5, 2
 TINT = 0.22
@@ -45,7 +46,7 @@ def image_estimator(scenario: Scenario) -> Ife:
 
 
 def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArray[np.uint8]:
-    """The picture with usable road and shadow tinted, ellipses, patches by their class, and the verdict.
+    """The picture with usable road and shadow tinted, ellipses, lines across the road, patches by their class, verdict.
 
     The near group, whose verdict it is, is drawn in thick lines; a bar in the class's colour stands beside the
     verdict, and a red line stands below it where the flag is down.
@@ -59,6 +60,10 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
     for mask, colour in ((result.view.masks.drivable, ROAD_BGR), (result.view.masks.shadow, SHADOW_BGR)):
         inside = cv2.resize(mask, size, interpolation=cv2.INTER_LINEAR) > 0.5
         shown[inside] = ((1.0 - TINT) * shown[inside] + TINT * np.array(colour)).astype(np.uint8)
+    for line in result.view.lines_px:
+        if np.isfinite(line).all():
+            left, right = np.round(line).astype(np.int32).tolist()
+            cv2.line(shown, left, right, LINE_BGR, FAR_LINE_PX, cv2.LINE_AA)
     for number, group in enumerate(result.view.groups):
         for outline in group.outlines_px[::2]:
             if np.isfinite(outline).all():

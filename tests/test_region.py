@@ -117,6 +117,15 @@ def test_without_a_way_no_line_is_known_and_none_is_remembered():
     assert unknown.lines_m == ()
 
 
+def test_the_view_shows_the_lines_over_the_width_that_was_read():
+    ife = Ife(CONFIG, Masks(), Middle())
+    state, first = ife.process(IfeState(), road(4.0), at(5.0), with_view=True)
+    assert first.view.lines_px.shape == (0, 2, 2), "not known yet"
+    _, second = ife.process(state, road(3.5), at(5.5), with_view=True)
+    ((left, right),) = CAMERA.image_to_ground(second.view.lines_px.reshape(-1, 2)).reshape(-1, 2, 2)
+    assert_allclose((left, right), [(3.5, 1.2), (3.5, -1.2)], atol=0.05)
+
+
 def test_a_line_that_parts_nothing_changes_nothing():
     """Dry road that gets a little darker at one place stays dry, as sure as it was."""
 

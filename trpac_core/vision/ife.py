@@ -16,7 +16,7 @@ from .evidence import EvidenceState, basic_probability, combine, update_weights,
 from .foresight import BEHIND_M, Look, due, recalled, within_reach
 from .ife_config import GROUP_NAMES, SIDES, IfeConfig
 from .images import ImageError
-from .lines import KNOWN_WITHIN_M, lines_across
+from .lines import KNOWN_WITHIN_M, ends_m, lines_across
 from .neighbours import among_neighbours
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
 from .region import Region, Way
@@ -118,7 +118,11 @@ class Ife:
         regions = self.classify(regions, image)
         state, result = self.judge(state, motion, regions)
         if with_view:
-            result = replace(result, view=_view(camera, masks, usable, regions[: len(result.groups)]))
+            curvature, wheelbase_m = path_curvature(motion, self.config.wheelbase_m), self.config.wheelbase_m
+            lines_m = ends_m(regions[0].way.lines_m, curvature, wheelbase_m)
+            result = replace(
+                result, view=_view(camera, masks, usable, regions[: len(result.groups)], lines_m)
+            )
         return state, result
 
     def look(
@@ -361,6 +365,7 @@ def _view(
     masks: RoadMasks,
     usable: NDArray[np.bool_],
     regions: list[Region],
+    lines_m: NDArray[np.float64],
 ) -> FrameView:
     groups = []
     for region in regions:
@@ -373,4 +378,5 @@ def _view(
                 region.probabilities,
             )
         )
-    return FrameView(masks, usable, tuple(groups))
+    lines_px = camera.ground_to_image(lines_m.reshape(-1, 2)).reshape(lines_m.shape)
+    return FrameView(masks, usable, tuple(groups), lines_px)

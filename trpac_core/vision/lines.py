@@ -103,6 +103,12 @@ def plainness(brightness: NDArray[np.float64]) -> NDArray[np.float64]:
     return plainest
 
 
+def ends_m(lines_m: NDArray[np.float64], curvature_1_m: float, wheelbase_m: float) -> NDArray[np.float64]:
+    """Ground points at which lines end to the left and to the right of what is read of them, shape (n, 2, 2) [m]."""
+    sides = (wheel_track(lines_m, curvature_1_m, wheelbase_m, y) for y in (HALF_WIDTH_M, -HALF_WIDTH_M))
+    return np.stack(tuple(sides), axis=1)
+
+
 def _bands(
     image: NDArray[np.uint8],
     camera: Camera,

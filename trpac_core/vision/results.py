@@ -55,11 +55,16 @@ class GroupView:
 
 @dataclass(frozen=True)
 class FrameView:
-    """What was looked at in a frame, for a person to see; `usable` is the mask of road out of the shadow."""
+    """What was looked at in a frame, for a person to see.
+
+    `usable` is the mask of road out of the shadow, `lines_px` the ends of the lines across the road, shape (n, 2, 2);
+    NaN where they are not ahead of the lens [px].
+    """
 
     masks: RoadMasks
     usable: NDArray[np.bool_]
     groups: tuple[GroupView, ...]
+    lines_px: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
