@@ -60,10 +60,6 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
     for mask, colour in ((result.view.masks.drivable, ROAD_BGR), (result.view.masks.shadow, SHADOW_BGR)):
         inside = cv2.resize(mask, size, interpolation=cv2.INTER_LINEAR) > 0.5
         shown[inside] = ((1.0 - TINT) * shown[inside] + TINT * np.array(colour)).astype(np.uint8)
-    for line in result.view.lines_px:
-        if np.isfinite(line).all():
-            left, right = np.round(line).astype(np.int32).tolist()
-            cv2.line(shown, left, right, LINE_BGR, FAR_LINE_PX, cv2.LINE_AA)
     for number, group in enumerate(result.view.groups):
         for outline in group.outlines_px[::2]:
             if np.isfinite(outline).all():
@@ -74,6 +70,10 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
             colour = CLASS_BGR[Surface(int(np.argmax(probabilities)))]
             corners = (int(box[0]), int(box[1])), (int(box[2]), int(box[3]))
             cv2.rectangle(shown, *corners, colour, NEAR_LINE_PX if number == 0 else FAR_LINE_PX)
+    for line in result.view.lines_px:
+        if np.isfinite(line).all():
+            left, right = np.round(line).astype(np.int32).tolist()
+            cv2.line(shown, left, right, LINE_BGR, NEAR_LINE_PX, cv2.LINE_AA)
     verdict = (
         f"{result.surface.label}  Q_v {result.Q_v:.2f} (p_util {result.p_util:.2f}, P {result.P_fusion:.2f})"
         f"  flag {int(result.flag)}"
