@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from test_ife import CAMERA, DRY, SNOW, Masks, Middle, paint
 
+from trpac_core.vision import ife as ife_module
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
+from trpac_core.vision.lines import lines_across
 from trpac_core.vision.sides import SidesIfe, SidesState
 from trpac_core.vision.trajectory import Motion
 
@@ -55,6 +57,23 @@ def test_verdicts_are_those_of_two_estimators_bit_by_bit(yaw_rate):
             assert verdict.near == own.near
     for side, one in (("left", state.left), ("right", state.right)):
         assert one.evidence[0] == states[side].evidence[0]
+
+
+def test_lines_across_the_road_are_looked_for_once_and_are_those_of_each_side(monkeypatch):
+    """A border across the road on two frames: the first sees it, the second knows it."""
+    found = []
+    monkeypatch.setattr(ife_module, "lines_across", lambda *a: found.append(1) or lines_across(*a))
+    sides, state = SidesIfe(IfeConfig(camera=CAMERA), Masks(), Middle()), SidesState()
+    alone, own = Ife(IfeConfig(camera=CAMERA, side="right"), Masks(), Middle()), IfeState()
+    for way_m in (0.0, 0.5):
+        picture = paint(lambda x, y, border_m=4.0 - way_m: SPLIT[(x > border_m).astype(int)])
+        motion = Motion(12.0, way_m=way_m)
+        state, _, right = sides.process(state, picture, motion)
+        assert len(found) == 1
+        own, verdict = alone.process(own, picture, motion)
+        assert right.near == verdict.near
+        assert state.left.lines_m == state.right.lines_m == own.lines_m != ()
+        found.clear()
 
 
 def test_state_survives_json():

@@ -19,7 +19,7 @@ from .images import ImageError
 from .lines import KNOWN_WITHIN_M, ends_m, lines_across
 from .neighbours import among_neighbours
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
-from .region import Region, Way
+from .region import Lines, Region, Way
 from .regions import classify_corners, corners_in_ellipses, corners_in_strip, sample
 from .results import FrameResult, FrameView, GroupResult, GroupView
 from .scene import scene_of
@@ -133,15 +133,16 @@ class Ife:
         camera: Camera,
         masks: RoadMasks,
         usable: NDArray[np.bool_],
+        lines: Lines | None = None,
     ) -> list[Region]:
         """Corners and patches in a picture of this camera's size.
 
         One region for each group that has a verdict, and a last one of the middle group's range where a look at it is
-        to be remembered.
+        to be remembered. `lines` are those of this picture, where several estimators share it.
         """
         groups, ahead = self.config.groups_looked_at, self._remembers(state, motion)
         tracks = self._tracks(motion, max(groups, 1 + ahead)) if self.config.use_trajectory else []
-        way = self._way(state, image, motion, camera, tracks)
+        way = Way(tuple(tracks), *(self.lines(state, image, motion, camera) if lines is None else lines))
         wanted = [(index, index, self.config.b[index]) for index in range(groups)]
         wanted += [(1, len(GROUP_NAMES), PATCHES_AHEAD)] * ahead
         return [
@@ -229,21 +230,15 @@ class Ife:
         widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, len(drawn))
         return Region.around(corners, drawn, widths_m, way, ellipses, camera)
 
-    def _way(
-        self,
-        state: IfeState,
-        image: NDArray[np.uint8],
-        motion: Motion,
-        camera: Camera,
-        tracks: list[Ellipses],
-    ) -> Way:
-        """The way with the lines across it up to the middle group's end, seen in this frame or passed since.
+    def lines(self, state: IfeState, image: NDArray[np.uint8], motion: Motion, camera: Camera) -> Lines:
+        """The lines across the road up to the middle group's end, seen now or passed since; and doubtful ones.
 
-        A line is one of the road where it was seen before at the same place: the rear of a car ahead is not.
+        They are the same whichever wheels are looked at. A line is one of the road where it was seen before at the same
+        place: the rear of a car ahead is not.
         """
         config = self.config
         if not config.use_lines or motion.way_m is None:
-            return Way(tuple(tracks))
+            return np.empty(0), np.empty(0)
         known_m = np.array(state.lines_m) - motion.way_m
         near_m, end_m = config.ranges_m[0][0], config.ranges_m[1][1]
         curvature = path_curvature(motion, config.wheelbase_m)
@@ -252,7 +247,7 @@ class Ife:
         same = np.abs(seen_m[:, None] - known_m) <= KNOWN_WITHIN_M
         again = same.any(axis=1)
         hidden_m = known_m[~same.any(axis=0) & (known_m >= self._reach_m[0]) & (known_m < near_m + HIDDEN_M)]
-        return Way(tuple(tracks), np.sort(np.append(hidden_m, seen_m[again])), seen_m[~again])
+        return np.sort(np.append(hidden_m, seen_m[again])), seen_m[~again]
 
     def _tracks(self, motion: Motion, groups: int) -> list[Ellipses]:
         config = self.config

@@ -25,6 +25,9 @@ BODIES_OF_SECTION = 2
 CORNERS_THINNED = 20
 """One of so many corners tells how much ground lies between two lines [-]."""
 
+Lines = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Where lines cross the road, and where something looked like one for the first time: see `Way` [m]."""
+
 
 @dataclass(frozen=True)
 class Way:
