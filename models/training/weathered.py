@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.camera.disturbances import DISPLAY_GAMMA
+from scenarios.camera.renderer import fresnel_reflectance
 from trpac_core.vision.classes import Surface
 
 from .data import Image, Picture, pixel_box
@@ -20,10 +22,6 @@ from .data import Image, Picture, pixel_box
 Light = NDArray[np.float32]
 Range = tuple[float, float]
 
-GAMMA = 2.2
-"""Between bytes and light, of a usual camera [-]."""
-SHINE_HEAD_ON = 0.02
-"""Share of light that water mirrors head-on (refractive index 1.33) [-]."""
 DARKENING: Range = (0.35, 0.8)
 """Share of its light that a wet road still scatters [-]."""
 DEEPENING: Range = (1.0, 1.5)
@@ -166,11 +164,11 @@ def snowed(rng: np.random.Generator, image: Image, road: Light, seen: Standpoint
 
 
 def _light(image: Image) -> Light:
-    return ((np.arange(256, dtype=np.float32) / 255.0) ** np.float32(GAMMA))[image]
+    return ((np.arange(256, dtype=np.float32) / 255.0) ** np.float32(DISPLAY_GAMMA))[image]
 
 
 def _bytes(light: Light) -> Image:
-    return (255.0 * np.clip(light, 0.0, 1.0) ** np.float32(1.0 / GAMMA) + 0.5).astype(np.uint8)
+    return (255.0 * np.clip(light, 0.0, 1.0) ** np.float32(1.0 / DISPLAY_GAMMA) + 0.5).astype(np.uint8)
 
 
 def _below_px(image: Image, seen: Standpoint) -> Light:
@@ -179,9 +177,8 @@ def _below_px(image: Image, seen: Standpoint) -> Light:
 
 
 def _shine(slope: Light) -> Light:
-    """Share of light that water mirrors where the look falls by a slope (Schlick's approximation of Fresnel)."""
-    sine = slope / np.sqrt(1.0 + slope * slope)
-    return SHINE_HEAD_ON + (1.0 - SHINE_HEAD_ON) * (1.0 - sine) ** 5
+    """Share of light that water mirrors where the look falls by a slope."""
+    return fresnel_reflectance(slope / np.sqrt(1.0 + slope * slope)).astype(np.float32)
 
 
 def _mirrored(light: Light, horizon_px: float, blur: float) -> Light:
