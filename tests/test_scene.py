@@ -56,11 +56,10 @@ def test_numbers_of_a_scene_of_known_parts():
     scene[10:, :6] = scene[10:, -6:] = 120
     scene[8:10, :6] = scene[8:10, -6:] = 120
     found = dict(zip(NUMBERS, scene_numbers(PATCH, scene)[0], strict=True))
-    upper = (200 * (320 - 24) + 120 * 24) / 320 / 255
     spread = scene[..., 0].std() / 255 + FLAT
     assert found["patch_brightness"] == pytest.approx(100 / 255)
     assert found["scene_deviation"] == pytest.approx(spread - FLAT)
-    assert found["patch_beyond_upper"] == pytest.approx((100 / 255 - upper) / spread)
+    assert found["patch_beyond_brightest"] == pytest.approx(-100 / 255 / spread)
     assert found["patch_beyond_sides"] == pytest.approx(-20 / 255 / spread)
     assert found["patch_contrast"] == pytest.approx(0.0, abs=1e-12)
     assert [found[k] for k in ("patch_blue", "patch_red", "scene_blue", "scene_red")] == pytest.approx(
@@ -94,7 +93,9 @@ def test_gain_and_offset_of_a_camera_hardly_move_what_a_patch_is_beside_its_scen
     plain = scene_numbers(patches.astype(np.uint8), scene.astype(np.uint8))
     looks = [np.clip(gain * image + offset, 0, 255).astype(np.uint8) for image in (patches, scene)]
     other = scene_numbers(*looks)
-    beside = [NUMBERS.index(name) for name in ("patch_beyond_upper", "patch_beyond_sides", "patch_contrast")]
+    beside = [
+        NUMBERS.index(name) for name in ("patch_beyond_brightest", "patch_beyond_sides", "patch_contrast")
+    ]
     # what is left is FLAT beside a deviation of some 0.15 times the gain, and what clips
     assert other[:, beside] == pytest.approx(plain[:, beside], rel=0.15, abs=0.08)
     assert np.isfinite(other).all()

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import softmax
 from tiny_onnx import write_classifier
 
-from models.training import scene_run
+from models.training import roadside, scene_run
 from models.training.cards import SCENE_BEGIN, SCENE_END
 from models.training.patches import PatchSet
 from models.training.scene_set import SceneSet, all_of, apart, load_scenes, save_scenes, scenes_of_views
@@ -54,6 +54,32 @@ def test_views_keep_their_scene_with_each_patch():
     assert found.scenes[:, 0, 0, 0].tolist() == [10, 10, 10, 30]
     assert len(set(found.patches.pictures[:3])) == 2  # a view's two classes are two pictures
     assert len(all_of([found, found])) == 8
+
+
+def test_roadsides_darken_most_skies_and_leave_the_road_as_it_is():
+    sky, ground = 200, 80
+    open_land = np.full((400, 20, 32, 3), ground, np.uint8)
+    open_land[:, :10] = sky
+    seen = roadside.with_roadsides(open_land, seed=1)
+    assert seen.dtype == np.uint8
+    assert np.array_equal(seen[:, 10:], open_land[:, 10:])
+    assert np.array_equal(seen, roadside.with_roadsides(open_land, seed=1))
+    assert (open_land[:, :10] == sky).all(), "what was given has changed"
+    hidden = (seen[:, :10] != sky).any(axis=-1)
+    overgrown = hidden.any(axis=(1, 2))
+    # 19 of 20 of the sides drawn are at least a column wide: a road with neither is rare
+    assert overgrown.mean() == pytest.approx(roadside.OVERGROWN, abs=0.07)
+    darkest = ground * roadside.MASS[0] * roadside.TINTS[0] * roadside.GRAIN[0]
+    brightest = ground * roadside.MASS[1] * roadside.TINTS[1] * roadside.GRAIN[1]
+    painted = seen[:, :10][hidden]
+    assert darkest - 1.0 <= painted.min() < 0.4 * ground
+    assert 0.8 * brightest < painted.max() <= brightest + 1.0
+    # trees are highest and commonest at the edges, and the sky over the road's end is seen in most pictures
+    often = hidden[overgrown].mean(axis=(0, 1))
+    assert often[0] > 0.5
+    assert often[31] > 0.5
+    assert often[15] < 0.35
+    assert (seen[:, :10] == sky).all(axis=-1).any(axis=(1, 2)).mean() > 0.9
 
 
 def test_regression_stands_where_the_loss_is_least():

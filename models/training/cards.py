@@ -266,8 +266,9 @@ A patch is grey, but the road is packed snow where its verge is as grey. {len(NU
 a patch (`trpac_core/vision/scene.py`) times a matrix are added to its logits; whoever judges patches without their
 picture leaves it out. Learned last, the rest fixed, by multinomial regression with a ridge: {patches} patches of the
 real training pictures and of rendered worlds that the network had not seen (seeds from
-{SEED_RANGES["train"].start + FIRST_SCENE_WORLD}), each with its picture as two undisturbed cameras would show both,
-drawn by the same shares (`python -m models.training --only scene` does this again). Logits per standard deviation:
+{SEED_RANGES["train"].start + FIRST_SCENE_WORLD}; trees and houses painted beside most of their roads,
+`models/training/roadside.py`), each with its picture as two undisturbed cameras would show both, drawn by the same
+shares (`python -m models.training --only scene` does this again). Logits per standard deviation:
 
 {weights}
 

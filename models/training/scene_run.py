@@ -32,6 +32,7 @@ from .rendered import (
     split_views,
     view_patches,
 )
+from .roadside import with_roadsides
 from .scene_set import SceneSet, all_of, load_scenes, save_scenes, scenes_of_pictures, scenes_of_views
 
 WORLDS, PATCHES_PER_WORLD_VIEW = 480, 6
@@ -95,6 +96,7 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
     real = trained_on(pictures, given.without)
     cut = training_patches(real, CUTTING_SEED)
     drawn = kept_or_made(given.kept, f"scenes-{count}.npz", load=load_scenes, make=draw, save=save_scenes)
+    drawn = SceneSet(drawn.patches, with_roadsides(drawn.scenes, CUTTING_SEED))
     return all_of([scenes_of_pictures(cut, real), drawn])
 
 

@@ -1,8 +1,8 @@
 """How bright and how tinted a patch of road is beside the picture that it was cut from.
 
 A patch alone does not tell packed snow at dusk from grey asphalt at noon: both are grey. Beside its picture it does:
-snow is as bright as the verge, wet asphalt mirrors the sky. A few numbers of the whole picture say so, and a linear map
-of them is added to the patch's logits.
+snow is nearly as bright as the sky and as the verge, wet asphalt mirrors the sky. A few numbers of the whole picture
+say so, and a linear map of them is added to the patch's logits.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ SCENE_WIDTH_PX, SCENE_HEIGHT_PX = 32, 20
 """Size of the reduced picture that the numbers are of."""
 FINE_ENOUGH = 8
 """Pixels to each side behind one of the reduced picture: the mean needs no more of a large one."""
-UPPER_ROWS = 10
-"""Rows from the top in which the sky, or what stands against it, is taken to be."""
 SIDE_ROWS, SIDE_COLUMNS = 8, 6
 """Row from which, and columns from the left and right edge within which, the verges are taken to be."""
 GREY_OF_BGR = np.array([0.114, 0.587, 0.299]) / 255.0
@@ -36,7 +34,7 @@ LIMIT = 4.0
 NUMBERS = (
     "patch_brightness",
     "scene_deviation",
-    "patch_beyond_upper",
+    "patch_beyond_brightest",
     "patch_beyond_sides",
     "patch_contrast",
     "patch_blue",
@@ -45,8 +43,9 @@ NUMBERS = (
     "scene_red",
 )
 """What a scene tells of a patch [-]: its brightness in [0, 1] and the picture's deviation of it; in units of the latter
-how much brighter it is than the upper half and than the sides, and its own deviation; blue and red beyond the mean of
-the three channels, over it. But for the first two a camera's gain does not move them, nor exposure by much."""
+how much brighter it is than the picture's brightest part, which is sky wherever there is some to be seen, and than the
+sides, and its own deviation; blue and red beyond the mean of the three channels, over it. But for the first two a
+camera's gain does not move them, nor exposure by much."""
 
 
 def scene_of(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -80,7 +79,7 @@ def scene_numbers(patches: NDArray[np.uint8], scenes: NDArray[np.uint8]) -> NDAr
     columns = [
         brightness,
         deviation,
-        (brightness - scene[:, :UPPER_ROWS].mean(axis=(1, 2))) / (deviation + FLAT),
+        (brightness - scene.max(axis=(1, 2))) / (deviation + FLAT),
         (brightness - sides.mean(axis=(1, 2))) / (deviation + FLAT),
         patch.std(axis=(1, 2)) / (deviation + FLAT),
         *_tint(patches),
