@@ -83,9 +83,12 @@ def chosen(shares: pd.DataFrame) -> float | None:
 
 
 def as_markdown(shares: pd.DataFrame) -> str:
-    """Per least mass a row, per set and scenario a cell: held back / cost (left)."""
+    """Per least mass a row, per set and scenario a cell: held back / cost (left); - where no frame is wrong."""
     cells = shares.assign(
-        cell=[f"{r[HELD_BACK]:.0f} / {r[COST]:.0f} ({r[LEFT]:.1f})" for _, r in shares.iterrows()],
+        cell=[
+            f"{'-' if pd.isna(r[HELD_BACK]) else f'{r[HELD_BACK]:.0f}'} / {r[COST]:.0f} ({r[LEFT]:.1f})"
+            for _, r in shares.iterrows()
+        ],
         column=shares["set"] + ", " + shares["scenario"],
     )
     wide = cells.pivot_table("cell", "least_mass", "column", aggfunc="first", sort=False)
@@ -97,9 +100,9 @@ def as_markdown(shares: pd.DataFrame) -> str:
 
 
 def draw(shares: pd.DataFrame, path: Path) -> None:
-    """Held back against cost, a line per set and scenario, the units' least mass marked."""
+    """Held back against cost, a line per set and scenario with wrong frames, the units' least mass marked."""
     figure, axes = plt.subplots(figsize=(7.0, 4.5), layout="constrained")
-    for (name, scenario), part in shares.groupby(["set", "scenario"], sort=False):
+    for (name, scenario), part in shares.dropna(subset=HELD_BACK).groupby(["set", "scenario"], sort=False):
         (line,) = axes.plot(part[COST], part[HELD_BACK], ".-", label=f"{name}, {scenario}")
         now = part[np.isclose(part["least_mass"], IfeConfig().least_mass)]
         axes.plot(now[COST], now[HELD_BACK], "o", ms=11, mfc="none", color=line.get_color())

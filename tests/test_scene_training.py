@@ -9,7 +9,7 @@ from models.training import roadside, scene_run
 from models.training.cards import SCENE_BEGIN, SCENE_END
 from models.training.patches import PatchSet
 from models.training.scene_set import SceneSet, all_of, apart, load_scenes, save_scenes, scenes_of_views
-from trpac_core.vision.networks import SurfaceClassifier
+from trpac_core.vision.networks import ModelError, SurfaceClassifier
 from trpac_core.vision.scene import NUMBERS
 
 
@@ -142,3 +142,19 @@ def test_kept_scenes_come_back_as_they_were(tmp_path):
     for name, values in vars(made.patches).items():
         np.testing.assert_array_equal(getattr(again.patches, name), values)
     assert [file.name for file in (tmp_path / "kept").iterdir()] == ["scenes.npz"], "no part is left behind"
+
+
+def test_a_head_of_numbers_no_longer_read_is_no_obstacle_to_another(tmp_path):
+    pytest.importorskip("onnx", reason="the training extra is not installed")
+    patch = np.full((1, 64, 96, 3), 90, np.uint8)
+    told = {"temperature": "1.5", "classes": "dry,wet,snow_ice"}
+    plain = write_classifier(tmp_path / "plain.onnx", metadata=told)
+    stale = write_classifier(tmp_path / "stale.onnx", metadata=told | {"scene": '{"numbers": ["gloss"]}'})
+    before = stale.read_bytes()
+    with pytest.raises(ModelError, match="'numbers' must be"):
+        SurfaceClassifier(stale)
+    bare = scene_run.patches_alone(stale, threads=1)
+    assert bare.scene_head is None
+    assert bare.temperature == 1.5
+    assert np.array_equal(bare.verdicts(patch).logits, SurfaceClassifier(plain).verdicts(patch).logits)
+    assert stale.read_bytes() == before

@@ -302,7 +302,9 @@ def draw(measured: Measured, path: Path) -> None:
         axis.set_xlim(-0.6, len(named) + 0.2)
         axis.grid(axis="y", alpha=0.3)
     figure.axes[0].set_ylabel("n_w: wrong frames per 100")
-    figure.axes[0].legend(loc="upper left", fontsize=8)
+    figure.legend(
+        *figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8
+    )
     if measured.missing and measured.not_left_out:
         figure.suptitle("Provisional: the networks were trained on the sources of (a)", fontsize=10)
     figure.savefig(path, dpi=110, metadata={"Software": None})

@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 
-def annotate(path: Path, properties: Mapping[str, str]) -> None:
-    """Set entries of an ONNX file's metadata; others stay."""
+def annotate(path: Path, properties: Mapping[str, str | None]) -> None:
+    """Set entries of an ONNX file's metadata, or with None take them out; others stay."""
     import onnx
 
     model = onnx.load(str(path))
     known = {entry.key: entry.value for entry in model.metadata_props}
-    onnx.helper.set_model_props(model, {**known, **properties})
+    told = {key: value for key, value in {**known, **properties}.items() if value is not None}
+    onnx.helper.set_model_props(model, told)
     onnx.save(model, str(path))
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import re
+import shutil
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,9 +60,8 @@ def ship_scene(
     file: Path, given: argparse.Namespace, pictures: Sequence[Picture], worlds: dict[str, int], steps: Steps
 ) -> dict[str, Judged]:
     """Learn the scene's head of a network file, calibrate it anew, and write both into the file and its card."""
-    classifier = SurfaceClassifier(file, given.threads)
     train = gather(given, pictures, steps)
-    head = learn_head(classifier, train, given.seed)
+    head = learn_head(patches_alone(file, given.threads), train, given.seed)
     annotate(file, {"scene": head.to_text()})
     classifier = SurfaceClassifier(file, given.threads)
     judged = judged_sets(given, pictures, worlds, steps)
@@ -75,6 +76,14 @@ def ship_scene(
     text = card.read_text(encoding="utf-8")
     cards.write_card(card, with_section(text, section, sha256_of(file), temperature))
     return found
+
+
+def patches_alone(file: Path, threads: int) -> SurfaceClassifier:
+    """A network without what a scene adds so far, which may be of numbers that are read no longer."""
+    with TemporaryDirectory() as folder:
+        bare = Path(shutil.copy(file, folder))
+        annotate(bare, {"scene": None})
+        return SurfaceClassifier(bare, threads)
 
 
 def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps) -> SceneSet:
