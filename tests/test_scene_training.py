@@ -1,5 +1,7 @@
 """How the scene's head is learned: patches and pictures seen alike, the regression, the card."""
 
+import argparse
+
 import numpy as np
 import pytest
 from scipy.special import softmax
@@ -80,6 +82,20 @@ def test_roadsides_darken_most_skies_and_leave_the_road_as_it_is():
     assert often[31] > 0.5
     assert often[15] < 0.35
     assert (seen[:, :10] == sky).all(axis=-1).any(axis=(1, 2)).mean() > 0.9
+
+
+def test_roadsides_are_painted_beside_rendered_roads_alone(monkeypatch):
+    real, drawn = scene_set([70] * 40, [90] * 40, source="clip"), scene_set([70] * 40, [120] * 40)
+    monkeypatch.setattr(scene_run, "trained_on", lambda pictures, without: [])
+    monkeypatch.setattr(scene_run, "training_patches", lambda pictures, seed: real.patches)
+    monkeypatch.setattr(scene_run, "scenes_of_pictures", lambda patches, pictures: real)
+    monkeypatch.setattr(scene_run, "kept_or_made", lambda *given, **ways: drawn)
+    given = argparse.Namespace(without=(), effort=1.0, kept=None, threads=1)
+    seen = scene_run.gather(given, [], None)
+    assert np.array_equal(seen.scenes[:40], real.scenes)
+    changed = (seen.scenes[40:] != drawn.scenes).any(axis=(1, 2, 3))
+    assert changed.mean() == pytest.approx(roadside.OVERGROWN, abs=0.2)
+    assert np.array_equal(seen.patches.patches[40:], drawn.patches.patches)
 
 
 def test_regression_stands_where_the_loss_is_least():
