@@ -60,8 +60,9 @@ def ship_scene(
     file: Path, given: argparse.Namespace, pictures: Sequence[Picture], worlds: dict[str, int], steps: Steps
 ) -> dict[str, Judged]:
     """Learn the scene's head of a network file, calibrate it anew, and write both into the file and its card."""
+    alone = patches_alone(file, given.threads)
     train = gather(given, pictures, steps)
-    head = learn_head(patches_alone(file, given.threads), train, given.seed)
+    head = learn_head(alone, train, given.seed)
     annotate(file, {"scene": head.to_text()})
     classifier = SurfaceClassifier(file, given.threads)
     judged = judged_sets(given, pictures, worlds, steps)
