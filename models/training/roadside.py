@@ -50,7 +50,7 @@ def _stand(rng: np.random.Generator, scene: Colours, ground: Colours) -> None:
     tops = np.round(falling + rng.uniform(-1.0, 1.0, len(columns)))
     there = np.zeros(scene.shape[:2], np.bool_)
     there[:FOOT_PX, columns] = np.arange(FOOT_PX)[:, None] >= tops
-    scene[there] = _grained(rng, ground * rng.uniform(*MASS), int(there.sum()))
+    _paint(rng, scene, there, ground * rng.uniform(*MASS))
 
 
 def _overhang(rng: np.random.Generator, scene: Colours, ground: Colours) -> None:
@@ -58,9 +58,9 @@ def _overhang(rng: np.random.Generator, scene: Colours, ground: Colours) -> None
     there = np.zeros(scene.shape[:2], np.bool_)
     rows = int(rng.uniform(1.0, LOWEST_TOP_PX))
     there[:rows] = rng.random((rows, SCENE_WIDTH_PX)) < LEAF_COVER
-    scene[there] = _grained(rng, ground * rng.uniform(*LEAVES), int(there.sum()))
+    _paint(rng, scene, there, ground * rng.uniform(*LEAVES))
 
 
-def _grained(rng: np.random.Generator, colour: Colours, count: int) -> Colours:
-    """A colour with a tint of its own, shape (count, 3), brighter and darker from pixel to pixel."""
-    return colour * rng.uniform(*TINTS, 3) * rng.uniform(*GRAIN, (count, 1))
+def _paint(rng: np.random.Generator, scene: Colours, there: NDArray[np.bool_], colour: Colours) -> None:
+    """Some pixels of a scene, in place, in a colour with a tint of its own, each brighter or darker than it."""
+    scene[there] = colour * rng.uniform(*TINTS, 3) * rng.uniform(*GRAIN, (np.count_nonzero(there), 1))
