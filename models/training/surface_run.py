@@ -19,7 +19,7 @@ from .annotate import sha256_of
 from .data import Image, Picture, judged_groups, of_split, trained_on
 from .export import export_surface
 from .keeping import keep_whole, kept_or_made
-from .nets import SurfaceNet
+from .nets import SurfaceNet, together
 from .outliers import outlier_patches
 from .patches import PatchSet, joined, judged_patches, thinned, training_patches
 from .train_surface import (
@@ -32,6 +32,7 @@ from .train_surface import (
     new_net,
     verdicts_of,
 )
+from .trunk import LITE0, LITE2, Kind
 from .weathered import weathered
 
 CLASS_STEPS = 1200
@@ -41,6 +42,9 @@ CUTS = 8
 """How often the real pictures are cut, each time at other places."""
 WEATHERS = 4
 """How often the dry ones among them are shown in other weather, each time in another way."""
+
+TOWERS = (LITE0, LITE2)
+"""What the classifier's towers begin from."""
 
 READING_STEPS = 2000
 OUTLIERS = {"train": 12000, "val": 1600}
@@ -139,12 +143,13 @@ def kept_stage(
     count: int,
     what: str,
     patches: Callable[[], PatchSet],
+    kind: Kind = LITE0,
 ) -> Stage:
-    """A net from its file in the folder of the command line, or trained on `patches()` for `count` steps and kept."""
+    """A net of one tower from its file in the folder of the command line, or trained on `patches()` and kept."""
 
     def load(file: Path) -> Stage:
         found = torch.load(file, weights_only=True)
-        net = SurfaceNet()
+        net = SurfaceNet([kind])
         net.load_state_dict(found.pop("weights"))
         return Stage(net.eval(), **found)
 
@@ -160,7 +165,7 @@ def kept_stage(
         start = time.monotonic()
         with steps(f"training the {what}", count) as report:
             net = learn_classes(
-                new_net(given.seed), seen, steps=count, seed=given.seed, device=device, report=report
+                new_net(given.seed, kind), seen, steps=count, seed=given.seed, device=device, report=report
             )
         return Stage(net, len(seen), count, time.monotonic() - start, on)
 
@@ -176,13 +181,26 @@ def _classes(
     further: Callable[[], PatchSet],
     steps: Steps,
 ) -> Stage:
-    """The net with its classes learned."""
+    """The net with its classes learned: the towers of several trainings."""
     count = max(2, round(given.effort * CLASS_STEPS))
 
     def patches() -> PatchSet:
         return joined([*_cuts(given, trained_on(pictures, given.without)), worlds, further()])
 
-    return kept_stage(given, "classes", steps, count=count, what="surface classifier", patches=patches)
+    def tower(number: int, kind: Kind) -> Stage:
+        what = f"surface classifier, {number} of {len(TOWERS)}"
+        return kept_stage(
+            given, f"classes-{kind.name}", steps, count=count, what=what, patches=patches, kind=kind
+        )
+
+    stages = [tower(number, kind) for number, kind in enumerate(TOWERS, start=1)]
+    return Stage(
+        together([stage.net for stage in stages]),
+        patches=max(stage.patches for stage in stages),
+        steps=sum(stage.steps for stage in stages),
+        seconds=sum(stage.seconds for stage in stages),
+        device=stages[-1].device,
+    )
 
 
 def _cuts(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[PatchSet]:

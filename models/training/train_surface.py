@@ -16,6 +16,7 @@ from .data import Image
 from .looks import seen_anew
 from .nets import SurfaceNet
 from .patches import PatchSet, camera_spreads, draw_weights
+from .trunk import LITE0, Kind
 
 BATCH = 256
 """Patches of a step."""
@@ -31,10 +32,10 @@ DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3,
 Report = Callable[[int, float], None]
 
 
-def new_net(seed: int) -> SurfaceNet:
-    """A net with its pretrained trunk, the rest untrained."""
+def new_net(seed: int, kind: Kind = LITE0) -> SurfaceNet:
+    """A net of one tower with its pretrained trunk, the rest untrained."""
     torch.manual_seed(seed)
-    return SurfaceNet(pretrained=True)
+    return SurfaceNet([kind], pretrained=True)
 
 
 def learn_classes(
@@ -50,8 +51,9 @@ def learn_classes(
     if device.type == "cpu":
         net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     average = torch.optim.swa_utils.AveragedModel(net, multi_avg_fn=_running_average, use_buffers=True)
-    learned = [p for p in net.trunk.parameters() if p.requires_grad]
-    new = [p for name, p in net.named_parameters() if p.requires_grad and not name.startswith("trunk.")]
+    parts = {name: p for name, p in net.named_parameters() if p.requires_grad}
+    learned = [p for name, p in parts.items() if ".trunk." in name]
+    new = [p for name, p in parts.items() if ".trunk." not in name]
     rates = [TRUNK_RATE, RATE]
     optimiser = torch.optim.AdamW(
         [{"params": part, "lr": rate} for part, rate in zip((learned, new), rates, strict=True)],
@@ -167,10 +169,10 @@ def learn_softening(net: SurfaceNet, patches: Image, labels: NDArray[np.int64]) 
 
 @torch.no_grad()
 def embeddings(net: SurfaceNet, patches: NDArray[np.uint8]) -> Tensor:
-    """Pooled features of patches (n, 64, 96, 3), shape (n, EMBEDDING)."""
+    """Pooled features of patches (n, 64, 96, 3), shape (n, embedding)."""
     net.eval()
     batches = [net.embed(batch) for batch in _batches(patches)]
-    return torch.cat(batches) if batches else torch.empty((0, net.EMBEDDING))
+    return torch.cat(batches) if batches else torch.empty((0, net.embedding))
 
 
 @torch.no_grad()

