@@ -313,10 +313,11 @@ def test_shuffle_deals_each_group_to_all_groups():
 def test_export_computes_what_was_trained(tmp_path):
     torch = pytest.importorskip("torch", reason="the training extra is not installed")
     from models.training.export import export_picture, export_surface
-    from models.training.nets import SurfaceNet
+    from models.training.nets import SurfaceNet, together
+    from models.training.surface_run import TOWERS
 
     torch.manual_seed(3)
-    net = SurfaceNet().eval()
+    net = together([SurfaceNet([kind]) for kind in TOWERS])
     export_surface(net, 1.25, tmp_path / "surface.onnx")
     network = ort.InferenceSession(str(tmp_path / "surface.onnx"))
     images = random_patches(5)

@@ -95,6 +95,28 @@ def test_a_net_of_several_towers_has_the_mean_of_their_logits():
     assert [tower.trunk.kind for tower in net.towers] == list(surface_run.TOWERS)
 
 
+def test_every_tower_is_trained_on_the_same_patches(monkeypatch):
+    given = argparse.Namespace(kept=None, seed=5, effort=1.0, device="cpu", threads=1, without=())
+    seen, cut = [], []
+
+    def learned(net, patches, *, seed, steps, **others):
+        seen.append((net.towers[0].trunk.kind, patches, seed, steps))
+        return net.eval()
+
+    @contextmanager
+    def steps(what, count):
+        yield None
+
+    monkeypatch.setattr(surface_run, "learn_classes", learned)
+    monkeypatch.setattr(surface_run, "joined", lambda parts: range(9))
+    monkeypatch.setattr(surface_run, "_cuts", lambda given, pictures: cut)
+    stage = surface_run._classes(given, [], None, lambda: cut.append("drawn"), steps)
+    assert seen == [(kind, range(9), 5, surface_run.CLASS_STEPS) for kind in surface_run.TOWERS]
+    assert cut == ["drawn"], "the patches were cut more than once"
+    assert [tower.trunk.kind for tower in stage.net.towers] == list(surface_run.TOWERS)
+    assert (stage.patches, stage.steps) == (9, 2 * surface_run.CLASS_STEPS)
+
+
 def test_training_leaves_the_first_blocks_and_their_statistics_as_they_are():
     net = nets.SurfaceNet(pretrained=True)
     seen = net.towers[0].trunk

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -184,6 +185,7 @@ def _classes(
     """The net with its classes learned: the towers of several trainings."""
     count = max(2, round(given.effort * CLASS_STEPS))
 
+    @functools.cache
     def patches() -> PatchSet:
         return joined([*_cuts(given, trained_on(pictures, given.without)), worlds, further()])
 
