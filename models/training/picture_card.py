@@ -52,9 +52,9 @@ def picture_card(
 
 sha256: `{sha256}`
 
-The net of [surface.onnx](surface.md) without its further heads, {parameters} parameters, trained on looks at most of a
-picture. `trpac vision classify` counts it beside the patches of road. The estimator of a driving car does not use it:
-where the class changes ahead, the picture's is not that of the road under the wheel.
+A net as the first tower of [surface.onnx](surface.md), without its further heads, {parameters} parameters, trained on
+looks at most of a picture. `trpac vision classify` counts it beside the patches of road. The estimator of a driving car
+does not use it: where the class changes ahead, the picture's is not that of the road under the wheel.
 
 - Input `looks`: uint8 (N, 128, 192, 3), BGR, parts of a picture squeezed; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice.

@@ -20,6 +20,7 @@ from .picture_looks import rendered_looks, training_looks
 from .picture_scores import Scores, calibrated
 from .rendered import FIRST_SCENE_WORLD, SEED_RANGES, load_patches, save_patches
 from .surface_run import Steps, kept_stage
+from .trunk import LITE0
 
 PICTURE_STEPS = 375
 WORLDS = 480
@@ -31,7 +32,9 @@ def ship_picture(given: argparse.Namespace, pictures: Sequence[Picture], steps: 
     start = time.monotonic()
     looks = gather(given, pictures, steps)
     count = max(2, round(given.effort * PICTURE_STEPS))
-    stage = kept_stage(given, "picture", steps, count=count, what="picture network", patches=lambda: looks)
+    stage = kept_stage(
+        given, "picture", steps, count=count, what="picture network", patches=lambda: looks, kind=LITE0
+    )
     file = given.out / "picture.onnx"
     export_picture(stage.net, 1.0, file)
     train_s = time.monotonic() - start

@@ -144,7 +144,7 @@ def kept_stage(
     count: int,
     what: str,
     patches: Callable[[], PatchSet],
-    kind: Kind = LITE0,
+    kind: Kind,
 ) -> Stage:
     """A net of one tower from its file in the folder of the command line, or trained on `patches()` and kept."""
 

