@@ -50,11 +50,7 @@ def development_sequences(out: Path, count: int, data: Path | None, bars: Progre
     """Rendered drives of seeds of their own, kept in `out`, and the validation parts of the real clips in `data`."""
     drawing = bars.add_task("rendered drives", total=count)
     drives, _ = rendered_drives(out, count, lambda done, _: bars.update(drawing, completed=done), FIRST_SEED)
-    rendered = [
-        replace(drive, frames=drive.frames[::EVERY], step_m=EVERY * drive.step_m)
-        for drive in drives
-        if drive.step_m
-    ]
+    rendered = [replace(drive, frames=drive.frames[::EVERY]) for drive in drives]
     real = real_sequences(data) if data else []
     return rendered + [part for part in (sequence.validation_part() for sequence in real) if part.frames]
 

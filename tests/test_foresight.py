@@ -113,6 +113,28 @@ def test_what_was_plain_from_afar_mends_a_verdict_from_near():
     assert {r.surface for r in without} == {DRY}
 
 
+class Fickle(Middle):
+    """Takes every patch of some pictures for wet, as a network may against a low sun."""
+
+    def __init__(self, fooled):
+        super().__init__()
+        self.fooled = iter(fooled)
+
+    def verdicts(self, patches, scene=None):
+        found = super().verdicts(patches, scene)
+        return replace(found, logits=found.logits * 0 + (1.0, 2.0, 0.0)) if next(self.fooled) else found
+
+
+def test_pictures_far_apart_are_read_together():
+    """On a dry road, one picture in eight is misread, 10 m from the one before: a surface goes on."""
+    ways_m, fooled = np.arange(0.0, 240.0, 10.0), np.arange(24) % 8 == 5
+    state, results = drive(CONFIG, Fickle(fooled), ways_m, border_m=1e4, before=DRY)
+    assert {r.surface for r in results} == {DRY}
+    _, alone = drive(replace(CONFIG, use_foresight=False), Fickle(fooled), ways_m, border_m=1e4, before=DRY)
+    assert [r.surface for r in alone] == [WET if misread else DRY for misread in fooled]
+    assert state.passed.end_m == pytest.approx(ways_m[-1] + STILL_HEARD_M[0])
+
+
 def test_a_border_stays_where_it_is():
     """Looks at snow beyond a border must not make the dry road before it snow, nor the other way round."""
     ways = np.arange(0.0, 12.0, 0.5)
@@ -131,6 +153,7 @@ def test_a_car_that_stands_or_whose_way_is_unknown_remembers_no_more():
     assert again.looks == state.looks
     unknown, result = ife.process(state, road(100.0), at(None))
     assert unknown.looks == ()
+    assert unknown.passed is None
     assert result.surface == first.surface
     assert state.elsewhere().looks == ()
     assert state.elsewhere().evidence == state.evidence
@@ -147,12 +170,26 @@ def test_verdicts_do_not_depend_on_how_many_groups_have_one():
 
 
 def test_memory_survives_json_and_goes_on_alike():
-    state, _ = drive(CONFIG, Middle(), (0.0, 0.5, 1.0))
-    restored = IfeState.from_json(json.loads(json.dumps(state.to_json())))
-    assert restored == state
-    assert len(state.looks) == 3
+    for ways_m in ((0.0, 0.5, 1.0), (0.0, 5.0, 10.0)):
+        state, _ = drive(CONFIG, Middle(), ways_m)
+        restored = IfeState.from_json(json.loads(json.dumps(state.to_json())))
+        assert restored == state
+        assert len(state.looks) == (3 if ways_m[-1] < 5.0 else 2)
+        assert (state.passed is None) == (ways_m[-1] < 5.0)
+        ife, next_m = Ife(CONFIG, Masks(), Middle()), ways_m[-1] + 0.5
+        assert ife.process(restored, road(5.0), at(next_m)) == ife.process(state, road(5.0), at(next_m))
+
+
+def test_a_car_that_rolls_back_has_not_passed_the_road_before_it():
+    state, _ = drive(CONFIG, Middle(), np.arange(0.0, 12.0, 0.5))
+    assert state.passed.end_m == pytest.approx(11.5 + STILL_HEARD_M[0])
+    assert state.passed.probabilities[WET] > 0.9
     ife = Ife(CONFIG, Masks(), Middle())
-    assert ife.process(restored, road(5.0), at(1.5)) == ife.process(state, road(5.0), at(1.5))
+    little, _ = ife.process(state, road(100.0), at(10.0))
+    assert little.passed == state.passed
+    far, _ = ife.process(state, road(100.0), at(9.0))
+    assert far.passed is None
+    assert state.elsewhere().passed is None
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

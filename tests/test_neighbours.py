@@ -17,7 +17,9 @@ from trpac_core.vision.neighbours import (
     LEAST_PROBABILITY,
     OWN_SHARE,
     SAY,
+    Passed,
     among_neighbours,
+    passed_by,
 )
 
 DRY, WET, DOUBTFUL = (0.9, 0.08, 0.02), (0.1, 0.85, 0.05), (0.3, 0.6, 0.1)
@@ -31,7 +33,7 @@ def drawn(data, ahead_m):
     return found / found.sum(axis=1, keepdims=True)
 
 
-def counted(ahead_m, probabilities, lines_m=()):
+def counted(ahead_m, probabilities, lines_m=(), first_cell=(1.0, 1.0, 1.0)):
     """Sum over all sequences of classes of the cells, each as likely as its changes and what is seen make it."""
     first, last = (int(np.floor(end / CELL_M)) for end in (min(ahead_m), max(ahead_m)))
     ends = {CELL_M * number: CHANGES_PER_M * CELL_M for number in range(first + 1, last + 1)}
@@ -45,6 +47,7 @@ def counted(ahead_m, probabilities, lines_m=()):
         steps = zip(pairwise(classes), changes, strict=True)
         weight = np.prod([1.0 - change if a == b else change / 2.0 for (a, b), change in steps])
         weight *= np.prod([triple[classes[cell]] for cell, triple in zip(cells, likely, strict=True)])
+        weight *= first_cell[classes[0]]
         found[np.arange(len(found)), classes] += weight
     found /= found.sum(axis=1, keepdims=True)
     return OWN_SHARE * probabilities + (1.0 - OWN_SHARE) * found[cells]
@@ -109,3 +112,65 @@ def test_what_lies_far_off_says_less():
 
 def test_nothing_seen_is_nothing_said():
     assert among_neighbours(np.empty(0), np.empty((0, 3))).shape == (0, 3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("way_m", "lines_m"), [(0.0, ()), (4.0, ()), (0.3, (1.9, 2.6)), (60.0, (2.3,))])
+def test_road_passed_counts_as_a_first_cell_that_far_behind(seed, way_m, lines_m):
+    rng = np.random.default_rng(seed)
+    ahead_m = np.append(2.05, rng.uniform(2.05, 2.0 + 5 * CELL_M, 4))
+    probabilities, told = rng.dirichlet((0.5, 0.5, 0.5), 5), rng.dirichlet((0.5, 0.5, 0.5))
+    passed = Passed(2.05 - way_m, tuple(told))
+    # Of many small changes one after the other, as a matrix to a power.
+    step_m, crossed = 1e-3, sum(passed.end_m < line <= 2.05 for line in lines_m)
+    once = changing(CHANGES_PER_M * step_m)
+    moved = told @ np.linalg.matrix_power(once, round(way_m / step_m))
+    moved = moved @ np.linalg.matrix_power(changing(CHANGES_AT_LINE), crossed)
+    found = among_neighbours(ahead_m, probabilities, lines_m, passed)
+    assert_allclose(found, counted(ahead_m, probabilities, lines_m, moved), rtol=1e-4)
+
+
+def changing(change):
+    """How likely each class follows each other."""
+    return np.full((3, 3), change / 2.0) + (1.0 - 1.5 * change) * np.eye(3)
+
+
+@pytest.mark.parametrize("lines_m", [(), (0.6,), (1.4, 2.6)])
+def test_patches_passed_tell_of_the_road_to_come_what_they_would_tell_if_they_were_kept(lines_m):
+    rng = np.random.default_rng(5)
+    ahead_m = np.sort(rng.uniform(0.0, 4.0, 20))
+    probabilities = rng.dirichlet((4.0, 4.0, 4.0), 20)
+    before = ahead_m < 2.0
+    passed = passed_by(None, ahead_m[before], probabilities[before], lines_m, 2.0)
+    apart = among_neighbours(ahead_m[~before], probabilities[~before], lines_m, passed)
+    assert_allclose(apart, among_neighbours(ahead_m, probabilities, lines_m)[~before], atol=2e-4)
+    twice = passed_by(None, ahead_m[:4], probabilities[:4], lines_m, ahead_m[3])
+    twice = passed_by(twice, ahead_m[4:][before[4:]], probabilities[4:][before[4:]], lines_m, 2.0)
+    assert_allclose(twice.probabilities, passed.probabilities, atol=2e-4)
+
+
+def test_road_passed_mends_a_doubtful_patch_the_less_the_longer_ago_it_was():
+    dry = Passed(0.0, (0.98, 0.01, 0.01))
+    heard = [
+        among_neighbours(np.array([way_m]), np.array([DOUBTFUL]), (), dry)[0, 0]
+        for way_m in (0.1, 10.0, 100.0, 1e4)
+    ]
+    assert np.all(np.diff(heard) < 0.0)
+    assert heard[0] > 0.6
+    assert heard[-1] == pytest.approx(among_neighbours(np.array([0.0]), np.array([DOUBTFUL]))[0, 0], abs=1e-6)
+
+
+@given(places, st.data(), st.floats(0.0, 100.0), st.tuples(*[st.floats(0.01, 1.0)] * 3))
+def test_road_passed_is_never_sure(ahead_m, data, further_m, told):
+    passed = Passed(min(ahead_m) - 1.0, tuple(np.array(told) / sum(told)))
+    end_m = max(ahead_m) + further_m
+    found = passed_by(passed, np.array(ahead_m), drawn(data, ahead_m), (), end_m)
+    assert found.end_m == end_m
+    assert sum(found.probabilities) == pytest.approx(1.0)
+    assert min(found.probabilities) >= LEAST_PROBABILITY / (1.0 + 2.0 * LEAST_PROBABILITY)
+
+
+def test_road_passed_without_patches_only_moves_on():
+    assert passed_by(Passed(1.0, (0.5, 0.3, 0.2)), np.empty(0), np.empty((0, 3)), (), 1.0) == Passed(
+        1.0, (0.5, 0.3, 0.2)
+    )

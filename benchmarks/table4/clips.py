@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +44,7 @@ class AssumedSource(BaseModel):
     usable: list[list[int]] = []
     speed_m_s: float
     consecutive: bool
-    interval_s: float | None = None
+    frames_per_s: float = Field(gt=0.0)
 
     def camera(self) -> Camera:
         """The assumed camera of the cropped picture: what the rows below the crop showed is no part of it."""
@@ -58,9 +60,10 @@ class AssumedSource(BaseModel):
             pitch_rad=float(np.arctan((middle - self.horizon_row) / self.fx_px)),
         )
 
-    def step_m(self) -> float | None:
-        """Way from frame to frame in the camera's scale, in which regions are `roi_scale` as wide [m]."""
-        return None if self.interval_s is None else self.roi_scale * self.speed_m_s * self.interval_s
+    def way_m(self, file: Path) -> float:
+        """Way until a frame, by the number at the end of its name; in the camera's scale, as `roi_scale` is [m]."""
+        number = int(re.findall(r"\d+", file.stem)[-1])
+        return self.roi_scale * self.speed_m_s * number / self.frames_per_s
 
     def usable_shares(self) -> tuple[Box, ...]:
         """Parts that may be judged, as shares of the cropped picture."""
@@ -98,12 +101,14 @@ def _clips(pictures: Iterable[Picture], assumed: Iterable[AssumedSource]) -> Ite
                 left_out=source.left_out,
                 camera=source.camera(),
                 motion=Motion(source.speed_m_s),
-                frames=tuple(map(_frame, sorted(by_folder.get(folder, []), key=lambda p: p.path.name))),
+                frames=tuple(
+                    replace(_frame(picture), way_m=source.way_m(picture.path))
+                    for picture in sorted(by_folder.get(folder, []), key=lambda p: p.path.name)
+                ),
                 usable=source.usable_shares(),
                 roi_scale=source.roi_scale,
                 cropped_rows=source.cropped_rows or 0,
                 consecutive=source.consecutive,
-                step_m=source.step_m(),
             )
 
 

@@ -142,6 +142,8 @@ def _sequence(drawn: Plan, folder: Path) -> Sequence:
         left_out="full",
         camera=drawn.camera,
         motion=Motion(drawn.speed_m_s),
-        frames=tuple(Frame(folder / f"{n:03d}.jpg", truth(n)) for n in range(FRAMES)),
-        step_m=STEP_M,
+        frames=tuple(
+            Frame(folder / f"{n:03d}.jpg", truth(n), way_m=float(place))
+            for n, place in enumerate(drawn.places_m)
+        ),
     )

@@ -28,6 +28,8 @@ class Frame:
     truth: Truth
     part: str = ""
     """Part of the source's split ('train', 'val', ...); empty for rendered pictures."""
+    way_m: float | None = None
+    """Way driven until then, where it is known; with assumed cameras as guessed as their speed [m]."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,6 @@ class Sequence:
         False for stills: each is a drive of its own.
     consecutive : bool
         Whether the pictures follow each other at a frame rate.
-    step_m : float, optional
-        Way from frame to frame, of assumed cameras as guessed as their speed [m].
     """
 
     name: str
@@ -69,7 +69,6 @@ class Sequence:
     cropped_rows: int = 0
     memory: bool = True
     consecutive: bool = True
-    step_m: float | None = None
     notes: dict[str, str] = field(default_factory=dict)
 
     def validation_part(self) -> Sequence:
@@ -78,7 +77,7 @@ class Sequence:
 
     def motion_at(self, number: int) -> Motion:
         """The car's motion at a frame."""
-        return self.motion if self.step_m is None else replace(self.motion, way_m=number * self.step_m)
+        return replace(self.motion, way_m=self.frames[number].way_m)
 
     def picture(self, frame: Frame) -> Image:
         """The picture as the estimator gets it, BGR; raises OSError."""

@@ -17,7 +17,7 @@ from .foresight import BEHIND_M, Look, due, recalled, within_reach
 from .ife_config import GROUP_NAMES, SIDES, IfeConfig
 from .images import ImageError
 from .lines import KNOWN_WITHIN_M, ends_m, lines_across
-from .neighbours import among_neighbours
+from .neighbours import Passed, among_neighbours, passed_by
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
 from .region import Lines, Region, Way
 from .regions import classify_corners, corners_in_ellipses, corners_in_strip, sample
@@ -41,16 +41,21 @@ PATCHES_AHEAD = 3
 
 @dataclass(frozen=True)
 class IfeState:
-    """What the estimator remembers: evidence weights per group, frames seen, looks at road that was not near yet."""
+    """What the estimator remembers: evidence weights per group, frames seen, looks at road that was not near yet.
+
+    `lines_m` are ways of the front wheels at lines across the road, and `passed` ends at one: what all of the road
+    before it tells.
+    """
 
     evidence: tuple[EvidenceState, ...] = (EvidenceState(),) * len(GROUP_NAMES)
     frame_count: int = 0
     looks: tuple[Look, ...] = ()
     lines_m: tuple[float, ...] = ()
+    passed: Passed | None = None
 
     def elsewhere(self) -> IfeState:
-        """The state of a car that may be anywhere by now: no road ahead is known."""
-        return replace(self, looks=(), lines_m=())
+        """The state of a car that may be anywhere by now: no road ahead is known, nor what led to it."""
+        return replace(self, looks=(), lines_m=(), passed=None)
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
@@ -59,6 +64,7 @@ class IfeState:
             "frame_count": self.frame_count,
             "looks": [look.to_json() for look in self.looks],
             "lines_m": list(self.lines_m),
+            "passed": None if self.passed is None else self.passed.to_json(),
         }
 
     @classmethod
@@ -66,7 +72,8 @@ class IfeState:
         """The state that `to_json` wrote."""
         evidence = tuple(EvidenceState((dry, wet, snow_ice)) for dry, wet, snow_ice in data["weights"])
         looks = tuple(Look.from_json(look) for look in data["looks"])
-        return cls(evidence, int(data["frame_count"]), looks, tuple(data["lines_m"]))
+        passed = None if data["passed"] is None else Passed.from_json(data["passed"])
+        return cls(evidence, int(data["frame_count"]), looks, tuple(data["lines_m"]), passed)
 
 
 class Ife:
@@ -153,7 +160,8 @@ class Ife:
     def judge(self, state: IfeState, motion: Motion, regions: list[Region]) -> tuple[IfeState, FrameResult]:
         """The state after a frame and its verdict, from the classified regions of `look`."""
         looks = self._remembered(state, motion, regions[-1])
-        near, before, say = self._along_the_road(regions[0], looks, motion)
+        passed = self._passed(state, motion)
+        near, before, say = self._along_the_road(regions[0], looks, passed, motion)
         verdicts = [self._fuse(0, state.evidence[0], near, before, say)]
         for index in range(1, self.config.groups_looked_at):
             own = regions[index]
@@ -163,7 +171,7 @@ class Ife:
         after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
         result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)
         lines_m = regions[0].way.lines_from(motion.way_m)
-        return IfeState(after, state.frame_count + 1, looks, lines_m), result
+        return IfeState(after, state.frame_count + 1, looks, lines_m, passed), result
 
     def _remembers(self, state: IfeState, motion: Motion) -> bool:
         """Whether what the middle group shows in this frame is to be remembered."""
@@ -184,19 +192,36 @@ class Ife:
         """Where remembered patches have a say [m]."""
         return self.config.ranges_m[0][0] - BEHIND_M, self.config.ranges_m[1][1]
 
+    def _passed(self, state: IfeState, motion: Motion) -> Passed | None:
+        """The road before the remembered patches that still have a say each, its end a way of the front wheels."""
+        at_m, low = motion.way_m, self._reach_m[0]
+        if at_m is None or not self.config.use_foresight:
+            return None
+        known = None if state.passed is None else state.passed.seen_from(at_m)
+        if known is not None and known.end_m > low:
+            # The car has rolled back: road that is near again is not passed.
+            return state.passed if known.end_m <= self.config.ranges_m[0][0] else None
+        places_m, probabilities = recalled(state.looks, at_m, (known.end_m if known else -np.inf, low))
+        if known is None and not len(places_m):
+            return None
+        lines_m = np.array(state.lines_m) - at_m
+        return passed_by(known, places_m, probabilities, lines_m, low).seen_from(-at_m)
+
     def _along_the_road(
-        self, near: Region, looks: tuple[Look, ...], motion: Motion
+        self, near: Region, looks: tuple[Look, ...], passed: Passed | None, motion: Motion
     ) -> tuple[Region, NDArray[np.float64], NDArray[np.float64]]:
         """The near group's patches, and what was seen before of its ground, each among its neighbours on the road.
 
         The last array says how much ground each of both stands for.
         """
-        ahead_m, before = recalled(looks, motion.way_m or 0.0, self._reach_m)
+        at_m = motion.way_m or 0.0
+        passed = None if passed is None else passed.seen_from(at_m)
+        ahead_m, before = recalled(looks, at_m, self._reach_m)
         own = len(near.ahead_m)
         places_m = np.concatenate((near.ahead_m, ahead_m))
         probabilities = np.concatenate((near.probabilities, before))
-        if looks:
-            probabilities = among_neighbours(places_m, probabilities, near.way.lines_m)
+        if looks or passed:
+            probabilities = among_neighbours(places_m, probabilities, near.way.lines_m, passed)
         low, high = self.config.ranges_m[0]
         inside = (low <= places_m) & (places_m < high)
         inside[:own] = True

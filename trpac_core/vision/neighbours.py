@@ -2,35 +2,73 @@
 
 The road is a chain of cells whose class seldom changes, and each patch has a say in its own cell: a hidden Markov
 chain, read forwards and backwards. Road behind and ahead speaks for the road between, and a border lies where it fits
-best what is seen on both sides of it.
+best what is seen on both sides of it. What has been passed is not kept patch by patch: all that it tells of the road to
+come is how likely each class is where it ends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .classes import Surface
+
 CELL_M = 0.25
 """Length of a cell [m]."""
-CHANGES_PER_M = 0.01
+CHANGES_PER_M = 0.003
 """How often the class changes where no line across the road is seen [1/m]."""
 CHANGES_AT_LINE = 0.1
 """How often it changes at a line across the road [-]."""
 SAY = 0.3
 """Share of a patch's log probabilities that counts [-]: patches of one road and light are wrong together."""
 LEAST_PROBABILITY = 0.02
-"""No patch says that a class is less likely [-]."""
+"""No patch says that a class is less likely, nor all of the road behind [-]."""
 OWN_SHARE = 0.5
 """How much of a patch's probabilities stays its own [-]: what all patches of a road agree on may be wrong, and the
 chain alone would be sure of it."""
+EVEN = np.full(len(Surface), 1.0 / len(Surface))
+"""Where nothing is known [-]."""
+
+
+@dataclass(frozen=True)
+class Passed:
+    """What all of the road up to a place tells of the class there.
+
+    Attributes
+    ----------
+    end_m : float
+        The place on the way [m].
+    probabilities : tuple of 3 floats
+        Of dry, wet, snow and ice [-].
+    """
+
+    end_m: float
+    probabilities: tuple[float, float, float]
+
+    def seen_from(self, way_m: float) -> Passed:
+        """The same, measured from a place on the way."""
+        return replace(self, end_m=self.end_m - way_m)
+
+    def to_json(self) -> list[Any]:
+        """It as JSON-able values, exact."""
+        return [self.end_m, list(self.probabilities)]
+
+    @classmethod
+    def from_json(cls, data: Sequence[Any]) -> Passed:
+        """What `to_json` wrote."""
+        end_m, (dry, wet, snow_ice) = data
+        return cls(end_m, (dry, wet, snow_ice))
 
 
 def among_neighbours(
     ahead_m: NDArray[np.float64],
     probabilities: NDArray[np.float64],
     lines_m: NDArray[np.float64] | Sequence[float] = (),
+    passed: Passed | None = None,
 ) -> NDArray[np.float64]:
     """Probabilities of each patch, half of them those that its place has by all that is seen of the road.
 
@@ -42,6 +80,8 @@ def among_neighbours(
         Calibrated probabilities of each by itself [-].
     lines_m : array, shape (m,)
         Where lines cross the road, ascending: a class is likelier to end there than elsewhere [m].
+    passed : Passed, optional
+        The road before the patches, on the same way.
 
     Returns
     -------
@@ -50,6 +90,53 @@ def among_neighbours(
     """
     if not len(ahead_m):
         return probabilities
+    seen, changes, cells = _chain(ahead_m, probabilities, lines_m)
+    from_behind = _passed_on(seen, changes, _told(passed, float(ahead_m.min()), lines_m))
+    from_ahead = _passed_on(seen[::-1], changes[::-1], EVEN)[::-1]
+    known = from_behind * seen * from_ahead
+    known /= known.sum(axis=1, keepdims=True)
+    return np.asarray(OWN_SHARE * probabilities + (1.0 - OWN_SHARE) * known[cells])
+
+
+def passed_by(
+    passed: Passed | None,
+    ahead_m: NDArray[np.float64],
+    probabilities: NDArray[np.float64],
+    lines_m: NDArray[np.float64] | Sequence[float],
+    end_m: float,
+) -> Passed:
+    """The road up to a later place, with these patches before it; arguments as of `among_neighbours`."""
+    if len(ahead_m):
+        seen, changes, _ = _chain(ahead_m, probabilities, lines_m)
+        last = _passed_on(seen, changes, _told(passed, float(ahead_m.min()), lines_m))[-1] * seen[-1]
+        passed = _as_passed(float(ahead_m.max()), last / last.sum())
+    return _as_passed(end_m, _told(passed, end_m, lines_m).clip(LEAST_PROBABILITY))
+
+
+def _as_passed(end_m: float, probabilities: NDArray[np.float64]) -> Passed:
+    dry, wet, snow_ice = (probabilities / probabilities.sum()).tolist()
+    return Passed(end_m, (dry, wet, snow_ice))
+
+
+def _told(
+    passed: Passed | None, place_m: float, lines_m: NDArray[np.float64] | Sequence[float]
+) -> NDArray[np.float64]:
+    """What the road passed tells of a place: the less the further on it lies, and the more lines are between [-]."""
+    if passed is None:
+        return EVEN
+    k = len(EVEN)
+    crossed = sum(passed.end_m < line <= place_m for line in lines_m)
+    goes_on = np.exp(-k / (k - 1) * CHANGES_PER_M * max(place_m - passed.end_m, 0.0))
+    goes_on *= (1.0 - k / (k - 1) * CHANGES_AT_LINE) ** crossed
+    return np.asarray(EVEN + goes_on * (np.array(passed.probabilities) - EVEN))
+
+
+def _chain(
+    ahead_m: NDArray[np.float64],
+    probabilities: NDArray[np.float64],
+    lines_m: NDArray[np.float64] | Sequence[float],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+    """Likelihoods of the cells' classes, shape (m, k), changes from each cell to the next, and the patches' cells."""
     first, last = np.floor(np.array((ahead_m.min(), ahead_m.max())) / CELL_M)
     crossed = np.array([line for line in lines_m if ahead_m.min() < line <= ahead_m.max()])
     ends = np.union1d(CELL_M * np.arange(first + 1.0, last + 1.0), crossed)
@@ -59,20 +146,19 @@ def among_neighbours(
     likely = np.log(likely / likely.sum(axis=1, keepdims=True))
     seen = np.zeros((len(ends) + 1, probabilities.shape[1]))
     np.add.at(seen, cells, SAY * likely)
-    seen = np.exp(seen - seen.max(axis=1, keepdims=True))
-    from_behind, from_ahead = _passed_on(seen, changes), _passed_on(seen[::-1], changes[::-1])[::-1]
-    known = from_behind * seen * from_ahead
-    known /= known.sum(axis=1, keepdims=True)
-    return np.asarray(OWN_SHARE * probabilities + (1.0 - OWN_SHARE) * known[cells])
+    return np.exp(seen - seen.max(axis=1, keepdims=True)), changes, cells
 
 
-def _passed_on(seen: NDArray[np.float64], changes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _passed_on(
+    seen: NDArray[np.float64], changes: NDArray[np.float64], first: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Probabilities of each cell's class by the cells before it, from their likelihoods, both of shape (m, k).
 
-    `changes`, shape (m - 1,), is how likely the class changes from each cell to the next [-].
+    `changes`, shape (m - 1,), is how likely the class changes from each cell to the next, `first`, shape (k,), how
+    likely each is in the first [-].
     """
     k = seen.shape[1]
-    passed = np.full(seen.shape, 1.0 / k)
+    passed = np.tile(first, (len(seen), 1))
     for number, change in enumerate(changes / (k - 1), start=1):
         known = passed[number - 1] * seen[number - 1]
         known /= known.sum()
