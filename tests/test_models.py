@@ -317,7 +317,7 @@ def test_export_computes_what_was_trained(tmp_path):
     from models.training.surface_run import TOWERS
 
     torch.manual_seed(3)
-    net = together([SurfaceNet([kind]) for kind in TOWERS])
+    net = together([SurfaceNet([kind]) for kind in TOWERS], list(TOWERS.values()))
     export_surface(net, 1.25, tmp_path / "surface.onnx")
     network = ort.InferenceSession(str(tmp_path / "surface.onnx"))
     images = random_patches(5)

@@ -84,7 +84,7 @@ def test_a_trunk_is_that_of_its_package(kind, shapes):
     assert [tuple(maps.shape[1:]) for maps in read] == shapes
 
 
-def test_a_net_of_several_towers_has_the_mean_of_their_logits():
+def test_a_net_of_several_towers_has_the_weighted_mean_of_their_logits():
     nets_of_one = [train_surface.new_net(seed, kind).eval() for seed, kind in enumerate(surface_run.TOWERS)]
     patches = torch.randint(0, 256, (5, 64, 96, 3), dtype=torch.uint8, generator=generator(8))
     for net in nets_of_one:
@@ -92,10 +92,10 @@ def test_a_net_of_several_towers_has_the_mean_of_their_logits():
         net.norm.running_var = torch.rand(net.embedding, generator=generator(net.embedding)) + 0.5
     with torch.no_grad():
         apart = [net.classifier(net.embed(patches)) for net in nets_of_one]
-        net = nets.together(nets_of_one)
+        net = nets.together(nets_of_one, (3.0, 1.0))
         logits = net.classifier(net.embed(patches))
     assert not net.training
-    assert torch.allclose(logits, sum(apart) / 2.0, atol=1e-4)
+    assert torch.allclose(logits, 0.75 * apart[0] + 0.25 * apart[1], atol=1e-4)
     assert (apart[0] - apart[1]).abs().max() > 0.1
     assert [tower.trunk.kind for tower in net.towers] == list(surface_run.TOWERS)
 

@@ -152,6 +152,7 @@ def surface_card(facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: flo
     kinds = [tower.trunk.kind for tower in net.towers]
     towers = ", ".join(f"the first {kind.blocks} blocks of {kind.name}" for kind in kinds)
     frozen = " or ".join(str(kind.frozen) for kind in kinds)
+    weights = " : ".join(f"{say:g}" for say in stage.says)
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
     return f"""\
 # surface.onnx
@@ -162,7 +163,7 @@ Towers side by side: {towers}. Each trunk has learned
 to see from other pictures (ImageNet weights, Apache-2.0); two units of ShuffleNet stand on it (grouped 1x1 convolutions
 with {net.towers[0].GROUPS} groups, channel shuffle, depthwise 3x3; ref. [22] of Tian et al. 2022). {parameters}
 parameters. Mean and deviation of four maps of each tower feed one linear layer. The towers are trained one by one, and
-the logits are the mean of theirs.
+the logits are the mean of theirs, weighted {weights}.
 
 - Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).

@@ -245,8 +245,8 @@ class SurfaceNet(nn.Module):
         return self.soft_logits(embedding), torch.sigmoid(self.readable(embedding))
 
 
-def together(nets: Sequence[SurfaceNet]) -> SurfaceNet:
-    """The towers of several nets in one, whose logits are the mean of theirs; the other heads are yet to be taught.
+def together(nets: Sequence[SurfaceNet], says: Sequence[float]) -> SurfaceNet:
+    """The towers of several nets in one, whose logits are the weighted mean of theirs; other heads are yet to be taught.
 
     Nets that began from unlike trunks err on unlike patches, so the mean is better than each and less sure of what it
     does not know. Source: Lakshminarayanan et al. 2017, Simple and scalable predictive uncertainty estimation.
@@ -256,6 +256,8 @@ def together(nets: Sequence[SurfaceNet]) -> SurfaceNet:
     with torch.no_grad():
         whole.norm.running_mean = torch.cat([net.norm.running_mean for net in nets])
         whole.norm.running_var = torch.cat([net.norm.running_var for net in nets])
-        whole.classifier.weight.copy_(torch.cat([net.classifier.weight for net in nets], dim=1) / len(nets))
-        whole.classifier.bias.copy_(torch.stack([net.classifier.bias for net in nets]).mean(dim=0))
+        shares = torch.tensor(says) / sum(says)
+        read = [share * net.classifier.weight for share, net in zip(shares, nets, strict=True)]
+        whole.classifier.weight.copy_(torch.cat(read, dim=1))
+        whole.classifier.bias.copy_(shares @ torch.stack([net.classifier.bias for net in nets]))
     return whole.eval()

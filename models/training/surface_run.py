@@ -44,8 +44,8 @@ CUTS = 8
 WEATHERS = 4
 """How often the dry ones among them are shown in other weather, each time in another way."""
 
-TOWERS = (LITE0, LITE2)
-"""What the classifier's towers begin from."""
+TOWERS = {LITE0: 2.0, LITE2: 1.0}
+"""What the classifier's towers begin from, and how much the logits of each count beside the others'."""
 
 READING_STEPS = 2000
 OUTLIERS = {"train": 12000, "val": 1600}
@@ -121,13 +121,14 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], rendered: dic
 
 @dataclass(frozen=True)
 class Stage:
-    """A net that has learned its classes, and how that came about."""
+    """A net that has learned its classes, how that came about, and how much each tower's logits count."""
 
     net: SurfaceNet
     patches: int
     steps: int
     seconds: float
     device: str
+    says: tuple[float, ...] = (1.0,)
 
     def told(self) -> str:
         """The effort in words, for the card."""
@@ -195,13 +196,17 @@ def _classes(
             given, f"classes-{kind.name}", steps, count=count, what=what, patches=patches, kind=kind
         )
 
-    stages = [tower(number, kind) for number, kind in enumerate(TOWERS, start=1)]
+    stages, says = (
+        [tower(number, kind) for number, kind in enumerate(TOWERS, start=1)],
+        tuple(TOWERS.values()),
+    )
     return Stage(
-        together([stage.net for stage in stages]),
+        together([stage.net for stage in stages], says),
         patches=max(stage.patches for stage in stages),
         steps=sum(stage.steps for stage in stages),
         seconds=sum(stage.seconds for stage in stages),
         device=stages[-1].device,
+        says=says,
     )
 
 
