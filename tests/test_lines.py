@@ -1,4 +1,4 @@
-"""Lines across the road: found where brightness steps over the whole width, and nowhere else."""
+"""Lines across the road: found where brightness or tint steps over the whole width, and nowhere else."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from trpac_core.vision.lines import (
     HALF_WIDTH_M,
     KNOWN_PLAINNESS,
     LEAST_PLAINNESS,
-    NOISE,
     SAMPLE_M,
     SIDE_M,
     SLANTS,
@@ -64,6 +63,39 @@ def test_a_border_is_found_on_a_curve_and_aslant(curvature_1_m, slant_rad):
     assert_allclose(lines(picture(grey), curvature_1_m), [way_m], atol=0.1)
 
 
+def tinted(image, beyond, blue_over_red):
+    """The picture with more blue and less red where a function of the ground point says, as bright as before."""
+    there = beyond(*ground(CAMERA).T).reshape(CAMERA.height_px // 2, CAMERA.width_px // 2)
+    there = there.repeat(2, axis=0).repeat(2, axis=1)[..., None]
+    factor = np.array([blue_over_red, 1.0, 1.0 / blue_over_red])
+    shifted = np.where(there, image * factor, image.astype(float))
+    shifted *= image.mean(axis=2, keepdims=True) / shifted.mean(axis=2, keepdims=True)
+    return np.round(shifted).astype(np.uint8)
+
+
+@pytest.mark.parametrize("blue_over_red", [0.97, 1.03])
+def test_a_border_as_bright_on_both_sides_is_found_by_its_tint(blue_over_red):
+    image = tinted(picture(lambda x, y: np.full_like(x, 110.0)), lambda x, y: x > 4.2, blue_over_red)
+    assert_allclose(lines(image), [4.2], atol=0.05)
+
+
+def test_a_tint_that_changes_over_half_of_the_lane_is_no_line():
+    image = tinted(picture(lambda x, y: np.full_like(x, 110.0)), lambda x, y: (x > 4.2) & (y > 0.0), 1.03)
+    assert not len(lines(image))
+
+
+@pytest.mark.parametrize(("step", "found"), [(1.03, 0), (1.06, 1)])
+def test_on_a_road_without_grain_a_faint_step_of_brightness_is_no_line(step, found):
+    image = picture(lambda x, y: np.where(x < 4.2, 150.0, 150.0 * step), grain=0.0)
+    assert len(lines(image)) == found
+
+
+@pytest.mark.parametrize(("step", "found"), [(1.01, 0), (1.03, 1)])
+def test_on_a_road_without_grain_a_faint_step_of_tint_is_no_line(step, found):
+    even = picture(lambda x, y: np.full_like(x, 150.0), grain=0.0)
+    assert len(lines(tinted(even, lambda x, y: x > 4.2, step**0.5))) == found
+
+
 def blotches(x, y):
     """Puddles: brighter where waves of different ways add up."""
     waves = np.sin(5.0 * x + 1.0) + np.sin(4.0 * y + 2.0 * x) + np.sin(7.0 * y - 3.0 * x + 0.5)
@@ -100,9 +132,9 @@ def stepped(step, scatter, rows=80, bands=12):
 
 
 def test_plainness_is_the_step_over_its_standard_error():
-    found = plainness(stepped(0.2, 0.1))
+    found = plainness(stepped(0.2, 0.1), 0.03)
     assert found.argmax() == 40
-    assert found.max() == pytest.approx(0.2 / (0.1 / np.sqrt(12) + NOISE))
+    assert found.max() == pytest.approx(0.2 / (0.1 / np.sqrt(12) + 0.03))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -119,9 +151,9 @@ def test_plainness_counted_out_one_by_one(seed):
                 at = min(max(row + round(slant * aside / SAMPLE_M), side), rows - side)
                 before, after = brightness[at - side : at, band], brightness[at : at + side, band]
                 steps.append(after.mean() - before.mean())
-            plain = abs(np.mean(steps)) / (np.std(steps) / np.sqrt(bands) + NOISE)
+            plain = abs(np.mean(steps)) / (np.std(steps) / np.sqrt(bands) + 0.02)
             expected[row] = max(expected[row], plain)
-    assert_allclose(plainness(brightness), expected, atol=1e-9)
+    assert_allclose(plainness(brightness, 0.02), expected, atol=1e-9)
 
 
 def test_a_line_seen_before_may_be_fainter():
