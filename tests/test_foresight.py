@@ -16,6 +16,7 @@ from test_ife import CAMERA, DRY, SNOW, WET, Masks, Middle, paint
 from trpac_core.vision.foresight import BEHIND_M, LOOK_EVERY_M, Look, due, recalled, within_reach
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
+from trpac_core.vision.neighbours import passed_by
 from trpac_core.vision.regions import sample
 from trpac_core.vision.sides import SidesIfe, SidesState
 from trpac_core.vision.trajectory import Motion
@@ -178,6 +179,19 @@ def test_memory_survives_json_and_goes_on_alike():
         assert (state.passed is None) == (ways_m[-1] < 5.0)
         ife, next_m = Ife(CONFIG, Masks(), Middle()), ways_m[-1] + 0.5
         assert ife.process(restored, road(5.0), at(next_m)) == ife.process(state, road(5.0), at(next_m))
+
+
+def test_each_patch_passed_counts_once_and_lines_passed_count_too():
+    """What is carried on is what all patches passed, kept to the end, would tell."""
+    ife, state, looks = Ife(CONFIG, Masks(), Middle(certainty=0.4)), IfeState(), {}
+    for way_m in np.arange(0.0, 14.0, 0.5):
+        state, _ = ife.process(state, road(9.0 - way_m, WET, DRY), at(way_m))
+        looks |= {look.at_m: look for look in state.looks}
+    ways_m, shown = recalled(list(looks.values()), 0.0, (-np.inf, state.passed.end_m))
+    assert len(ways_m) > 40
+    told, without = (passed_by(None, ways_m, shown, lines_m, state.passed.end_m) for lines_m in ([9.0], []))
+    assert_allclose(state.passed.probabilities, told.probabilities, atol=0.01)
+    assert np.abs(np.subtract(told.probabilities, without.probabilities)).max() > 0.03
 
 
 def test_a_car_that_rolls_back_has_not_passed_the_road_before_it():
