@@ -85,10 +85,7 @@ def chosen(shares: pd.DataFrame) -> float | None:
 def as_markdown(shares: pd.DataFrame) -> str:
     """Per least mass a row, per set and scenario a cell: held back / cost (left); - where no frame is wrong."""
     cells = shares.assign(
-        cell=[
-            f"{'-' if pd.isna(r[HELD_BACK]) else f'{r[HELD_BACK]:.0f}'} / {r[COST]:.0f} ({r[LEFT]:.1f})"
-            for _, r in shares.iterrows()
-        ],
+        cell=[_cell(*row) for row in shares[[HELD_BACK, COST, LEFT]].itertuples(index=False, name=None)],
         column=shares["set"] + ", " + shares["scenario"],
     )
     wide = cells.pivot_table("cell", "least_mass", "column", aggfunc="first", sort=False)
@@ -97,6 +94,11 @@ def as_markdown(shares: pd.DataFrame) -> str:
         f"| {mass:g} | {' | '.join(row)} |" for mass, row in zip(wide.index, wide.to_numpy(), strict=True)
     ]
     return "\n".join(lines)
+
+
+def _cell(held_back: float, cost: float, left: float) -> str:
+    held = "-" if np.isnan(held_back) else f"{held_back:.0f}"
+    return f"{held} / {cost:.0f} ({left:.1f})"
 
 
 def draw(shares: pd.DataFrame, path: Path) -> None:

@@ -11,7 +11,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .trunk import LITE0, Kind, Trunk
+from trpac_core.vision.classes import Surface
+
+from .trunk import Kind, Trunk
 
 PIXEL_MEAN, PIXEL_DEVIATION = 110.0, 60.0
 """Round figures for road pictures; the same for the three channels, so that grey stays grey."""
@@ -189,25 +191,20 @@ class SurfaceNet(nn.Module):
     class.
     """
 
+    DROPOUT = 0.3
+    """Share of the pooled features that a step of training leaves out [-]."""
     READING = 64
     """Width of the head that tells readable road."""
     MOST_DISTURBED = 4.0
     """Limit of the logit that a patch is disturbed, to both sides, beyond which the softening stays as it is."""
 
-    def __init__(
-        self,
-        kinds: Sequence[Kind] = (LITE0,),
-        classes: int = 3,
-        dropout: float = 0.3,
-        *,
-        pretrained: bool = False,
-    ):
+    def __init__(self, kinds: Sequence[Kind], *, pretrained: bool = False):
         super().__init__()
         self.towers = nn.ModuleList([Tower(kind, pretrained=pretrained) for kind in kinds])
         self.embedding = 2 * sum(tower.channels for tower in self.towers)
         self.norm = nn.BatchNorm1d(self.embedding, affine=False)
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(self.embedding, classes)
+        self.dropout = nn.Dropout(self.DROPOUT)
+        self.classifier = nn.Linear(self.embedding, len(Surface))
         self.reading = nn.Sequential(
             nn.Linear(self.embedding, self.READING), nn.ReLU(), nn.Linear(self.READING, 1)
         )
