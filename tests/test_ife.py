@@ -24,6 +24,7 @@ from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import PatchVerdicts, RoadMasks, Segmenter, SurfaceClassifier
+from trpac_core.vision.regions import road_shares
 from trpac_core.vision.scene import scene_of
 from trpac_core.vision.trajectory import Motion
 from trpac_core.vision.voting import Voting, VotingConfig
@@ -113,6 +114,24 @@ def test_plain_road(surface, speed_m_s):
     assert [group.n_roi for group in result.groups] == [4, 6, 8]
     assert state.frame_count == 1
     assert all(max(group.weights) == group.weights[surface] for group in state.evidence)
+
+
+def test_patches_keep_off_what_is_no_road_beside_the_wheels_way():
+    """A kerb close to the left wheel: of 1.2 m around its track, a third is no road, and a patch lies where less is."""
+    road = NONE.copy()
+    rows, columns = np.mgrid[0:160, 0:256]
+    ground_m = CAMERA.image_to_ground((np.column_stack((columns.ravel(), rows.ravel())) + 0.5) * 7.5)
+    road.ravel()[ground_m[:, 1] < 0.95] = 1.0
+    _, kept = run(plain(DRY), masks=Masks(road), with_view=True)
+    _, free = run(plain(DRY), with_view=True)
+    shares = [
+        np.concatenate([road_shares(group.boxes_px, CAMERA, road > 0.5) for group in result.view.groups])
+        for result in (kept, free)
+    ]
+    assert [len(part) for part in shares] == [18, 18]
+    assert shares[0].mean() > shares[1].mean() + 0.02
+    assert shares[0].min() > 0.8
+    assert (shares[0] >= 0.95).sum() > (shares[1] >= 0.95).sum()
 
 
 @pytest.mark.parametrize("group", [0, 1, 2])

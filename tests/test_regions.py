@@ -1,9 +1,12 @@
 """Grid corners, usable share, sampling and patches of known masks and pictures."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.regions import (
@@ -12,9 +15,11 @@ from trpac_core.vision.regions import (
     corners_in_ellipses,
     corners_in_strip,
     cut_patch,
+    road_shares,
     roi_box,
     roi_width_px,
     sample,
+    with_most_road,
 )
 from trpac_core.vision.trajectory import CHI_SQUARE_95_2DOF, Ellipses
 
@@ -145,3 +150,42 @@ def test_patch_is_the_area_mean_of_its_region():
     assert patch.shape == (64, 96, 3)
     assert patch.dtype == np.uint8
     assert np.abs(patch - blocks).max() <= 0.51
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_share_of_road_in_a_region_is_that_of_the_mask_cells_that_it_touches(seed):
+    rng = np.random.default_rng(seed)
+    drivable = rng.random((160, 256)) < 0.6
+    columns, rows = rng.integers(0, 1700, 20), rng.integers(0, 1000, 20)
+    boxes = np.column_stack(
+        (columns, rows, columns + rng.integers(48, 220, 20), rows + rng.integers(32, 200, 20))
+    )
+    cells = [
+        drivable[int(top / 7.5) : math.ceil(bottom / 7.5), int(left / 7.5) : math.ceil(right / 7.5)]
+        for left, top, right, bottom in boxes
+    ]
+    assert_allclose(road_shares(boxes, Camera(), drivable), [cell.mean() for cell in cells])
+
+
+def test_the_share_of_road_holds_for_regions_at_the_ends_of_the_picture():
+    camera, drivable = Camera().scaled(0.5), np.ones((160, 256), bool)
+    whole = np.array([(0, 0, camera.width_px, camera.height_px), (0, 0, 48, 32)])
+    corner = np.array([(camera.width_px - 48, camera.height_px - 32, camera.width_px, camera.height_px)])
+    assert_array_equal(road_shares(np.concatenate((whole, corner)), camera, drivable), 1.0)
+    assert len(road_shares(np.empty((0, 4), np.int64), camera, drivable)) == 0
+
+
+def test_of_the_regions_tried_the_first_with_road_enough_is_taken_else_the_one_with_most():
+    shares = np.array([(0.97, 0.2, 0.96), (1.0, 0.9, 0.1), (0.99, 0.5, 1.0)]).ravel()
+    assert_array_equal(with_most_road(shares, 3), [0, 4, 2])
+    assert_array_equal(with_most_road(shares[:4], 3), [0, 1, 2])
+    assert_array_equal(with_most_road(shares[:2], 3), [0, 1])
+    assert_array_equal(with_most_road(np.empty(0), 0), [])
+
+
+@given(st.lists(st.floats(0.0, 1.0), max_size=40), st.integers(1, 9))
+def test_each_region_taken_is_of_its_own_kind_and_has_no_less_road_than_the_first_tried(shares, count):
+    taken = with_most_road(np.array(shares), count)
+    assert len(taken) == min(len(shares), count)
+    assert_array_equal(taken % count, np.arange(len(taken)))
+    assert (np.array(shares)[taken] >= np.minimum(np.array(shares)[: len(taken)], 0.95)).all()

@@ -20,7 +20,7 @@ from .lines import KNOWN_WITHIN_M, ends_m, lines_across
 from .neighbours import Passed, among_neighbours, passed_by
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
 from .region import Lines, Region, Way
-from .regions import classify_corners, corners_in_ellipses, corners_in_strip, sample
+from .regions import TRIES, classify_corners, corners_in_ellipses, corners_in_strip, sample
 from .results import FrameResult, FrameView, GroupResult, GroupView
 from .scene import scene_of
 from .trajectory import Ellipses, Motion, path_curvature, reckon
@@ -152,8 +152,11 @@ class Ife:
         way = Way(tuple(tracks), *(self.lines(state, image, motion, camera) if lines is None else lines))
         wanted = [(index, index, self.config.b[index]) for index in range(groups)]
         wanted += [(1, len(GROUP_NAMES), PATCHES_AHEAD)] * ahead
+        drivable = masks.drivable > MASK_THRESHOLD
         return [
-            self._region(index, (state.frame_count, draw), count, way, camera, masks, usable).seen_in(image)
+            self._region(index, (state.frame_count, draw), count, way, camera, drivable, usable).seen_in(
+                image
+            )
             for index, draw, count in wanted
         ]
 
@@ -238,7 +241,7 @@ class Ife:
         count: int,
         way: Way,
         camera: Camera,
-        masks: RoadMasks,
+        drivable: NDArray[np.bool_],
         usable: NDArray[np.bool_],
     ) -> Region:
         config = self.config
@@ -249,11 +252,12 @@ class Ife:
         else:
             ground = _strip(low, high, config.strip_half_width_m, config.a_m)
             # Without ellipses the group is the drivable road: what lies beside it is no loss of usable area.
-            road = classify_corners(ground, camera, masks.drivable > MASK_THRESHOLD)
+            road = classify_corners(ground, camera, drivable)
             corners = classify_corners(road.ground_m[road.usable], camera, usable)
-        drawn = sample(corners, count, (config.seed, *draw, list(SIDES).index(config.side)))
-        widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, len(drawn))
-        return Region.around(corners, drawn, widths_m, way, ellipses, camera)
+        drawn = sample(corners, TRIES * count, (config.seed, *draw, list(SIDES).index(config.side)))
+        count = min(count, len(drawn))
+        widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, count)
+        return Region.around(corners, drawn, widths_m, way, ellipses, camera, drivable)
 
     def lines(self, state: IfeState, image: NDArray[np.uint8], motion: Motion, camera: Camera) -> Lines:
         """The lines across the road up to the middle group's end, seen now or passed since; and doubtful ones.

@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .classes import Surface
 from .evidence import combine
-from .regions import Corners, cut_box, middle_ground_m, project, roi_boxes, roi_widths_px
+from .regions import (
+    Corners,
+    cut_box,
+    middle_ground_m,
+    project,
+    road_shares,
+    roi_boxes,
+    roi_widths_px,
+    with_most_road,
+)
 from .trajectory import Ellipses, way_beside
 
 LEAST_CONTRAST = 1.0
@@ -115,14 +124,19 @@ class Region:
         way: Way,
         ellipses: Sequence[Ellipses],
         camera: Camera,
+        drivable: NDArray[np.bool_],
     ) -> Region:
-        """A region with patches of these widths around the corners drawn, each on its side of the way's lines."""
+        """A region with patches of these widths, each on its side of the way's lines.
+
+        Around as many of the corners drawn, those whose patches show most drivable road: kerbs and cars are no surface.
+        """
         ground_m = corners.ground_m[drawn]
-        widths_px = roi_widths_px(camera, ground_m, widths_m)
+        widths_px = roi_widths_px(camera, ground_m, np.resize(widths_m, len(drawn)))
         ends_px = way.rows_of_ends_px(ground_m, camera)
         boxes = roi_boxes(camera, corners.pixel[drawn], widths_px, ends_px)
-        ahead_m = way.to(middle_ground_m(camera, ground_m, boxes))
-        return cls(corners, way, tuple(ellipses), len(drawn), boxes, ahead_m)
+        taken = with_most_road(road_shares(boxes, camera, drivable), len(widths_m))
+        ahead_m = way.to(middle_ground_m(camera, ground_m[taken], boxes[taken]))
+        return cls(corners, way, tuple(ellipses), len(taken), boxes[taken], ahead_m)
 
     def seen_in(self, image: NDArray[np.uint8]) -> Region:
         """The region with the patches cut, those without contrast left out."""

@@ -20,6 +20,10 @@ LEAST_ROI_WIDTH_PX = 48
 ROI_ASPECT = PATCH_WIDTH_PX / PATCH_HEIGHT_PX
 MOST_ASPECT = 3.0
 """Width over height up to which the network has learned from regions [-]."""
+TRIES = 6
+"""Corners that are drawn for each patch, of which one is taken [-]."""
+LEAST_ROAD = 0.95
+"""Share of drivable road from which on a region is as good as any [-]: the network has learned from such."""
 _PROBE_M = 0.1
 
 
@@ -243,6 +247,27 @@ def _between(
         return box
     top, left = min(max(top, first), end - rows), left + (right - left - columns) // 2
     return left, top, left + columns, top + rows
+
+
+def road_shares(boxes: NDArray[np.int64], camera: Camera, drivable: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Share of drivable road in each region of the camera's picture, shape (n,) [-]."""
+    counts = cv2.integral(drivable.astype(np.uint8))
+    size = np.array(drivable.shape[::-1])
+    scale = size / (camera.width_px, camera.height_px)
+    first = np.floor(boxes[:, :2] * scale).astype(int)
+    end = np.minimum(np.ceil(boxes[:, 2:] * scale).astype(int), size)
+    (left, top), (right, bottom) = first.T, end.T
+    road = counts[bottom, right] - counts[top, right] - counts[bottom, left] + counts[top, left]
+    return np.asarray(road / ((right - left) * (bottom - top)), np.float64)
+
+
+def with_most_road(shares: NDArray[np.float64], count: int) -> NDArray[np.intp]:
+    """Of every `count`-th region the first with road enough, or else with most: indices, at most `count`."""
+    if len(shares) <= count:
+        return np.arange(len(shares))
+    tries = len(shares) // count
+    enough = np.minimum(shares[: tries * count], LEAST_ROAD).reshape(tries, count)
+    return count * enough.argmax(axis=0) + np.arange(count)
 
 
 def middle_ground_m(
