@@ -176,7 +176,7 @@ def test_the_share_of_road_holds_for_regions_at_the_ends_of_the_picture():
 
 
 def test_of_the_regions_tried_the_first_with_road_enough_is_taken_else_the_one_with_most():
-    shares = np.array([(0.97, 0.2, 0.96), (1.0, 0.9, 0.1), (0.99, 0.5, 1.0)]).ravel()
+    shares = np.array([(0.75, 0.2, 0.71), (1.0, 0.69, 0.1), (0.99, 0.5, 1.0)]).ravel()
     assert_array_equal(with_most_road(shares, 3), [0, 4, 2])
     assert_array_equal(with_most_road(shares[:4], 3), [0, 1, 2])
     assert_array_equal(with_most_road(shares[:2], 3), [0, 1])
@@ -188,4 +188,4 @@ def test_each_region_taken_is_of_its_own_kind_and_has_no_less_road_than_the_firs
     taken = with_most_road(np.array(shares), count)
     assert len(taken) == min(len(shares), count)
     assert_array_equal(taken % count, np.arange(len(taken)))
-    assert (np.array(shares)[taken] >= np.minimum(np.array(shares)[: len(taken)], 0.95)).all()
+    assert (np.array(shares)[taken] >= np.minimum(np.array(shares)[: len(taken)], 0.7)).all()

@@ -22,8 +22,8 @@ MOST_ASPECT = 3.0
 """Width over height up to which the network has learned from regions [-]."""
 TRIES = 6
 """Corners that are drawn for each patch, of which one is taken [-]."""
-LEAST_ROAD = 0.95
-"""Share of drivable road from which on a region is as good as any [-]: the network has learned from such."""
+LEAST_ROAD = 0.7
+"""Share of drivable road from which on a region is as good as any [-]: the least from which the network has learned."""
 _PROBE_M = 0.1
 
 
