@@ -223,7 +223,7 @@ class Ife:
         own = len(near.ahead_m)
         places_m = np.concatenate((near.ahead_m, ahead_m))
         probabilities = np.concatenate((near.probabilities, before))
-        if looks or passed:
+        if looks or passed is not None:
             probabilities = among_neighbours(places_m, probabilities, near.way.lines_m, passed)
         low, high = self.config.ranges_m[0]
         inside = (low <= places_m) & (places_m < high)
