@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .classes import Surface
+from .neighbours import Passed, passed_by
 
 LOOK_EVERY_M = 0.4
 """Way between the looks that are remembered: closer ones show the same, and a car that stands must not add any [m]."""
@@ -89,3 +90,35 @@ def within_reach(looks: Sequence[Look], at_m: float, reach_m: tuple[float, float
     """The looks of which a patch lies in [from, to) ahead of the front wheels now: the others have no say."""
     low, high = reach_m
     return tuple(look for look in looks if any(low <= way_m - at_m < high for way_m in look.ways_m))
+
+
+def road_passed(
+    passed: Passed | None, looks: Sequence[Look], lines_m: Sequence[float], at_m: float, near_m: float
+) -> Passed | None:
+    """All of the road that has no patches of its own any more, at a way of the front wheels.
+
+    Parameters
+    ----------
+    passed : Passed, optional
+        As far as it went a frame before.
+    looks : sequence of Look
+        Remembered since: those of their patches that are passed now are taken up.
+    lines_m : sequence of float
+        Ways at lines across the road [m].
+    at_m, near_m : float
+        Way now, and how far ahead the near group begins [m].
+
+    Returns
+    -------
+    Passed, optional
+        It ends `BEHIND_M` nearer than the near group, unless the car has rolled back; nothing where nothing is passed,
+        or where the car stands before its end again.
+    """
+    low_m = near_m - BEHIND_M
+    known = None if passed is None else passed.seen_from(at_m)
+    if known is not None and known.end_m > low_m:
+        return passed if known.end_m <= near_m else None
+    places_m, probabilities = recalled(looks, at_m, (-np.inf if known is None else known.end_m, low_m))
+    if known is None and not len(places_m):
+        return None
+    return passed_by(known, places_m, probabilities, np.array(lines_m) - at_m, low_m).seen_from(-at_m)

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .classes import Surface
 from .evidence import EvidenceState, basic_probability, combine, update_weights, visual_confidence
-from .foresight import BEHIND_M, Look, due, recalled, within_reach
+from .foresight import BEHIND_M, Look, due, recalled, road_passed, within_reach
 from .ife_config import GROUP_NAMES, SIDES, IfeConfig
 from .images import ImageError
 from .lines import KNOWN_WITHIN_M, ends_m, lines_across
-from .neighbours import Passed, among_neighbours, passed_by
+from .neighbours import Passed, among_neighbours
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
 from .region import Lines, Region, Way
 from .regions import TRIES, classify_corners, corners_in_ellipses, corners_in_strip, sample
@@ -197,18 +197,10 @@ class Ife:
 
     def _passed(self, state: IfeState, motion: Motion) -> Passed | None:
         """The road before the remembered patches that still have a say each, its end a way of the front wheels."""
-        at_m, low = motion.way_m, self._reach_m[0]
-        if at_m is None or not self.config.use_foresight:
+        if motion.way_m is None or not self.config.use_foresight:
             return None
-        known = None if state.passed is None else state.passed.seen_from(at_m)
-        if known is not None and known.end_m > low:
-            # The car has rolled back: road that is near again is not passed.
-            return state.passed if known.end_m <= self.config.ranges_m[0][0] else None
-        places_m, probabilities = recalled(state.looks, at_m, (known.end_m if known else -np.inf, low))
-        if known is None and not len(places_m):
-            return None
-        lines_m = np.array(state.lines_m) - at_m
-        return passed_by(known, places_m, probabilities, lines_m, low).seen_from(-at_m)
+        near_m = self.config.ranges_m[0][0]
+        return road_passed(state.passed, state.looks, state.lines_m, motion.way_m, near_m)
 
     def _along_the_road(
         self, near: Region, looks: tuple[Look, ...], passed: Passed | None, motion: Motion
