@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -102,7 +101,7 @@ def _clips(pictures: Iterable[Picture], assumed: Iterable[AssumedSource]) -> Ite
                 camera=source.camera(),
                 motion=Motion(source.speed_m_s),
                 frames=tuple(
-                    replace(_frame(picture), way_m=source.way_m(picture.path))
+                    _frame(picture, source.way_m(picture.path))
                     for picture in sorted(by_folder.get(folder, []), key=lambda p: p.path.name)
                 ),
                 usable=source.usable_shares(),
@@ -112,8 +111,8 @@ def _clips(pictures: Iterable[Picture], assumed: Iterable[AssumedSource]) -> Ite
             )
 
 
-def _frame(picture: Picture) -> Frame:
-    return Frame(picture.path, constant(picture.surface), picture.split)
+def _frame(picture: Picture, way_m: float | None = None) -> Frame:
+    return Frame(picture.path, constant(picture.surface), picture.split, way_m)
 
 
 def _stills(pictures: Iterable[Picture]) -> Iterator[Sequence]:

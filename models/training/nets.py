@@ -243,7 +243,7 @@ class SurfaceNet(nn.Module):
 
 
 def together(nets: Sequence[SurfaceNet], says: Sequence[float]) -> SurfaceNet:
-    """The towers of several nets in one, whose logits are the weighted mean of theirs; its heads are yet to be taught.
+    """The towers of several nets in one, whose logits are the weighted mean of theirs; other heads are not taught yet.
 
     Nets that began from unlike trunks err on unlike patches, so the mean is better than each and less sure of what it
     does not know. Source: Lakshminarayanan et al. 2017, Simple and scalable predictive uncertainty estimation.

@@ -196,10 +196,8 @@ def _classes(
             given, f"classes-{kind.name}", steps, count=count, what=what, patches=patches, kind=kind
         )
 
-    stages, says = (
-        [tower(number, kind) for number, kind in enumerate(TOWERS, start=1)],
-        tuple(TOWERS.values()),
-    )
+    stages = [tower(number, kind) for number, kind in enumerate(TOWERS, start=1)]
+    says = tuple(TOWERS.values())
     return Stage(
         together([stage.net for stage in stages], says),
         patches=max(stage.patches for stage in stages),

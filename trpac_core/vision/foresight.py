@@ -93,7 +93,12 @@ def within_reach(looks: Sequence[Look], at_m: float, reach_m: tuple[float, float
 
 
 def road_passed(
-    passed: Passed | None, looks: Sequence[Look], lines_m: Sequence[float], at_m: float, near_m: float
+    passed: Passed | None,
+    looks: Sequence[Look],
+    lines_m: Sequence[float],
+    at_m: float,
+    end_m: float,
+    near_m: float,
 ) -> Passed | None:
     """All of the road that has no patches of its own any more, at a way of the front wheels.
 
@@ -105,20 +110,21 @@ def road_passed(
         Remembered since: those of their patches that are passed now are taken up.
     lines_m : sequence of float
         Ways at lines across the road [m].
-    at_m, near_m : float
-        Way now, and how far ahead the near group begins [m].
+    at_m : float
+        Way now [m].
+    end_m, near_m : float
+        How far ahead patches begin to have a say of their own, and the near group begins [m].
 
     Returns
     -------
     Passed, optional
-        It ends `BEHIND_M` nearer than the near group, unless the car has rolled back; nothing where nothing is passed,
-        or where the car stands before its end again.
+        It ends there, or farther ahead where the car has rolled back; nothing where nothing is passed, or where the car
+        has rolled back so far that it would end in the near group.
     """
-    low_m = near_m - BEHIND_M
     known = None if passed is None else passed.seen_from(at_m)
-    if known is not None and known.end_m > low_m:
+    if known is not None and known.end_m > end_m:
         return passed if known.end_m <= near_m else None
-    places_m, probabilities = recalled(looks, at_m, (-np.inf if known is None else known.end_m, low_m))
+    places_m, probabilities = recalled(looks, at_m, (-np.inf if known is None else known.end_m, end_m))
     if known is None and not len(places_m):
         return None
-    return passed_by(known, places_m, probabilities, np.array(lines_m) - at_m, low_m).seen_from(-at_m)
+    return passed_by(known, places_m, probabilities, np.array(lines_m) - at_m, end_m).seen_from(-at_m)

@@ -162,8 +162,7 @@ class Ife:
 
     def judge(self, state: IfeState, motion: Motion, regions: list[Region]) -> tuple[IfeState, FrameResult]:
         """The state after a frame and its verdict, from the classified regions of `look`."""
-        looks = self._remembered(state, motion, regions[-1])
-        passed = self._passed(state, motion)
+        looks, passed = self._remembered(state, motion, regions[-1])
         near, before, say = self._along_the_road(regions[0], looks, passed, motion)
         verdicts = [self._fuse(0, state.evidence[0], near, before, say)]
         for index in range(1, self.config.groups_looked_at):
@@ -180,27 +179,25 @@ class Ife:
         """Whether what the middle group shows in this frame is to be remembered."""
         return self.config.use_foresight and motion.way_m is not None and due(state.looks, motion.way_m)
 
-    def _remembered(self, state: IfeState, motion: Motion, last: Region) -> tuple[Look, ...]:
-        """The looks that still have a say, with this frame's (`last`) where it is to be remembered."""
+    def _remembered(
+        self, state: IfeState, motion: Motion, last: Region
+    ) -> tuple[tuple[Look, ...], Passed | None]:
+        """The looks that still have a say, with this frame's (`last`) where it is to be remembered; the road before."""
         at_m = motion.way_m
         if at_m is None or not self.config.use_foresight:
-            return ()
+            return (), None
         looks = state.looks
         if self._remembers(state, motion):
             looks = (*looks, Look.of(at_m, last.ahead_m, last.probabilities))
-        return within_reach(looks, at_m, self._reach_m)
+        passed = road_passed(
+            state.passed, state.looks, state.lines_m, at_m, self._reach_m[0], self.config.ranges_m[0][0]
+        )
+        return within_reach(looks, at_m, self._reach_m), passed
 
     @property
     def _reach_m(self) -> tuple[float, float]:
         """Where remembered patches have a say [m]."""
         return self.config.ranges_m[0][0] - BEHIND_M, self.config.ranges_m[1][1]
-
-    def _passed(self, state: IfeState, motion: Motion) -> Passed | None:
-        """The road before the remembered patches that still have a say each, its end a way of the front wheels."""
-        if motion.way_m is None or not self.config.use_foresight:
-            return None
-        near_m = self.config.ranges_m[0][0]
-        return road_passed(state.passed, state.looks, state.lines_m, motion.way_m, near_m)
 
     def _along_the_road(
         self, near: Region, looks: tuple[Look, ...], passed: Passed | None, motion: Motion
