@@ -1,9 +1,9 @@
 """From which mass on the class of a frame is believed: what the flag holds back of wrong frames, and of right ones.
 
-``python -m benchmarks.flag_gate [--data ROAD_IMAGES] [--models DIR] [--out DIR]`` judges the drives of development of
-`benchmarks.patch_width`, on which nothing is scored, and prints a row per value of `least_mass`: shares of wrong and of
-right frames with flag 0, and what is wrong among those with flag 1 [%]. The value chosen is the least that holds back
-more than half of the wrong frames in every set and scenario.
+``python -m benchmarks.flag_gate [--data ROAD_IMAGES] [--models DIR] [--out DIR]`` judges drives of development, on
+which nothing is scored, and prints a row per value of `least_mass`: shares of wrong and of right frames with flag 0,
+and what is wrong among those with flag 1 [%]. The value chosen is the least that holds back more than half of the wrong
+frames in every set and scenario.
 """
 
 from __future__ import annotations
@@ -11,19 +11,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import cv2
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from rich.progress import Progress
 
 from trpac_core.vision.ife_config import IfeConfig
 
-from .patch_width import ROOT, development_sequences
-from .table4.judge import SCENARIOS, Networks, judged
+from .development_drives import add_options, verdicts
 from .table4.scores import gate, method_of
 
 MASSES = tuple(np.round(np.arange(0.5, 0.96, 0.025), 3).tolist())
@@ -34,33 +31,23 @@ HELD_BACK, COST, LEFT = "wrong frames with flag 0", "right frames with flag 0", 
 
 def main() -> None:
     given = _options()
-    cv2.setNumThreads(1)
-    networks = Networks.load(given.models)
-    with Progress() as bars:
-        sequences = development_sequences(given.out, given.drives, given.data, bars)
-        task = bars.add_task("judged", total=len(sequences) * len(SCENARIOS))
-        found = []
-        for sequence in sequences:
-            for scenario in SCENARIOS:
-                found.append(judged(sequence, networks, scenario, {"IFE": {}}))
-                bars.advance(task)
-    shares = shares_by_mass(method_of(pd.concat(found, ignore_index=True), "IFE"))
+    shares = shares_by_mass(method_of(verdicts(given, {"IFE": {}}), "IFE"))
     print(as_markdown(shares))
     print(f"chosen: {chosen(shares)}")
     draw(shares, given.out / "flag_gate.png")
 
 
-def shares_by_mass(verdicts: pd.DataFrame) -> pd.DataFrame:
+def shares_by_mass(judged: pd.DataFrame) -> pd.DataFrame:
     """A row per set, scenario and least mass: what the flag is worth there [%].
 
     Parameters
     ----------
-    verdicts : DataFrame
-        Of `judged`, one method.
+    judged : DataFrame
+        Of `verdicts`, one method.
     """
-    sets = np.where(verdicts["source"].str.startswith("rendered"), RENDERED, REAL)
+    sets = np.where(judged["source"].str.startswith("rendered"), RENDERED, REAL)
     rows = []
-    for (name, scenario), part in verdicts.groupby([sets, "scenario"], sort=False):
+    for (name, scenario), part in judged.groupby([sets, "scenario"], sort=False):
         for mass in MASSES:
             worth = gate(part.assign(flag=flags(part, mass)))
             rows.append(
@@ -70,9 +57,9 @@ def shares_by_mass(verdicts: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def flags(verdicts: pd.DataFrame, mass: float) -> pd.Series:
+def flags(judged: pd.DataFrame, mass: float) -> pd.Series:
     """The estimator's flags with another least mass (groups of one patch or none have mass 0)."""
-    return (verdicts["Q_v"] > IfeConfig().flag_threshold) & (verdicts["m_0"] >= mass)
+    return (judged["Q_v"] > IfeConfig().flag_threshold) & (judged["m_0"] >= mass)
 
 
 def chosen(shares: pd.DataFrame) -> float | None:
@@ -127,12 +114,7 @@ def _options() -> argparse.Namespace:
         description=__doc__,
         formatter_class=argparse.RawTextHelpFormatter,
     )
-    parser.add_argument("--data", type=Path, help="folder of real road pictures; none: rendered drives only")
-    parser.add_argument("--models", type=Path, default=ROOT / "models", help="folder of both networks")
-    parser.add_argument("--drives", type=int, default=96, help="rendered drives of 30 frames")
-    parser.add_argument(
-        "--out", type=Path, default=Path("out/patch_width"), help="where these and the figure are kept"
-    )
+    add_options(parser, drives=96)
     return parser.parse_args()
 
 
