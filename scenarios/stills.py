@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from scenarios.looks import MODELS
+from scenarios.whole_files import written_whole
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import LEAST_READABLE, usable_road
 from trpac_core.vision.images import ImageError, decode_image
@@ -222,16 +221,5 @@ def _usable_share(
 
 def write_classes(table: pd.DataFrame, out: Path) -> None:
     """Write the table of `classify_pictures`, whole or not at all; raises OSError."""
-    with scratch_for(out.parent) as scratch:
-        table.to_csv(scratch / out.name, index=False, float_format="%.6f")
-        out.parent.mkdir(parents=True, exist_ok=True)
-        (scratch / out.name).replace(out)
-
-
-@contextmanager
-def scratch_for(folder: Path) -> Iterator[Path]:
-    """A passing folder on the file system that a folder lies on, or will lie on, so that moving is at once."""
-    whole = folder.absolute()
-    nearest = next(place for place in (whole, *whole.parents) if place.exists())
-    with tempfile.TemporaryDirectory(dir=nearest, prefix=".trpac_") as scratch:
-        yield Path(scratch)
+    with written_whole(out.parent) as made:
+        table.to_csv(made / out.name, index=False, float_format="%.6f")

@@ -21,7 +21,8 @@ from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.film import Film, Strip, dark, shown
 from scenarios.looks import MODELS
-from scenarios.stills import PICTURE_ENDINGS, Progress, pictures_in, printable, scratch_for, silent
+from scenarios.stills import PICTURE_ENDINGS, Progress, pictures_in, printable, silent
+from scenarios.whole_files import written_whole
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
@@ -165,7 +166,7 @@ def run_frames(
         speed_m_s / fps,
         Motion(speed_m_s),
     )
-    with scratch_for(out) as scratch:
+    with written_whole(out) as scratch:
         film, strip = Film(scratch / FILM, camera, fps), Strip()
         rows, unreadable = [], []
         for number, (name, image) in enumerate(frames):
@@ -186,7 +187,8 @@ def run_frames(
         strip.write(scratch / STRIP)
         table.to_csv(scratch / FRAMES_CSV, index=False, float_format="%.6g")
         (scratch / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        _publish(scratch, out)
+        if not (scratch / FILM).exists():
+            (out / FILM).unlink(missing_ok=True)  # of an earlier run
     return Drive(table, summary, out)
 
 
@@ -268,12 +270,3 @@ def _summary(
         "versions": {package: version(package) for package in PACKAGES},
         "model_sha256": {file: sha256(MODELS / file) for file in ("segmenter.onnx", "surface.onnx")},
     }
-
-
-def _publish(scratch: Path, out: Path) -> None:
-    """Move the finished files into the folder; a film of an earlier run goes where this one has none."""
-    out.mkdir(parents=True, exist_ok=True)
-    if not (scratch / FILM).exists():
-        (out / FILM).unlink(missing_ok=True)
-    for file in sorted(scratch.iterdir()):
-        file.replace(out / file.name)

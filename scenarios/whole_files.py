@@ -13,18 +13,17 @@ from pathlib import Path
 def written_whole(folder: Path) -> Iterator[Path]:
     """A scratch folder; the files that lie in it when the block ends well are moved to `folder`, else none is.
 
-    It lies in `folder` if that is there, which may be a mounted disk, else beside it: always on the same disk, so that
-    a full one shows before anything is moved.
+    It lies in `folder` if that is there, which may be a mounted disk, else in the nearest folder above it that is:
+    always on the same disk, so that a full one shows before anything is moved.
 
     Raises
     ------
     OSError
         The folder cannot be written to, or the disk is full.
     """
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    place = folder if folder.is_dir() else folder.parent
+    place = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=place) as made:
         yield Path(made)
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         for path in sorted(Path(made).iterdir()):
             os.replace(path, folder / path.name)

@@ -60,3 +60,21 @@ def test_a_missing_package_is_one_sentence(missing, arguments, tmp_path):
     assert run.returncode == 2
     assert run.stderr.startswith(f"trpac: needs the package that brings '{missing}'")
     assert run.stderr.count("\n") == 1
+
+
+def test_a_command_that_is_ended_from_outside_leaves_its_folder_as_it_was(tmp_path):
+    code = (
+        "import os, signal, sys, time\nfrom pathlib import Path\nimport trpac_cli.main\n"
+        "from scenarios.whole_files import written_whole\nfrom trpac_cli.entry import main\n"
+        "def app():\n"
+        "    with written_whole(Path(sys.argv[1])) as made:\n"
+        "        (made / 'log.csv').write_text('half')\n"
+        "        os.kill(os.getpid(), signal.SIGTERM)\n        time.sleep(60)\n"
+        "trpac_cli.main.app = app\nmain()"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code, tmp_path / "new" / "out"], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 143, run.stderr
+    assert not list(tmp_path.iterdir())
+    assert run.stderr == ""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from typing import NoReturn
 
 OURS = ("fmu_src", "models", "scenarios", "sim2real", "trpac_cli", "trpac_core", "trpac_hil")
 EXTRAS = "fmu,scenarios,gap,hil,sweep,design"
 
 
 def main() -> None:
-    """Run the command line; exits with 2 where one of its packages is missing."""
+    """Run the command line; exits with 2 where one of its packages is missing, with 143 after SIGTERM."""
+    signal.signal(signal.SIGTERM, _leave)
     try:
         from trpac_cli.main import app
 
@@ -24,3 +27,8 @@ def main() -> None:
             file=sys.stderr,
         )
         sys.exit(2)
+
+
+def _leave(number: int, _: object) -> NoReturn:
+    """End as after any other error: passing folders are removed, files keep what they held."""
+    sys.exit(128 + number)

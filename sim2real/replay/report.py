@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from base64 import b64encode
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ import jinja2
 import numpy as np
 import pandas as pd
 
+from scenarios.whole_files import written_whole
 from sim2real.replay import figures
 from sim2real.replay.run import DYNAMICS, OURS, Replay
 from sim2real.telling.report import DASH, jsonable
@@ -56,16 +55,11 @@ def write_replay(done: Replay, summary: dict[str, Any], folder: Path) -> tuple[P
     OSError
         The folder cannot be written to.
     """
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=folder.parent) as scratch:
-        made = Path(scratch)
+    with written_whole(folder) as made:
         estimates_table(done).to_csv(made / CSV_NAME, index=False, float_format="%.6g")
         text = json.dumps(jsonable(summary), indent=1, allow_nan=False)
         (made / SUMMARY_NAME).write_text(text + "\n", encoding="utf-8")
         (made / REPORT_NAME).write_text(render(done, summary), encoding="utf-8")
-        folder.mkdir(exist_ok=True)
-        for name in (CSV_NAME, SUMMARY_NAME, REPORT_NAME):
-            os.replace(made / name, folder / name)
     return tuple(folder / name for name in (REPORT_NAME, CSV_NAME, SUMMARY_NAME))
 
 
