@@ -27,7 +27,7 @@ from trpac_core.vision.networks import (
     calibrated_probabilities,
 )
 from trpac_core.vision.region import LEAST_CONTRAST
-from trpac_core.vision.regions import cut_box
+from trpac_core.vision.regions import cut_box, road_shares
 from trpac_core.vision.scene import scene_of
 
 CLASSIFY_COLUMNS = ("file", "class", "confidence", "p_dry", "p_wet", "p_snow_ice")
@@ -150,7 +150,7 @@ def patch_logs(
             "focus and lit?"
         )
     usable = usable_road(masks, remove_shadow=True)
-    share = np.array([_usable_share(usable, box, image.shape[1], image.shape[0]) for box in boxes])
+    share = road_shares(np.array(boxes), usable, image.shape[1], image.shape[0])
     readable = contrast & (verdicts.readable >= LEAST_READABLE)
     on_road = readable & (share >= LEAST_USABLE)
     best = next(
@@ -207,16 +207,6 @@ def _looks(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:
     parts = [(x, y, x + columns, y + rows) for x in (left, right - columns) for y in (top, bottom - rows)]
     size = np.array([width_px, height_px, width_px, height_px])
     return [tuple(int(edge) for edge in np.round(box * size)) for box in (WIDE, LOWER_CENTRE, *parts)]  # type: ignore[misc]
-
-
-def _usable_share(
-    usable: NDArray[np.bool_], box: tuple[int, int, int, int], width_px: int, height_px: int
-) -> float:
-    """Share of a patch that is usable road [-], from the mask of the whole picture."""
-    rows, columns = usable.shape
-    left, right = box[0] * columns // width_px, -(-box[2] * columns // width_px)
-    top, bottom = box[1] * rows // height_px, -(-box[3] * rows // height_px)
-    return float(usable[top:bottom, left:right].mean())
 
 
 def write_classes(table: pd.DataFrame, out: Path) -> None:

@@ -125,7 +125,7 @@ def test_patches_keep_off_what_is_no_road_beside_the_wheels_way():
     _, kept = run(plain(DRY), masks=Masks(road), with_view=True)
     _, free = run(plain(DRY), with_view=True)
     shares = [
-        np.concatenate([road_shares(group.boxes_px, CAMERA, road > 0.5) for group in result.view.groups])
+        np.concatenate([road_shares(group.boxes_px, road > 0.5, 1920, 1200) for group in result.view.groups])
         for result in (kept, free)
     ]
     assert [len(part) for part in shares] == [18, 18]

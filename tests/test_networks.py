@@ -4,11 +4,12 @@ import os
 import subprocess
 import sys
 
+import cv2
 import numpy as np
 import pytest
 from tiny_onnx import write_classifier, write_segmenter
 
-from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
+from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier, reduced
 
 
 def test_classifier_takes_any_number_of_patches_in_one_run(tmp_path):
@@ -31,6 +32,23 @@ def test_segmenter_reduces_the_picture_and_keeps_its_layout(tmp_path):
     assert masks.shadow[100, 10] == pytest.approx(200.0)
     assert (masks.drivable[:80] == 0.5).all()
     assert (masks.drivable[80:, 128:] == 0.5).all()
+
+
+@pytest.mark.parametrize(
+    "shape", [(160, 256), (600, 960), (639, 1030), (1200, 1920), (1201, 1921), (3000, 4000)]
+)
+def test_a_picture_is_reduced_to_the_means_of_its_areas(shape):
+    rng = np.random.default_rng(sum(shape))
+    coarse = cv2.resize(rng.uniform(0, 255, (20, 32, 3)), shape[::-1], interpolation=cv2.INTER_CUBIC)
+    image = np.clip(coarse + rng.normal(0.0, 8.0, (*shape, 3)), 0, 255).astype(np.uint8)
+    areas = cv2.resize(image, (256, 160), interpolation=cv2.INTER_AREA).astype(int)
+    difference = reduced(image) - areas
+    if min(shape[0] / 160, shape[1] / 256) < 4:
+        assert not difference.any()
+    assert np.abs(difference).mean() < 1.5, (
+        "of pixels that scatter by 8 levels; an odd row or column is left out"
+    )
+    assert np.abs(difference.mean(axis=(0, 1))).max() < 0.3
 
 
 def test_swapped_files_are_named_with_what_was_expected(tmp_path):

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from test_foresight import CONFIG, at, drive, road
 from test_ife import CAMERA, DRY, PAINT, SNOW, WET, Masks, Middle, paint
 
-from trpac_core.vision.evidence import basic_probability, combine
+from trpac_core.vision.evidence import WeightLaw, basic_probability, combine
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.lines import KNOWN_WITHIN_M
 from trpac_core.vision.networks import PatchVerdicts
@@ -87,10 +87,12 @@ def test_no_patch_lies_on_a_line_that_is_known():
     assert_array_equal(near.ahead_m > 3.5, above)
 
 
-@pytest.mark.parametrize("half_step", [0.0, 0.25])
-def test_the_verdict_changes_with_most_of_the_ground(half_step):
-    ways = np.arange(0.0, 12.0, 0.5) + half_step
-    _, seen = drive(CONFIG, Whole(), ways, border_m=10.0, before=DRY)
+@pytest.mark.parametrize("first_m", [0.05, 0.25, 0.45])
+@pytest.mark.parametrize("law", [WeightLaw(), WeightLaw(sigmoid_centre=1 / 3, sigmoid_slope=10.0)])
+def test_the_verdict_changes_with_most_of_the_ground(first_m, law):
+    """To twice the step of the rows in which lines are looked for, however much what the road was before weighs."""
+    ways = np.arange(0.0, 12.0, 0.5) + first_m
+    _, seen = drive(replace(CONFIG, weight_law=law), Whole(), ways, border_m=10.0, before=DRY)
     _, unseen = drive(replace(CONFIG, use_lines=False), Whole(), ways, border_m=10.0, before=DRY)
     ahead = 10.0 - ways
     assert [r.surface for r in seen] == [DRY if border_m > 3.5 else SNOW for border_m in ahead]
@@ -169,8 +171,9 @@ def test_half_the_ground_weighs_as_half_the_ground_though_it_is_told_less_surely
     weights = (1 / 3, 1 / 3, 1 / 3)
     assert basic_probability(shown, weights, say).argmax() == SNOW
     assert basic_probability(combined, weights, say).argmax() == WET
-    alone = region(np.arange(2.5, 4.5, 0.1), [])
-    assert_array_equal(alone.by_section(places_m, shown, alone.say(places_m, np.ones(2, bool))), shown)
+    alone = region(np.arange(2.5, 4.5, 0.1), []).heard(places_m, shown, np.ones(2, bool))
+    assert not alone.parted
+    assert_array_equal(alone.probabilities, shown)
 
 
 def test_lines_are_looked_for_from_standstill_too():

@@ -19,7 +19,7 @@ from .images import ImageError
 from .lines import KNOWN_WITHIN_M, ends_m, lines_across
 from .neighbours import Passed, among_neighbours
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
-from .region import Lines, Region, Way
+from .region import Heard, Lines, Region, Way
 from .regions import TRIES, classify_corners, corners_in_ellipses, corners_in_strip, sample
 from .results import FrameResult, FrameView, GroupResult, GroupView
 from .scene import scene_of
@@ -163,13 +163,15 @@ class Ife:
     def judge(self, state: IfeState, motion: Motion, regions: list[Region]) -> tuple[IfeState, FrameResult]:
         """The state after a frame and its verdict, from the classified regions of `look`."""
         looks, passed = self._remembered(state, motion, regions[-1])
-        near, before, say = self._along_the_road(regions[0], looks, passed, motion)
-        verdicts = [self._fuse(0, state.evidence[0], near, before, say)]
+        verdicts = [
+            self._fuse(
+                0, state.evidence[0], regions[0], self._along_the_road(regions[0], looks, passed, motion)
+            )
+        ]
         for index in range(1, self.config.groups_looked_at):
             own = regions[index]
-            say = own.say(own.ahead_m, np.ones(len(own.ahead_m), np.bool_))
-            own = replace(own, probabilities=own.by_section(own.ahead_m, own.probabilities, say))
-            verdicts.append(self._fuse(index, state.evidence[index], own, before[:0], say))
+            heard = own.heard(own.ahead_m, own.probabilities, np.ones(len(own.ahead_m), np.bool_))
+            verdicts.append(self._fuse(index, state.evidence[index], own, heard))
         after = (*(weights for weights, _ in verdicts), *state.evidence[len(verdicts) :])
         result = FrameResult(tuple(verdict for _, verdict in verdicts), state.frame_count)
         lines_m = regions[0].way.lines_from(motion.way_m)
@@ -201,27 +203,19 @@ class Ife:
 
     def _along_the_road(
         self, near: Region, looks: tuple[Look, ...], passed: Passed | None, motion: Motion
-    ) -> tuple[Region, NDArray[np.float64], NDArray[np.float64]]:
-        """The near group's patches, and what was seen before of its ground, each among its neighbours on the road.
-
-        The last array says how much ground each of both stands for.
-        """
+    ) -> Heard:
+        """The near group's patches, and what was seen before of its ground, each among its neighbours on the road."""
         at_m = motion.way_m or 0.0
         passed = None if passed is None else passed.seen_from(at_m)
         ahead_m, before = recalled(looks, at_m, self._reach_m)
-        own = len(near.ahead_m)
         places_m = np.concatenate((near.ahead_m, ahead_m))
         probabilities = np.concatenate((near.probabilities, before))
         if looks or passed is not None:
             probabilities = among_neighbours(places_m, probabilities, near.way.lines_m, passed)
         low, high = self.config.ranges_m[0]
         inside = (low <= places_m) & (places_m < high)
-        inside[:own] = True
-        say = near.say(places_m, inside)
-        probabilities = near.by_section(places_m, probabilities, say)
-        heard = say[own:] > 0.0
-        near = replace(near, probabilities=probabilities[:own])
-        return near, probabilities[own:][heard], np.concatenate((say[:own], say[own:][heard]))
+        inside[: len(near.ahead_m)] = True
+        return near.heard(places_m, probabilities, inside)
 
     def _region(
         self,
@@ -305,24 +299,20 @@ class Ife:
         ]
 
     def _fuse(
-        self,
-        index: int,
-        before: EvidenceState,
-        region: Region,
-        seen_before: NDArray[np.float64],
-        say: NDArray[np.float64],
+        self, index: int, before: EvidenceState, region: Region, heard: Heard
     ) -> tuple[EvidenceState, GroupResult]:
         """Evidence weights and verdict of one group, Eqs. (7) to (10).
 
         Patches that were seen before have their say in the weights and the mass, but Eq. (7) combines no more bodies
-        of evidence for them: they show the same road again.
+        of evidence for them: they show the same road again. Where a line parts the group its ground decides, not the
+        weights, which know the surface up to the line.
         """
         config, corners, n_roi = self.config, region.corners, len(region.probabilities)
-        probabilities = np.concatenate((region.probabilities, seen_before))
         if n_roi > 1:
-            after = update_weights(before, probabilities.argmax(axis=1), config.weight_law)
-            weights = after.weights if config.weight_evidence else EvidenceState().weights
-            mass = basic_probability(probabilities, weights, say)
+            after = update_weights(before, heard.probabilities.argmax(axis=1), config.weight_law)
+            weighted = config.weight_evidence and not heard.parted
+            weights = after.weights if weighted else EvidenceState().weights
+            mass = basic_probability(heard.probabilities, weights, heard.say)
             m_0, fused = float(mass.max()), combine(mass, n_roi)
         else:
             m_0 = 0.0

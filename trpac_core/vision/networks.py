@@ -18,6 +18,8 @@ from .scene import SceneHead
 
 MASK_WIDTH_PX = 256
 MASK_HEIGHT_PX = 160
+HALVED_FROM = 4
+"""Times the masks' size from which on a picture is halved first [-]."""
 MASKS = ("drivable", "shadow")
 VERDICTS = ("logits", "readable")
 PICTURE_VERDICTS = ("logits",)
@@ -95,6 +97,22 @@ def calibrated_probabilities(logits: NDArray[np.float64], temperature: float) ->
     return raised / raised.sum(axis=1, keepdims=True)
 
 
+def reduced(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A BGR picture of any size as the segmenter sees it, shape (160, 256, 3): means over areas.
+
+    Means of four pixels are quick, means over areas with broken edges slow: a large picture is halved before. What that
+    changes, a grey level here and there, is much less than the network has learned to bear.
+    """
+    while image.shape[0] >= HALVED_FROM * MASK_HEIGHT_PX and image.shape[1] >= HALVED_FROM * MASK_WIDTH_PX:
+        rows, columns = image.shape[0] // 2, image.shape[1] // 2
+        image = cv2.resize(
+            image[: 2 * rows, : 2 * columns], (columns, rows), interpolation=cv2.INTER_AREA
+        ).astype(np.uint8, copy=False)
+    return np.asarray(
+        cv2.resize(image, (MASK_WIDTH_PX, MASK_HEIGHT_PX), interpolation=cv2.INTER_AREA), np.uint8
+    )
+
+
 class Segmenter:
     """The multi-task network for drivable road and shadow (section 3.1)."""
 
@@ -107,9 +125,8 @@ class Segmenter:
 
     def segment(self, image: NDArray[np.uint8]) -> RoadMasks:
         """Masks of a BGR picture of any size, reduced by area averaging; raises ModelError if they are none."""
-        small = cv2.resize(image, (MASK_WIDTH_PX, MASK_HEIGHT_PX), interpolation=cv2.INTER_AREA)
         shape = (MASK_HEIGHT_PX, MASK_WIDTH_PX)
-        masks = _run(self._session, self._path, MASKS, {"image": small[None]})
+        masks = _run(self._session, self._path, MASKS, {"image": reduced(image)[None]})
         for name, mask in zip(MASKS, masks, strict=True):
             if mask.size != MASK_HEIGHT_PX * MASK_WIDTH_PX or not np.isfinite(mask).all():
                 raise ModelError(

@@ -28,8 +28,8 @@ LEAST_CONTRAST = 1.0
 """Standard deviation of a patch's grey levels below which it shows no road but a covered, blinded or dark camera. The
 lowest of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
 
-BODIES_OF_SECTION = 2
-"""Bodies of evidence as which Eq. (7) combines the patches on one side of a line: they share light, camera and road."""
+BODIES_OF_SECTION = 10
+"""Bodies of evidence as which Eq. (7) combines the patches on one side of a line, so that each side is as sure [-]."""
 
 CORNERS_THINNED = 20
 """One of so many corners tells how much ground lies between two lines [-]."""
@@ -80,6 +80,25 @@ class Way:
                 on_line_m = ground_m[known] + np.outer((end_m - places_m)[known], (1.0, 0.0))
                 rows_px[known, column] = project(on_line_m, camera)[:, 1]
         return rows_px
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What has a say in a group's verdict.
+
+    Attributes
+    ----------
+    probabilities : array, shape (n, 3)
+        Of the group's own patches, and of those of its ground that were seen before [-].
+    say : array, shape (n,)
+        How much road each stands for: see `Region.say`.
+    parted : bool
+        Whether a line lies between them.
+    """
+
+    probabilities: NDArray[np.float64]
+    say: NDArray[np.float64]
+    parted: bool
 
 
 @dataclass(frozen=True)
@@ -134,7 +153,8 @@ class Region:
         widths_px = roi_widths_px(camera, ground_m, np.resize(widths_m, len(drawn)))
         ends_px = way.rows_of_ends_px(ground_m, camera)
         boxes = roi_boxes(camera, corners.pixel[drawn], widths_px, ends_px)
-        taken = with_most_road(road_shares(boxes, camera, drivable), len(widths_m))
+        shares = road_shares(boxes, drivable, camera.width_px, camera.height_px)
+        taken = with_most_road(shares, len(widths_m))
         ahead_m = way.to(middle_ground_m(camera, ground_m[taken], boxes[taken]))
         return cls(corners, way, tuple(ellipses), len(taken), boxes[taken], ahead_m)
 
@@ -162,6 +182,17 @@ class Region:
         """
         read = len(self.probabilities) / self.drawn if self.drawn else 1.0
         return self.corners.p_util * read
+
+    def heard(
+        self, places_m: NDArray[np.float64], probabilities: NDArray[np.float64], inside: NDArray[np.bool_]
+    ) -> Heard:
+        """What of these patches, the region's own first, has a say in its verdict; arguments as of `say`."""
+        say = self.say(places_m, inside)
+        parted = len(np.unique(self.way.section(places_m[say > 0.0]))) > 1
+        if parted:
+            probabilities = self.by_section(places_m, probabilities, say)
+        kept = (say > 0.0) | (np.arange(len(say)) < len(self.ahead_m))
+        return Heard(probabilities[kept], say[kept], parted)
 
     def say(self, places_m: NDArray[np.float64], inside: NDArray[np.bool_]) -> NDArray[np.float64]:
         """How much of the group's ground each patch stands for: those on one side of a line share what lies there.
@@ -196,7 +227,7 @@ class Region:
     def by_section(
         self, places_m: NDArray[np.float64], probabilities: NDArray[np.float64], say: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """What each patch shows, combined with those heard on its side of a line where the group has more than one.
+        """What each patch shows, combined with those heard on its side of a line.
 
         Half the ground is to weigh as half the ground, also where one of two surfaces is told less surely.
 
@@ -213,11 +244,8 @@ class Region:
             Of sum 1 each [-].
         """
         sections = self.way.section(places_m)
-        heard = np.unique(sections[say > 0.0])
-        if len(heard) < 2:
-            return probabilities
         combined = probabilities.copy()
-        for section in heard:
+        for section in np.unique(sections[say > 0.0]):
             there = sections == section
             combined[there] = combine(probabilities[there & (say > 0.0)].mean(axis=0), BODIES_OF_SECTION)
         return combined

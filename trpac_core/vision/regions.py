@@ -249,14 +249,13 @@ def _between(
     return left, top, left + columns, top + rows
 
 
-def road_shares(boxes: NDArray[np.int64], camera: Camera, drivable: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Share of drivable road in each region of the camera's picture, shape (n,) [-]."""
-    counts = cv2.integral(drivable.astype(np.uint8))
-    size = np.array(drivable.shape[::-1])
-    scale = size / (camera.width_px, camera.height_px)
-    first = np.floor(boxes[:, :2] * scale).astype(int)
-    end = np.minimum(np.ceil(boxes[:, 2:] * scale).astype(int), size)
-    (left, top), (right, bottom) = first.T, end.T
+def road_shares(
+    boxes: NDArray[np.int64], mask: NDArray[np.bool_], width_px: int, height_px: int
+) -> NDArray[np.float64]:
+    """Share of each box of the picture that a reduced mask of the whole picture holds, shape (n,) [-]."""
+    counts = cv2.integral(mask.astype(np.uint8))
+    size, whole = np.array(mask.shape[::-1]), np.array((width_px, height_px))
+    (left, top), (right, bottom) = (boxes[:, :2] * size // whole).T, (-(-boxes[:, 2:] * size // whole)).T
     road = counts[bottom, right] - counts[top, right] - counts[bottom, left] + counts[top, left]
     return np.asarray(road / ((right - left) * (bottom - top)), np.float64)
 

@@ -90,7 +90,7 @@ def scene_numbers(patches: NDArray[np.uint8], scenes: NDArray[np.uint8]) -> NDAr
 
 def _tint(images: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Blue and red beyond the mean of the three channels, over it, of each image [-]."""
-    channels = images.mean(axis=(1, 2)) / 255.0
+    channels = np.reshape([cv2.mean(image)[:3] for image in images], (-1, 3)) / 255.0
     mean = channels.mean(axis=1)
     return (channels[:, 0] - mean) / (mean + DARK), (channels[:, 2] - mean) / (mean + DARK)
 
