@@ -9,16 +9,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from trpac_core.vision.regions import cut_box, cut_patch
+from trpac_core.vision.regions import LEAST_ROAD, MOST_ASPECT, ROI_ASPECT, cut_box, cut_patch
 
 from .data import Image, Picture, family_of, pixel_box
 
 CALIBRATION_PER_SOURCE = 240
 """Most validation patches that one source gives to the calibration, lest one drive decide T."""
 
-ASPECTS = (1.5, 3.0)
+ASPECTS = (ROI_ASPECT, MOST_ASPECT)
 """Width over height of a training patch on the road, squeezed to 3:2 in the end: narrow and wide looks [-]."""
-JUDGED_ASPECT = 1.5
 
 MIN_WIDTH_PX = 48.0
 WIDE_SHARE = 0.4
@@ -58,7 +57,7 @@ cameras being dry does not make "dash camera" mean "dry": wet and snowy dash fra
 OTHER_SHARE = 1.0
 """That of any other source."""
 
-LEAST_ROADS = (0.95, 0.7)
+LEAST_ROADS = (0.95, LEAST_ROAD)
 """Least share of road in a patch cut by a mask, of one half and the other: some with kerbs and vehicles [-]."""
 
 CAMERA_SPREAD, RENDERED_SPREAD = 0.4, 0.2
@@ -176,15 +175,15 @@ def fixed_patches(picture: Picture) -> list[Image]:
     image = unsquashed(picture, picture.image(), float(np.mean(WEB_STRETCH)))
     if picture.mask is not None:
         rng = np.random.default_rng(0)
-        return _patches_in_mask(rng, image, picture.road_mask(), 4, (JUDGED_ASPECT,) * 2, LEAST_ROADS[:1] * 2)
+        return _patches_in_mask(rng, image, picture.road_mask(), 4, (ROI_ASPECT,) * 2, LEAST_ROADS[:1] * 2)
     wide = picture.wide_box
     patches = [] if wide is None else [reduced(image, pixel_box(wide, image))]
     for box in picture.boxes:
         x0, y0, x1, y1 = pixel_box(box, image)
         patches.append(reduced(image, (x0, y0, x1, y1)))
-        width = 0.55 * min(x1 - x0, JUDGED_ASPECT * (y1 - y0))
+        width = 0.55 * min(x1 - x0, ROI_ASPECT * (y1 - y0))
         for column in (x0 + width / 2, x1 - width / 2):
-            for row in (y0 + width / JUDGED_ASPECT / 2, y1 - width / JUDGED_ASPECT / 2):
+            for row in (y0 + width / ROI_ASPECT / 2, y1 - width / ROI_ASPECT / 2):
                 patches.append(cut_patch(image, (column, row), width))
     return patches
 
