@@ -14,7 +14,7 @@ from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
 from sim2real.how_far.gap import measure
 from sim2real.how_far.trpac_error import trpac_error
-from sim2real.merge import camera_side, counter_side, merge
+from sim2real.merge import merge
 from sim2real.observing.drive import WHEEL, Drive
 from sim2real.observing.evidence import Evidence, drift_of, gather, residuals
 from sim2real.observing.lattice import common_lattice
@@ -23,6 +23,7 @@ from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order, counts, read_order, without_swing
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.result import Diagnosis, Measure, TrpacError, Verdict, added
+from sim2real.sides import camera_side, counter_side
 from sim2real.sources import Source, Sources, read_source, read_sources
 from sim2real.telling.findings import Findings, describe
 from sim2real.which.closure import at_the_floor, closing, loud

@@ -27,9 +27,9 @@ from long import beyond
 
 from scenarios.perception import perceive
 from scenarios.plant import make_log, simulate
-from sim2real.merge import UNKNOWN_BELIEF, camera_side
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Verdict
+from sim2real.sides import UNKNOWN_BELIEF, camera_side
 
 
 @pytest.mark.parametrize("drives", beyond(1, [12, 60]))
