@@ -93,6 +93,7 @@ def test_training_looks_leave_out_what_is_written_into_a_clip(tmp_path):
         else:
             assert top >= 0.42, "the text ends at 0.41"
             assert bottom <= 0.88, "the bonnet begins at 0.88"
+            assert (top - 0.43) / 0.44 >= 0.19, "what is left is looked at as any other picture"
 
 
 def test_rendered_looks_have_the_class_of_their_world():
@@ -120,9 +121,23 @@ def test_the_weight_of_the_whole_is_what_it_is_worth():
         return strength * (strength * np.eye(3)[labels] + rng.normal(size=(4000, 3)))
 
     patches = evidence(1.5)
-    twice = Verdicts(labels, patches, 2.0 * evidence(1.2))
+    alone = np.arange(4000).astype(str)
+    twice = Verdicts(labels, patches, 2.0 * evidence(1.2), alone)
     assert learned_share([twice]) == pytest.approx(0.5, rel=0.1)
-    noise = Verdicts(labels, patches, rng.normal(size=(4000, 3)))
+    noise = Verdicts(labels, patches, rng.normal(size=(4000, 3)), alone)
     assert learned_share([noise]) < 0.05
     before = calibrate.cross_entropy(patches, labels)
     assert calibrate.cross_entropy(twice.together(0.5), labels) < 0.8 * before
+
+
+def test_a_long_sequence_counts_as_much_as_a_short_one():
+    """A whole that is right about ten stills and wrong about a clip of a thousand frames is heard."""
+    rng = np.random.default_rng(4)
+    labels = np.repeat([0, 1], [10, 1000])
+    whole = np.where(np.arange(1010)[:, None] < 10, 3.0, -3.0) * np.eye(3)[labels]
+    whole += rng.normal(size=(1010, 3))
+    sequences = np.array([f"still {i}" for i in range(10)] + ["clip"] * 1000)
+    found = Verdicts(labels, np.zeros((1010, 3)), whole, sequences)
+    assert learned_share([found]) > 0.2
+    every = Verdicts(labels, np.zeros((1010, 3)), whole, np.arange(1010).astype(str))
+    assert learned_share([every]) < 0.01

@@ -68,12 +68,12 @@ too. The mean of their logits over T is added to the mean log probability of the
 From the pretrained trunk, as the surface network; {stage.told()}, drawn by the same shares of
 classes and sources. {left_out}{real} looks at real pictures and {len(looks) - real} at rendered worlds of one class
 (seeds from {first}), undisturbed, at places and sizes about those that are judged, seen by cameras of other gain, gamma
-and white balance (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones). Of the clips
-that have the weather written into them only what lies below the text is shown. Seed {given.seed}; {train_s:.0f} s by
-the clock for what was not kept. Command: `python -m models.training --only picture --data DIR`.
+and white balance (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones). Of
+the clips that have the weather written into them the parts without text and bonnet are looked at. Seed {given.seed};
+{train_s:.0f} s by the clock for what was not kept. Command: `python -m models.training --only picture --data DIR`.
 
-T makes the true classes of the validation pictures likeliest beside the patches, every source counted alike. Data,
-splits and versions: [surface.md](surface.md).
+T makes the true classes of the validation pictures likeliest beside the patches, every sequence of neighbouring
+pictures counted alike. Data, splits and versions: [surface.md](surface.md).
 
 ## Scores on pictures
 

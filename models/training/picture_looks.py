@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,31 +28,9 @@ PURE_SHARE = 0.9
 """Least share of one surface on the road of a rendered view [-]: a look has one class."""
 
 
-@dataclass(frozen=True)
-class Edges:
-    """Between which fractions of a picture each edge of a look is drawn."""
-
-    left: tuple[float, float]
-    top: tuple[float, float]
-    right: tuple[float, float]
-    bottom: tuple[float, float]
-
-    def draw(self, rng: np.random.Generator) -> Box:
-        """One box."""
-        left, top, right, bottom = (
-            float(rng.uniform(*edge)) for edge in (self.left, self.top, self.right, self.bottom)
-        )
-        return left, top, right, bottom
-
-
-WIDE = Edges((0.0, 0.2), (0.2, 0.5), (0.8, 1.0), (0.9, 1.0))
-"""About the looks that a picture is judged by."""
-OVERLAID = (
-    Edges((0.02, 0.12), (0.43, 0.47), (0.5, 0.6), (0.84, 0.87)),
-    Edges((0.4, 0.5), (0.43, 0.47), (0.88, 0.98), (0.84, 0.87)),
-)
-"""In the clips that have the weather written into them: the left and the right of what is below the text and above the
-bonnet, by turns."""
+EDGES = ((0.0, 0.2), (0.2, 0.5), (0.8, 1.0), (0.9, 1.0))
+"""Between which fractions of a picture the left, top, right and bottom edge of a look are drawn: about the looks that a
+picture is judged by."""
 
 
 def training_looks(pictures: Iterable[Picture], seed: int) -> PatchSet:
@@ -63,12 +40,15 @@ def training_looks(pictures: Iterable[Picture], seed: int) -> PatchSet:
 
 
 def _drawn(rng: np.random.Generator, picture: Picture) -> list[Image]:
-    edges = OVERLAID if picture.family == "seq_extreme" else (WIDE,)
-    image = picture.image()
-    return [
-        look(image, edges[number % len(edges)].draw(rng))
-        for number in range(LOOKS_PER_PICTURE.get(picture.family, OTHER_LOOKS))
-    ]
+    """Looks at what one would show of the picture, at its parts by turns."""
+    parts = picture.clear_parts()
+    count = LOOKS_PER_PICTURE.get(picture.family, OTHER_LOOKS)
+    return [look(parts[number % len(parts)], _box(rng)) for number in range(count)]
+
+
+def _box(rng: np.random.Generator) -> Box:
+    left, top, right, bottom = (float(rng.uniform(*edge)) for edge in EDGES)
+    return left, top, right, bottom
 
 
 def rendered_looks(seeds: Sequence[int], processes: int, report: Callable[[], None]) -> PatchSet:
@@ -84,4 +64,4 @@ def _looks_at(view: View) -> tuple[list[Image], int]:
     if counts.max() < PURE_SHARE * max(len(road), 1):
         return [], 0
     rng = np.random.default_rng([view.patch_seed, 2])
-    return [look(view.frame.image, WIDE.draw(rng)) for _ in range(LOOKS_PER_VIEW)], int(counts.argmax())
+    return [look(view.frame.image, _box(rng)) for _ in range(LOOKS_PER_VIEW)], int(counts.argmax())

@@ -33,15 +33,24 @@ class Verdicts:
         Mean log probabilities of the patches.
     picture : array, shape (n, 3)
         Logits of the whole.
+    sequences : array of str, shape (n,)
+        Series of neighbouring pictures that each belongs to.
     """
 
     labels: NDArray[np.int64]
     patches: NDArray[np.float64]
     picture: NDArray[np.float64]
+    sequences: NDArray[np.str_]
 
     def together(self, share: float) -> NDArray[np.float64]:
         """Log probabilities, but for a constant, with the whole counted by a share (1 / T)."""
         return self.patches + share * self.picture
+
+    def by_sequence(self) -> list[Verdicts]:
+        """The verdicts of each sequence."""
+        columns = (self.labels, self.patches, self.picture, self.sequences)
+        rows = (self.sequences == name for name in np.unique(self.sequences))
+        return [Verdicts(*(column[chosen] for column in columns)) for chosen in rows]
 
 
 @dataclass(frozen=True)
@@ -65,22 +74,22 @@ def calibrated(folder: Path, pictures: Sequence[Picture]) -> tuple[dict[str, Sco
 
 
 def learned_share(validation: Sequence[Verdicts]) -> float:
-    """1 / T that makes the true classes likeliest, every source counted alike lest one drive decide [-]."""
+    """1 / T that makes the true classes likeliest, every sequence counted alike [-].
+
+    Neighbouring pictures are one observation more or less, and those of a clip whose rest was trained on are told too
+    easily to say how sure a picture of a new place may be.
+    """
+    parts = [part for found in validation for part in found.by_sequence()]
 
     def entropy(share: float) -> float:
-        parts = [
-            calibrate.cross_entropy(found.together(share), found.labels)
-            for found in validation
-            if len(found.labels)
-        ]
-        return float(np.mean(parts))
+        return float(np.mean([calibrate.cross_entropy(p.together(share), p.labels) for p in parts]))
 
     return float(minimize_scalar(entropy, bounds=SHARES, method="bounded").x)
 
 
 def verdicts(networks: StillNetworks, pictures: Sequence[Picture]) -> Verdicts:
     """What the networks say of pictures, cropped as one is asked to; those that the command refuses are left out."""
-    labels, patches, whole = [], [], []
+    labels, patches, whole, sequences = [], [], [], []
     for picture in pictures:
         for image in picture.clear_parts():
             masks = networks.segmenter.segment(image)
@@ -91,8 +100,14 @@ def verdicts(networks: StillNetworks, pictures: Sequence[Picture]) -> Verdicts:
             labels.append(int(picture.surface))
             patches.append(logs)
             whole.append(networks.picture.logits(image))
+            sequences.append(picture.sequence)
     shape = (len(labels), len(Surface))
-    return Verdicts(np.array(labels, np.int64), np.reshape(patches, shape), np.reshape(whole, shape))
+    return Verdicts(
+        np.array(labels, np.int64),
+        np.reshape(patches, shape),
+        np.reshape(whole, shape),
+        np.array(sequences, np.str_),
+    )
 
 
 def score(found: Verdicts, share: float) -> Scores:
