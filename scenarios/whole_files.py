@@ -21,7 +21,8 @@ def written_whole(folder: Path) -> Iterator[Path]:
     OSError
         The folder cannot be written to, or the disk is full.
     """
-    place = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
+    whole = folder.absolute()
+    place = next(place for place in (whole, *whole.parents) if place.exists())
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=place) as made:
         yield Path(made)
         folder.mkdir(parents=True, exist_ok=True)
