@@ -28,6 +28,7 @@ def add_options(parser: argparse.ArgumentParser, drives: int) -> None:
     parser.add_argument("--data", type=Path, help="folder of real road pictures; none: rendered drives only")
     parser.add_argument("--models", type=Path, default=ROOT / "models", help="folder of both networks")
     parser.add_argument("--drives", type=int, default=drives, help="rendered drives of 30 frames")
+    parser.add_argument("--streets", action="store_true", help="their roads lie in the open shade of houses")
     parser.add_argument(
         "--out", type=Path, default=Path("out/development"), help="where the drives are kept, and figures"
     )
@@ -39,7 +40,7 @@ def verdicts(given: argparse.Namespace, variants: Mapping[str, Mapping[str, Any]
     networks = Networks.load(given.models)
     found = []
     with Progress() as bars:
-        sequences = _sequences(given.out, given.drives, given.data, bars)
+        sequences = _sequences(given, bars)
         task = bars.add_task("judged", total=len(sequences) * len(SCENARIOS))
         for sequence in sequences:
             for scenario in SCENARIOS:
@@ -48,10 +49,17 @@ def verdicts(given: argparse.Namespace, variants: Mapping[str, Mapping[str, Any]
     return pd.concat(found, ignore_index=True)
 
 
-def _sequences(out: Path, count: int, data: Path | None, bars: Progress) -> list[Sequence]:
-    """Rendered drives, kept in `out`, and the validation parts of the real clips in `data`."""
-    drawing = bars.add_task("rendered drives", total=count)
-    drives, _ = rendered_drives(out, count, lambda done, _: bars.update(drawing, completed=done), FIRST_SEED)
+def _sequences(given: argparse.Namespace, bars: Progress) -> list[Sequence]:
+    """Rendered drives, kept in the command line's folder, and the validation parts of its real clips."""
+    drawing = bars.add_task("rendered drives", total=given.drives)
+    kept = given.out / "streets" if given.streets else given.out
+    drives, _ = rendered_drives(
+        kept,
+        given.drives,
+        lambda done, _: bars.update(drawing, completed=done),
+        FIRST_SEED,
+        streets=given.streets,
+    )
     rendered = [replace(drive, frames=drive.frames[::EVERY]) for drive in drives]
-    real = real_sequences(data) if data else []
+    real = real_sequences(given.data) if given.data else []
     return rendered + [part for part in (sequence.validation_part() for sequence in real) if part.frames]

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.camera.renderer import Renderer, fresnel_reflectance
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import HOUSE_RISE, SceneLook, SurfaceSegment
+from scenarios.camera.sky import AZIMUTH_RAD, LOWEST_RAD, ROOFS, build_panorama
 from scenarios.camera.textures import build_ripmap
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
@@ -155,6 +156,67 @@ def test_shadows_darken_the_road_where_the_mask_says(surface):
 def test_no_shadow_labels_under_an_overcast_sky():
     look = replace(SHADED, sky="overcast", sun_share=0.0)
     assert not any(renderer(look=look).frame(position).shadow.any() for position in range(0, 240, 40))
+
+
+@pytest.mark.parametrize("surface", [Surface.DRY, Surface.SNOW_ICE])
+def test_in_open_shade_the_road_has_the_skys_light_and_no_shadow(surface):
+    """With the exposure held, a matt road's linear light falls to the share that the sun does not bring."""
+    sunny = replace(
+        PLAIN, auto_exposure=0.0, sun_share=0.6, visibility_m=1e9, ice_gloss=0.0, exposure_ev=-1.5
+    )
+    shade = replace(sunny, open_shade=True)
+    lit, shaded = (renderer(look=look, surface=surface).frame(5.0) for look in (sunny, shade))
+    assert not shaded.shadow.any()
+    road = lit.drivable & (lit.surface == surface)
+    ratio = _linear(shaded.image[road]).mean(axis=0) / _linear(lit.image[road]).mean(axis=0)
+    fill, sun = 0.4 * np.array([1.22, 1.0, 0.86]), 0.6 * np.array([0.9, 1.0, 1.06])
+    assert ratio == pytest.approx(fill / (fill + sun), rel=0.05)  # bytes of a dark road are 2 % of its light
+
+
+def _linear(image):
+    """Light of display bytes below the tone curve's shoulder, the inverse of sRGB's curve."""
+    display = image / 255.0
+    return np.where(display < 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
+
+
+def test_a_camera_in_open_shade_exposes_longer():
+    dark = replace(PLAIN, auto_exposure=0.0, open_shade=True)
+    evened = replace(dark, auto_exposure=0.9)
+    lit = [replace(look, open_shade=False) for look in (dark, evened)]
+    means = [renderer(look=look).frame(5.0).image[200:].mean() for look in (dark, evened, *lit)]
+    assert means[1] / means[3] > 1.2 * means[0] / means[2]
+
+
+def test_streets_have_houses_on_one_side_or_both_and_else_the_look_that_they_were_given():
+    look = SceneLook.random(np.random.default_rng(5))
+    streets = [look.in_a_street(np.random.default_rng(seed)) for seed in range(400)]
+    assert all(street.open_shade for street in streets)
+    assert all(replace(street, open_shade=False, house_rise=(0.0, 0.0)) == look for street in streets)
+    rises = np.array([street.house_rise for street in streets])
+    one_side = (rises == 0.0).any(axis=1)
+    assert rises.max() <= HOUSE_RISE[1]
+    assert (rises.max(axis=1) >= HOUSE_RISE[0]).all()
+    assert 0.4 < one_side.mean() < 0.6  # a half each way, four standard deviations
+    assert 0.35 < (rises[one_side, 0] == 0.0).mean() < 0.65
+
+
+@pytest.mark.parametrize(("left", "right"), [(1.0, 0.0), (0.0, 1.0), (0.6, 1.8)])
+def test_a_row_of_houses_stands_as_high_as_its_rise_says(left, right):
+    """A wall h high at the distance d aside reaches the elevation atan(h sin(azimuth) / d)."""
+    open_land = replace(PLAIN, hills=0.0, tree_line=0.0)
+    px_rad = 0.004
+    free, street = (
+        build_panorama(look, px_rad).sharp
+        for look in (open_land, replace(open_land, house_rise=(left, right)))
+    )
+    hidden = (free != street).any(axis=2)
+    elevation = LOWEST_RAD + (np.arange(hidden.shape[0]) + 0.5) * px_rad
+    azimuth = AZIMUTH_RAD - (np.arange(hidden.shape[1]) + 0.5) * px_rad
+    roof = np.where(hidden.any(axis=0), elevation[-1 - hidden[::-1].argmax(axis=0)], 0.0)
+    by_hand = np.where(azimuth > 0.0, left, right) * np.abs(np.sin(azimuth))
+    assert (np.tan(roof) <= ROOFS[1] * by_hand + px_rad).all()
+    below_top = np.arctan(ROOFS[0] * by_hand) < elevation[-1]
+    assert (np.tan(roof) >= ROOFS[0] * by_hand - 2 * px_rad)[below_top].all()
 
 
 def test_dry_wet_and_snow_of_one_look_differ():

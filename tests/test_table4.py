@@ -49,6 +49,16 @@ def test_drives_repeat_and_share_no_seed_with_training():
         drives.plan(SEED_RANGES["test"][-1])
 
 
+def test_a_drive_through_a_street_is_the_same_drive_in_open_shade():
+    for seed in range(drives.FIRST_SEED, drives.FIRST_SEED + 4):
+        open_land, street = drives.plan(seed), drives.plan(seed, streets=True)
+        assert street.look.open_shade
+        assert max(street.look.house_rise) > 0.0
+        in_the_open = replace(street.look, open_shade=False, house_rise=(0.0, 0.0))
+        assert replace(street, look=in_the_open) == open_land
+        assert street == drives.plan(seed, streets=True)
+
+
 def test_the_truth_of_ground_points_is_what_the_renderer_draws():
     plan = drives.plan(drives.FIRST_SEED + 1)
     frame = int(np.searchsorted(plan.places_m, plan.segments[1].start_m - 5.0))

@@ -6,7 +6,7 @@ import hashlib
 import inspect
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import cache
 from itertools import permutations
@@ -34,6 +34,8 @@ CHANGE_M = (9.0, 27.0)
 SPEEDS_M_S = (8.0, 22.0)
 QUALITY = 95
 PAIRS = tuple(permutations(Surface, 2))
+STREET = 9
+"""Beside a drive's seed, for its street: all else stays as it is without."""
 PLAN, COST = "plan.json", "cost.json"
 
 
@@ -56,8 +58,11 @@ class Plan:
         return STEP_M * np.arange(FRAMES)
 
 
-def plan(seed: int) -> Plan:
-    """Every pair of classes in turn; every other six drives have the weather likely for the first, the rest any."""
+def plan(seed: int, streets: bool = False) -> Plan:
+    """Every pair of classes in turn; every other six drives have the weather likely for the first, the rest any.
+
+    With `streets` the same drive lies in the open shade of houses.
+    """
     if any(seed in known for known in SEED_RANGES.values()):
         raise ValueError(f"Seed {seed} belongs to a training split; expected {FIRST_SEED} or above.")
     rng = np.random.default_rng(seed)
@@ -66,6 +71,8 @@ def plan(seed: int) -> Plan:
     camera = random_camera(rng, SCALE)
     segments = (SurfaceSegment(-1000.0, first), SurfaceSegment(float(rng.uniform(*CHANGE_M)), second))
     look = SceneLook.random(rng, first if likely else None)
+    if streets:
+        look = look.in_a_street(np.random.default_rng([seed, STREET]))
     way = STEP_M * np.arange(FRAMES)
     wave, sway, phase = rng.uniform(30.0, 80.0), rng.uniform(0.0, 0.4), rng.uniform(0.0, 2.0 * np.pi)
     lateral = sway * np.sin(2.0 * np.pi * way / wave + phase)
@@ -112,11 +119,19 @@ def _renderer_sha256() -> str:
 
 
 def rendered_drives(
-    kept: Path, count: int, told: Callable[[int, int], None], first_seed: int = FIRST_SEED
+    kept: Path,
+    count: int,
+    told: Callable[[int, int], None],
+    first_seed: int = FIRST_SEED,
+    *,
+    streets: bool = False,
 ) -> tuple[list[Sequence], float]:
-    """The first drives from a seed, drawn where the folder `kept` lacks them; CPU time of all when drawn [s]."""
+    """The first drives from a seed, drawn where the folder `kept` lacks them; CPU time of all when drawn [s].
+
+    With `streets` all of them lie in the open shade of houses.
+    """
     drives, cpu_s = [], 0.0
-    for done, drawn in enumerate(plans(count, first_seed)):
+    for done, drawn in enumerate(plan(first_seed + number, streets) for number in range(count)):
         folder = kept / str(drawn.seed)
         written = folder / PLAN
         if not (written.is_file() and written.read_text(encoding="utf-8") == described(drawn)):
@@ -125,11 +140,6 @@ def rendered_drives(
         drives.append(_sequence(drawn, folder))
         told(done + 1, count)
     return drives, cpu_s
-
-
-def plans(count: int, first_seed: int = FIRST_SEED) -> Iterator[Plan]:
-    """The plans of the first drives."""
-    return (plan(first_seed + number) for number in range(count))
 
 
 def _sequence(drawn: Plan, folder: Path) -> Sequence:

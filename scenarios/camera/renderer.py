@@ -178,7 +178,7 @@ class Renderer:
         ahead = np.linspace(*METERED_M, 36) + position_m
         # the quadratic mean protects bright surfaces from clipping
         road = float(np.sqrt(np.mean([brightness[self.surface_at(place)] ** 2 for place in ahead])))
-        metered = 0.6 * road + 0.4 * max(0.12, 0.5 * self._sky_mean)
+        metered = 0.6 * look.ground_light * road + 0.4 * max(0.12, 0.5 * self._sky_mean)
         exposure = 2.0**look.exposure_ev * (GREY / 0.25) * (0.25 / metered) ** look.auto_exposure
         return (exposure * TONE_STEPS_PER_UNIT * np.array(look.white_balance)).astype(np.float32)
 
@@ -311,7 +311,8 @@ def _loop_look(look: SceneLook, horizon: NDArray[np.float32], sky: Panorama) -> 
     colour, verge_grain = _VERGES[look.verge]
     verge = np.array(colour) * look.verge_tone
     low = look.sky == "low_sun"
-    sun = look.sun_share * (np.array([0.62, 0.85, 1.12]) if low else np.array([0.9, 1.0, 1.06]))
+    sunlight = 0.0 if look.open_shade else look.sun_share
+    sun = sunlight * (np.array([0.62, 0.85, 1.12]) if low else np.array([0.9, 1.0, 1.06]))
     fill_tint = np.array([1.22, 1.0, 0.86]) if look.sky in ("clear", "low_sun") else np.ones(3)
     fill = (1.0 - look.sun_share) * fill_tint
 

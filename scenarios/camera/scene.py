@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -13,6 +13,8 @@ from trpac_core.vision.classes import Surface
 Sky = Literal["clear", "broken", "overcast", "low_sun"]
 Verge = Literal["grass", "dry_grass", "soil", "gravel"]
 Line = Literal["none", "dashed", "solid", "double"]
+HOUSE_RISE = (0.4, 2.0)
+"""Height of a row of houses over its distance from the road's middle [-]."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,8 @@ class SceneLook:
     poles_per_100_m: float = 2.0
     walls_per_100_m: float = 0.3
     bridges_per_100_m: float = 0.1
+    house_rise: tuple[float, float] = (0.0, 0.0)  # left, right: height of a row over its distance aside
+    open_shade: bool = False  # houses keep the sun from the road and beside it: the sky alone lights them
     # camera
     exposure_ev: float = 0.0
     auto_exposure: float = 0.7  # share of a surface's brightness that the camera evens out
@@ -112,7 +116,17 @@ class SceneLook:
     @property
     def casts_shadows(self) -> bool:
         """Whether the sun is strong enough for shadows that one can see (and that are labelled)."""
-        return self.sun_share > 0.25
+        return self.sun_share > 0.25 and not self.open_shade
+
+    @property
+    def ground_light(self) -> float:
+        """Light on the road outside of cast shadows, over that on open ground [-]."""
+        return 1.0 - self.sun_share if self.open_shade else 1.0
+
+    def in_a_street(self, rng: np.random.Generator) -> SceneLook:
+        """The same road in the open shade of houses that stand on one side or on both, drawn at random."""
+        left, right = rng.uniform(*HOUSE_RISE, 2) * rng.permutation([1.0, rng.choice([0.0, 1.0])])
+        return replace(self, open_shade=True, house_rise=(float(left), float(right)))
 
     @classmethod
     def random(cls, rng: np.random.Generator, surface: Surface | None = None) -> SceneLook:

@@ -14,6 +14,12 @@ Float = NDArray[np.float32]
 
 AZIMUTH_RAD = 1.0  # the panorama reaches this far to either side
 LOWEST_RAD, HIGHEST_RAD = -0.02, 0.62
+HOUSES, HOUSE_LENGTH = 40, 1.0
+"""Houses that a row repeats no more after, and the length of one over the row's distance aside [-]."""
+ROOFS, FACADES, FACADE_TINTS = (0.7, 1.2), (0.08, 0.5), (0.85, 1.15)
+"""Height of a house over its row's, reflectance of its wall, and the tint of each of its channels [-]."""
+STOREYS, WINDOWS, GLASS = 4, 3.0, 0.35
+"""Storeys, windows per distance aside, and how dark they are beside the wall [-]."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,7 @@ def build_panorama(look: SceneLook, px_rad: float) -> Panorama:
     light = _sky(look, rng, elevation, azimuth)
     haze = light[int(0.06 / px_rad)].mean(axis=0)
     _land(look, rng, light, elevation, haze)
+    _houses(look, light, elevation, azimuth)
     rough_px_rad = max(px_rad, 0.006)
     factor = px_rad / rough_px_rad
     small = cv2.resize(light, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
@@ -96,7 +103,7 @@ def _sky(look: SceneLook, rng: np.random.Generator, elevation: Float, azimuth: F
             share = share * 0.55
         bright = look.cloud_tone * (0.55 + 0.5 * field[..., None]) * np.array([1.0, 0.99, 0.97])
         light = light * (1 - share) + bright.astype(np.float32) * share
-    if look.sun_share > 0.0:
+    if look.sun_share > 0.0 and not look.open_shade:
         apart = np.arccos(
             np.clip(
                 np.sin(elevation)[:, None] * np.sin(look.sun_elevation_rad)
@@ -149,3 +156,22 @@ def _land(look: SceneLook, rng: np.random.Generator, light: Float, elevation: Fl
         share = 1.0 - np.exp(-120.0 / look.visibility_m)
         light[inside] = (colour * (1 - share) + haze * share)[inside]
     light[elevation < 0] = light[np.searchsorted(elevation, 0.0)] * 0.8
+
+
+def _houses(look: SceneLook, light: Float, elevation: Float, azimuth: Float) -> None:
+    """A row of houses along each side, in place: seen along the street its roofs fall towards the road's end."""
+    for side, rise in zip((1.0, -1.0), look.house_rise, strict=True):
+        if rise == 0.0:
+            continue
+        rng = np.random.default_rng([look.seed, 29, int(side > 0.0)])
+        aside = np.maximum(np.sin(side * azimuth), 0.0)
+        along = np.cos(azimuth) / np.maximum(aside, 1e-3)  # of each column's wall, over its distance aside
+        house = np.minimum(along / HOUSE_LENGTH, HOUSES - 1).astype(int)
+        roof = np.arctan(rise * rng.uniform(*ROOFS, HOUSES)[house] * aside)
+        facade = rng.uniform(*FACADES, HOUSES)[house] * rng.uniform(look.ground_light, 1.0)
+        tint = rng.uniform(*FACADE_TINTS, (HOUSES, 3))[house]
+        storey = np.tan(elevation)[:, None] / np.maximum(rise * aside, 1e-3) * STOREYS % 1.0
+        window = (abs(storey - 0.5) < 0.25) & (along * WINDOWS % 1.0 < 0.5)
+        wall = facade[:, None] * tint * np.where(window, GLASS, 1.0)[..., None]
+        inside = (elevation[:, None] > 0.0) & (elevation[:, None] < roof)
+        light[inside] = wall[inside]
