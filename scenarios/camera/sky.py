@@ -15,7 +15,7 @@ Float = NDArray[np.float32]
 AZIMUTH_RAD = 1.0  # the panorama reaches this far to either side
 LOWEST_RAD, HIGHEST_RAD = -0.02, 0.62
 HOUSES, HOUSE_LENGTH = 40, 1.0
-"""Houses that a row repeats no more after, and the length of one over the row's distance aside [-]."""
+"""Houses of a row, of which the last one goes on for ever, and their length over the row's distance aside [-]."""
 ROOFS, FACADES, FACADE_TINTS = (0.7, 1.2), (0.08, 0.5), (0.85, 1.15)
 """Height of a house over its row's, reflectance of its wall, and the tint of each of its channels [-]."""
 STOREYS, WINDOWS, GLASS = 4, 3.0, 0.35
