@@ -311,8 +311,7 @@ def _loop_look(look: SceneLook, horizon: NDArray[np.float32], sky: Panorama) -> 
     colour, verge_grain = _VERGES[look.verge]
     verge = np.array(colour) * look.verge_tone
     low = look.sky == "low_sun"
-    sunlight = 0.0 if look.open_shade else look.sun_share
-    sun = sunlight * (np.array([0.62, 0.85, 1.12]) if low else np.array([0.9, 1.0, 1.06]))
+    sun = look.sun_on_road * (np.array([0.62, 0.85, 1.12]) if low else np.array([0.9, 1.0, 1.06]))
     fill_tint = np.array([1.22, 1.0, 0.86]) if look.sky in ("clear", "low_sun") else np.ones(3)
     fill = (1.0 - look.sun_share) * fill_tint
 

@@ -116,7 +116,12 @@ class SceneLook:
     @property
     def casts_shadows(self) -> bool:
         """Whether the sun is strong enough for shadows that one can see (and that are labelled)."""
-        return self.sun_share > 0.25 and not self.open_shade
+        return self.sun_on_road > 0.25
+
+    @property
+    def sun_on_road(self) -> float:
+        """What the sun itself brings to the road, of the light on open ground [-]."""
+        return 0.0 if self.open_shade else self.sun_share
 
     @property
     def ground_light(self) -> float:

@@ -103,7 +103,7 @@ def _sky(look: SceneLook, rng: np.random.Generator, elevation: Float, azimuth: F
             share = share * 0.55
         bright = look.cloud_tone * (0.55 + 0.5 * field[..., None]) * np.array([1.0, 0.99, 0.97])
         light = light * (1 - share) + bright.astype(np.float32) * share
-    if look.sun_share > 0.0 and not look.open_shade:
+    if look.sun_on_road > 0.0:
         apart = np.arccos(
             np.clip(
                 np.sin(elevation)[:, None] * np.sin(look.sun_elevation_rad)
@@ -115,7 +115,7 @@ def _sky(look: SceneLook, rng: np.random.Generator, elevation: Float, azimuth: F
             )
         )[..., None]
         glow = 0.6 * np.exp(-apart / 0.25) + 3.0 * np.exp(-apart / 0.06)
-        light = light + look.sun_share * glow * np.array([0.75, 0.9, 1.0])
+        light = light + look.sun_on_road * glow * np.array([0.75, 0.9, 1.0])
     return light.astype(np.float32)
 
 
