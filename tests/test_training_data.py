@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import binom
 
 from models.training import (
     augment,
@@ -357,6 +358,20 @@ def test_regions_of_a_driving_car_are_cut_on_the_road_and_repeat():
         assert patch.shape == (64, 96, 3)
         assert (patch == same).all()
         assert label == same_label
+
+
+def test_worlds_in_streets_are_those_of_open_land_but_for_their_light():
+    """About three in ten lie between houses: they show the same road in another light, all others the same picture."""
+    changed, count = 0, 16
+    for seed in range(rendered.SEED_RANGES["train"].start, rendered.SEED_RANGES["train"].start + count):
+        land, street = (
+            next(rendered.world_views(seed, 0.06, streets=share))
+            for share in (rendered.OPEN_LAND, rendered.STREETS)
+        )
+        assert (land.frame.surface == street.frame.surface).all()
+        changed += not np.array_equal(land.frame.image, street.frame.image)
+    low, high = binom.interval(0.999, count, rendered.STREETS)
+    assert low <= changed <= high
 
 
 def test_shared_sequence_is_refused(tmp_path):

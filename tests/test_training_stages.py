@@ -100,26 +100,78 @@ def test_a_net_of_several_towers_has_the_weighted_mean_of_their_logits():
     assert [tower.trunk.kind for tower in net.towers] == list(surface_run.TOWERS)
 
 
-def test_every_tower_is_trained_on_the_same_patches(monkeypatch):
+def test_the_mean_of_nets_has_the_means_of_their_weights_and_statistics():
+    alike = [train_surface.new_net(seed).eval() for seed in range(2)]
+    for net, part in zip(alike, (1.0, 3.0), strict=True):
+        net.norm.running_var = torch.full_like(net.norm.running_var, part)
+        net.norm.num_batches_tracked = torch.tensor(12)
+    before = [{name: value.clone() for name, value in net.state_dict().items()} for net in alike]
+    mean = nets.mean_of(alike)
+    assert not mean.training
+    for name, value in mean.state_dict().items():
+        middle = (before[0][name].double() + before[1][name].double()) / 2
+        assert torch.allclose(value.double(), middle, atol=1e-7), name
+        assert value.dtype == before[0][name].dtype
+    assert (mean.norm.running_var == 2.0).all()
+    assert mean.norm.num_batches_tracked == 12
+    assert not torch.equal(before[0]["classifier.weight"], before[1]["classifier.weight"])
+    for net, kept in zip(alike, before, strict=True):
+        assert all(torch.equal(value, kept[name]) for name, value in net.state_dict().items())
+
+
+def test_each_tower_is_the_mean_of_a_training_per_sort_of_worlds(monkeypatch):
+    """All begin alike; the patches of a sort are cut once for all towers."""
     given = argparse.Namespace(kept=None, seed=5, effort=1.0, device="cpu", threads=1, without=())
-    seen, cut = [], []
+    seen, drawn = [], []
 
     def learned(net, patches, *, seed, steps, **others):
         seen.append((net.towers[0].trunk.kind, patches, seed, steps))
+        torch.nn.init.constant_(net.classifier.bias, float(len(patches)))
         return net.eval()
 
     @contextmanager
     def steps(what, count):
         yield None
 
+    def worlds(count):
+        def draw():
+            drawn.append(count)
+            return range(count)
+
+        return draw
+
     monkeypatch.setattr(surface_run, "learn_classes", learned)
-    monkeypatch.setattr(surface_run, "joined", lambda parts: range(9))
-    monkeypatch.setattr(surface_run, "_cuts", lambda given, pictures: cut)
-    stage = surface_run._classes(given, [], None, lambda: cut.append("drawn"), steps)
-    assert seen == [(kind, range(9), 5, surface_run.CLASS_STEPS) for kind in surface_run.TOWERS]
-    assert cut == ["drawn"], "the patches were cut more than once"
+    monkeypatch.setattr(surface_run, "joined", lambda parts: parts[-1])
+    monkeypatch.setattr(surface_run, "_cuts", lambda given, pictures: ["real"])
+    sorts = {"open-land": worlds(9), "streets": worlds(5)}
+    stage = surface_run._classes(given, [], sorts, steps)
+    assert seen == [
+        (kind, range(count), 5, surface_run.CLASS_STEPS) for count in (9, 5) for kind in surface_run.TOWERS
+    ]
+    assert drawn == [9, 5], "the patches were cut more than once"
     assert [tower.trunk.kind for tower in stage.net.towers] == list(surface_run.TOWERS)
-    assert (stage.patches, stage.steps) == (9, 2 * surface_run.CLASS_STEPS)
+    assert (stage.patches, stage.steps) == (9, 4 * surface_run.CLASS_STEPS)
+    assert stage.says == tuple(surface_run.TOWERS.values())
+    assert torch.allclose(stage.net.classifier.bias, torch.tensor(7.0))
+    begun = train_surface.new_net(5).towers[0].state_dict()
+    for name, value in stage.net.towers[0].state_dict().items():
+        assert torch.allclose(value, begun[name], atol=1e-7), name
+
+
+@pytest.mark.parametrize(("kernel", "stride"), [(5, 1), (3, 2)])
+def test_a_depthwise_convolution_keeps_32_bits_in_half_precision(kernel, stride):
+    """As without half precision, but for one rounding of what comes out; weights learn from exact gradients."""
+    torch.manual_seed(9)
+    conv = trunk.Depthwise(6, 6, kernel, stride, kernel // 2, groups=6, bias=False)
+    maps = torch.randn(4, 6, 8, 12, generator=generator(9)).bfloat16()
+    exact = torch.nn.Conv2d.forward(conv, maps.float())
+    (expected,) = torch.autograd.grad(exact.sum(), conv.weight)
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        out = conv(maps)
+    (found,) = torch.autograd.grad(out.float().sum(), conv.weight)
+    assert out.dtype == torch.bfloat16
+    assert torch.equal(out, exact.bfloat16())
+    assert torch.allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
 def test_training_leaves_the_first_blocks_and_their_statistics_as_they_are():

@@ -41,6 +41,9 @@ of those that it has."""
 STORED_WIDTH_PX = 384
 """Width at which whole pictures are kept for the segmenter [px]."""
 
+OPEN_LAND, STREETS = 0.0, 0.3
+"""Share of the worlds that lie in the open shade of houses [-]: of none, and where they are to be learned."""
+
 PLACES_M = (0.0, 17.0, 41.0)
 """Road coordinates from which each world is seen [m]."""
 
@@ -94,11 +97,14 @@ def random_camera(rng: np.random.Generator, scale: float) -> Camera:
     )
 
 
-def world_views(seed: int, scale: float, camera: Camera | None = None) -> Iterator[View]:
+def world_views(
+    seed: int, scale: float, camera: Camera | None = None, streets: float = OPEN_LAND
+) -> Iterator[View]:
     """Pictures of one world from several places; its class is seed modulo 3, and one world in four changes it.
 
     Half of the worlds have the weather that is likely for their class, half any weather: snow under a summer sky
-    must still be told by its surface. Without a camera the world draws its own.
+    must still be told by its surface. Without a camera the world draws its own. A share `streets` of the worlds lies
+    between houses, and is else as it would be in open land.
     """
     rng = np.random.default_rng(seed)
     surface = Surface(seed % 3)
@@ -108,19 +114,28 @@ def world_views(seed: int, scale: float, camera: Camera | None = None) -> Iterat
     if rng.random() < 0.25:
         other = Surface((int(surface) + int(rng.integers(1, 3))) % 3)
         segments.append(SurfaceSegment(rng.uniform(8.0, 60.0), other))
-    renderer = Renderer(camera, segments, SceneLook.random(rng, likely))
+    look = SceneLook.random(rng, likely)
+    street = rng.spawn(1)[0]
+    if street.random() < streets:
+        look = look.in_a_street(street)
+    renderer = Renderer(camera, segments, look)
     for number, place_m in enumerate(PLACES_M):
         frame = renderer.frame(place_m, rng.uniform(-0.5, 0.5), rng.uniform(-0.05, 0.05))
         yield View(frame, camera, 10 * seed + number)
 
 
 def draw_worlds(
-    split: str, count: int, patches_per_view: int, processes: int, report: Callable[[], None]
+    split: str,
+    count: int,
+    patches_per_view: int,
+    processes: int,
+    report: Callable[[], None],
+    streets: float = OPEN_LAND,
 ) -> tuple[list[Sample], PatchSet]:
     """Whole pictures and patches of the first `count` worlds of a split; `report` is called after each world."""
     samples: list[Sample] = []
     cut: list[Cut] = []
-    see = partial(_sample_and_patches, split=split, count=patches_per_view)
+    see = partial(_sample_and_patches, split=split, count=patches_per_view, streets=streets)
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
         for views in pool.map(see, range(count)):
             samples += [sample for sample, _ in views]
@@ -129,14 +144,15 @@ def draw_worlds(
     return samples, rendered_patches(cut)
 
 
-def _sample_and_patches(number: int, split: str, count: int) -> list[tuple[Sample, Cut]]:
+def _sample_and_patches(number: int, split: str, count: int, streets: float) -> list[tuple[Sample, Cut]]:
     cv2.setNumThreads(1)
-    return [(view_sample(view), view_patches(view, count)) for view in _split_world(split, number)]
+    return [(view_sample(view), view_patches(view, count)) for view in _split_world(split, number, streets)]
 
 
-def _split_world(split: str, number: int) -> Iterator[View]:
+def _split_world(split: str, number: int, streets: float = OPEN_LAND) -> Iterator[View]:
     """Views of one world of a split, by a camera of its own."""
-    return world_views(SEED_RANGES[split][number], FULL_SCALE if number % 4 == 0 else REDUCED_SCALE)
+    scale = FULL_SCALE if number % 4 == 0 else REDUCED_SCALE
+    return world_views(SEED_RANGES[split][number], scale, streets=streets)
 
 
 def split_views(split: str, count: int, report: Callable[[], None]) -> Iterator[View]:
@@ -147,30 +163,40 @@ def split_views(split: str, count: int, report: Callable[[], None]) -> Iterator[
 
 
 def draw_further_worlds(
-    seeds: Sequence[int], patches_per_view: int, processes: int, report: Callable[[], None]
+    seeds: Sequence[int],
+    patches_per_view: int,
+    processes: int,
+    report: Callable[[], None],
+    streets: float,
 ) -> list[tuple[Image, Cut]]:
     """Scene and patches of each view of further worlds, see `seen_in_worlds`."""
-    return seen_in_worlds(seeds, partial(_scene_and_patches, count=patches_per_view), processes, report)
+    see = partial(_scene_and_patches, count=patches_per_view)
+    return seen_in_worlds(seeds, see, processes, report, streets)
 
 
 def seen_in_worlds(
-    seeds: Sequence[int], see: Callable[[View], Seen], processes: int, report: Callable[[], None]
+    seeds: Sequence[int],
+    see: Callable[[View], Seen],
+    processes: int,
+    report: Callable[[], None],
+    streets: float = OPEN_LAND,
 ) -> list[Seen]:
     """What each view of worlds shows, at the reduced scale, a camera for several; independent of `processes`."""
     sharing = [seeds[first : first + WORLDS_PER_CAMERA] for first in range(0, len(seeds), WORLDS_PER_CAMERA)]
     seen: list[Seen] = []
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
-        for some, views in zip(sharing, pool.map(partial(_by_one_camera, see=see), sharing), strict=True):
+        look = partial(_by_one_camera, see=see, streets=streets)
+        for some, views in zip(sharing, pool.map(look, sharing), strict=True):
             seen += views
             for _ in some:
                 report()
     return seen
 
 
-def _by_one_camera(seeds: Sequence[int], see: Callable[[View], Seen]) -> list[Seen]:
+def _by_one_camera(seeds: Sequence[int], see: Callable[[View], Seen], streets: float) -> list[Seen]:
     cv2.setNumThreads(1)
     camera = random_camera(np.random.default_rng([seeds[0], 2]), REDUCED_SCALE)
-    return [see(view) for seed in seeds for view in world_views(seed, REDUCED_SCALE, camera)]
+    return [see(view) for seed in seeds for view in world_views(seed, REDUCED_SCALE, camera, streets)]
 
 
 def _scene_and_patches(view: View, count: int) -> tuple[Image, Cut]:

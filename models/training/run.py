@@ -27,11 +27,13 @@ from .annotate import sha256_of
 from .data import Picture, check_trainable, of_split, read_manifest
 from .export import export_segmenter
 from .keeping import kept_or_made
-from .patches import PatchSet
+from .patches import PatchSet, joined
 from .picture_run import ship_picture
 from .rendered import (
+    OPEN_LAND,
     PATCHES_PER_VIEW,
     SEED_RANGES,
+    STREETS,
     draw_further_worlds,
     draw_worlds,
     load_patches,
@@ -70,6 +72,8 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
     _keep_memory()
     torch.set_num_threads(given.threads)
     torch.use_deterministic_algorithms(mode=given.device == "cpu")
+    # Filling what is about to be written would take a fifth of the time of a step.
+    torch.utils.deterministic.fill_uninitialized_memory = False
     with _progress() as progress:
         worlds = {split: max(3, round(given.effort * count)) for split, count in WORLDS.items()}
         steps = partial(_steps, progress)
@@ -110,8 +114,13 @@ def _patch_networks(
     if given.only in (None, "segmenter"):
         _segmenter(progress, given, facts, rendered)
     if given.only in (None, "surface"):
+        streets = _render(progress, {"train": worlds["train"]}, given, STREETS)["train"].patches
         draw = partial(_render_further, progress, worlds["train"], further, given)
-        train_and_ship(given, facts, patches, draw, progress, steps)
+        roads = {
+            "open-land": lambda: joined([patches["train"], draw(OPEN_LAND)]),
+            "streets": lambda: joined([streets, draw(STREETS)]),
+        }
+        train_and_ship(given, facts, patches | {"train": streets}, roads, progress, steps)
         _scene(progress, given, pictures, worlds, steps)
 
 
@@ -149,22 +158,30 @@ def _keep_memory() -> None:
             mallopt(parameter, value)
 
 
-def _render(progress: Progress, counts: dict[str, int], given: argparse.Namespace) -> dict[str, Rendered]:
+def _render(
+    progress: Progress, counts: dict[str, int], given: argparse.Namespace, streets: float = OPEN_LAND
+) -> dict[str, Rendered]:
     task = progress.add_task("rendering worlds", total=sum(counts.values()), note="")
     rendered, done = {}, 0
     for split, count in counts.items():
         report = partial(progress.advance, task)
-        draw = partial(draw_worlds, split, count, PATCHES_PER_VIEW[split], given.threads, report)
-        worlds = kept_or_made(
-            given.kept, f"{split}-{count}.npz", load=load_worlds, make=draw, save=save_worlds
-        )
+        draw = partial(draw_worlds, split, count, PATCHES_PER_VIEW[split], given.threads, report, streets)
+        name = f"{split}-{count}{_where(streets)}.npz"
+        worlds = kept_or_made(given.kept, name, load=load_worlds, make=draw, save=save_worlds)
         rendered[split] = Rendered(*worlds)
         done += count
         progress.update(task, completed=done)
     return rendered
 
 
-def _render_further(progress: Progress, first: int, count: int, given: argparse.Namespace) -> PatchSet:
+def _where(streets: float) -> str:
+    """What the name of a kept file tells of where its worlds lie."""
+    return "-streets" if streets else ""
+
+
+def _render_further(
+    progress: Progress, first: int, count: int, given: argparse.Namespace, streets: float
+) -> PatchSet:
     """Patches of `count` training worlds from the `first` on."""
 
     def draw() -> PatchSet:
@@ -174,10 +191,11 @@ def _render_further(progress: Progress, first: int, count: int, given: argparse.
             FURTHER_PATCHES_PER_VIEW,
             given.threads,
             lambda: progress.advance(task),
+            streets,
         )
         return rendered_patches([cut for _, cut in seen])
 
-    name = f"further-{first}-{count}.npz"
+    name = f"further-{first}-{count}{_where(streets)}.npz"
     return kept_or_made(given.kept, name, load=load_patches, make=draw, save=save_patches)
 
 

@@ -30,6 +30,7 @@ from .rendered import (
     FIRST_SCENE_WORLD,
     PATCHES_PER_VIEW,
     SEED_RANGES,
+    STREETS,
     draw_further_worlds,
     split_views,
     view_patches,
@@ -100,6 +101,7 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
                 PATCHES_PER_WORLD_VIEW,
                 given.threads,
                 lambda: report(next(done), np.nan),
+                STREETS,
             )
         return scenes_of_views(views)
 

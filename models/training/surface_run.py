@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import functools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from .annotate import sha256_of
 from .data import Image, Picture, judged_groups, of_split, trained_on
 from .export import export_surface
 from .keeping import keep_whole, kept_or_made
-from .nets import SurfaceNet, together
+from .nets import SurfaceNet, mean_of, together
 from .outliers import outlier_patches
 from .patches import PatchSet, joined, judged_patches, thinned, training_patches
 from .train_surface import (
@@ -81,16 +81,17 @@ def train_and_ship(
     given: argparse.Namespace,
     facts: cards.RunFacts,
     rendered: dict[str, PatchSet],
-    further: Callable[[], PatchSet],
+    worlds: Mapping[str, Callable[[], PatchSet]],
     progress: Progress,
     steps: Steps,
 ) -> None:
     """Train as the command line asks, write surface.onnx, its card and the reliability diagram.
 
-    `further` draws the patches of further worlds, of which the classes are learned, and no more.
+    `worlds` gives the rendered patches that the classes are learned from, by what sort of worlds they show: each tower
+    learns from each sort in a training of its own.
     """
     start = time.monotonic()
-    stage = _classes(given, facts.pictures, rendered["train"], further, steps)
+    stage = _classes(given, facts.pictures, worlds, steps)
     net = stage.net
     material = gather(given, facts.pictures, rendered)
     learn_heads(net, material, given.seed, given.effort)
@@ -179,32 +180,44 @@ def kept_stage(
 def _classes(
     given: argparse.Namespace,
     pictures: Sequence[Picture],
-    worlds: PatchSet,
-    further: Callable[[], PatchSet],
+    worlds: Mapping[str, Callable[[], PatchSet]],
     steps: Steps,
 ) -> Stage:
-    """The net with its classes learned: the towers of several trainings."""
+    """The net with its classes learned: towers side by side, each the mean of a training per sort of worlds."""
     count = max(2, round(given.effort * CLASS_STEPS))
 
-    @functools.cache
-    def patches() -> PatchSet:
-        return joined([*_cuts(given, trained_on(pictures, given.without)), worlds, further()])
+    def trained(sort: str) -> list[Stage]:
+        @functools.cache
+        def patches() -> PatchSet:
+            return joined([*_cuts(given, trained_on(pictures, given.without)), worlds[sort]()])
 
-    def tower(number: int, kind: Kind) -> Stage:
-        what = f"surface classifier, {number} of {len(TOWERS)}"
-        return kept_stage(
-            given, f"classes-{kind.name}", steps, count=count, what=what, patches=patches, kind=kind
-        )
+        return [
+            kept_stage(
+                given,
+                f"classes-{sort}-{kind.name}",
+                steps,
+                count=count,
+                what=f"surface classifier, {kind.name}, {sort}",
+                patches=patches,
+                kind=kind,
+            )
+            for kind in TOWERS
+        ]
 
-    stages = [tower(number, kind) for number, kind in enumerate(TOWERS, start=1)]
+    by_kind = zip(*[trained(sort) for sort in worlds], strict=True)
+    towers = [_together(alike, mean_of) for alike in by_kind]
     says = tuple(TOWERS.values())
+    return replace(_together(towers, functools.partial(together, says=says)), says=says)
+
+
+def _together(stages: Sequence[Stage], net_of: Callable[[list[SurfaceNet]], SurfaceNet]) -> Stage:
+    """Several trainings as one, whose net is made of theirs."""
     return Stage(
-        together([stage.net for stage in stages], says),
+        net_of([stage.net for stage in stages]),
         patches=max(stage.patches for stage in stages),
         steps=sum(stage.steps for stage in stages),
         seconds=sum(stage.seconds for stage in stages),
         device=stages[-1].device,
-        says=says,
     )
 
 
