@@ -15,7 +15,7 @@ from trpac_core.vision.scene import NUMBERS, SceneHead
 
 from .data import Picture
 from .patches import CAMERA_SPREAD, RENDERED_SPREAD
-from .rendered import FIRST_SCENE_WORLD, SEED_RANGES
+from .rendered import FIRST_SCENE_WORLD, SEED_RANGES, STREETS
 from .scores import ClassScore, wilson_interval
 
 if TYPE_CHECKING:
@@ -163,7 +163,8 @@ Towers side by side: {towers}. Each trunk has learned
 to see from other pictures (ImageNet weights, Apache-2.0); two units of ShuffleNet stand on it (grouped 1x1 convolutions
 with {net.towers[0].GROUPS} groups, channel shuffle, depthwise 3x3; ref. [22] of Tian et al. 2022). {parameters}
 parameters. Mean and deviation of four maps of each tower feed one linear layer. The towers are trained one by one, and
-the logits are the mean of theirs, weighted {weights}.
+the logits are the mean of theirs, weighted {weights}. Each tower's weights are the mean of two trainings that begin
+alike: the rendered worlds of one lie in open land, of the other's {100 * STREETS:.0f} % in the open shade of houses.
 
 - Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).
