@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-GRAIN_PX, GRAIN_LEVELS, ROAD_LEVEL, SKY_LEVEL = 1.5, 8.0, 105.0, 190
+GRAIN_PX, GRAIN_LEVELS, ROAD_LEVEL, SKY_LEVEL = 2.5, 5.0, 105.0, 190
 TINT_LEVELS = (6.0, 0.0, -4.0)
 
 
