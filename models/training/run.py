@@ -114,7 +114,7 @@ def _patch_networks(
     if given.only in (None, "segmenter"):
         _segmenter(progress, given, facts, rendered)
     if given.only in (None, "surface"):
-        streets = _render(progress, {"train": worlds["train"]}, given, STREETS)["train"].patches
+        streets = _render_streets(progress, worlds["train"], given)
         draw = partial(_render_further, progress, worlds["train"], further, given)
         roads = {
             "open-land": lambda: joined([patches["train"], draw(OPEN_LAND)]),
@@ -158,25 +158,31 @@ def _keep_memory() -> None:
             mallopt(parameter, value)
 
 
-def _render(
-    progress: Progress, counts: dict[str, int], given: argparse.Namespace, streets: float = OPEN_LAND
-) -> dict[str, Rendered]:
+def _render(progress: Progress, counts: dict[str, int], given: argparse.Namespace) -> dict[str, Rendered]:
     task = progress.add_task("rendering worlds", total=sum(counts.values()), note="")
     rendered, done = {}, 0
     for split, count in counts.items():
         report = partial(progress.advance, task)
-        draw = partial(draw_worlds, split, count, PATCHES_PER_VIEW[split], given.threads, report, streets)
-        name = f"{split}-{count}{_where(streets)}.npz"
-        worlds = kept_or_made(given.kept, name, load=load_worlds, make=draw, save=save_worlds)
+        draw = partial(draw_worlds, split, count, PATCHES_PER_VIEW[split], given.threads, report)
+        worlds = kept_or_made(
+            given.kept, f"{split}-{count}.npz", load=load_worlds, make=draw, save=save_worlds
+        )
         rendered[split] = Rendered(*worlds)
         done += count
         progress.update(task, completed=done)
     return rendered
 
 
-def _where(streets: float) -> str:
-    """What the name of a kept file tells of where its worlds lie."""
-    return "-streets" if streets else ""
+def _render_streets(progress: Progress, count: int, given: argparse.Namespace) -> PatchSet:
+    """Patches of the first training worlds, a share of which lies in streets: the segmenter does not see them."""
+
+    def draw() -> PatchSet:
+        task = progress.add_task("rendering worlds in streets", total=count, note="")
+        report = partial(progress.advance, task)
+        return draw_worlds("train", count, PATCHES_PER_VIEW["train"], given.threads, report, STREETS)[1]
+
+    name = f"train-{count}-streets.npz"
+    return kept_or_made(given.kept, name, load=load_patches, make=draw, save=save_patches)
 
 
 def _render_further(
@@ -195,7 +201,7 @@ def _render_further(
         )
         return rendered_patches([cut for _, cut in seen])
 
-    name = f"further-{first}-{count}{_where(streets)}.npz"
+    name = f"further-{first}-{count}{'-streets' if streets else ''}.npz"
     return kept_or_made(given.kept, name, load=load_patches, make=draw, save=save_patches)
 
 
