@@ -14,8 +14,8 @@ from sim2real.telling.sentences import verdict
 from sim2real.which.closure import at_the_floor, loud
 from sim2real.which.contest import Contest, Entry
 from sim2real.which.fitting import Candidate, fit
-from sim2real.which.goodness import Fitness
-from sim2real.which.quiet import rare_share
+from sim2real.which.goodness import Fitness, fitness
+from sim2real.which.quiet import is_noise, rare_share
 from sim2real.which.selection import NO_GAP_DOUBT, Decision
 
 KEY = "torque_gain"
@@ -77,6 +77,48 @@ def test_a_log_that_is_far_beyond_noise_now_and_then_has_a_gap():
     rare = replace(contest, null=replace(contest.null, z_hold=far))
     assert at_the_floor(decision, contest, MODEL, fit_to, held).verdict is Verdict.NO_GAP
     assert at_the_floor(decision, rare, MODEL, fit_to, held) is decision
+
+
+def leaving(misfit, taken, fit_to, held):
+    """A contest whose model as it is has this misfit, and whose only effect takes this share off the loss."""
+    _, contest = decided(fit_to, held)
+    [entry] = contest.singles
+    louder = misfit / fitness(contest.null, fit_to, held).misfit
+    z_fit, z_hold = louder * contest.null.z_fit, louder * contest.null.z_hold
+    left = np.sqrt(1.0 - taken)
+    return Contest(
+        replace(contest.null, z_fit=z_fit, z_hold=z_hold),
+        (replace(entry, z_fit=left * z_fit, z_hold=left * z_hold),),
+        (),
+    )
+
+
+@pytest.mark.parametrize(
+    ("misfit", "taken", "noise"),
+    [
+        (0.95, 0.10, True),
+        (0.95, 0.14, False),
+        (1.05, 0.10, False),
+        (1.05, 0.02, True),
+        (1.35, 0.05, False),
+        (1.35, 0.02, True),
+        (1.45, 0.02, False),
+        (1.45, 0.01, True),
+        (1.65, 0.0, False),
+    ],
+)
+def test_what_an_effect_may_take_where_noise_is_left_hangs_on_the_misfit(misfit, taken, noise):
+    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
+    assert is_noise(leaving(misfit, taken, fit_to, held), fit_to, held) is noise
+
+
+def test_an_effect_that_is_next_to_none_may_take_what_it_will():
+    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
+    contest = leaving(0.95, 0.14, fit_to, held)
+    [entry] = contest.singles
+    candidate = entry.fit.candidate
+    none = replace(entry, fit=replace(entry.fit, x=candidate.neutral + 0.01 * candidate.scale))
+    assert is_noise(replace(contest, singles=(none,)), fit_to, held)
 
 
 def knocking(part, size_sigmas):
