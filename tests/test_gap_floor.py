@@ -79,9 +79,15 @@ def test_a_log_that_is_far_beyond_noise_now_and_then_has_a_gap():
     assert at_the_floor(decision, rare, MODEL, fit_to, held) is decision
 
 
-def leaving(misfit, taken, fit_to, held):
-    """A contest whose model as it is has this misfit, and whose only effect takes this share off the loss."""
-    _, contest = decided(fit_to, held)
+@pytest.fixture(scope="module")
+def slight():
+    """Logs with a slight gap, and their contest."""
+    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
+    return fit_to, held, decided(fit_to, held)[1]
+
+
+def leaving(misfit, taken, fit_to, held, contest):
+    """The contest if its model as it is had this misfit, and its only effect took this share off the loss."""
     [entry] = contest.singles
     louder = misfit / fitness(contest.null, fit_to, held).misfit
     z_fit, z_hold = louder * contest.null.z_fit, louder * contest.null.z_hold
@@ -107,14 +113,14 @@ def leaving(misfit, taken, fit_to, held):
         (1.65, 0.0, False),
     ],
 )
-def test_what_an_effect_may_take_where_noise_is_left_hangs_on_the_misfit(misfit, taken, noise):
-    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
-    assert is_noise(leaving(misfit, taken, fit_to, held), fit_to, held) is noise
+def test_what_an_effect_may_take_where_noise_is_left_hangs_on_the_misfit(misfit, taken, noise, slight):
+    fit_to, held, _ = slight
+    assert is_noise(leaving(misfit, taken, *slight), fit_to, held) is noise
 
 
-def test_an_effect_that_is_next_to_none_may_take_what_it_will():
-    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
-    contest = leaving(0.95, 0.14, fit_to, held)
+def test_an_effect_that_is_next_to_none_may_take_what_it_will(slight):
+    fit_to, held, _ = slight
+    contest = leaving(0.95, 0.14, *slight)
     [entry] = contest.singles
     candidate = entry.fit.candidate
     none = replace(entry, fit=replace(entry.fit, x=candidate.neutral + 0.01 * candidate.scale))
