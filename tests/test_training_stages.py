@@ -120,12 +120,14 @@ def test_the_mean_of_nets_has_the_means_of_their_weights_and_statistics():
 
 
 def test_each_tower_is_the_mean_of_a_training_per_sort_of_worlds(monkeypatch):
-    """All begin alike; the patches of a sort are cut once for all towers."""
+    """All begin alike; the patches of a sort are cut once for all towers; Lite0 sees streets in mixed styles, too."""
     given = argparse.Namespace(kept=None, seed=5, effort=1.0, device="cpu", threads=1, without=())
     seen, drawn = [], []
 
     def learned(net, patches, *, seed, steps, **others):
-        seen.append((net.towers[0].trunk.kind, patches, seed, steps))
+        [tower] = net.towers
+        styled = isinstance(tower.trunk.style, trunk.MixedStyle)
+        seen.append((tower.trunk.kind, styled, patches, seed, steps))
         torch.nn.init.constant_(net.classifier.bias, float(len(patches)))
         return net.eval()
 
@@ -145,14 +147,17 @@ def test_each_tower_is_the_mean_of_a_training_per_sort_of_worlds(monkeypatch):
     monkeypatch.setattr(surface_run, "_cuts", lambda given, pictures: ["real"])
     sorts = {"open-land": worlds(9), "streets": worlds(5)}
     stage = surface_run._classes(given, [], sorts, steps)
+    plain = [(kind, False) for kind in (trunk.LITE0, trunk.LITE2)]
     assert seen == [
-        (kind, range(count), 5, surface_run.CLASS_STEPS) for count in (9, 5) for kind in surface_run.TOWERS
+        *((*each, range(9), 5, surface_run.CLASS_STEPS) for each in plain),
+        *((*each, range(5), 5, surface_run.CLASS_STEPS) for each in [*plain, (trunk.LITE0, True)]),
     ]
     assert drawn == [9, 5], "the patches were cut more than once"
     assert [tower.trunk.kind for tower in stage.net.towers] == list(surface_run.TOWERS)
-    assert (stage.patches, stage.steps) == (9, 4 * surface_run.CLASS_STEPS)
+    assert (stage.patches, stage.steps) == (9, 5 * surface_run.CLASS_STEPS)
     assert stage.says == tuple(surface_run.TOWERS.values())
-    assert torch.allclose(stage.net.classifier.bias, torch.tensor(7.0))
+    assert torch.allclose(stage.net.classifier.bias, torch.tensor((2 * 19 / 3 + 7) / 3))
+    assert not any(isinstance(part, trunk.MixedStyle) for part in stage.net.modules())
     begun = train_surface.new_net(5).towers[0].state_dict()
     for name, value in stage.net.towers[0].state_dict().items():
         assert torch.allclose(value, begun[name], atol=1e-7), name
@@ -172,6 +177,52 @@ def test_a_depthwise_convolution_keeps_32_bits_in_half_precision(kernel, stride)
     assert out.dtype == torch.bfloat16
     assert torch.equal(out, exact.bfloat16())
     assert torch.allclose(found, expected, rtol=1e-5, atol=1e-5)
+
+
+def of_channels(maps):
+    """Means and deviations of the channels, shape (n, 2 c), and the maps without them."""
+    flat = maps.double().flatten(2)
+    mean, deviation = flat.mean(2, keepdim=True), flat.std(2, keepdim=True)
+    return torch.cat((mean, deviation), 1)[..., 0], (flat - mean) / deviation
+
+
+def test_a_style_is_that_of_two_pictures_and_what_they_show_stays():
+    torch.manual_seed(4)
+    count = 200
+    maps = torch.randn(count, 5, 8, 12) * torch.rand(count, 5, 1, 1).add(0.5) + torch.randn(count, 5, 1, 1)
+    before, shown = of_channels(maps)
+    styled, still_shown = of_channels(trunk.MixedStyle().train()(maps))
+    assert torch.allclose(still_shown, shown, atol=1e-3)
+    moved = styled - before
+    changed = moved.norm(dim=1) > 1e-2
+    assert 0.3 < changed.double().mean() < 0.6, "half of them, and some of these hardly"
+    others = before[None] - before[:, None]
+    parts = torch.einsum("ik,ijk->ij", moved, others) / others.square().sum(2).clamp(min=1e-9)
+    off_line = (moved[:, None] - parts[..., None] * others).norm(dim=2) + (
+        parts - parts.clamp(0.0, 1.0)
+    ).abs()
+    assert off_line.min(1).values[changed].max() < 1e-3
+
+
+def test_a_style_is_left_alone_at_rest():
+    maps = torch.randn(6, 5, 8, 12, generator=generator(4))
+    assert trunk.MixedStyle().eval()(maps) is maps
+
+
+def test_what_a_classifier_reads_first_has_a_mixed_style(monkeypatch):
+    """In training; at rest the same net reads the pretrained maps."""
+    seen = train_surface.new_net(1, styled=True).towers[0].trunk
+    patches = torch.randint(0, 256, (2, 64, 96, 3), dtype=torch.uint8, generator=generator(6))
+    patches[1] //= 4
+    plain = [each.detach() for each in seen.eval()(patches)]
+    monkeypatch.setattr(trunk.MixedStyle, "SHARE", 1.0)
+    monkeypatch.setattr(trunk.MixedStyle, "SPREAD", 100.0)
+    torch.manual_seed(1)
+    first = seen.train()(patches)[0]
+    assert not torch.allclose(first, plain[0], atol=1e-2)
+    torch.manual_seed(1)
+    assert torch.equal(first, trunk.MixedStyle().train()(plain[0]))
+    assert torch.equal(train_surface.new_net(1).towers[0].trunk.train()(patches)[0], plain[0])
 
 
 def test_training_leaves_the_first_blocks_and_their_statistics_as_they_are():

@@ -163,8 +163,10 @@ Towers side by side: {towers}. Each trunk has learned
 to see from other pictures (ImageNet weights, Apache-2.0); two units of ShuffleNet stand on it (grouped 1x1 convolutions
 with {net.towers[0].GROUPS} groups, channel shuffle, depthwise 3x3; ref. [22] of Tian et al. 2022). {parameters}
 parameters. Mean and deviation of four maps of each tower feed one linear layer. The towers are trained one by one, and
-the logits are the mean of theirs, weighted {weights}. Each tower's weights are the mean of two trainings that begin
-alike: the rendered worlds of one lie in open land, of the other's {100 * STREETS:.0f} % in the open shade of houses.
+the logits are the mean of theirs, weighted {weights}. Each tower's weights are the mean of trainings that begin
+alike: the rendered worlds of one lie in open land, of another's {100 * STREETS:.0f} % in the open shade of houses.
+{kinds[0].name} has a third, in that shade with mixed styles: half of its patches have, in the first maps that are read,
+means and deviations between their own and another patch's (Zhou et al. 2021, Domain generalization with MixStyle).
 
 - Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).

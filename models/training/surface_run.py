@@ -47,6 +47,9 @@ WEATHERS = 4
 TOWERS = {LITE0: 2.0, LITE2: 1.0}
 """What the classifier's towers begin from, and how much the logits of each count beside the others'."""
 
+STYLED = {("streets", LITE0)}
+"""Trainings that are done once more with mixed styles: the sort of worlds and what the tower begins from."""
+
 READING_STEPS = 2000
 OUTLIERS = {"train": 12000, "val": 1600}
 LOOKS, READ_LOOKS = {"": 1500}, {"": 1500, "condition_web": 7500, "rendered": 5500}
@@ -88,7 +91,7 @@ def train_and_ship(
     """Train as the command line asks, write surface.onnx, its card and the reliability diagram.
 
     `worlds` gives the rendered patches that the classes are learned from, by what sort of worlds they show: each tower
-    learns from each sort in a training of its own.
+    learns from each sort in a training of its own, and some in one more with mixed styles.
     """
     start = time.monotonic()
     stage = _classes(given, facts.pictures, worlds, steps)
@@ -147,6 +150,7 @@ def kept_stage(
     what: str,
     patches: Callable[[], PatchSet],
     kind: Kind,
+    styled: bool = False,
 ) -> Stage:
     """A net of one tower from its file in the folder of the command line, or trained on `patches()` and kept."""
 
@@ -168,7 +172,12 @@ def kept_stage(
         start = time.monotonic()
         with steps(f"training the {what}", count) as report:
             net = learn_classes(
-                new_net(given.seed, kind), seen, steps=count, seed=given.seed, device=device, report=report
+                new_net(given.seed, kind, styled=styled),
+                seen,
+                steps=count,
+                seed=given.seed,
+                device=device,
+                report=report,
             )
         return Stage(net, len(seen), count, time.monotonic() - start, on)
 
@@ -183,29 +192,33 @@ def _classes(
     worlds: Mapping[str, Callable[[], PatchSet]],
     steps: Steps,
 ) -> Stage:
-    """The net with its classes learned: towers side by side, each the mean of a training per sort of worlds."""
+    """The net with its classes learned: towers side by side, each the mean of its trainings on all sorts of worlds."""
     count = max(2, round(given.effort * CLASS_STEPS))
 
-    def trained(sort: str) -> list[Stage]:
+    def trained(sort: str) -> list[tuple[Kind, Stage]]:
         @functools.cache
         def patches() -> PatchSet:
             return joined([*_cuts(given, trained_on(pictures, given.without)), worlds[sort]()])
 
-        return [
-            kept_stage(
+        def of_kind(kind: Kind, styled: bool) -> Stage:
+            name = f"{sort}-styled" if styled else sort
+            return kept_stage(
                 given,
-                f"classes-{sort}-{kind.name}",
+                f"classes-{name}-{kind.name}",
                 steps,
                 count=count,
-                what=f"surface classifier, {kind.name}, {sort}",
+                what=f"surface classifier, {kind.name}, {name}",
                 patches=patches,
                 kind=kind,
+                styled=styled,
             )
-            for kind in TOWERS
-        ]
 
-    by_kind = zip(*[trained(sort) for sort in worlds], strict=True)
-    towers = [_together(alike, mean_of) for alike in by_kind]
+        plan = [(kind, False) for kind in TOWERS]
+        plan += [(kind, True) for kind in TOWERS if (sort, kind) in STYLED]
+        return [(kind, of_kind(kind, styled)) for kind, styled in plan]
+
+    stages = [each for sort in worlds for each in trained(sort)]
+    towers = [_together([stage for kind, stage in stages if kind == tower], mean_of) for tower in TOWERS]
     says = tuple(TOWERS.values())
     return replace(_together(towers, functools.partial(together, says=says)), says=says)
 

@@ -16,7 +16,7 @@ from .data import Image
 from .looks import seen_anew
 from .nets import SurfaceNet
 from .patches import PatchSet, camera_spreads, draw_weights
-from .trunk import LITE0, Kind
+from .trunk import LITE0, Kind, MixedStyle
 
 BATCH = 256
 """Patches of a step."""
@@ -32,10 +32,13 @@ DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3,
 Report = Callable[[int, float], None]
 
 
-def new_net(seed: int, kind: Kind = LITE0) -> SurfaceNet:
-    """A net of one tower with its pretrained trunk, the rest untrained."""
+def new_net(seed: int, kind: Kind = LITE0, *, styled: bool = False) -> SurfaceNet:
+    """A net of one tower with its pretrained trunk, the rest untrained; it may learn from mixed styles."""
     torch.manual_seed(seed)
-    return SurfaceNet([kind], pretrained=True)
+    net = SurfaceNet([kind], pretrained=True)
+    if styled:
+        net.towers[0].trunk.style = MixedStyle()
+    return net
 
 
 def learn_classes(
