@@ -145,7 +145,7 @@ def test_each_tower_is_the_mean_of_a_training_per_sort_of_worlds(tmp_path, monke
     monkeypatch.setattr(surface_run, "learn_classes", learned)
     monkeypatch.setattr(surface_run, "joined", lambda parts: parts[-1])
     monkeypatch.setattr(surface_run, "_cuts", lambda given, pictures: ["real"])
-    sorts = {"open-land": worlds(9), "streets": worlds(5)}
+    sorts = {surface_run.IN_OPEN_LAND: worlds(9), surface_run.IN_STREETS: worlds(5)}
     stage = surface_run._classes(given, [], sorts, steps)
     plain = [(kind, False) for kind in (trunk.LITE0, trunk.LITE2)]
     assert seen == [

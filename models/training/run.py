@@ -44,7 +44,7 @@ from .rendered import (
 )
 from .scene_run import ship_scene
 from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
-from .surface_run import Steps, train_and_ship
+from .surface_run import IN_OPEN_LAND, IN_STREETS, Steps, train_and_ship
 from .train_segmenter import score_segmenter, train_segmenter
 
 WORLDS = {"train": 480, "val": 36, "test": 60}
@@ -117,8 +117,8 @@ def _patch_networks(
         streets = _render_streets(progress, worlds["train"], given)
         draw = partial(_render_further, progress, worlds["train"], further, given)
         roads = {
-            "open-land": lambda: joined([patches["train"], draw(OPEN_LAND)]),
-            "streets": lambda: joined([streets, draw(STREETS)]),
+            IN_OPEN_LAND: lambda: joined([patches["train"], draw(OPEN_LAND)]),
+            IN_STREETS: lambda: joined([streets, draw(STREETS)]),
         }
         train_and_ship(given, facts, patches | {"train": streets}, roads, progress, steps)
         _scene(progress, given, pictures, worlds, steps)

@@ -47,7 +47,9 @@ WEATHERS = 4
 TOWERS = {LITE0: 2.0, LITE2: 1.0}
 """What the classifier's towers begin from, and how much the logits of each count beside the others'."""
 
-STYLED = {("streets", LITE0)}
+IN_OPEN_LAND, IN_STREETS = "open-land", "streets"
+"""Sorts of rendered worlds that the towers learn from."""
+STYLED = {(IN_STREETS, LITE0)}
 """Trainings that are done once more with mixed styles: the sort of worlds and what the tower begins from."""
 
 READING_STEPS = 2000
