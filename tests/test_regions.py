@@ -11,14 +11,18 @@ from numpy.testing import assert_allclose, assert_array_equal
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.regions import (
     LEAST_ROI_WIDTH_PX,
+    TRIES,
+    Corners,
     classify_corners,
     corners_in_ellipses,
+    corners_in_lane,
     corners_in_strip,
     cut_patch,
     road_shares,
     roi_box,
     roi_width_px,
     sample,
+    sample_across,
     with_most_road,
 )
 from trpac_core.vision.trajectory import CHI_SQUARE_95_2DOF, Ellipses
@@ -114,6 +118,50 @@ def test_a_group_with_one_usable_corner_is_skipped(left, drawn):
 def test_frames_draw_different_patches():
     corners = classify_corners(corners_in_strip(4.0, 8.0, 1.0, 0.02), CAMERA, np.ones((160, 256), bool))
     assert set(sample(corners, 8, (0, 1))) != set(sample(corners, 8, (0, 2)))
+
+
+@given(st.floats(-0.12, 0.12), st.floats(1.0, 4.0))
+def test_the_lane_bends_about_the_turns_centre(curvature_1_m, wheelbase_m):
+    """The car's body turns about one point: a corner beside the way stays as far from it as at the front axle."""
+    corners_m = corners_in_lane((4.5, 7.5), (-2.0, 2.0), curvature_1_m, wheelbase_m).reshape(40, 30, 2)
+    lateral_m = np.arange(-20, 20) / 10.0
+    if abs(curvature_1_m) < 1e-3:
+        assert_allclose(corners_m[..., 1], lateral_m[:, None] + np.zeros(30), atol=0.1)
+        return
+    radius_m = 1.0 / curvature_1_m
+    from_centre_m = np.hypot(corners_m[..., 0] + wheelbase_m, corners_m[..., 1] - radius_m)
+    expected_m = np.hypot(wheelbase_m, radius_m - lateral_m)[:, None]
+    assert_allclose(from_centre_m, expected_m + np.zeros(30), rtol=1e-6)
+
+
+def test_the_lane_straight_ahead_is_a_grid_in_the_order_of_its_columns():
+    corners_m = corners_in_lane((4.5, 7.5), (0.6, 2.0), 0.0, 2.3)
+    assert corners_m[0].tolist() == pytest.approx([4.5, 0.6])
+    assert corners_m[-1].tolist() == pytest.approx([7.4, 1.9])
+    assert len(corners_m) == 30 * 14
+    assert (np.diff(corners_m[:, 1]) > -1e-9).all()
+
+
+@given(st.integers(0, 10**6), st.floats(0.3, 1.0), st.integers(2, 8))
+def test_patches_drawn_across_lie_each_in_its_share_of_what_is_usable(seed, share, b):
+    ground = corners_in_lane((4.5, 7.5), (-2.0, 2.0), 0.02, 2.3)
+    usable = np.random.default_rng(seed).random(len(ground)) < share
+    corners = Corners(ground, ground, usable)
+    drawn = sample_across(corners, b, (seed,))
+    assert drawn.tolist() == sample_across(corners, b, (seed,)).tolist()
+    assert usable[drawn].all()
+    assert len(set(drawn.tolist())) == len(drawn) == TRIES * b
+    rank = np.cumsum(usable)[drawn] - 1
+    shares = np.floor(rank * b / usable.sum() + 1e-9).reshape(TRIES, b)
+    assert np.abs(shares - np.arange(b)).max() <= 1 + (usable.sum() % b > 0)
+    assert (np.diff(rank.reshape(TRIES, b), axis=1) > 0).all(), "every round goes from the right to the left"
+
+
+@pytest.mark.parametrize(("left", "drawn"), [(0, 0), (1, 0), (2, 2), (11, 11), (12, 12)])
+def test_where_little_is_usable_all_of_it_is_drawn(left, drawn):
+    usable = np.arange(50) < left
+    corners = Corners(np.zeros((50, 2)), np.zeros((50, 2)), usable)
+    assert len(sample_across(corners, 2, (0,))) == drawn
 
 
 def test_region_width_is_focal_length_times_width_over_depth():

@@ -1,4 +1,4 @@
-"""Road seen before it is near: patches of the middle group have their say when their ground comes into the near group.
+"""Road seen before it is near: patches from the middle group's range have their say when their ground is near.
 
 Water shows in what it mirrors, and the flatter the look, the more it mirrors: from 6 m a wet road is told from a dry
 one more surely than from 3 m. The way driven says where the ground of an earlier look is by now.

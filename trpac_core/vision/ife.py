@@ -20,7 +20,16 @@ from .lines import KNOWN_WITHIN_M, ends_m, lines_across
 from .neighbours import Passed, among_neighbours
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
 from .region import Heard, Lines, Region, Way
-from .regions import TRIES, classify_corners, corners_in_ellipses, corners_in_strip, sample
+from .regions import (
+    LANE_HALF_WIDTH_M,
+    TRIES,
+    classify_corners,
+    corners_in_ellipses,
+    corners_in_lane,
+    corners_in_strip,
+    sample,
+    sample_across,
+)
 from .results import FrameResult, FrameView, GroupResult, GroupView
 from .scene import scene_of
 from .trajectory import Ellipses, Motion, path_curvature, reckon
@@ -35,8 +44,8 @@ BEFORE_NEAR_M, HIDDEN_M = 0.5, 0.3
 """Road before the near group on which lines are looked for, and road of its own up to which the picture's end may hide
 one that was seen before [m]."""
 
-PATCHES_AHEAD = 3
-"""Patches of a look that is remembered: six save no more, and cost time [-]."""
+PATCHES_AHEAD = 6
+"""Patches of a look that is remembered [-]."""
 
 
 @dataclass(frozen=True)
@@ -150,15 +159,13 @@ class Ife:
         groups, ahead = self.config.groups_looked_at, self._remembers(state, motion)
         tracks = self._tracks(motion, max(groups, 1 + ahead)) if self.config.use_trajectory else []
         way = Way(tuple(tracks), *(self.lines(state, image, motion, camera) if lines is None else lines))
-        wanted = [(index, index, self.config.b[index]) for index in range(groups)]
-        wanted += [(1, len(GROUP_NAMES), PATCHES_AHEAD)] * ahead
         drivable = masks.drivable > MASK_THRESHOLD
-        return [
-            self._region(index, (state.frame_count, draw), count, way, camera, drivable, usable).seen_in(
-                image
-            )
-            for index, draw, count in wanted
+        regions = [
+            self._region(index, state.frame_count, way, camera, drivable, usable) for index in range(groups)
         ]
+        if ahead:
+            regions.append(self._lane_ahead(state.frame_count, motion, way, camera, drivable, usable))
+        return [region.seen_in(image) for region in regions]
 
     def judge(self, state: IfeState, motion: Motion, regions: list[Region]) -> tuple[IfeState, FrameResult]:
         """The state after a frame and its verdict, from the classified regions of `look`."""
@@ -178,7 +185,7 @@ class Ife:
         return IfeState(after, state.frame_count + 1, looks, lines_m, passed), result
 
     def _remembers(self, state: IfeState, motion: Motion) -> bool:
-        """Whether what the middle group shows in this frame is to be remembered."""
+        """Whether what the lane ahead shows in this frame is to be remembered."""
         return self.config.use_foresight and motion.way_m is not None and due(state.looks, motion.way_m)
 
     def _remembered(
@@ -220,14 +227,13 @@ class Ife:
     def _region(
         self,
         index: int,
-        draw: tuple[int, int],
-        count: int,
+        frame: int,
         way: Way,
         camera: Camera,
         drivable: NDArray[np.bool_],
         usable: NDArray[np.bool_],
     ) -> Region:
-        config = self.config
+        config, count = self.config, self.config.b[index]
         low, high = config.ranges_m[index]
         ellipses = tuple(track.within(low, high) for track in way.tracks)
         if config.use_trajectory:
@@ -237,10 +243,41 @@ class Ife:
             # Without ellipses the group is the drivable road: what lies beside it is no loss of usable area.
             road = classify_corners(ground, camera, drivable)
             corners = classify_corners(road.ground_m[road.usable], camera, usable)
-        drawn = sample(corners, TRIES * count, (config.seed, *draw, list(SIDES).index(config.side)))
-        count = min(count, len(drawn))
-        widths_m = config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, count)
-        return Region.around(corners, drawn, widths_m, way, ellipses, camera, drivable)
+        drawn = sample(corners, TRIES * count, self._key(frame, index))
+        return Region.around(corners, drawn, self._widths_m(count, drawn), way, ellipses, camera, drivable)
+
+    def _lane_ahead(
+        self,
+        frame: int,
+        motion: Motion,
+        way: Way,
+        camera: Camera,
+        drivable: NDArray[np.bool_],
+        usable: NDArray[np.bool_],
+    ) -> Region:
+        """What is to be remembered: patches all across the lane, or across a wheel's side of it.
+
+        Those of the wheels' tracks alone overlap, share their gloss and hence their mistakes.
+        """
+        config = self.config
+        inner_m = config.roi_width_m / 2.0
+        across_m = {
+            "left": (inner_m, LANE_HALF_WIDTH_M),
+            "right": (-LANE_HALF_WIDTH_M, -inner_m),
+            "both": (-LANE_HALF_WIDTH_M, LANE_HALF_WIDTH_M),
+        }[config.side]
+        curvature = path_curvature(motion, config.wheelbase_m)
+        ground = corners_in_lane(config.ranges_m[1], across_m, curvature, config.wheelbase_m)
+        corners = classify_corners(ground, camera, usable)
+        drawn = sample_across(corners, PATCHES_AHEAD, self._key(frame, len(GROUP_NAMES)))
+        return Region.around(corners, drawn, self._widths_m(PATCHES_AHEAD, drawn), way, (), camera, drivable)
+
+    def _key(self, frame: int, draw: int) -> tuple[int, ...]:
+        return self.config.seed, frame, draw, list(SIDES).index(self.config.side)
+
+    def _widths_m(self, count: int, drawn: NDArray[np.intp]) -> NDArray[np.float64]:
+        config, count = self.config, min(count, len(drawn))
+        return config.roi_width_m * config.roi_spread ** np.linspace(-1.0, 1.0, count)
 
     def lines(self, state: IfeState, image: NDArray[np.uint8], motion: Motion, camera: Camera) -> Lines:
         """The lines across the road up to the middle group's end, seen now or passed since; and doubtful ones.

@@ -66,8 +66,8 @@ class IfeConfig:
     use_trajectory, remove_shadow, calibrate, weight_evidence, use_scene, use_foresight, use_lines : bool
         Each False leaves that part of the method out, to measure what it is worth: the whole drivable strip
         ahead in place of the ellipses; shadow kept; T = 1; equal evidence weights in Eq. (8); patches judged
-        without the picture around them; no memory of what the middle group showed of road that is near now;
-        patches that may lie on lines across the road.
+        without the picture around them; no memory of what the lane showed of road that is near now; patches
+        that may lie on lines across the road.
     """
 
     camera: Camera = field(default_factory=Camera)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .trajectory import CHI_SQUARE_95_2DOF, Ellipses
+from .trajectory import CHI_SQUARE_95_2DOF, Ellipses, wheel_track
 
 PATCH_WIDTH_PX = 96
 PATCH_HEIGHT_PX = 64
@@ -24,6 +24,9 @@ TRIES = 6
 """Corners that are drawn for each patch, of which one is taken [-]."""
 LEAST_ROAD = 0.7
 """Share of drivable road from which on a region is as good as any [-]: the least from which the network has learned."""
+LANE_HALF_WIDTH_M = 2.0
+"""Road on either side of the car's middle that is looked at farther ahead: its lane, of usual width [m]."""
+_LANE_GRID_M = 0.1
 _PROBE_M = 0.1
 
 
@@ -101,6 +104,38 @@ def corners_in_strip(from_m: float, to_m: float, half_width_m: float, grid_m: fl
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
+def corners_in_lane(
+    range_m: tuple[float, float],
+    across_m: tuple[float, float],
+    curvature_1_m: float,
+    wheelbase_m: float,
+) -> NDArray[np.float64]:
+    """Corners of a grid along the way of the car, ordered across it: the lane ahead, or a side of it.
+
+    Parameters
+    ----------
+    range_m : pair
+        Way of the rear axle from and up to which it lies [m].
+    across_m : pair
+        Its ends to the left of the car's middle [m].
+    curvature_1_m : float
+        Curvature of the rear axle's path [1/m].
+    wheelbase_m : float
+        [m]
+
+    Returns
+    -------
+    array, shape (n, 2)
+        x and y, from the right to the left [m].
+    """
+    way_m, offsets_m = (
+        np.arange(round(low / _LANE_GRID_M), round(high / _LANE_GRID_M), dtype=np.float64) * _LANE_GRID_M
+        for low, high in (range_m, across_m)
+    )
+    middle, beside = (wheel_track(way_m, curvature_1_m, wheelbase_m, lateral_m) for lateral_m in (0.0, 1.0))
+    return (middle + offsets_m[:, None, None] * (beside - middle)).reshape(-1, 2)
+
+
 def project(points_m: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
     """Pixels of ground points, shape (n, 2), by H_cv of Eq. (6) where the lens does not distort."""
     if any(camera.distortion):
@@ -153,6 +188,20 @@ def sample(corners: Corners, b: int, key: Sequence[int]) -> NDArray[np.intp]:
     if len(candidates) <= 1:
         return np.empty(0, dtype=np.intp)
     return np.random.default_rng(list(key)).choice(candidates, min(b, len(candidates)), replace=False)
+
+
+def sample_across(corners: Corners, b: int, key: Sequence[int]) -> NDArray[np.intp]:
+    """Indices of usable corners for b patches, each from its own share of the ground across the way.
+
+    `TRIES` rounds, in each of which every patch has one; corners are ordered across the way. As `sample` where there
+    are too few.
+    """
+    candidates = np.flatnonzero(corners.usable)
+    if len(candidates) < TRIES * b:
+        return sample(corners, TRIES * b, key)
+    rng = np.random.default_rng(list(key))
+    shares = [rng.choice(share, TRIES, replace=False) for share in np.array_split(candidates, b)]
+    return np.stack(shares, axis=1).ravel()
 
 
 def roi_widths_px(
