@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from test_ife import CAMERA, DRY, SNOW, WET, Masks, Middle, paint, plain
+from test_ife import CAMERA, DRY, SNOW, WET, Masks, Middle, half, paint, plain
 
 from trpac_core.vision.foresight import BEHIND_M, LOOK_EVERY_M, Look, due, recalled, within_reach
 from trpac_core.vision.ife import PATCHES_AHEAD, Ife, IfeState
@@ -219,6 +219,21 @@ def test_what_is_remembered_was_seen_all_across_the_lane():
         share = (LANE_HALF_WIDTH_M - half_m) / (2.0 * LANE_HALF_WIDTH_M)
         assert len(shown) == PATCHES_AHEAD
         assert np.count_nonzero(shown == SNOW) == pytest.approx(PATCHES_AHEAD * share, abs=0.6)
+
+
+def test_road_in_the_shadow_is_not_remembered():
+    split = paint(lambda x, y: np.where(y > 0.0, SNOW, DRY))
+    state, _ = Ife(CONFIG, Masks(shadow=half(left=True)), Middle()).process(IfeState(), split, at(0.0))
+    assert_array_equal(np.argmax(state.looks[0].probabilities, axis=1), int(DRY))
+
+
+def test_each_frame_remembers_other_places():
+    seen = [
+        Ife(CONFIG, Masks(), Middle()).process(replace(IfeState(), frame_count=n), plain(DRY), at(0.0))[0]
+        for n in (0, 0, 1)
+    ]
+    ways_m = [state.looks[0].ways_m for state in seen]
+    assert ways_m[0] == ways_m[1] != ways_m[2]
 
 
 @pytest.mark.parametrize("yaw_rate_rad_s", [-0.9, 0.9])
