@@ -35,8 +35,10 @@ from trpac_core.vision.networks import (
 from trpac_core.vision.trajectory import Motion
 
 SMALL = Camera().scaled(0.25)
-POSITIONS_M = (0.0, 3.0, 6.0, 20.0, 22.0, 24.0)
+POSITIONS_M = (0.0, 7.0, 14.0, 21.0, 28.0, 35.0)
 """Three places with dry road under the whole near group, and three with snow."""
+SPEED_M_S, FPS = 14.0, 2.0
+"""At which a car comes from each to the next."""
 
 BROKEN = b"\xff\xd8\xff\xe0 not a picture"
 
@@ -47,7 +49,7 @@ def road(*segments):
 
 @pytest.fixture(scope="module")
 def pictures():
-    drive = road((-5.0, Surface.DRY), (14.0, Surface.SNOW_ICE))
+    drive = road((-5.0, Surface.DRY), (21.0, Surface.SNOW_ICE))
     return [drive.frame(position).image for position in POSITIONS_M]
 
 
@@ -77,7 +79,7 @@ def trpac(*arguments):
     return CliRunner().invoke(app, ["vision", *map(str, arguments)])
 
 
-def drive(frames, camera_file, out, speed_m_s=10.0, fps=20.0):
+def drive(frames, camera_file, out, speed_m_s=SPEED_M_S, fps=FPS):
     return trpac("run", frames, "--camera", camera_file, "--speed-m-s", speed_m_s, "--fps", fps, "--out", out)
 
 
@@ -304,7 +306,7 @@ def as_the_estimator_says(folder, table):
     networks = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
     ife, state = Ife(IfeConfig(camera=SMALL), *networks), IfeState()
     for number, row in table.iterrows():
-        motion = Motion(10.0, way_m=0.5 * number)
+        motion = Motion(SPEED_M_S, way_m=SPEED_M_S / FPS * number)
         state, expected = ife.process(state, decode_image(folder / row["frame"]), motion)
         found = (row["P_fusion"], row["p_util"], row["Q_v"], row["flag"])
         assert [float(x) for x in found] == pytest.approx(
@@ -338,7 +340,7 @@ def test_a_folder_of_frames_gives_what_the_estimator_gives_frame_by_frame(folder
     ]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["camera.yaml", "frames", "out"]
     film = cv2.VideoCapture(str(out / "annotated.mp4"))
-    assert (film.get(cv2.CAP_PROP_FRAME_COUNT), film.get(cv2.CAP_PROP_FPS)) == (6, 20.0)
+    assert (film.get(cv2.CAP_PROP_FRAME_COUNT), film.get(cv2.CAP_PROP_FPS)) == (6, FPS)
     assert film.read()[1].shape == (600, 960, 3)
     assert decode_image(out / "strip.jpg").shape == (600, 1440, 3)
 

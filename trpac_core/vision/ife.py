@@ -218,7 +218,8 @@ class Ife:
         places_m = np.concatenate((near.ahead_m, ahead_m))
         probabilities = np.concatenate((near.probabilities, before))
         if looks or passed is not None:
-            probabilities = among_neighbours(places_m, probabilities, near.way.lines_m, passed)
+            lines_m, own = near.way.lines_m, len(near.ahead_m)
+            probabilities = among_neighbours(places_m, probabilities, lines_m, passed, own)
         low, high = self.config.ranges_m[0]
         inside = (low <= places_m) & (places_m < high)
         inside[: len(near.ahead_m)] = True

@@ -25,6 +25,8 @@ CHANGES_AT_LINE = 0.1
 """How often it changes at a line across the road [-]."""
 SAY = 0.3
 """Share of a patch's log probabilities that counts [-]: patches of one road and light are wrong together."""
+SAY_BEFORE = 0.15
+"""The same of a patch of a look ahead [-]: six share one picture, and a picture that is misread is so as a whole."""
 LEAST_PROBABILITY = 0.02
 """No patch says that a class is less likely, nor all of the road behind [-]."""
 OWN_SHARE = 0.5
@@ -69,6 +71,7 @@ def among_neighbours(
     probabilities: NDArray[np.float64],
     lines_m: NDArray[np.float64] | Sequence[float] = (),
     passed: Passed | None = None,
+    own: int | None = None,
 ) -> NDArray[np.float64]:
     """Probabilities of each patch, half of them those that its place has by all that is seen of the road.
 
@@ -82,6 +85,8 @@ def among_neighbours(
         Where lines cross the road, ascending: a class is likelier to end there than elsewhere [m].
     passed : Passed, optional
         The road before the patches, on the same way.
+    own : int, optional
+        How many of them, the first, are of this frame, the others of frames before; all if it is not given.
 
     Returns
     -------
@@ -90,7 +95,9 @@ def among_neighbours(
     """
     if not len(ahead_m):
         return probabilities
-    seen, changes, cells = _chain(ahead_m, probabilities, lines_m)
+    say = np.full(len(ahead_m), SAY)
+    say[len(say) if own is None else own :] = SAY_BEFORE
+    seen, changes, cells = _chain(ahead_m, probabilities, say, lines_m)
     from_behind = _passed_on(seen, changes, _told(passed, float(ahead_m.min()), lines_m))
     from_ahead = _passed_on(seen[::-1], changes[::-1], EVEN)[::-1]
     known = from_behind * seen * from_ahead
@@ -105,9 +112,10 @@ def passed_by(
     lines_m: NDArray[np.float64] | Sequence[float],
     end_m: float,
 ) -> Passed:
-    """The road up to a later place, with these patches before it; arguments as of `among_neighbours`."""
+    """The road up to a later place, with these patches, seen before; arguments as of `among_neighbours`."""
     if len(ahead_m):
-        seen, changes, _ = _chain(ahead_m, probabilities, lines_m)
+        say = np.full(len(ahead_m), SAY_BEFORE)
+        seen, changes, _ = _chain(ahead_m, probabilities, say, lines_m)
         last = _passed_on(seen, changes, _told(passed, float(ahead_m.min()), lines_m))[-1] * seen[-1]
         passed = _as_passed(float(ahead_m.max()), last / last.sum())
     return _as_passed(end_m, _told(passed, end_m, lines_m).clip(LEAST_PROBABILITY))
@@ -134,6 +142,7 @@ def _told(
 def _chain(
     ahead_m: NDArray[np.float64],
     probabilities: NDArray[np.float64],
+    say: NDArray[np.float64],
     lines_m: NDArray[np.float64] | Sequence[float],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
     """Likelihoods of the cells' classes, shape (m, k), changes from each cell to the next, and the patches' cells."""
@@ -145,7 +154,7 @@ def _chain(
     likely = probabilities.clip(LEAST_PROBABILITY)
     likely = np.log(likely / likely.sum(axis=1, keepdims=True))
     seen = np.zeros((len(ends) + 1, probabilities.shape[1]))
-    np.add.at(seen, cells, SAY * likely)
+    np.add.at(seen, cells, say[:, None] * likely)
     return np.exp(seen - seen.max(axis=1, keepdims=True)), changes, cells
 
 
