@@ -34,7 +34,7 @@ def drawn(data, ahead_m):
     return found / found.sum(axis=1, keepdims=True)
 
 
-def counted(ahead_m, probabilities, lines_m=(), first_cell=(1.0, 1.0, 1.0), own=None):
+def counted(ahead_m, probabilities, lines_m=(), first_cell=(1.0, 1.0, 1.0), before=0):
     """Sum over all sequences of classes of the cells, each as likely as its changes and what is seen make it."""
     first, last = (int(np.floor(end / CELL_M)) for end in (min(ahead_m), max(ahead_m)))
     ends = {CELL_M * number: CHANGES_PER_M * CELL_M for number in range(first + 1, last + 1)}
@@ -43,7 +43,7 @@ def counted(ahead_m, probabilities, lines_m=(), first_cell=(1.0, 1.0, 1.0), own=
     changes = [ends[end] for end in sorted(ends)]
     likely = probabilities.clip(LEAST_PROBABILITY)
     likely = likely / likely.sum(axis=1, keepdims=True)
-    own = len(likely) if own is None else own
+    own = len(likely) - before
     likely = np.concatenate((likely[:own] ** SAY, likely[own:] ** SAY_BEFORE))
     found = np.zeros((len(ends) + 1, 3))
     for classes in product(range(3), repeat=len(found)):
@@ -56,14 +56,14 @@ def counted(ahead_m, probabilities, lines_m=(), first_cell=(1.0, 1.0, 1.0), own=
     return OWN_SHARE * probabilities + (1.0 - OWN_SHARE) * found[cells]
 
 
-@pytest.mark.parametrize(("seed", "own"), [(0, None), (1, 6), (2, 4), (3, 0)])
+@pytest.mark.parametrize(("seed", "before"), [(0, 0), (1, 1), (2, 2), (3, 6)])
 @pytest.mark.parametrize("lines_m", [(), (2.6,), (2.0, 2.55, 3.1)])
-def test_it_is_the_sum_over_all_sequences_of_classes(seed, own, lines_m):
+def test_it_is_the_sum_over_all_sequences_of_classes(seed, before, lines_m):
     rng = np.random.default_rng(seed)
     ahead_m = rng.uniform(2.05, 2.0 + 6 * CELL_M, 6)
     probabilities = rng.dirichlet((0.5, 0.5, 0.5), 6)
-    found = among_neighbours(ahead_m, probabilities, lines_m, own=own)
-    assert_allclose(found, counted(ahead_m, probabilities, lines_m, own=own), rtol=1e-9)
+    found = among_neighbours(ahead_m, probabilities, lines_m, before=before)
+    assert_allclose(found, counted(ahead_m, probabilities, lines_m, before=before), rtol=1e-9)
 
 
 def test_a_class_ends_rather_at_a_line():
@@ -145,8 +145,11 @@ def test_patches_passed_tell_of_the_road_to_come_what_they_would_tell_if_they_we
     probabilities = rng.dirichlet((4.0, 4.0, 4.0), 20)
     before = ahead_m < 2.0
     passed = passed_by(None, ahead_m[before], probabilities[before], lines_m, 2.0)
-    apart = among_neighbours(ahead_m[~before], probabilities[~before], lines_m, passed, own=0)
-    assert_allclose(apart, among_neighbours(ahead_m, probabilities, lines_m, own=0)[~before], atol=2e-4)
+    apart = among_neighbours(
+        ahead_m[~before], probabilities[~before], lines_m, passed, before=np.count_nonzero(~before)
+    )
+    together = among_neighbours(ahead_m, probabilities, lines_m, before=len(ahead_m))
+    assert_allclose(apart, together[~before], atol=2e-4)
     twice = passed_by(None, ahead_m[:4], probabilities[:4], lines_m, ahead_m[3])
     twice = passed_by(twice, ahead_m[4:][before[4:]], probabilities[4:][before[4:]], lines_m, 2.0)
     assert_allclose(twice.probabilities, passed.probabilities, atol=2e-4)

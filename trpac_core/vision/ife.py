@@ -218,8 +218,8 @@ class Ife:
         places_m = np.concatenate((near.ahead_m, ahead_m))
         probabilities = np.concatenate((near.probabilities, before))
         if looks or passed is not None:
-            lines_m, own = near.way.lines_m, len(near.ahead_m)
-            probabilities = among_neighbours(places_m, probabilities, lines_m, passed, own)
+            lines_m = near.way.lines_m
+            probabilities = among_neighbours(places_m, probabilities, lines_m, passed, len(before))
         low, high = self.config.ranges_m[0]
         inside = (low <= places_m) & (places_m < high)
         inside[: len(near.ahead_m)] = True

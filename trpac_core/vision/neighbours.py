@@ -71,7 +71,7 @@ def among_neighbours(
     probabilities: NDArray[np.float64],
     lines_m: NDArray[np.float64] | Sequence[float] = (),
     passed: Passed | None = None,
-    own: int | None = None,
+    before: int = 0,
 ) -> NDArray[np.float64]:
     """Probabilities of each patch, half of them those that its place has by all that is seen of the road.
 
@@ -85,8 +85,8 @@ def among_neighbours(
         Where lines cross the road, ascending: a class is likelier to end there than elsewhere [m].
     passed : Passed, optional
         The road before the patches, on the same way.
-    own : int, optional
-        How many of them, the first, are of this frame, the others of frames before; all if it is not given.
+    before : int
+        How many of them, the last, were seen in frames before.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def among_neighbours(
     if not len(ahead_m):
         return probabilities
     say = np.full(len(ahead_m), SAY)
-    say[len(say) if own is None else own :] = SAY_BEFORE
+    say[len(say) - before :] = SAY_BEFORE
     seen, changes, cells = _chain(ahead_m, probabilities, say, lines_m)
     from_behind = _passed_on(seen, changes, _told(passed, float(ahead_m.min()), lines_m))
     from_ahead = _passed_on(seen[::-1], changes[::-1], EVEN)[::-1]
