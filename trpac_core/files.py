@@ -52,6 +52,8 @@ def open_file(path: str | Path, most_bytes: int, expected: str) -> BinaryIO:
         _require_regular(os.stat(path), name, most_bytes, expected)
         # A pipe that took the file's place meanwhile is not waited for.
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except FileError:
+        raise
     except FileNotFoundError:
         raise FileError(f"{name}: no such file; expected {expected}.") from None
     except (OSError, ValueError) as error:  # the latter of a path with a zero in it
