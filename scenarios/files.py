@@ -22,9 +22,25 @@ from trpac_core.vision.classes import Surface
 
 WheelName = Literal["fl", "fr", "rl", "rr"]
 SurfaceName = Literal["dry", "wet", "snow_ice"]
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Friction = Annotated[float, Field(gt=0.0, le=1.5)]
+Friction = Annotated[float, Field(ge=0.001, le=1.5)]
+Name = Annotated[str, Field(max_length=200)]
+Description = Annotated[str, Field(max_length=5_000)]
+
+# From a model car to a mining truck [kg, m, kg m^2, N m, N]; from a pulse of a millisecond to a day's drive.
+Mass = Annotated[float, Field(ge=1.0, le=1e6)]
+Length = Annotated[float, Field(ge=0.01, le=100.0)]
+Height = Annotated[float, Field(ge=0.0, le=100.0)]
+Radius = Annotated[float, Field(ge=0.01, le=10.0)]
+Inertia = Annotated[float, Field(ge=1e-4, le=1e6)]
+PeakTorque = Annotated[float, Field(ge=0.01, le=1e6)]
+Torque = Annotated[float, Field(ge=-1e6, le=1e6)]
+Stiffness = Annotated[float, Field(ge=100.0, le=1e9)]
+Place = Annotated[float, Field(ge=-1e7, le=1e7)]
+Time = Annotated[float, Field(ge=0.0, le=1e5)]
+Duration = Annotated[float, Field(ge=1e-3, le=1e5)]
+Noise = Annotated[float, Field(ge=0.0, le=1e5)]
+LONGEST_RUN_S = 3600.0
+"""A simulated drive ends by then: an hour [s]."""
 
 
 class _FileModel(BaseModel):
@@ -35,22 +51,22 @@ class TyreSection(_FileModel):
     """The tyre in vehicle.yaml."""
 
     model: Literal["modified_dugoff"]
-    longitudinal_stiffness_n: Positive
+    longitudinal_stiffness_n: Stiffness
 
 
 class VehicleFile(_FileModel):
     """vehicle.yaml: the vehicle, and which effects the simulation models of it."""
 
     schema_: Literal[1] = Field(alias="schema")
-    name: str
-    mass_kg: Positive
-    wheelbase_m: Positive
-    track_m: Positive
-    cog_height_m: NonNegative
-    cog_to_rear_axle_m: Positive
-    wheel_radius_m: Positive
-    wheel_inertia_kg_m2: Positive
-    motor_peak_torque_nm: Positive
+    name: Name
+    mass_kg: Mass
+    wheelbase_m: Length
+    track_m: Length
+    cog_height_m: Height
+    cog_to_rear_axle_m: Length
+    wheel_radius_m: Radius
+    wheel_inertia_kg_m2: Inertia
+    motor_peak_torque_nm: PeakTorque
     tyre: TyreSection
     effects: dict[str, dict[str, float]] = Field(default_factory=dict)
     forms: dict[str, str] = Field(default_factory=dict)
@@ -116,7 +132,7 @@ class VehicleFile(_FileModel):
 class RoadSegment(_FileModel):
     """One stretch of road; it holds to the next one's start. Its sides may have other surfaces than `surface`."""
 
-    start_m: float
+    start_m: Place
     mu_left: Friction
     mu_right: Friction
     surface: SurfaceName
@@ -161,10 +177,10 @@ class RoadFile(_FileModel):
 class Pulse(_FileModel):
     """A trapezoidal torque pulse: rises from start_s and falls to 0 at end_s, over ramp_s each [N m, s]."""
 
-    start_s: NonNegative
-    end_s: Positive
-    torque_nm: float
-    ramp_s: Positive
+    start_s: Time
+    end_s: Duration
+    torque_nm: Torque
+    ramp_s: Duration
     wheels: Annotated[list[WheelName], Field(min_length=1)] = ["fl", "fr", "rl", "rr"]
 
     @model_validator(mode="after")
@@ -187,8 +203,8 @@ class Manoeuvre(_FileModel):
     """manoeuvre.yaml: torque pulses per wheel; where pulses of one wheel overlap they add up."""
 
     schema_: Literal[1] = Field(alias="schema")
-    name: str
-    description: str = ""
+    name: Name
+    description: Description = ""
     pulses: list[Pulse]
 
     def torque(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -208,17 +224,17 @@ class Manoeuvre(_FileModel):
 class End(_FileModel):
     """When a drive ends: at a place (of the front axle) or a time, whichever comes first."""
 
-    position_m: Positive
-    time_s: Positive
+    position_m: Annotated[float, Field(gt=0.0, le=1e6)]
+    time_s: Annotated[float, Field(gt=0.0, le=LONGEST_RUN_S)]
 
 
 class SensorNoise(_FileModel):
     """Standard deviations of the sensors' white Gaussian noise; the defaults are ideal sensors."""
 
-    wheel_speed_noise_rad_s: NonNegative = 0.0
-    wheel_torque_noise_nm: NonNegative = 0.0
-    vehicle_speed_noise_m_s: NonNegative = 0.0
-    accel_x_noise_m_s2: NonNegative = 0.0
+    wheel_speed_noise_rad_s: Noise = 0.0
+    wheel_torque_noise_nm: Noise = 0.0
+    vehicle_speed_noise_m_s: Noise = 0.0
+    accel_x_noise_m_s2: Noise = 0.0
 
 
 class Pictures(_FileModel):
@@ -226,25 +242,25 @@ class Pictures(_FileModel):
 
     disturbance: Literal["paper", "none"] = "none"
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 90
-    fps: Positive = 20.0
+    fps: Annotated[float, Field(ge=0.1, le=1000.0)] = 20.0
 
 
 class ScenarioFile(_FileModel):
     """scenario.yaml as written; paths are relative to it."""
 
     schema_: Literal[1] = Field(alias="schema")
-    name: str
-    description: str = ""
-    vehicle: str
-    road: str
-    camera: str | None = None
-    manoeuvre: str
+    name: Name
+    description: Description = ""
+    vehicle: Name
+    road: Name
+    camera: Name | None = None
+    manoeuvre: Name
     step_s: Annotated[float, Field(ge=1e-4, le=0.02)]
     end: End
     sensors: SensorNoise = Field(default_factory=SensorNoise)
     pictures: Pictures = Field(default_factory=Pictures)
     wheel: WheelName = "fl"
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
 
 
 @dataclass(frozen=True)

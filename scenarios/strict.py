@@ -7,65 +7,49 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-import yaml
 from pydantic import BaseModel, ValidationError
 
 from scenarios.effects import suggestion
 from scenarios.errors import ScenarioError
+from scenarios.yaml_text import YamlError, parse_yaml
+from trpac_core.files import FileError, quoted, read_text
 
 Model = TypeVar("Model", bound=BaseModel)
 
-
-class _StrictLoader(yaml.SafeLoader):
-    """YAML that refuses a key written twice, and takes 5e4 for a number as YAML 1.2 does."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: set[str] = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                continue
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key.value!r} stands twice", key.start_mark
-                )
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
-_StrictLoader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+$"),
-    list("-+.0123456789"),
-)
+MOST_BYTES = 1_000_000
+"""Larger files are refused unread; a road of 10,000 segments has 900,000 [bytes]."""
+MOST_PROBLEMS = 20
+"""Problems of a file that are told; the rest is counted."""
+LONGEST_PROBLEM = 600
+"""Characters of one problem."""
 
 
 def load_strict(path: str | Path, model: type[Model]) -> Model:
     """Read a YAML file into its model; all of its problems in one ScenarioError."""
-    path = Path(path)
+    name = quoted(path)
     try:
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)  # a SafeLoader
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror}; expected a YAML file.") from error
-    except RecursionError as error:
-        raise ScenarioError(f"{path}: not valid YAML: nested too deeply") from error
-    except (
-        yaml.YAMLError,
-        ValueError,
-    ) as error:  # the latter of text that is not UTF-8 and of dates that do not exist
-        raise ScenarioError(f"{path}: not valid YAML: {error}") from error
+        data = parse_yaml(read_text(path, MOST_BYTES, "a YAML file"))
+    except FileError as error:
+        raise ScenarioError(str(error)) from error
+    except YamlError as error:
+        raise ScenarioError(f"{name}: not valid YAML: {error}") from error
+    if not isinstance(data, dict):
+        # Not a word of it: whoever named the wrong file need not see it in a log.
+        raise ScenarioError(f"{name}: holds no keys at its top; expected lines of `key: value`.")
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError("\n".join(f"{path}: {text}" for text in _problems(error, model))) from error
+        raise ScenarioError("\n".join(f"{name}: {text}" for text in _problems(error, model))) from error
 
 
 def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
     """One sentence per problem: key, what is wrong, what was expected."""
-    texts = []
-    for item in error.errors():
+    texts: list[str] = []
+    every = error.errors(include_url=False)
+    for item in every[:MOST_PROBLEMS]:
         place, known = _place(model, item["loc"])
         if item["type"] == "extra_forbidden":
-            texts.append(f"{place}: unknown key; {suggestion(str(item['loc'][-1]), known)}")
+            texts.append(f"{place}: unknown key; {suggestion(quoted(item['loc'][-1]), known)}")
         elif item["type"] == "missing":
             texts.append(f"{place}: missing; expected this key.")
         elif item["type"] == "value_error":
@@ -73,9 +57,18 @@ def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
             texts.extend(prefix + line for line in str(item["ctx"]["error"]).splitlines())
         else:
             texts.append(
-                f"{place or 'file'}: is {item['input']!r}; {item['msg'][0].lower()}{item['msg'][1:]}."
+                f"{place or 'file'}: is {_shown(item['input'])}; {item['msg'][0].lower()}{item['msg'][1:]}."
             )
-    return texts
+    told = [quoted(text, LONGEST_PROBLEM) for text in texts[:MOST_PROBLEMS]]
+    more = len(texts) + len(every[MOST_PROBLEMS:]) - len(told)
+    return [*told, f"and {more} more problems."] if more else told
+
+
+def _shown(value: Any) -> str:
+    """A value as a message repeats it; of lists and mappings the kind alone."""
+    if value and isinstance(value, (list, dict)):
+        return f"a {'list' if isinstance(value, list) else 'mapping'} of {len(value)}"
+    return quoted(repr(value))
 
 
 def _place(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
@@ -97,7 +90,7 @@ def _place(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str
         place += f".{key}"
         known = list(fields)
         types = _types(fields[key]) if key in fields else types
-    return place.lstrip("."), known
+    return quoted(place.lstrip(".")), known
 
 
 def _fields(types: Iterable[type]) -> dict[str, Any]:

@@ -197,7 +197,7 @@ class TestFileProblems:
             ("schema: 1", "maps nothing"),
             ("columns: {time_s: t}\nposition_m: x", "columns: stands beside position_m"),
             ("columns: 3", "columns: expected one line"),
-            ("[1, 2]", "file: is [1, 2];"),
+            ("[1, 2]", "holds no keys at its top"),
             ("time_s: t\ntime_s: u", "stands twice"),
             ("a: [", "not valid YAML"),
         ],

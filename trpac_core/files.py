@@ -1,4 +1,4 @@
-"""The one way to the files that others wrote: regular, of a bounded size, and quoted in messages as short, plain text."""
+"""The one way to files of others: regular, of a bounded size, and quoted in messages as short, plain text."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ class FileError(ValueError):
     """A file is not to be read: its name, why, and what was expected."""
 
 
-def quoted(text: object) -> str:
-    """Text of a file, or its name, as messages repeat it: on one line, printable, at most 200 characters.
+def quoted(text: object, longest: int = LONGEST_QUOTE) -> str:
+    """Text of a file, or its name, as messages repeat it: on one line, printable, at most `longest` characters.
 
     What is not printable, such as the escape codes of a terminal or half a surrogate pair, is written as its code.
     """
-    whole = str(text)
-    plain = "".join(c if c.isprintable() else _code(c) for c in whole[: LONGEST_QUOTE + 1])
-    return plain if len(plain) <= LONGEST_QUOTE else f"{plain[:LONGEST_QUOTE]} ..."
+    plain = "".join(c if c.isprintable() else _code(c) for c in str(text)[: longest + 1])
+    return plain if len(plain) <= longest else f"{plain[:longest]} ..."
 
 
 def _code(character: str) -> str:
@@ -54,8 +53,6 @@ def open_file(path: str | Path, most_bytes: int, expected: str) -> BinaryIO:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except FileError:
         raise
-    except FileNotFoundError:
-        raise FileError(f"{name}: no such file; expected {expected}.") from None
     except (OSError, ValueError) as error:  # the latter of a path with a zero in it
         why = getattr(error, "strerror", None) or error
         raise FileError(f"{name}: cannot be read: {quoted(why)}; expected {expected}.") from error

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from scenarios.errors import ScenarioError
 from scenarios.files import VehicleFile, load_road, load_vehicle
+from scenarios.strict import load_strict
 from sim2real.how_far.gap import measure
 from sim2real.logs import load_mapping, read_log
 from sim2real.observing.drive import Drive, awake
@@ -81,11 +81,7 @@ def load_case(name: str) -> Case:
     """
     if name not in case_names():
         raise ScenarioError(f"{name!r} is no case. Known: {', '.join(case_names())}.")
-    path = FOLDER / name / "case.yaml"
-    try:
-        return Case.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-    except ValidationError as error:
-        raise ScenarioError(f"{path}: {error}") from error
+    return load_strict(FOLDER / name / "case.yaml", Case)
 
 
 def stages(name: str, data: Path) -> list[Stage]:

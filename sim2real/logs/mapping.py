@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
@@ -17,6 +17,10 @@ from sim2real.logs.units import factor
 SOURCES = ("column", "constant", "sum", "integrate", "copy")
 INTEGRAND_UNIT = {"m": "m/s", "m/s": "m/s2", "rad": "rad/s"}
 """Unit of a column of the log format, and of what it is the integral of."""
+
+
+Name = Annotated[str, Field(max_length=1_000)]
+Factor = Annotated[float, Field(ge=-1e12, le=1e12)]
 
 
 class _Strict(BaseModel):
@@ -31,16 +35,16 @@ class Spec(_Strict):
     `copy` (of another column of the log format). A bare name in a file is a `column`.
     """
 
-    column: str | None = None
-    constant: float | None = None
-    sum: list[Spec] = Field(default_factory=list)
+    column: Name | None = None
+    constant: Factor | None = None
+    sum: Annotated[list[Spec], Field(max_length=100)] = Field(default_factory=list)
     integrate: Spec = Field(default=None)  # type: ignore[assignment]  # absent, but a null in the file is refused
-    copy_of: str | None = Field(default=None, alias="copy")
-    unit: str | None = None
-    radius_m: float | None = Field(default=None, gt=0.0)
+    copy_of: Name | None = Field(default=None, alias="copy")
+    unit: Name | None = None
+    radius_m: float | None = Field(default=None, ge=0.01, le=10.0)
     sign: Literal[1, -1] = 1
-    scale: float = 1.0
-    offset: float = 0.0
+    scale: Factor = 1.0
+    offset: Factor = 0.0
 
     @model_validator(mode="before")
     @classmethod
