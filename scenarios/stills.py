@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from scenarios.looks import MODELS
 from scenarios.whole_files import written_whole
+from trpac_core.files import quoted
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import LEAST_READABLE, usable_road
 from trpac_core.vision.images import ImageError, decode_image
@@ -114,7 +114,7 @@ def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tup
     rows, problems = [], []
     for done, file in enumerate(files, start=1):
         try:
-            probabilities = networks.probabilities(upright(file), str(file))
+            probabilities = networks.probabilities(decode_image(file, upright=True), quoted(file))
             surface = Surface(int(probabilities.argmax()))
             rows.append(
                 (printable(str(file)), surface.label, float(probabilities.max()), *probabilities.tolist())
@@ -188,16 +188,6 @@ class StillNetworks:
         logs = patch_logs(image, self.segmenter.segment(image), self.classifier, name)
         both = logs + self.picture.logits(image) / self.picture.temperature
         return calibrated_probabilities(both[None], 1.0)[0]
-
-
-def upright(file: Path) -> NDArray[np.uint8]:
-    """The picture as a viewer shows it; raises ImageError. A turn noted by a telephone would move the road."""
-    image = decode_image(file)
-    data = file.read_bytes()
-    if b"Exif\0" not in data[:65536] and b"eXIf" not in data:
-        return image
-    turned = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR_BGR)
-    return image if turned is None else turned.astype(np.uint8, copy=False)
 
 
 def _looks(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:

@@ -24,7 +24,7 @@ class YamlError(ValueError):
     """Text that is no YAML of the kind that is read; says where."""
 
 
-class _Loader(Composer, CParser, SafeConstructor, BaseResolver):
+class _Loader(Composer, CParser, SafeConstructor, BaseResolver):  # type: ignore[misc]
     """Reads null, booleans, decimal numbers, text, lists and mappings; no tags, no merge keys, no key twice."""
 
     def __init__(self, text: str) -> None:
@@ -37,7 +37,7 @@ class _Loader(Composer, CParser, SafeConstructor, BaseResolver):
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """A value; an alias counts as much as what it stands for."""
-        event = self.peek_event()
+        event: Any = self.peek_event()
         if isinstance(event, yaml.AliasEvent):
             node = super().compose_node(parent, index)
             size = self._sizes.get(id(node))
@@ -65,7 +65,7 @@ class _Loader(Composer, CParser, SafeConstructor, BaseResolver):
             seen.add(key.value)
         return yaml.constructor.BaseConstructor.construct_mapping(self, node, deep)
 
-    def construct_scalar(self, node: yaml.ScalarNode) -> str:
+    def construct_scalar(self, node: Any) -> str:
         if found := _UNPRINTABLE.search(node.value):
             raise _wrong(f"text with the character {found[0]!a}, which cannot be shown", node)
         return str(node.value)
@@ -92,12 +92,14 @@ for _tag, _pattern, _first in (
     ),
 ):
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), _first)
-for _tag in ("int", "float"):
-    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _Loader._number)
-_Loader.add_constructor("tag:yaml.org,2002:bool", _Loader._boolean)
+_Loader.yaml_constructors = {
+    **SafeConstructor.yaml_constructors,
+    **dict.fromkeys(("tag:yaml.org,2002:int", "tag:yaml.org,2002:float"), _Loader._number),
+    "tag:yaml.org,2002:bool": _Loader._boolean,
+}
 
 
-def _wrong(what: str, at: yaml.Event | yaml.Node) -> yaml.MarkedYAMLError:
+def _wrong(what: str, at: Any) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=what, problem_mark=at.start_mark)
 
 

@@ -81,7 +81,7 @@ def test_damaged_png():
 def test_missing_empty_foreign_and_unreadable_files(tmp_path):
     (tmp_path / "empty.jpg").write_bytes(b"")
     (tmp_path / "text.jpg").write_text("hello")
-    with pytest.raises(ImageError, match=r"nothing\.jpg: no such file"):
+    with pytest.raises(ImageError, match=r"nothing\.jpg: cannot be read: No such file"):
         decode_image(tmp_path / "nothing.jpg")
     with pytest.raises(ImageError, match=r"empty\.jpg: empty"):
         decode_image(tmp_path / "empty.jpg")

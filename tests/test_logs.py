@@ -117,7 +117,7 @@ class TestFormats:
     def test_missing_files_and_unknown_endings(self, tmp_path, frame):
         with pytest.raises(LogError, match="cannot be read: No such file"):
             read_log(tmp_path / "no.csv")
-        with pytest.raises(LogError, match="cannot be read: Is a directory"):
+        with pytest.raises(LogError, match="is a folder; expected a log"):
             read_log(tmp_path)
         with pytest.raises(LogError, match="expected a name that ends with"):
             write_log(frame, tmp_path / "log.xlsx")

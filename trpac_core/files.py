@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 LONGEST_QUOTE = 200
 """Characters of a file's own text, or of its name, that a message repeats."""
@@ -29,7 +30,7 @@ def _code(character: str) -> str:
     return " " if character in "\n\r\t" else character.encode("unicode_escape").decode("ascii")
 
 
-def open_file(path: str | Path, most_bytes: int, expected: str) -> BinaryIO:
+def open_file(path: str | Path, most_bytes: int, expected: str) -> BufferedReader:
     """A regular file of at most `most_bytes`, opened for reading; never a pipe, a device or a folder.
 
     Parameters

@@ -6,22 +6,41 @@ import csv
 import io
 import re
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from sim2real.logs.errors import LogError
-from sim2real.logs.table import SHOWN, Array, Finding, Table, Wanted, and_more, numbered
+from sim2real.logs.table import (
+    MOST_COLUMNS,
+    SHOWN,
+    Array,
+    Finding,
+    Table,
+    Wanted,
+    and_more,
+    labels_of,
+    numbered,
+)
+from trpac_core.files import read_text
 
 MISSING = frozenset({"", "nan", "+nan", "-nan", "na", "n/a", "null"})
 """Cells that say that a sample was lost, in lower case."""
+
+MOST_BYTES = 500_000_000
+"""Larger files are refused unread; in memory a file takes several times its size [bytes]."""
+LONGEST_LINE = 1_000_000
+"""Characters of a row: 20,000 columns of 50."""
+MOST_ROWS = 10_000_000
+"""Rows of a file: 83 minutes at 2 kHz."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
 
 
 def read_csv(path: Path, wanted: Wanted) -> Table:
     """Read the wanted columns of a CSV file; raises LogError where it has no rows to speak of."""
-    text = _decode(path)
+    text = read_text(path, MOST_BYTES, "a CSV file saved as UTF-8")
     header, records, rows, findings = _records(path, text)
     count = Counter(header)
     findings += [
@@ -36,7 +55,7 @@ def read_csv(path: Path, wanted: Wanted) -> Table:
         cells = [record[i].strip() for record in records] if name in wanted.numbers | wanted.text else []
         if name in wanted.text:
             told = ["" if cell.lower() in MISSING else cell for cell in cells]
-            labels[name] = np.array(told, dtype=np.str_)
+            labels[name] = labels_of(told)
         elif name in wanted.numbers:
             values, bad = _numbers(cells, name in wanted.identifiers)
             findings += _bad_cells(name, cells, rows, bad)
@@ -52,18 +71,9 @@ def read_csv(path: Path, wanted: Wanted) -> Table:
     return Table(tuple(header), numbers, labels, np.array(rows, dtype=np.int64), tuple(findings))
 
 
-def _decode(path: Path) -> str:
-    raw = path.read_bytes()
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        row = raw.count(b"\n", 0, error.start) + 1
-        raise LogError(f"{path}: row {row} is not UTF-8 text; expected a CSV file saved as UTF-8.") from error
-
-
 def _records(path: Path, text: str) -> tuple[list[str], list[list[str]], list[int], list[Finding]]:
     """Header, rows that have as many cells as it, their row numbers, and what is wrong with the others."""
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    reader = csv.reader(_lines(path, text), strict=True)
     header: list[str] = []
     records, rows, ragged = [], [], []
     try:
@@ -72,6 +82,8 @@ def _records(path: Path, text: str) -> tuple[list[str], list[list[str]], list[in
                 continue
             if not header:
                 header = [name.strip() for name in record]
+                if len(header) > MOST_COLUMNS:
+                    raise LogError(f"{path}: has {len(header)} columns; expected at most {MOST_COLUMNS}.")
             elif len(record) == len(header):
                 records.append(record)
                 rows.append(reader.line_num)
@@ -93,6 +105,20 @@ def _records(path: Path, text: str) -> tuple[list[str], list[list[str]], list[in
         text = f"{', '.join(ragged[:SHOWN])}{and_more(len(ragged))}: not as many cells as row 1 has names "
         return header, records, rows, [Finding(f"{text}({len(header)}); expected one cell per column.")]
     return header, records, rows, []
+
+
+def _lines(path: Path, text: str) -> Iterator[str]:
+    """The text's lines, none of them endless, and not more of them than a log has."""
+    lines = io.StringIO(text, newline="")
+    for row, line in enumerate(iter(lambda: lines.readline(LONGEST_LINE + 1), ""), start=1):
+        if len(line) > LONGEST_LINE or row > MOST_ROWS:
+            what = (
+                f"row {row} is longer than {LONGEST_LINE} characters"
+                if row <= MOST_ROWS
+                else f"has {row} rows"
+            )
+            raise LogError(f"{path}: {what}; expected one line per sample, and at most {MOST_ROWS} of them.")
+        yield line
 
 
 def _numbers(cells: list[str], identifiers: bool) -> tuple[Array, list[int]]:

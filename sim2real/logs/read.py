@@ -24,7 +24,12 @@ from sim2real.logs.translate import (
     translate,
     wanted_columns,
 )
+from trpac_core.files import FileError, open_file, quoted
 
+MOST_BYTES = 4_000_000_000
+"""Larger logs are refused unread [bytes]."""
+LONGEST_FINDING = 600
+"""Characters of one sentence about a log."""
 MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF"}
 """First four bytes of the files that are not text; UnFi is an MDF that its recorder did not close."""
 SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"}
@@ -46,7 +51,12 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         With all problems of the file, one a line.
     """
     path, mapping = Path(path), mapping or NO_MAPPING
-    row_word, table = _read_table(path, wanted_columns(mapping))
+    try:
+        row_word, table = _read_table(path, wanted_columns(mapping))
+    except LogError:
+        raise
+    except (FileError, ValueError) as error:  # the latter of text that is no picture's path
+        raise LogError(f"{quoted(path)}: {error}" if type(error) is ValueError else str(error)) from error
 
     def row(i: int) -> str:
         return f"{row_word} {table.rows[i]}"
@@ -77,18 +87,15 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         gaps=clock.gaps,
         derived=made.derived,
         ignored=ignored_columns(table, mapping),
-        warnings=tuple(finding.text for finding in findings),
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        warnings=tuple(quoted(finding.text, LONGEST_FINDING) for finding in findings),
+        sha256=_sha256(path),
     )
 
 
 def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
     """The file's columns, and what one of its rows is called; the content tells the format, the name must agree."""
-    try:
-        with path.open("rb") as file:
-            start = file.read(4)
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}; expected a log.") from error
+    with open_file(path, MOST_BYTES, "a log") as file:
+        start = file.read(4)
     kind = MAGIC.get(start, "CSV")
     named = SUFFIXES.get(path.suffix.lower(), kind)
     if kind != named:
@@ -103,4 +110,10 @@ def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
 
 
 def _error(path: Path, findings: list[Finding]) -> LogError:
-    return LogError("\n".join(f"{path}: {finding.text}" for finding in findings if finding.fatal))
+    fatal = [quoted(finding.text, LONGEST_FINDING) for finding in findings if finding.fatal]
+    return LogError("\n".join(f"{quoted(path)}: {text}" for text in fatal))
+
+
+def _sha256(path: Path) -> str:
+    with open_file(path, MOST_BYTES, "a log") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +10,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Text = NDArray[np.str_]
+
+MOST_NUMBERS = 60_000_000
+"""Samples that are read of a file, all its columns together: 16 signals for an hour at 1 kHz, 480 MB."""
+MOST_COLUMNS = 20_000
+"""Columns of a table that is not MDF."""
+LONGEST_TEXT = 1_000
+"""Characters of one sample of text: a picture's path."""
+MOST_TEXT = 120_000_000
+"""Characters of a column of text, each sample as long as the longest: 480 MB."""
 
 SHOWN = 3
 """Cells or rows of one kind that an error lists; the rest is counted."""
@@ -75,6 +84,16 @@ def numbered(labels: Iterable[str]) -> Array:
     return np.array(
         [codes.setdefault(label, len(codes)) if label else np.nan for label in labels], dtype=np.float64
     )
+
+
+def labels_of(cells: Sequence[str]) -> Text:
+    """Text samples as an array, shape (n,); raises ValueError where one is too long for a picture's path."""
+    longest = max(map(len, cells), default=0)
+    if longest > LONGEST_TEXT or longest * len(cells) > MOST_TEXT:
+        raise ValueError(
+            f"holds text of {longest} characters in {len(cells)} rows; expected names of pictures."
+        )
+    return np.array(cells, dtype=np.str_)
 
 
 def and_more(count: int) -> str:

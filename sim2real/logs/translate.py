@@ -10,12 +10,15 @@ import numpy as np
 from sim2real.logs.contract import COLUMNS, IMAGE_PATH, REQUIRED, TIME, WHEEL_SPEEDS
 from sim2real.logs.mapping import INTEGRAND_UNIT, Mapping, Spec
 from sim2real.logs.table import Array, Finding, Table, Wanted
+from trpac_core.files import quoted
 
 BRIDGED_S = 0.25
 """An integral across a longer stretch of lost samples is worth a warning [s]."""
 
-LISTED_NAMES = 12
-"""Column names of the file that an error lists."""
+LISTED_NAMES, LONGEST_NAME = 12, 40
+"""Column names of the file that an error lists, and characters of each."""
+MOST_COMPARED = 3_000
+"""Column names of the file among which a likely one is looked for: comparing takes microseconds each."""
 
 
 def wanted_columns(mapping: Mapping) -> Wanted:
@@ -52,7 +55,7 @@ def missing_columns(table: Table, mapping: Mapping) -> list[Finding]:
     if absent:
         findings.append(Finding(_absent_text(absent, names)))
     spare = [n for n in COLUMNS if n not in REQUIRED and n not in mapped and n not in names]
-    for name in ignored_columns(table, mapping):
+    for name in ignored_columns(table, mapping)[:MOST_COMPARED]:
         close = get_close_matches(name.lower(), spare, n=1, cutoff=0.85)
         if close:
             findings.append(Finding(f"column {name!r} is ignored; did you mean {close[0]!r}?", fatal=False))
@@ -179,13 +182,13 @@ def picture_source(mapping: Mapping) -> str:
 
 
 def _did_you_mean(name: str, known: list[str]) -> str:
-    lower = {k.lower(): k for k in known}
+    lower = {k.lower(): k for k in known[:MOST_COMPARED]}
     close = get_close_matches(name.lower(), lower, n=1, cutoff=0.5)
     return f" Did you mean {lower[close[0]]!r}?" if close else f" The file has: {_listed(known)}."
 
 
 def _absent_text(absent: list[str], names: list[str]) -> str:
-    lower = {n.lower(): n for n in names}
+    lower = {n.lower(): n for n in names[:MOST_COMPARED]}
     hints = [
         f"{name} (is it {lower[close[0]]!r}?)" if close else name
         for name in absent
@@ -203,4 +206,4 @@ def _absent_text(absent: list[str], names: list[str]) -> str:
 
 def _listed(names: list[str]) -> str:
     more = f" and {len(names) - LISTED_NAMES} more" if len(names) > LISTED_NAMES else ""
-    return ", ".join(names[:LISTED_NAMES]) + more
+    return ", ".join(quoted(name, LONGEST_NAME) for name in names[:LISTED_NAMES]) + more

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
-import stat
+import re
 import struct
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from trpac_core.files import FileError, quoted, read_bytes
+
 LEAST_SIDE_PX = 64
 MOST_PIXELS = 64_000_000
 """Larger pictures are refused before they are decoded: 64 megapixels."""
 MOST_FILE_BYTES = 3 * MOST_PIXELS
 """Larger files are refused unread: no picture needs more than its pixels do [bytes]."""
+MOST_SCANNED_PIXELS = 1_000_000_000
+"""Pixels of a JPEG times its scans, each of which is a pass over all of them: 15 passes over the largest picture."""
 
 _JPEG_START = b"\xff\xd8\xff"
-_JPEG_END = b"\xff\xd9"
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-_JPEG_SCAN = 0xDA
+_JPEG_SCAN, _JPEG_RESTARTS, _JPEG_END = 0xDA, 0xDD, b"\xff\xd9"
+_JPEG_MARKER = re.compile(b"\xff[^\x00\xd0-\xd7\xff]")
+"""Within a scan FF is followed by 00 or a restart marker; whatever else follows ends it."""
+_JPEG_RESTART = re.compile(b"\xff[\xd0-\xd7]")
+_JPEG_MORE = bytes(range(1, 255))
+"""What a scan that was cut off would go on to decode."""
+_JPEG_UNDECODED = 128
+"""Value of each channel where the decoder had no data."""
 
 
 class ImageError(ValueError):
@@ -29,13 +40,11 @@ class ImageError(ValueError):
 
 
 def decode_image(
-    source: str | Path | bytes | bytearray | memoryview, name: str = "image"
+    source: str | Path | bytes | bytearray | memoryview, name: str = "image", *, upright: bool = False
 ) -> NDArray[np.uint8]:
     """Read a JPEG or PNG as 8-bit BGR.
 
-    Grey pictures get three equal channels, 16-bit ones their upper 8 bits, and an alpha channel is dropped. A
-    turn noted in the file's EXIF data is not applied: the camera file describes the pixels as they are
-    stored.
+    Grey pictures get three equal channels, 16-bit ones their upper 8 bits, and an alpha channel is dropped.
 
     Parameters
     ----------
@@ -43,6 +52,9 @@ def decode_image(
         A file, or the content of one.
     name : str
         What error messages call a source given as bytes.
+    upright : bool
+        Whether a turn noted in the file's EXIF data is applied, as a viewer does; not by default, since a camera
+        file describes the pixels as they are stored.
 
     Returns
     -------
@@ -55,22 +67,31 @@ def decode_image(
         If the file is missing, empty, cut short, damaged, of another format, or outside the limits on size.
     """
     if isinstance(source, (str, Path)):
-        name = str(source)
-        data = _read(Path(source))
+        name = quoted(source)
+        try:
+            data = read_bytes(source, MOST_FILE_BYTES, "a JPEG or PNG picture")
+        except FileError as error:
+            raise ImageError(str(error)) from error
     else:
         data = bytes(source)
     if not data:
         raise ImageError(f"{name}: empty. Expected a JPEG or PNG picture.")
     if data.startswith(_JPEG_START):
-        width, height = _check_jpeg(data, name)
+        image = _jpeg(data, name)
     elif data.startswith(_PNG_START):
         width, height = _check_png(data, name)
+        check_size(width, height, name)
+        image = _decoded(data, name)
     else:
         raise ImageError(
             f"{name}: neither JPEG nor PNG (starts with {data[:8].hex(' ')}). Convert the picture."
         )
-    check_size(width, height, name)
-    how = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_IGNORE_ORIENTATION
+    return _decoded(data, name, cv2.IMREAD_COLOR_BGR) if upright and _turned(data) else image
+
+
+def _decoded(
+    data: bytes, name: str, how: int = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_IGNORE_ORIENTATION
+) -> NDArray[np.uint8]:
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), how)
     except cv2.error as error:
@@ -78,6 +99,10 @@ def decode_image(
     if image is None:
         raise ImageError(f"{name}: damaged; the picture cannot be decoded. Copy or record it again.")
     return image.astype(np.uint8, copy=False)
+
+
+def _turned(data: bytes) -> bool:
+    return b"Exif\0" in data[:65536] or b"eXIf" in data
 
 
 def raw_bgr_image(
@@ -93,25 +118,6 @@ def raw_bgr_image(
     return np.frombuffer(data, np.uint8).reshape(height_px, width_px, 3)
 
 
-def _read(path: Path) -> bytes:
-    try:
-        there = path.stat()
-        regular = stat.S_ISREG(there.st_mode)
-        data = path.read_bytes() if regular and there.st_size <= MOST_FILE_BYTES else b""
-    except FileNotFoundError:
-        raise ImageError(f"{path}: no such file. Expected a JPEG or PNG picture; correct the path.") from None
-    except (OSError, ValueError) as error:
-        raise ImageError(f"{path}: cannot be read ({error}). Expected a JPEG or PNG picture.") from error
-    if not regular:
-        raise ImageError(f"{path}: cannot be read (no file of its own). Expected a JPEG or PNG picture.")
-    if there.st_size > MOST_FILE_BYTES:
-        raise ImageError(
-            f"{path}: {there.st_size / 1e6:.0f} MB; expected a JPEG or PNG picture of at most "
-            f"{MOST_FILE_BYTES / 1e6:.0f} MB."
-        )
-    return data
-
-
 def check_size(width: int, height: int, name: str) -> None:
     """Raise ImageError if a picture of this size [px] is refused, whatever it shows."""
     if min(width, height) < LEAST_SIDE_PX or width * height > MOST_PIXELS:
@@ -125,31 +131,78 @@ def _cut_short(name: str) -> ImageError:
     return ImageError(f"{name}: cut short; the end of the picture is missing. Copy or record it again.")
 
 
-def _check_jpeg(data: bytes, name: str) -> tuple[int, int]:
-    """Width and height of a JPEG whose end is there; raises ImageError."""
-    at, size = 2, None
+def _jpeg(data: bytes, name: str) -> NDArray[np.uint8]:
+    """The picture of a JPEG that is whole and of a bounded size; raises ImageError."""
+    at, frame, scans, interval = 2, None, 0, 0
     while True:
         while data[at : at + 2] == b"\xff\xff":
             at += 1
+        if data[at : at + 2] == _JPEG_END:
+            break
         if at + 4 > len(data):
             raise _cut_short(name)
         if data[at] != 0xFF:
             raise ImageError(f"{name}: damaged JPEG, no marker at byte {at}. Copy or record it again.")
         marker, (length,) = data[at + 1], struct.unpack_from(">H", data, at + 2)
-        if marker in _JPEG_FRAMES:
-            if at + 9 > len(data):
-                raise _cut_short(name)
-            height, width = struct.unpack_from(">HH", data, at + 5)
-            size = width, height
+        header = data[at + 4 : at + 2 + length]
         at += 2 + length
-        if marker == _JPEG_SCAN:
-            break
-    # Within a scan FF is followed by 00 or a restart marker, so that FF D9 can only be the picture's end.
-    if data.find(_JPEG_END, at) < 0:
+        if marker in _JPEG_FRAMES:
+            frame = _JpegFrame.of(header, name)
+            check_size(frame.width, frame.height, name)
+        elif marker == _JPEG_RESTARTS and len(header) == 2:
+            (interval,) = struct.unpack(">H", header)
+        elif marker == _JPEG_SCAN:
+            following = _JPEG_MARKER.search(data, at)
+            if following is None:
+                raise _cut_short(name)
+            if frame is None or not header:
+                raise ImageError(f"{name}: damaged JPEG without a frame header. Copy or record it again.")
+            scans += 1
+            if scans * frame.width * frame.height > MOST_SCANNED_PIXELS:
+                raise ImageError(
+                    f"{name}: a JPEG of {frame.width} x {frame.height} pixels in {scans} scans or more; expected at "
+                    f"most {MOST_SCANNED_PIXELS // (frame.width * frame.height)}. Save it anew."
+                )
+            began, at = at, following.start()
+            restarts = (frame.units(header[1 : 1 + 2 * header[0] : 2]) - 1) // interval if interval else 0
+            if len(_JPEG_RESTART.findall(data, began, at)) < restarts:
+                raise _cut_short(name)
+    if not scans:
+        raise ImageError(f"{name}: damaged JPEG without a picture. Copy or record it again.")
+    image = _decoded(data, name)
+    # Bytes that follow a whole scan are passed over; one that was cut off before the end marker goes on with them.
+    # Where the data of a single scan end early, the last pixel was never decoded.
+    doubtful = scans > 1 or bool((image[-1, -1] == _JPEG_UNDECODED).all())
+    if doubtful and not np.array_equal(_decoded(data[:at] + _JPEG_MORE + data[at:], name), image):
         raise _cut_short(name)
-    if size is None:
-        raise ImageError(f"{name}: damaged JPEG without a frame header. Copy or record it again.")
-    return size
+    return image
+
+
+@dataclass(frozen=True)
+class _JpegFrame:
+    """Size of a JPEG [px], and how many blocks of 8 x 8 each component has in a unit of all: across and down."""
+
+    width: int
+    height: int
+    sampling: dict[int, tuple[int, int]]
+
+    @classmethod
+    def of(cls, header: bytes, name: str) -> _JpegFrame:
+        """From the content of a frame header; raises ImageError where that is cut short."""
+        if len(header) < 6 or len(header) < 6 + 3 * header[5]:
+            raise _cut_short(name)
+        height, width = struct.unpack_from(">HH", header, 1)
+        parts = [header[at : at + 2] for at in range(6, 6 + 3 * header[5], 3)]
+        return cls(width, height, {part[0]: (part[1] >> 4 or 1, part[1] & 15 or 1) for part in parts})
+
+    def units(self, components: bytes) -> int:
+        """Units that a scan of these components has: of all blocks of a place, or blocks of one component alone."""
+        across, down = (max((s[i] for s in self.sampling.values()), default=1) for i in (0, 1))
+        if len(components) == 1:
+            own = self.sampling.get(components[0], (across, down))
+            columns, rows = -(-self.width * own[0] // across), -(-self.height * own[1] // down)
+            return -(-columns // 8) * -(-rows // 8)
+        return -(-self.width // (8 * across)) * -(-self.height // (8 * down))
 
 
 def _check_png(data: bytes, name: str) -> tuple[int, int]:
