@@ -21,9 +21,10 @@ from fmpy.fmi2 import FMU2Slave
 from pythonfmu import FmuBuilder
 
 from benchmarks.ledger import machine
-from fmu_src.packaging import build_unit, sha256, unpack_unit
+from fmu_src.packaging import build_unit, unpack_unit
 from fmu_src.units import UNITS
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.files import file_sha256
 from trpac_core.readings import Sensors
 from trpac_core.vision.classes import Surface
 
@@ -158,7 +159,7 @@ def main() -> None:
             "boundary_over_empty_slave_us": round(cost["unit"] - cost["estimator"] - cost["empty_slave"], 2),
             "steps": STEPS,
             "rounds": ROUNDS,
-            "unit_sha256": sha256(archive),
+            "unit_sha256": file_sha256(archive),
             "machine": machine(),
             "versions": {p: version(p) for p in ("fmpy", "pythonfmu")},
         }

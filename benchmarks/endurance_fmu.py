@@ -28,8 +28,9 @@ from fmpy.fmi2 import FMU2Slave
 
 from benchmarks.conformance.cases import CASES, STEP_S, write_pictures
 from benchmarks.ledger import append
-from fmu_src.packaging import build_unit, sha256, unpack_unit
+from fmu_src.packaging import build_unit, unpack_unit
 from fmu_src.units import UNITS
+from trpac_core.files import file_sha256
 
 HISTORY = Path(__file__).parent / "history" / "endurance.jsonl"
 ROOT = Path(__file__).parents[1]
@@ -289,7 +290,7 @@ def measure(unit: str, steps: int, instances: int) -> dict[str, Any]:
         archive = build_unit(UNITS[unit], Path(name) / f"{unit}.fmu")
         folder = unpack_unit(archive, Path(name) / "unpacked")
         counts = {"steps": steps, "instances": instances}
-        return {"sha256": sha256(archive)} | {
+        return {"sha256": file_sha256(archive)} | {
             part: measured(part, folder, counts.get(part, 0)) for part in PARTS
         }
 

@@ -60,7 +60,9 @@ def run_build(program: str, load: Callable[[], Product], name: str) -> int:
 
     try:
         product = load()
-        from .packaging import BuildError, sha256
+        from trpac_core.files import file_sha256
+
+        from .packaging import BuildError
     except ImportError as error:
         say(f"{error}. Run it with the project's interpreter: .venv/bin/python {program}")
         return EXIT_BUILD
@@ -86,5 +88,5 @@ def run_build(program: str, load: Callable[[], Product], name: str) -> int:
         return EXIT_RUN
     print(f"ran        {done}")
     print(f"{product.noun:<10} {path}")
-    print(f"SHA-256    {sha256(path)}")
+    print(f"SHA-256    {file_sha256(path)}")
     return 0

@@ -8,10 +8,14 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from trpac_core.files import FileError, file_sha256, parse_json, quoted, read_bytes
+
 CONTENTS_FILE = "contents.json"
 """The record, among the unit's resources; it lists every file of the archive but itself."""
 SCHEMA = 1
 SHOWN_DIGITS = 12
+MOST_RECORD_BYTES = 4_000_000
+"""Size of the record of a build; those of this project's units have 10 kB [bytes]."""
 
 
 class ContentError(ValueError):
@@ -46,12 +50,16 @@ class Contents:
 def read_contents(data: bytes) -> Contents:
     """The record that `to_bytes` wrote; raises ContentError."""
     try:
-        content = json.loads(data)
+        content = parse_json(data, CONTENTS_FILE)
         schema = content.pop("schema")
         contents = Contents(**content)
         pairs = [*contents.packages.items(), *contents.files.items()]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ContentError(f"{CONTENTS_FILE}: damaged ({error}). Build or copy the unit again.") from error
+        raise ContentError(
+            f"{CONTENTS_FILE}: damaged ({quoted(error)}). Build or copy the unit again."
+        ) from error
+    pairs.append((contents.unit, contents.version))
+    pairs.append((contents.build, ""))
     if schema != SCHEMA or not all(isinstance(text, str) for pair in pairs for text in pair):
         raise ContentError(f"{CONTENTS_FILE}: not of schema {SCHEMA}. Build the unit again.")
     return contents
@@ -62,7 +70,7 @@ def sha256_of(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def deviations(contents: Contents, names: Iterable[str], read: Callable[[str], bytes]) -> list[str]:
+def deviations(contents: Contents, names: Iterable[str], sha256: Callable[[str], str]) -> list[str]:
     """One sentence for each of the named files that is missing or is not the one that was built.
 
     Parameters
@@ -71,23 +79,23 @@ def deviations(contents: Contents, names: Iterable[str], read: Callable[[str], b
         The record.
     names : iterable of str
         Paths in the archive.
-    read : callable
-        Gives the bytes at such a path now; OSError or KeyError where there are none.
+    sha256 : callable
+        Gives the hash of what lies at such a path now; FileError or KeyError where nothing can be read.
     """
     problems = []
     for name in names:
         try:
-            found = sha256_of(read(name))
-        except (OSError, KeyError):
-            problems.append(f"{name} is missing")
+            found = sha256(name)
+        except (FileError, KeyError):
+            problems.append(f"{quoted(name)} is missing")
             continue
         built = contents.files.get(name)
         if built is None:
-            problems.append(f"{name} is not of this build")
+            problems.append(f"{quoted(name)} is not of this build")
         elif found != built:
             problems.append(
-                f"{name} is damaged or has been exchanged: SHA-256 {found[:SHOWN_DIGITS]}..., "
-                f"built was {built[:SHOWN_DIGITS]}..."
+                f"{quoted(name)} is damaged or has been exchanged: SHA-256 {found[:SHOWN_DIGITS]}..., "
+                f"built was {quoted(built[:SHOWN_DIGITS])}..."
             )
     return problems
 
@@ -95,13 +103,13 @@ def deviations(contents: Contents, names: Iterable[str], read: Callable[[str], b
 def require_as_built(resources: Path, names: Iterable[str]) -> None:
     """Raise one ContentError that names all of these resources that are not what was built into the unit."""
     try:
-        contents = read_contents((resources / CONTENTS_FILE).read_bytes())
-    except OSError as error:
-        raise ContentError(
-            f"{resources / CONTENTS_FILE}: cannot be read ({error}). Copy the unit again."
-        ) from error
+        data = read_bytes(resources / CONTENTS_FILE, MOST_RECORD_BYTES, "the unit's record of its build")
+    except FileError as error:
+        raise ContentError(f"{error} Copy the unit again.") from error
     problems = deviations(
-        contents, [f"resources/{name}" for name in names], lambda name: (resources.parent / name).read_bytes()
+        read_contents(data),
+        [f"resources/{name}" for name in names],
+        lambda name: file_sha256(resources.parent / name),
     )
     if problems:
         raise ContentError(

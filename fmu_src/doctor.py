@@ -2,35 +2,44 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from trpac_core.files import parse_json, quoted
+
+from .archives import Archive, UnitFileError, opened_archive
 from .contents import CONTENTS_FILE, ContentError, Contents, deviations, read_contents
 from .host import LEAST_PYTHON
-from .packaging import DAMAGED, SAFE_PATH, brief, damage, unpack_unit
+from .packaging import SAFE_PATH, unpack_unit
+from .units import UNITS
 
 RECORD = f"resources/{CONTENTS_FILE}"
 DESCRIPTION = "modelDescription.xml"
-MOST_UNPACKED_BYTES = 1 << 30
-"""Archives that unpack to more are not opened [bytes]."""
+KNOWN_PACKAGES = {module: package for slave in UNITS.values() for module, package in slave.packages.items()}
+"""What units of this project may need, and what brings it: nothing else that a file names is imported."""
 PROBE_LIMIT_S, TRIAL_LIMIT_S = 60.0, 300.0
 """How long the interpreter may take to import the packages, and the unit to start: the plant compiles first [s]."""
-MOST_NAMED = 5
-"""Problems of one kind that a finding names; the rest are counted."""
+MOST_NAMED, LONGEST_PROBLEM = 5, 400
+"""Problems of one kind that a finding names; the rest are counted. Characters of one: two hashes and a quoted name."""
 TESTED_PYTHON = (3, 11)
+ISOLATED = ("-I",)
+"""No folder of the caller's, no PYTHONPATH and no packages of the user's own are imported from: it includes -P, which
+Pythons before 3.11 do not know."""
+MISSAID = (ValueError, IndexError, KeyError, TypeError, AttributeError)
+"""What an answer of a side process may end in that is none."""
 
 PROBE = """
-import importlib, json, sys, sysconfig
+import ctypes, importlib, json, sys, sysconfig
+if sys.platform.startswith("linux"):
+    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG, SIGKILL
 packages = {}
 for module in sys.argv[1:]:
     try:
@@ -79,6 +88,8 @@ class Examination:
     unit: str
     findings: tuple[Finding, ...]
     python: Python
+    ran: bool
+    """Whether the unit's code has been run."""
 
     @property
     def fine(self) -> bool:
@@ -90,8 +101,13 @@ class UnusableError(ValueError):
     """What was given is no unit, or no Python; the text says what was expected."""
 
 
-def examine(path: Path, python: str = sys.executable) -> Examination:
-    """Look at a unit's file and try it out in a child process.
+def examine(
+    path: Path,
+    python: str = sys.executable,
+    run: bool = True,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Examination:
+    """Look at a unit's file and try it out in a child process, which runs the unit's own code.
 
     Parameters
     ----------
@@ -99,6 +115,10 @@ def examine(path: Path, python: str = sys.executable) -> Examination:
         The unit's archive.
     python : str
         The interpreter that shall run it.
+    run : bool
+        Whether it is tried out; its code is not run otherwise.
+    tell : callable
+        Is given a sentence before the unit's code is run.
 
     Raises
     ------
@@ -106,16 +126,26 @@ def examine(path: Path, python: str = sys.executable) -> Examination:
         If the file is not an FMU, or the interpreter cannot be started.
     """
     contents, (*of_file, described) = look_at_file(path)
-    intact = all(finding.state is not State.PROBLEM for finding in of_file)
     findings = [*of_file, described]
-    modules = dict(contents.packages) if contents else None
-    probed = _probe(python, sorted(modules or {}))
-    findings += _python(probed, modules)
-    if intact:
+    named = set(contents.packages) if contents else set()
+    if unknown := sorted(named - set(KNOWN_PACKAGES)):
+        text = (
+            f"names modules that no unit of this project needs, and that were not imported: {_some(unknown)}"
+        )
+        of_file.append(Finding("record", State.PROBLEM, text, "Build the unit again."))
+        findings.append(of_file[-1])
+    modules = sorted(named & set(KNOWN_PACKAGES))
+    probed = _probe(python, modules)
+    findings += _python(probed, modules if contents else None)
+    intact = all(finding.state is not State.PROBLEM for finding in of_file)
+    if intact and run:
+        tell(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
         findings.append(_trial(path, python))
     else:
-        findings.append(Finding("trial", State.NOTE, "not run: the file is not what was built"))
-    return Examination(contents.unit if contents else path.stem, tuple(findings), probed)
+        why = "the file is not what was built" if run else "as it was asked for"
+        findings.append(Finding("trial", State.NOTE, f"not run: {why}"))
+    name = contents.unit if contents else path.stem
+    return Examination(quoted(name), tuple(findings), probed, intact and run)
 
 
 def look_at_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
@@ -126,40 +156,32 @@ def look_at_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
     UnusableError
         If the file is not an FMU.
     """
-    with _opened(path) as archive:
-        whole = _archive(archive)
-        contents, recorded = _contents(archive)
+    try:
+        with opened_archive(path) as archive:
+            if DESCRIPTION not in archive.names:
+                raise UnusableError(f"{archive.name}: no FMU, it holds no {DESCRIPTION}.")
+            whole = _archive(archive)
+            contents, recorded = _contents(archive)
+    except UnitFileError as error:
+        raise UnusableError(str(error)) from error
+    if whole.state is State.PROBLEM:
+        return contents, (
+            whole,
+            recorded,
+            Finding("description", State.NOTE, "not looked at: see the archive"),
+        )
     return contents, (whole, recorded, _description(path))
 
 
-def _opened(path: Path) -> zipfile.ZipFile:
-    try:
-        archive = zipfile.ZipFile(path)
-    except FileNotFoundError:
-        raise UnusableError(
-            f"{path}: no such file. Expected a unit: python build_fmu.py makes one."
-        ) from None
-    except (OSError, *DAMAGED) as error:
-        raise UnusableError(
-            f"{path}: cannot be opened as an FMU, which is a zip archive ({brief(error)})."
-        ) from error
-    size = sum(entry.file_size for entry in archive.infolist())
-    if DESCRIPTION not in archive.namelist() or size > MOST_UNPACKED_BYTES:
-        archive.close()
-        why = f"unpacks to {size / 1e9:.1f} GB" if size > MOST_UNPACKED_BYTES else f"holds no {DESCRIPTION}"
-        raise UnusableError(f"{path}: no FMU, it {why}.")
-    return archive
-
-
-def _archive(archive: zipfile.ZipFile) -> Finding:
-    if damaged := damage(archive):
+def _archive(archive: Archive) -> Finding:
+    if damaged := archive.damage():
         return Finding("archive", State.PROBLEM, f"damaged at {damaged}", "Copy or build the unit again.")
-    return Finding("archive", State.OK, f"{len(archive.namelist())} files, all checksums right")
+    return Finding("archive", State.OK, f"{len(archive.names)} files, all checksums right")
 
 
-def _contents(archive: zipfile.ZipFile) -> tuple[Contents | None, Finding]:
+def _contents(archive: Archive) -> tuple[Contents | None, Finding]:
     """The record of the build, and whether the files are those of the record: networks first."""
-    names = archive.namelist()
+    names = archive.names
     if RECORD not in names:
         text = f"no {RECORD}: another tool's unit, or one of an older version; nothing to compare with"
         return None, Finding("contents", State.NOTE, text)
@@ -167,19 +189,19 @@ def _contents(archive: zipfile.ZipFile) -> tuple[Contents | None, Finding]:
         contents = read_contents(archive.read(RECORD))
         there = {name for name in names if name != RECORD and not name.endswith("/")}
         every = sorted(there | set(contents.files), key=lambda name: (not name.endswith(".onnx"), name))
-        problems = deviations(contents, every, archive.read)
-    except (ContentError, *DAMAGED) as error:
-        return None, Finding("contents", State.PROBLEM, brief(error), "Copy or build the unit again.")
+        problems = deviations(contents, every, archive.sha256)
+    except (ContentError, UnitFileError) as error:
+        return None, Finding("contents", State.PROBLEM, str(error), "Copy or build the unit again.")
     if problems:
         return contents, Finding("contents", State.PROBLEM, _some(problems), "Copy or build the unit again.")
     networks = [name for name in every if name.endswith(".onnx")]
-    text = f"all {len(every)} files are those of build {contents.build}, version {contents.version}"
+    text = f"all {len(every)} files are those of build {quoted(contents.build)}, version {quoted(contents.version)}"
     return contents, Finding("contents", State.OK, f"{text}; networks: {len(networks)}")
 
 
 def _some(problems: Sequence[str]) -> str:
     more = f"; and {len(problems) - MOST_NAMED} more" if len(problems) > MOST_NAMED else ""
-    return "; ".join(problems[:MOST_NAMED]) + more
+    return "; ".join(quoted(problem, LONGEST_PROBLEM) for problem in problems[:MOST_NAMED]) + more
 
 
 def _description(path: Path) -> Finding:
@@ -188,7 +210,7 @@ def _description(path: Path) -> Finding:
     try:
         problems = [str(problem) for problem in validate_fmu(str(path))]
     except Exception as error:  # noqa: BLE001 - fmpy raises bare Exceptions, and a damaged file may raise anything
-        problems = [brief(error)]
+        problems = [quoted(error)]
     if problems:
         return Finding("description", State.PROBLEM, _some(problems), "Build the unit again.")
     return Finding("description", State.OK, f"fmpy's validation finds nothing in {DESCRIPTION}")
@@ -209,17 +231,19 @@ def _run(command: list[str], limit_s: float) -> subprocess.CompletedProcess[str]
 def _probe(python: str, modules: list[str]) -> Python:
     """What the interpreter is and can import; raises UnusableError if it cannot be started."""
     try:
-        done = _run([python, "-c", PROBE, *modules], PROBE_LIMIT_S)
-        said: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    except (OSError, ValueError, IndexError, subprocess.TimeoutExpired) as error:
-        raise UnusableError(f"{python}: cannot be run as a Python interpreter ({error}).") from error
-    packages = {module: (bool(good), str(text)) for module, (good, text) in said["packages"].items()}
-    return Python(
-        said["executable"] or python, tuple(said["version"]), said["prefix"], said["libpython"], packages
-    )
+        done = _run([python, *ISOLATED, "-c", PROBE, *modules], PROBE_LIMIT_S)
+        said = parse_json(done.stdout.splitlines()[-1], "its answer")
+        packages = {module: (bool(good), quoted(text)) for module, (good, text) in said["packages"].items()}
+        return Python(
+            said["executable"] or python, tuple(said["version"]), said["prefix"], said["libpython"], packages
+        )
+    except (OSError, *MISSAID, subprocess.TimeoutExpired) as error:
+        raise UnusableError(
+            f"{quoted(python)}: cannot be run as a Python interpreter ({quoted(error)})."
+        ) from error
 
 
-def _python(python: Python, modules: dict[str, str] | None) -> list[Finding]:
+def _python(python: Python, modules: list[str] | None) -> list[Finding]:
     version = ".".join(map(str, python.version))
     text = f"{python.command}, version {version}, prefix {python.prefix}"
     least, tested = (".".join(map(str, v)) for v in (LEAST_PYTHON, TESTED_PYTHON))
@@ -231,14 +255,17 @@ def _python(python: Python, modules: dict[str, str] | None) -> list[Finding]:
         found = Finding("python", State.OK, text)
     if modules is None:
         return [found, Finding("packages", State.NOTE, "the file does not say what it needs")]
-    missing = [f"{modules[m]} ({why})" for m, (good, why) in python.packages.items() if not good]
+    missing = {KNOWN_PACKAGES[m]: why for m, (good, why) in python.packages.items() if not good}
     if missing:
-        names = " ".join(modules[module] for module, (good, _) in python.packages.items() if not good)
-        mend = f"{python.command} -m pip install {names}"
-        return [found, Finding("packages", State.PROBLEM, f"cannot be imported: {'; '.join(missing)}", mend)]
+        mend = f"{python.command} -m pip install {' '.join(missing)}"
+        reasons = "; ".join(f"{package} ({why})" for package, why in missing.items())
+        text = f"cannot be imported without PYTHONPATH and the user's own packages: {reasons}"
+        return [found, Finding("packages", State.PROBLEM, text, mend)]
     if not modules:
         return [found, Finding("packages", State.OK, "it needs none")]
-    there = ", ".join(f"{modules[module]} {text}".strip() for module, (_, text) in python.packages.items())
+    there = ", ".join(
+        f"{KNOWN_PACKAGES[module]} {text}".strip() for module, (_, text) in python.packages.items()
+    )
     return [found, Finding("packages", State.OK, there)]
 
 
@@ -252,15 +279,14 @@ def _trial(path: Path, python: str) -> Finding:
     folder = None
     try:
         folder = unpack_unit(path)
-        done = _run([python, str(Path(__file__).with_name("trial.py")), str(folder)], TRIAL_LIMIT_S)
+        script = str(Path(__file__).with_name("trial.py"))
+        done = _run([python, *ISOLATED, script, str(folder)], TRIAL_LIMIT_S)
     except subprocess.TimeoutExpired:
         return Finding(
             "trial", State.PROBLEM, f"no answer within {TRIAL_LIMIT_S:g} s", "Report this as a fault."
         )
-    except (OSError, ValueError) as error:
-        return Finding(
-            "trial", State.PROBLEM, f"cannot be unpacked: {error}", "Free or choose another TMPDIR."
-        )
+    except (OSError, UnitFileError) as error:
+        return Finding("trial", State.PROBLEM, quoted(error), "Free or choose another TMPDIR.")
     finally:
         if folder is not None:
             shutil.rmtree(folder, ignore_errors=True)
@@ -268,25 +294,24 @@ def _trial(path: Path, python: str) -> Finding:
 
 
 def _judged(done: subprocess.CompletedProcess[str]) -> Finding:
-    last_words = next((line for line in reversed(done.stderr.splitlines()) if line.strip()), "")
+    last_words = quoted(next((line for line in reversed(done.stderr.splitlines()) if line.strip()), ""))
     if done.returncode < 0:
-        name = signal.Signals(-done.returncode).name
-        return Finding("trial", State.PROBLEM, f"the process died of {name}; {last_words}".strip("; "))
+        names = (one.name for one in signal.Signals if one == -done.returncode)
+        text = f"the process died of {next(names, f'signal {-done.returncode}')}; {last_words}".strip("; ")
+        return Finding("trial", State.PROBLEM, text)
     try:
-        said: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    except (ValueError, IndexError):
+        said: dict[str, Any] = parse_json(done.stdout.splitlines()[-1], "its answer")
+        log = _some(said["log"])
+        if not said["ran"]:
+            text = "; ".join(filter(None, [quoted(said["error"], LONGEST_PROBLEM), log, last_words]))
+            return Finding("trial", State.PROBLEM, text)
+        if said["not_finite"] or done.returncode:
+            text = f"outputs not finite: {quoted(said['not_finite'])}; exit {done.returncode}"
+            return Finding("trial", State.PROBLEM, text)
+        text = f"instantiates and steps, {said['step_us']:.0f} us a step; ends in order"
+    except MISSAID:
         text = f"the process ended with {done.returncode}: {last_words or 'nothing said'}"
         return Finding("trial", State.PROBLEM, text)
-    if not said["ran"]:
-        return Finding(
-            "trial", State.PROBLEM, "; ".join(filter(None, [said["error"], *said["log"], last_words]))
-        )
-    if said["not_finite"] or done.returncode:
-        return Finding(
-            "trial", State.PROBLEM, f"outputs not finite: {said['not_finite']}; exit {done.returncode}"
-        )
-    if said["log"]:
-        return Finding("trial", State.NOTE, f"runs, and says: {_some(said['log'])}")
-    return Finding(
-        "trial", State.OK, f"instantiates and steps, {said['step_us']:.0f} us a step; ends in order"
-    )
+    if log:
+        return Finding("trial", State.NOTE, f"runs, and says: {log}")
+    return Finding("trial", State.OK, text)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -15,6 +14,7 @@ from trpac_core.four_wheels import SideClasses
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.images import MOST_FILE_BYTES, ImageError, check_size, decode_image, raw_bgr_image
 
+from .memory import read_memory
 from .settings import BUFFERS_ENABLED
 from .signals import NO_ROAD_CLASS
 
@@ -112,8 +112,7 @@ def _read(source: str, values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> 
 def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
     """The picture at an address, copied; the address is two signed halves of 32 bits.
 
-    All that the numbers alone can tell is checked before the first byte is read; whether the address is readable they
-    cannot tell.
+    All that the numbers alone can tell is checked before the first byte is read.
     """
     address = (values["image.base.lo"] & 0xFFFFFFFF) | (values["image.base.hi"] & 0xFFFFFFFF) << 32
     size, width, height = values["image.size"], values["image_width"], values["image_height"]
@@ -127,7 +126,7 @@ def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
                 f"image.size is {size} bytes; expected {3 * width * height} for {width} x {height} pixels of raw "
                 "BGR. For a JPEG or PNG picture leave image_width and image_height at 0."
             )
-    data = ctypes.string_at(address, size)
+    data = read_memory(address, size)
     return raw_bgr_image(data, width, height) if raw else decode_image(data, IN_MEMORY)
 
 

@@ -14,11 +14,14 @@ import threading
 import zlib
 from _thread import interrupt_main
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import wraps
 from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
+
+from trpac_core.files import FileError, parse_json, quoted
 
 from .host import end_in_order
 from .variables import Kind, Variable
@@ -28,13 +31,26 @@ STATE_SCHEMA = 1
 INTERRUPT_DELAY_S = 0.1
 """A Ctrl-C that arrives within a callback is raised again this much later, in the host's own code: long enough for
 the callback to return on a busy machine [s]."""
+LONGEST_LOG = 1000
+"""Characters of a log line, whatever a file or the host has put into it."""
+MOST_STATE_BYTES = 16_000_000
+"""A serialised state of more is none of the unit's, which has 0.1 MB and the path of a picture [bytes]."""
+MOST_INTEGER = 1 << 31
+"""Integers of FMI 2.0 have 32 bits."""
+PYTHON: dict[Kind, Callable[[Any], Value]] = {
+    Kind.REAL: float,
+    Kind.INTEGER: int,
+    Kind.BOOLEAN: bool,
+    Kind.STRING: str,
+}
+"""What the wrapper takes for a value; of others it makes an error that nobody catches."""
 NEUTRAL: dict[Kind, Value] = {Kind.REAL: 0.0, Kind.INTEGER: 0, Kind.BOOLEAN: False, Kind.STRING: ""}
 """Start of outputs, and what a read of an unknown value reference gives."""
 
 
 def log_text(message: str) -> str:
-    """The message as the wrapper can log it: no printf directive, no lone surrogate."""
-    return message.encode("utf-8", "replace").decode("utf-8").replace("%", "%%")
+    """The message as the wrapper can log it: short, on one line, no printf directive, no lone surrogate."""
+    return quoted(message, LONGEST_LOG).replace("%", "%%")
 
 
 def guarded(fallback: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -45,16 +61,11 @@ def guarded(fallback: Callable[..., Any]) -> Callable[[Callable[..., Any]], Call
         def run(self: GuardedSlave, *arguments: Any) -> Any:
             try:
                 return callback(self, *arguments)
-            except KeyboardInterrupt:
-                threading.Timer(INTERRUPT_DELAY_S, interrupt_main).start()
             except BaseException as error:  # noqa: BLE001 - whatever it is, C++ must not see it
-                name = callback.__name__
-                self.report(
-                    f"{name}: {type(error).__name__}",
-                    Fmi2Status.error,
-                    f"{self.modelName}: {name} failed: {type(error).__name__}: {error}. "
-                    f"The outputs hold their last values. Please report this as a fault of the unit.",
-                )
+                with suppress(
+                    BaseException
+                ):  # nor what goes wrong as it is told: there is nobody left to tell
+                    self.tell_fault(callback.__name__, error)
             return fallback(*arguments)
 
         return run
@@ -78,6 +89,17 @@ def settled(callback: Callable[..., Any]) -> Callable[..., Any]:
 
 def _nothing(*_: Any) -> None:
     return None
+
+
+def _fits(kind: Kind, value: Any) -> bool:
+    """Whether the wrapper can hand on such a value of a variable of this kind."""
+    if kind is Kind.STRING:
+        return (
+            isinstance(value, str) and value.encode("utf-8", "ignore").decode() == value
+        )  # no half surrogate pair
+    if isinstance(value, float):
+        return kind is Kind.REAL
+    return isinstance(value, int) and -MOST_INTEGER <= value < MOST_INTEGER
 
 
 def holes(items: list[Any]) -> list[int]:
@@ -149,7 +171,7 @@ class GuardedSlave(Fmi2Slave):
         try:
             self.prepare()
         except Exception as error:
-            text = f"{self.modelName} cannot be instantiated: {error}"
+            text = quoted(f"{self.modelName} cannot be instantiated: {error}", LONGEST_LOG)
             if not type(self)._prepared:
                 # Before there is an instance the wrapper survives an exception, and only so does the host
                 # learn of it. Many hosts show no log of a unit that they could not instantiate.
@@ -210,7 +232,21 @@ class GuardedSlave(Fmi2Slave):
         self._reported.add(kind)
         self.log(log_text(message), status)
         if status >= Fmi2Status.error:
-            print(message, file=sys.stderr)
+            with suppress(OSError, ValueError):  # standard error may be closed, and the log has it
+                print(quoted(message, LONGEST_LOG), file=sys.stderr)
+
+    def tell_fault(self, name: str, error: BaseException) -> None:
+        """Log what went wrong in the callback of this name; an interrupt is handed to the host."""
+        if isinstance(error, KeyboardInterrupt):
+            threading.Timer(INTERRUPT_DELAY_S, interrupt_main).start()
+            return
+        kind = type(error).__name__
+        self.report(
+            f"{name}: {kind}",
+            Fmi2Status.error,
+            f"{self.modelName}: {name} failed: {kind}: {quoted(error)}. The outputs hold their last values. "
+            "Please report this as a fault of the unit.",
+        )
 
     # FMI callbacks
 
@@ -227,7 +263,7 @@ class GuardedSlave(Fmi2Slave):
         try:
             self.initialise()
         except ValueError as error:
-            message = f"{self.modelName} cannot be initialised: {error} Every step will be discarded."
+            message = f"{self.modelName} cannot be initialised, and every step will be discarded: {error}"
             self.report("initialise", Fmi2Status.error, message)
             self._looked_at = False
         else:
@@ -267,9 +303,9 @@ class GuardedSlave(Fmi2Slave):
     def _get(self, kind: Kind, references: list[int]) -> list[Any]:
         if self._stale:
             self._look_ahead()
-        names, values = self._names[kind], self.values
+        names, values, python = self._names[kind], self.values, PYTHON[kind]
         try:
-            return [values[names[reference]] for reference in references]
+            return [python(values[names[reference]]) for reference in references]
         except KeyError:
             unknown = [reference for reference in references if reference not in names]
             self.report(
@@ -279,7 +315,8 @@ class GuardedSlave(Fmi2Slave):
                 f"{NEUTRAL[kind]!r}.",
             )
             return [
-                values[names[reference]] if reference in names else NEUTRAL[kind] for reference in references
+                python(values[names[reference]]) if reference in names else NEUTRAL[kind]
+                for reference in references
             ]
 
     @guarded(_nothing)
@@ -356,35 +393,56 @@ class GuardedSlave(Fmi2Slave):
 
     @guarded(_nothing)
     def _set_fmu_state(self, state: bytes) -> None:
-        try:
-            content = json.loads(state)
-            origin = (content["schema"], content["unit"])
-        except (ValueError, KeyError, TypeError) as error:
-            self._refuse_state(f"it is not a state of this unit ({type(error).__name__}: {error})")
-            return
-        if origin != (STATE_SCHEMA, __name__):
-            self._refuse_state(f"it was saved by another build of the unit ({content['unit']})")
-            return
-        if content.pop("crc32", None) != zlib.crc32(json.dumps(content).encode()):
-            self._refuse_state("it is damaged")
-            return
-        if content["values"].keys() != self.values.keys():
-            self._refuse_state("its variables are not those of this unit")
-            return
-        if content["ready"]:
+        content, problem = self._read_state(state)
+        before = vars(self).copy()
+        if not problem and content["ready"]:
             try:
                 self.restore_inner_state(content["values"], content["inner"])
-            except ValueError as error:  # a file that it names is another now, or gone
-                self._refuse_state(str(error))
-                return
+                for name in self.views:
+                    self.shown(name)
+            except Exception as error:  # noqa: BLE001 - a host's bytes: a file changed or gone, or anything else
+                kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+                problem = "inner", f"it cannot be taken up ({kind}{quoted(error, LONGEST_LOG)})"
+        if problem:
+            self.__dict__ = before
+            text = f"{self.modelName}: the state was not restored: {problem[1]}."
+            self.report(f"state {problem[0]}", Fmi2Status.error, text)
+            return
         self._settable = self._inputs if content["initialised"] else self._inputs_and_parameters
         self.values = Held(content["values"], self._view)
         self._ready, self._looked_at = content["ready"], False
         self._initialising = self._stale = not content["initialised"]
 
-    def _refuse_state(self, reason: str) -> None:
-        text = f"{self.modelName}: the state was not restored: {reason.removesuffix('.')}."
-        self.report(f"state {reason}", Fmi2Status.error, text)
+    def _read_state(self, state: bytes) -> tuple[dict[str, Any], tuple[str, str] | None]:
+        """What a serialised state says; and what is wrong with it, by kind and in words."""
+        if len(state) > MOST_STATE_BYTES:
+            return {}, ("size", f"it has {len(state) / 1e6:.0f} MB, expected a state of this unit")
+        try:
+            content = parse_json(state, "it")
+            origin = (content["schema"], content["unit"])
+            crc32 = content.pop("crc32", None)
+            saved = json.dumps(content).encode()
+        except (FileError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            return {}, ("other", f"it is not a state of this unit ({type(error).__name__}: {quoted(error)})")
+        if origin != (STATE_SCHEMA, __name__):
+            return {}, ("build", f"it was saved by another build of the unit ({quoted(origin[1])})")
+        if crc32 != zlib.crc32(saved):
+            return {}, ("damage", "it is damaged")
+        if not self._states(content):
+            return {}, ("variables", "its variables are not those of this unit")
+        return content, None
+
+    def _states(self, content: dict[str, Any]) -> bool:
+        """Whether a state gives each variable a value of its kind."""
+        values, kinds = content.get("values"), {v.name: v.kind for v in self.variables}
+        return (
+            content.keys() == {"schema", "unit", "ready", "initialised", "values", "inner"}
+            and isinstance(content["ready"], bool)
+            and isinstance(content["initialised"], bool)
+            and isinstance(values, dict)
+            and values.keys() == self.values.keys()
+            and all(_fits(kinds[name], value) for name, value in values.items())
+        )
 
     @staticmethod
     def _fmu_state_to_bytes(state: bytes) -> bytes:

@@ -10,7 +10,9 @@ from xml.etree.ElementTree import ParseError
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from .packaging import UnitFileError
+from trpac_core.files import quoted
+
+from .archives import UnitFileError
 
 
 def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: str) -> tuple[FMU2Slave, Any]:
@@ -39,14 +41,14 @@ def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: 
         description = read_model_description(str(folder))
         name = description.coSimulation.modelIdentifier
     except (OSError, ValueError, AttributeError, ParseError) as error:
-        raise UnitFileError(f"{archive}: not a co-simulation unit ({error}).") from error
+        raise UnitFileError(f"{quoted(archive)}: not a co-simulation unit ({quoted(error)}).") from error
     if name not in expected:
-        raise UnitFileError(f"{archive}: is {name}; expected {' or '.join(expected)}.")
+        raise UnitFileError(f"{quoted(archive)}: is {quoted(name)}; expected {' or '.join(expected)}.")
     unit = FMU2Slave(
         guid=description.guid, unzipDirectory=str(folder), modelIdentifier=name, instanceName=instance
     )
     try:
         unit.instantiate()
     except Exception as error:  # fmpy raises a bare Exception here
-        raise UnitFileError(f"{archive}: cannot be instantiated ({error}).") from error
+        raise UnitFileError(f"{quoted(archive)}: cannot be instantiated ({quoted(error)}).") from error
     return unit, description

@@ -7,7 +7,6 @@ import re
 import shutil
 import tempfile
 import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distribution, version
@@ -16,7 +15,9 @@ from pathlib import Path
 import pythonfmu
 
 from scenarios.whole_files import written_whole
+from trpac_core.files import quoted
 
+from .archives import UnitFileError, opened_archive
 from .contents import CONTENTS_FILE, Contents, sha256_of
 from .model_description import UnitInfo, model_description
 from .variables import Variable
@@ -134,16 +135,6 @@ def write_archive(target: Path, content: Mapping[str, bytes]) -> Path:
     return target
 
 
-class UnitFileError(ValueError):
-    """A unit's file cannot be unpacked; the text says why and what to do."""
-
-
-DAMAGED = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError)
-"""What zipfile raises of a damaged archive; which one depends on the byte."""
-LONGEST_REASON = 200
-"""Characters of another package's error that a message quotes."""
-
-
 def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
     """Unpack a unit to a folder whose path the wrapper can read; returns the folder.
 
@@ -152,13 +143,14 @@ def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
     archive : Path
         The unit.
     folder : Path, optional
-        Where to; by default a fresh temporary folder, which the caller removes.
+        Where to, new or empty; by default a fresh temporary folder, which the caller removes. After an error nothing
+        is left of it.
 
     Raises
     ------
     UnitFileError
-        If the path holds a character that crashes the wrapper, an entry of the archive leaves the folder, or the
-        archive is damaged.
+        If the path holds a character that crashes the wrapper, or the archive is damaged, too large, or has an entry
+        that is not to be unpacked.
     """
     if folder is not None:
         return _unpacked(archive, folder)
@@ -175,52 +167,20 @@ def _unpacked(archive: Path, folder: Path) -> Path:
     if not SAFE_PATH.fullmatch(path):
         bad = "".join(sorted(set(re.sub(SAFE_PATH, "", path))))
         raise UnitFileError(
-            f"{path}: the unit's wrapper crashes on the characters {bad!r} in its path. Unpack to a path of "
-            "letters, digits, spaces and . _ - only, for example by setting TMPDIR."
+            f"{quoted(path)}: the unit's wrapper crashes on the characters '{quoted(bad)}' in its path. Unpack to a "
+            "path of letters, digits, spaces and . _ - only, for example by setting TMPDIR."
         )
-    try:
-        with zipfile.ZipFile(archive) as content:
-            for name in content.namelist():
-                if not (folder / name).resolve().is_relative_to(folder.resolve()):
-                    raise UnitFileError(
-                        f"{archive}: its entry '{name}' would be written outside of {folder}."
-                    )
-            content.extractall(folder)
-    except DAMAGED as error:
-        raise UnitFileError(
-            f"{archive}: cannot be unpacked: {brief(error)}. Copy or build the unit again."
-        ) from error
+    with opened_archive(archive) as content:
+        content.unpack(folder)
     return folder
 
 
-def damage(archive: zipfile.ZipFile) -> str | None:
-    """Where an open archive is damaged or why it cannot be read, in a line; None where it is whole."""
-    try:
-        return archive.testzip()
-    except (OSError, *DAMAGED) as error:
-        return brief(error)
-
-
 def require_whole(archive: Path) -> None:
-    """Read a unit's archive to its end; raises UnitFileError where it is damaged."""
-    try:
-        with zipfile.ZipFile(archive) as content:
-            damaged = damage(content)
-    except DAMAGED as error:
-        damaged = brief(error)
+    """Read a unit's archive to its end; raises UnitFileError where it is damaged or not to be unpacked."""
+    with opened_archive(archive) as content:
+        damaged = content.damage()
     if damaged:
-        raise UnitFileError(f"{archive}: damaged at {damaged}. Copy or build the unit again.")
-
-
-def brief(error: Exception) -> str:
-    """What an error says in a line: zipfile puts whole names into it, and a damaged one may be as long as the file."""
-    text = " ".join(str(error).split()) or type(error).__name__
-    return text if len(text) <= LONGEST_REASON else f"{text[:LONGEST_REASON]} ..."
-
-
-def sha256(path: Path) -> str:
-    """SHA-256 of a file, as hexadecimal text."""
-    return sha256_of(path.read_bytes())
+        raise UnitFileError(f"{quoted(archive)}: damaged at {damaged}. Copy or build the unit again.")
 
 
 def _module_files(place: str, path: Path) -> dict[str, bytes]:

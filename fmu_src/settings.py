@@ -278,7 +278,7 @@ _UNIT_PARAMETERS = (
         Kind.BOOLEAN,
         "parameter",
         "fixed",
-        "Pictures in memory are read; false: the inputs image.* are never followed, so that no wrong address can crash",
+        "Pictures in memory are read; false: the inputs image.* are never followed",
         start=True,
     ),
 )

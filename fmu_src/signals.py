@@ -30,9 +30,7 @@ def _signal(
 
 _input, _output = partial(_signal, "input"), partial(_signal, "output")
 
-WRONG_ADDRESS = (
-    "The unit cannot catch a wrong address: it crashes the host (image.buffers_enabled turns this off)"
-)
+WRONG_ADDRESS = "An address that cannot be read is a warning, and no frame; macOS: no frame"
 
 INPUTS = (
     _input("wheel_speed", "rad/s", "Rotational speed of the wheel, positive forwards", nominal=100.0),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import zipfile
-from io import BytesIO
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,36 +13,63 @@ from fmpy.ssp.ssd import ParameterSet, find_components, read_ssd
 from lxml import etree
 from numpy.typing import NDArray
 
+from trpac_core.files import quoted
+
+from .archives import UnitFileError, opened_archive
+from .packaging import require_whole
 from .units import STEP_S
 
 SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
+EXPECTED = "an SSP package, which is a zip archive"
 SCHEMA_OF = {".ssd": "SystemStructureDescription.xsd", ".ssv": "SystemStructureParameterValues.xsd"}
 
 
 def problems(package: Path) -> list[str]:
-    """What the schemas of SSP 1.0 find in the package, and sources that are not in it."""
+    """What the schemas of SSP 1.0 find in the package, and sources that are not in it; raises UnitFileError."""
     found = []
-    with zipfile.ZipFile(package) as archive:
-        names = archive.namelist()
+    with opened_archive(package, EXPECTED) as archive:
+        names = archive.names
         for name in names:
             schema = SCHEMA_OF.get(Path(name).suffix)
             if schema is None:
                 continue
-            tree = etree.parse(BytesIO(archive.read(name)))
+            parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False, load_dtd=False)
+            try:
+                tree = etree.fromstring(archive.read(name), parser)
+            except etree.XMLSyntaxError as error:
+                found.append(f"{quoted(name)}: {quoted(error)}")
+                continue
             checked = etree.XMLSchema(file=str(SCHEMAS / schema))
             checked.validate(tree)
-            found += [f"{name}, line {entry.line}: {entry.message}" for entry in checked.error_log]
+            found += [f"{quoted(name)}, line {e.line}: {quoted(e.message)}" for e in checked.error_log]
             sources = (element.get("source") for element in tree.iter())
             found += [
-                f"{name}: no '{source}' in the package"
+                f"{quoted(name)}: no '{quoted(source)}' in the package"
                 for source in sources
                 if source and source not in names
             ]
     return found
 
 
+def require_package(package: Path) -> None:
+    """Read a package and the units in it to their ends; raises UnitFileError where one is not to be unpacked."""
+    with (
+        opened_archive(package, EXPECTED) as archive,
+        tempfile.TemporaryDirectory(prefix="trpac_ssp_") as made,
+    ):
+        if "SystemStructure.ssd" not in archive.names:
+            raise UnitFileError(f"{archive.name}: holds no SystemStructure.ssd, expected {EXPECTED}.")
+        archive.unpack(Path(made))
+        for unit in Path(made).rglob("*.fmu"):
+            require_whole(unit)
+
+
 def bound_parameters(package: Path) -> ParameterSet:
-    """All bound parameters under their names in the system: fmpy takes them so, and does not follow the bindings."""
+    """All bound parameters under their names in the system: fmpy takes them so, and does not follow the bindings.
+
+    Raises UnitFileError where the package or a unit in it is not to be unpacked.
+    """
+    require_package(package)
     merged = ParameterSet(name="bound")
     for component in find_components(read_ssd(str(package)).system):
         for binding in component.parameterBindings:
@@ -61,6 +87,11 @@ def simulate(package: Path, stop_s: float, step_s: float = STEP_S) -> NDArray[An
     -------
     structured array
         One row per step: `time` and all connectors, named `element.variable`.
+
+    Raises
+    ------
+    UnitFileError
+        If the package or a unit in it is not to be unpacked.
     """
     result = simulate_ssp(
         str(package), stop_time=stop_s, step_size=step_s, parameter_set=bound_parameters(package)

@@ -21,6 +21,8 @@ ROLLING = {"wheel_speed": 34.5, "vehicle_speed": 10.0, "wheel_torque": 20.0}
 STEPS, STEP_S = 20, 0.001
 PLATFORMS = {"linux": ("linux64", ".so"), "win32": ("win64", ".dll")}
 CO_SIMULATION = 1
+PR_SET_PDEATHSIG, SIGKILL = 1, 9
+"""What asks Linux to end this process with its parent (prctl(2))."""
 OK = 0
 
 _POINTER, _TEXT = ctypes.c_void_p, ctypes.c_char_p
@@ -159,5 +161,12 @@ def run(folder: Path, steps: int) -> dict[str, Any]:
     return {"ran": True, "step_us": elapsed / steps * 1e6, "not_finite": strange, "log": instance.log}
 
 
+def end_with_parent() -> None:
+    """Let this process be killed as soon as the one that started it ends, on Linux."""
+    if sys.platform.startswith("linux"):
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, SIGKILL)
+
+
 if __name__ == "__main__":
+    end_with_parent()
     print(json.dumps(run(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else STEPS)))

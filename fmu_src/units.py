@@ -14,6 +14,8 @@ from .packaging import Slave
 
 ROOT = Path(__file__).parent.parent
 MODELS = ROOT / "models"
+CORE_FILES = {place: ROOT / place for place in ("trpac_core/__init__.py", "trpac_core/files.py")}
+"""What every unit carries of the core."""
 NETWORKS = (MODELS / "segmenter.onnx", MODELS / "surface.onnx")
 STEP_S, STOP_S = 0.001, 10.0
 
@@ -25,6 +27,7 @@ ESTIMATOR_FILES = (
     "fields.py",
     "frames.py",
     "image_settings.py",
+    "memory.py",
     "parameters.py",
     "settings.py",
     "signals.py",
@@ -32,7 +35,6 @@ ESTIMATOR_FILES = (
 
 PLANT_PACKAGES = {"numpy": "numpy", "numba": "numba", "pydantic": "pydantic", "yaml": "PyYAML"}
 PLANT_MODULES = (
-    "trpac_core/__init__.py",
     "trpac_core/vehicle.py",
     "trpac_core/vision/__init__.py",
     "trpac_core/vision/classes.py",
@@ -40,6 +42,7 @@ PLANT_MODULES = (
     "scenarios/errors.py",
     "scenarios/files.py",
     "scenarios/strict.py",
+    "scenarios/yaml_text.py",
     "scenarios/effects",
     "scenarios/plant/dynamics.py",
     "scenarios/plant/parameters.py",
@@ -89,6 +92,7 @@ UNITS = {
         variables=REFERENCE_PLANT,
         modules={
             "scenarios/plant/__init__.py": Path(__file__).parent / "carried_plant.py",
+            **CORE_FILES,
             **{place: ROOT / place for place in PLANT_MODULES},
         },
         packages=PLANT_PACKAGES,
@@ -99,7 +103,7 @@ UNITS = {
         _info("TorquePulses", "Driving and braking torque by the clock, for systems without a driver"),
         files=("fields.py", "parameters.py", "interface_pulses.py", "torque_pulses.py"),
         variables=TORQUE_PULSES,
-        modules={},
+        modules=CORE_FILES,
         packages={},
         resources=(),
     ),

@@ -45,6 +45,7 @@ def draw_figure17(run: Run, path: Path) -> None:
             f"{noise.vehicle_speed_noise_m_s:g} m/s, {noise.wheel_speed_noise_rad_s:g} rad/s, "
             f"{noise.wheel_torque_noise_nm:g} N m",
             fontsize=9,
+            parse_math=False,  # the name is the file's, and a $ in it is a $
         )
         figure.align_ylabels(axes)
         figure.tight_layout(h_pad=0.4)

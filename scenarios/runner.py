@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from fmu_src.packaging import sha256
 from scenarios.files import Scenario
 from scenarios.metrics import score_run
 from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.unit_client import parameters, run_unit
+from trpac_core.files import file_sha256
 from trpac_core.vehicle import WHEELS
 
 ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
@@ -152,7 +152,7 @@ def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path) -> dict[str, A
         "wheel": scenario.wheel,
         "longitudinal_stiffness_n": scenario.vehicle.tyre.longitudinal_stiffness_n,
         "excited_time_of": "DIFE's start/stop flag, one clock for all estimators",
-        "fmu_sha256": sha256(fmu),
+        "fmu_sha256": file_sha256(fmu),
         "versions": {package: version(package) for package in PACKAGES},
         "estimators": scores,
     }

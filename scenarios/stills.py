@@ -79,9 +79,13 @@ def pictures_in(folder: Path) -> list[Path]:
     return sorted((p for p in files if not p.is_dir()), key=counting_order)
 
 
-def printable(text: str) -> str:
-    """A name or sentence as it can be written: a file's name need not be text, and then holds a mark instead."""
-    return os.fsencode(text).decode("utf-8", "replace")
+def cell_of(name: str | Path) -> str:
+    """A file's name as a table holds it: text, though a name need not be, and no formula where people open the table.
+
+    A spreadsheet runs what begins with one of = + - @; behind ./ it is the same file's name.
+    """
+    text = os.fsencode(name).decode("utf-8", "replace")
+    return f"./{text}" if text.lstrip().startswith(("=", "+", "-", "@")) else text
 
 
 def counting_order(path: Path) -> tuple[list[tuple[int, int, str]], str]:
@@ -116,11 +120,9 @@ def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tup
         try:
             probabilities = networks.probabilities(decode_image(file, upright=True), quoted(file))
             surface = Surface(int(probabilities.argmax()))
-            rows.append(
-                (printable(str(file)), surface.label, float(probabilities.max()), *probabilities.tolist())
-            )
+            rows.append((cell_of(file), surface.label, float(probabilities.max()), *probabilities.tolist()))
         except ImageError as error:
-            problems.append(printable(str(error)))
+            problems.append(str(error))
         progress(done, len(files))
     return pd.DataFrame(rows, columns=list(CLASSIFY_COLUMNS)), problems
 

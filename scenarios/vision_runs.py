@@ -16,22 +16,39 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from fmu_src.packaging import sha256
 from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.film import Film, Strip, dark, shown
 from scenarios.looks import MODELS
-from scenarios.stills import PICTURE_ENDINGS, Progress, pictures_in, printable, silent
+from scenarios.stills import PICTURE_ENDINGS, Progress, cell_of, pictures_in, silent
 from scenarios.whole_files import written_whole
+from trpac_core.files import FileError, file_sha256, quoted, require_file
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
-from trpac_core.vision.images import ImageError, decode_image
+from trpac_core.vision.images import ImageError, check_size, decode_image
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.trajectory import Motion
 from trpac_core.vision.voting import Voting, VotingConfig
 
 FRAME_COLUMNS = ("frame", "class", "P_fusion", "p_util", "Q_v", "flag", "voting_class", "ms")
+CONTAINERS = (
+    "mov",
+    "avi",
+    "matroska",
+    "mpegts",
+    "mpeg",
+    "flv",
+    "h264",
+    "hevc",
+    "mjpeg",
+    "mpegvideo",
+    "asf",
+    "ogg",
+)
+"""FFmpeg's names of the formats that are read: files that hold their pictures, no lists of other files or addresses."""
+MOST_VIDEO_BYTES = 100_000_000_000
+"""Larger videos are refused [bytes]."""
 LOWEST_FPS, HIGHEST_FPS = 0.01, 1000.0
 FASTEST_M_S = 150.0
 PACKAGES = ("numpy", "onnxruntime", "opencv-python-headless", "trpac-fmu")
@@ -66,10 +83,6 @@ class Frames:
                     f"{path}: no pictures in this folder. Expected JPEG or PNG files, one per frame."
                 )
             return cls(path, files, len(files))
-        if not path.is_file():
-            raise ScenarioError(
-                f"{path}: no such folder or video. Expected a folder of frames or a video file."
-            )
         if path.suffix.lower() in PICTURE_ENDINGS:
             raise ScenarioError(
                 f"{path}: a single picture. Expected a folder of frames or a video; for single pictures: "
@@ -85,14 +98,15 @@ class Frames:
         if self.files:
             for file in self.files:
                 try:
-                    yield printable(file.name), decode_image(file)
+                    yield cell_of(file.name), decode_image(file)
                 except ImageError as error:
-                    yield printable(file.name), error
+                    yield cell_of(file.name), error
             return
         capture = _open_video(self.path)
         try:
             number, (read, image) = 0, capture.read()
             while read:
+                check_size(image.shape[1], image.shape[0], f"{quoted(self.path)}, frame {number}")
                 yield f"{number:06d}", image.astype(np.uint8, copy=False)
                 number, (read, image) = number + 1, capture.read()
         finally:
@@ -102,7 +116,12 @@ class Frames:
 def _open_video(path: Path) -> cv2.VideoCapture:
     # The decoder and OpenCV would print their own complaints; one clear error is raised here instead.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = f"format_whitelist;{','.join(CONTAINERS)}"
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        require_file(path, MOST_VIDEO_BYTES, "a folder of frames or a video file")
+    except FileError as error:
+        raise ScenarioError(str(error)) from error
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     cv2.utils.logging.setLogLevel(level)
     if not capture.isOpened():
@@ -174,7 +193,7 @@ def run_frames(
             try:
                 row, shown = watcher.look(number, name, image, caption)
             except ImageError as error:
-                unreadable.append({"frame": name, "reason": printable(str(error))})
+                unreadable.append({"frame": name, "reason": str(error)})
                 row, shown = (name, "", None, None, None, 0, "", None), dark(film.size, caption)
             rows.append(row)
             film.add(shown)
@@ -268,5 +287,5 @@ def _summary(
         "annotated": FILM if film else None,
         "strip": STRIP,
         "versions": {package: version(package) for package in PACKAGES},
-        "model_sha256": {file: sha256(MODELS / file) for file in ("segmenter.onnx", "surface.onnx")},
+        "model_sha256": {file: file_sha256(MODELS / file) for file in ("segmenter.onnx", "surface.onnx")},
     }

@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+
+from trpac_core.files import quoted
 
 
 @contextmanager
@@ -14,17 +16,49 @@ def written_whole(folder: Path) -> Iterator[Path]:
     """A scratch folder; the files that lie in it when the block ends well are moved to `folder`, else none is.
 
     It lies in `folder` if that is there, which may be a mounted disk, else in the nearest folder above it that is:
-    always on the same disk, so that a full one shows before anything is moved.
+    always on the same disk, so that a full one shows before anything is moved. Whatever ends the moves half-way, what
+    was in the way is put back; only a process that is killed meanwhile leaves it in the scratch folder.
 
     Raises
     ------
     OSError
-        The folder cannot be written to, or the disk is full.
+        The folder cannot be written to, the disk is full, or a folder has the name of a file.
     """
     whole = folder.absolute()
     place = next(place for place in (whole, *whole.parents) if place.exists())
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=place) as made:
         yield Path(made)
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in sorted(Path(made).iterdir()):
+        _move_all(Path(made), whole)
+
+
+def _move_all(made: Path, folder: Path) -> None:
+    """Move what lies in `made` into a folder; on any exception all is as it was before."""
+    files = sorted(made.iterdir())
+    aside = Path(tempfile.mkdtemp(dir=made))
+    with ExitStack() as undo:  # last done, first undone
+        for above in [p for p in (*reversed(folder.parents), folder) if not p.exists()]:
+            undo.callback(_remove, above)
+            above.mkdir(exist_ok=True)
+        for path in files:
+            there = folder / path.name
+            if there.is_dir() and not there.is_symlink():
+                raise IsADirectoryError(f"{quoted(there)}: a folder. Expected a place for a file.")
+            if os.path.lexists(there):
+                undo.callback(_move_back, aside / path.name, there)
+                os.replace(there, aside / path.name)
+        for path in files:
+            undo.callback(_move_back, folder / path.name, path)
             os.replace(path, folder / path.name)
+        undo.pop_all()
+
+
+def _move_back(now: Path, before: Path) -> None:
+    """Undo a move, if it was made."""
+    if not os.path.lexists(before):
+        os.rename(now, before)
+
+
+def _remove(folder: Path) -> None:
+    """Undo the making of a folder, if it was made."""
+    if folder.exists():
+        folder.rmdir()

@@ -6,9 +6,9 @@ import re
 from typing import Any
 
 import yaml
+from yaml._yaml import CParser
 from yaml.composer import Composer
 from yaml.constructor import SafeConstructor
-from yaml.cyaml import CParser
 from yaml.resolver import BaseResolver
 
 from trpac_core.files import quoted
@@ -24,7 +24,7 @@ class YamlError(ValueError):
     """Text that is no YAML of the kind that is read; says where."""
 
 
-class _Loader(Composer, CParser, SafeConstructor, BaseResolver):  # type: ignore[misc]
+class _Loader(Composer, CParser, SafeConstructor, BaseResolver):
     """Reads null, booleans, decimal numbers, text, lists and mappings; no tags, no merge keys, no key twice."""
 
     def __init__(self, text: str) -> None:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from scenarios.errors import ScenarioError
 from scenarios.files import (
@@ -24,6 +23,8 @@ from scenarios.files import (
 from scenarios.plant import simulate
 from scenarios.plant.sensors import make_log, write_log
 from scenarios.whole_files import written_whole
+from scenarios.yaml_text import to_yaml
+from trpac_core.files import parse_json, read_bytes
 
 VEHICLE = Path(__file__).parents[1] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml"
 
@@ -49,6 +50,8 @@ LOGS = ("fit_1.csv", "fit_2.csv", "holdout.csv")
 DURATION_S, STEP_S = 30.0, 0.005
 FINE = 5
 """Steps of the plant per row of a log: the real car is not stepped by its logger."""
+MOST_TRUTH_BYTES = 10_000
+"""Size of truth.json [bytes]."""
 ROAD_M = 1000.0
 THETA: dict[SurfaceName, float] = {"dry": 0.9, "wet": 0.5, "snow_ice": 0.3}
 STRETCHES: tuple[SurfaceName, ...] = ("dry", "dry", "wet", "snow_ice")
@@ -105,7 +108,7 @@ def make_case(folder: Path, seed: int) -> Case:
     road = draw_road(rng)
     with written_whole(folder) as made:
         (made / "vehicle.yaml").write_bytes(VEHICLE.read_bytes())
-        (made / "road.yaml").write_text(yaml.safe_dump(road.model_dump(by_alias=True), sort_keys=False))
+        (made / "road.yaml").write_text(to_yaml(road.model_dump(by_alias=True)))
         for number, name in enumerate(LOGS):
             speed_m_s = float(rng.uniform(8.0, 14.0))
             fine_s = STEP_S / FINE
@@ -129,12 +132,12 @@ def make_case(folder: Path, seed: int) -> Case:
 
 def open_seal(case: Case) -> Truth:
     """What was hidden; raises ScenarioError where the file is not the one that was sealed."""
-    data = case.truth.read_bytes()
+    data = read_bytes(case.truth, MOST_TRUTH_BYTES, "the sealed truth of a demonstration")
     if _hash(data) != case.seal:
         raise ScenarioError(
             f"{case.truth}: changed since it was sealed; expected SHA-256 {case.seal}. Run the demonstration again."
         )
-    return Truth(**json.loads(data))
+    return Truth(**parse_json(data, str(case.truth)))
 
 
 def draw_truth(rng: np.random.Generator) -> Truth:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from importlib.metadata import version
@@ -39,6 +38,7 @@ from sim2real.which.structure import add_structure
 from sim2real.which.suspect import unlike_wheels
 from sim2real.which.varying import add_varied
 from sim2real.which.wander import effect_beside_wandering, nothing_but_wandering
+from trpac_core.files import file_sha256
 
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
 
@@ -259,7 +259,7 @@ def _origin(source: Source) -> dict[str, object]:
 
 
 def _file(path: Path) -> dict[str, str]:
-    return {"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    return {"path": str(path), "sha256": file_sha256(path)}
 
 
 def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:

@@ -15,10 +15,11 @@ from fmu_unit import STEP_S, Unit
 from fmu_src.fields import field_value
 from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.interface_4w import PER_SIDE, PER_WHEEL, SIDES, TRPAC_ESTIMATOR_4W, WHICH_WHEEL
-from fmu_src.packaging import build_unit, sha256
+from fmu_src.packaging import build_unit
 from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
 from trpac_core.estimator import RoadClass
+from trpac_core.files import file_sha256
 from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig, SideClasses
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
@@ -50,7 +51,7 @@ def test_validation_finds_no_problem_and_the_same_sources_give_the_same_bytes(tm
         build_unit(UNITS["TrpacEstimator4W"], tmp_path / name) for name in ("TrpacEstimator4W.fmu", "b.fmu")
     )
     assert validate_fmu(str(first)) == []
-    assert sha256(first) == sha256(second)
+    assert file_sha256(first) == file_sha256(second)
 
 
 def test_variables_are_those_of_one_wheel_at_each_wheel_and_side() -> None:

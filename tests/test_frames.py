@@ -60,11 +60,11 @@ def test_what_is_no_file_or_far_too_large_is_refused_unread(tmp_path):
     large = tmp_path / "large.png"
     with large.open("wb") as file:
         file.truncate(MOST_FILE_BYTES + 1)
-    with pytest.raises(ImageError, match=r"large\.png: 192 MB; expected"):
+    with pytest.raises(ImageError, match=r"large\.png: 192.*MB; expected"):
         decode_image(large)
-    with pytest.raises(ImageError, match="cannot be read"):
+    with pytest.raises(ImageError, match="no regular file"):
         decode_image("/dev/zero")
-    with pytest.raises(ImageError, match="cannot be read"):
+    with pytest.raises(ImageError, match="a folder"):
         decode_image(tmp_path)
 
 

@@ -16,7 +16,7 @@ from foreign_clients import need_client
 
 import build_ssp
 from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
-from fmu_src.packaging import BuildError, build_unit, sha256, unpack_unit
+from fmu_src.packaging import BuildError, build_unit, unpack_unit
 from fmu_src.ssp import (
     ESTIMATOR,
     PLANT,
@@ -29,6 +29,7 @@ from fmu_src.ssp import (
 from fmu_src.ssp_client import bound_parameters, problems, simulate
 from fmu_src.units import UNITS
 from fmu_src.variables import Kind
+from trpac_core.files import file_sha256
 
 RUN_S = 0.6
 OUTPUT = {"one_wheel": "TRPAC", "four_wheels": "TRPAC.rl"}
@@ -62,7 +63,7 @@ def test_packages_keep_the_schemas_of_the_standard_and_the_same_units_give_the_s
 ) -> None:
     name, package = system
     assert problems(package) == []
-    assert sha256(build_package(SYSTEMS[name], units, tmp_path / "again.ssp")) == sha256(package)
+    assert file_sha256(build_package(SYSTEMS[name], units, tmp_path / "again.ssp")) == file_sha256(package)
     structure = system_structure(SYSTEMS[name])
     wrong = structure.replace(b'kind="input"', b'kind="entrance"', 1)
     assert problems(with_file(package, tmp_path / "wrong.ssp", "SystemStructure.ssd", wrong)) != []
@@ -265,7 +266,7 @@ def test_command_line_builds_validates_runs_and_prints_the_hash(
     monkeypatch.setattr(build_ssp, "RUN_S", 0.005)
     assert build_ssp.main(["--system", "one_wheel", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert sha256(tmp_path / "trpac_one_wheel.ssp") in printed
+    assert file_sha256(tmp_path / "trpac_one_wheel.ssp") in printed
     assert "against the schemas of SSP 1.0" in printed
     assert build_ssp.main(["--system", "five_wheels"]) == EXIT_USAGE
     assert "four_wheels, one_wheel" in capsys.readouterr().err

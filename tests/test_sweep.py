@@ -48,7 +48,7 @@ def sweep_of(tmp_path):
     def make(**changes):
         path = tmp_path / "sweep.yaml"
         path.write_text(yaml.safe_dump(SHORT | changes))
-        return load_sweep(path)
+        return load_sweep(path, allow_code=True)
 
     return make
 
@@ -309,7 +309,7 @@ ROW = {"run": 0, "number": 0, "seed": 1, "stretch": 0, "parameter": "", "surface
 def test_a_damaged_part_is_named(tmp_path, part):
     parts = Parts(tmp_path / "out", {})
     parts.open()
-    parts.keep(0, [{**ROW, "error_end": 0.1, "convergence_time_s": None, "level": float("nan")}], 1.5)
+    parts.keep(0, [{**ROW, "error_end": 0.1, "convergence_time_s": None, "level": None}], 1.5)
     assert (len(parts.table()), parts.cpu_s()) == (1, [1.5])
     (tmp_path / "out" / "parts" / "0000001.json").write_text(json.dumps(part))
     with pytest.raises(ScenarioError, match=r"0000001\.json: damaged.*delete it and run the sweep again"):
@@ -324,7 +324,7 @@ def test_a_folder_of_another_sweep_is_refused(sweep_of, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "text", "named"),
-    [("sweep.json", "[1]", "no sweep's identity"), ("parts/notes.json", "{}", "no run of a sweep")],
+    [("sweep.json", "[1]", "no sweep's identity"), ("parts/notes.json", "{}", "no run of this sweep")],
 )
 def test_files_of_others_in_the_folder_are_named(sweep_of, tmp_path, name, text, named):
     Parts(tmp_path / "out", identity(sweep_of())).open()
@@ -364,7 +364,7 @@ def test_normal_draws_stay_within_what_their_quantity_can_be(sweep_of):
 
 
 def test_a_scheduler_that_does_not_answer_is_said(sweep_of, tmp_path, monkeypatch):
-    monkeypatch.setattr("scenarios.sweep.execute.CONNECT_S", 0.5)
+    monkeypatch.setattr("scenarios.sweep.cluster.CONNECT_S", 0.5)
     with pytest.raises(ScenarioError, match=r"127\.0\.0\.1:9"):
         execute(sweep_of(), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 
@@ -378,7 +378,9 @@ def test_a_cluster_by_address_loses_no_run_when_a_worker_dies(sweep_of, tmp_path
         row for key in run_keys(sweep) for row in run_plan(plan_run(sweep, key), ["IFE", "DE", "DIFE"], {})
     ]
     write_table(as_table(rows), tmp_path / "here.parquet")
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0", memory_limit=0) as cluster:
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0
+    ) as cluster:
         victims = [cluster.workers[0].pid]
 
         def kill_one(done, total):
@@ -458,6 +460,8 @@ def test_rendered_pictures_go_through_the_image_estimator(tmp_path):
 def test_no_run_is_lost_between_those_handed_out_ahead_and_the_rest(monkeypatch, sweep_of):
     monkeypatch.setattr(execute_module, "run_one", lambda sweep, key: key.index)
     keys = run_keys(sweep_of(runs=3 * execute_module.AHEAD))
-    with Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as client:
+    with Client(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+    ) as client:
         done = [(key.index, future.result()) for key, future in execute_module._stream(client, None, keys)]
     assert sorted(done) == [(i, i) for i in range(len(keys))]

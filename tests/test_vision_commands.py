@@ -453,7 +453,7 @@ def test_classify_does_not_write_over_what_is_no_table(folder, tmp_path, out):
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"frames": "nowhere"}, "no such folder or video"),
+        ({"frames": "nowhere"}, "expected a folder of frames or a video"),
         ({"frames": "empty"}, "no pictures in this folder"),
         ({"frames": "frames/f_8.png"}, "a single picture"),
         ({"frames": "camera.yaml"}, "not a video that can be decoded"),

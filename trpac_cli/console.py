@@ -1,4 +1,4 @@
-"""What commands on files share: progress bars, the check of the output folder, refusals on one line."""
+"""What commands share: a terminal that shows text as it is, progress bars, the check of the folder, refusals."""
 
 from __future__ import annotations
 
@@ -7,24 +7,45 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import typer
+from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from trpac_core.files import quoted
 
 EXIT_INPUT = 2
 """Unusable input: one line on standard error, and nothing written."""
-MOST_NAMED = 10
-"""Problems that the line names; the rest are counted."""
+LONGEST_LINE = 900
+"""Characters of that line: the problems that fit are named, the rest are counted."""
+LONGEST_SHOWN = 10_000
+"""Characters of a line on the terminal."""
 
 Told = Callable[[str, int, int], None]
+
+
+class Terminal(Console):
+    """A console for text that files may have a part in: brackets are brackets, control characters are shown as codes.
+
+    Where a text of ours has markup, `print(..., markup=True)` says so, and what is not ours is escaped.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(markup=False, emoji=False, highlight=False, **options)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Text ready to be shown."""
+        plain = "\n".join(quoted(line, LONGEST_SHOWN) for line in text.split("\n"))
+        return super().render_str(plain, **options)
 
 
 @contextmanager
 def bars() -> Iterator[Told]:
     """A progress bar per stage, and what to tell them."""
-    columns = (TextColumn("{task.description:>20}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns) as shown:
+    named = TextColumn("{task.description:>20}", markup=False)
+    with Progress(named, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()) as shown:
         tasks: dict[str, TaskID] = {}
 
         def told(stage: str, done: int, total: int) -> None:
@@ -48,8 +69,21 @@ def require_folder(command: str, out: Path) -> None:
 
 
 def refuse(command: str, problem: str | Exception) -> NoReturn:
-    """All problems in one line on standard error."""
-    lines = [line.strip() for line in str(problem).splitlines() if line.strip()]
-    more = [f"And {len(lines) - MOST_NAMED} more problems."] if len(lines) > MOST_NAMED else []
-    print(f"{command}: {' '.join([*lines[:MOST_NAMED], *more])}", file=sys.stderr)
+    """All problems in one line on standard error, as far as they fit."""
+    complain(command, problem)
     raise typer.Exit(EXIT_INPUT)
+
+
+def complain(command: str, problem: str | Exception) -> None:
+    """One line on standard error: the problems, one a line of the text, as far as they fit."""
+    lines = [line.strip() for line in str(problem).splitlines() if line.strip()]
+    shown: list[str] = []
+    room = LONGEST_LINE
+    for line in lines:
+        text = quoted(line, LONGEST_LINE)
+        if shown and len(text) > room:
+            break
+        shown.append(text)
+        room -= len(text) + 1
+    more = [f"And {len(lines) - len(shown)} more problems."] if len(lines) > len(shown) else []
+    print(f"{command}: {' '.join([*shown, *more])}", file=sys.stderr)

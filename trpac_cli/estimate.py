@@ -7,11 +7,9 @@ from typing import Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from trpac_cli.console import bars, refuse, require_folder
+from trpac_cli.console import Terminal, bars, refuse, require_folder
 
 COMMAND = "trpac estimate"
 
@@ -73,13 +71,13 @@ def estimate(
             told("report", 1, 1)
     except (ScenarioError, ModelError, OSError) as error:
         refuse(COMMAND, error)
-    console = Console()
-    console.print(escape(verdict(summary)))
+    console = Terminal()
+    console.print(verdict(summary))
     if summary["errors"] is not None:
         console.print(_error_table(summary["errors"]))
     for warning in summary["warnings"]:
-        console.print(f"[yellow]{escape(warning)}[/yellow]")
-    console.print("  ".join(str(path) for path in written), soft_wrap=True, highlight=False)
+        console.print(warning, style="yellow")
+    console.print("  ".join(str(path) for path in written), soft_wrap=True)
 
 
 def _error_table(errors: dict[str, Any]) -> Table:
@@ -90,7 +88,7 @@ def _error_table(errors: dict[str, Any]) -> Table:
     )
     for heading in ("estimator", "rows", "time [s]", "mean abs. error", "within 2 std"):
         left = heading in ("estimator", "rows")
-        table.add_column(escape(heading), justify="left" if left else "right")
+        table.add_column(heading, justify="left" if left else "right")
     for name, sets in errors.items():
         if not isinstance(sets, dict):
             continue

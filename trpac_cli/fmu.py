@@ -41,18 +41,24 @@ def doctor(
         ),
     ] = sys.executable,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
+    run: Annotated[
+        bool, typer.Option("--run/--no-run", help="Run the unit's own code; --no-run looks at the file only.")
+    ] = True,
 ) -> None:
     """Examine a unit, and say what a host needs to run it.
 
     Looks at the archive and its checksums, at every file against the hash that the build recorded (a network that was
     damaged or exchanged is named), at modelDescription.xml with fmpy's validation, at the interpreter and its packages;
-    then instantiates the unit and steps it in a process of its own, so that a crash is a line in the table.
+    then instantiates the unit and steps it in a process of its own, so that a crash is a line in the table. That runs
+    code out of the file with your rights: give --no-run for a file that you do not trust.
 
     The second table tells what each kind of host needs, with this interpreter's paths filled in.
 
     Example: trpac fmu doctor dist/TrpacEstimator.fmu
 
     Another interpreter: trpac fmu doctor dist/ReferencePlant.fmu --python /opt/rig/bin/python3
+
+    Without running the unit's code: trpac fmu doctor unknown.fmu --no-run
 
     In a script: trpac fmu doctor dist/TrpacEstimator.fmu --json > doctor.json
 
@@ -62,7 +68,7 @@ def doctor(
     from fmu_src.host_needs import host_needs
 
     try:
-        examined = examine(file, python)
+        examined = examine(file, python, run, lambda text: print(text, file=sys.stderr))
     except UnusableError as error:
         refuse("trpac fmu doctor", error)
     needs = host_needs(examined.python)
@@ -78,6 +84,7 @@ def _json(file: Path, examined: Examination, needs: tuple[HostNeeds, ...]) -> di
     return {
         "file": str(file),
         "unit": examined.unit,
+        "ran_its_code": examined.ran,
         "verdict": "fine" if examined.fine else "problems",
         "findings": [
             {"what": f.what, "state": f.state.value, "text": f.text, "mend": f.mend}

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.markup import escape
 from rich.panel import Panel
 from rich.table import Table
+from rich.text import Text
 
-from trpac_cli.console import bars, refuse, require_folder
+from trpac_cli.console import Terminal, bars, refuse, require_folder
 
 if TYPE_CHECKING:
     from sim2real.demo import Case, Truth
@@ -103,9 +103,9 @@ def diagnose(
             told("report", 1, 1)
     except (ScenarioError, OSError) as error:
         refuse(command, error)
-    console = Console()
+    console = Terminal()
     _summarise(console, said)
-    console.print("  ".join(str(path) for path in written), soft_wrap=True, highlight=False)
+    console.print("  ".join(str(path) for path in written), soft_wrap=True)
 
 
 @app.command()
@@ -136,7 +136,7 @@ def demo(
 
     command = "trpac gap demo"
     require_folder(command, out)
-    console = Console(highlight=False)
+    console = Terminal()
     try:
         case = make_case(out, seed)
         _tell_case(console, case)
@@ -159,12 +159,12 @@ def demo(
     console.print(f"The whole story, with pictures: {report}", soft_wrap=True)
 
 
-def _tell(console: Console, step: str, *sentences: str) -> None:
+def _tell(console: Terminal, step: str, *sentences: str) -> None:
     """One step of the demonstration, wrapped to the terminal."""
-    console.print(f"[bold]{step}[/bold] {' '.join(sentences)}\n", soft_wrap=False)
+    console.print(f"[bold]{step}[/bold] {' '.join(sentences)}\n", markup=True)
 
 
-def _tell_case(console: Console, case: Case) -> None:
+def _tell_case(console: Terminal, case: Case) -> None:
     """What is hidden from whom."""
     _tell(
         console,
@@ -188,7 +188,7 @@ def _tell_case(console: Console, case: Case) -> None:
     )
 
 
-def _tell_truth(console: Console, case: Case, truth: Truth, said: Diagnosis) -> None:
+def _tell_truth(console: Terminal, case: Case, truth: Truth, said: Diagnosis) -> None:
     """The end of the demonstration: what was hidden against what was found."""
     from sim2real.telling.report import estimate
 
@@ -229,7 +229,7 @@ def judge(hidden: str, said: Diagnosis) -> str:
     )
 
 
-def _summarise(console: Console, said: Diagnosis) -> None:
+def _summarise(console: Terminal, said: Diagnosis) -> None:
     """Verdict, sizes and the first causes on the terminal."""
     from sim2real.result import added
     from sim2real.telling.report import leading
@@ -238,15 +238,15 @@ def _summarise(console: Console, said: Diagnosis) -> None:
     sizes = f"gap {gap.before.total:.2f}"
     if added(said):
         sizes += f", with {' and '.join(c.effect for c in added(said))} {gap.after.total:.2f}"
-    text = f"{escape(said.sentence)}\n[dim]{sizes}; noise alone {gap.noise_floor:.2f}[/dim]"
+    text = Text.assemble(said.sentence, "\n", (f"{sizes}; noise alone {gap.noise_floor:.2f}", "dim"))
     colour = COLOURS[said.verdict]
     console.print(Panel(text, title=said.verdict.replace("_", " "), title_align="left", border_style=colour))
     if leading(said):
         console.print(_cause_table(said))
     if said.next_manoeuvre is not None:
-        console.print(f"To tell them apart: {escape(said.next_manoeuvre.sentence)}")
+        console.print(f"To tell them apart: {said.next_manoeuvre.sentence}")
     for warning in said.warnings:
-        console.print(f"[yellow]{escape(warning)}[/yellow]")
+        console.print(warning, style="yellow")
 
 
 def _cause_table(said: Diagnosis) -> Table:

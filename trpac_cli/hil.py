@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from trpac_cli.console import refuse, require_folder
+from trpac_cli.console import Terminal, complain, refuse, require_folder
 
 if TYPE_CHECKING:
     from trpac_hil.bus import BusSettings
@@ -140,7 +138,7 @@ def hil(
         refuse(COMMAND, error)
     _show(summary, out)
     if summary["log"]["problem"]:
-        print(f"{COMMAND}: no log: {summary['log']['problem']}", file=sys.stderr)
+        complain(COMMAND, f"no log: {summary['log']['problem']}")
         raise typer.Exit(EXIT_NO_LOG)
 
 
@@ -178,7 +176,7 @@ def hil_plant(
     try:
         job = _plant_job(_bus(interface, channel, bus_option), dbc, scenario, rate_hz, True)
         job = replace(job, camera_fps=camera_fps, camera_delay_s=camera_delay_s)
-        partner = open_partner(job, lambda kind, text: print(f"{PLANT_COMMAND}: {text}", file=sys.stderr))
+        partner = open_partner(job, lambda kind, text: complain(PLANT_COMMAND, text))
     except (ScenarioError, OSError) as error:
         refuse(PLANT_COMMAND, error)
     stopper = Stopper()
@@ -240,7 +238,7 @@ def _plant_job(
 
 def _show(summary: dict[str, Any], out: Path) -> None:
     """The outcome on the terminal."""
-    console, overruns = Console(), summary["overruns"]
+    console, overruns = Terminal(), summary["overruns"]
     worst = f", the worst by {overruns['worst_ms']:.2f} ms" if overruns["count"] else ""
     console.print(
         f"{summary['cycles']} cycles at {summary['rate_hz']:g} Hz, {overruns['count']} deadlines missed{worst}; "
@@ -256,6 +254,6 @@ def _show(summary: dict[str, Any], out: Path) -> None:
         console.print(table)
     for text in (summary["system"].get("priority"), summary["system"].get("core")):
         if text:
-            console.print(escape(text))
+            console.print(text)
     log = f"{out / summary['log']['file']}  " if summary["log"]["file"] else ""
-    console.print(f"{log}{out / 'summary.json'}", soft_wrap=True, highlight=False)
+    console.print(f"{log}{out / 'summary.json'}", soft_wrap=True)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -21,7 +18,7 @@ from rich.progress import (
 from rich.table import Table
 
 from scenarios.errors import ScenarioError
-from trpac_cli.console import refuse, require_folder
+from trpac_cli.console import Terminal, complain, refuse, require_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,6 +40,10 @@ def sweep(
         typer.Option(help="Address of a running Dask cluster; without it processes of this machine."),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes of this machine; one per core.")] = None,
+    allow_code: Annotated[
+        bool,
+        typer.Option("--allow-code", help="Run estimators that the file names as package.module:function."),
+    ] = False,
 ) -> None:
     """Run a scenario many times over drawn roads, noise, errors and disturbances; write table and report.
 
@@ -62,11 +63,11 @@ def sweep(
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    console = Console()
+    console = Terminal()
     try:
         _require(scheduler, jobs)
         require_folder("trpac sweep", out)
-        loaded = load_sweep(file)
+        loaded = load_sweep(file, allow_code=allow_code)
         with Progress(*columns, console=console) as bars:
             task = bars.add_task("runs", total=None)
             parts, failures = execute(
@@ -82,10 +83,7 @@ def sweep(
         refuse("trpac sweep", error)
     if failures:
         named = "; ".join(f"run {f.run}: {f.why}" for f in failures[:MOST_NAMED])
-        print(
-            f"trpac sweep: {len(failures)} runs failed: {named}. Call again to try these once more.",
-            file=sys.stderr,
-        )
+        complain("trpac sweep", f"{len(failures)} runs failed: {named}. Call again to try these once more.")
         raise typer.Exit(EXIT_SOME_FAILED)
 
 
@@ -95,11 +93,12 @@ def _require(scheduler: str | None, jobs: int | None) -> None:
         raise ScenarioError("--jobs goes with processes of this machine; leave it out with --scheduler.")
 
 
-def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, console: Console) -> None:
-    """Write what the runs make together."""
+def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, console: Terminal) -> None:
+    """Write what the runs make together: all of it, or nothing."""
     from scenarios.sweep.report import write_report
-    from scenarios.sweep.store import write_table, write_whole
+    from scenarios.sweep.store import write_table
     from scenarios.sweep.summary import summarise
+    from scenarios.whole_files import written_whole
 
     table: pd.DataFrame = parts.table()
     cpu_s = parts.cpu_s()
@@ -109,9 +108,10 @@ def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, con
         "cpu_s": {"total": sum(cpu_s), "median_per_run": sorted(cpu_s)[len(cpu_s) // 2]},
         **summarise(table),
     }
-    write_table(table, out / "runs.parquet")
-    write_whole(out / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
-    write_report(loaded, table, summary, failures, out / "report.html")
+    with written_whole(out) as made:
+        write_table(table, made / "runs.parquet")
+        (made / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        write_report(loaded, table, summary, failures, made / "report.html")
     console.print(_shown(summary))
     console.print(f"Report: {out / 'report.html'}   table: {out / 'runs.parquet'}", soft_wrap=True)
 
@@ -132,7 +132,7 @@ def _shown(summary: dict[str, Any]) -> Table:
         "in 2 std",
     ):
         left = heading in ("level", "estimator")
-        table.add_column(escape(heading), justify="left" if left else "right", overflow="fold")
+        table.add_column(heading, justify="left" if left else "right", overflow="fold")
     for level in summary["levels"]:
         where = f"{level['parameter']} {level['level']:g}" if level["parameter"] else ""
         for name, found in level["estimators"].items():

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from trpac_cli.console import refuse, require_folder
+from trpac_cli.console import Terminal, refuse, require_folder
+from trpac_core.files import quoted
 
 if TYPE_CHECKING:
     from scenarios.stills import Progress as Told
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 EXIT_SOME_UNREADABLE = 1
 """Done, but some of the pictures could not be used; they are named on standard error."""
+LONGEST_PROBLEM = 400
+"""Characters of one problem."""
 MOST_NAMED = 20
 """Unusable pictures that a message names; the rest are counted."""
 
@@ -60,7 +62,7 @@ def classify(
         write_classes(table, out)
     except (ModelError, OSError) as error:
         refuse(command, error)
-    Console().print(f"{len(table)} pictures: {_counted(list(table['class']))}. Table: {out}", soft_wrap=True)
+    Terminal().print(f"{len(table)} pictures: {_counted(list(table['class']))}. Table: {out}", soft_wrap=True)
     _finish(command, f"{len(problems)} of the inputs could not be used", problems)
 
 
@@ -101,7 +103,7 @@ def run(
 
 def _show(drive: Drive) -> None:
     """The run's outcome on the terminal."""
-    summary, console = drive.summary, Console()
+    summary, console = drive.summary, Terminal()
     table = Table(title=f"{summary['frames']} frames, {len(summary['unreadable'])} not usable")
     for heading in ("share of frames", "IFE", "voting"):
         table.add_column(heading, justify="left" if heading == "share of frames" else "right")
@@ -138,7 +140,8 @@ def _counted(classes: Sequence[str]) -> str:
 
 def _listed(heading: str, problems: Sequence[str]) -> str:
     more = [f"and {len(problems) - MOST_NAMED} more"] if len(problems) > MOST_NAMED else []
-    return "\n  ".join([f"{heading}:", *problems[:MOST_NAMED], *more])
+    named = [quoted(problem, LONGEST_PROBLEM) for problem in problems[:MOST_NAMED]]
+    return "\n  ".join([f"{heading}:", *named, *more])
 
 
 def _finish(command: str, heading: str, problems: Sequence[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import stat
@@ -11,9 +12,12 @@ from typing import Any
 
 LONGEST_QUOTE = 200
 """Characters of a file's own text, or of its name, that a message repeats."""
+MOST_HASHED_BYTES = 10_000_000_000
+"""Size of the largest file whose hash is worth waiting for: half a minute [bytes]."""
+CHUNK_BYTES = 1 << 20
 
 
-class FileError(ValueError):
+class FileError(OSError, ValueError):
     """A file is not to be read: its name, why, and what was expected."""
 
 
@@ -72,7 +76,7 @@ def _require_regular(there: os.stat_result, name: str, most_bytes: int, expected
         raise FileError(f"{name}: is {kind}; expected {expected}.")
     if there.st_size > most_bytes:
         raise FileError(
-            f"{name}: {there.st_size / 1e6:.1f} MB; expected {expected} of at most {most_bytes / 1e6:.3g} MB."
+            f"{name}: {there.st_size / 1e6:.1f} MB; expected {expected} of at most {most_bytes / 1e6:g} MB."
         )
 
 
@@ -95,7 +99,7 @@ def read_bytes(path: str | Path, most_bytes: int, expected: str) -> bytes:
                 f"{quoted(path)}: cannot be read: {error.strerror}; expected {expected}."
             ) from error
     if len(data) > most_bytes:
-        raise FileError(f"{quoted(path)}: grows; expected {expected} of at most {most_bytes / 1e6:.3g} MB.")
+        raise FileError(f"{quoted(path)}: grows; expected {expected} of at most {most_bytes / 1e6:g} MB.")
     return data
 
 
@@ -107,6 +111,15 @@ def read_text(path: str | Path, most_bytes: int, expected: str) -> str:
     except UnicodeDecodeError as error:
         row = data.count(b"\n", 0, error.start) + 1
         raise FileError(f"{quoted(path)}: row {row} is not UTF-8 text; expected {expected}.") from error
+
+
+def file_sha256(path: str | Path) -> str:
+    """SHA-256 of a regular file, as hexadecimal text; raises FileError."""
+    total = hashlib.sha256()
+    with open_file(path, MOST_HASHED_BYTES, "a file") as file:
+        while chunk := file.read(CHUNK_BYTES):
+            total.update(chunk)
+    return total.hexdigest()
 
 
 def parse_json(data: bytes | str, name: str) -> Any:

@@ -7,12 +7,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import BaseModel, ConfigDict
 
 from scenarios.peers.kalman import KalmanTuning
 from scenarios.peers.slip_slope import SlipSlopeTuning
 from scenarios.strict import load_strict
+from scenarios.yaml_text import to_yaml
 
 TUNING_FILE = Path(__file__).with_name("tuning.yaml")
 HEADER = "# Written by `python -m benchmarks.tune_peers tune`; see docs/peers.md.\n"
@@ -46,7 +46,7 @@ def load_tuning(path: Path = TUNING_FILE) -> Tuning:
 def write_tuning(path: Path, tuning: Tuning, how: dict[str, Any]) -> None:
     """Write a tuning with how it was found."""
     values = {name: _rounded(part) for name, part in asdict(tuning).items()}
-    path.write_text(HEADER + yaml.safe_dump({"how": how, **values}, sort_keys=False), encoding="utf-8")
+    path.write_text(HEADER + to_yaml({"how": how, **values}), encoding="utf-8")
 
 
 def _rounded(part: dict[str, float]) -> dict[str, float]:

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from scenarios.camera.disturbances import disturb
@@ -25,8 +24,11 @@ from scenarios.files import Scenario
 from scenarios.pictures import DISTURBANCES, frame_steps, scene
 from scenarios.plant.pipeline import PlantTrajectory
 from scenarios.sweep.draw import Camera
+from scenarios.yaml_text import parse_yaml
 from trpac_core.estimator import RoadClass
+from trpac_core.files import read_text
 from trpac_core.vision.classes import Surface
+from trpac_core.vision.images import decode_image
 
 RECORDS = Path(__file__).with_name("camera_process.yaml")
 CERTAIN = 0.95
@@ -52,7 +54,7 @@ class CameraProcess:
 @lru_cache(maxsize=1)
 def measured_process() -> CameraProcess:
     """The shipped records."""
-    data = yaml.safe_load(RECORDS.read_text(encoding="utf-8"))
+    data = parse_yaml(read_text(RECORDS, 1_000_000, "the shipped records"))
     return CameraProcess(
         spacing_m=float(data["spacing_m"]),
         near_m=float(data["near_m"]),
@@ -159,7 +161,7 @@ class RenderedFrames:
         )
         image = disturb(image, DISTURBANCES[pictures.disturbance], seed)
         _, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality])
-        return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), dtype=np.uint8)
+        return decode_image(packed.tobytes())
 
 
 def _played_back(

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import dask
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import Client, Future, as_completed
 from joblib import cpu_count
 
 from scenarios.errors import ScenarioError
+from scenarios.sweep.cluster import connected, security_of
 from scenarios.sweep.draw import RunKey, plan_run, run_keys
 from scenarios.sweep.files import Sweep
 from scenarios.sweep.run import run_plan
 from scenarios.sweep.store import Parts, identity, source_digest
+from trpac_core.files import quoted
 
 AHEAD = 8
 """Runs handed to Dask per worker thread: enough to keep it busy, few enough to stop quickly."""
-DEATHS = 3
-"""Workers that one run may take down before it is given up."""
-CONNECT_S = 20.0
 
 Progress = Callable[[int, int], None]
 """Told how many of how many runs are done."""
@@ -84,8 +81,11 @@ def execute(
     Raises
     ------
     ScenarioError
-        A folder that holds another sweep; a scheduler that does not answer; workers with other code.
+        A folder that holds another sweep, or a damaged part of it; a scheduler that does not answer, or that strangers
+        could steer; workers with other code.
     """
+    if scheduler is not None:
+        security_of(scheduler)  # refused before anything is written
     parts = Parts(out, identity(sweep))
     keys = run_keys(sweep)
     done = parts.open()
@@ -106,31 +106,6 @@ def execute(
             finished += 1
             progress(finished, len(keys))
     return parts, sorted(failures, key=lambda failure: failure.run)
-
-
-@contextmanager
-def connected(scheduler: str | None, jobs: int) -> Iterator[Client]:
-    """A client of the cluster at an address, or of `jobs` processes of this machine; raises ScenarioError."""
-    settings = {"distributed.scheduler.allowed-failures": DEATHS}
-    if scheduler is not None:
-        try:
-            client = Client(scheduler, timeout=CONNECT_S)
-        except (OSError, ValueError) as error:
-            raise ScenarioError(
-                f"--scheduler {scheduler}: no answer ({error}). Expected the address of a running Dask scheduler, "
-                "such as tcp://10.0.0.1:8786."
-            ) from error
-        with client:
-            yield client
-        return
-    with (
-        dask.config.set(settings),
-        LocalCluster(
-            n_workers=jobs, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
 
 
 def _stream(client: Client, sweep: Sweep, todo: list[RunKey]) -> Iterator[tuple[RunKey, Future]]:
@@ -164,4 +139,4 @@ def _same_code(digest: str) -> None:
 
 def _why(future: Future) -> str:
     error = future.exception()
-    return f"{type(error).__name__}: {error}"
+    return quoted(f"{type(error).__name__}: {error}")

@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scenarios.sweep.summary import COVERAGE_SPAN, ENOUGH_SHOWN_S, quantile, shown_enough, slippery
+from trpac_core.files import quoted
 
 COLOURS = {"IFE": "#d08a00", "DE": "#4c8fd0", "DIFE": "#c0272d"}
 OTHERS = ("#2c9c5a", "#7a4fb5", "#777777", "#b06d3a")
@@ -31,6 +32,11 @@ def colour(name: str, names: list[str]) -> str:
     """An estimator's colour."""
     others = [n for n in names if n not in COLOURS]
     return COLOURS.get(name) or OTHERS[others.index(name) % len(OTHERS)]
+
+
+def plain(name: object) -> str:
+    """A name as pictures show it: a dollar begins no formula in it."""
+    return quoted(name).replace("$", r"\$")
 
 
 def png(figure: Figure) -> bytes:
@@ -54,7 +60,7 @@ def distributions(table: pd.DataFrame) -> bytes:
         )
         for axis, column, label, goals in panels:
             for name in names:
-                _cumulative(axis, rows[rows["estimator"] == name][column], name, colour(name, names))
+                _cumulative(axis, rows[rows["estimator"] == name][column], plain(name), colour(name, names))
             for goal, share in zip(goals, (0.5, 0.95), strict=True):
                 axis.plot([goal], [share], marker="x", color="#222222", ms=8, mew=2, ls="none")
             axis.set_xlabel(label)
@@ -103,7 +109,7 @@ def errors_by_friction(table: pd.DataFrame) -> bytes:
             axis.set_yscale("log")
             axis.set_ylim(*ERROR_SPAN)
             axis.axhline(ERROR_GOALS[1], color="#222222", lw=0.8, ls="--")
-            axis.set_title(name)
+            axis.set_title(plain(name))
             axis.set_xlabel("true TRPAC [-]")
             axis.legend(loc="lower right", fontsize=7)
         axes[0][0].set_ylabel("steady-state error [-]")
@@ -132,7 +138,7 @@ def coverage_figure(table: pd.DataFrame) -> bytes | None:
                     THETA_BIN * (float(part["theta"].iloc[0]) // THETA_BIN + 0.5) for _, part in groups
                 ]
                 shares = [np.average(part[column], weights=part[weight]) for _, part in groups]
-                axis.plot(centres, shares, style, color=colour(name, names), label=f"{name}, {said}")
+                axis.plot(centres, shares, style, color=colour(name, names), label=f"{plain(name)}, {said}")
         axis.set_ylim(0.0, 1.02)
         axis.set_xlabel("true TRPAC [-]")
         axis.set_ylabel("share within 2 TRPAC_std")
@@ -149,7 +155,7 @@ def degradations(table: pd.DataFrame) -> Iterator[tuple[str, bytes]]:
             figure, axes = plt.subplots(1, 3, figsize=(12.5, 3.6))
             _degradation(axes, part, names)
             for axis in axes:
-                axis.set_xlabel(str(parameter))
+                axis.set_xlabel(plain(parameter))
             axes[0].legend(fontsize=8)
             figure.tight_layout()
             yield str(parameter), png(figure)
@@ -163,7 +169,7 @@ def _degradation(axes: np.ndarray, part: pd.DataFrame, names: list[str]) -> None
         mine, shade = slick[slick["estimator"] == name], colour(name, names)
         judged = shown_enough(mine)
         for share, style in ((0.5, "o-"), (0.95, "^:")):
-            label = name if share == 0.5 else None
+            label = plain(name) if share == 0.5 else None
             error = [quantile(judged[judged["level"] == x]["steady_state_error"], share) for x in levels]
             axes[0].plot(levels, _plain(error), style, color=shade, label=label)
             if name != "IFE":

@@ -14,7 +14,21 @@ from scenarios.effects import suggestion
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario, SurfaceName, load_scenario
 from scenarios.strict import load_strict
-from scenarios.sweep.trackers import problem_of_tracker
+from scenarios.sweep.trackers import ADDRESS, problem_of_address, problem_of_tracker
+from trpac_core.files import quoted
+
+MOST_RUNS = 1_000_000
+"""Runs of a sweep in all its levels."""
+MOST_LISTED = 1000
+"""Levels of a quantity, or values to choose from."""
+MOST_NAMED = 100
+"""Estimators, or varied quantities, of a sweep."""
+MOST_ROWS = 20_000
+"""Rows of one run: its stretches of road times its estimators."""
+LARGEST = 1e6
+"""Bound of a parameter of the estimator that the unit leaves open, in the parameter's unit."""
+MOST_SEED = 2**63 - 1
+"""The seed goes into a column of 64 bits."""
 
 
 class _Section(BaseModel):
@@ -28,7 +42,7 @@ class Drawn(_Section):
     """Lowest and highest."""
     normal: list[float] | None = None
     """Mean and standard deviation."""
-    choice: Annotated[list[float], Field(min_length=1)] | None = None
+    choice: Annotated[list[float], Field(min_length=1, max_length=MOST_LISTED)] | None = None
     """One of these, all equally likely."""
 
     @model_validator(mode="after")
@@ -37,9 +51,9 @@ class Drawn(_Section):
         if len(given) != 1:
             raise ValueError(f"names {given or 'no kind'}; expected exactly one of uniform, normal, choice.")
         if self.uniform is not None and not (len(self.uniform) == 2 and self.uniform[0] <= self.uniform[1]):
-            raise ValueError(f"uniform is {self.uniform}; expected [lowest, highest].")
+            raise ValueError(f"uniform is {quoted(self.uniform)}; expected [lowest, highest].")
         if self.normal is not None and not (len(self.normal) == 2 and self.normal[1] >= 0.0):
-            raise ValueError(f"normal is {self.normal}; expected [mean, standard deviation].")
+            raise ValueError(f"normal is {quoted(self.normal)}; expected [mean, standard deviation].")
         return self
 
     def sample(self, random: np.random.Generator, within: tuple[float, float]) -> float:
@@ -71,7 +85,7 @@ class RoadDraw(_Section):
     """A road per run: one stretch of each surface, its friction drawn within the class's range."""
 
     order: Literal["random", "as_listed"] = "random"
-    stretch_m: Annotated[float, Field(gt=0.0)] = 20.0
+    stretch_m: Annotated[float, Field(ge=1.0, le=10_000.0)] = 20.0
     friction: Annotated[dict[SurfaceName, list[float]], Field(min_length=1)]
     """Surface to its lowest and highest friction [-]."""
 
@@ -80,7 +94,7 @@ class RoadDraw(_Section):
         for surface, span in self.friction.items():
             if not (len(span) == 2 and 0.02 <= span[0] <= span[1] <= 1.2):
                 raise ValueError(
-                    f"friction.{surface} is {span}; expected [lowest, highest] within 0.02 and 1.2."
+                    f"friction.{surface} is {quoted(span)}; expected [lowest, highest] within 0.02 and 1.2."
                 )
         return self
 
@@ -93,7 +107,7 @@ class PedalDraw(_Section):
     pulse_s: Number = Field(default_factory=lambda: Drawn(uniform=[0.34, 0.5]))
     """Length of a pulse, per pulse [s]."""
     period_s: Annotated[float, Field(ge=0.3, le=5.0)] = 0.58
-    light_torque_nm: Annotated[float, Field(ge=0.0)] = 60.0
+    light_torque_nm: Annotated[float, Field(ge=0.0, le=100_000.0)] = 60.0
     """On roads that the motors cannot excite, after the launch [N m]."""
 
 
@@ -129,7 +143,7 @@ class CameraDraw(_Section):
     source: Literal["class_process", "rendered", "none"] = "class_process"
     wrong_share: Number = 0.0
     """Share of the way for which another class is given with confidence 0.95: flag 1 [-]."""
-    wrong_length_m: Annotated[float, Field(gt=0.0)] = 5.0
+    wrong_length_m: Annotated[float, Field(ge=0.1, le=10_000.0)] = 5.0
     """Mean length of such a stretch [m]."""
     lost_share: Number = 0.0
     """Share of frames that never come [-]."""
@@ -145,19 +159,19 @@ class Axis(_Section):
     """One quantity that takes several levels, `runs` runs on each, all else drawn alike on every level."""
 
     parameter: str
-    levels: Annotated[list[float], Field(min_length=1)]
+    levels: Annotated[list[float], Field(min_length=1, max_length=MOST_LISTED)]
 
 
 class SweepFile(_Section):
     """sweep.yaml as written; the scenario's path is relative to it."""
 
     schema_: Literal[1] = Field(alias="schema")
-    name: str
-    description: str = ""
+    name: Annotated[str, Field(max_length=200)]
+    description: Annotated[str, Field(max_length=10_000)] = ""
     scenario: str
-    runs: Annotated[int, Field(ge=1, le=1_000_000)]
-    seed: Annotated[int, Field(ge=0)] = 0
-    estimators: Annotated[list[str], Field(min_length=1)] = ["IFE", "DE", "DIFE"]
+    runs: Annotated[int, Field(ge=1, le=MOST_RUNS)]
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED)] = 0
+    estimators: Annotated[list[str], Field(min_length=1, max_length=MOST_NAMED)] = ["IFE", "DE", "DIFE"]
     road: RoadDraw | None = None
     pedal: PedalDraw | None = None
     vehicle: VehicleDraw = Field(default_factory=VehicleDraw)
@@ -166,27 +180,42 @@ class SweepFile(_Section):
     camera: CameraDraw = Field(default_factory=CameraDraw)
     unit: dict[str, float] = Field(default_factory=dict)
     """Parameters of the estimator by the unit's names, in place of the delivered ones."""
-    vary: list[Axis] = Field(default_factory=list)
+    vary: Annotated[list[Axis], Field(max_length=MOST_NAMED)] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _check(self) -> SweepFile:
         known = list(drawn_numbers(self))
         problems = [
-            f"vary[{i}].parameter is {axis.parameter!r}; {suggestion(axis.parameter, known)}"
+            f"vary[{i}].parameter is {quoted(repr(axis.parameter))}; {suggestion(axis.parameter, known)}"
             for i, axis in enumerate(self.vary)
             if axis.parameter not in known
         ]
-        reals = [v.name for v in UNITS["TrpacEstimator"].variables if v.causality == "parameter" and v.unit]
-        problems += [
-            f"unit.{name}: unknown; {suggestion(name, reals)}" for name in self.unit if name not in reals
-        ]
+        problems += _problems_of_unit(self.unit)
         problems += [text for name in self.estimators if (text := problem_of_tracker(name))]
         twice = sorted({name for name in self.estimators if self.estimators.count(name) > 1})
         problems += [f"estimators names {name} twice." for name in twice]
         problems += [text for name, value in _all_numbers(self) if (text := _out_of_range(name, value))]
+        runs = self.runs * (sum(len(axis.levels) for axis in self.vary) or 1)
+        if runs > MOST_RUNS:
+            problems.append(f"runs times levels are {runs}; expected at most {MOST_RUNS}.")
         if problems:
             raise ValueError("\n".join(problems))
         return self
+
+
+def _problems_of_unit(given: dict[str, float]) -> list[str]:
+    """What is wrong with parameters of the estimator: their names, or their values by the unit's own bounds."""
+    reals = {v.name: v for v in UNITS["TrpacEstimator"].variables if v.causality == "parameter" and v.unit}
+    problems = []
+    for name, value in given.items():
+        if name not in reals:
+            problems.append(f"unit.{quoted(name)}: unknown; {suggestion(quoted(name), list(reals))}")
+            continue
+        low, high = reals[name].minimum, reals[name].maximum
+        low, high = -LARGEST if low is None else low, LARGEST if high is None else high
+        if not low <= value <= high:
+            problems.append(f"unit.{name} is {value:g}; expected within {low:g} and {high:g}.")
+    return problems
 
 
 RANGES = {
@@ -245,6 +274,8 @@ def _out_of_range(name: str, value: Number) -> str | None:
         return None
     low, high = extremes(value)
     least, most = RANGES[name]
+    if isinstance(value, Drawn) and value.normal is not None and value.normal[1] > most - least:
+        return f"{name} has a deviation of {value.normal[1]:g}; expected at most {most - least:g}."
     if least <= low and high <= most:
         return None
     return f"{name} reaches from {low:g} to {high:g}; expected within {least:g} and {most:g}."
@@ -259,29 +290,51 @@ class Sweep:
     scenario: Scenario
 
 
-def load_sweep(path: str | Path) -> Sweep:
-    """Read a sweep file and its scenario; raises ScenarioError with all problems."""
+def load_sweep(path: str | Path, *, allow_code: bool = False) -> Sweep:
+    """Read a sweep file and its scenario; raises ScenarioError with all problems.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    allow_code : bool
+        Whether estimators may be package.module:function, which is imported and run; else that is a problem.
+    """
     path = Path(path)
     file = load_strict(path, SweepFile)
+    addresses = [name for name in file.estimators if ADDRESS.fullmatch(name)]
+    if addresses and not allow_code:
+        raise ScenarioError(
+            f"{quoted(path)}: estimators names {quoted(repr(addresses[0]))}, which is code that would be run. Where "
+            "you trust the file: --allow-code."
+        )
     try:
         scenario = load_scenario(path.parent / file.scenario)
     except ScenarioError as error:
-        raise ScenarioError(f"{path}: scenario: {error}") from error
-    problems = []
+        raise ScenarioError(f"{quoted(path)}: scenario: {error}") from error
+    problems = [f"{quoted(path)}: {text}" for name in addresses if (text := problem_of_address(name))]
+    stretches = len(scenario.road.segments if file.road is None else file.road.friction)
+    if stretches * len(file.estimators) > MOST_ROWS:
+        problems.append(
+            f"{quoted(path)}: {stretches} stretches of road times {len(file.estimators)} estimators; expected at most "
+            f"{MOST_ROWS} scores of a run."
+        )
     if file.camera.source == "rendered" and scenario.camera_path is None:
-        problems.append(f"{path}: camera.source is 'rendered', but {scenario.path} names no camera.")
+        problems.append(
+            f"{quoted(path)}: camera.source is 'rendered', but {quoted(scenario.path)} names no camera."
+        )
     confidence = [file.camera.confidence_factor]
     confidence += [
         x for axis in file.vary if axis.parameter == "camera.confidence_factor" for x in axis.levels
     ]
     if file.camera.source == "rendered" and any(value != 1.0 for value in confidence):
         problems.append(
-            f"{path}: camera.confidence_factor is not 1, but camera.source is 'rendered': pictures have the "
+            f"{quoted(path)}: camera.confidence_factor is not 1, but camera.source is 'rendered': pictures have the "
             "confidence that the networks give them. Expected 'class_process' or a factor of 1."
         )
     if file.road is not None and file.pedal is None:
         problems.append(
-            f"{path}: road is drawn and pedal is not; expected both, for a pedal trace made for one friction "
+            f"{quoted(path)}: road is drawn and pedal is not; expected both, for a pedal trace made for one friction "
             "spins the wheels on a lower one."
         )
     if problems:

@@ -18,14 +18,15 @@ from typing import Any
 
 import cv2
 import numpy as np
-import yaml
 
 from scenarios.camera.disturbances import disturb
 from scenarios.files import RoadFile, RoadSegment, Scenario, load_scenario
 from scenarios.looks import image_estimator
 from scenarios.pictures import DISTURBANCES, scene
+from scenarios.yaml_text import to_yaml
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import IfeState
+from trpac_core.vision.images import decode_image
 from trpac_core.vision.trajectory import Motion
 
 FIRST_SEED = 900_000
@@ -77,7 +78,7 @@ def verdicts(scenario: Scenario) -> Iterator[Verdict]:
         image = disturb(renderer.frame(float(place)).image, disturbance, seed)
         _, packed = cv2.imencode(".jpg", image, quality)
         began = time.perf_counter()
-        decoded = np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), dtype=np.uint8)
+        decoded = decode_image(packed.tobytes())
         state, result = ife.process(state, decoded, Motion(SPEED_M_S, way_m=float(place)))
         passed = time.perf_counter() - began
         ends = [scenario.road.segment_at(float(place) + ahead).surface_class for ahead in (near_m, far_m)]
@@ -157,7 +158,7 @@ def main() -> None:
         "statistics": statistics(worlds),
         "worlds": [record(w, seed) for w, seed in zip(worlds, seeds, strict=True)],
     }
-    options.out.write_text(yaml.safe_dump(content, sort_keys=False, width=4000), encoding="utf-8")
+    options.out.write_text(to_yaml(content, width=4000), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from scenarios.report import number
 from scenarios.sweep import figures
 from scenarios.sweep.execute import Failure
 from scenarios.sweep.files import Sweep
-from scenarios.sweep.store import write_whole
 from scenarios.sweep.summary import ENOUGH_SHOWN_S
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
@@ -41,7 +40,7 @@ def write_report(
         enough_s=ENOUGH_SHOWN_S,
         pictures=[(title, said, _address(data)) for title, said, data in _pictures(table)],
     )
-    write_whole(path, text.encode())
+    path.write_bytes(text.encode("utf-8", "backslashreplace"))  # a name may hold half a surrogate pair
 
 
 def _pictures(table: pd.DataFrame) -> list[tuple[str, str, bytes]]:

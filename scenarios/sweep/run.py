@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -99,7 +100,7 @@ def signals_of(plan: RunPlan, trajectory: PlantTrajectory) -> list[list[float]]:
 def step_all(
     plan: RunPlan, trajectory: PlantTrajectory, config: EstimatorConfig, estimators: list[str]
 ) -> Tracks:
-    """Step ours and the peers over the run's signals."""
+    """Step ours and the peers over the run's signals; raises ValueError where an estimate is not finite."""
     frames, ife = camera_of(plan, trajectory)
     estimator, step_s = TrpacEstimator(config, ife), plan.scenario.step_s
     peers = {name: make_peer(name, told_of(plan, config)) for name in estimators if name not in OWN}
@@ -119,6 +120,9 @@ def step_all(
         for column, peer in enumerate(peers.values(), start=len(OWN)):
             said = peer.step(step_s, sensors)
             theta[row, column], std[row, column] = said.TRPAC, said.TRPAC_std
+    strange = [name for i, name in enumerate(names) if not np.isfinite(theta[:, i]).all()]
+    if strange:
+        raise ValueError(f"{strange[0]} gives an estimate that is no finite number.")
     chosen = {name: Track(theta[:, i], std[:, i]) for i, name in enumerate(names) if name in estimators}
     return Tracks(chosen, excited)
 
@@ -170,7 +174,7 @@ def rows_of(
         truth = {
             "run": key.index,
             "parameter": key.parameter,
-            "level": key.level,
+            "level": None if math.isnan(key.level) else key.level,
             "number": key.number,
             "seed": scenario.seed,
             "stretch": int(index),

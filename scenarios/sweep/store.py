@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Iterable, Iterator
+from dataclasses import fields
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,9 @@ import numpy as np
 import pandas as pd
 
 from scenarios.errors import ScenarioError
+from scenarios.metrics import SegmentScore
 from scenarios.sweep.files import Sweep, content
+from trpac_core.files import FileError, parse_json, quoted, read_bytes, read_text
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("trpac_core", "fmu_src", "scenarios")
@@ -22,7 +27,18 @@ SOURCES = ("trpac_core", "fmu_src", "scenarios")
 TEXT = ("parameter", "surface", "estimator")
 WHOLE = ("run", "number", "seed", "stretch")
 SORT = ["run", "stretch", "estimator"]
+SCORES = (
+    *(field.name for field in fields(SegmentScore)),
+    *("level", "theta_before", "shown_s", "time_s", "shown_convergence_time_s", "band_time_s"),
+    *("error_end", "error_mean", "error_shown_late", "std_end", "std_mean"),
+    *("covered_share", "covered_share_shown", "covered_end"),
+)
+"""What is null where there is nothing to measure."""
+COLUMNS = {*TEXT, *WHOLE, *SCORES}
+"""What a row of a run says; see `run.rows_of`."""
 IDENTITY = "sweep.json"
+MOST_BYTES = 64_000_000
+"""Size up to which sweep.json or a part is read [bytes]; a row has about 900, and a run at most 20,000 rows."""
 
 
 @lru_cache(maxsize=1)
@@ -39,7 +55,7 @@ def source_digest() -> str:
 
 
 def identity(sweep: Sweep) -> dict[str, Any]:
-    """What parts of a folder must agree in: the sweep, the scenario with its files, the code."""
+    """What parts of a folder must agree in: the sweep, the scenario with its files, the code; raises FileError."""
     scenario = sweep.scenario
     described = {
         "sweep": content(sweep.file),
@@ -49,7 +65,9 @@ def identity(sweep: Sweep) -> dict[str, Any]:
         "sensors": scenario.sensors.model_dump(by_alias=True),
         "pictures": scenario.pictures.model_dump(by_alias=True),
         "end": scenario.end.model_dump(by_alias=True),
-        "camera": "" if scenario.camera_path is None else scenario.camera_path.read_text(encoding="utf-8"),
+        "camera": ""
+        if scenario.camera_path is None
+        else read_text(scenario.camera_path, MOST_BYTES, "the camera's YAML file"),
         "step_s": scenario.step_s,
         "wheel": scenario.wheel,
         "source_sha256": source_digest(),
@@ -59,48 +77,50 @@ def identity(sweep: Sweep) -> dict[str, Any]:
 
 
 class Parts:
-    """The part files of a sweep's folder.
+    """The part files of a sweep's folder; each says which run of which sweep it is, and has a hash of what it says.
 
     Parameters
     ----------
     out : Path
-        The sweep's folder; it is made when the first part is kept.
+        The sweep's folder; it is made when it is opened.
     described : dict
-        See `identity`.
+        See `identity`. Of one that names no sweep, only what a part says of itself is checked.
     """
 
     def __init__(self, out: Path, described: dict[str, Any]) -> None:
         self._out, self._identity = out, described
         self._folder = out / "parts"
+        self._sha256 = _digest(described)
 
     def open(self) -> set[int]:
-        """Numbers of the runs that are there; raises ScenarioError where the folder holds another sweep."""
+        """Numbers of the runs that are there; raises ScenarioError where the folder holds anything else."""
         known = self._out / IDENTITY
-        if self._out.exists() and not self._out.is_dir():
-            raise ScenarioError(f"{self._out}: a file. Expected a folder to write into.")
-        if known.is_file():
-            before = _read(known)
+        for place in (self._out, self._folder):
+            if os.path.lexists(place) and not place.is_dir():
+                raise ScenarioError(f"{quoted(place)}: a file. Expected a folder to write into.")
+        if os.path.lexists(known):
+            before = _read(known, "what identifies the folder's sweep")
             if not isinstance(before, dict):
-                raise ScenarioError(f"{known}: is no sweep's identity; delete it and run the sweep again.")
+                raise ScenarioError(
+                    f"{quoted(known)}: is no sweep's identity; delete it and run the sweep again."
+                )
             differs = sorted(k for k in self._identity if before.get(k) != self._identity[k])
             if differs:
                 raise ScenarioError(
-                    f"{self._out}: holds runs of another sweep (differs in {', '.join(differs)}). "
+                    f"{quoted(self._out)}: holds runs of another sweep (differs in {', '.join(differs)}). "
                     "Expected the same sweep, to go on with, or an empty folder; choose another --out."
                 )
         elif self._folder.exists():
-            raise ScenarioError(f"{self._out}: holds parts but no {IDENTITY}; choose another --out.")
+            raise ScenarioError(f"{quoted(self._out)}: holds parts but no {IDENTITY}; choose another --out.")
         self._folder.mkdir(parents=True, exist_ok=True)
         write_whole(known, json.dumps(self._identity, indent=1).encode())
-        strange = sorted(path.name for path in self._folder.glob("*.json") if not path.stem.isdecimal())
-        if strange:
-            raise ScenarioError(f"{self._folder / strange[0]}: is no run of a sweep; move it elsewhere.")
-        return {int(path.stem) for path in self._folder.glob("*.json")}
+        return {part["run"] for part in self._all()}
 
     def keep(self, index: int, rows: list[dict[str, Any]], cpu_s: float) -> None:
         """Write one run's rows and the processor time that it took [s]."""
-        part = {"cpu_s": cpu_s, "rows": rows}
-        write_whole(self._folder / f"{index:07d}.json", json.dumps(part).encode())
+        part = {"run": index, "sweep": self._sha256, "cpu_s": cpu_s, "rows": rows}
+        part["sha256"] = _digest(part)
+        write_whole(self._folder / _name(index), json.dumps(part).encode())
 
     def empty(self) -> bool:
         """Whether no run is there."""
@@ -115,22 +135,53 @@ class Parts:
         return [float(part["cpu_s"]) for part in self._all()]
 
     def _all(self) -> Iterator[dict[str, Any]]:
+        asked = self._identity.get("sweep")
+        names = None if asked is None else {_name(index) for index in range(_count(asked))}
         for path in sorted(self._folder.glob("*.json")):
-            part = _read(path)
-            if not _is_part(part):
+            if names is not None and path.name not in names:
                 raise ScenarioError(
-                    f"{path}: damaged, expected 'cpu_s' and the 'rows' of a run; delete it and run the sweep again."
+                    f"{quoted(path)}: is no run of this sweep; delete it and run the sweep again."
+                )
+            part = _read(path, "a finished run")
+            written = _is_part(part) and (part["sweep"], _name(part["run"])) == (self._sha256, path.name)
+            if not written or not (asked is None or _is_complete(part["rows"], asked["estimators"])):
+                raise ScenarioError(
+                    f"{quoted(path)}: damaged, or of another run or sweep; delete it and run the sweep again."
                 )
             yield part
 
 
+def _count(asked: dict[str, Any]) -> int:
+    """How many runs a sweep asks for, in all its levels."""
+    return int(asked["runs"]) * (sum(len(axis["levels"]) for axis in asked["vary"]) or 1)
+
+
+def _name(index: int) -> str:
+    return f"{index:07d}.json"
+
+
+def _digest(value: dict[str, Any]) -> str:
+    """SHA-256 of a JSON value; raises ValueError where a number is not finite."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
 def _is_part(part: Any) -> bool:
     """Whether this is what `Parts.keep` writes."""
-    if not isinstance(part, dict) or part.keys() != {"cpu_s", "rows"} or not isinstance(part["rows"], list):
-        return False
-    return _is_number(part["cpu_s"]) and all(
+    return (
+        isinstance(part, dict)
+        and part.keys() == {"run", "sweep", "cpu_s", "rows", "sha256"}
+        and isinstance(part["sweep"], str)
+        and _fits("run", part["run"])
+        and _is_number(part["cpu_s"])
+        and isinstance(part["rows"], list)
+        and all(_is_row(row) and row["run"] == part["run"] for row in part["rows"])
+        and part["sha256"] == _digest({key: value for key, value in part.items() if key != "sha256"})
+    )
+
+
+def _is_row(row: Any) -> bool:
+    return (
         isinstance(row, dict) and {*TEXT, *WHOLE} <= row.keys() and all(_fits(*item) for item in row.items())
-        for row in part["rows"]
     )
 
 
@@ -143,8 +194,17 @@ def _fits(column: str, value: Any) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether it goes into a column of 64 bits."""
-    return isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 63)
+    """Whether it goes into a column of 64 bits, and is finite: what is not measured is null."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1 << 63
+
+
+def _is_complete(rows: list[dict[str, Any]], estimators: list[str]) -> bool:
+    """Whether each estimator has one row on each stretch that was driven."""
+    places = [(row["stretch"], row["estimator"]) for row in rows]
+    wanted = product({stretch for stretch, _ in places}, estimators)
+    return bool(rows) and sorted(places) == sorted(wanted) and all(row.keys() == COLUMNS for row in rows)
 
 
 def as_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
@@ -157,23 +217,22 @@ def as_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 
 def write_table(table: pd.DataFrame, path: Path) -> None:
     """Write runs.parquet; the same table gives the same bytes."""
-    scratch = path.with_name(path.name + ".part")
-    table.to_parquet(scratch, index=False)
-    os.replace(scratch, path)
+    table.to_parquet(path, index=False)
 
 
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file so that it is there whole or not at all."""
     scratch = path.with_name(path.name + ".part")
-    with scratch.open("wb") as file:
+    scratch.unlink(missing_ok=True)
+    with scratch.open("xb") as file:  # a link or a pipe of that name is not written through
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
     os.replace(scratch, path)
 
 
-def _read(path: Path) -> Any:
+def _read(path: Path, expected: str) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ScenarioError(f"{path}: cannot be read: {error}; delete it and run the sweep again.") from error
+        return parse_json(read_bytes(path, MOST_BYTES, expected), quoted(path))
+    except FileError as error:
+        raise ScenarioError(f"{str(error).rstrip('.')}; delete it and run the sweep again.") from error

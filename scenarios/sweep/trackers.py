@@ -7,32 +7,40 @@ name, `reset()` and `step(step_s, Sensors)`, see `scenarios.peers.base.Peer`.
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Callable
 
 from scenarios import peers
 from scenarios.effects import suggestion
 from scenarios.peers import Peer, PeerSetup
+from trpac_core.files import quoted
 
 OWN = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
 """The estimators of this project, and the output of the fused one that holds each."""
 
+ADDRESS = re.compile(r"\w+(\.\w+)*:\w+")
+"""package.module:function, which no formula, markup or relative import is."""
+
 
 def problem_of_tracker(name: str) -> str | None:
-    """One sentence on what is wrong with an estimator's name in a sweep file; None where it is good."""
-    if name in OWN or name in peers.PEERS:
+    """One sentence on what is wrong with an estimator's name in a sweep file; None where it is good, or an address."""
+    if name in OWN or name in peers.PEERS or ADDRESS.fullmatch(name):
         return None
+    problem = f"estimators names {quoted(repr(name))}"
     if ":" in name:
-        return _problem_of_address(name)
-    return f"estimators names {name!r}; {suggestion(name, [*OWN, *peers.PEERS])}"
+        return f"{problem}; expected package.module:function."
+    return f"{problem}; {suggestion(name, [*OWN, *peers.PEERS])}"
 
 
-def _problem_of_address(name: str) -> str | None:
+def problem_of_address(name: str) -> str | None:
+    """One sentence on why the function at an address cannot be called; None where it can. Imports its module."""
+    problem = f"estimators names {quoted(repr(name))}"
     module, _, function = name.partition(":")
     try:
         found = getattr(importlib.import_module(module), function)
-    except (ImportError, AttributeError, ValueError) as error:
-        return f"estimators names {name!r}: {error}; expected package.module:function."
-    return None if callable(found) else f"estimators names {name!r}, which cannot be called."
+    except (ImportError, AttributeError, SyntaxError, ValueError) as error:
+        return f"{problem}: {quoted(error)}; expected package.module:function."
+    return None if callable(found) else f"{problem}, which cannot be called."
 
 
 def make_peer(name: str, setup: PeerSetup) -> Peer:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ from sim2real.logs.translate import (
     translate,
     wanted_columns,
 )
-from trpac_core.files import FileError, open_file, quoted
+from trpac_core.files import FileError, file_sha256, open_file, quoted
 
 MOST_BYTES = 4_000_000_000
 """Larger logs are refused unread [bytes]."""
@@ -88,7 +87,7 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         derived=made.derived,
         ignored=ignored_columns(table, mapping),
         warnings=tuple(quoted(finding.text, LONGEST_FINDING) for finding in findings),
-        sha256=_sha256(path),
+        sha256=file_sha256(path),
     )
 
 
@@ -112,8 +111,3 @@ def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
 def _error(path: Path, findings: list[Finding]) -> LogError:
     fatal = [quoted(finding.text, LONGEST_FINDING) for finding in findings if finding.fatal]
     return LogError("\n".join(f"{quoted(path)}: {text}" for text in fatal))
-
-
-def _sha256(path: Path) -> str:
-    with open_file(path, MOST_BYTES, "a log") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from sim2real.replay.camera import camera_side
 from sim2real.replay.inputs import make_inputs
 from sim2real.replay.run import OURS, Replay, Told, replay, silent
 from sim2real.replay.score import errors, excitation
+from trpac_core.files import file_sha256
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 MODELS = CHECKOUT / "models"
@@ -72,7 +72,7 @@ def estimate_files(
             "rate_hz": read.rate_hz,
             "rows": len(read),
         },
-        "vehicle": {"name": car.name, "path": str(car_path), "sha256": _sha256(car_path)},
+        "vehicle": {"name": car.name, "path": str(car_path), "sha256": file_sha256(car_path)},
         "camera": seen.source,
         "noise": {
             "wheel_speed_rad_s": inputs.noise.wheel_speed_rad_s,
@@ -98,7 +98,3 @@ def _outcome(done: Replay) -> dict[str, float | None]:
         "mean_std_seen": float(std[seen].mean()) if seen.any() else None,
         "mean_std": float(std[done.inputs.moving].mean()),
     }
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
