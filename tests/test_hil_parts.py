@@ -381,8 +381,8 @@ def test_error_frames_are_counted_and_a_flood_is_read_in_parts() -> None:
     bus = RaisingBus()
     link = Link(lambda: bus, unsaid)
     bus.waiting = [can.Message(is_error_frame=True)] + [can.Message(arbitration_id=1)] * 700
-    assert len(link.receive()) == 512
-    assert len(link.receive()) == 188
+    assert len(link.receive()) == 511
+    assert len(link.receive()) == 189
     assert (link.error_frames, link.backlogs) == (1, 1)
 
 

@@ -9,18 +9,31 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import can
+from can.interfaces import BACKENDS
 
+from trpac_core.files import quoted
 from trpac_hil.errors import HilError
 from trpac_hil.inputs import Say
 
 RETRY_S = 0.5
 """Pause between attempts to open a lost bus anew [s]."""
 MOST_AT_ONCE = 512
-"""Messages that one cycle reads at most; what is left waits for the next one."""
+"""Frames, of whatever kind, that one cycle reads at most; what is left waits for the next one."""
 BUS_ERRORS = (can.CanError, OSError)
 """What interfaces raise when a bus fails."""
 OPENING_ERRORS = (*BUS_ERRORS, ValueError, TypeError, ImportError, NotImplementedError)
 """What they raise when one cannot be opened."""
+GARBLED_BY = (
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    ArithmeticError,
+    MemoryError,
+    RecursionError,
+)
+"""Causes of python-can's error where what came cannot be read as a CAN message; a bus that fails has others."""
+BACKENDS["udp_multicast"] = ("trpac_hil.datagrams", "DatagramBus")
 
 
 @dataclass(frozen=True)
@@ -66,7 +79,7 @@ class Link:
     def __init__(self, open_bus: Callable[[], can.BusABC], say: Say, retry_s: float = RETRY_S) -> None:
         """Open the bus; raises HilError where it cannot be opened at the start."""
         self._open, self._say, self._retry_s = open_bus, say, retry_s
-        self.losses = self.unsent = self.error_frames = self.backlogs = 0
+        self.losses = self.unsent = self.error_frames = self.garbled = self.backlogs = 0
         self._found: can.BusABC | None = None
         self._closing = threading.Event()
         self._seeker: threading.Thread | None = None
@@ -84,30 +97,46 @@ class Link:
         return self._bus is not None
 
     def receive(self) -> list[can.Message]:
-        """All messages that have come, at most `MOST_AT_ONCE`; none while the bus is lost."""
+        """All messages that have come, of at most `MOST_AT_ONCE` frames; none while the bus is lost."""
         bus = self._bus or self._back()
         messages: list[can.Message] = []
         if bus is None:
             return messages
-        try:
-            while len(messages) < MOST_AT_ONCE:
+        for _ in range(MOST_AT_ONCE):
+            try:
                 message = bus.recv(0.0)
-                if message is None:
-                    return messages
-                if message.is_error_frame:
-                    self.error_frames += 1
-                elif not message.is_remote_frame:
-                    messages.append(message)
-            self.backlogs += 1
-        except BUS_ERRORS as error:
-            self._lose(f"{type(error).__name__}: {error}")
+            except BUS_ERRORS as error:
+                if isinstance(error, can.CanOperationError) and isinstance(error.__cause__, GARBLED_BY):
+                    self._leave_aside(error.__cause__)
+                    continue
+                self._lose(f"{type(error).__name__}: {quoted(error)}")
+                return messages
+            if message is None:
+                return messages
+            if message.is_error_frame:
+                self.error_frames += 1
+            elif not _sound(message):
+                self._leave_aside("identifier or data of a wrong kind")
+            elif not message.is_remote_frame:
+                messages.append(message)
+        self.backlogs += 1
         return messages
+
+    def _leave_aside(self, why: object) -> None:
+        self.garbled += 1
+        self._say(
+            "garbled",
+            f"What came is no CAN message and was left aside ({quoted(why)}). "
+            "Something else sends to the bus's address; give the bus one of its own.",
+        )
 
     def drain(self, longest_s: float = 1.0) -> None:
         """Throw away what has waited: nobody knows how old it is."""
         end_s = time.monotonic() + longest_s
-        while time.monotonic() < end_s and self.receive():
-            continue
+        while time.monotonic() < end_s:
+            backlogs = self.backlogs
+            if not self.receive() and self.backlogs == backlogs:
+                return
 
     def send(self, frame_id: int, extended: bool, data: bytes) -> bool:
         """Hand a message over; False where that failed."""
@@ -119,11 +148,11 @@ class Link:
         except can.CanOperationError as error:
             # A full transmit buffer is no lost bus: nobody acknowledges, or too much is sent.
             self.unsent += 1
-            self._say("unsent", f"A message could not be sent: {error}")
+            self._say("unsent", f"A message could not be sent: {quoted(error)}")
             return False
         except BUS_ERRORS as error:
             self.unsent += 1
-            self._lose(f"{type(error).__name__}: {error}")
+            self._lose(f"{type(error).__name__}: {quoted(error)}")
             return False
         return True
 
@@ -137,7 +166,7 @@ class Link:
         except NotImplementedError:
             return
         except BUS_ERRORS as error:
-            self._lose(f"{type(error).__name__}: {error}")
+            self._lose(f"{type(error).__name__}: {quoted(error)}")
 
     def _lose(self, why: str) -> None:
         self.losses += 1
@@ -175,6 +204,17 @@ class Link:
                 time.sleep(0.02)
                 _shut(bus)
         self._bus = self._found = None
+
+
+def _sound(message: can.Message) -> bool:
+    """Whether identifier and data are what they must be; python-can does not look at their types."""
+    number = message.arbitration_id
+    return (
+        isinstance(number, int)
+        and isinstance(message.is_extended_id, int)
+        and 0 <= number < (2**29 if message.is_extended_id else 2**11)
+        and isinstance(message.data, bytes | bytearray)
+    )
 
 
 def _shut(bus: can.BusABC) -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import bitstruct  # type: ignore[import-untyped]
 import cantools
 from cantools.database.can import Message, Signal
 
+from trpac_core.files import FileError, quoted, read_text
 from trpac_hil.errors import HilError
 
 DBC_FILE = Path(__file__).with_name("trpac.dbc")
@@ -22,6 +26,37 @@ INPUT_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion", "Chassis", "Ro
 OUTPUT_MESSAGES = ("Estimate", "EstimateWheels", "Health")
 COUNTER_OF = "_Counter"
 LIFE_COUNTER = "LifeCounter"
+
+MOST_BYTES = 16_000_000
+"""Size of a DBC file that is read [bytes]; those of a whole car have some megabytes."""
+LONGEST_MS = 60_000
+"""Greatest cycle time and age limit [ms]; from the definitions in trpac.dbc."""
+CLASSIC_BYTES, FD_SIZES = 8, (8, 12, 16, 20, 24, 32, 48, 64)
+"""Longest message of classic CAN, and lengths of a CAN FD message from there on [bytes]; ISO 11898-1."""
+LONGEST_PAYLOAD = 4095
+"""Longest message that a DBC file may describe [bytes]; ISO 15765-2. cantools writes each bit of it down."""
+MOST_BRANCHES = 1_000_000
+"""Numbers in all ranges of extended multiplexing that a DBC file may have; cantools writes each of them down."""
+GREATEST_FLOATS = {16: 65504.0, 32: 3.4028234e38, 64: 1.7976931348623157e308}
+"""Greatest number that a float of so many bits holds; IEEE 754."""
+DAMAGE = (
+    cantools.Error,
+    bitstruct.Error,
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    ArithmeticError,
+    AssertionError,
+    MemoryError,
+    NotImplementedError,
+    RecursionError,
+)
+"""What cantools raises on damaged files, when it reads them or at the first message."""
+_COMMENT_OR_TEXT = re.compile(r'//[^\n]*|"(?:\\"|[^"])*?"')
+_SIZES = re.compile(r":\s*([-+]?\d+)(?:\s*\|\s*([-+]?\d+))?")
+"""Bytes of a message, or first bit and bits of a signal, which are all that follows a colon as a number."""
+_BRANCHES, _RANGE = re.compile(r"SG_MUL_VAL_[^;]*"), re.compile(r"(\d+)\s*[-+]\s*(\d+)")
 
 
 @dataclass(frozen=True)
@@ -42,6 +77,8 @@ class Coded:
         Least and greatest value that can be sent, by signal.
     stale_ns : mapping
         Age beyond which a signal counts as lost [ns].
+    cycle_ns : int
+        How often it comes; 0 where the file does not say [ns].
     """
 
     message: Message
@@ -51,10 +88,11 @@ class Coded:
     absent: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
     stale_ns: Mapping[str, int]
+    cycle_ns: int
 
     @classmethod
     def of(cls, message: Message) -> Coded:
-        """What the DBC file says of a message."""
+        """What the DBC file says of a message; raises one of `DAMAGE`."""
         absent, stale_ns = {}, {}
         for signal in message.signals:
             for raw, name in (signal.choices or {}).items():
@@ -62,7 +100,9 @@ class Coded:
                     absent[signal.name] = float(raw * signal.scale + signal.offset)
             attributes = signal.dbc.attributes if signal.dbc else {}
             if STALE_AFTER in attributes:
-                stale_ns[signal.name] = int(attributes[STALE_AFTER].value) * 1_000_000
+                stale_ns[signal.name] = _whole_ms(
+                    attributes[STALE_AFTER].value, f"{STALE_AFTER} of {signal.name}"
+                )
         counters = [s for s in message.signals if s.name.endswith(COUNTER_OF) or s.name == LIFE_COUNTER]
         return cls(
             message,
@@ -72,6 +112,7 @@ class Coded:
             absent,
             {s.name: _bounds(s, absent.get(s.name)) for s in message.signals},
             stale_ns,
+            _whole_ms(message.cycle_time, "its cycle time") if message.cycle_time else 0,
         )
 
     def encode(self, values: Mapping[str, float], count: int = 0) -> bytes:
@@ -83,16 +124,18 @@ class Coded:
             if low <= value <= high:
                 ready[name] = value
             elif math.isnan(value):
-                ready[name] = self.absent.get(name, 0.0)
+                ready[name] = self.absent.get(name, min(max(0.0, low), high))
             else:
                 ready[name] = low if value < low else high
         return bytes(self.message.encode(ready, strict=False))
 
     def decode(self, data: bytes) -> tuple[dict[str, float], int]:
-        """Values by signal, NaN where not available, and the count, -1 without one; ValueError on too few bytes."""
-        if len(data) < self.message.length:
+        """Values by signal, NaN where not available, and the count, -1 without one; ValueError on a wrong length."""
+        least = self.message.length
+        if len(data) not in (least, _padded(least)):
             raise ValueError(
-                f"{self.message.name}: {len(data)} bytes; expected {self.message.length}, see docs/hil_dbc.md."
+                f"{self.message.name}: {len(data)} bytes; expected {least}, or these filled up to a length of CAN FD, "
+                "see docs/hil_dbc.md."
             )
         values: dict[str, float] = self.message.decode(data, decode_choices=False)  # type: ignore[assignment]
         count = int(values.pop(self.counter)) if self.counts else -1
@@ -102,10 +145,30 @@ class Coded:
         return values, count
 
 
+def _padded(length: int) -> int:
+    """The shortest CAN FD message of 8 bytes or more that such a message fits into [bytes]."""
+    return next((size for size in FD_SIZES if size >= length), length)
+
+
+def _whole_ms(value: object, what: str) -> int:
+    """A time of the DBC file [ns]; ValueError where it is none."""
+    try:
+        milliseconds = int(value)  # type: ignore[call-overload]
+    except (TypeError, ValueError, OverflowError):
+        milliseconds = 0
+    if not 0 < milliseconds <= LONGEST_MS:
+        raise ValueError(f"{what} is {quoted(value)}; expected 1 to {LONGEST_MS} ms")
+    return milliseconds * 1_000_000
+
+
 def _bounds(signal: Signal, absent: float | None) -> tuple[float, float]:
     """The range that a signal states, else what its bits can hold but for "not available"."""
-    low, high = -math.inf, math.inf
-    if not signal.is_float:
+    if signal.is_float:
+        greatest = GREATEST_FLOATS[signal.length]
+        low, high = sorted(
+            value * float(signal.scale) + float(signal.offset) for value in (-greatest, greatest)
+        )
+    else:
         raw = (0, 2**signal.length - 1)
         if signal.is_signed:
             raw = (-(2 ** (signal.length - 1)), 2 ** (signal.length - 1) - 1)
@@ -141,7 +204,7 @@ def load_codec(path: Path = DBC_FILE) -> Codec:
     Raises
     ------
     HilError
-        The file cannot be read, or lacks messages or signals: all of them are named.
+        The file cannot be read, lacks messages or signals (all of them are named), or has one that cannot be coded.
     """
     codec = _read(path)
     if path != DBC_FILE:
@@ -156,16 +219,78 @@ def load_codec(path: Path = DBC_FILE) -> Codec:
         ]
         if missing:
             raise HilError(
-                f"{path}: lacks {', '.join(missing)}. Expected all messages and signals of {DBC_FILE}."
+                f"{quoted(path)}: lacks {', '.join(missing)}. Expected all messages and signals of {DBC_FILE}."
             )
     return codec
 
 
 def _read(path: Path) -> Codec:
     try:
-        database = cantools.database.load_file(path, database_format="dbc", encoding="utf-8")
-    except (OSError, UnicodeError, ValueError, cantools.Error) as error:
+        text = read_text(path, MOST_BYTES, "a DBC file")
+    except FileError as error:
+        raise HilError(f"{error} It cannot be read as DBC file; {DBC_FILE} is one.") from error
+    try:
+        _require_sizes(text)
+        messages = cantools.database.load_string(text, "dbc").messages  # type: ignore[union-attr]
+    except DAMAGE as error:
         raise HilError(
-            f"{path}: cannot be read as DBC file ({error}). Expected one like {DBC_FILE}."
+            f"{quoted(path)}: cannot be read as DBC file ({quoted(error)}). Expected one like {DBC_FILE}."
         ) from error
-    return Codec(path, {m.name: Coded.of(m) for m in database.messages})  # type: ignore[union-attr]
+    used: Counter[object] = Counter(
+        key for m in messages for key in (m.name, (m.frame_id, m.is_extended_frame))
+    )
+    coded = {}
+    for message in messages:
+        if message.name not in INPUT_MESSAGES + OUTPUT_MESSAGES:
+            continue
+        try:
+            if used[message.name] > 1 or used[message.frame_id, message.is_extended_frame] > 1:
+                raise ValueError("its name or its identifier is there twice")
+            coded[message.name] = _tried(message)
+        except DAMAGE as error:
+            raise HilError(
+                f"{quoted(path)}: {message.name} cannot be used ({quoted(error)}). "
+                f"Expected one like that of {DBC_FILE}."
+            ) from error
+    return Codec(path, coded)
+
+
+def _require_sizes(text: str) -> None:
+    """ValueError where a message, a signal or a multiplexer is so large that cantools would fill the memory."""
+    bare = _COMMENT_OR_TEXT.sub(lambda found: " " if found[0][0] == "/" else '""', text)
+    for found in _SIZES.finditer(bare):
+        if not all(0 <= int(size) <= 8 * LONGEST_PAYLOAD for size in found.groups("0")):
+            raise ValueError(f"{quoted(found[0])}: no message has so many bytes or bits")
+    ranges = (each for found in _BRANCHES.finditer(bare) for each in _RANGE.findall(found[0]))
+    if sum(max(0, int(last) - int(first)) for first, last in ranges) > MOST_BRANCHES:
+        raise ValueError("its multiplexers have too many branches")
+
+
+def _tried(message: Message) -> Coded:
+    """A message that was sent and received; raises one of `DAMAGE` where that cannot be."""
+    longest = CLASSIC_BYTES if message.name in OUTPUT_MESSAGES else FD_SIZES[-1]
+    if not 0 < message.length <= longest:
+        raise ValueError(f"it has {message.length} bytes; expected 1 to {longest}")
+    if message.is_multiplexed():
+        raise ValueError("it is multiplexed")
+    names = [signal.name for signal in message.signals]
+    if len(set(names)) < len(names):
+        raise ValueError("a signal is there twice")
+    coded = Coded.of(message)
+    for name, (low, high) in coded.bounds.items():
+        if not -math.inf < low <= high < math.inf:
+            raise ValueError(f"{name} has no range")
+    counter = message.get_signal_by_name(coded.counter) if coded.counts else None
+    if counter and (counter.is_float or counter.is_signed or (counter.scale, counter.offset) != (1, 0)):
+        raise ValueError(f"{coded.counter} does not count by one from 0")
+    sent = [
+        coded.encode(dict.fromkeys(coded.signals, value))
+        for value in (math.nan, -math.inf, 0.0, 1.0, math.inf)
+    ]
+    for data in (*sent, *(bytes([byte]) * message.length for byte in (0x00, 0x55, 0xAA, 0xFF))):
+        values, _ = coded.decode(data)
+        if values.keys() != set(coded.signals) or not all(
+            isinstance(v, float | int) for v in values.values()
+        ):
+            raise ValueError("its signals cannot be told apart")
+    return coded

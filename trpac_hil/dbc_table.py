@@ -14,8 +14,10 @@ _HEAD = """# Messages of `trpac hil`
 
 Written by `python -m trpac_hil.dbc_table` from `trpac_hil/trpac.dbc`; do not edit. How they are used: [hil.md](hil.md).
 
-Classic CAN, 11-bit identifiers, 8 bytes, Intel byte order. "Stale after" is the age beyond which
-the rig takes a signal for lost.
+Classic CAN, 11-bit identifiers, 8 bytes, Intel byte order; a CAN FD bus may fill them up. "Stale after" is the age
+beyond which the rig takes a signal for lost. A message that comes more often than its cycle time for long has two
+senders, unless its counter goes on by one each time: its signals then count as lost, and `Status` is 2 until 1 s after
+the last sign of it.
 """
 
 

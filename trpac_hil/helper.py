@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import pickle
 import queue
 import signal
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import parent_process
 from multiprocessing.queues import SimpleQueue
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 from trpac_hil.errors import HilError
@@ -105,6 +109,35 @@ class Control:
             parent = parent_process()
             return parent is not None and not parent.is_alive()
         return False
+
+
+class Body:
+    """What a process is to do; reaches it packed, so that what it needs is loaded when the process runs."""
+
+    def __init__(self, work: Callable[..., None], arguments: Sequence[Any]) -> None:
+        self._work, self._arguments = work, tuple(arguments)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return bytes, (bytes(ForkingPickler.dumps((self._work, self._arguments))),)
+
+
+def begin(packed: bytes, with_parent: bool) -> None:
+    """Target of each process beside the loop, given a `Body`.
+
+    `with_parent` ends it with the loop's process, even while it loads; one that has something to save looks at
+    `Control.stopped` instead.
+    """
+    if with_parent:
+        threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+    work, arguments = pickle.loads(packed)
+    work(*arguments)
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager

@@ -6,10 +6,85 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from trpac_core.files import quoted
 from trpac_hil.codec import Codec, Coded
 
+MOST_OFTEN = 1.2
+"""How much more often than its cycle time says a message may come for long [-]; the clocks of a bus differ by less."""
+LONGEST_STALL_NS = 270_000_000
+"""For how long messages may be held up and then come at once [ns]; a sender that keeps no real time takes 200 ms."""
+MOST_ODD, ODD_LEAK = 5.0, 0.25
+"""Odd counts that are too many, and how many each other message makes up for [-].
+
+Two senders of one rate make every second count odd, and are noticed by 14 messages. A sender that restarts makes one;
+one of which seven messages in ten are lost at random makes one in twenty.
+"""
+ORDERLY, ORDERLY_WEIGHT = 4, 0.125
+"""Messages counted on by one from which on such a message tells of one sender, and what it then weighs [-].
+
+So a sender that counts may be eight times too fast. One that fills the gap between two true messages with all counts
+that there are, to look like one, must be faster.
+"""
+OVERFULL = 1.1
+"""How far beyond what is too much both are counted on [-]: so it ends soon after the second sender."""
+HELD_NS = 1_000_000_000
+"""For how long after the last sign of a second sender its message is not believed [ns]."""
 Say = Callable[[str, str], None]
 """Told a kind of event and a sentence; each kind is said once."""
+
+
+@dataclass
+class Senders:
+    """Whether more than one device sends a message.
+
+    Attributes
+    ----------
+    cycle_ns : int
+        How often it is due; 0 where that is not known [ns].
+    until_ns : int
+        Up to when there are two senders [ns].
+    noticed : int
+        How often there began to be.
+    """
+
+    cycle_ns: int
+    until_ns: int = -1
+    noticed: int = 0
+    _surplus: float = 0.0
+    _odd: float = 0.0
+    _orderly: int = 0
+    _at_ns: int = 0
+
+    def look(self, at_ns: int, went_on: bool, odd: bool) -> str:
+        """Count a message; returns what gives a second sender away when there begins to be one, else "".
+
+        `went_on` is whether the counter went on by one, and `odd` whether it is where one sender's never is.
+        """
+        self._orderly = self._orderly + 1 if went_on else 0
+        often = self._often(at_ns, ORDERLY_WEIGHT if self._orderly > ORDERLY else 1.0)
+        self._odd = min(max(0.0, self._odd + (1.0 if odd else -ODD_LEAK)), OVERFULL * MOST_ODD)
+        if not often and self._odd < MOST_ODD:
+            return ""
+        begins, self.until_ns = at_ns >= self.until_ns, at_ns + HELD_NS
+        self.noticed += begins
+        if not begins:
+            return ""
+        return (
+            f"it comes more often than every {self.cycle_ns * 1e-6:g} ms"
+            if often
+            else "its counter runs back"
+        )
+
+    def _often(self, at_ns: int, weight: float) -> bool:
+        """Whether more has come up to the look before than is due and could have been held up."""
+        if not self.cycle_ns:
+            return False
+        most, often = LONGEST_STALL_NS / self.cycle_ns + 1.0, False
+        if at_ns > self._at_ns:
+            self._surplus = max(0.0, self._surplus - MOST_OFTEN * (at_ns - self._at_ns) / self.cycle_ns)
+            self._at_ns, often = at_ns, self._surplus > most
+        self._surplus = min(self._surplus + weight, OVERFULL * most + 2.0)
+        return often
 
 
 @dataclass
@@ -24,15 +99,24 @@ class Heard:
         When it was there at the earliest; -1 before the first [ns].
     count : int
         Its counter.
+    data : bytes
+        Its bytes.
     values : dict
         By signal, NaN where not available.
+    senders : Senders
+        Whether more than one device sends it.
+    new : bool
+        Whether the last message, old news or not, was no old news.
     received, lost, frozen, broken : int
-        Messages that came; that the counter says are missing; whose counter stood still; that were too short.
+        Messages that came; that the counter says are missing; whose counter stood still; of a wrong length.
     """
 
     coded: Coded
+    senders: Senders
     at_ns: int = -1
     count: int = -1
+    data: bytes = b""
+    new: bool = False
     values: dict[str, float] = field(default_factory=dict)
     received: int = 0
     lost: int = 0
@@ -56,7 +140,9 @@ class Inputs:
     """
 
     def __init__(self, codec: Codec, names: tuple[str, ...], say: Say, counters: bool = True) -> None:
-        self.heard: Mapping[str, Heard] = {name: Heard(codec[name]) for name in names}
+        self.heard: Mapping[str, Heard] = {
+            name: Heard(codec[name], Senders(codec[name].cycle_ns)) for name in names
+        }
         self._by_id = {key: self.heard[c.message.name] for key, c in codec.by_id(names).items()}
         self._message_of = {signal: h for h in self.heard.values() for signal in h.coded.signals}
         self._say, self._counters = say, counters
@@ -75,29 +161,45 @@ class Inputs:
             values, count = heard.coded.decode(data)
         except ValueError as error:
             heard.broken += 1
-            self._say(f"broken {name}", f"A message was left aside: {error}")
+            self._say(f"broken {name}", f"A message was left aside: {quoted(error)}")
             return ""
+        ahead, went_on, odd = 1, False, False
         if self._counters and count >= 0 and heard.count >= 0:
             ahead = (count - heard.count) % heard.coded.counts
-            if ahead == 0:
-                heard.frozen += 1
-                self._say(
-                    f"frozen {name}",
-                    f"{name}: its counter stood still at {count}, so the message is old news. "
-                    "A sender that does not count needs --no-counters.",
-                )
-                return ""
-            heard.lost += ahead - 1
-        heard.values, heard.count, heard.at_ns = values, count, at_ns
+            went_on = ahead == 1
+            # Of two senders one's counts run back behind the other's, or are the other's with another content.
+            odd = 2 * ahead > heard.coded.counts or (ahead == 0 and heard.new and data != heard.data)
+        heard.new = ahead > 0
+        seen = heard.senders.look(at_ns, went_on, odd)
+        if seen:
+            self._say(
+                f"two senders {name}",
+                f"{name}: {seen}, so two devices send it. TRPAC is held with flag 0 until "
+                f"{HELD_NS * 1e-9:g} s after the last sign of it. Take one off the bus, or correct its cycle time.",
+            )
+        if ahead == 0:
+            heard.frozen += 1
+            self._say(
+                f"frozen {name}",
+                f"{name}: its counter stood still at {count}, so the message is old news. "
+                "A sender that does not count needs --no-counters.",
+            )
+            return ""
+        heard.lost += ahead - 1
+        heard.values, heard.count, heard.at_ns, heard.data = values, count, at_ns, data
         return name
 
     def value(self, signal: str, now_ns: int) -> float:
-        """The newest value of a signal, NaN where there is none or it is too old."""
+        """The newest value of a signal, NaN where there is none, it is too old, or two devices send it."""
         heard = self._message_of[signal]
         limit_ns = heard.coded.stale_ns.get(signal)
         if heard.at_ns < 0 or (limit_ns is not None and now_ns - heard.at_ns > limit_ns):
             return math.nan
-        return heard.values[signal]
+        return math.nan if now_ns < heard.senders.until_ns else heard.values[signal]
+
+    def doubted(self, now_ns: int) -> list[str]:
+        """Messages that two devices send."""
+        return [name for name, heard in self.heard.items() if now_ns < heard.senders.until_ns]
 
     def age_ns(self, message: str, now_ns: int) -> int:
         """Age of the newest message of a kind, -1 where none has come [ns]."""

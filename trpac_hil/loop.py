@@ -181,15 +181,17 @@ class Loop:
         self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
         sight = self._sight
         sight.share_motion(self.odometer, values)
-        heard = self._inputs.heard["RoadClass"]
-        if sight.news(heard, "RoadClass" in fresh, self.odometer, began_ns, self._events.say):
+        heard, doubted = self._inputs.heard["RoadClass"], self._inputs.doubted(began_ns)
+        if sight.news(
+            heard, "RoadClass" in fresh, "RoadClass" in doubted, self.odometer, began_ns, self._events.say
+        ):
             self._unit.give_class(sight.classes, sight.number)
         readings = self._readings(values)
         unit_began_ns = self._clock.now_ns()
         step_s = (slot - self._unit_slot) * self._deadlines.period_ns * 1e-9
         estimates = self._unit.step(self._unit_time_s, step_s, self._references, readings)
         unit_ended_ns = self._clock.now_ns()
-        status = self._judge(estimates, readings)
+        status = self._judge(estimates, readings, bool(doubted))
         if estimates is None:
             estimates, step_s = self._unit.last, 0.0
         else:
@@ -248,7 +250,7 @@ class Loop:
                 self._references = self._unit.references(tuple(self._wired))
         return [values[signal] for signal in self._wired.values()]
 
-    def _judge(self, estimates: Estimates | None, readings: Sequence[float]) -> int:
+    def _judge(self, estimates: Estimates | None, readings: Sequence[float], doubted: bool) -> int:
         """What the signal Status says of this cycle."""
         if not self._bus.up:
             return HELD_BUS
@@ -262,7 +264,7 @@ class Loop:
         if self._missing(readings):
             started = len(self._fresh) == len(REQUIRED_MESSAGES)
             return HELD_INPUT if started else STARTING
-        return RUNNING
+        return HELD_INPUT if doubted else RUNNING
 
     def _missing(self, readings: Sequence[float]) -> bool:
         """Whether signals are lost without which no wheel can be estimated; one wheel's own hold that wheel alone."""

@@ -36,7 +36,7 @@ from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
 from trpac_hil.ferry import Ferry, ferry_ring
-from trpac_hil.helper import CONTEXT, Control
+from trpac_hil.helper import CONTEXT, Body, Control, begin
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Loop
 from trpac_hil.mdf import SCRATCH_PREFIX
@@ -156,10 +156,12 @@ class Rig:
         self.dead: list[str] = []
 
     def add(self, name: str, body: Callable[..., None], *arguments: Any) -> Control:
-        """Start a process; the control is its body's last argument but what follows `...`."""
+        """Start a process, its control in the place of `...`; the recorder alone, which saves a log, may outlive us."""
         control = Control(name)
         places = [control if argument is ... else argument for argument in arguments]
-        process = CONTEXT.Process(target=body, args=tuple(places), name=f"trpac-hil-{name}")
+        process = CONTEXT.Process(
+            target=begin, args=(Body(body, places), name != "recorder"), name=f"trpac-hil-{name}"
+        )
         process.start()
         self._helpers.append((control, process))
         return control

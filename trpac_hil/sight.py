@@ -72,13 +72,19 @@ class Sight:
                 )
             )
 
-    def news(self, heard: Heard, fresh: bool, odometer: Odometer, now_ns: int, say: Say) -> bool:
+    def news(
+        self, heard: Heard, fresh: bool, doubted: bool, odometer: Odometer, now_ns: int, say: Say
+    ) -> bool:
         """Take results in; returns whether the unit is to be told something new.
 
-        `heard` is the newest message RoadClass, and `fresh` whether it has just come.
+        `heard` is the newest message RoadClass, `fresh` whether it has just come, and `doubted` whether two devices
+        send it: then nothing that came by bus counts.
         """
         placing = self.placing
         by_bus = self._results is None
+        if by_bus and doubted:
+            fresh = False
+            placing.forget()
         for result in self._by_bus(heard, fresh, now_ns, say) if by_bus else self._shared(now_ns):
             placing.take(result, odometer, self._stale_ns)
         newest = placing.newest

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fmu_src.packaging import sha256
+from trpac_core.files import file_sha256
 from trpac_hil.bus import Link
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
@@ -40,7 +40,7 @@ def summarise(
     done = said.get("done")
     return {
         "unit": unit.name,
-        "unit_sha256": sha256(unit.archive),
+        "unit_sha256": file_sha256(unit.archive),
         "wheel": settings.wheel if len(unit.wiring.wheels) == 1 else "all",
         "rate_hz": settings.rate_hz,
         "ended": ended,
@@ -75,9 +75,16 @@ def _bus(settings: HilSettings, inputs: Inputs, link: Link) -> dict[str, Any]:
         "losses": link.losses,
         "unsent": link.unsent,
         "error_frames": link.error_frames,
+        "garbled": link.garbled,
         "backlogs": link.backlogs,
         "messages": {
-            name: {"received": h.received, "lost": h.lost, "frozen": h.frozen, "broken": h.broken}
+            name: {
+                "received": h.received,
+                "lost": h.lost,
+                "frozen": h.frozen,
+                "broken": h.broken,
+                "two_senders": h.senders.noticed,
+            }
             for name, h in inputs.heard.items()
         },
     }

@@ -73,7 +73,8 @@ if __name__ == "__main__":
         ctypes.CDLL(None).prctl(DEATH_OF_PARENT, signal.SIGKILL)
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    replace_evaluators()
+
+replace_evaluators()
 
 import numpy as np  # noqa: E402
 from asammdf import MDF, Signal  # noqa: E402
