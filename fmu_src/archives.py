@@ -132,7 +132,9 @@ def _reason(error: Exception) -> str:
 
 
 @contextmanager
-def opened_archive(path: str | Path, expected: str = "a unit, a zip archive such as build_fmu.py makes") -> Iterator[Archive]:
+def opened_archive(
+    path: str | Path, expected: str = "a unit, a zip archive such as build_fmu.py makes"
+) -> Iterator[Archive]:
     """An archive of a stranger, whose directory keeps all limits and whose XML texts declare nothing.
 
     Parameters

@@ -14,8 +14,8 @@ from trpac_core.vision.images import ImageError, decode_image, raw_bgr_image
 PICTURE = np.random.default_rng(0).integers(0, 256, (80, 128, 3), dtype=np.uint8)
 
 
-def encoded(kind: str, image=PICTURE) -> bytes:
-    good, data = cv2.imencode(kind, image)
+def encoded(kind: str, image=PICTURE, settings=()) -> bytes:
+    good, data = cv2.imencode(kind, image, list(settings))
     assert good
     return data.tobytes()
 
@@ -87,7 +87,7 @@ def test_missing_empty_foreign_and_unreadable_files(tmp_path):
         decode_image(tmp_path / "empty.jpg")
     with pytest.raises(ImageError, match=r"text\.jpg: neither JPEG nor PNG"):
         decode_image(tmp_path / "text.jpg")
-    with pytest.raises(ImageError, match="cannot be read"):
+    with pytest.raises(ImageError, match="is a folder"):
         decode_image(tmp_path)
     with pytest.raises(ImageError, match="cannot be read"):
         decode_image("a\0b.jpg")
@@ -114,3 +114,46 @@ def test_raw_buffer():
         raw_bgr_image(PICTURE.tobytes()[:-1], 128, 80)
     with pytest.raises(ImageError, match="at least 64"):
         raw_bgr_image(b"", 0, 0)
+
+
+def with_scans(count: int, width: int = 4000, height: int = 3000) -> bytes:
+    """A progressive JPEG whose last pass over the picture is there so often again."""
+    data = encoded(".jpg", np.full((height, width, 3), 127, np.uint8), [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])
+    return data[:-2] + data[data.rfind(b"\xff\xda") : -2] * count + data[-2:]
+
+
+def test_a_jpeg_of_too_many_scans_is_refused_before_it_is_decoded(monkeypatch):
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("decoded"))
+    with pytest.raises(ImageError, match="4000 x 3000 pixels in 84 scans or more; expected at most 83"):
+        decode_image(with_scans(100))
+
+
+def test_an_ordinary_progressive_jpeg_is_read():
+    image = np.random.default_rng(0).integers(0, 256, (200, 300, 3), dtype=np.uint8)
+    data = encoded(".jpg", image, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])
+    assert np.array_equal(decode_image(data), cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR))
+    assert decode_image(with_scans(5, 320, 240)).shape == (240, 320, 3)
+
+
+@pytest.mark.parametrize(
+    "settings", [[], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1], [cv2.IMWRITE_JPEG_RST_INTERVAL, 3]]
+)
+@pytest.mark.parametrize("grey", [False, True])
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.5, 0.8, 0.97])
+def test_a_jpeg_cut_off_before_an_end_marker_is_cut_short(settings, grey, share):
+    image = np.random.default_rng(1).integers(0, 256, (240, 320, 3), dtype=np.uint8)
+    data = encoded(".jpg", image[..., 0] if grey else image, settings)
+    began = data.find(b"\xff\xda") + 20
+    with pytest.raises(ImageError, match="cut short"):
+        decode_image(data[: began + round(share * (len(data) - began - 2))] + b"\xff\xd9")
+
+
+@pytest.mark.parametrize(
+    "settings", [[], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1], [cv2.IMWRITE_JPEG_RST_INTERVAL, 1]]
+)
+@pytest.mark.parametrize("size", [(64, 64), (65, 71), (240, 320)])
+@pytest.mark.parametrize("level", [0, 128, 255])
+def test_a_whole_jpeg_that_looks_like_one_cut_off_is_read(settings, size, level):
+    image = np.full((*size, 3), level, np.uint8)
+    image[:40, :40] = 17
+    assert abs(int(decode_image(encoded(".jpg", image, settings))[-1, -1, 0]) - level) < 4

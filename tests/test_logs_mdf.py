@@ -1,11 +1,21 @@
 """Reading MDF: rasters, groups, invalid samples, and files that are damaged."""
 
+import json
+import os
+import subprocess
+import sys
+import time
+from io import BytesIO
+from pathlib import Path
+
 import numpy as np
 import pytest
 from asammdf import MDF, Signal
 from log_maker import make_frame
 
 from sim2real.logs import LogError, load_mapping, mdf_file, read_log, write_log
+from sim2real.logs.mdf_file import EXTRACTOR
+from sim2real.logs.table import Wanted
 
 
 @pytest.fixture
@@ -197,3 +207,80 @@ def test_a_reader_that_crashes_or_hangs_is_one_too(tmp_path, monkeypatch, capfd,
     with pytest.raises(LogError, match=expected):
         read_log(tmp_path / "log.mf4")
     assert capfd.readouterr().err == ""
+
+
+PRINTING = """
+import os, runpy, sys
+sys.argv = [sys.argv[1]]
+import asammdf
+select = asammdf.MDF.select
+asammdf.MDF.select = lambda *a, **k: (print("10 s on", flush=True), os.write(1, b"bar"), select(*a, **k))[2]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def test_what_a_library_prints_while_it_reads_is_no_part_of_the_answer(tmp_path, frame):
+    path = save_groups(tmp_path / "log.mf4", signals(frame))
+    order = {"path": str(path), "wanted": ["accel_x_m_s2"], "most_numbers": 10**6, "most_bytes": 10**9}
+    done = subprocess.run(
+        [sys.executable, "-c", PRINTING, EXTRACTOR],
+        input=json.dumps(order).encode(),
+        capture_output=True,
+        check=True,
+    )
+    assert b"10 s on" in done.stderr
+    with np.load(BytesIO(done.stdout), allow_pickle=False) as arrays:
+        assert np.array_equal(arrays["samples_0"], frame["accel_x_m_s2"])
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="the reading process hears of its parent's end on Linux alone"
+)
+def test_the_reading_process_ends_with_the_command_that_was_killed(tmp_path):
+    hold, unused = os.pipe()  # the reader's order never comes, and its input is never closed
+    starter = f"import subprocess, sys; print(subprocess.Popen([sys.executable, {str(EXTRACTOR)!r}]).pid, flush=True)"
+    starter += "; sys.stdin.close(); import time; time.sleep(60)"
+    with subprocess.Popen([sys.executable, "-c", starter], stdin=hold, stdout=subprocess.PIPE) as command:
+        reader = int(command.stdout.readline())
+        time.sleep(1.0)
+        assert Path(f"/proc/{reader}/stat").read_text().split()[2] != "Z"
+        command.kill()
+    for _ in range(100):
+        try:
+            ended = Path(f"/proc/{reader}/stat").read_text().split()[2] == "Z"
+        except FileNotFoundError:
+            ended = True
+        if ended:
+            break
+        time.sleep(0.05)
+    os.close(unused)
+    os.close(hold)
+    assert ended
+
+
+def packed(path, names, n):
+    """A log of these channels without any change, which takes next to nothing in the file."""
+    with MDF(version="4.10") as mdf:
+        mdf.append([Signal(np.zeros(n, np.int8), np.arange(n) * 1e-3, name=name) for name in names])
+        mdf.save(path, compression=2)
+    return path
+
+
+def read_mdf_columns(path):
+    wanted = Wanted(frozenset({"wheel_speed_fl_rad_s"}), base=("wheel_speed_fl_rad_s",))
+    return set(mdf_file.read_mdf(path, wanted).numbers)
+
+
+def test_a_file_that_unfolds_is_refused(tmp_path, frame):
+    """A megabyte of packed zeros is a gigabyte of samples."""
+    with pytest.raises(LogError, match="samples in the channels that are read; expected at most"):
+        read_log(packed(tmp_path / "log.mf4", frame.columns[1:11], 7_000_000))
+
+
+def test_the_process_that_reads_has_no_more_memory_than_it_needs(tmp_path, monkeypatch):
+    path = packed(tmp_path / "log.mf4", ["wheel_speed_fl_rad_s"], 3_000_000)
+    assert read_mdf_columns(path) == {"wheel_speed_fl_rad_s"}
+    monkeypatch.setattr(mdf_file, "LEAST_MEMORY_BYTES", 0)
+    monkeypatch.setattr(mdf_file, "MEMORY_PER_BYTE", 0)
+    with pytest.raises(LogError, match="cannot be read as MDF"):
+        read_mdf_columns(path)

@@ -154,7 +154,7 @@ def test_a_damaged_head_is_named_with_its_file(tmp_path, change, said):
 
 @pytest.mark.parametrize("text", ["", "no JSON", "[1, 2]", "null"])
 def test_a_head_that_is_no_table_is_refused(text):
-    with pytest.raises(ValueError, match=r"not JSON|'numbers' must be"):
+    with pytest.raises(ValueError, match=r"no JSON|'numbers' must be"):
         SceneHead.from_text(text)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -109,8 +108,6 @@ class Unit:
 
     def __init__(self, archive: Path, settings: Mapping[str, Any], wheel: str) -> None:
         """Unpack, instantiate, warm up, initialise; raises HilError where the file or a setting cannot be used."""
-        if not zipfile.is_zipfile(archive):
-            raise HilError(f"{archive}: no unit there. Build one: .venv/bin/python build_fmu.py")
         self.archive = archive
         try:
             self._folder = unpack_unit(archive)

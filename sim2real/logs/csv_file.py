@@ -23,13 +23,14 @@ from sim2real.logs.table import (
     labels_of,
     numbered,
 )
-from trpac_core.files import read_text
+from trpac_core.files import open_file, read_text
 
 MISSING = frozenset({"", "nan", "+nan", "-nan", "na", "n/a", "null"})
 """Cells that say that a sample was lost, in lower case."""
 
 MOST_BYTES = 500_000_000
 """Larger files are refused unread; in memory a file takes several times its size [bytes]."""
+EXPECTED = "a CSV file saved as UTF-8"
 LONGEST_LINE = 1_000_000
 """Characters of a row: 20,000 columns of 50."""
 MOST_ROWS = 10_000_000
@@ -40,8 +41,16 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", 
 
 def read_csv(path: Path, wanted: Wanted) -> Table:
     """Read the wanted columns of a CSV file; raises LogError where it has no rows to speak of."""
-    text = read_text(path, MOST_BYTES, "a CSV file saved as UTF-8")
-    header, records, rows, findings = _records(path, text)
+    try:
+        with (
+            open_file(path, MOST_BYTES, EXPECTED) as raw,
+            io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as file,
+        ):
+            lines = _Lines(path, file)
+            header, records, rows, findings = _records(path, lines)
+    except UnicodeDecodeError:
+        read_text(path, MOST_BYTES, EXPECTED)  # says in which row
+        raise
     count = Counter(header)
     findings += [
         Finding(f"column {name!r} stands {n} times; expected once.")
@@ -61,7 +70,7 @@ def read_csv(path: Path, wanted: Wanted) -> Table:
             findings += _bad_cells(name, cells, rows, bad)
             if not bad:
                 numbers[name] = values
-    if rows and text[-1] not in "\r\n":
+    if rows and lines.last[-1] not in "\r\n":
         findings.append(
             Finding(
                 f"row {rows[-1]} ends the file without a line break; if the recording was cut off, look at it.",
@@ -71,9 +80,9 @@ def read_csv(path: Path, wanted: Wanted) -> Table:
     return Table(tuple(header), numbers, labels, np.array(rows, dtype=np.int64), tuple(findings))
 
 
-def _records(path: Path, text: str) -> tuple[list[str], list[list[str]], list[int], list[Finding]]:
+def _records(path: Path, lines: _Lines) -> tuple[list[str], list[list[str]], list[int], list[Finding]]:
     """Header, rows that have as many cells as it, their row numbers, and what is wrong with the others."""
-    reader = csv.reader(_lines(path, text), strict=True)
+    reader = csv.reader(lines, strict=True)
     header: list[str] = []
     records, rows, ragged = [], [], []
     try:
@@ -107,18 +116,27 @@ def _records(path: Path, text: str) -> tuple[list[str], list[list[str]], list[in
     return header, records, rows, []
 
 
-def _lines(path: Path, text: str) -> Iterator[str]:
-    """The text's lines, none of them endless, and not more of them than a log has."""
-    lines = io.StringIO(text, newline="")
-    for row, line in enumerate(iter(lambda: lines.readline(LONGEST_LINE + 1), ""), start=1):
-        if len(line) > LONGEST_LINE or row > MOST_ROWS:
-            what = (
-                f"row {row} is longer than {LONGEST_LINE} characters"
-                if row <= MOST_ROWS
-                else f"has {row} rows"
+class _Lines:
+    """A file's lines, none of them endless, and not more of them than a log has; `last` is the last one."""
+
+    def __init__(self, path: Path, file: io.TextIOBase) -> None:
+        self.last = ""
+        self._path, self._file, self._row = path, file, 0
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        line = self._file.readline(LONGEST_LINE + 1)
+        if not line:
+            raise StopIteration
+        self.last, self._row = line, self._row + 1
+        if len(line) > LONGEST_LINE or self._row > MOST_ROWS:
+            raise LogError(
+                f"{self._path}: row {self._row} is longer than {LONGEST_LINE} characters, or one of more than "
+                f"{MOST_ROWS}; expected one line per sample."
             )
-            raise LogError(f"{path}: {what}; expected one line per sample, and at most {MOST_ROWS} of them.")
-        yield line
+        return line
 
 
 def _numbers(cells: list[str], identifiers: bool) -> tuple[Array, list[int]]:

@@ -16,6 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from trpac_core.files import parse_json
+
 from .classes import Surface
 
 SCENE_WIDTH_PX, SCENE_HEIGHT_PX = 32, 20
@@ -136,10 +138,7 @@ class SceneHead:
         ValueError
             Not such a text: what was expected.
         """
-        try:
-            given: Any = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise ValueError(f"not JSON: {error}") from error
+        given: Any = parse_json(text, "the network's scene")
         if not isinstance(given, Mapping) or given.get("numbers") != list(NUMBERS):
             raise ValueError(f"'numbers' must be {list(NUMBERS)}")
         arrays = {}
