@@ -8,7 +8,7 @@ BLIND_SEED ?= 1
 # The tests start hundreds of processes; without byte code each would compile every library anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test test-all check style types compiled collected format lock clean blind bench
+.PHONY: help demo test test-all check style types compiled collected format lock audit clean blind bench
 
 help:            ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -62,6 +62,9 @@ lock: $(READY)   ## resolve the dependencies anew (needs uv on PATH)
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
 	  --no-emit-index-url --no-emit-find-links \
 	  --extra fmu --extra scenarios --extra design --extra conformance --extra gap --extra hil --extra sweep --extra dev pyproject.toml -o requirements/dev.txt
+
+audit:           ## published faults of the locked packages (needs pip-audit on PATH, and the network)
+	pip-audit --strict --disable-pip --require-hashes -r requirements/dev.txt
 
 blind: $(READY)  ## the diagnosis on withheld cases, all thresholds (long; BLIND_SEED=n for other cases; newest family of forms)
 	$(BIN)/python -m benchmarks.blind run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --forms tenth --jobs 2

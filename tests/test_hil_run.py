@@ -194,7 +194,7 @@ def test_ctrl_c_ends_cleanly_with_the_log_written(unit_file: Path, tmp_path: Pat
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--fmu", "README.md"], "no unit there"),
+        (["--fmu", "README.md"], "cannot be unpacked: File is not a zip file"),
         (["--interface", "no_such", "--channel", "x"], "cannot be opened"),
         (["--frames", "requirements", "--camera", str(CAMERA)], "no pictures in this folder"),
         (["--frames", "docs"], "--camera"),

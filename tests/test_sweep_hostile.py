@@ -64,6 +64,13 @@ def sweep_of(tmp_path: Path) -> Callable[..., Sweep]:
     return make
 
 
+def plugged_in(sweep_of: Callable[..., Sweep], **changes: Any) -> Sweep:
+    """The sweep of these changes with code that its file names."""
+    with pytest.raises(ScenarioError, match="--allow-code") as refused:
+        sweep_of(**changes)
+    return load_sweep(str(refused.value).partition(": ")[0], allow_code=True)
+
+
 def one_sentence(error: BaseException) -> str:
     """The text of a refusal, which is one line that ends once."""
     text = str(error)
@@ -463,7 +470,7 @@ class Diverging:
 
 
 def test_an_estimate_that_is_no_number_is_a_failed_run_by_name(sweep_of: Callable[..., Sweep]) -> None:
-    sweep = sweep_of(estimators=["DIFE", f"{__name__}:Diverging"], runs=1)
+    sweep = plugged_in(sweep_of, estimators=["DIFE", f"{__name__}:Diverging"], runs=1)
     with pytest.raises(ValueError, match="Diverging gives an estimate that is no finite number"):
         run_one(sweep, run_keys(sweep)[0])
 
@@ -489,7 +496,7 @@ def test_table_summary_and_report_appear_together_or_not_at_all(
     assert len(os.listdir(folder)) == 5
 
 
-MARKUP = "[/bold] $x_{$ :bug: [red]\x1b[31m\n\x9b 50% \ud800 $\\frac$"
+MARKUP = "[/bold] $x_{$ :bug: [red]\x1b[31m \x9b 50% \ud800 $\\frac$"
 
 
 @pytest.mark.e2e
