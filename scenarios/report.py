@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
+from scenarios.html_page import data_address, page
 from scenarios.runner import Run
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
@@ -16,17 +14,15 @@ DASH = "–"
 
 def write_report(run: Run, figure: Path, looks: Path | None, path: Path) -> None:
     """Write the report of a run around its figure and, where there was a camera, its sheet of pictures."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATE.parent), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters["number"] = number
-    text = environment.get_template(TEMPLATE.name).render(
+    text = page(
+        TEMPLATE,
+        {"number": number},
         run=run,
         summary=run.summary,
         rows=score_rows(run.summary),
         verdict=verdict(run.summary),
-        figure=embedded(figure, "image/png"),
-        looks=embedded(looks, "image/jpeg") if looks is not None else None,
+        figure=data_address(figure.read_bytes()),
+        looks=data_address(looks.read_bytes(), "image/jpeg") if looks is not None else None,
     )
     path.write_text(text, encoding="utf-8")
 
@@ -68,8 +64,3 @@ def _convergence(score: dict[str, Any]) -> str:
 def number(value: float | None, digits: int = 3) -> str:
     """A number as the tables show it; a dash where there is none."""
     return DASH if value is None else f"{value:.{digits}f}"
-
-
-def embedded(path: Path, media_type: str) -> str:
-    """A file as a data address."""
-    return f"data:{media_type};base64,{b64encode(path.read_bytes()).decode('ascii')}"

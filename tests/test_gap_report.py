@@ -71,6 +71,16 @@ def pages():
     return {name: Page(render(diagnosis)) for name, diagnosis in drawn.items()}
 
 
+def test_text_of_files_is_text():
+    diagnosis = next(iter(BRIEF.values()))
+    said = replace(
+        diagnosis, warnings=("log <i>a</i>.csv: $x$",), provenance={"vehicle": {"path": "<i>", "sha256": "0"}}
+    )
+    page = render(said)
+    assert page.count("&lt;i&gt;") >= 2
+    assert "<i>" not in page
+
+
 @pytest.mark.parametrize("name", DIAGNOSES)
 class TestEveryVerdict:
     def test_the_page_is_whole_and_needs_nothing_beside_it(self, pages, name):

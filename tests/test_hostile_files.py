@@ -481,7 +481,7 @@ REFUSED: dict[str, Make] = {
 
 READ: dict[str, Make] = {
     "markup and mathematics in names": as_log(
-        "[bold]$x.csv", lambda path: make_frame().to_csv(path, index=False)
+        "[bold]$x<i>.csv", lambda path: make_frame().to_csv(path, index=False)
     ),
     "a file name that is a formula": as_picture(
         "=cmd|A0.png", lambda path: cv2.imwrite(str(path), road_picture(640, 480))
@@ -545,5 +545,7 @@ def test_is_read_harmlessly(name: str, command: Any, tmp_path: Path, monkeypatch
     assert told["megabytes"] < MOST_MB
     assert "Traceback" not in told["err"]
     assert not (tmp_path / "ran").exists()
+    for report in tmp_path.glob("out/report.html"):
+        assert "<i>" not in report.read_text()
     if (tmp_path / "classes.csv").exists():
         assert pd.read_csv(tmp_path / "classes.csv")["file"].tolist() == ["./=cmd|A0.png"]

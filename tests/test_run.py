@@ -28,6 +28,8 @@ SHORT_ROAD = {
         {"start_m": 4.0, "mu_left": 0.3, "mu_right": 0.3, "surface": "snow_ice"},
     ],
 }
+STRANGE = "short <i>$x_{$ [/bold]"
+"""A name that is no markup, no mathematics and no HTML."""
 SCORE_KEYS = {
     "start_m",
     "theta",
@@ -62,7 +64,7 @@ def scenario_file(tmp_path):
         "vehicle.yaml": yaml.safe_load((root / "vehicles" / "four_in_wheel_motor_ev.yaml").read_text()),
         "scenario.yaml": {
             "schema": 1,
-            "name": "short",
+            "name": STRANGE,
             "vehicle": "vehicle.yaml",
             "road": "road.yaml",
             "camera": "camera.yaml",
@@ -97,6 +99,8 @@ def test_run_writes_report_figure_log_and_scores(scenario_file, unit_file, tmp_p
     assert {"time_s", "TRPAC", "flag", "K_v", "theta_true"} <= set(log.columns)
     assert np.isfinite(log["TRPAC"]).all()
     report = (out / "report.html").read_text()
+    assert "short &lt;i&gt;" in report
+    assert "<i>" not in report
     assert 'src="http' not in report
     assert report.count("data:image/") == 2
 

@@ -496,7 +496,7 @@ def test_table_summary_and_report_appear_together_or_not_at_all(
     assert len(os.listdir(folder)) == 5
 
 
-MARKUP = "[/bold] $x_{$ :bug: [red]\x1b[31m \x9b 50% \ud800 $\\frac$"
+MARKUP = "<i>[/bold] $x_{$ :bug: [red]\x1b[31m \x9b 50% \ud800 $\\frac$"
 
 
 @pytest.mark.e2e
@@ -521,11 +521,12 @@ def test_names_of_the_file_are_text_in_every_result(
     result = CliRunner().invoke(app, ["sweep", "sweep.yaml", "--out", str(out)])
     assert result.exit_code == 0, result.output
     text = shown.getvalue()
-    assert "[/bold] $x_{$ :bug: [red]\\x1b[31m \\x9b 50% \\ud800" in text
+    assert "<i>[/bold] $x_{$ :bug: [red]\\x1b[31m \\x9b 50% \\ud800" in text
     assert f"Report: {tmp_path}/[bold]$a$[/[red]\\x1b[31m/report.html" in text
     assert "\x1b" not in text
     report = (out / "report.html").read_text()
-    assert "[/bold] $x_{$ :bug:" in report
+    assert "&lt;i&gt;[/bold] $x_{$ :bug:" in report
+    assert "<i>" not in report
     assert json.loads((out / "summary.json").read_text())["name"] == MARKUP
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import pandas as pd
 
+from scenarios.html_page import data_address, page
 from scenarios.report import number
 from scenarios.sweep import figures
 from scenarios.sweep.execute import Failure
@@ -22,13 +21,10 @@ def write_report(
     sweep: Sweep, table: pd.DataFrame, summary: dict[str, Any], failures: list[Failure], path: Path
 ) -> None:
     """Write the report of a finished sweep."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATE.parent), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters["number"] = number
-    environment.filters["never"] = lambda value: "never" if value is None else f"{value:.2f}"
     file = sweep.file
-    text = environment.get_template(TEMPLATE.name).render(
+    text = page(
+        TEMPLATE,
+        {"number": number, "never": lambda value: "never" if value is None else f"{value:.2f}"},
         name=file.name,
         description=file.description,
         runs=table["run"].nunique(),
@@ -38,7 +34,7 @@ def write_report(
         levels=summary["levels"],
         failures=[f"run {f.run} ({f.why})" for f in failures],
         enough_s=ENOUGH_SHOWN_S,
-        pictures=[(title, said, _address(data)) for title, said, data in _pictures(table)],
+        pictures=[(title, said, data_address(data)) for title, said, data in _pictures(table)],
     )
     path.write_bytes(text.encode("utf-8", "backslashreplace"))  # a name may hold half a surrogate pair
 
@@ -59,7 +55,3 @@ def _pictures(table: pd.DataFrame) -> list[tuple[str, str, bytes]]:
         said = "Slippery stretches that the tyre showed; on the right all the time on slippery stretches."
         shown.append((f"Degradation over {parameter}", said, picture))
     return shown
-
-
-def _address(data: bytes) -> str:
-    return f"data:image/png;base64,{b64encode(data).decode('ascii')}"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import pandas as pd
 
+from scenarios.html_page import data_address, page
 from scenarios.whole_files import written_whole
 from sim2real.replay import figures
 from sim2real.replay.run import DYNAMICS, OURS, Replay
@@ -65,23 +64,21 @@ def write_replay(done: Replay, summary: dict[str, Any], folder: Path) -> tuple[P
 
 def render(done: Replay, summary: dict[str, Any]) -> str:
     """The report as one HTML page that needs nothing beside it."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATE.parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(number=number, percent=percent)
     pictures = {
-        "estimate": _address(figures.estimate(done)),
-        "wheels": _address(figures.wheels(done)),
-        "curve": _address(figures.curve(done)),
+        "estimate": data_address(figures.estimate(done)),
+        "wheels": data_address(figures.wheels(done)),
+        "curve": data_address(figures.curve(done)),
     }
     if len(done.traces) > 2:
-        pictures["compared"] = _address(figures.compared(done))
-    return environment.get_template(TEMPLATE.name).render(
-        s=summary, pictures=pictures, verdict=verdict(summary), ours=OURS, dynamics=DYNAMICS
+        pictures["compared"] = data_address(figures.compared(done))
+    return page(
+        TEMPLATE,
+        {"number": number, "percent": percent},
+        s=summary,
+        pictures=pictures,
+        verdict=verdict(summary),
+        ours=OURS,
+        dynamics=DYNAMICS,
     )
 
 
@@ -118,7 +115,3 @@ def number(value: float | None, digits: int = 3) -> str:
 def percent(share: float | None) -> str:
     """A share of 1 as per cent."""
     return DASH if share is None or not np.isfinite(share) else f"{100.0 * share:.0f} %"
-
-
-def _address(png: bytes) -> str:
-    return f"data:image/png;base64,{b64encode(png).decode('ascii')}"

@@ -5,15 +5,15 @@ from __future__ import annotations
 import io
 import json
 import math
-from base64 import b64encode
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
 from scenarios.effects import EFFECTS
+from scenarios.html_page import data_address, page
 from scenarios.whole_files import written_whole
 from sim2real.how_far.rating import rate
 from sim2real.result import (
@@ -90,23 +90,18 @@ class Picture:
 
 def render(diagnosis: Diagnosis) -> str:
     """The report as one HTML page that needs nothing beside it."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATE.parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(
-        number=number,
-        percent=percent,
-        estimate=estimate,
-        is_number=math.isfinite,
-        words=figures.words,
-        unit=figures.pretty_unit,
-        label=figures.label_of,
-    )
-    return environment.get_template(TEMPLATE.name).render(
+    filters: dict[str, Callable[..., str | bool]] = {
+        "number": number,
+        "percent": percent,
+        "estimate": estimate,
+        "is_number": math.isfinite,
+        "words": figures.words,
+        "unit": figures.pretty_unit,
+        "label": figures.label_of,
+    }
+    return page(
+        TEMPLATE,
+        filters,
         d=diagnosis,
         meaning=MEANING[diagnosis.verdict],
         colours=figures,
@@ -179,7 +174,7 @@ def profile_csv(manoeuvre: NextManoeuvre) -> str:
     text = io.StringIO()
     table = np.column_stack([manoeuvre.time_s, manoeuvre.wheel_torque_nm])
     np.savetxt(text, table, fmt="%.6g", delimiter=",", header=",".join(names), comments="")
-    return _address(text.getvalue().encode("ascii"), "text/csv")
+    return data_address(text.getvalue().encode("ascii"), "text/csv")
 
 
 def provenance_rows(value: Any, label: str = "") -> list[tuple[str, str, str]]:
@@ -218,11 +213,7 @@ def _pictures(diagnosis: Diagnosis) -> dict[str, Picture]:
 
 
 def _picture(png: bytes, alt: str) -> Picture:
-    return Picture(_address(png, "image/png"), alt)
-
-
-def _address(data: bytes, media_type: str) -> str:
-    return f"data:{media_type};base64,{b64encode(data).decode('ascii')}"
+    return Picture(data_address(png, "image/png"), alt)
 
 
 def number(value: float | None, digits: int = 2) -> str:
