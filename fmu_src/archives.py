@@ -15,6 +15,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from scenarios.whole_files import written_whole
+from trpac_core.errors import TrpacError
 from trpac_core.files import FileError, open_file, quoted
 
 MOST_BYTES = 500_000_000
@@ -43,7 +44,7 @@ DAMAGED = (
 MEND = "Copy or build it again."
 
 
-class UnitFileError(ValueError):
+class UnitFileError(TrpacError):
     """A unit's file cannot be used; the text says why and what to do."""
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import pythonfmu
 
 from scenarios.whole_files import written_whole
+from trpac_core.errors import TrpacError
 from trpac_core.files import quoted
 
 from .archives import UnitFileError, opened_archive
@@ -78,7 +79,7 @@ class Slave:
         return self.files[-1].removesuffix(".py")
 
 
-class BuildError(ValueError):
+class BuildError(TrpacError):
     """The unit cannot be built; the text lists everything that is wrong."""
 
 
@@ -224,11 +225,13 @@ def _binaries(name: str) -> dict[str, bytes]:
 
 
 def _licences() -> dict[str, bytes]:
-    files = {"documentation/licenses/license.txt": (Path(__file__).parent.parent / "LICENSE").read_bytes()}
-    for path in distribution("pythonfmu").files or []:
-        if path.name == "LICENSE":
-            files["documentation/licenses/pythonfmu.txt"] = Path(str(path.locate())).read_bytes()
-    return files
+    names = {"trpac-fmu": "license.txt", "pythonfmu": "pythonfmu.txt"}
+    return {
+        f"documentation/licenses/{name}": Path(str(path.locate())).read_bytes()
+        for package, name in names.items()
+        for path in distribution(package).files or []
+        if path.name == "LICENSE"
+    }
 
 
 def _digest(description: bytes, content: dict[str, bytes]) -> str:

@@ -14,7 +14,9 @@ from .packaging import Slave
 
 ROOT = Path(__file__).parent.parent
 MODELS = ROOT / "models"
-CORE_FILES = {place: ROOT / place for place in ("trpac_core/__init__.py", "trpac_core/files.py")}
+CORE_FILES = {
+    place: ROOT / place for place in ("trpac_core/__init__.py", "trpac_core/errors.py", "trpac_core/files.py")
+}
 """What every unit carries of the core."""
 NETWORKS = (MODELS / "segmenter.onnx", MODELS / "surface.onnx")
 STEP_S, STOP_S = 0.001, 10.0
@@ -41,6 +43,7 @@ PLANT_MODULES = (
     "scenarios/__init__.py",
     "scenarios/errors.py",
     "scenarios/files.py",
+    "scenarios/library.py",
     "scenarios/strict.py",
     "scenarios/yaml_text.py",
     "scenarios/effects",

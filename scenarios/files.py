@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from scenarios.effects import EFFECTS, FORMS, Effect, make_effect, problems_of
 from scenarios.errors import ScenarioError
+from scenarios.library import located
 from scenarios.strict import Model, load_strict
 from trpac_core.vehicle import WHEELS, Vehicle
 from trpac_core.vision.classes import Surface
@@ -283,23 +284,23 @@ class Scenario:
 
 
 def load_vehicle(path: str | Path) -> VehicleFile:
-    """Read vehicle.yaml; raises ScenarioError."""
-    return load_strict(path, VehicleFile)
+    """Read vehicle.yaml, or the shipped vehicle of a name; raises ScenarioError."""
+    return load_strict(located("vehicle", path), VehicleFile)
 
 
 def load_road(path: str | Path) -> RoadFile:
-    """Read road.yaml; raises ScenarioError."""
-    return load_strict(path, RoadFile)
+    """Read road.yaml, or the shipped road of a name; raises ScenarioError."""
+    return load_strict(located("road", path), RoadFile)
 
 
 def load_manoeuvre(path: str | Path) -> Manoeuvre:
-    """Read manoeuvre.yaml; raises ScenarioError."""
-    return load_strict(path, Manoeuvre)
+    """Read manoeuvre.yaml, or the shipped manoeuvre of a name; raises ScenarioError."""
+    return load_strict(located("manoeuvre", path), Manoeuvre)
 
 
 def load_scenario(path: str | Path) -> Scenario:
-    """Read scenario.yaml and the files that it names; raises ScenarioError."""
-    path = Path(path)
+    """Read scenario.yaml, or the shipped one of a name, and the files that it names; raises ScenarioError."""
+    path = located("scenario", path)
     file = load_strict(path, ScenarioFile)
     problems: list[str] = []
 

@@ -21,7 +21,7 @@ from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order, counts, read_order, without_swing
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
-from sim2real.result import Diagnosis, Measure, TrpacError, Verdict, added
+from sim2real.result import Diagnosis, Measure, RmsError, Verdict, added
 from sim2real.sides import camera_side, counter_side
 from sim2real.sources import Source, Sources, read_source, read_sources
 from sim2real.telling.findings import Findings, describe
@@ -106,7 +106,7 @@ def diagnose_files(
     )
 
 
-def _estimate(findings: Findings, sources: Sources) -> TrpacError | None:
+def _estimate(findings: Findings, sources: Sources) -> RmsError | None:
     """What the found effects do to the estimator's own error."""
     held = sources.holdout
     measured = "mu_reference" in held.log.signals and "mu_reference" not in held.log.derived

@@ -225,7 +225,7 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
-class TrpacError:
+class RmsError:
     """Root mean square error of the estimator's TRPAC on the hold-out, excited time only [-].
 
     `before` with the simulation's model in the estimator, `after` with the found effect's parameters where they have a
@@ -277,7 +277,7 @@ class Diagnosis:
     cannot_rule_out: tuple[str, ...] = ()
     next_manoeuvre: NextManoeuvre | None = None
     unexplained: Unexplained | None = None
-    trpac: TrpacError | None = None
+    trpac: RmsError | None = None
     rating: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     """ISO/TS 18571 rating per signal, before and after; None where it is not defined."""
     traces: tuple[Trace, ...] = ()

@@ -15,8 +15,8 @@ from sim2real.result import (
     Measure,
     NextManoeuvre,
     Place,
+    RmsError,
     Trace,
-    TrpacError,
     Unexplained,
     Verdict,
 )
@@ -130,7 +130,7 @@ def identified() -> Diagnosis:
         heat_map=HEAT_MAP,
         causes=_causes(("tyre_relaxation", 0.93, {"length_m": LENGTH}, 1.1, 73.0), *OTHERS),
         cannot_rule_out=("camera_pitch",),
-        trpac=TrpacError(
+        trpac=RmsError(
             0.081, 0.034, "road.yaml's friction", "The estimator's own tyre model has no place for a lag."
         ),
         rating={

@@ -10,6 +10,8 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
+from trpac_core.errors import TrpacError
+
 LONGEST_QUOTE = 200
 """Characters of a file's own text, or of its name, that a message repeats."""
 MOST_HASHED_BYTES = 10_000_000_000
@@ -17,7 +19,7 @@ MOST_HASHED_BYTES = 10_000_000_000
 CHUNK_BYTES = 1 << 20
 
 
-class FileError(OSError, ValueError):
+class FileError(OSError, TrpacError):
     """A file is not to be read: its name, why, and what was expected."""
 
 

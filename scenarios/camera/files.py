@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from scenarios.library import located
 from scenarios.strict import load_strict
 from trpac_core.vision.camera import Camera
 
@@ -44,7 +45,7 @@ class CameraFile(BaseModel):
 
 
 def load_camera(path: str | Path) -> Camera:
-    """Read camera.yaml; raises one ScenarioError that lists all problems of the file."""
-    values = load_strict(path, CameraFile).model_dump(exclude={"schema_"})
+    """Read camera.yaml, or the shipped camera of a name; raises ScenarioError with all problems of the file."""
+    values = load_strict(located("camera", path), CameraFile).model_dump(exclude={"schema_"})
     k1, k2, p1, p2, k3 = values.pop("distortion")
     return Camera(distortion=(k1, k2, p1, p2, k3), **values)

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from fmu_src.units import UNITS
-from scenarios.effects import suggestion
-from scenarios.errors import ScenarioError
+from scenarios.errors import ScenarioError, suggestion
 from scenarios.files import Scenario, SurfaceName, load_scenario
+from scenarios.library import located
 from scenarios.strict import load_strict
 from scenarios.sweep.trackers import ADDRESS, problem_of_address, problem_of_tracker
 from trpac_core.files import quoted
@@ -300,7 +300,7 @@ def load_sweep(path: str | Path, *, allow_code: bool = False) -> Sweep:
     allow_code : bool
         Whether estimators may be package.module:function, which is imported and run; else that is a problem.
     """
-    path = Path(path)
+    path = located("sweep", path)
     file = load_strict(path, SweepFile)
     addresses = [name for name in file.estimators if ADDRESS.fullmatch(name)]
     if addresses and not allow_code:

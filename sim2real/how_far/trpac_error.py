@@ -24,7 +24,7 @@ from scenarios.plant.dynamics import DynamicsParameters
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
 from sim2real.observing.noise import read_noise
 from sim2real.observing.observer import Prediction, Simulation
-from sim2real.result import TrpacError
+from sim2real.result import RmsError
 from trpac_core.elastic import AS_TOLD
 from trpac_core.estimator import LOCKED_M_S, EstimatorConfig, TrpacEstimator
 from trpac_core.readings import Sensors, filter_share
@@ -110,7 +110,7 @@ def trpac_error(
     drive: Drive,
     added: Sequence[Effect],
     mu_reference: Array | None = None,
-) -> TrpacError | None:
+) -> RmsError | None:
     """Error of the estimator with the simulation's model in it, and with the effects that were found.
 
     A run is judged where the tyre truly shows the road's friction (at the slip and load that the simulation with
@@ -136,7 +136,7 @@ def trpac_error(
 
     Returns
     -------
-    TrpacError or None
+    RmsError or None
         None where the tyre is never excited, nor taken to be by either run. Where only one of them has anything to
         be judged by, the other is held to account over the same rows, with the estimate that it holds.
 
@@ -167,7 +167,7 @@ def trpac_error(
         for run, mask in zip((first, second), rows, strict=True)
     )
     said = (_placed(simulation, added, drive), _judgement(own, drive.step_s))
-    return TrpacError(before, after, _against(mended, mu_reference), " ".join(said))
+    return RmsError(before, after, _against(mended, mu_reference), " ".join(said))
 
 
 def places(effect: Effect, parameters: DynamicsParameters) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from trpac_core.errors import TrpacError
 from trpac_core.files import FileError, quoted, read_bytes
 
 LEAST_SIDE_PX = 64
@@ -35,7 +36,7 @@ _JPEG_UNDECODED = 128
 """Value of each channel where the decoder had no data."""
 
 
-class ImageError(ValueError):
+class ImageError(TrpacError):
     """A picture that cannot be used; the text names it and what was expected."""
 
 

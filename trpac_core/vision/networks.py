@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from trpac_core.errors import TrpacError
+
 from .classes import Surface
 from .onnx_runtime import ort, ort_errors
 from .picture import LOOK_HEIGHT_PX, LOOK_WIDTH_PX, picture_looks
@@ -41,7 +43,7 @@ _RUNTIME_ERRORS = (
 CLASS_LIST = ",".join(surface.label for surface in Surface)
 
 
-class ModelError(ValueError):
+class ModelError(TrpacError):
     """A network file that cannot be used; the text names the file and what was expected."""
 
 

@@ -1,0 +1,44 @@
+"""What comes with the package, by name: scenarios, vehicles, roads, manoeuvres, cameras and sweeps."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from scenarios.errors import ScenarioError, suggestion
+from trpac_core.files import quoted
+
+FOLDERS = {
+    "scenario": "",
+    "vehicle": "vehicles",
+    "road": "roads",
+    "manoeuvre": "manoeuvres",
+    "camera": "cameras",
+    "sweep": "sweeps",
+}
+"""Folder of each kind of file."""
+
+
+def shipped(kind: str) -> dict[str, Path]:
+    """The shipped files of a kind by their names, in alphabetical order."""
+    folder = Path(str(files(__package__))) / FOLDERS[kind]
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def located(kind: str, given: str | Path) -> Path:
+    """The file that is meant: a path as it is, and a word without ending and folder as the shipped file of that name.
+
+    Raises
+    ------
+    ScenarioError
+        A word that is neither a file nor a shipped name.
+    """
+    path = Path(given)
+    if path.suffix or len(path.parts) != 1 or path.exists():
+        return path
+    known = shipped(kind)
+    if path.name not in known:
+        raise ScenarioError(
+            f"{quoted(path)}: neither a file nor the name of a shipped {kind}; {suggestion(path.name, known)}"
+        )
+    return known[path.name]
