@@ -5,6 +5,8 @@ from __future__ import annotations
 from importlib.metadata import version
 from pathlib import Path
 
+from scenarios.library import networks_folder
+
 from .interface import TRPAC_ESTIMATOR
 from .interface_4w import TRPAC_ESTIMATOR_4W
 from .interface_plant import REFERENCE_PLANT
@@ -13,12 +15,11 @@ from .model_description import UnitInfo
 from .packaging import Slave
 
 ROOT = Path(__file__).parent.parent
-MODELS = ROOT / "models"
 CORE_FILES = {
     place: ROOT / place for place in ("trpac_core/__init__.py", "trpac_core/errors.py", "trpac_core/files.py")
 }
 """What every unit carries of the core."""
-NETWORKS = (MODELS / "segmenter.onnx", MODELS / "surface.onnx")
+NETWORKS = (networks_folder() / "segmenter.onnx", networks_folder() / "surface.onnx")
 STEP_S, STOP_S = 0.001, 10.0
 
 ESTIMATOR_PACKAGES = {"numpy": "numpy", "cv2": "opencv-python-headless", "onnxruntime": "onnxruntime"}

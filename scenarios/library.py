@@ -19,6 +19,11 @@ FOLDERS = {
 """Folder of each kind of file."""
 
 
+def networks_folder() -> Path:
+    """The folder of the trained networks: segmenter.onnx, surface.onnx, picture.onnx."""
+    return Path(str(files("models")))
+
+
 def shipped(kind: str) -> dict[str, Path]:
     """The shipped files of a kind by their names, in alphabetical order."""
     folder = Path(str(files(__package__))) / FOLDERS[kind]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario
+from scenarios.library import networks_folder
 from scenarios.runner import Run
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
@@ -20,7 +21,6 @@ from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.results import FrameResult
 from trpac_core.vision.trajectory import Motion
 
-MODELS = Path(__file__).resolve().parents[1] / "models"
 CLASS_BGR = {Surface.DRY: (60, 160, 240), Surface.WET: (230, 140, 40), Surface.SNOW_ICE: (220, 80, 200)}
 ROAD_BGR, SHADOW_BGR = (90, 200, 90), (200, 90, 90)
 LINE_BGR = (0, 230, 255)
@@ -42,7 +42,11 @@ def image_estimator(scenario: Scenario) -> Ife:
         wheelbase_m=car.wheelbase_m,
         side="left" if scenario.wheel.endswith("l") else "right",
     )
-    return Ife(config, Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx"))
+    return Ife(
+        config,
+        Segmenter(networks_folder() / "segmenter.onnx"),
+        SurfaceClassifier(networks_folder() / "surface.onnx"),
+    )
 
 
 def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArray[np.uint8]:

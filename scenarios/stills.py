@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from scenarios.looks import MODELS
+from scenarios.library import networks_folder
 from scenarios.whole_files import written_whole
 from trpac_core.files import quoted
 from trpac_core.vision.classes import Surface
@@ -114,7 +114,7 @@ def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tup
     ModelError
         If a network file cannot be used.
     """
-    networks = StillNetworks.load(MODELS)
+    networks = StillNetworks.load(networks_folder())
     rows, problems = [], []
     for done, file in enumerate(files, start=1):
         try:

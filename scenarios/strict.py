@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -14,6 +14,7 @@ from scenarios.yaml_text import YamlError, parse_yaml
 from trpac_core.files import FileError, quoted, read_text
 
 Model = TypeVar("Model", bound=BaseModel)
+Made = TypeVar("Made")
 
 MOST_BYTES = 1_000_000
 """Larger files are refused unread; a road of 10,000 segments has 900,000 [bytes]."""
@@ -35,8 +36,25 @@ def load_strict(path: str | Path, model: type[Model]) -> Model:
     if not isinstance(data, dict):
         # Not a word of it: whoever named the wrong file need not see it in a log.
         raise ScenarioError(f"{name}: holds no keys at its top; expected lines of `key: value`.")
+    return made(model.model_validate, model, name, data)
+
+
+def made(make: Callable[..., Made], model: type[BaseModel], name: str, data: dict[str, Any]) -> Made:
+    """What `make` gives for the values of a model; all that is wrong with them in one ScenarioError.
+
+    Parameters
+    ----------
+    make : callable
+        The model's own making: from one mapping, or from keywords.
+    model : type
+        The model, whose keys are known.
+    name : str
+        What messages call the values.
+    data : dict
+        The values.
+    """
     try:
-        return model.model_validate(data)
+        return make(data) if getattr(make, "__name__", "") == "model_validate" else make(**data)
     except ValidationError as error:
         raise ScenarioError("\n".join(f"{name}: {text}" for text in _problems(error, model))) from error
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.film import Film, Strip, dark, shown
-from scenarios.looks import MODELS
+from scenarios.library import networks_folder
 from scenarios.stills import PICTURE_ENDINGS, Progress, cell_of, pictures_in, silent
 from scenarios.whole_files import written_whole
 from trpac_core.files import FileError, file_sha256, quoted, require_file
@@ -177,7 +177,10 @@ def run_frames(
     if folders := [name for name in WRITTEN if (out / name).is_dir()]:
         raise ScenarioError(f"{out / folders[0]}: a folder. Expected none: a file of that name is written.")
     camera = load_camera(camera_file)
-    segmenter, classifier = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
+    segmenter, classifier = (
+        Segmenter(networks_folder() / "segmenter.onnx"),
+        SurfaceClassifier(networks_folder() / "surface.onnx"),
+    )
     watcher = _Watcher(
         segmenter,
         Ife(IfeConfig(camera=camera), segmenter, classifier),
@@ -287,5 +290,7 @@ def _summary(
         "annotated": FILM if film else None,
         "strip": STRIP,
         "versions": {package: version(package) for package in PACKAGES},
-        "model_sha256": {file: file_sha256(MODELS / file) for file in ("segmenter.onnx", "surface.onnx")},
+        "model_sha256": {
+            file: file_sha256(networks_folder() / file) for file in ("segmenter.onnx", "surface.onnx")
+        },
     }

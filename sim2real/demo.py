@@ -20,13 +20,14 @@ from scenarios.files import (
     VehicleFile,
     load_vehicle,
 )
+from scenarios.library import shipped
 from scenarios.plant import simulate
 from scenarios.plant.sensors import make_log, write_log
 from scenarios.whole_files import written_whole
 from scenarios.yaml_text import to_yaml
 from trpac_core.files import parse_json, read_bytes
 
-VEHICLE = Path(__file__).parents[1] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml"
+VEHICLE = shipped("vehicle")["four_in_wheel_motor_ev"]
 
 HIDDEN: dict[str, dict[str, tuple[float, float]]] = {
     "accelerometer_bias": {"bias_m_s2": (0.15, 0.4)},

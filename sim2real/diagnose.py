@@ -81,8 +81,20 @@ def diagnose_files(
     """
     progress("reading", 0, 1)
     sources = read_sources(vehicle, road, fit, holdout, mapping)
-    provenance = _provenance(sources)  # now: the files may be others when the fits are done
     progress("reading", 1, 1)
+    return diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
+
+
+def diagnose_sources(
+    sources: Sources,
+    *,
+    seed: int = 0,
+    exclude: Collection[str] = (),
+    jobs: int = 1,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Diagnose logs that have been read; see `diagnose_files`."""
+    provenance = _provenance(sources)  # now: the files may be others when the fits are done
     drives = [s.drive for s in sources.all]
     model = Simulation(sources.vehicle)
     findings = find(model, drives[:-1], drives[-1], exclude=exclude, jobs=jobs, progress=progress)
@@ -258,8 +270,12 @@ def _origin(source: Source) -> dict[str, object]:
     return {**log, "road": _file(source.road_path), "rate_hz": source.log.rate_hz}
 
 
-def _file(path: Path) -> dict[str, str]:
-    return {"path": str(path), "sha256": file_sha256(path)}
+def _file(path: Path | None) -> dict[str, str | None]:
+    """A file's path and hash; neither where it was no file."""
+    return {
+        "path": None if path is None else str(path),
+        "sha256": None if path is None else file_sha256(path),
+    }
 
 
 def shrink_on(diagnosis: Diagnosis, log: Path, road: Path) -> float:

@@ -45,7 +45,7 @@ class Source:
 
     log: Log
     road: RoadFile
-    road_path: Path
+    road_path: Path | None
     drive: Drive
 
     def on_rows(self, signal: str) -> Array:
@@ -58,7 +58,7 @@ class Sources:
     """All that a diagnosis reads."""
 
     vehicle: VehicleFile
-    vehicle_path: Path
+    vehicle_path: Path | None
     fit: tuple[Source, ...]
     holdout: Source
 
@@ -107,11 +107,16 @@ def read_sources(
             problems.append(str(error))
     if problems or car is None:
         raise ScenarioError("\n".join(dict.fromkeys(problems)))
+    return put_together(car, vehicle, found)
+
+
+def put_together(car: VehicleFile, vehicle_path: Path | None, found: Sequence[Source]) -> Sources:
+    """A diagnosis' sources: those that are fitted to and, the last one, the hold-out."""
     *fitted, held = (with_turns_told(source, car) for source in told_apart(found))
     if any(s.log.sha256 == held.log.sha256 for s in fitted):
         told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
         held = replace(held, log=held.log.warned(told))
-    return Sources(car, vehicle, tuple(fitted), held)
+    return Sources(car, vehicle_path, tuple(fitted), held)
 
 
 def with_turns_told(source: Source, vehicle: VehicleFile) -> Source:
@@ -167,17 +172,22 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
         problems.append(str(error))
     if course is None or log is None:
         raise ScenarioError("\n".join(problems))
+    return make_source(log, course, road_path)
+
+
+def make_source(log: Log, road: RoadFile, road_path: Path | None = None) -> Source:
+    """A log with its road, made ready; raises ScenarioError where it tells of no driving."""
     grid = on_grid(log)
-    whole = drive_of(log, course, grid)
+    whole = drive_of(log, road, grid)
     drive = awake(whole)
     if not drive.moving.any():
         raise ScenarioError(
-            f"{log_path}: the car never moves forward on all wheels; expected a log of driving."
+            f"{log.path}: the car never moves forward on all wheels; expected a log of driving."
         )
     told_s = float(drive.time_s[-1] - drive.time_s[0])
     if told_s < MIN_DURATION_S:
         raise ScenarioError(
-            f"{log_path}: tells how fast the car is in its last {told_s:.3g} s alone; expected at least "
+            f"{log.path}: tells how fast the car is in its last {told_s:.3g} s alone; expected at least "
             f"{MIN_DURATION_S:g} s."
         )
     asleep_s = float(drive.time_s[0] - whole.time_s[0])
@@ -193,7 +203,7 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     if back_s > 0.0:
         left_out = f"{back_s:.3g} s are left out: a wheel turns back, or has just done so, which the plant's never do."
         log = log.warned(left_out)
-    return Source(log, course, road_path, drive)
+    return Source(log, road, road_path, drive)
 
 
 def _untold_s(time_s: Array, signals: dict[str, Array]) -> float:

@@ -12,11 +12,12 @@ from log_maker import make_frame, save
 from typer.testing import CliRunner
 
 from scenarios.files import load_scenario, load_vehicle
+from scenarios.library import networks_folder
 from scenarios.plant.pipeline import drive
 from scenarios.plant.sensors import make_scenario_log
 from sim2real.logs import read_log, write_log
 from sim2real.replay.camera import camera_side
-from sim2real.replay.estimate import MODELS, TABLE_3, estimate_files
+from sim2real.replay.estimate import TABLE_3, estimate_files
 from sim2real.replay.inputs import make_inputs, white_noise
 from sim2real.replay.run import OURS, readings, replay
 from sim2real.replay.score import score
@@ -220,7 +221,7 @@ class TestCamera:
         car = load_vehicle(TABLE_3)
         read = read_log(save(log, tmp_path / "d.csv"))
         inputs = make_inputs(read, car)
-        return inputs, camera_side(read, inputs, car, None, MODELS)
+        return inputs, camera_side(read, inputs, car, None, networks_folder())
 
     def test_classes_of_the_log_are_used(self, with_classes, tmp_path):
         inputs, side = self.side(with_classes, tmp_path)

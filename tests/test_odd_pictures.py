@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 from benchmarks.odd_pictures import KINDS, verdicts
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
-from scenarios.looks import MODELS
+from scenarios.library import networks_folder
 from trpac_cli.main import app
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
@@ -112,8 +112,8 @@ def files(tmp_path_factory) -> Path:
 def ife() -> Ife:
     return Ife(
         IfeConfig(groups_looked_at=1),
-        Segmenter(MODELS / "segmenter.onnx"),
-        SurfaceClassifier(MODELS / "surface.onnx"),
+        Segmenter(networks_folder() / "segmenter.onnx"),
+        SurfaceClassifier(networks_folder() / "surface.onnx"),
     )
 
 

@@ -19,7 +19,7 @@ from benchmarks.table4.scores import blocks_of, confusion, gate, n_w, share, wil
 from benchmarks.table4.sequences import Sequence, majority
 from models.training.rendered import SEED_RANGES
 from scenarios.camera.renderer import Renderer
-from scenarios.looks import MODELS
+from scenarios.library import networks_folder
 from scenarios.strict import load_strict
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
@@ -33,7 +33,7 @@ SOURCES = load_strict(ASSUMED, AssumedFile).sources
 
 @pytest.fixture(scope="module")
 def networks():
-    return Networks.load(MODELS)
+    return Networks.load(networks_folder())
 
 
 def seen(camera, usable=((0.0, 0.0, 1.0, 1.0),)):
@@ -195,7 +195,7 @@ def test_the_command_judges_keeps_and_says_what_it_leaves_out(tmp_path, monkeypa
     (data / "manifest.csv").write_text("\n".join(rows) + "\n")
     asked = [
         "--models",
-        MODELS,
+        networks_folder(),
         "--data",
         data,
         "--frames-cache",
@@ -231,8 +231,10 @@ def test_kept_verdicts_are_read_as_they_were_written(tmp_path, monkeypatch, netw
     monkeypatch.setattr(drives, "FRAMES", 2)
     monkeypatch.setattr(drives, "SCALE", 0.25)
     (sequence,), _ = drives.rendered_drives(tmp_path, 1, lambda *_: None)
-    fresh = command._kept(sequence, MODELS, "w/ interference", tmp_path, lambda: networks)
-    again = command._kept(sequence, MODELS, "w/ interference", tmp_path, lambda: pytest.fail("judged twice"))
+    fresh = command._kept(sequence, networks_folder(), "w/ interference", tmp_path, lambda: networks)
+    again = command._kept(
+        sequence, networks_folder(), "w/ interference", tmp_path, lambda: pytest.fail("judged twice")
+    )
     assert (fresh["found"] == judged(sequence, networks, "w/ interference")["found"]).all(), "a run repeats"
     pd.testing.assert_frame_equal(again, fresh)
     measured = Measured(

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from scenarios import film, stills
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
-from scenarios.looks import MODELS
+from scenarios.library import networks_folder
 from scenarios.stills import CLASSIFY_COLUMNS, StillNetworks, patch_logs
 from scenarios.vision_runs import FRAME_COLUMNS, Frames, run_frames
 from trpac_cli.main import app
@@ -303,7 +303,10 @@ def test_what_cannot_be_read_does_not_count_and_alone_is_refused():
 
 def as_the_estimator_says(folder, table):
     """Hold rows to the estimator's own verdicts; the car drives on half a metre from row to row."""
-    networks = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
+    networks = (
+        Segmenter(networks_folder() / "segmenter.onnx"),
+        SurfaceClassifier(networks_folder() / "surface.onnx"),
+    )
     ife, state = Ife(IfeConfig(camera=SMALL), *networks), IfeState()
     for number, row in table.iterrows():
         motion = Motion(SPEED_M_S, way_m=SPEED_M_S / FPS * number)

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from typing import NoReturn
 
-OURS = ("fmu_src", "models", "scenarios", "sim2real", "trpac_cli", "trpac_core", "trpac_hil")
-EXTRAS = "fmu,scenarios,gap,hil,sweep,design"
+from trpac.extras import MissingExtraError, missing
 
 
 def main() -> None:
     """Run the command line; exits with 2 where one of its packages is missing, with 143 after SIGTERM."""
     signal.signal(signal.SIGTERM, _leave)
+    os.environ.setdefault("MPLBACKEND", "Agg")  # files are drawn, no windows
     try:
         from trpac_cli.main import app
 
         app()
     except ModuleNotFoundError as error:
-        missing = (error.name or "").partition(".")[0]
-        if missing in OURS:
+        text = missing(error)
+        if text is None:
             raise
-        print(
-            f"trpac: needs the package that brings '{missing}', which is not installed. In the checkout: "
-            f"pip install -e '.[{EXTRAS}]'",
-            file=sys.stderr,
-        )
+        print(f"trpac: {text}", file=sys.stderr)
+        sys.exit(2)
+    except MissingExtraError as error:
+        print(f"trpac: {error}", file=sys.stderr)
         sys.exit(2)
 
 

@@ -57,22 +57,19 @@ def estimate(
 
     Exit codes: 0 with an estimate, 2 unusable input, and then nothing is written.
     """
-    from scenarios.errors import ScenarioError
-    from sim2real.replay.estimate import estimate_files
-    from sim2real.replay.report import verdict, write_replay
-    from trpac_core.vision.networks import ModelError
+    import trpac
 
     require_folder(COMMAND, out)
     try:
         with bars() as told:
-            done, summary = estimate_files(log, vehicle, camera, mapping, peers, told)
+            done = trpac.estimate(log, vehicle, mapping=mapping, camera=camera, peers=peers, progress=told)
             told("report", 0, 1)
-            written = write_replay(done, summary, out)
+            written = done.write(out)
             told("report", 1, 1)
-    except (ScenarioError, ModelError, OSError) as error:
+    except (trpac.TrpacError, OSError) as error:
         refuse(COMMAND, error)
-    console = Terminal()
-    console.print(verdict(summary))
+    console, summary = Terminal(), done.summary
+    console.print(done.verdict)
     if summary["errors"] is not None:
         console.print(_error_table(summary["errors"]))
     for warning in summary["warnings"]:

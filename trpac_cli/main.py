@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import tempfile
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from scenarios.errors import ScenarioError
 from trpac_cli import fmu as fmu_commands
 from trpac_cli import gap, vision
 from trpac_cli.console import Terminal, refuse, require_folder
 from trpac_cli.estimate import estimate
 from trpac_cli.hil import hil, hil_plant
 from trpac_cli.sweep import sweep
-
-if TYPE_CHECKING:
-    from scenarios.files import Scenario
+from trpac_core.errors import TrpacError
 
 app = typer.Typer(
     help="Tyre-road adhesion from dynamics and camera: run scenarios, estimate on recorded logs, diagnose the gap "
@@ -57,7 +52,9 @@ def _root(
 
 @app.command()
 def run(
-    scenario: Annotated[Path, typer.Argument(help="Scenario file, such as scenarios/paper_simulation.yaml.")],
+    scenario: Annotated[
+        Path, typer.Argument(help="Scenario file, or the name of a shipped one: paper_simulation, road_test.")
+    ],
     out: Annotated[
         Path, typer.Option(help="Folder for report.html, figure17.png, log.csv and summary.json.")
     ],
@@ -72,75 +69,30 @@ def run(
 ) -> None:
     """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy; write report and scores.
 
-    Example: trpac run scenarios/paper_simulation.yaml --out out/paper
+    Example: trpac run paper_simulation --out out/paper
 
     Exit codes: 0 done, 2 unusable input or no place to write, and then nothing is written.
     """
-    from scenarios.files import load_scenario
+    import trpac
 
     require_folder("trpac run", out)
-    try:
-        _require(fmu)
-        chosen = _varied(load_scenario(scenario), seed, stiffness_n)
-        with tempfile.TemporaryDirectory(prefix="trpac_") as scratch:
-            _run(chosen, fmu, out, Path(scratch))
-    except (ScenarioError, OSError) as error:
-        refuse("trpac run", error)
-
-
-def _require(fmu: Path | None) -> None:
-    """Refuse before the work what would fail after it."""
-    if fmu is not None:
-        from fmu_src.packaging import UnitFileError, require_whole
-
-        try:
-            require_whole(fmu)
-        except UnitFileError as error:
-            raise ScenarioError(str(error)) from error
-
-
-def _varied(scenario: Scenario, seed: int | None, stiffness_n: float | None) -> Scenario:
-    """The scenario with another seed or another tyre."""
-    if seed is not None:
-        scenario = replace(scenario, seed=seed)
-    if stiffness_n is not None:
-        tyre = scenario.vehicle.tyre.model_copy(update={"longitudinal_stiffness_n": stiffness_n})
-        scenario = replace(scenario, vehicle=scenario.vehicle.model_copy(update={"tyre": tyre}))
-    return scenario
-
-
-def _run(scenario: Scenario, fmu: Path | None, out: Path, scratch: Path) -> None:
-    """Run, then write everything; what fails before leaves the folder untouched."""
-    from fmu_src.packaging import build_unit
-    from fmu_src.units import UNITS
-    from scenarios.figure17 import draw_figure17
-    from scenarios.looks import draw_looks
-    from scenarios.report import write_report
-    from scenarios.runner import run_scenario, write_run
-    from scenarios.whole_files import written_whole
-
     console = Terminal()
-    unit = fmu or build_unit(UNITS["TrpacEstimator"], scratch / "TrpacEstimator.fmu")
-    columns = (TextColumn("{task.description:>18}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bars:
-        tasks: dict[str, TaskID] = {}
+    named = TextColumn("{task.description:>18}", markup=False)
+    try:
+        with Progress(
+            named, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+        ) as bars:
+            tasks: dict[str, TaskID] = {}
 
-        def show(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
-            bars.update(tasks[stage], completed=done)
+            def show(stage: str, done: int, total: int) -> None:
+                if stage not in tasks:
+                    tasks[stage] = bars.add_task(stage, total=total)
+                bars.update(tasks[stage], completed=done)
 
-        finished = run_scenario(scenario, unit, scratch / "frames", show)
-        figure, looks = scratch / "figure17.png", scratch / "looks.jpg"
-        draw_figure17(finished, figure)
-        if len(finished.frames):
-            draw_looks(finished, looks, lambda done, total: show("drawing the report", done, total))
-    report = scratch / "report.html"
-    write_report(finished, figure, looks if looks.is_file() else None, report)
-    with written_whole(out) as made:
-        write_run(finished, made)
-        for path in (figure, report):
-            (made / path.name).write_bytes(path.read_bytes())
+            finished = trpac.run(scenario, seed=seed, stiffness_n=stiffness_n, fmu=fmu, progress=show)
+            finished.write(out, show)
+    except (TrpacError, OSError) as error:
+        refuse("trpac run", error)
     console.print(_score_table(finished.summary))
     console.print(f"Report: {out / 'report.html'}   figure: {out / 'figure17.png'}")
 

@@ -115,6 +115,11 @@ class TrpacEstimator:
         """Way of the front wheel of this side since the start [m]."""
         return self._state.position_m
 
+    @property
+    def sees(self) -> bool:
+        """Whether it can be given pictures."""
+        return self._ife is not None
+
     def step(
         self,
         step_s: float,

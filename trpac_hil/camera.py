@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.library import networks_folder
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError, decode_image
@@ -23,7 +24,6 @@ from trpac_hil.deadlines import Deadlines, SystemClock
 from trpac_hil.helper import Control, helper
 from trpac_hil.shared import Numbers, Ring
 
-MODELS = Path(__file__).parent.parent / "models"
 FAILED = -1.0
 """In the place of a class: the picture could not be used."""
 MOTION = ("speed_m_s", "acceleration_m_s2", "steering_angle_rad", "yaw_rate_rad_s", "way_m")
@@ -98,8 +98,8 @@ class Eyes:
         """Load the networks; raises ModelError."""
         job = self.job
         networks = (
-            Segmenter(MODELS / "segmenter.onnx", job.threads),
-            SurfaceClassifier(MODELS / "surface.onnx", job.threads),
+            Segmenter(networks_folder() / "segmenter.onnx", job.threads),
+            SurfaceClassifier(networks_folder() / "surface.onnx", job.threads),
         )
         config = replace(job.vision, groups_looked_at=1)
         if len(job.sides) == 2:

@@ -12,6 +12,7 @@ import numpy as np
 
 from scenarios.errors import ScenarioError
 from scenarios.files import SensorNoise, load_scenario
+from scenarios.library import shipped
 from trpac_core.vehicle import WHEELS
 from trpac_hil.bus import BUS_ERRORS, BusSettings, Link
 from trpac_hil.codec import DBC_FILE, Codec, load_codec
@@ -22,7 +23,7 @@ from trpac_hil.helper import Control, helper
 from trpac_hil.realtime import raise_priority
 from trpac_hil.shared import Ring
 
-PLAIN_SCENARIO = Path(__file__).parent.parent / "scenarios" / "paper_simulation.yaml"
+PLAIN_SCENARIO = shipped("scenario")["paper_simulation"]
 SLOW_NS = 10_000_000
 """Cycle of the messages Chassis and PlantTruth [ns]."""
 P_0_M = 2.5

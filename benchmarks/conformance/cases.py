@@ -17,7 +17,8 @@ import numpy as np
 
 from fmu_src.contents import CONTENTS_FILE, Contents, sha256_of
 from fmu_src.guarded_slave import GuardedSlave
-from fmu_src.units import MODELS, ROOT
+from fmu_src.units import ROOT
+from scenarios.library import networks_folder
 from trpac_core.vehicle import WHEELS
 
 STEP_S = 0.001
@@ -147,7 +148,7 @@ def _networks() -> Path:
     resources.mkdir()
     files = {}
     for name in (SEGMENTER_FILE, CLASSIFIER_FILE):
-        data = (MODELS / name).read_bytes()
+        data = (networks_folder() / name).read_bytes()
         (resources / name).write_bytes(data)
         files[f"resources/{name}"] = sha256_of(data)
     record = Contents(unit="direct", version="", build="", packages={}, files=files)

@@ -18,7 +18,8 @@ import cv2
 import numpy as np
 
 from fmu_src.doctor import State, UnusableError, look_at_file
-from fmu_src.units import MODELS, ROOT
+from fmu_src.units import ROOT
+from scenarios.library import networks_folder
 
 from .forked import forked
 from .mutations import BINARY, TEXT, Rng, damaged
@@ -209,7 +210,7 @@ def _read_mdf(path: Path) -> Any:
 
 
 def _network(name: str) -> Callable[[Path], Path]:
-    return lambda folder: Path(shutil.copy(MODELS / name, folder / name))
+    return lambda folder: Path(shutil.copy(networks_folder() / name, folder / name))
 
 
 def _segment(path: Path) -> Any:

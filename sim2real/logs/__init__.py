@@ -4,7 +4,7 @@ from sim2real.logs.contract import COLUMNS, REQUIRED, Column
 from sim2real.logs.errors import LogError
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import Mapping, load_mapping
-from sim2real.logs.read import read_log
+from sim2real.logs.read import log_of_frame, read_log
 from sim2real.logs.resampling import resample
 from sim2real.logs.write import write_log
 
@@ -16,6 +16,7 @@ __all__ = [
     "LogError",
     "Mapping",
     "load_mapping",
+    "log_of_frame",
     "read_log",
     "resample",
     "write_log",

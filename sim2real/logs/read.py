@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from sim2real.logs.checks import check_held, check_motion, check_time, check_values, check_wheels
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
+from sim2real.logs.frame_table import frame_sha256, frame_table
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import NO_MAPPING, Mapping
 from sim2real.logs.mdf_file import read_mdf
-from sim2real.logs.parquet_file import read_parquet
 from sim2real.logs.resampling import median_step
 from sim2real.logs.table import Finding, Table, Wanted
 from sim2real.logs.translate import (
@@ -56,6 +58,33 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         raise
     except (FileError, ValueError) as error:  # the latter of text that is no picture's path
         raise LogError(f"{quoted(path)}: {error}" if type(error) is ValueError else str(error)) from error
+    return _log(table, mapping, path, row_word, lambda: file_sha256(path))
+
+
+def log_of_frame(frame: pd.DataFrame, mapping: Mapping | None = None, name: str = "frame") -> Log:
+    """The log that a table holds, checked as one of a file is; its rows count from 0.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Columns of the log format, or those that the mapping names.
+    mapping : Mapping, optional
+        How its columns become those of the log format.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    LogError
+        With all problems of the table, one a line.
+    """
+    mapping = mapping or NO_MAPPING
+    table = frame_table(frame, wanted_columns(mapping))
+    return _log(table, mapping, Path(name), "row", lambda: frame_sha256(frame))
+
+
+def _log(table: Table, mapping: Mapping, path: Path, row_word: str, sha256: Callable[[], str]) -> Log:
+    """The log that a table makes under a mapping; raises LogError with all problems."""
 
     def row(i: int) -> str:
         return f"{row_word} {table.rows[i]}"
@@ -87,7 +116,7 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         derived=made.derived,
         ignored=ignored_columns(table, mapping),
         warnings=tuple(quoted(finding.text, LONGEST_FINDING) for finding in findings),
-        sha256=file_sha256(path),
+        sha256=sha256(),
     )
 
 
@@ -102,6 +131,8 @@ def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
             f"{path}: is named like {named} and does not start like it; expected a whole {named} file."
         )
     if kind == "Parquet":
+        from sim2real.logs.parquet_file import read_parquet  # pyarrow is an extra
+
         return "row", read_parquet(path, wanted)
     if kind == "MDF":
         return "sample", read_mdf(path, wanted)

@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.camera.files import load_camera
-from scenarios.files import load_vehicle
-from sim2real.logs import load_mapping, read_log
+from scenarios.files import VehicleFile, load_vehicle
+from scenarios.library import networks_folder, shipped
+from sim2real.logs import Log, load_mapping, read_log
 from sim2real.replay.camera import camera_side
 from sim2real.replay.inputs import make_inputs
 from sim2real.replay.run import OURS, Replay, Told, replay, silent
 from sim2real.replay.score import errors, excitation
 from trpac_core.files import file_sha256
+from trpac_core.vision.camera import Camera
 
-CHECKOUT = Path(__file__).resolve().parents[2]
-MODELS = CHECKOUT / "models"
-TABLE_3 = CHECKOUT / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml"
+TABLE_3 = shipped("vehicle")["four_in_wheel_motor_ev"]
 """The car that is assumed where none is given."""
 PACKAGES = ("trpac-fmu", "numpy", "scipy")
 
@@ -58,21 +58,44 @@ def estimate_files(
     car = load_vehicle(car_path)
     lens = None if camera is None else load_camera(camera)
     read = read_log(log, None if mapping is None else load_mapping(mapping))
-    inputs = make_inputs(read, car)
     told("reading", 1, 1)
-    seen = camera_side(read, inputs, car, lens, MODELS, lambda done, total: told("pictures", done, total))
+    return estimate_log(read, car, lens, peers, told, guessed=vehicle is None, vehicle_path=car_path)
+
+
+def estimate_log(
+    read: Log,
+    car: VehicleFile,
+    lens: Camera | None = None,
+    peers: bool = False,
+    told: Told = silent,
+    *,
+    guessed: bool = False,
+    vehicle_path: Path | None = None,
+) -> tuple[Replay, dict[str, Any]]:
+    """Run the estimators along a log that has been read; see `estimate_files`.
+
+    `guessed` says that the car is an assumption; `vehicle_path` is its file, if it is of one.
+    """
+    inputs = make_inputs(read, car)
+    seen = camera_side(
+        read, inputs, car, lens, networks_folder(), lambda done, total: told("pictures", done, total)
+    )
     done = replay(inputs, seen, peers, told)
-    guessed = (f"no vehicle file was given: the car is taken to be {car.name} of {TABLE_3.name}.",)
+    assumed = (f"no vehicle file was given: the car is taken to be {car.name} of {TABLE_3.name}.",)
     summary = {
         "schema": 1,
         "log": {
             "name": read.name,
-            "path": str(log),
+            "path": str(read.path),
             "sha256": read.sha256,
             "rate_hz": read.rate_hz,
             "rows": len(read),
         },
-        "vehicle": {"name": car.name, "path": str(car_path), "sha256": file_sha256(car_path)},
+        "vehicle": {
+            "name": car.name,
+            "path": None if vehicle_path is None else str(vehicle_path),
+            "sha256": None if vehicle_path is None else file_sha256(vehicle_path),
+        },
         "camera": seen.source,
         "noise": {
             "wheel_speed_rad_s": inputs.noise.wheel_speed_rad_s,
@@ -81,7 +104,7 @@ def estimate_files(
         "excitation": excitation(done),
         "estimate": _outcome(done),
         "errors": errors(done),
-        "warnings": [*(guessed if vehicle is None else ()), *inputs.warnings, *seen.warnings],
+        "warnings": [*(assumed if guessed else ()), *inputs.warnings, *seen.warnings],
         "versions": {name: version(name) for name in PACKAGES},
     }
     return done, summary

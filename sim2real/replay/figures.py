@@ -6,13 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 
-import matplotlib as mpl
-import numpy as np
-from numpy.typing import NDArray
-
-mpl.use("Agg")
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from sim2real.replay.run import DYNAMICS, OURS, Replay
 from sim2real.telling.figures import AFTER, BEFORE, DPI, FLOOR, MEASURED, STYLE, WIDTH_IN

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.peers import PEER_NAMES, PeerSetup, make_peers
 from sim2real.replay.camera import NO_CAMERA, CameraSide
 from sim2real.replay.inputs import Inputs
 from sim2real.replay.vehicle_level import vehicle_level
@@ -162,6 +161,8 @@ def _our_wheel(inputs: Inputs, camera: CameraSide, wheel: int, told: Told) -> li
 
 def _peer_traces(inputs: Inputs, load_n: Array, told: Told) -> dict[str, Trace]:
     """All peers on all wheels."""
+    from scenarios.peers import PEER_NAMES, PeerSetup, make_peers  # their filters are an extra
+
     said = np.zeros((len(PEER_NAMES), len(WHEELS), len(inputs), 3))
     noise = inputs.noise
     for wheel, name in enumerate(WHEELS):

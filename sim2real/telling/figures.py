@@ -7,15 +7,12 @@ from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
 
-import matplotlib as mpl
-import numpy as np
-from numpy.typing import NDArray
-
-mpl.use("Agg")
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from sim2real.result import Gap, NextManoeuvre, Trace, Unexplained
 from sim2real.where.equations import QUANTITIES, TWO_SIDED

@@ -182,7 +182,7 @@ def provenance_rows(value: Any, label: str = "") -> list[tuple[str, str, str]]:
     if isinstance(value, dict):
         rows = []
         if {"path", "sha256"} <= set(value):
-            rows.append((label, str(value["path"]), str(value["sha256"])))
+            rows.append((label, str(value["path"] or "in memory"), str(value["sha256"] or "")))
             value = {k: v for k, v in value.items() if k not in ("path", "sha256")}
         return rows + [
             row

@@ -1,0 +1,140 @@
+"""The diagnosis of the gap between a simulation and recorded logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from scenarios.files import RoadFile, VehicleFile
+from sim2real.logs import Log
+from sim2real.logs.mapping import Mapping
+from sim2real.result import Cause, Gap, Place, Verdict, needed
+from sim2real.result import Diagnosis as Said
+from trpac.extras import extras
+from trpac.files import Vehicle, read_log, the_road, the_vehicle
+
+AnyLog = Log | pd.DataFrame | str | Path
+Told = Callable[[str, int, int], None]
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    """Progress that nobody is told."""
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis:
+    """What a diagnosis says; `said` has all of it."""
+
+    said: Said
+
+    def __repr__(self) -> str:
+        return f"Diagnosis {self.verdict}: {self.said.sentence}"
+
+    def _repr_html_(self) -> str:
+        rows = [(c.effect, c.probability, c.gap_after, c.shrink_percent.value) for c in self.causes]
+        return pd.DataFrame(rows, columns=["effect", "probability", "gap after", "shrink [%]"]).to_html(
+            index=False
+        )
+
+    @property
+    def verdict(self) -> Verdict:
+        """The outcome in a word: identified, ambiguous, compound, unknown or no_gap."""
+        return self.said.verdict
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """The candidates, likeliest first."""
+        return self.said.causes
+
+    @property
+    def gap(self) -> Gap:
+        """The gap on the hold-out before and after, in noise floors."""
+        return self.said.gap
+
+    @property
+    def where(self) -> tuple[Place, ...]:
+        """Where the gap lies: signal, subsystem, regime and time."""
+        return self.said.where
+
+    def apply_to(self, vehicle: VehicleFile) -> Vehicle:
+        """The car with the effects that the verdict names, ready for `simulate`; as it was where it names none."""
+        car = Vehicle(**vehicle.model_dump(by_alias=True))
+        from scenarios.effects import form_of
+
+        return car.with_effects(
+            [
+                form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()})
+                for c in needed(self.said)
+            ]
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """What diagnosis.json holds."""
+        return self.said.to_json()
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write the report; returns its path."""
+        with extras("to_html"):
+            from sim2real.telling.report import rated, render
+
+            Path(path).write_text(render(rated(self.said)), encoding="utf-8")
+        return Path(path)
+
+    def write(self, folder: str | Path) -> tuple[Path, Path]:
+        """Write diagnosis.json and report.html, both or neither; returns their paths."""
+        with extras("write"):
+            from sim2real.telling.report import rated, write_diagnosis
+
+            return write_diagnosis(rated(self.said), folder)
+
+
+def diagnose(
+    vehicle: VehicleFile | str | Path,
+    road: RoadFile | str | Path,
+    *,
+    fit: Sequence[AnyLog],
+    holdout: AnyLog,
+    mapping: Mapping | str | Path | None = None,
+    seed: int = 0,
+    exclude: Collection[str] = (),
+    jobs: int = 1,
+    progress: Told = _silent,
+) -> Diagnosis:
+    """Diagnose recorded logs against the simulation of a car on one road.
+
+    Parameters
+    ----------
+    vehicle, road : Vehicle and Road, or path or name of each
+        What the simulation knows.
+    fit, holdout : sequence of logs, log
+        DataFrames or paths: those that parameters are fitted to, and the one that the gap is measured on.
+    mapping : path, optional
+        How the logs' columns become those of the log format.
+    seed : int
+        Of the resampling behind the intervals.
+    exclude : collection of str
+        Effects that are left out.
+    jobs : int
+        Threads.
+    progress : callable
+        Told the stage, and how much of how much is done.
+
+    Raises
+    ------
+    TrpacError
+        With all that is wrong.
+    MissingExtraError
+        Without the extra 'gap'.
+    """
+    car, course = the_vehicle(vehicle), the_road(road)
+    logs = [read_log(log, mapping=mapping) for log in (*fit, holdout)]
+    with extras("diagnose"):
+        from sim2real.diagnose import diagnose_sources
+        from sim2real.sources import make_source, put_together
+
+        sources = put_together(car, None, [make_source(log, course) for log in logs])
+        return Diagnosis(diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress))

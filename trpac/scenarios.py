@@ -1,0 +1,178 @@
+"""The reference plant under a torque, and whole scenarios with pictures and the unit."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from scenarios.effects import Effect
+from scenarios.files import RoadFile, Scenario, SensorNoise, VehicleFile, load_scenario
+from scenarios.plant import make_log
+from scenarios.plant import simulate as run_plant
+from trpac.extras import extras
+from trpac.files import Vehicle, the_road, the_vehicle
+from trpac.picture import Picture
+from trpac_core.errors import TrpacError
+from trpac_core.vehicle import WHEELS
+
+Told = Callable[[str, int, int], None]
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    """Progress that nobody is told."""
+
+
+def simulate(
+    vehicle: VehicleFile | str | Path,
+    road: RoadFile | str | Path,
+    *,
+    torque: pd.DataFrame | ArrayLike,
+    step_s: float = 0.01,
+    speed: float = 0.0,
+    effects: Sequence[Effect] = (),
+    noise: SensorNoise | None = None,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """The log of a car that is driven by these wheel torques, with the columns of the log format.
+
+    Parameters
+    ----------
+    vehicle, road : Vehicle and Road, or path or name of each
+        What drives, and on what.
+    torque : DataFrame, or array of shape (n, 4)
+        time_s at equal steps and wheel_torque_{fl,fr,rl,rr}_nm; or the torques alone, `step_s` apart [N m].
+    step_s : float
+        Of an array [s].
+    speed : float
+        At the start [m/s].
+    effects : sequence of Effect
+        On top of those of the vehicle: `trpac.effects.TorqueLag(time_constant_s=0.05)`.
+    noise, seed : SensorNoise, int
+        Of the sensors, which are ideal without it.
+
+    Raises
+    ------
+    TrpacError
+        With all that is wrong.
+    """
+    if isinstance(torque, pd.DataFrame):
+        names = ["time_s", *(f"wheel_torque_{wheel}_nm" for wheel in WHEELS)]
+        if absent := [name for name in names if name not in torque]:
+            raise TrpacError(f"torque lacks {', '.join(absent)}; expected {', '.join(names)}.")
+        time_s, torque = torque["time_s"].to_numpy(dtype=float), torque[names[1:]].to_numpy(dtype=float)
+        steps = np.diff(time_s)
+        if len(steps) == 0 or not np.allclose(steps, steps[0], rtol=1e-6, atol=1e-9) or steps[0] <= 0.0:
+            raise TrpacError("torque has times that are not equally apart; expected a uniform time_s.")
+        step_s = float(steps[0])
+    car = the_vehicle(vehicle)
+    if effects:
+        car = Vehicle(**car.model_dump(by_alias=True)).with_effects(effects)
+    trajectory = run_plant(car, the_road(road), np.asarray(torque, dtype=float), step_s, speed)
+    return make_log(trajectory, car, noise or SensorNoise(), seed)
+
+
+@dataclass(frozen=True, repr=False)
+class ScenarioRun:
+    """A finished scenario.
+
+    Attributes
+    ----------
+    log : DataFrame
+        One row per step: the sensors, the unit's outputs, theta and segment under the wheel.
+    summary : dict
+        Scores per stretch of road and estimator, as summary.json has them.
+    """
+
+    log: pd.DataFrame
+    summary: dict[str, Any]
+    _run: Any
+    _scratch: tempfile.TemporaryDirectory[str]
+
+    def __repr__(self) -> str:
+        return (
+            f"ScenarioRun of {self.summary['scenario']!r}, seed {self.summary['seed']}, {len(self.log)} steps"
+        )
+
+    def _repr_html_(self) -> str:
+        from scenarios.report import score_rows
+
+        rows = [{"estimator": name, **score} for name, score in score_rows(self.summary)]
+        return pd.DataFrame(rows).to_html(index=False)
+
+    def figure17(self) -> Picture:
+        """The paper's Figure 17 of this run."""
+        from scenarios.figure17 import draw_figure17
+
+        path = Path(self._scratch.name) / "figure17.png"
+        draw_figure17(self._run, path)
+        return Picture(path.read_bytes())
+
+    def write(self, folder: str | Path, progress: Told = _silent) -> tuple[Path, ...]:
+        """Write report.html, figure17.png, log.csv and summary.json, all or none; returns their paths."""
+        from scenarios.looks import draw_looks
+        from scenarios.report import write_report
+        from scenarios.runner import write_run
+        from scenarios.whole_files import written_whole
+
+        with written_whole(Path(folder)) as made:
+            looks = None
+            if len(self._run.frames):
+                looks = Path(self._scratch.name) / "looks.jpg"
+                draw_looks(self._run, looks, lambda done, total: progress("drawing the report", done, total))
+            figure = self.figure17().save(made / "figure17.png")
+            write_report(self._run, figure, looks, made / "report.html")
+            write_run(self._run, made)
+            names = sorted(path.name for path in made.iterdir())
+        return tuple(Path(folder) / name for name in names)
+
+
+def run(
+    scenario: Scenario | str | Path,
+    *,
+    seed: int | None = None,
+    stiffness_n: float | None = None,
+    fmu: str | Path | None = None,
+    progress: Told = _silent,
+) -> ScenarioRun:
+    """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
+
+    Parameters
+    ----------
+    scenario : path or name
+        Scenario file, or a shipped one such as "paper_simulation".
+    seed, stiffness_n : optional
+        In place of the scenario's seed, and of the vehicle's C_x [N].
+    fmu : path, optional
+        The unit; without it one is built.
+    progress : callable
+        Told the stage, and how much of how much is done.
+
+    Raises
+    ------
+    TrpacError
+        With all that is wrong.
+    MissingExtraError
+        Without the extra 'fmu'.
+    """
+    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    if seed is not None:
+        chosen = replace(chosen, seed=seed)
+    if stiffness_n is not None:
+        car = chosen.vehicle.model_dump(by_alias=True)
+        car["tyre"]["longitudinal_stiffness_n"] = stiffness_n
+        chosen = replace(chosen, vehicle=Vehicle(**car))
+    scratch = tempfile.TemporaryDirectory(prefix="trpac_")
+    with extras("run"):
+        from scenarios.runner import run_scenario
+        from trpac.units import build_fmu, require_unit
+
+        unit = build_fmu(scratch.name) if fmu is None else require_unit(fmu)
+        finished = run_scenario(chosen, unit, Path(scratch.name) / "frames", progress)
+    return ScenarioRun(finished.table, finished.summary, finished, scratch)

@@ -1,0 +1,52 @@
+"""Co-simulation units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from scenarios.errors import suggestion
+from trpac.extras import extras
+from trpac_core.errors import TrpacError
+
+
+def build_fmu(folder: str | Path, *, unit: str = "TrpacEstimator", flat: bool = False) -> Path:
+    """Build a co-simulation unit (FMI 2.0) and validate it; returns its path.
+
+    Parameters
+    ----------
+    folder : path
+        Where the archive goes; it is made where it is missing.
+    unit : str
+        TrpacEstimator, TrpacEstimator4W, ReferencePlant or TorquePulses.
+    flat : bool
+        Whether its variables have names without dots.
+
+    Raises
+    ------
+    TrpacError
+        An unknown unit, or one that cannot be built.
+    MissingExtraError
+        Without the extra 'fmu'.
+    """
+    with extras("build_fmu"):
+        from fmpy.validation import validate_fmu
+
+        from fmu_src.packaging import build_unit
+        from fmu_src.units import UNITS
+
+        if unit not in UNITS:
+            raise TrpacError(f"unit is {unit!r}; {suggestion(unit, UNITS)}")
+        name = f"{unit}_flat.fmu" if flat else f"{unit}.fmu"
+        path = build_unit(UNITS[unit], Path(folder) / name, flat=flat)
+        if problems := validate_fmu(str(path)):
+            raise TrpacError("\n".join(f"{path}: {problem}" for problem in problems))
+    return path
+
+
+def require_unit(path: str | Path) -> Path:
+    """The path of a unit whose archive is whole; raises TrpacError."""
+    with extras("a unit"):
+        from fmu_src.packaging import require_whole
+
+        require_whole(Path(path))
+    return Path(path)

@@ -1,0 +1,149 @@
+"""The camera side: single pictures of any camera, and the frames of one drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.camera.files import load_camera
+from scenarios.library import networks_folder
+from scenarios.stills import StillNetworks
+from trpac_core.errors import TrpacError
+from trpac_core.vision.camera import Camera
+from trpac_core.vision.classes import Surface
+from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife_config import IfeConfig
+from trpac_core.vision.images import check_size, decode_image
+from trpac_core.vision.networks import Segmenter, SurfaceClassifier
+from trpac_core.vision.trajectory import Motion
+
+Order = Literal["bgr", "rgb"]
+
+
+@dataclass(frozen=True)
+class PictureClass:
+    """What a picture shows.
+
+    Attributes
+    ----------
+    surface : str
+        dry, wet or snow_ice.
+    confidence : float
+        Its probability; of a frame the quality Q_v [-].
+    probabilities : dict
+        Each surface's probability [-].
+    flag : bool
+        Whether the class may be used; of a single picture whether it is likelier than all others together.
+    """
+
+    surface: str
+    confidence: float
+    probabilities: dict[str, float]
+    flag: bool
+
+
+def picture_of(image: str | Path | NDArray[np.uint8], order: Order, upright: bool) -> NDArray[np.uint8]:
+    """A picture as BGR of 8 bits; raises TrpacError for an array of another kind."""
+    if isinstance(image, (str, Path)):
+        return decode_image(image, upright=upright)
+    array = np.asarray(image)
+    if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:
+        raise TrpacError(
+            f"image is an array of {array.dtype} and shape {array.shape}; expected uint8 and (height, width, 3)."
+        )
+    if order not in ("bgr", "rgb"):
+        raise TrpacError(f"order is {order!r}; expected 'bgr' or 'rgb'.")
+    check_size(array.shape[1], array.shape[0], "image")
+    return np.ascontiguousarray(array[..., ::-1] if order == "rgb" else array)
+
+
+@lru_cache(maxsize=1)
+def _networks() -> StillNetworks:
+    return StillNetworks.load(networks_folder())
+
+
+def classify(image: str | Path | NDArray[np.uint8], *, order: Order = "bgr") -> PictureClass:
+    """The surface of the road in a single picture, of any camera.
+
+    Parameters
+    ----------
+    image : path, or array of uint8, shape (height, width, 3)
+        JPEG or PNG, or its pixels.
+    order : {'bgr', 'rgb'}
+        Of an array's channels: OpenCV's, or that of most others.
+
+    Raises
+    ------
+    TrpacError
+        A picture that cannot be used, or shows no road that could be judged.
+    """
+    name = str(image) if isinstance(image, (str, Path)) else "image"
+    shares = _networks().probabilities(picture_of(image, order, upright=True), name)
+    best = int(shares.argmax())
+    probabilities = {surface.label: float(shares[surface]) for surface in Surface}
+    return PictureClass(Surface(best).label, float(shares[best]), probabilities, bool(shares[best] > 0.5))
+
+
+def image_estimator(networks: Path, settings: IfeConfig, camera: Camera) -> Ife:
+    """The image estimator of a camera."""
+    loaded = Segmenter(networks / "segmenter.onnx"), SurfaceClassifier(networks / "surface.onnx")
+    return Ife(replace(settings, camera=camera), *loaded)
+
+
+class VisionEstimator:
+    """The image estimator over the frames of one drive; it remembers the road that it has seen.
+
+    Parameters
+    ----------
+    camera : path, name or Camera
+        Its lens and mounting: camera.yaml.
+
+    Raises
+    ------
+    TrpacError
+        A camera file that cannot be used.
+    """
+
+    def __init__(self, camera: str | Path | Camera) -> None:
+        lens = camera if isinstance(camera, Camera) else load_camera(camera)
+        self._ife = image_estimator(networks_folder(), IfeConfig(), lens)
+        self._state, self._time_s, self._way_m = IfeState(), 0.0, 0.0
+
+    def step(
+        self,
+        image: str | Path | NDArray[np.uint8],
+        t: float,
+        *,
+        speed: float,
+        steering: float = 0.0,
+        order: Order = "bgr",
+    ) -> PictureClass:
+        """What the next frame shows of the road ahead of the wheels.
+
+        Parameters
+        ----------
+        image : path, or array of uint8, shape (height, width, 3)
+            The frame.
+        t : float
+            When it was taken [s].
+        speed, steering : float
+            Of the car [m/s], and of the front wheels, positive to the left [rad].
+        order : {'bgr', 'rgb'}
+            Of an array's channels.
+
+        Raises
+        ------
+        TrpacError
+            A frame that cannot be used: nothing is remembered of it.
+        """
+        way_m = self._way_m + max(0.0, t - self._time_s) * speed * (self._state.frame_count > 0)
+        motion = Motion(speed, steering_angle_rad=steering, way_m=way_m)
+        state, seen = self._ife.process(self._state, picture_of(image, order, upright=False), motion)
+        self._state, self._time_s, self._way_m = state, t, way_m
+        probabilities = {s.label: float(p) for s, p in zip(Surface, seen.near.probabilities, strict=True)}
+        return PictureClass(seen.surface.label, float(seen.Q_v), probabilities, bool(seen.flag))
