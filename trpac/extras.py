@@ -32,22 +32,21 @@ class MissingExtraError(ImportError):
     """A package is not installed that this function needs; the text says which extra brings it."""
 
 
-def missing(error: ModuleNotFoundError) -> str | None:
-    """One sentence on the extra that brings a missing module; None where no extra does."""
+def missing(error: ModuleNotFoundError, extra: str = "") -> str | None:
+    """One sentence on the extra that brings a missing module, `extra` or any; None where no extra does."""
     module = (error.name or "").partition(".")[0]
-    extra = EXTRA_OF.get(module)
-    if extra is None:
+    if module not in EXTRA_OF:
         return None
-    return f"needs the package '{module}', which is not installed: pip install 'trpac-fmu[{extra}]'"
+    return f"needs the package '{module}', which is not installed: pip install 'trpac-fmu[{extra or EXTRA_OF[module]}]'"
 
 
 @contextmanager
-def extras(what: str) -> Iterator[None]:
-    """Within it a missing package of an extra is a MissingExtraError that names the extra."""
+def extras(what: str, extra: str = "") -> Iterator[None]:
+    """Within it a missing package of an extra is a MissingExtraError that names `extra`, or one that brings it."""
     try:
         yield
     except ModuleNotFoundError as error:
-        text = missing(error)
+        text = missing(error, extra)
         if text is None:
             raise
         raise MissingExtraError(f"{what} {text}", name=error.name) from error

@@ -78,7 +78,7 @@ class Diagnosis:
 
     def to_html(self, path: str | Path) -> Path:
         """Write the report; returns its path."""
-        with extras("to_html"):
+        with extras("to_html", "gap"):
             from sim2real.telling.report import rated, render
 
             Path(path).write_text(render(rated(self.said)), encoding="utf-8")
@@ -86,7 +86,7 @@ class Diagnosis:
 
     def write(self, folder: str | Path) -> tuple[Path, Path]:
         """Write diagnosis.json and report.html, both or neither; returns their paths."""
-        with extras("write"):
+        with extras("write", "gap"):
             from sim2real.telling.report import rated, write_diagnosis
 
             return write_diagnosis(rated(self.said), folder)
@@ -132,7 +132,7 @@ def diagnose(
     """
     car, course = the_vehicle(vehicle), the_road(road)
     logs = [read_log(log, mapping=mapping) for log in (*fit, holdout)]
-    with extras("diagnose"):
+    with extras("diagnose", "gap"):
         from sim2real.diagnose import diagnose_sources
         from sim2real.sources import make_source, put_together
 

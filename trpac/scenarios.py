@@ -169,7 +169,7 @@ def run(
         car["tyre"]["longitudinal_stiffness_n"] = stiffness_n
         chosen = replace(chosen, vehicle=Vehicle(**car))
     scratch = tempfile.TemporaryDirectory(prefix="trpac_")
-    with extras("run"):
+    with extras("run", "fmu"):
         from scenarios.runner import run_scenario
         from trpac.units import build_fmu, require_unit
 

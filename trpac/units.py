@@ -28,7 +28,7 @@ def build_fmu(folder: str | Path, *, unit: str = "TrpacEstimator", flat: bool = 
     MissingExtraError
         Without the extra 'fmu'.
     """
-    with extras("build_fmu"):
+    with extras("build_fmu", "fmu"):
         from fmpy.validation import validate_fmu
 
         from fmu_src.packaging import build_unit
@@ -45,7 +45,7 @@ def build_fmu(folder: str | Path, *, unit: str = "TrpacEstimator", flat: bool = 
 
 def require_unit(path: str | Path) -> Path:
     """The path of a unit whose archive is whole; raises TrpacError."""
-    with extras("a unit"):
+    with extras("a unit", "fmu"):
         from fmu_src.packaging import require_whole
 
         require_whole(Path(path))

@@ -99,7 +99,6 @@ def hil(
 
     Exit codes: 0 done or ended by Ctrl-C, 2 unusable input or no bus, 4 ran, but the log could not be written.
     """
-    _require_packages(COMMAND)
     from scenarios.errors import ScenarioError
     from trpac_hil.codec import DBC_FILE
     from trpac_hil.deadlines import SPIN_NS
@@ -167,7 +166,6 @@ def hil_plant(
 
     Exit codes: 0 done or ended by Ctrl-C, 2 unusable input or no bus.
     """
-    _require_packages(PLANT_COMMAND)
     from scenarios.errors import ScenarioError
     from trpac_hil.deadlines import SystemClock
     from trpac_hil.partner import open_partner
@@ -186,18 +184,6 @@ def hil_plant(
         partner.run(SystemClock().now_ns() + RUN_UP_NS, stopper, slots)
     partner.close()
     print(f"{PLANT_COMMAND}: {partner.left_out} cycles were left out for being late.", file=sys.stderr)
-
-
-def _require_packages(command: str) -> None:
-    """One line for who lacks the extra."""
-    import importlib.util
-
-    wanted = {"can": "python-can", "cantools": "cantools", "asammdf": "asammdf", "fmpy": "fmpy"}
-    missing = [package for module, package in wanted.items() if importlib.util.find_spec(module) is None]
-    if missing:
-        refuse(
-            command, f"lacks {', '.join(missing)}. Run: {sys.executable} -m pip install {' '.join(missing)}"
-        )
 
 
 def _bus(interface: str, channel: str | None, options: list[str] | None) -> BusSettings:
