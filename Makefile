@@ -8,7 +8,7 @@ BLIND_SEED ?= 1
 # The tests start hundreds of processes; without byte code each would compile every library anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test test-all check style types compiled collected format lock audit clean blind bench
+.PHONY: help demo test test-all check style types compiled collected format lock audit wheel wheel-test clean blind bench
 
 help:            ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -61,7 +61,25 @@ format: $(READY) ## rewrite the sources in the house format
 lock: $(READY)   ## resolve the dependencies anew (needs uv on PATH)
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
 	  --no-emit-index-url --no-emit-find-links \
-	  --extra fmu --extra scenarios --extra design --extra conformance --extra gap --extra hil --extra sweep --extra dev pyproject.toml -o requirements/dev.txt
+	  --extra all --extra conformance --extra dev pyproject.toml -o requirements/dev.txt
+
+# The wheel in a fresh environment of each of these, in an empty folder; CI does it for one.
+PYTHONS ?= python3.11 python3.12 python3.13
+
+wheel: $(READY)  ## build the wheel into dist
+	rm -rf build dist/*.whl
+	$(BIN)/python -m build --wheel --outdir dist . >/dev/null
+	rm -rf build
+
+wheel-test: wheel ## install the wheel into fresh environments, run the README's Python and the commands there
+	@set -e; for python in $(PYTHONS); do \
+	  place=$$(mktemp -d); echo "$$python in $$place"; \
+	  $$python -m venv $$place/env; \
+	  $$place/env/bin/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[all]"; \
+	  mkdir $$place/empty; \
+	  (cd $$place/empty && env -u PYTHONPATH $$place/env/bin/python $(CURDIR)/tests/wheel_check.py $(CURDIR)/README.md); \
+	  rm -rf $$place; \
+	done
 
 audit:           ## published faults of the locked packages (needs pip-audit on PATH, and the network)
 	pip-audit --strict --disable-pip --require-hashes -r requirements/dev.txt

@@ -16,6 +16,8 @@ from hypothesis import settings
 from fmu_src.packaging import build_unit, unpack_unit
 from fmu_src.units import UNITS
 
+os.environ.setdefault("MPLBACKEND", "Agg")
+
 EXIT_STATUS = pytest.StashKey[int]()
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from trpac.files import (
         Log,
         Road,
+        SensorNoise,
         Vehicle,
         list_effects,
         list_roads,
@@ -39,6 +40,7 @@ _HOMES = {
     "files": (
         "Log",
         "Road",
+        "SensorNoise",
         "Vehicle",
         "list_effects",
         "list_roads",
@@ -63,6 +65,7 @@ __all__ = [
     "PictureClass",
     "Road",
     "ScenarioRun",
+    "SensorNoise",
     "TrpacError",
     "Vehicle",
     "VisionEstimator",

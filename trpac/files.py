@@ -10,7 +10,7 @@ from typing import Any, Self
 import pandas as pd
 
 from scenarios.effects import FORMS, Effect
-from scenarios.files import RoadFile, VehicleFile, load_scenario
+from scenarios.files import RoadFile, SensorNoise, VehicleFile, load_scenario
 from scenarios.library import located, shipped
 from scenarios.strict import load_strict, made
 from sim2real.logs import Log, load_mapping, log_of_frame
@@ -21,6 +21,7 @@ from trpac.extras import extras
 __all__ = [
     "Log",
     "Road",
+    "SensorNoise",
     "Vehicle",
     "list_effects",
     "list_roads",

@@ -95,6 +95,11 @@ class ScenarioRun:
     _run: Any
     _scratch: tempfile.TemporaryDirectory[str]
 
+    @property
+    def frames(self) -> tuple[Path, ...]:
+        """The pictures that the camera took, as files that are there as long as this run is."""
+        return tuple(Path(path) for path in self._run.frames["path"])
+
     def __repr__(self) -> str:
         return (
             f"ScenarioRun of {self.summary['scenario']!r}, seed {self.summary['seed']}, {len(self.log)} steps"
