@@ -23,7 +23,7 @@ OPENED = {
     "trpac_core/vision/images.py": {"imdecode"},  # the reader of pictures
     "scenarios/yaml_text.py": {"yaml"},  # the reader of YAML
     "scenarios/vision_runs.py": {"VideoCapture"},  # of videos, behind the guard
-    "fmu_src/archives.py": {"open", "ZipFile"},  # of archives
+    "scenarios/fmu_client/archives.py": {"open", "ZipFile"},  # of archives
     "fmu_src/ssp_client.py": {"XMLParser", "fromstring"},  # of what the reader of archives hands on
     "fmu_src/trial.py": {
         "parse"

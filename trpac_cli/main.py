@@ -91,7 +91,8 @@ def run(
 def _require(fmu: Path | None) -> None:
     """Refuse before the work what would fail after it."""
     if fmu is not None:
-        from fmu_src.packaging import UnitFileError, require_whole
+        from scenarios.fmu_client.archives import UnitFileError
+        from scenarios.fmu_client.unpacking import require_whole
 
         try:
             require_whole(fmu)

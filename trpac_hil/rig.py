@@ -15,15 +15,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.packaging import build_unit
-from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
-from fmu_src.variables import Kind
 from scenarios.camera.files import load_camera
 from scenarios.files import load_scenario, load_vehicle
-from scenarios.unit_client import car_parameters
+from scenarios.fmu_client.estimator import car_parameters
 from trpac_core.estimator import EstimatorConfig
+from trpac_core.parameters.configuration import configuration
+from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
+from trpac_core.parameters.variables import Kind
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.ife_config import IfeConfig
@@ -354,10 +354,10 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
 def _vision(settings: HilSettings, camera: Camera) -> IfeConfig:
     """The image estimator's settings by the unit's parameters, which the unit itself has taken already."""
     told = _parameters(settings)
-    variables = [v for v in TRPAC_ESTIMATOR if v.name.startswith("image.") and v.causality == "parameter"]
+    variables = [v for v in ESTIMATOR_PARAMETERS if v.name.startswith("image.")]
     kinds = {Kind.INTEGER: int, Kind.BOOLEAN: bool, Kind.REAL: float}
-    values = {v.name: kinds[v.kind](told.get(v.name, v.start)) for v in variables if v.source}
-    vision = configuration([v for v in variables if v.source], values, EstimatorConfig()).vision
+    values = {v.name: kinds[v.kind](told.get(v.name, v.start)) for v in variables}
+    vision = configuration(variables, values, EstimatorConfig()).vision
     return replace(
         vision, camera=camera, track_m=told["vehicle.track"], wheelbase_m=told["vehicle.wheelbase"]
     )
