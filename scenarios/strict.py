@@ -9,8 +9,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from scenarios.effects import suggestion
-from scenarios.errors import ScenarioError
+from scenarios.errors import ScenarioError, suggestion
 from scenarios.yaml_text import YamlError, parse_yaml
 from trpac_core.files import FileError, quoted, read_text
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 
 from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.aero_drag import AeroDrag
@@ -60,6 +59,7 @@ from scenarios.effects.wheel_radius_offset import (
 )
 from scenarios.effects.wheel_speed_delay import WheelSpeedDelay
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
+from scenarios.errors import suggestion
 from trpac_core.vehicle import Vehicle
 
 EFFECTS: dict[str, type[Effect]] = {
@@ -134,13 +134,6 @@ FORMS: dict[str, tuple[type[Effect], ...]] = {
 """Every form of each effect, the plant's own first: what goes by one name in the field may act in more than one way."""
 
 __all__ = ["EFFECTS", "FORMS", "Effect", "Parameter", "form_of", "make_effect", "problems_of"]
-
-
-def suggestion(word: str, known: list[str]) -> str:
-    """A closing sentence for an error about an unknown word: what it may have meant, or what is known."""
-    close = get_close_matches(word, known, n=1)
-    hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"{hint}Known: {', '.join(known)}."
 
 
 def problems_of(effect_id: str, values: Mapping[str, float], vehicle: Vehicle, form: str = "") -> list[str]:

@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from scenarios.effects import suggestion
-from scenarios.errors import ScenarioError
+from scenarios.errors import ScenarioError, suggestion
 from scenarios.files import Scenario, SurfaceName, load_scenario
 from scenarios.strict import load_strict
 from scenarios.sweep.trackers import ADDRESS, problem_of_address, problem_of_tracker

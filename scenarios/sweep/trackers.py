@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable
 
 from scenarios import peers
-from scenarios.effects import suggestion
+from scenarios.errors import suggestion
 from scenarios.peers import Peer, PeerSetup
 from trpac_core.files import quoted
 
