@@ -55,8 +55,8 @@ def smoke_run(path: Path) -> str:
     from fmpy import read_model_description
     from fmpy.fmi2 import FMU2Slave
 
-    from fmu_src.packaging import unpack_unit
     from fmu_src.trial import rolling
+    from scenarios.fmu_client.unpacking import unpack_unit
 
     description = read_model_description(str(path))
     folder = unpack_unit(path)

@@ -21,8 +21,9 @@ from fmpy.fmi2 import FMU2Slave
 from pythonfmu import FmuBuilder
 
 from benchmarks.ledger import machine
-from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
+from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.files import file_sha256
 from trpac_core.readings import Sensors

@@ -27,7 +27,8 @@ from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.loop import LONG_NS
 from trpac_hil.partner import PLAIN_SCENARIO, PartnerJob
 from trpac_hil.realtime import loop_core, pin, raise_priority, undisturbed
-from trpac_hil.rig import HilSettings, run_hil
+from trpac_hil.rig import run_hil
+from trpac_hil.settings import HilSettings
 
 PICTURES = 12
 EVERY_M = 5.0

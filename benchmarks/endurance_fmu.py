@@ -28,8 +28,9 @@ from fmpy.fmi2 import FMU2Slave
 
 from benchmarks.conformance.cases import CASES, STEP_S, write_pictures
 from benchmarks.ledger import append
-from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
+from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_core.files import file_sha256
 
 HISTORY = Path(__file__).parent / "history" / "endurance.jsonl"

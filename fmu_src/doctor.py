@@ -13,12 +13,12 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from scenarios.fmu_client.archives import Archive, UnitFileError, opened_archive
+from scenarios.fmu_client.unpacking import SAFE_PATH, unpack_unit
 from trpac_core.files import parse_json, quoted
 
-from .archives import Archive, UnitFileError, opened_archive
 from .contents import CONTENTS_FILE, ContentError, Contents, deviations, read_contents
 from .host import LEAST_PYTHON
-from .packaging import SAFE_PATH, unpack_unit
 from .units import UNITS
 
 RECORD = f"resources/{CONTENTS_FILE}"

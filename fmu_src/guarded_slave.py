@@ -22,9 +22,9 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from trpac_core.files import FileError, parse_json, quoted
+from trpac_core.parameters.variables import Kind, Variable
 
 from .host import end_in_order
-from .variables import Kind, Variable
 
 Value = float | int | bool | str
 STATE_SCHEMA = 1

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 from trpac_core.dife import GREATEST_THETA
 from trpac_core.four_wheels import FourWheelsConfig
+from trpac_core.parameters.variables import Kind, Variable
 from trpac_core.vehicle import WHEELS
 
 from .settings import PARAMETERS
 from .signals import INPUTS, OUTPUTS
-from .variables import Kind, Variable
 
 PER_WHEEL = ("wheel_speed", "wheel_torque", "vertical_load")
 PER_SIDE = ("road_class", "road_class_confidence")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .variables import Kind, Variable
+from trpac_core.parameters.variables import Kind, Variable
 
 WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 SIDES = ("left", "right")

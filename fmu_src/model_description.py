@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from .variables import Kind, Variable
+from trpac_core.parameters.variables import Kind, Variable
 
 UNITS: dict[str, dict[str, int] | None] = {
     "1": {},

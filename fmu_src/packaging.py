@@ -1,11 +1,9 @@
-"""From sources to the unit's archive: unique module names, fixed bytes, and unpacking to a safe place."""
+"""From sources to the unit's archive: unique module names, fixed bytes."""
 
 from __future__ import annotations
 
 import hashlib
 import re
-import shutil
-import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,14 +14,12 @@ import pythonfmu
 
 from scenarios.whole_files import written_whole
 from trpac_core.errors import TrpacError
-from trpac_core.files import quoted
+from trpac_core.parameters.variables import Variable
 
-from .archives import UnitFileError, opened_archive
 from .contents import CONTENTS_FILE, Contents, sha256_of
 from .model_description import UnitInfo, model_description
-from .variables import Variable
 
-SLAVE_FILES = ("__init__.py", "contents.py", "guarded_slave.py", "host.py", "variables.py")
+SLAVE_FILES = ("__init__.py", "contents.py", "guarded_slave.py", "host.py")
 """Files of this package that every unit carries; what a unit needs besides comes on top."""
 
 PYTHONFMU_FILES = (
@@ -39,8 +35,6 @@ PYTHONFMU_FILES = (
 
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 HASH_DIGITS = 12
-SAFE_PATH = re.compile(r"[A-Za-z0-9_./ -]*")
-"""Paths that the wrapper's URI decoding leaves as they are: it crashes on umlauts, # + % ( and )."""
 
 
 @dataclass(frozen=True)
@@ -134,54 +128,6 @@ def write_archive(target: Path, content: Mapping[str, bytes]) -> Path:
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, content[path])
     return target
-
-
-def unpack_unit(archive: Path, folder: Path | None = None) -> Path:
-    """Unpack a unit to a folder whose path the wrapper can read; returns the folder.
-
-    Parameters
-    ----------
-    archive : Path
-        The unit.
-    folder : Path, optional
-        Where to, new or empty; by default a fresh temporary folder, which the caller removes. After an error nothing
-        is left of it.
-
-    Raises
-    ------
-    UnitFileError
-        If the path holds a character that crashes the wrapper, or the archive is damaged, too large, or has an entry
-        that is not to be unpacked.
-    """
-    if folder is not None:
-        return _unpacked(archive, folder)
-    made = Path(tempfile.mkdtemp(prefix="trpac-fmu-"))
-    try:
-        return _unpacked(archive, made)
-    except BaseException:
-        shutil.rmtree(made, ignore_errors=True)
-        raise
-
-
-def _unpacked(archive: Path, folder: Path) -> Path:
-    path = str(folder.resolve())
-    if not SAFE_PATH.fullmatch(path):
-        bad = "".join(sorted(set(re.sub(SAFE_PATH, "", path))))
-        raise UnitFileError(
-            f"{quoted(path)}: the unit's wrapper crashes on the characters '{quoted(bad)}' in its path. Unpack to a "
-            "path of letters, digits, spaces and . _ - only, for example by setting TMPDIR."
-        )
-    with opened_archive(archive) as content:
-        content.unpack(folder)
-    return folder
-
-
-def require_whole(archive: Path) -> None:
-    """Read a unit's archive to its end; raises UnitFileError where it is damaged or not to be unpacked."""
-    with opened_archive(archive) as content:
-        damaged = content.damage()
-    if damaged:
-        raise UnitFileError(f"{quoted(archive)}: damaged at {damaged}. Copy or build the unit again.")
 
 
 def _module_files(place: str, path: Path) -> dict[str, bytes]:

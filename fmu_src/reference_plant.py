@@ -14,12 +14,12 @@ from pythonfmu.enums import Fmi2Status
 from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
 from scenarios.plant.parameters import Wheels
 from scenarios.plant.pipeline import PlantState, advance, initial_state
+from trpac_core.parameters.configuration import check_parameters
+from trpac_core.parameters.variables import Variable
 from trpac_core.vision.classes import Surface
 
 from .guarded_slave import GuardedSlave
 from .interface_plant import MOST_TORQUE_NM, REFERENCE_PLANT, SIDES, WHEELS
-from .parameters import check_parameters
-from .variables import Variable
 
 File = TypeVar("File", bound=BaseModel)
 

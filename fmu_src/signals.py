@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from trpac_core.dife import GREATEST_THETA
+from trpac_core.parameters.variables import Kind, Variable
 from trpac_core.vision.classes import Surface
-
-from .variables import Kind, Variable
 
 NO_ROAD_CLASS = -1
 """Value of `road_class` that means: no class by bus, use the picture."""

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
 
+from trpac_core.parameters.variables import Kind, Variable
 from trpac_core.vehicle import WHEELS
 
 from .interface_4w import TRPAC_ESTIMATOR_4W
 from .interface_plant import REFERENCE_PLANT
 from .packaging import BuildError, write_archive
 from .units import STEP_S, UNITS
-from .variables import Kind, Variable
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"

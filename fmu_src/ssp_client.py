@@ -13,10 +13,10 @@ from fmpy.ssp.ssd import ParameterSet, find_components, read_ssd
 from lxml import etree
 from numpy.typing import NDArray
 
+from scenarios.fmu_client.archives import UnitFileError, opened_archive
+from scenarios.fmu_client.unpacking import require_whole
 from trpac_core.files import quoted
 
-from .archives import UnitFileError, opened_archive
-from .packaging import require_whole
 from .units import STEP_S
 
 SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"

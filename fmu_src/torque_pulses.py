@@ -6,10 +6,11 @@ from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
 
+from trpac_core.parameters.configuration import check_parameters
+from trpac_core.parameters.variables import Variable
+
 from .guarded_slave import GuardedSlave
 from .interface_pulses import TORQUE_PULSES, WHEELS
-from .parameters import check_parameters
-from .variables import Variable
 
 LONGEST_STEP_S = 10.0
 """As of the other units: beyond it the host has lost its clock [s]."""

@@ -8,6 +8,8 @@ from typing import Any, ClassVar
 from trpac_core.estimator import Estimate, EstimatorConfig
 from trpac_core.estimator import TrpacEstimator as Estimator
 from trpac_core.local_speed import local_speeds
+from trpac_core.parameters.configuration import configuration
+from trpac_core.parameters.variables import Variable
 from trpac_core.readings import Sensors
 from trpac_core.vision.ife import Ife
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
@@ -17,8 +19,6 @@ from .estimate_outputs import OF_ESTIMATE
 from .frames import ONE_CLASS, BusClass
 from .guarded_slave import Value
 from .interface import TRPAC_ESTIMATOR
-from .parameters import configuration
-from .variables import Variable
 
 
 class TrpacEstimator(CameraSlave):

@@ -7,6 +7,8 @@ from operator import attrgetter
 from typing import Any, ClassVar
 
 from trpac_core.four_wheels import CarEstimate, CarSensors, FourWheels, FourWheelsConfig
+from trpac_core.parameters.configuration import configuration
+from trpac_core.parameters.variables import Variable
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.sides import SidesIfe
@@ -16,8 +18,6 @@ from .estimate_outputs import OF_ESTIMATE
 from .frames import CLASS_PER_SIDE, BusClass
 from .guarded_slave import Value
 from .interface_4w import TRPAC_ESTIMATOR_4W
-from .parameters import configuration
-from .variables import Variable
 
 _OF_WHEEL = {
     f"{name}.{wheel}": (place, of_estimate)

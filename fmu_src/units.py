@@ -16,7 +16,16 @@ from .packaging import Slave
 
 ROOT = Path(__file__).parent.parent
 CORE_FILES = {
-    place: ROOT / place for place in ("trpac_core/__init__.py", "trpac_core/errors.py", "trpac_core/files.py")
+    place: ROOT / place
+    for place in (
+        "trpac_core/__init__.py",
+        "trpac_core/errors.py",
+        "trpac_core/files.py",
+        "trpac_core/parameters/__init__.py",
+        "trpac_core/parameters/configuration.py",
+        "trpac_core/parameters/fields.py",
+        "trpac_core/parameters/variables.py",
+    )
 }
 """What every unit carries of the core."""
 NETWORKS = (networks_folder() / "segmenter.onnx", networks_folder() / "surface.onnx")
@@ -26,12 +35,8 @@ ESTIMATOR_PACKAGES = {"numpy": "numpy", "cv2": "opencv-python-headless", "onnxru
 ESTIMATOR_FILES = (
     "camera_slave.py",
     "estimate_outputs.py",
-    "estimator_parameter.py",
-    "fields.py",
     "frames.py",
-    "image_settings.py",
     "memory.py",
-    "parameters.py",
     "settings.py",
     "signals.py",
 )
@@ -92,7 +97,7 @@ UNITS = {
         _info(
             "ReferencePlant", "A car on a road of known friction: four driven or braked wheels, straight on"
         ),
-        files=("parameters.py", "fields.py", "interface_plant.py", "reference_plant.py"),
+        files=("interface_plant.py", "reference_plant.py"),
         variables=REFERENCE_PLANT,
         modules={
             "scenarios/plant/__init__.py": Path(__file__).parent / "carried_plant.py",
@@ -105,7 +110,7 @@ UNITS = {
     ),
     "TorquePulses": Slave(
         _info("TorquePulses", "Driving and braking torque by the clock, for systems without a driver"),
-        files=("fields.py", "parameters.py", "interface_pulses.py", "torque_pulses.py"),
+        files=("interface_pulses.py", "torque_pulses.py"),
         variables=TORQUE_PULSES,
         modules=CORE_FILES,
         packages={},

@@ -6,8 +6,9 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from trpac_core.parameters.variables import Variable
+
 from .units import UNITS
-from .variables import Variable
 
 DOCS = Path(__file__).parent.parent / "docs"
 TARGETS = {

@@ -14,11 +14,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from scenarios.files import Scenario
+from scenarios.fmu_client.estimator import parameters, run_unit
 from scenarios.metrics import score_run
 from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
-from scenarios.unit_client import parameters, run_unit
 from trpac_core.files import file_sha256
 from trpac_core.vehicle import WHEELS
 

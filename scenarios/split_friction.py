@@ -1,6 +1,6 @@
 """Braking on split friction: plant and four-wheel estimator as two units under fmpy.
 
-``python -m scenarios.split_friction --out DIR [--pictures] [--figure FILE.png]``
+``python -m scenarios.split_friction --plant P.fmu --estimator E.fmu --out DIR [--pictures] [--figure FILE.png]``
 
 The car comes at 22 m/s onto a road whose left side is ice, later its right side, and brakes in pulses. In a pulse each
 wheel is braked to a share of what its own road carries, as anti-lock control does. The camera side is either the
@@ -15,19 +15,20 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pandas as pd
-from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from fmu_src.packaging import build_unit, unpack_unit
-from fmu_src.units import UNITS
 from scenarios.camera.files import load_camera
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.camera.split import SplitRenderer
 from scenarios.files import load_road, load_vehicle
+from scenarios.fmu_client.archives import UnitFileError
+from scenarios.fmu_client.opening import opened_unit
+from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_core.car_friction import Friction, car_friction
 from trpac_core.vehicle import WHEELS
 
@@ -35,6 +36,8 @@ HERE = Path(__file__).parent
 ROAD = HERE / "roads" / "split_friction.yaml"
 VEHICLE = HERE / "vehicles" / "four_in_wheel_motor_ev.yaml"
 CAMERA = HERE / "cameras" / "paper.yaml"
+
+PLANT, ESTIMATOR = "ReferencePlant", "TrpacEstimator4W"
 
 STEP_S, FRAME_STEPS = 0.001, 50
 START_M_S, END_M = 22.0, 95.0
@@ -50,16 +53,9 @@ NAMES = ("TRPAC", "TRPAC_std", "TRPAC_image", "excitation_flag", "flag")
 class Unit:
     """A unit in a host's hands, variables by name."""
 
-    def __init__(self, folder: Path, parameters: Mapping[str, float | str]) -> None:
-        description = read_model_description(str(folder))
+    def __init__(self, unit: FMU2Slave, description: Any, parameters: Mapping[str, float | str]) -> None:
         self._variables = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
-        self._unit = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=description.modelName,
-        )
-        self._unit.instantiate()
+        self._unit = unit
         self._unit.setupExperiment(startTime=0.0)
         self.set(parameters)
         self._unit.enterInitializationMode()
@@ -85,21 +81,19 @@ class Unit:
         """One communication step."""
         self._unit.doStep(time_s, STEP_S)
 
-    def free(self) -> None:
-        """Let the instance go."""
-        self._unit.freeInstance()
-
 
 @contextmanager
-def opened(name: str, folder: Path, parameters: Mapping[str, float | str]) -> Iterator[Unit]:
-    """Build a unit and open it; unpacked and freed for this run alone."""
-    unpacked = unpack_unit(build_unit(UNITS[name], folder / f"{name}.fmu"))
-    unit = Unit(unpacked, parameters)
+def opened(name: str, archive: Path, parameters: Mapping[str, float | str]) -> Iterator[Unit]:
+    """A unit of this name from its file, unpacked and freed for this run alone; raises UnitFileError."""
+    folder = unpack_unit(archive)
     try:
-        yield unit
+        unit, description = opened_unit(archive, folder, [name], name)
+        try:
+            yield Unit(unit, description, parameters)
+        finally:
+            unit.freeInstance()
     finally:
-        unit.free()
-        shutil.rmtree(unpacked, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def pulse(time_s: float) -> float:
@@ -110,19 +104,34 @@ def pulse(time_s: float) -> float:
     return float(np.clip(min(since, PULSE_S - since) / RAMP_S, 0.0, 1.0))
 
 
-def run(out: Path, *, pictures: bool = False, seed: int = 1, road: Path = ROAD) -> pd.DataFrame:
+def run(
+    plant_file: Path,
+    estimator_file: Path,
+    out: Path,
+    *,
+    pictures: bool = False,
+    seed: int = 1,
+    road: Path = ROAD,
+) -> pd.DataFrame:
     """Drive both units over a road; returns one row per step, in the order of time.
 
     Parameters
     ----------
+    plant_file, estimator_file : Path
+        The units `ReferencePlant` and `TrpacEstimator4W`.
     out : Path
-        Where units and pictures go.
+        Where pictures go.
     pictures : bool
         Whether the estimator sees rendered pictures, or is given the plant's class.
     seed : int
         Of the sensors' noise and of the pictures' world.
     road : Path
         The road file.
+
+    Raises
+    ------
+    UnitFileError
+        If one of the units cannot be used.
     """
     out.mkdir(parents=True, exist_ok=True)
     radius_m = load_vehicle(VEHICLE).wheel_radius_m
@@ -135,8 +144,8 @@ def run(out: Path, *, pictures: bool = False, seed: int = 1, road: Path = ROAD) 
     world = _world(road, seed) if pictures else None
     rows = []
     with (
-        opened("ReferencePlant", out, start) as plant,
-        opened("TrpacEstimator4W", out, settings) as estimator,
+        opened(PLANT, plant_file, start) as plant,
+        opened(ESTIMATOR, estimator_file, settings) as estimator,
     ):
         step = 0
         while plant.get("position") < END_M and plant.get("vehicle_speed") > 2.0:
@@ -217,6 +226,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    for option, name in (("--plant", PLANT), ("--estimator", ESTIMATOR)):
+        file = Path("dist") / f"{name}.fmu"
+        told = f"unit that build_fmu.py --slave {name} makes (default: %(default)s)"
+        parser.add_argument(option, type=Path, default=file, help=told)
     parser.add_argument(
         "--out", type=Path, default=Path("out/split_friction"), help="folder (default: %(default)s)"
     )
@@ -226,7 +239,12 @@ def main() -> int:
     options = parser.parse_args()
     from scenarios.split_figure import draw_split
 
-    table = run(options.out, pictures=options.pictures, seed=options.seed)
+    try:
+        table = run(
+            options.plant, options.estimator, options.out, pictures=options.pictures, seed=options.seed
+        )
+    except UnitFileError as error:
+        parser.error(str(error))
     table.to_csv(options.out / "log.csv", index=False)
     figure = options.figure or options.out / "split_friction.png"
     draw_split(table, figure)

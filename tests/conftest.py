@@ -13,8 +13,9 @@ import pytest
 from fmu_unit import Unit
 from hypothesis import settings
 
-from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
+from scenarios.fmu_client.unpacking import unpack_unit
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 

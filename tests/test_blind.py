@@ -21,7 +21,8 @@ from benchmarks.blind.generator.cases import make_case
 from benchmarks.blind.generator.details import FLOOR_M_S
 from benchmarks.blind.generator.forms import Family
 from benchmarks.blind.generator.kernel import N, V, begin, integrate
-from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, noise_of, read
+from benchmarks.blind.generator.sensor_set import Sensors
+from benchmarks.blind.generator.sensors import Noise, make_log, noise_of, read
 from benchmarks.blind.generator.table import SIZES, Group, Spec, table
 from benchmarks.blind.generator.world import nominal
 

@@ -35,7 +35,8 @@ from benchmarks.blind.generator.forms import (
 )
 from benchmarks.blind.generator.kernel import N, V, W, integrate
 from benchmarks.blind.generator.library import LIBRARY
-from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
+from benchmarks.blind.generator.sensor_set import Sensors
+from benchmarks.blind.generator.sensors import Noise, make_log, read
 from benchmarks.blind.generator.table import MORE_PAIRS, PAIRS, Group, table
 from benchmarks.blind.generator.tyre import dugoff
 from benchmarks.blind.generator.world import World, nominal

@@ -20,7 +20,8 @@ from benchmarks.blind.generator.recording_eighth import (
     resampled,
 )
 from benchmarks.blind.generator.scales import AIRED_S, TABLE_M_S
-from benchmarks.blind.generator.sensors import Sensors, read
+from benchmarks.blind.generator.sensor_set import Sensors
+from benchmarks.blind.generator.sensors import read
 from benchmarks.blind.generator.tyre_eighth import COMPOSITE_AT, COMPOSITE_TOP, bristles, composite
 
 pytestmark = pytest.mark.long

@@ -21,7 +21,8 @@ from benchmarks.blind.generator.recording_seventh import (
     working_loose,
     yawing,
 )
-from benchmarks.blind.generator.sensors import Sensors, read
+from benchmarks.blind.generator.sensor_set import Sensors
+from benchmarks.blind.generator.sensors import read
 from benchmarks.blind.generator.signals import JUMP_S
 from benchmarks.blind.generator.tyre import arctangent, sine_rise
 from benchmarks.blind.generator.world import nominal

@@ -30,7 +30,8 @@ from benchmarks.blind.generator.recording_sixth import (
     skewed,
     slow_accelerometer,
 )
-from benchmarks.blind.generator.sensors import Sensors, read
+from benchmarks.blind.generator.sensor_set import Sensors
+from benchmarks.blind.generator.sensors import read
 from benchmarks.blind.generator.signals import JUMP_S
 from benchmarks.blind.generator.tyre import blended, plain_dugoff, two_lines
 from benchmarks.blind.generator.world import nominal

@@ -25,7 +25,8 @@ from benchmarks.blind.generator.recording import (
 )
 from benchmarks.blind.generator.recording_fourth import DIGITS_FOURTH, NOISES_FOURTH
 from benchmarks.blind.generator.scales import SWAY_S
-from benchmarks.blind.generator.sensors import Noise, Sensors, read
+from benchmarks.blind.generator.sensor_set import Sensors
+from benchmarks.blind.generator.sensors import Noise, read
 from benchmarks.blind.generator.world import nominal
 
 pytestmark = pytest.mark.long

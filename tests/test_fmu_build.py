@@ -22,17 +22,19 @@ import build_fmu
 from fmu_src import packaging, variable_table
 from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
 from fmu_src.doctor import State, look_at_file
-from fmu_src.fields import field_value
 from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.model_description import UNITS as SI_UNITS
 from fmu_src.model_description import flat_name
-from fmu_src.packaging import BuildError, UnitFileError, build_unit, require_whole, unpack_unit
-from fmu_src.parameters import configuration
+from fmu_src.packaging import BuildError, build_unit
 from fmu_src.units import UNITS
-from fmu_src.variables import Kind, Variable
+from scenarios.fmu_client.archives import UnitFileError
+from scenarios.fmu_client.unpacking import require_whole, unpack_unit
 from trpac_core.estimator import Estimate, EstimatorConfig
 from trpac_core.estimator_data import OUTPUTS
 from trpac_core.files import file_sha256
+from trpac_core.parameters.configuration import configuration
+from trpac_core.parameters.fields import field_value
+from trpac_core.parameters.variables import Kind, Variable
 
 ROOT = Path(__file__).parent.parent
 SLAVE = UNITS["TrpacEstimator"]

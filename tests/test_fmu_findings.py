@@ -22,8 +22,9 @@ from fmpy.validation import validate_fmu
 from fmu_unit import DRIVING, Unit
 from pythonfmu import FmuBuilder
 
-from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
+from scenarios.fmu_client.unpacking import unpack_unit
 
 pytestmark = pytest.mark.e2e
 

@@ -12,15 +12,15 @@ import pytest
 from fmpy.validation import validate_fmu
 from fmu_unit import STEP_S, Unit
 
-from fmu_src.fields import field_value
 from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.interface_4w import PER_SIDE, PER_WHEEL, SIDES, TRPAC_ESTIMATOR_4W, WHICH_WHEEL
 from fmu_src.packaging import build_unit
-from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
 from trpac_core.estimator import RoadClass
 from trpac_core.files import file_sha256
 from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig, SideClasses
+from trpac_core.parameters.configuration import configuration
+from trpac_core.parameters.fields import field_value
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier

@@ -26,8 +26,9 @@ from test_fmu_doctor import changed, crashing, findings
 from typer.testing import CliRunner, Result
 
 from fmu_src.contents import CONTENTS_FILE
-from fmu_src.packaging import UnitFileError, require_whole, unpack_unit
 from fmu_src.ssp_client import problems, simulate
+from scenarios.fmu_client.archives import UnitFileError
+from scenarios.fmu_client.unpacking import require_whole, unpack_unit
 from trpac_cli.main import app
 
 pytestmark = pytest.mark.e2e

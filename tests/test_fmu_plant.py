@@ -14,10 +14,11 @@ from fmpy.validation import validate_fmu
 from fmu_unit import STEP_S, Unit
 
 from fmu_src.interface_plant import REFERENCE_PLANT
-from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.packaging import build_unit
 from fmu_src.reference_plant import _road, _vehicle
 from fmu_src.units import UNITS
 from scenarios.files import load_road, load_vehicle
+from scenarios.fmu_client.unpacking import unpack_unit
 from scenarios.plant.pipeline import PlantState, advance, initial_state, make_setup
 from trpac_core.files import file_sha256
 

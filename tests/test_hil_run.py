@@ -21,14 +21,15 @@ from fmu_unit import Unit as Client
 from long import long
 from typer.testing import CliRunner
 
-from fmu_src.packaging import unpack_unit
+from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_cli.main import app
 from trpac_hil.bus import BusSettings
 from trpac_hil.codec import load_codec
 from trpac_hil.errors import HilError
 from trpac_hil.partner import PartnerJob
 from trpac_hil.placing import UNIT_PREVIEW
-from trpac_hil.rig import HilSettings, Rig, run_hil
+from trpac_hil.rig import Rig, run_hil
+from trpac_hil.settings import HilSettings
 
 pytestmark = pytest.mark.e2e
 
@@ -105,7 +106,7 @@ def replayed(archive: Path, parameters: dict[str, object], log: dict[str, np.nda
 
 
 def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(unit_file: Path, tmp_path: Path) -> None:
-    from scenarios.unit_client import car_parameters
+    from scenarios.fmu_client.estimator import car_parameters
     from trpac_hil.rig import _vehicle
 
     bus = BusSettings("virtual", "test-whole")

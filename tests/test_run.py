@@ -13,10 +13,10 @@ from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios.errors import ScenarioError
 from scenarios.files import load_scenario
+from scenarios.fmu_client.estimator import INPUTS, run_unit
 from scenarios.pictures import frame_name, record
 from scenarios.plant.pipeline import drive
 from scenarios.runner import run_scenario
-from scenarios.unit_client import INPUTS, run_unit
 from trpac_cli.main import app
 
 ROOT = Path(__file__).parents[1]

@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fmu_src.packaging import build_unit
+from fmu_src.units import UNITS
 from scenarios import split_friction
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.camera.split import SplitRenderer
@@ -33,7 +35,12 @@ ERROR = 0.02
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
-    return run(tmp_path_factory.mktemp("split"))
+    folder = tmp_path_factory.mktemp("split")
+    plant, estimator = (
+        build_unit(UNITS[name], folder / f"{name}.fmu")
+        for name in (split_friction.PLANT, split_friction.ESTIMATOR)
+    )
+    return run(plant, estimator, folder)
 
 
 def steady(drive: pd.DataFrame, wheel: str) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from foreign_clients import need_client
 
 import build_ssp
 from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
-from fmu_src.packaging import BuildError, build_unit, unpack_unit
+from fmu_src.packaging import BuildError, build_unit
 from fmu_src.ssp import (
     ESTIMATOR,
     PLANT,
@@ -28,8 +28,9 @@ from fmu_src.ssp import (
 )
 from fmu_src.ssp_client import bound_parameters, problems, simulate
 from fmu_src.units import UNITS
-from fmu_src.variables import Kind
+from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_core.files import file_sha256
+from trpac_core.parameters.variables import Kind
 
 RUN_S = 0.6
 OUTPUT = {"one_wheel": "TRPAC", "four_wheels": "TRPAC.rl"}

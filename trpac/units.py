@@ -46,7 +46,7 @@ def build_fmu(folder: str | Path, *, unit: str = "TrpacEstimator", flat: bool = 
 def require_unit(path: str | Path) -> Path:
     """The path of a unit whose archive is whole; raises TrpacError."""
     with extras("a unit", "fmu"):
-        from fmu_src.packaging import require_whole
+        from scenarios.fmu_client.unpacking import require_whole
 
         require_whole(Path(path))
     return Path(path)

@@ -102,7 +102,8 @@ def hil(
     from scenarios.errors import ScenarioError
     from trpac_hil.codec import DBC_FILE
     from trpac_hil.deadlines import SPIN_NS
-    from trpac_hil.rig import HilSettings, run_hil
+    from trpac_hil.rig import run_hil
+    from trpac_hil.settings import HilSettings
     from trpac_hil.unit import WHEELS
 
     require_folder(COMMAND, out)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,26 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trpac_hil.figures import Figures
 from trpac_hil.helper import Control, helper
 from trpac_hil.mdf import MdfLog
-from trpac_hil.records import AGED, Column
+from trpac_hil.records import Column
 from trpac_hil.shared import Ring
-from trpac_hil.spread import Spread
 
 EVERY_S = 0.25
 """How often rows are fetched and the terminal is drawn [s]."""
 ROWS_KEPT = 30_000
 """Rows that wait for a recorder that is held up: 30 s at 1 kHz."""
-SPREADS = {
-    "jitter_us": "lateness_us",
-    "cycle_us": "work_us",
-    "cycle_cpu_us": "cpu_us",
-    "unit_step_us": "unit_us",
-    **{f"age_{m}_ms": f"age_{m}_ms" for m in AGED},
-    "age_picture_ms": "age_picture_ms",
-    "age_under_wheel_ms": "age_under_wheel_ms",
-}
-"""Figures of summary.json, and the column of each."""
 LOG_FAILED = "log failed"
 
 
@@ -61,34 +50,6 @@ class RecorderJob:
     live: bool
     title: str
     core: int | None = None
-
-
-class Figures:
-    """Spreads of timing and ages over all rows, and the newest row."""
-
-    def __init__(self, columns: Sequence[Column]) -> None:
-        self._at = {column.name: place for place, column in enumerate(columns)}
-        self.spreads = {name: Spread() for name in SPREADS}
-        self.newest: NDArray[np.float64] | None = None
-        self.rows = 0
-
-    def add(self, rows: NDArray[np.float64]) -> None:
-        """Count rows, shape (n, columns)."""
-        if not len(rows):
-            return
-        for name, column in SPREADS.items():
-            self.spreads[name].add(rows[:, self._at[column]])
-        self.newest, self.rows = rows[-1].copy(), self.rows + len(rows)
-
-    def now(self, column: str) -> float:
-        """Newest value of a column, NaN before the first row or where there is no such column."""
-        if self.newest is None or column not in self._at:
-            return float("nan")
-        return float(self.newest[self._at[column]])
-
-    def summary(self) -> dict[str, dict[str, float] | None]:
-        """Median, p99 and maximum of each."""
-        return {name: spread.summary() for name, spread in self.spreads.items()}
 
 
 def record(job: RecorderJob, ring: Ring, control: Control, words: Any) -> None:

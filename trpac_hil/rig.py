@@ -11,27 +11,27 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.packaging import build_unit
-from fmu_src.parameters import configuration
 from fmu_src.units import UNITS
-from fmu_src.variables import Kind
 from scenarios.camera.files import load_camera
 from scenarios.files import load_scenario, load_vehicle
-from scenarios.unit_client import car_parameters
+from scenarios.fmu_client.estimator import car_parameters
 from trpac_core.estimator import EstimatorConfig
+from trpac_core.parameters.configuration import configuration
+from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
+from trpac_core.parameters.variables import Kind
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
-from trpac_hil.bus import BusSettings, Link
+from trpac_hil.bus import Link
 from trpac_hil.camera import MOTION, RESULTS_KEPT, CameraJob, Folder, result_columns, watch
-from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, load_codec
-from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock
+from trpac_hil.codec import INPUT_MESSAGES, load_codec
+from trpac_hil.deadlines import Deadlines, SystemClock
 from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
@@ -40,11 +40,12 @@ from trpac_hil.helper import CONTEXT, Body, Control, begin
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Loop
 from trpac_hil.mdf import SCRATCH_PREFIX
-from trpac_hil.partner import PartnerJob, play
+from trpac_hil.partner import play
 from trpac_hil.placing import UNIT_PREVIEW, Placing
 from trpac_hil.realtime import as_before, loop_core, memory_mb, pin, raise_priority, undisturbed
 from trpac_hil.recorder import LOG_FAILED, ROWS_KEPT, RecorderJob, record
 from trpac_hil.records import columns
+from trpac_hil.settings import HilSettings
 from trpac_hil.shared import Numbers, Ring
 from trpac_hil.sight import Sight
 from trpac_hil.summary import summarise, write_summary
@@ -56,68 +57,6 @@ PATIENCE_S, RECORDERS_PATIENCE_S = 60.0, 3600.0
 RUN_UP_NS = 200_000_000
 """From the word to start until slot 0, for all processes to hear it [ns]."""
 CLASS_MESSAGE, CLASS_SIGNAL = "RoadClass", "RoadClass_Number"
-
-
-@dataclass(frozen=True)
-class HilSettings:
-    """What a run is told.
-
-    Attributes
-    ----------
-    out : Path
-        Folder for log.mf4 and summary.json.
-    fmu : Path or None
-        The unit; None builds TrpacEstimator from the sources.
-    bus : BusSettings
-        The bus.
-    dbc : Path
-        Its messages.
-    rate_hz : float
-        Cycles per second, 100 to 1000.
-    duration_s : float or None
-        None runs until asked to stop [s].
-    wheel : str
-        Which wheel a unit of one wheel is for.
-    vehicle, camera : Path or None
-        vehicle.yaml; camera.yaml of the pictures.
-    frames : Path or None
-        Folder of pictures; None takes classes from the bus.
-    fps : float
-        Pictures per second.
-    parameters : mapping
-        Parameters of the unit by variable name.
-    plant : PartnerJob or None
-        The plant to play on the same bus.
-    log, counters, live, realtime : bool
-        Whether to log; to hold messages to their counters; to draw on the terminal; to ask for real-time priority.
-    core : int or None
-        Core of the loop; with real-time priority the last one by default.
-    camera_threads : int
-        Threads of each network.
-    spin_ns : int
-        How long before a due time the sleep ends [ns].
-    """
-
-    out: Path
-    fmu: Path | None = None
-    bus: BusSettings = field(default_factory=BusSettings)
-    dbc: Path = DBC_FILE
-    rate_hz: float = 1000.0
-    duration_s: float | None = None
-    wheel: str = "fl"
-    vehicle: Path | None = None
-    camera: Path | None = None
-    frames: Path | None = None
-    fps: float = 20.0
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    plant: PartnerJob | None = None
-    log: bool = True
-    counters: bool = True
-    live: bool = False
-    realtime: bool = False
-    core: int | None = None
-    camera_threads: int = 1
-    spin_ns: int = SPIN_NS
 
 
 class Stopper:
@@ -354,10 +293,10 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
 def _vision(settings: HilSettings, camera: Camera) -> IfeConfig:
     """The image estimator's settings by the unit's parameters, which the unit itself has taken already."""
     told = _parameters(settings)
-    variables = [v for v in TRPAC_ESTIMATOR if v.name.startswith("image.") and v.causality == "parameter"]
+    variables = [v for v in ESTIMATOR_PARAMETERS if v.name.startswith("image.")]
     kinds = {Kind.INTEGER: int, Kind.BOOLEAN: bool, Kind.REAL: float}
-    values = {v.name: kinds[v.kind](told.get(v.name, v.start)) for v in variables if v.source}
-    vision = configuration([v for v in variables if v.source], values, EstimatorConfig()).vision
+    values = {v.name: kinds[v.kind](told.get(v.name, v.start)) for v in variables}
+    vision = configuration(variables, values, EstimatorConfig()).vision
     return replace(
         vision, camera=camera, track_m=told["vehicle.track"], wheelbase_m=told["vehicle.wheelbase"]
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -12,10 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from trpac_hil.figures import Figures
 from trpac_hil.records import AGED
-
-if TYPE_CHECKING:
-    from trpac_hil.recorder import Figures
 
 STATUS = {0: "starting", 1: "running", 2: "held: inputs", 3: "held: bus", 4: "held: unit"}
 MOST_WORDS = 8

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,11 +15,9 @@ from trpac_hil.bus import Link
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Counts
+from trpac_hil.settings import HilSettings
 from trpac_hil.sight import Sight
 from trpac_hil.unit import Unit
-
-if TYPE_CHECKING:
-    from trpac_hil.rig import HilSettings
 
 PACKAGES = ("trpac-fmu", "fmpy", "python-can", "cantools", "asammdf", "numpy", "onnxruntime")
 

@@ -12,8 +12,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
 from fmu_src.interface_4w import WHICH_WHEEL
-from fmu_src.opening import opened_unit
-from fmu_src.packaging import UnitFileError, unpack_unit
+from scenarios.fmu_client.archives import UnitFileError
+from scenarios.fmu_client.opening import opened_unit
+from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_core.vehicle import WHEELS
 from trpac_hil.errors import HilError
 

@@ -13,8 +13,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
+from scenarios.fmu_client.unpacking import unpack_unit
 
 from .cases import CASES, write_pictures
 from .clients import CLIENTS

@@ -247,7 +247,7 @@ def _unit(folder: Path) -> Path:
 
 def _read_unit(path: Path) -> Any:
     """Unpacked as our tools do it; the files' content counts."""
-    from fmu_src.packaging import unpack_unit
+    from scenarios.fmu_client.unpacking import unpack_unit
 
     folder = Path(tempfile.mkdtemp(prefix="trpac-fuzz-unit-"))
     try:

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.conformance.cases import CASES
-from fmu_src.packaging import build_unit, unpack_unit
+from fmu_src.packaging import build_unit
 from fmu_src.units import ROOT, UNITS
+from scenarios.fmu_client.unpacking import unpack_unit
 
 from .files import KINDS, damaged_files
 from .states import UNIT_OF, damaged_states

@@ -20,8 +20,7 @@ from .scores import ClassScore, wilson_interval
 
 if TYPE_CHECKING:
     from .calibrate import Reliability
-    from .scene_run import Judged
-    from .surface_run import Outcome, Stage
+    from .outcomes import Judged, Outcome, Stage
     from .train_segmenter import SegmentationScore
 
 CLASSES = [surface.label for surface in Surface]

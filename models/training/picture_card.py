@@ -13,8 +13,8 @@ from .patches import CAMERA_SPREAD, RENDERED_SPREAD, PatchSet
 from .rendered import FIRST_SCENE_WORLD, SEED_RANGES
 
 if TYPE_CHECKING:
+    from .outcomes import Stage
     from .picture_scores import Scores
-    from .surface_run import Stage
 
 
 def picture_card(

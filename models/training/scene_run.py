@@ -7,7 +7,6 @@ import re
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,6 +24,7 @@ from .annotate import annotate, sha256_of
 from .cards import SCENE_BEGIN, SCENE_END
 from .data import Picture, judged_groups, trained_on
 from .keeping import kept_or_made
+from .outcomes import Judged
 from .patches import draw_weights, judged_patches, thinned, training_patches
 from .rendered import (
     FIRST_SCENE_WORLD,
@@ -47,14 +47,6 @@ CUTTING_SEED = 21
 
 Report = Callable[[int, float], None]
 Steps = Callable[[str, int], AbstractContextManager[Report]]
-
-
-@dataclass(frozen=True)
-class Judged:
-    """Scores of a set, patches alone and in their scenes."""
-
-    alone: scores.ClassScore
-    in_scene: scores.ClassScore
 
 
 def ship_scene(

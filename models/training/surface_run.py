@@ -21,10 +21,10 @@ from .data import Image, Picture, judged_groups, of_split, trained_on
 from .export import export_surface
 from .keeping import keep_whole, kept_or_made
 from .nets import SurfaceNet, mean_of, together
+from .outcomes import Outcome, Stage
 from .outliers import outlier_patches
 from .patches import PatchSet, joined, judged_patches, thinned, training_patches
 from .train_surface import (
-    BATCH,
     Report,
     learn_classes,
     learn_disturbed,
@@ -69,19 +69,6 @@ class Material:
     outliers: dict[str, Image]
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """A trained and calibrated classifier with its scores on the judged sets."""
-
-    net: SurfaceNet
-    temperature: float
-    reliabilities: dict[str, tuple[calibrate.Reliability, calibrate.Reliability]]
-    entropies: tuple[float, float]
-    picture_scores: dict[str, scores.ClassScore]
-    patch_scores: dict[str, scores.ClassScore]
-    readings: dict[str, float]
-
-
 def train_and_ship(
     given: argparse.Namespace,
     facts: cards.RunFacts,
@@ -123,24 +110,6 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], rendered: dic
         "val": outlier_patches(rng, of_split(pictures, "val"), rendered["val"].patches, count["val"]),
     }
     return Material(patches, outliers)
-
-
-@dataclass(frozen=True)
-class Stage:
-    """A net that has learned its classes, how that came about, and how much each tower's logits count."""
-
-    net: SurfaceNet
-    patches: int
-    steps: int
-    seconds: float
-    device: str
-    says: tuple[float, ...] = (1.0,)
-
-    def told(self) -> str:
-        """The effort in words, for the card."""
-        return (
-            f"{self.steps} steps of {BATCH} on {self.patches} patches, {self.seconds:.0f} s on {self.device}"
-        )
 
 
 def kept_stage(

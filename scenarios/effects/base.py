@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.effects.frames import Frames
+
 if TYPE_CHECKING:
-    from scenarios.perception import Frames
     from scenarios.plant.dynamics import DynamicsParameters, RoadTable
     from trpac_core.vehicle import Vehicle
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.perception import Frames
+from scenarios.effects.frames import Frames
 
 LEAST_ANGLE_RAD = 0.005
 """Rays are not followed closer to the horizon than this: they would meet the road beyond 280 m [rad]."""

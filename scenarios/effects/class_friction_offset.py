@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenarios.effects.base import Effect, parameter
+from scenarios.effects.frames import Frames
 from trpac_core.vision.classes import CLASS_THETA, Surface
-
-if TYPE_CHECKING:
-    from scenarios.perception import Frames
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.perception import Frames
+from scenarios.effects.frames import Frames
 
 TOLERATED_STOPS = 4.3
 """Exposure error that leaves 1/e of the right classes [stops].

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.perception import Frames
+from scenarios.effects.frames import Frames
 
 TOLERATED_SMEAR_M = 4.0
 """Smear on the road that leaves 1/e of the right classes [m].

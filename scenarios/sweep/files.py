@@ -9,13 +9,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from fmu_src.units import UNITS
 from scenarios.errors import ScenarioError, suggestion
 from scenarios.files import Scenario, SurfaceName, load_scenario
 from scenarios.library import located
 from scenarios.strict import load_strict
 from scenarios.sweep.trackers import ADDRESS, problem_of_address, problem_of_tracker
 from trpac_core.files import quoted
+from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
 
 MOST_RUNS = 1_000_000
 """Runs of a sweep in all its levels."""
@@ -205,7 +205,7 @@ class SweepFile(_Section):
 
 def _problems_of_unit(given: dict[str, float]) -> list[str]:
     """What is wrong with parameters of the estimator: their names, or their values by the unit's own bounds."""
-    reals = {v.name: v for v in UNITS["TrpacEstimator"].variables if v.causality == "parameter" and v.unit}
+    reals = {v.name: v for v in ESTIMATOR_PARAMETERS if v.unit}
     problems = []
     for name, value in given.items():
         if name not in reals:

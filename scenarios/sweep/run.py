@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fmu_src.parameters import configuration
-from fmu_src.units import UNITS
 from scenarios.files import Scenario
+from scenarios.fmu_client.estimator import parameters
 from scenarios.looks import image_estimator
 from scenarios.metrics import score_run
 from scenarios.peers import PeerSetup
@@ -22,9 +21,10 @@ from scenarios.runner import segment_starts, under_the_wheel
 from scenarios.sweep.camera import RenderedFrames, class_verdicts
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.trackers import OWN, make_peer
-from scenarios.unit_client import parameters
 from trpac_core.dife import GREATEST_THETA, LEAST_SENSITIVITY, LEAST_THETA
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.parameters.configuration import configuration
+from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
 from trpac_core.readings import Sensors
 from trpac_core.tyre import friction_by_theta
 from trpac_core.vehicle import WHEELS, Vehicle
@@ -80,12 +80,11 @@ def believed_config(plan: RunPlan, unit: dict[str, float]) -> EstimatorConfig:
     told["vehicle.mass"] *= believed.mass_factor
     told["vehicle.wheel_radius"] *= believed.radius_factor
     told["tyre.longitudinal_stiffness"] *= believed.stiffness_factor
-    variables = UNITS["TrpacEstimator"].variables
-    values: dict[str, Any] = {v.name: v.start for v in variables if v.causality == "parameter"} | told | unit
+    values: dict[str, Any] = {v.name: v.start for v in ESTIMATOR_PARAMETERS} | told | unit
     for surface in Surface:
         name = f"estimator.theta_{surface.label}"
         values[name] = min(max(values[name] + plan.camera.class_value_offset, LEAST_THETA), GREATEST_THETA)
-    return configuration(variables, values, EstimatorConfig())
+    return configuration(ESTIMATOR_PARAMETERS, values, EstimatorConfig())
 
 
 def signals_of(plan: RunPlan, trajectory: PlantTrajectory) -> list[list[float]]:

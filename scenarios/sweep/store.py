@@ -22,7 +22,7 @@ from scenarios.sweep.files import Sweep, content
 from trpac_core.files import FileError, parse_json, quoted, read_bytes, read_text
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("trpac_core", "fmu_src", "scenarios")
+SOURCES = ("trpac_core", "scenarios")
 """Packages whose code decides what a run gives."""
 TEXT = ("parameter", "surface", "estimator")
 WHOLE = ("run", "number", "seed", "stretch")

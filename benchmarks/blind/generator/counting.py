@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from .details import USUAL_RAD_S
 from .kernel import RECORD_STEP_S
-
-if TYPE_CHECKING:
-    from .sensors import Sensors
+from .sensor_set import Sensors
 
 Array = NDArray[np.floating[Any]]
 

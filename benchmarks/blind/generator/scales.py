@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .details import GRAIN_M, USUAL_M_S, WARM_S
 from .kernel import RECORD_STEP_S, N, V, X
+from .sensor_set import Sensors
 from .signals import cycling, jumping, lag, slow
-
-if TYPE_CHECKING:
-    from .sensors import Sensors
 
 Array = NDArray[np.floating[Any]]
 

@@ -15,7 +15,7 @@ from .details import FLOOR_M_S, spread
 from .falling import EXPONENTIAL
 from .kernel import GRAVITY, RECORD_STEP_S
 from .physics import Physics
-from .sensors import Sensors
+from .sensor_set import Sensors
 from .tyre import MAGIC, THETA_GRID, peaks
 
 Array = NDArray[np.floating[Any]]

@@ -11,10 +11,11 @@ import pandas as pd
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
-from fmu_src.opening import opened_unit
-from fmu_src.packaging import UnitFileError, unpack_unit
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario, ScenarioError
+from scenarios.fmu_client.archives import UnitFileError
+from scenarios.fmu_client.opening import opened_unit
+from scenarios.fmu_client.unpacking import unpack_unit
 from scenarios.pictures import frame_steps
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera

@@ -1,7 +1,8 @@
-"""Parameters of the unit's camera side: lens and mounting, and the image estimator's settings."""
+"""Parameters of the camera side: lens and mounting, and the image estimator's settings."""
 
 from __future__ import annotations
 
+from trpac_core.parameters.estimator_parameter import parameter
 from trpac_core.vision.ife_config import (
     FARTHEST_CENTRE,
     LEAST_GRID_M,
@@ -13,8 +14,6 @@ from trpac_core.vision.ife_config import (
     MOST_WIDTH_M,
     STEEPEST_SIGMOID,
 )
-
-from .estimator_parameter import parameter
 
 CAMERA_PARAMETERS = (
     parameter("camera.width", "", "vision.camera.width_px", "Width of the picture in pixels", 64),

@@ -10,9 +10,8 @@ from xml.etree.ElementTree import ParseError
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
+from scenarios.fmu_client.archives import UnitFileError
 from trpac_core.files import quoted
-
-from .archives import UnitFileError
 
 
 def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: str) -> tuple[FMU2Slave, Any]:
@@ -21,7 +20,7 @@ def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: 
     Parameters
     ----------
     archive, folder : Path
-        The unit, for messages, and where `packaging.unpack_unit` put it.
+        The unit, for messages, and where `unpack_unit` put it.
     expected : sequence of str
         Units that will do.
     instance : str

@@ -1,4 +1,4 @@
-"""What an FMI 2.0 scalar variable is to the units' tables."""
+"""What a named variable is, in the terms of FMI 2.0."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Variable:
-    """One FMI 2.0 scalar variable; its value reference is its place in the table."""
+    """One FMI 2.0 scalar variable; in a unit its value reference is its place in the table."""
 
     name: str
     kind: Kind

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from .fields import with_fields
-from .variables import Kind, Variable
+from trpac_core.parameters.fields import with_fields
+from trpac_core.parameters.variables import Kind, Variable
 
 Config = TypeVar("Config")
 

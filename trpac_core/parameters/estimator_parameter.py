@@ -1,13 +1,12 @@
-"""A parameter of the estimator as a unit's variable."""
+"""A parameter of the estimator as a named variable."""
 
 from __future__ import annotations
 
 from enum import Enum
 
 from trpac_core.estimator import EstimatorConfig
-
-from .fields import field_value
-from .variables import Kind, Variable
+from trpac_core.parameters.fields import field_value
+from trpac_core.parameters.variables import Kind, Variable
 
 _DEFAULTS = EstimatorConfig()
 

@@ -1,0 +1,54 @@
+"""The camera chain's pictures, as effects change them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Frames:
+    """What the camera chain makes of its pictures, one row per picture; effects act on it.
+
+    Attributes
+    ----------
+    time_s, arrival_s : array, shape (n,)
+        When the picture was taken, and when its result comes [s].
+    speed_m_s : array, shape (n,)
+        Speed when the picture was taken [m/s].
+    camera_m, stamp_camera_m : array, shape (n,)
+        Where the camera was when the picture was taken, and where the stamp takes it to have been [m].
+    stamped_m, seen_m : array, shape (n, 2)
+        Begin and end of the stretch ahead of the camera: as the camera file tells it, and as it truly is [m].
+    confidence, wrong_share : array, shape (n,)
+        Q_v, and the probability that the class is wrong [-].
+    camera_height_m : float
+        Of the lens above the road [m].
+    class_friction : array, shape (3,)
+        The road's friction per class, dry, wet, snow and ice [-].
+    drive_time_s, drive_camera_m : array, shape (m,)
+        The camera's whole way, for effects that shift time [s], [m].
+    """
+
+    time_s: Array
+    arrival_s: Array
+    speed_m_s: Array
+    camera_m: Array
+    stamp_camera_m: Array
+    stamped_m: Array
+    seen_m: Array
+    confidence: Array
+    wrong_share: Array
+    camera_height_m: float
+    class_friction: Array
+    drive_time_s: Array
+    drive_camera_m: Array
+
+    def dimmed(self, share: Array) -> Frames:
+        """The frames where pictures tell less: confidence and right classes fall to a share of them, shape (n,)."""
+        right = (1.0 - self.wrong_share) * share
+        return replace(self, confidence=self.confidence * share, wrong_share=1.0 - right)

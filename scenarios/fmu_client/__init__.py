@@ -1,0 +1,1 @@
+"""Units by their files: archives that others wrote, opened, unpacked and run."""

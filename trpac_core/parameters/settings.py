@@ -1,0 +1,275 @@
+"""All parameters of the estimator.
+
+A parameter's start is the default of the estimator's own configuration, so that no number is stated twice.
+"""
+
+from __future__ import annotations
+
+from trpac_core.dife import GREATEST_THETA, VisualTerm
+from trpac_core.excitation import K_V_LIMIT
+from trpac_core.parameters.estimator_parameter import parameter
+from trpac_core.parameters.image_settings import CAMERA_PARAMETERS, IMAGE_PARAMETERS
+from trpac_core.vision.classes import Surface
+
+_VEHICLE_PARAMETERS = (
+    parameter("wheel.front", "", "front_axle", "The wheel is on the front axle"),
+    parameter(
+        "wheel.left", "", "left_side", "The wheel is on the left side: whose track the camera looks at"
+    ),
+    parameter("vehicle.mass", "kg", "vehicle.mass_kg", "Mass of the car", 1.0, 1e6),
+    parameter("vehicle.wheelbase", "m", "vehicle.wheelbase_m", "Wheelbase", 0.1, 100.0),
+    parameter("vehicle.track", "m", "vehicle.track_m", "Track width", 0.1, 100.0),
+    parameter(
+        "vehicle.cog_height", "m", "vehicle.cog_height_m", "Height of the centre of gravity", 0.0, 100.0
+    ),
+    parameter(
+        "vehicle.cog_to_rear_axle",
+        "m",
+        "vehicle.cog_to_rear_axle_m",
+        "Centre of gravity to rear axle",
+        0.0,
+        100.0,
+    ),
+    parameter("vehicle.wheel_radius", "m", "vehicle.wheel_radius_m", "Rolling radius R", 0.01, 10.0),
+    parameter(
+        "vehicle.wheel_inertia",
+        "kg.m2",
+        "vehicle.wheel_inertia_kg_m2",
+        "Inertia I of a wheel",
+        1e-3,
+        1e6,
+    ),
+    parameter(
+        "tyre.rolling_resistance",
+        "1",
+        "vehicle.rolling_resistance",
+        "Rolling resistance coefficient",
+        0.0,
+        1.0,
+    ),
+    parameter(
+        "tyre.longitudinal_stiffness",
+        "N",
+        "vehicle.longitudinal_stiffness_n",
+        "Longitudinal stiffness C_x per unit slip",
+        10_000.0,
+        1e9,
+    ),
+)
+
+_FUSION_PARAMETERS = (
+    parameter("estimator.K", "1/s", "gains.K", "Bandwidth of the force observer", 1e-3, 1e6),
+    parameter("estimator.gamma", "1/s", "gains.gamma", "Rate of the estimator", 0.0, 1e6),
+    parameter(
+        "estimator.visual_term",
+        "",
+        "gains.visual_term",
+        "Form of the visual term: that of Eq. (17) or (18)",
+        min(form.value for form in VisualTerm),
+        max(form.value for form in VisualTerm),
+    ),
+    parameter(
+        "estimator.tyre_first",
+        "",
+        "gains.tyre_first",
+        "The visual term never pulls against what the tyre shows; false: Eqs. (17) and (18) as printed",
+    ),
+    parameter(
+        "estimator.theta_initial",
+        "1",
+        "theta_initial",
+        "Estimate at the start",
+        0.02,
+        GREATEST_THETA,
+    ),
+    parameter("estimator.floor_speed", "m/s", "floor_m_s", "Speed below which slip says nothing", 0.01),
+    parameter(
+        "estimator.sensor_filter", "s", "sensor_filter_s", "Time constant of the filter on the sensors", 1e-9
+    ),
+    parameter(
+        "estimator.sliding_speed_noise",
+        "m/s",
+        "sliding_speed_noise_m_s",
+        "Standard deviation of the sliding speed omega R - v per sample",
+        0.0,
+    ),
+    parameter(
+        "estimator.acceleration_filter",
+        "s",
+        "acceleration_filter_s",
+        "Time constant for the acceleration that the load follows",
+        1e-6,
+    ),
+    *(
+        parameter(
+            f"estimator.theta_{surface.label}",
+            "1",
+            f"class_theta.{surface.value}",
+            f"Adhesion of the class {surface.label}",
+            0.02,
+            GREATEST_THETA,
+        )
+        for surface in Surface
+    ),
+    *(
+        parameter(
+            f"scheduler.theta_{size}",
+            "1",
+            f"scheduler.theta_sets.{size}",
+            f"Camera's adhesion at which the set '{size}' is full",
+            0.0,
+            GREATEST_THETA,
+        )
+        for size in ("small", "medium", "big")
+    ),
+    *(
+        parameter(
+            f"scheduler.difference_{size}",
+            "1",
+            f"scheduler.difference_sets.{size}",
+            f"Difference of camera and estimate at which the set '{size}' is full",
+            0.0,
+            GREATEST_THETA,
+        )
+        for size in ("small", "medium", "big")
+    ),
+    *(
+        parameter(
+            f"scheduler.K_v_{size}",
+            "1/s",
+            f"scheduler.K_v_values.{place}",
+            f"K_v of the set '{size}', in 1/s as the visual term is in form (18)",
+            0.0,
+            K_V_LIMIT,
+        )
+        for place, size in enumerate(("small", "medium", "big"))
+    ),
+    parameter(
+        "scheduler.class_scatter",
+        "1",
+        "scheduler.class_scatter",
+        "How much more slippery than its class a road may be and still be seen",
+        0.0,
+        1.0,
+    ),
+    parameter(
+        "scheduler.onset_sensitivity",
+        "1",
+        "scheduler.onset_sensitivity",
+        "Sensitivity d mu / d theta from which the tyre shows theta",
+        0.0,
+        1.0,
+    ),
+    parameter(
+        "scheduler.noise_factor",
+        "1",
+        "scheduler.noise_factor",
+        "Noise deviations that the threshold stays above",
+        0.0,
+    ),
+    parameter("preview.P_0", "m", "preview.P_0_m", "Preview distance P_0", 0.0),
+    parameter("preview.hold", "m", "preview.hold_m", "How far beyond its end a frame holds", 0.0),
+    parameter(
+        "preview.resolution",
+        "m",
+        "preview.resolution_m",
+        "Way below which frames share a stamp",
+        0.0,
+    ),
+    parameter(
+        "confidence.torque_noise",
+        "N.m",
+        "confidence.torque_noise_nm",
+        "Standard deviation of the torque",
+        0.0,
+        1e6,
+    ),
+    parameter(
+        "confidence.tyre_share",
+        "1",
+        "confidence.tyre_share",
+        "Error of the tyre model, as a share of the used friction",
+        0.0,
+        10.0,
+    ),
+    parameter(
+        "confidence.road_change",
+        "1/m0.5",
+        "confidence.road_change",
+        "Wander of the adhesion per root of a metre driven unseen",
+        0.0,
+        10.0,
+    ),
+    parameter(
+        "confidence.car_share",
+        "1",
+        "confidence.car_share",
+        "Error of load and torque, as a share of the adhesion that no driving can tell",
+        0.0,
+        10.0,
+    ),
+    parameter(
+        "confidence.class_change",
+        "m",
+        "confidence.class_change_m",
+        "Way driven unseen that a change of the camera's class counts as",
+        0.0,
+        1e6,
+    ),
+    parameter(
+        "confidence.class_scatter",
+        "1",
+        "confidence.class_scatter",
+        "Standard deviation of a road from the value of the class that the camera gave it",
+        0.0,
+        10.0,
+    ),
+    parameter(
+        "tolerance.speed_bias",
+        "m/s",
+        "elastic.speed_bias_m_s",
+        "Standard deviation of a constant error of the sliding speed, learnt while the tyre adheres",
+        0.0,
+        100.0,
+    ),
+    parameter(
+        "tolerance.speed_drift",
+        "m/s1.5",
+        "elastic.speed_drift_m_s",
+        "How far that error wanders per root of a second",
+        0.0,
+        100.0,
+    ),
+    parameter(
+        "tolerance.rolling_radius",
+        "1",
+        "elastic.ratio",
+        "Standard deviation of the rolling radius as a share of it, learnt while the tyre adheres",
+        0.0,
+        1.0,
+    ),
+    parameter(
+        "tolerance.longitudinal_stiffness",
+        "1",
+        "elastic.compliance",
+        "Standard deviation of the tyre's compliance as a share of it, learnt while the tyre adheres",
+        0.0,
+        10.0,
+    ),
+    parameter(
+        "confidence.unknown",
+        "1",
+        "confidence.unknown",
+        "Standard deviation where nothing is known",
+        0.0,
+        10.0,
+    ),
+)
+
+ESTIMATOR_PARAMETERS = (
+    *_VEHICLE_PARAMETERS,
+    *_FUSION_PARAMETERS,
+    *CAMERA_PARAMETERS,
+    *IMAGE_PARAMETERS,
+)
+"""In the order in which units have them."""

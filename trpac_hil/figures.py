@@ -1,0 +1,50 @@
+"""Figures of a run: spreads of timing and ages, as the terminal and summary.json have them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trpac_hil.records import AGED, Column
+from trpac_hil.spread import Spread
+
+SPREADS = {
+    "jitter_us": "lateness_us",
+    "cycle_us": "work_us",
+    "cycle_cpu_us": "cpu_us",
+    "unit_step_us": "unit_us",
+    **{f"age_{m}_ms": f"age_{m}_ms" for m in AGED},
+    "age_picture_ms": "age_picture_ms",
+    "age_under_wheel_ms": "age_under_wheel_ms",
+}
+"""Figures of summary.json, and the column of each."""
+
+
+class Figures:
+    """Spreads of timing and ages over all rows, and the newest row."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        self._at = {column.name: place for place, column in enumerate(columns)}
+        self.spreads = {name: Spread() for name in SPREADS}
+        self.newest: NDArray[np.float64] | None = None
+        self.rows = 0
+
+    def add(self, rows: NDArray[np.float64]) -> None:
+        """Count rows, shape (n, columns)."""
+        if not len(rows):
+            return
+        for name, column in SPREADS.items():
+            self.spreads[name].add(rows[:, self._at[column]])
+        self.newest, self.rows = rows[-1].copy(), self.rows + len(rows)
+
+    def now(self, column: str) -> float:
+        """Newest value of a column, NaN before the first row or where there is no such column."""
+        if self.newest is None or column not in self._at:
+            return float("nan")
+        return float(self.newest[self._at[column]])
+
+    def summary(self) -> dict[str, dict[str, float] | None]:
+        """Median, p99 and maximum of each."""
+        return {name: spread.summary() for name, spread in self.spreads.items()}

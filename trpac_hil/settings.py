@@ -1,0 +1,74 @@
+"""What a run of the rig is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from trpac_hil.bus import BusSettings
+from trpac_hil.codec import DBC_FILE
+from trpac_hil.deadlines import SPIN_NS
+from trpac_hil.partner import PartnerJob
+
+
+@dataclass(frozen=True)
+class HilSettings:
+    """What a run is told.
+
+    Attributes
+    ----------
+    out : Path
+        Folder for log.mf4 and summary.json.
+    fmu : Path or None
+        The unit; None builds TrpacEstimator from the sources.
+    bus : BusSettings
+        The bus.
+    dbc : Path
+        Its messages.
+    rate_hz : float
+        Cycles per second, 100 to 1000.
+    duration_s : float or None
+        None runs until asked to stop [s].
+    wheel : str
+        Which wheel a unit of one wheel is for.
+    vehicle, camera : Path or None
+        vehicle.yaml; camera.yaml of the pictures.
+    frames : Path or None
+        Folder of pictures; None takes classes from the bus.
+    fps : float
+        Pictures per second.
+    parameters : mapping
+        Parameters of the unit by variable name.
+    plant : PartnerJob or None
+        The plant to play on the same bus.
+    log, counters, live, realtime : bool
+        Whether to log; to hold messages to their counters; to draw on the terminal; to ask for real-time priority.
+    core : int or None
+        Core of the loop; with real-time priority the last one by default.
+    camera_threads : int
+        Threads of each network.
+    spin_ns : int
+        How long before a due time the sleep ends [ns].
+    """
+
+    out: Path
+    fmu: Path | None = None
+    bus: BusSettings = field(default_factory=BusSettings)
+    dbc: Path = DBC_FILE
+    rate_hz: float = 1000.0
+    duration_s: float | None = None
+    wheel: str = "fl"
+    vehicle: Path | None = None
+    camera: Path | None = None
+    frames: Path | None = None
+    fps: float = 20.0
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    plant: PartnerJob | None = None
+    log: bool = True
+    counters: bool = True
+    live: bool = False
+    realtime: bool = False
+    core: int | None = None
+    camera_threads: int = 1
+    spin_ns: int = SPIN_NS
