@@ -123,6 +123,36 @@ def test_a_car_that_is_configured_without_any_error_is_no_error(fraction):
     assert 0.0 <= variance <= unknown_variance(sure, 0.5)
 
 
+@pytest.mark.parametrize("step_s", [0.002, 0.01, 0.04])
+def test_variance_settles_as_the_square_of_the_loops_error(step_s):
+    """theta_hat' = gamma (theta - theta_hat): what is left of an error after t is exp(-gamma t) of it."""
+    at, gamma = tyre_at_slip(0.05, LOAD_N, C_X), 12.5
+    evidence = Evidence(0.3, at.friction(0.3), at, 0.01, 0.0, 0.0)
+    start, variances = 0.04, []
+    for seconds in (0.04, 0.08, 10.0):
+        variance = start
+        for _ in range(round(seconds / step_s)):
+            variance, _ = advanced_variance(MODEL, variance, 0.0, 0.3, evidence, 0.11, gamma, 0.0, step_s)
+        variances.append(variance)
+    settled = variances.pop()
+    left = [(variance - settled) / (start - settled) for variance in variances]
+    assert left == pytest.approx([np.exp(-gamma * 0.04) ** 2, np.exp(-gamma * 0.08) ** 2], rel=1e-6)
+
+
+@given(st.floats(0.005, 0.33), st.floats(0.05, 1.2), st.floats(0.2, 0.8))
+def test_camera_and_estimate_are_as_by_bayes_rule_but_no_surer_than_the_surer_of_the_two(
+    std, theta_hat, theta_img
+):
+    """About the estimate, which is what the deviation is of: the camera's own error there is scatter and distance."""
+    roads = np.linspace(-2.0, 4.0, 6001)
+    scatter = MODEL.class_scatter
+    weights = np.exp(-0.5 * ((roads - theta_hat) / std) ** 2 - 0.5 * ((roads - theta_img) / scatter) ** 2)
+    by_bayes = np.average((roads - theta_hat) ** 2, weights=weights)
+    surer = min(std**2, scatter**2 + (theta_img - theta_hat) ** 2)
+    found = with_camera(MODEL, std**2, theta_hat, theta_img)
+    assert found == pytest.approx(max(by_bayes, surer), rel=1e-6)
+
+
 def test_the_camera_narrows_where_it_agrees_and_widens_where_it_does_not():
     unknown, sure = unknown_variance(MODEL, 0.8), 1e-4
     assert with_camera(MODEL, unknown, 0.8, 0.8) < unknown

@@ -104,6 +104,40 @@ def test_an_elastic_tyre_shows_nothing_and_the_estimate_holds():
     assert step.sensitivity == 0.0
 
 
+def at_sliding_limit(share, slip):
+    """A wheel on the road that is this share of the one on which its tyre just slides."""
+    return share * 2.0 * tyre.slip_ratio_force(slip, WHEEL.longitudinal_stiffness_n) / LOAD_N
+
+
+@given(st.floats(0.5, 1.2), st.floats(0.004, 0.03))
+def test_nothing_is_shown_where_theta_would_be_off_by_ten_times_what_the_used_friction_is(share, slip):
+    theta = at_sliding_limit(share, slip)
+    lower, upper = (
+        tyre.used_friction(theta + d, slip, LOAD_N, WHEEL.longitudinal_stiffness_n) for d in (-1e-5, 1e-5)
+    )
+    slope = (upper - lower) / 2e-5
+    inputs = on_road(theta, slip)
+    shown, _ = visible_theta(inputs.wheel_torque_nm / WHEEL.radius_m, inputs, WHEEL.longitudinal_stiffness_n)
+    if slope < 0.099:
+        assert shown is None
+    elif slope > 0.101:
+        assert shown == pytest.approx(min(theta, GREATEST_THETA), abs=1e-5)
+
+
+@pytest.mark.parametrize("theta_img", [None, 0.6])
+def test_a_tyre_that_hardly_slides_does_not_move_the_estimate(theta_img):
+    """On 0.62 its force is 0.04 % below that of one that does not slide at all, as it does on all roads above."""
+    inputs = on_road(at_sliding_limit(0.98, 0.0185), 0.0185)
+    assert np.all(run(inputs, 0.7, 0.5, theta_img=theta_img)[0] == 0.7)
+
+
+@pytest.mark.parametrize("slip", [0.0, 1e-4])
+def test_a_wheel_that_rolls_freely_shows_no_ice(slip):
+    """Without force and with no slip beyond noise any road would do."""
+    inputs = WheelInputs(34.0, 34.0, 0.0, Slip(slip, 1.0), LOAD_N, 1e-4, 0.0)
+    assert visible_theta(0.0, inputs, WHEEL.longitudinal_stiffness_n) == (None, 0.0)
+
+
 def test_noise_at_the_elastic_end_is_not_taken_for_a_slippery_road():
     """On 0.9 at L > 1 force and slip lie on the elastic line; a slip read 5 % high looks like a sliding tyre."""
     truth = on_road(0.9, slip=0.016)

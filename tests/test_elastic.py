@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from trpac_core.elastic import AS_TOLD, CORRELATED, SETTLING, ElasticModel, learned
-from trpac_core.tyre import INITIAL_SLOPE
+from trpac_core.tyre import INITIAL_SLOPE, used_friction
 
 LOAD_N, C_X = 3400.0, 50_000.0
 MODEL = ElasticModel()
@@ -53,6 +53,32 @@ def test_a_tyre_that_may_slide_teaches_nothing():
     line = MODEL.start
     for used in (0.061, 0.3):
         assert learned(line, MODEL, 0.03, 8.0, used * LOAD_N, LOAD_N, C_X, 1e-4, 0.0) is line
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("used", [0.0601, 0.065, 0.1, 0.5])
+def test_above_gentle_driving_not_even_slip_on_the_elastic_line_is_learned_from(used, direction):
+    """A tyre that slides a little on a slippery road would pass for one that is softer than told."""
+    line, force_n = MODEL.start, direction * used * LOAD_N
+    for more in (0.0, 1.0, 1.2):
+        slip = more * force_n / (INITIAL_SLOPE * C_X)
+        assert learned(line, MODEL, slip, 8.0, force_n, LOAD_N, C_X, 1e-4, 0.0) is line
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_gentle_driving_teaches_on_a_car_that_drives_or_brakes(direction):
+    force_n = direction * 0.0599 * LOAD_N
+    taught_by = learned(
+        MODEL.start, MODEL, force_n / (INITIAL_SLOPE * C_X), 8.0, force_n, LOAD_N, C_X, 1e-4, 0.0
+    )
+    assert taught_by.cc < MODEL.start.cc
+
+
+def test_what_counts_as_gentle_lets_no_tyre_slide_on_a_tenth():
+    """A tyre just slides, L = 1, where its elastic force X is half of theta F_z."""
+    stretch = 0.5 * 0.1 * LOAD_N / C_X
+    just_sliding = used_friction(0.1, stretch / (1.0 + stretch), LOAD_N, C_X)
+    assert 0.9 * just_sliding < MODEL.gentle < just_sliding
 
 
 def test_what_contradicts_all_that_is_known_counts_only_on_a_coasting_wheel():

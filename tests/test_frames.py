@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
+
 import cv2
 import numpy as np
 import pytest
 
 from fmu_src import frames
-from fmu_src.frames import BUFFER, FrameState, next_frame
+from fmu_src.frames import BUFFER, FrameState, _picture_in_memory, next_frame
 from sim2real.replay.camera import _motion
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.images import MOST_FILE_BYTES, ImageError, decode_image
@@ -54,6 +56,32 @@ def test_a_path_is_a_new_frame_with_a_new_number_or_after_none(picture):
     assert taken([held, held, held | {"frame_id": 1}, {"frame_id": 1}, held | {"frame_id": 1}]) == [
         str(picture), None, str(picture), None, str(picture),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "address",
+    [0x1, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0x1_00000000, 0x7FFE_80000010, 0x80000000_00000000,
+     0xB400_7F12_3456_7890, 0xFFFF8000_7FFF0000, 2**64 - 1],
+)  # fmt: skip
+def test_an_address_is_put_together_of_its_signed_halves_bit_by_bit(monkeypatch, address):
+    """An FMI integer has a sign: what the host's address has in its 32nd or its 64th bit comes as a negative half."""
+    low, high = struct.unpack("<ii", struct.pack("<Q", address))
+    asked = []
+
+    def read(address, size):
+        asked.append((address, size))
+        return bytearray(size)
+
+    monkeypatch.setattr(frames, "read_memory", read)
+    raw = {"image_width": 80, "image_height": 80, "image.size": 3 * 80 * 80}
+    _picture_in_memory({**raw, "image.base.lo": low, "image.base.hi": high})
+    assert asked == [(address, 3 * 80 * 80)]
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 1), (0, -1), (-1, 0), (1, 0)])
+def test_half_an_address_is_one(low, high):
+    here = {"image.size": 10, "image.base.lo": low, "image.base.hi": high}
+    assert taken([here]) == [BUFFER]
 
 
 def test_what_is_no_file_or_far_too_large_is_refused_unread(tmp_path):

@@ -448,6 +448,29 @@ def test_theta_is_that_of_each_wheels_own_contact():
     assert len(np.unique(run.theta[:, 0])) == len(np.unique(run.theta[:, 2])) == 2
 
 
+@pytest.mark.parametrize("torque", [250.0, -250.0])
+def test_each_tyre_pulls_as_the_road_at_its_own_contact_lets_it(torque):
+    """The rear axle comes onto the slippery road a wheelbase after the front one, and each side has its own."""
+    run = simulate(
+        NOMINAL, make_road((0.0, 0.9, 0.8), (2.0, 0.25, 0.35)), constant(torque, 0.6), 1e-3, 8.0, -1.0
+    )
+    contact = run.position_m[:, None] + [TO_FRONT_M, TO_FRONT_M, -TO_REAR_M, -TO_REAR_M]
+    theta = np.where(contact < 2.0, [0.9, 0.8, 0.9, 0.8], [0.25, 0.35, 0.25, 0.35])
+    sliding = np.maximum(run.wheel_speed_rad_s * CAR.wheel_radius_m / run.speed_m_s[:, None], 1e-9)
+    slip = np.abs(sliding - 1.0) / np.maximum(sliding, 1.0)
+    load = CAR.mass_kg * 9.81 * np.array([TO_REAR_M] * 2 + [TO_FRONT_M] * 2) / (2.0 * 2.305)
+    expected = [
+        [
+            tyre.force(*at, CAR.tyre.longitudinal_stiffness_n, np.sign(torque))
+            for at in zip(*row, load, strict=True)
+        ]
+        for row in zip(theta, slip, strict=True)
+    ]
+    apart = np.abs(contact - 2.0).min(axis=1) > 1e-3
+    assert run.tyre_force_n[apart][1:] == pytest.approx(np.array(expected)[apart][1:], abs=0.5)
+    assert len(np.unique(theta[apart], axis=0)) == 3, "both axles cross the border, one after the other"
+
+
 def test_accelerometer_reads_the_change_of_speed_on_a_flat_road():
     run = simulate(CAR, DRY, profile([(0.0, 0.0), (0.3, 200.0), (1.0, -100.0)], 1.0), 1e-3, 5.0)
     assert np.gradient(run.speed_m_s, run.time_s)[5:-5] == pytest.approx(run.accel_x_m_s2[5:-5], abs=2e-3)
