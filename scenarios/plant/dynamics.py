@@ -32,12 +32,12 @@ from numpy.typing import NDArray
 from scenarios.plant.parameters import (
     FORCE,
     MOTOR,
+    OF_VEHICLE,
     PER_WHEEL,
     POSITION,
     SPEED,
     STATES,
     TWIST,
-    VALUES,
     WHEEL,
     DynamicsParameters,
     PerWheel,
@@ -760,7 +760,7 @@ def _car_between(ends: NDArray, shares: NDArray) -> DynamicsParameters:
     """The parameters between rows of `DynamicsParameters.as_row`, as `between` has them."""
     v = between(ends, shares)
     # to_fixed_tuple is numba's intrinsic, whose first argument its compiler gives.
-    others: Any = to_fixed_tuple(v[4 * PER_WHEEL :], VALUES - 4 * PER_WHEEL)  # type: ignore[call-arg]
+    others: Any = to_fixed_tuple(v[4 * PER_WHEEL :], OF_VEHICLE)  # type: ignore[call-arg]
     return DynamicsParameters(
         _four(v, 0),
         _four(v, 1),

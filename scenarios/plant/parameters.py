@@ -100,7 +100,9 @@ class DynamicsParameters(NamedTuple):
         return np.hstack(self)
 
 
-VALUES = len(DynamicsParameters._fields) + 3 * PER_WHEEL
+OF_VEHICLE = len(DynamicsParameters._fields) - PER_WHEEL
+"""How many fields of `DynamicsParameters`, the last ones, hold one number."""
+VALUES = 4 * PER_WHEEL + OF_VEHICLE
 """How many numbers `DynamicsParameters` holds."""
 
 
