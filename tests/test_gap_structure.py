@@ -28,15 +28,15 @@ def parameters():
 
 
 def shaped(p, slip, load_n=3000.0, theta=0.5):
-    tyre = dynamics.tyre_force(theta, slip, load_n, p.longitudinal_stiffness_n)
-    return dynamics.reshaped(tyre, slip, theta * load_n, load_n, p)
+    tyre = dynamics.tyre_force(theta, slip, load_n, p.longitudinal_stiffness_n[0])
+    return dynamics.reshaped(tyre, theta, slip, load_n, p.longitudinal_stiffness_n[0], p)
 
 
 def test_a_shape_keeps_the_initial_slope_and_shifts_the_sliding_force(parameters):
     p = parameters._replace(**SHAPE)
-    small, plain = 1e-5, dynamics.tyre_force(0.5, 1e-5, 3000.0, p.longitudinal_stiffness_n)[0]
+    small, plain = 1e-5, dynamics.tyre_force(0.5, 1e-5, 3000.0, p.longitudinal_stiffness_n[0])[0]
     assert shaped(p, small)[0] == pytest.approx(plain, rel=1e-4)
-    locked = dynamics.tyre_force(0.5, 1.0, 3000.0, p.longitudinal_stiffness_n)[0]
+    locked = dynamics.tyre_force(0.5, 1.0, 3000.0, p.longitudinal_stiffness_n[0])[0]
     # At a stretch of 33 the two bumps have died away, and all but 2 % of the sliding part is there.
     assert shaped(p, 1.0)[0] / locked == pytest.approx(1.0 + SHAPE["sliding"], abs=5e-3)
 
@@ -52,7 +52,7 @@ def test_its_slopes_are_those_of_its_force(parameters, slip):
 
 
 def by_formula(p, slip, load_n=3000.0, theta=0.5):
-    stiffness_n = p.longitudinal_stiffness_n
+    stiffness_n = p.longitudinal_stiffness_n[0]
     tyre = dynamics.tyre_force(theta, slip, load_n, stiffness_n)
     return dynamics.by_formula(tyre, theta, slip, load_n, stiffness_n, p)
 
@@ -78,19 +78,19 @@ def test_beyond_all_roads_the_peak_stays_a_number_near_the_greatest_force(theta)
 @pytest.mark.parametrize("theta", [0.2, 0.8])
 def test_a_formula_keeps_initial_slope_and_peak_and_is_the_published_one(parameters, theta):
     p = parameters._replace(**{f"formula_{name}": value for name, value in FORMULA.items()})
-    plain = dynamics.tyre_force(theta, 1e-6, 3000.0, p.longitudinal_stiffness_n)[0]
+    plain = dynamics.tyre_force(theta, 1e-6, 3000.0, p.longitudinal_stiffness_n[0])[0]
     assert by_formula(p, 1e-6, theta=theta)[0] == pytest.approx(plain, rel=1e-4)
     slips = np.linspace(1e-4, 1.0, 4000)
     forces_n = np.array([by_formula(p, slip, theta=theta)[0] for slip in slips])
-    peak_n, _ = dynamics.peak_force(theta, 3000.0, p.longitudinal_stiffness_n)
+    peak_n, _ = dynamics.peak_force(theta, 3000.0, p.longitudinal_stiffness_n[0])
     assert forces_n.max() == pytest.approx(peak_n, rel=1e-5)
     c, e = FORMULA["shape"], FORMULA["curvature"]
-    b = dynamics.INITIAL_SLOPE * p.longitudinal_stiffness_n / (c * peak_n)
+    b = dynamics.INITIAL_SLOPE * p.longitudinal_stiffness_n[0] / (c * peak_n)
     pacejka = peak_n * np.sin(c * np.arctan(b * slips - e * (b * slips - np.arctan(b * slips))))
     np.testing.assert_allclose(forces_n, pacejka, rtol=1e-12)
     half = p._replace(formula_share=0.5)
     middle = 0.5 * (
-        by_formula(p, 0.2)[0] + dynamics.tyre_force(0.5, 0.2, 3000.0, p.longitudinal_stiffness_n)[0]
+        by_formula(p, 0.2)[0] + dynamics.tyre_force(0.5, 0.2, 3000.0, p.longitudinal_stiffness_n[0])[0]
     )
     assert by_formula(half, 0.2)[0] == pytest.approx(middle, rel=1e-12)
 

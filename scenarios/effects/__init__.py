@@ -1,139 +1,71 @@
-"""The effects that the plant can model; the one list of them is EFFECTS."""
+"""The effects that the plant can model; ORDER is the one list of them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 
-from scenarios.effects.accelerometer_bias import AccelerometerBias
-from scenarios.effects.aero_drag import AeroDrag
 from scenarios.effects.base import Effect, Parameter
-from scenarios.effects.brake_drag import BrakeDrag, BrakeDragOfAxles
-from scenarios.effects.camera_latency import CameraLatency
-from scenarios.effects.camera_pitch import CameraPitch
-from scenarios.effects.class_friction_offset import ClassFrictionOffset
-from scenarios.effects.driveline_compliance import (
-    DrivelineCompliance,
-    DrivelineComplianceOfAxles,
-    DrivelineComplianceOfWheels,
-)
-from scenarios.effects.exposure_shift import ExposureShift
-from scenarios.effects.friction_falloff import FrictionFalloff, FrictionFalloffHyperbolic
-from scenarios.effects.friction_offset import FrictionOffset
-from scenarios.effects.load_transfer import LoadTransfer
-from scenarios.effects.mass_offset import MassOffset, MassOffsetPlaced
-from scenarios.effects.motion_blur import MotionBlur
-from scenarios.effects.mu_split import MuSplit
-from scenarios.effects.road_grade import RoadGrade
-from scenarios.effects.rolling_resistance import (
-    RollingResistance,
-    RollingResistanceForce,
-    RollingResistanceOfAxles,
-)
-from scenarios.effects.torque_delay import TorqueDelay
-from scenarios.effects.torque_gain import TorqueGain, TorqueGainOfAxles, TorqueGainOfSigns
-from scenarios.effects.torque_lag import TorqueLag, TorqueLagInTwoStages, TorqueLagOfRiseAndFall
-from scenarios.effects.tyre_formula import TyreFormula
-from scenarios.effects.tyre_relaxation import (
-    TyreRelaxation,
-    TyreRelaxationOfAxles,
-    TyreRelaxationOfSlip,
-    TyreRelaxationOfWheels,
-    TyreRelaxationWhileItAdheres,
-    TyreRelaxationWithLoad,
-)
-from scenarios.effects.tyre_shape import TyreShape
-from scenarios.effects.tyre_stiffness_offset import (
-    TyreStiffnessOffset,
-    TyreStiffnessOffsetOfAxles,
-    TyreStiffnessOffsetOfWheels,
-    TyreStiffnessOffsetWithLoad,
-)
-from scenarios.effects.vehicle_speed_delay import VehicleSpeedDelay
-from scenarios.effects.vehicle_speed_scale import VehicleSpeedScale
-from scenarios.effects.wheel_inertia_offset import WheelInertiaOffset, WheelInertiaOffsetOfAxles
-from scenarios.effects.wheel_radius_offset import (
-    WheelRadiusOffset,
-    WheelRadiusOffsetOfAxles,
-    WheelRadiusOffsetOfWheels,
-    WheelRadiusOffsetRolling,
-)
-from scenarios.effects.wheel_speed_delay import WheelSpeedDelay
-from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.errors import suggestion
 from trpac_core.vehicle import Vehicle
 
-EFFECTS: dict[str, type[Effect]] = {
-    effect.id: effect
-    for effect in (
-        # actuators
-        TorqueGain,
-        TorqueLag,
-        TorqueDelay,
-        # dynamics
-        AeroDrag,
-        RollingResistance,
-        BrakeDrag,
-        RoadGrade,
-        MassOffset,
-        WheelRadiusOffset,
-        WheelInertiaOffset,
-        DrivelineCompliance,
-        LoadTransfer,
-        TyreStiffnessOffset,
-        TyreRelaxation,
-        FrictionFalloff,
-        TyreShape,
-        TyreFormula,
-        # road
-        FrictionOffset,
-        MuSplit,
-        # sensors
-        VehicleSpeedScale,
-        VehicleSpeedDelay,
-        WheelSpeedDelay,
-        WheelSpeedQuantisation,
-        AccelerometerBias,
-        # perception
-        CameraPitch,
-        CameraLatency,
-        MotionBlur,
-        ExposureShift,
-        ClassFrictionOffset,
-    )
-}
-"""All effects by id, in the order in which they act: along the plant, and within a stage as the signal passes them."""
-
-OTHER_FORMS = (
-    TorqueGainOfAxles,
-    TorqueGainOfSigns,
-    TorqueLagInTwoStages,
-    TorqueLagOfRiseAndFall,
-    RollingResistanceForce,
-    RollingResistanceOfAxles,
-    BrakeDragOfAxles,
-    MassOffsetPlaced,
-    WheelRadiusOffsetRolling,
-    WheelRadiusOffsetOfAxles,
-    WheelRadiusOffsetOfWheels,
-    WheelInertiaOffsetOfAxles,
-    DrivelineComplianceOfAxles,
-    DrivelineComplianceOfWheels,
-    TyreStiffnessOffsetOfAxles,
-    TyreStiffnessOffsetOfWheels,
-    TyreStiffnessOffsetWithLoad,
-    TyreRelaxationOfSlip,
-    TyreRelaxationWithLoad,
-    TyreRelaxationWhileItAdheres,
-    TyreRelaxationOfAxles,
-    TyreRelaxationOfWheels,
-    FrictionFalloffHyperbolic,
+ORDER = (
+    # actuators
+    "torque_gain",
+    "torque_lag",
+    "torque_delay",
+    # dynamics
+    "aero_drag",
+    "rolling_resistance",
+    "brake_drag",
+    "road_grade",
+    "mass_offset",
+    "wheel_radius_offset",
+    "wheel_inertia_offset",
+    "driveline_compliance",
+    "load_transfer",
+    "tyre_stiffness_offset",
+    "tyre_relaxation",
+    "friction_falloff",
+    "tyre_shape",
+    "tyre_formula",
+    # road
+    "friction_offset",
+    "mu_split",
+    # sensors
+    "vehicle_speed_scale",
+    "vehicle_speed_delay",
+    "wheel_speed_delay",
+    "wheel_speed_quantisation",
+    "accelerometer_bias",
+    # perception
+    "camera_pitch",
+    "camera_latency",
+    "motion_blur",
+    "exposure_shift",
+    "class_friction_offset",
 )
-FORMS: dict[str, tuple[type[Effect], ...]] = {
-    key: (effect, *(other for other in OTHER_FORMS if other.id == key)) for key, effect in EFFECTS.items()
-}
-"""Every form of each effect, the plant's own first: what goes by one name in the field may act in more than one way."""
+"""Files of this folder, each with one effect of the same id, in the order in which the effects act: along the plant,
+and within a stage as the signal passes them."""
 
-__all__ = ["EFFECTS", "FORMS", "Effect", "Parameter", "form_of", "make_effect", "problems_of"]
+
+def _forms_in(file: str) -> tuple[type[Effect], ...]:
+    """The classes of effects that a file of this folder defines, in its order."""
+    module = import_module(f"{__name__}.{file}")
+    return tuple(
+        kind
+        for kind in vars(module).values()
+        if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
+    )
+
+
+FORMS: dict[str, tuple[type[Effect], ...]] = {file: _forms_in(file) for file in ORDER}
+"""Every form of each effect by its id, the plant's own first: the same effect may act in more than one way."""
+
+EFFECTS: dict[str, type[Effect]] = {key: forms[0] for key, forms in FORMS.items()}
+"""All effects by id, in `ORDER`; each is the first class of its file."""
+
+__all__ = ["EFFECTS", "FORMS", "ORDER", "Effect", "Parameter", "form_of", "make_effect", "problems_of"]
 
 
 def problems_of(effect_id: str, values: Mapping[str, float], vehicle: Vehicle, form: str = "") -> list[str]:

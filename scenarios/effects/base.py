@@ -18,6 +18,7 @@ from scenarios.effects.frames import Frames
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters, RoadTable
+    from scenarios.plant.parameters import PerWheel
     from trpac_core.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -105,15 +106,34 @@ def share_of_sides(axle: str, start: float, most: float) -> Any:
     return _share_of_mean(f"the {axle} left wheel has more and the {axle} right one less", start, most)
 
 
-def of_each_wheel(mean: float, unlike: float, front_sides: float, rear_sides: float) -> Array:
-    """The values of fl, fr, rl, rr, shape (4,), for a mean and the shares of it that wheels have more or less."""
-    sides = np.array([front_sides, -front_sides, rear_sides, -rear_sides])
-    return mean * (1.0 + np.array([unlike, unlike, -unlike, -unlike]) + sides)
+def of_each_wheel(
+    mean: float, unlike: float = 0.0, front_sides: float = 0.0, rear_sides: float = 0.0
+) -> PerWheel:
+    """The values of the wheels fl, fr, rl, rr, in the unit of their mean.
+
+    Parameters
+    ----------
+    mean : float
+        Mean of the four wheels.
+    unlike : float
+        Share of the mean that the front wheels have more and the rear wheels less [-].
+    front_sides, rear_sides : float
+        Share of the mean that the left wheel of an axle has more and the right one less [-].
+    """
+    front, rear = mean + mean * unlike, mean - mean * unlike
+    front_side, rear_side = mean * front_sides, mean * rear_sides
+    return front + front_side, front - front_side, rear + rear_side, rear - rear_side
 
 
-def all_are_off(values: Array, nominal: float) -> bool:
+def mean_of_wheels(values: PerWheel) -> float:
+    """Mean of the four wheels in the unit of `values`; summed in pairs, it is exact where all wheels are alike."""
+    fl, fr, rl, rr = values
+    return 0.25 * ((fl + fr) + (rl + rr))
+
+
+def all_are_off(values: PerWheel, nominal: float) -> bool:
     """Whether all wheels are off to the same side; of a single wrong wheel nobody says that the car's are others."""
-    off = values - nominal
+    off = np.array(values) - nominal
     return bool(np.all(off * np.sign(off.mean()) >= LEAST_OFF * abs(off.mean())))
 
 

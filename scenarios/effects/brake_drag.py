@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter, share_of_axles
+from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.plant.parameters import PerWheel
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,13 @@ class BrakeDrag(Effect):
         starts=(5.0, 20.0, 60.0),
     )
 
+    def torques_nm(self) -> PerWheel:
+        """Drag torques of the wheels fl, fr, rl, rr [N m]."""
+        return of_each_wheel(self.torque_nm)
+
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """The same torque at each wheel, whatever its load."""
-        return parameters._replace(drag_torque_nm=self.torque_nm)
+        """Each wheel has its torque, whatever its load."""
+        return parameters._replace(drag_torque_nm=self.torques_nm())
 
 
 @dataclass(frozen=True)
@@ -47,8 +52,6 @@ class BrakeDragOfAxles(BrakeDrag):
 
     unlike: float = share_of_axles(start=0.5, most=1.0)
 
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each axle has its torque."""
-        return parameters._replace(
-            drag_torque_nm=self.torque_nm, axle_drag_torque_nm=self.unlike * self.torque_nm
-        )
+    def torques_nm(self) -> PerWheel:
+        """Drag torques of the wheels fl, fr, rl, rr [N m]."""
+        return of_each_wheel(self.torque_nm, self.unlike)

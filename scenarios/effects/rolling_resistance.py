@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter, share_of_axles
+from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.plant.parameters import PerWheel
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,13 @@ class RollingResistance(Effect):
         starts=(0.008, 0.02, 0.05),
     )
 
+    def coefficients(self) -> PerWheel:
+        """Coefficients of the wheels fl, fr, rl, rr [-]."""
+        return of_each_wheel(self.coefficient)
+
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The moment is proportional to each wheel's own load."""
-        return parameters._replace(rolling_coefficient=self.coefficient)
+        return parameters._replace(rolling_coefficient=self.coefficients())
 
 
 @dataclass(frozen=True)
@@ -59,8 +64,6 @@ class RollingResistanceOfAxles(RollingResistance):
 
     unlike: float = share_of_axles(start=0.3, most=1.0)
 
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each axle has its coefficient."""
-        return parameters._replace(
-            rolling_coefficient=self.coefficient, axle_rolling_coefficient=self.unlike * self.coefficient
-        )
+    def coefficients(self) -> PerWheel:
+        """Coefficients of the wheels fl, fr, rl, rr [-]."""
+        return of_each_wheel(self.coefficient, self.unlike)

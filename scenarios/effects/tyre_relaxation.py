@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter, share_of_axles, share_of_sides
+from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles, share_of_sides
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.plant.parameters import PerWheel
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,13 @@ class TyreRelaxation(Effect):
         starts=(0.1, 0.3, 0.8),
     )
 
+    def lengths_m(self) -> PerWheel:
+        """Lengths of the tyres fl, fr, rl, rr [m]."""
+        return of_each_wheel(self.length_m)
+
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The force becomes a state."""
-        return parameters._replace(relaxation_m=self.length_m)
+        return parameters._replace(relaxation_m=self.lengths_m())
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,7 @@ class TyreRelaxationOfSlip(TyreRelaxation):
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The lagging slip becomes a state."""
-        return parameters._replace(relaxation_m=self.length_m, slip_lags=1.0)
+        return super().dynamics(parameters)._replace(slip_lags=1.0)
 
 
 @dataclass(frozen=True)
@@ -85,9 +90,9 @@ class TyreRelaxationOfAxles(TyreRelaxationOfSlip):
 
     unlike: float = share_of_axles(start=0.15, most=0.5)
 
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each axle has its length."""
-        return super().dynamics(parameters)._replace(axle_relaxation_m=self.unlike * self.length_m)
+    def lengths_m(self) -> PerWheel:
+        """Lengths of the tyres fl, fr, rl, rr [m]."""
+        return of_each_wheel(self.length_m, self.unlike)
 
 
 @dataclass(frozen=True)
@@ -104,13 +109,6 @@ class TyreRelaxationOfWheels(TyreRelaxationOfAxles):
     front_sides: float = share_of_sides("front", start=0.15, most=0.4)
     rear_sides: float = share_of_sides("rear", start=0.15, most=0.4)
 
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each wheel has its length."""
-        return (
-            super()
-            .dynamics(parameters)
-            ._replace(
-                front_side_relaxation_m=self.front_sides * self.length_m,
-                rear_side_relaxation_m=self.rear_sides * self.length_m,
-            )
-        )
+    def lengths_m(self) -> PerWheel:
+        """Lengths of the tyres fl, fr, rl, rr [m]."""
+        return of_each_wheel(self.length_m, self.unlike, self.front_sides, self.rear_sides)

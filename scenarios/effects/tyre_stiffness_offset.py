@@ -16,6 +16,7 @@ from scenarios.effects.base import (
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.plant.parameters import PerWheel
     from trpac_core.vehicle import Vehicle
 
 
@@ -41,9 +42,13 @@ class TyreStiffnessOffset(Effect):
         starts=lambda car: tuple(s * car.longitudinal_stiffness_n for s in (0.5, 0.8, 1.3, 2.0)),
     )
 
+    def stiffnesses_n(self) -> PerWheel:
+        """Stiffnesses of the tyres fl, fr, rl, rr [N]."""
+        return of_each_wheel(self.stiffness_n)
+
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """The true stiffness takes the nominal one's place."""
-        return parameters._replace(longitudinal_stiffness_n=self.stiffness_n)
+        """The true stiffnesses take the nominal ones' place."""
+        return parameters._replace(longitudinal_stiffness_n=self.stiffnesses_n())
 
 
 @dataclass(frozen=True)
@@ -55,11 +60,9 @@ class TyreStiffnessOffsetOfAxles(TyreStiffnessOffset):
 
     unlike: float = share_of_axles(start=0.1, most=0.5)
 
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each axle has its stiffness."""
-        return parameters._replace(
-            longitudinal_stiffness_n=self.stiffness_n, axle_stiffness_n=self.unlike * self.stiffness_n
-        )
+    def stiffnesses_n(self) -> PerWheel:
+        """Stiffnesses of the tyres fl, fr, rl, rr [N]."""
+        return of_each_wheel(self.stiffness_n, self.unlike)
 
 
 @dataclass(frozen=True)
@@ -77,19 +80,11 @@ class TyreStiffnessOffsetOfWheels(TyreStiffnessOffsetOfAxles):
 
     def is_itself(self, vehicle: Vehicle) -> bool:
         """Whether all tyres are of another stiffness."""
-        stiffness_n = of_each_wheel(self.stiffness_n, self.unlike, self.front_sides, self.rear_sides)
-        return all_are_off(stiffness_n, vehicle.longitudinal_stiffness_n)
+        return all_are_off(self.stiffnesses_n(), vehicle.longitudinal_stiffness_n)
 
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each wheel has its stiffness."""
-        return (
-            super()
-            .dynamics(parameters)
-            ._replace(
-                front_side_stiffness_n=self.front_sides * self.stiffness_n,
-                rear_side_stiffness_n=self.rear_sides * self.stiffness_n,
-            )
-        )
+    def stiffnesses_n(self) -> PerWheel:
+        """Stiffnesses of the tyres fl, fr, rl, rr [N]."""
+        return of_each_wheel(self.stiffness_n, self.unlike, self.front_sides, self.rear_sides)
 
 
 @dataclass(frozen=True)
@@ -111,4 +106,4 @@ class TyreStiffnessOffsetWithLoad(TyreStiffnessOffset):
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Each wheel has the stiffness that its load gives."""
-        return parameters._replace(longitudinal_stiffness_n=self.stiffness_n, stiffness_by_load=self.by_load)
+        return super().dynamics(parameters)._replace(stiffness_by_load=self.by_load)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, parameter, share_of_axles
+from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.plant.parameters import PerWheel
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,13 @@ class WheelInertiaOffset(Effect):
         starts=lambda car: tuple(s * car.wheel_inertia_kg_m2 for s in (0.6, 0.85, 1.2, 2.0)),
     )
 
+    def inertias_kg_m2(self) -> PerWheel:
+        """Inertias of the wheels fl, fr, rl, rr with their motors [kg m^2]."""
+        return of_each_wheel(self.inertia_kg_m2)
+
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """The true inertia takes the nominal one's place."""
-        return parameters._replace(wheel_inertia_kg_m2=self.inertia_kg_m2)
+        """The true inertias take the nominal ones' place."""
+        return parameters._replace(wheel_inertia_kg_m2=self.inertias_kg_m2())
 
 
 @dataclass(frozen=True)
@@ -47,8 +52,6 @@ class WheelInertiaOffsetOfAxles(WheelInertiaOffset):
 
     unlike: float = share_of_axles(start=0.2, most=0.5)
 
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each axle has its inertia."""
-        return parameters._replace(
-            wheel_inertia_kg_m2=self.inertia_kg_m2, axle_inertia_kg_m2=self.unlike * self.inertia_kg_m2
-        )
+    def inertias_kg_m2(self) -> PerWheel:
+        """Inertias of the wheels fl, fr, rl, rr with their motors [kg m^2]."""
+        return of_each_wheel(self.inertia_kg_m2, self.unlike)

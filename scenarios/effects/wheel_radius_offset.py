@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from scenarios.effects.base import (
-    Array,
     Effect,
     all_are_off,
     of_each_wheel,
@@ -17,6 +16,7 @@ from scenarios.effects.base import (
 
 if TYPE_CHECKING:
     from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.plant.parameters import PerWheel
     from trpac_core.vehicle import Vehicle
 
 
@@ -42,9 +42,13 @@ class WheelRadiusOffset(Effect):
         starts=lambda car: tuple(s * car.wheel_radius_m for s in (0.95, 0.985, 1.015, 1.05)),
     )
 
+    def radii_m(self) -> PerWheel:
+        """Rolling radii of the wheels fl, fr, rl, rr [m]."""
+        return of_each_wheel(self.radius_m)
+
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """The true radius takes the nominal one's place."""
-        return parameters._replace(wheel_radius_m=self.radius_m)
+        """The true radii take the nominal ones' place, in rolling and as levers."""
+        return parameters._replace(wheel_radius_m=self.radii_m(), lever_m=self.radii_m())
 
 
 @dataclass(frozen=True)
@@ -56,11 +60,8 @@ class WheelRadiusOffsetRolling(WheelRadiusOffset):
     source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 1, effective rolling radius and loaded radius"
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """The lever stays what it was."""
-        return parameters._replace(
-            wheel_radius_m=self.radius_m,
-            lever_more_m=parameters.lever_more_m + parameters.wheel_radius_m - self.radius_m,
-        )
+        """The levers stay what they were."""
+        return parameters._replace(wheel_radius_m=self.radii_m())
 
 
 @dataclass(frozen=True)
@@ -72,9 +73,9 @@ class WheelRadiusOffsetOfAxles(WheelRadiusOffset):
 
     unlike: float = share_of_axles(start=0.003, most=0.05)
 
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each axle has its radius."""
-        return parameters._replace(wheel_radius_m=self.radius_m, axle_radius_m=self.unlike * self.radius_m)
+    def radii_m(self) -> PerWheel:
+        """Rolling radii of the wheels fl, fr, rl, rr [m]."""
+        return of_each_wheel(self.radius_m, self.unlike)
 
 
 @dataclass(frozen=True)
@@ -94,17 +95,6 @@ class WheelRadiusOffsetOfWheels(WheelRadiusOffsetOfAxles):
         """Whether all wheels are of another size."""
         return all_are_off(self.radii_m(), vehicle.wheel_radius_m)
 
-    def radii_m(self) -> Array:
-        """Rolling radii of the wheels fl, fr, rl, rr, shape (4,) [m]."""
+    def radii_m(self) -> PerWheel:
+        """Rolling radii of the wheels fl, fr, rl, rr [m]."""
         return of_each_wheel(self.radius_m, self.unlike, self.front_sides, self.rear_sides)
-
-    def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each wheel has its radius."""
-        return (
-            super()
-            .dynamics(parameters)
-            ._replace(
-                front_side_radius_m=self.front_sides * self.radius_m,
-                rear_side_radius_m=self.rear_sides * self.radius_m,
-            )
-        )

@@ -2,9 +2,9 @@
 
 Equations (docs/plant.md has them with their sources):
 
-    I omega' = T - F_x R - c F_z R - T_drag          Eq. (12) of [1]_, with resistances
-    m v'     = sum F_x - k v^2 - c_hub F_z - m g sin
-    lambda   = abs(omega R - v) / max(omega R, v, floor)        Eq. (13) of [1]_
+    I omega' = T - F_x R - c F_z R - T_drag                     Eq. (12) in [1]_, with resistances
+    m v'     = sum F_x - k v^2 - c_hub sum F_z - m g sin
+    lambda   = abs(omega R - v) / max(omega R, v, floor)        Eq. (13) in [1]_
 
 With relaxation each tyre force is a state that follows its steady value; with a driveline T is a shaft's torque, and
 twist and motor speed are states. Both vanish from the step's linear equations by elimination per wheel.
@@ -13,7 +13,7 @@ The vehicle drives forward or stands: omega >= 0 and v >= 0. A torque that resis
 can bring a wheel to rest and then holds it, it never turns it back; the ground holds a standing car likewise.
 
 All compiled code is in this one file: numba's cache notices changes of a function's own file only, not of those that
-it calls into.
+it calls into. Its order: tyre, road, wheel and vehicle, driveline, linear equations of the step, integrator, observer.
 
 References
 ----------
@@ -21,6 +21,8 @@ References
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -30,12 +32,15 @@ from numpy.typing import NDArray
 from scenarios.plant.parameters import (
     FORCE,
     MOTOR,
+    OF_VEHICLE,
+    PER_WHEEL,
     POSITION,
     SPEED,
     STATES,
     TWIST,
     WHEEL,
     DynamicsParameters,
+    PerWheel,
     RoadTable,
     Wheels,
 )
@@ -58,56 +63,58 @@ __all__ = [
 ]
 
 FLOOR_SPEED_M_S = 0.01
-"""Below this speed slip is taken relative to the floor, so that standstill has slip 0 and not 0/0 [m/s]."""
+"""Least speed that slip is taken relative to: at standstill slip is 0 and not 0/0 [m/s]."""
 
 TOLERANCE_M_S = 2e-5
-"""Accepted error estimate of a sub-step at rest, in wheel rim and vehicle speed [m/s]; see docs/plant.md."""
+"""Accepted error estimate of a sub-step at rest, in wheel rim speed and vehicle speed; docs/plant.md [m/s]."""
 
 RELATIVE_TOLERANCE = 5e-5
-"""What the accepted error estimate grows by with speed, which keeps slip equally accurate at all speeds [-]."""
+"""Growth of the accepted error estimate per vehicle speed, which keeps slip equally accurate at all speeds [-]."""
 
 BRAKE_FADE_RAD_S = 0.02
-"""Motor speed below which its brake fades out; the rim then creeps by no more than the slip's floor [rad/s]."""
+"""Motor speed below which the brake torque falls to 0 at rest; the rim then creeps slower than FLOOR_SPEED_M_S
+[rad/s]."""
 
 FOLLOWING = 4.0
-"""Tolerances that do where the plant follows measurements, whose noise is fifteen times what that leaves [-]."""
+"""Factor on both tolerances in `follow`: the error stays at a fifteenth of the noise of the measurements [-]."""
 
 SHORTEST_STEP_S = 1e-5
-"""A sub-step of this length is taken whatever its error estimate says [s]."""
+"""Length at which a sub-step is accepted whatever its error estimate is [s]."""
 
 ACCELERATION_TOLERANCE_M_S2 = 1e-7
-"""Accepted residual of the acceleration under load transfer, before its last Newton correction [m/s^2]."""
+"""Residual of the acceleration under load transfer after which one more Newton correction ends the iteration
+[m/s^2]."""
 
 RELEASE_SPEED_M_S = 1.0
-"""At rest a lagging force that still brakes is released as at this speed: the car would rock back on it [m/s]."""
+"""Speed as at which a lagging force that still brakes a standing car relaxes: a real car would rock back [m/s]."""
 
 LEAST_RELAXATION = 0.1
-"""Share of its length that is left of a tyre's relaxation where the load leaves it, or where it slides [-]."""
+"""Least share of its length that a relaxation keeps, where load leaves the tyre or the tyre slides [-]."""
 
 LEAST_STIFFNESS = 0.1
-"""Share that is left of a stiffness that goes with the load where the load leaves the tyre: less would push [-]."""
+"""Least share of its stiffness that a tyre keeps where load leaves it; a negative stiffness would push [-]."""
 
 INITIAL_SLOPE = 1.27
-"""Slope of the force by slip without any, in units of C_x: the tyre's shape there [-]."""
+"""Slope of the modified Dugoff force by slip at slip 0, over C_x; the constant of its G, docs/plant.md [-]."""
 
 KNEE_AT, CREST_AT, SLIDING_FROM = 0.6, 2.4, 5.0
-"""Stretches, in units of the grip, at which a tyre's deviations are greatest; the last one's half is there [-]."""
+"""Stretches x = C_x lambda / (theta F_z) at which `reshaped` has its two bumps and half of its sliding part [-]."""
 
 LEAST_GRIP_N = 1.0
-"""Grip that a tyre's stretch is at least related to [N]."""
+"""Least theta F_z that a stretch is taken relative to; it keeps the quotient finite [N]."""
 
 LEAST_SLOPE = 1e-3
-"""Where the slip lags, the force's slope by it counts as at least this share of C_x in the Jacobian [-]."""
+"""Least slope of the force by the lagging slip in the Jacobian, over the mean C_x [-]."""
 
 BORDER_TOLERANCE_M = 1e-7
-"""A contact point this close to the next road segment counts as being on it [m]."""
+"""Distance before a road segment's start within which a contact point counts as on it [m]."""
 
 compiled = njit(cache=True, error_model="numpy")  # divisions are guarded here, not by the compiler
-# As calls these would pass on fifty numbers and count references of every working array, which takes as long as their
-# arithmetic; what LLVM merges compiles faster than what numba does.
+# A call would pass on all parameters and count references of every array, which takes as long as the arithmetic.
+# LLVM's inlining (forceinline) compiles faster than numba's (inline="always").
 inlined = njit(cache=True, error_model="numpy", forceinline=True)
 
-# Rows of the wheels' working array. It is one array, since each one that a call passes on costs time.
+# Rows of `Wheels.work`, one array because each array that a call passes on costs time.
 _STEADY, _LAG, _SLOPE_WHEEL, _SLOPE_SPEED = range(4)  # the tyre's, filled by `forces`
 _GAIN, _BY_WHEEL, _BY_SPEED, _OWN, _SHARE, _MOTOR, _BRAKE = range(4, 11)  # the step's linear equations
 _PER_STATE = 11  # force per lagging state: 1 where the force itself lags, C_x or less where the slip does
@@ -117,7 +124,7 @@ _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)  # makes the two-stage Rosenbrock method L-sta
 
 @inlined
 def falling_shape(theta: float, slip: float) -> tuple[float, float]:
-    """By what the modified Dugoff force falls with slip beyond Dugoff's own, and its slope [-]."""
+    """Factor G of the modified Dugoff tyre, by which its force is Dugoff's, and the slope of G by slip [-]."""
     square, line = 1.15 - 0.75 * theta, 1.63 - 0.75 * theta
     return square * slip * slip - line * slip + INITIAL_SLOPE, 2.0 * square * slip - line
 
@@ -159,25 +166,31 @@ def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> 
 
 @inlined
 def bump(x: float, at: float) -> tuple[float, float]:
-    """A deviation that is 1 at a place and vanishes far from it on both sides, and its slope."""
+    """A function 4 u^2 / (1 + u^2)^2 of u = x / at, which is 1 at `at` and 0 far from it, and its slope by x [-]."""
     square = (x / at) ** 2
     return 4.0 * square / (1.0 + square) ** 2, 8.0 * x / (at * at) * (1.0 - square) / (1.0 + square) ** 3
 
 
+# Every further tyre curve is a function of this one shape: a force and its slopes in, others out.
 @inlined
 def reshaped(
-    tyre: tuple[float, float, float], slip: float, grip_n: float, load_n: float, p: DynamicsParameters
+    tyre: tuple[float, float, float],
+    theta: float,
+    slip: float,
+    load_n: float,
+    stiffness_n: float,
+    p: DynamicsParameters,
 ) -> tuple[float, float, float]:
-    """A tyre's force and slopes with another curve of the same initial slope, over x = C_x lambda / (theta F_z)."""
+    """A tyre's force and slopes times a function of the stretch x = C_x lambda / (theta F_z) that is 1 at slip 0."""
     force, by_slip, by_load = tyre
-    grip_n = max(grip_n, LEAST_GRIP_N)
-    x = p.longitudinal_stiffness_n * slip / grip_n
+    grip_n = max(theta * load_n, LEAST_GRIP_N)
+    x = stiffness_n * slip / grip_n
     knee, knee_by_x = bump(x, KNEE_AT)
     crest, crest_by_x = bump(x, CREST_AT)
     far = SLIDING_FROM * SLIDING_FROM
     ratio = 1.0 + p.knee * knee + p.crest * crest + p.sliding * x * x / (x * x + far)
     by_x = p.knee * knee_by_x + p.crest * crest_by_x + p.sliding * 2.0 * x * far / (x * x + far) ** 2
-    by_slip = by_slip * ratio + force * by_x * p.longitudinal_stiffness_n / grip_n
+    by_slip = by_slip * ratio + force * by_x * stiffness_n / grip_n
     by_load = by_load * ratio - force * by_x * x / max(load_n, LEAST_GRIP_N)
     return force * ratio, by_slip, by_load
 
@@ -212,11 +225,13 @@ def by_formula(
     stiffness_n: float,
     p: DynamicsParameters,
 ) -> tuple[float, float, float]:
-    """A tyre's force and slopes on the way to a magic formula of the same initial slope and the same peak.
+    """Weighted mean of a tyre's force, and slopes, with a magic formula of the same initial slope and peak.
+
+    The formula is D sin(C arctan(B lambda - E (B lambda - arctan B lambda))), Eq. (4.49) in [1]_, without its shifts.
 
     References
     ----------
-    .. [1] Pacejka (2012), Tire and Vehicle Dynamics, Eq. (4.49): D sin(C arctan(B s - E (B s - arctan B s))).
+    .. [1] Pacejka (2012), Tire and Vehicle Dynamics.
     """
     force, by_slip, by_load = tyre
     peak_n, peak_by_load = peak_force(theta, load_n, stiffness_n)
@@ -236,6 +251,64 @@ def by_formula(
         by_slip + share * (other_by_slip - by_slip),
         by_load + share * (other_by_load - by_load),
     )
+
+
+@inlined
+def steady_tyre(
+    theta: float,
+    slip: float,
+    load_n: float,
+    stiffness_n: float,
+    mean_stiffness_n: float,
+    p: DynamicsParameters,
+) -> tuple[float, float, float]:
+    """Steady force of a tyre as the parameters want its curve, and its slopes; arguments and units as `tyre_force`."""
+    tyre = tyre_force(theta, slip, load_n, stiffness_n)
+    if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
+        tyre = reshaped(tyre, theta, slip, load_n, mean_stiffness_n, p)
+    if p.formula_share != 0.0:
+        tyre = by_formula(tyre, theta, slip, load_n, stiffness_n, p)
+    return tyre
+
+
+@inlined
+def adhesion_left(sliding_m_s: float, p: DynamicsParameters) -> float:
+    """Share of the adhesion that a tyre has at a sliding speed [-]: exponential after [1]_, or hyperbolic.
+
+    References
+    ----------
+    .. [1] Canudas de Wit et al. (2003), Vehicle System Dynamics 39, doi:10.1076/vesd.39.3.189.14152.
+    """
+    if p.falloff_s_m <= 0.0:
+        return 1.0
+    fallen = p.falloff_s_m * sliding_m_s
+    left = 1.0 / (1.0 + fallen) if p.falloff_hyperbolic > 0.0 else np.exp(-fallen)
+    return p.falloff_floor + (1.0 - p.falloff_floor) * left
+
+
+@inlined
+def relaxation_length(
+    i: int, more_load: float, slope_n: float, stiffness_n: float, p: DynamicsParameters
+) -> float:
+    """Relaxation length of a wheel's tyre [m], ch. 7 of [1]_.
+
+    Parameters
+    ----------
+    i : int
+        The wheel.
+    more_load : float
+        Load over the mean static one, less 1 [-].
+    slope_n, stiffness_n : float
+        Slope of the steady force by slip here, and C_x [N].
+    p : DynamicsParameters
+        relaxation_m and what it goes with.
+
+    References
+    ----------
+    .. [1] Pacejka (2012), Tire and Vehicle Dynamics.
+    """
+    gone = p.relaxation_by_slope * max(1.0 - slope_n / (INITIAL_SLOPE * stiffness_n), 0.0)
+    return p.relaxation_m[i] * max((1.0 + p.relaxation_by_load * more_load) * (1.0 - gone), LEAST_RELAXATION)
 
 
 @inlined
@@ -275,48 +348,21 @@ def new_wheels() -> tuple[Wheels, Wheels]:
 
 
 @inlined
-def _of_axle(i: int, mean: float, unlike: float) -> float:
-    """A wheel's own value, where the front wheels have more than the mean by what the rear ones have less."""
-    return mean + unlike if i < 2 else mean - unlike
+def _mean_of_wheels(values: PerWheel) -> float:
+    """The compiled form of `scenarios.effects.base.mean_of_wheels`."""
+    return 0.25 * ((values[0] + values[1]) + (values[2] + values[3]))
 
 
 @inlined
-def _of_wheel(i: int, mean: float, unlike: float, front_sides: float, rear_sides: float) -> float:
-    """A wheel's own value, where beside it the left wheels of both axles have more by what the right ones have less."""
-    value = _of_axle(i, mean, unlike)
-    if front_sides == 0.0 and rear_sides == 0.0:
-        return value
-    side = front_sides if i < 2 else rear_sides
-    return value + side if i % 2 == 0 else value - side
+def _relaxes(p: DynamicsParameters) -> bool:
+    """Whether tyre forces or slips are states."""
+    return p.relaxation_m[0] > 0.0
 
 
 @inlined
-def _rolling_radius(i: int, p: DynamicsParameters) -> float:
-    """A wheel's own [m]; fl, fr, rl, rr."""
-    return _of_wheel(i, p.wheel_radius_m, p.axle_radius_m, p.front_side_radius_m, p.rear_side_radius_m)
-
-
-@inlined
-def _tyre_stiffness(i: int, p: DynamicsParameters) -> float:
-    """A wheel's own, along the road and at its usual load [N]."""
-    return _of_wheel(
-        i, p.longitudinal_stiffness_n, p.axle_stiffness_n, p.front_side_stiffness_n, p.rear_side_stiffness_n
-    )
-
-
-@inlined
-def _shaft_stiffness(i: int, p: DynamicsParameters) -> float:
-    """That of a wheel's own shaft [N m/rad]."""
-    front_sides, rear_sides = p.front_side_shaft_stiffness_nm_rad, p.rear_side_shaft_stiffness_nm_rad
-    return _of_wheel(i, p.shaft_stiffness_nm_rad, p.axle_shaft_stiffness_nm_rad, front_sides, rear_sides)
-
-
-@inlined
-def _relaxation_length(i: int, p: DynamicsParameters) -> float:
-    """A wheel's own at its usual load [m]."""
-    return _of_wheel(
-        i, p.relaxation_m, p.axle_relaxation_m, p.front_side_relaxation_m, p.rear_side_relaxation_m
-    )
+def _has_shafts(p: DynamicsParameters) -> bool:
+    """Whether shaft twists and motor speeds are states."""
+    return p.motor_inertia_kg_m2 > 0.0
 
 
 @compiled
@@ -325,10 +371,48 @@ def initial_y(speed_m_s: float, position_m: float, p: DynamicsParameters) -> NDA
     y = np.zeros(STATES)
     y[POSITION], y[SPEED] = position_m, speed_m_s
     for i in range(4):
-        y[WHEEL + i] = speed_m_s / _rolling_radius(i, p)
+        y[WHEEL + i] = speed_m_s / p.wheel_radius_m[i]
     if p.motor_inertia_kg_m2 > 0.0:
         y[MOTOR : MOTOR + 4] = y[WHEEL : WHEEL + 4]
     return y
+
+
+@inlined
+def slip_of(rim_m_s: float, speed_m_s: float) -> tuple[float, float]:
+    """Unsigned slip of a wheel [-], Eq. (13) in Tian et al. with a floor, and the speed it is relative to [m/s]."""
+    reference_m_s = max(rim_m_s, speed_m_s, FLOOR_SPEED_M_S)
+    return abs(rim_m_s - speed_m_s) / reference_m_s, reference_m_s
+
+
+@inlined
+def static_loads(p: DynamicsParameters) -> tuple[float, float, float]:
+    """Load of a front and of a rear wheel without acceleration [N], and what moves per acceleration [kg].
+
+    F_z,front = m (g l_r - a h) / (2 L), F_z,rear = m (g l_f + a h) / (2 L); ch. 1 of [1]_.
+
+    References
+    ----------
+    .. [1] Gillespie (1992), Fundamentals of Vehicle Dynamics.
+    """
+    half_base = 0.5 / (p.cog_to_front_axle_m + p.cog_to_rear_axle_m)
+    front_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_rear_axle_m * half_base
+    rear_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_front_axle_m * half_base
+    return front_n, rear_n, p.mass_kg * p.transfer_height_m * half_base
+
+
+@inlined
+def body_resistance(speed_m_s: float, tyres_n: float, p: DynamicsParameters) -> tuple[float, float]:
+    """Air drag and rolling resistance on the body [N]; the latter holds a standing car and never pushes it back.
+
+    F = 0.5 rho C_d A v^2 + c_hub m g; ch. 4 of [1]_.
+
+    References
+    ----------
+    .. [1] Gillespie (1992), Fundamentals of Vehicle Dynamics.
+    """
+    most_n = p.hub_resistance * p.mass_kg * p.gravity_m_s2
+    holding_n = min(most_n, max(tyres_n - p.mass_kg * p.slope_m_s2, 0.0))
+    return p.drag_kg_m * speed_m_s * speed_m_s, most_n if speed_m_s > 0.0 else holding_n
 
 
 @inlined
@@ -338,55 +422,41 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
     With load transfer the acceleration stands on both sides; Newton's method on it starts from `accel`.
     """
     speed = max(y[SPEED], 0.0)
-    half_base = 0.5 / (p.cog_to_front_axle_m + p.cog_to_rear_axle_m)
-    front_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_rear_axle_m * half_base
-    rear_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_front_axle_m * half_base
-    transfer_kg = p.mass_kg * p.transfer_height_m * half_base
+    front_n, rear_n, transfer_kg = static_loads(p)
     per_mean = 4.0 / (p.mass_kg * p.gravity_m_s2)
-    drag_n = p.drag_kg_m * speed * speed
-    force_lags = p.relaxation_m > 0.0 and p.slip_lags == 0.0
-    slip_lags = p.relaxation_m > 0.0 and p.slip_lags > 0.0
-    most_n = p.hub_resistance * p.mass_kg * p.gravity_m_s2
+    mean_stiffness_n = _mean_of_wheels(p.longitudinal_stiffness_n)
+    relaxes = _relaxes(p)
+    slip_lags = relaxes and p.slip_lags > 0.0
     for _ in range(8):
         shift_n = transfer_kg * accel
         total_n = 0.0
         total_by_accel = 0.0
         for i in range(4):
-            radius_m = _rolling_radius(i, p)
-            rim = max(y[WHEEL + i], 0.0) * radius_m
-            scale = max(rim, speed, FLOOR_SPEED_M_S)
-            slip = abs(rim - speed) / scale
+            rim = max(y[WHEEL + i], 0.0) * p.wheel_radius_m[i]
+            slip, scale = slip_of(rim, speed)
             load_n = max(front_n - shift_n, 0.0) if i < 2 else max(rear_n + shift_n, 0.0)
-            more = load_n * per_mean - 1.0
-            theta = wheels.theta[i]
-            if p.falloff_s_m > 0.0:
-                fallen = p.falloff_s_m * abs(rim - speed)
-                left = 1.0 / (1.0 + fallen) if p.falloff_hyperbolic > 0.0 else np.exp(-fallen)
-                theta *= p.falloff_floor + (1.0 - p.falloff_floor) * left
+            more_load = load_n * per_mean - 1.0
+            theta = wheels.theta[i] * adhesion_left(abs(rim - speed), p)
             acting = slip if rim >= speed else -slip
             if slip_lags:
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
-            stiffness_n = _tyre_stiffness(i, p) * max(1.0 + p.stiffness_by_load * more, LEAST_STIFFNESS)
-            tyre = tyre_force(theta, abs(acting), load_n, stiffness_n)
-            if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
-                tyre = reshaped(tyre, abs(acting), theta * load_n, load_n, p)
-            if p.formula_share != 0.0:
-                tyre = by_formula(tyre, theta, abs(acting), load_n, stiffness_n, p)
-            force, by_slip, by_load = tyre
+            softening = max(1.0 + p.stiffness_by_load * more_load, LEAST_STIFFNESS)
+            stiffness_n = p.longitudinal_stiffness_n[i] * softening
+            force, by_slip, by_load = steady_tyre(
+                theta, abs(acting), load_n, stiffness_n, mean_stiffness_n, p
+            )
             force, by_load = np.copysign(force, acting), np.copysign(by_load, acting)
             # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
             slope = max(by_slip, 0.0)
-            if p.relaxation_m > 0.0:
-                rest = speed <= 0.0 and y[FORCE + i] < 0.0
-                gone = p.relaxation_by_slope * max(1.0 - slope / (INITIAL_SLOPE * stiffness_n), 0.0)
-                share = max((1.0 + p.relaxation_by_load * more) * (1.0 - gone), LEAST_RELAXATION)
-                length_m = _relaxation_length(i, p) * share
-                wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if rest else scale) / length_m
+            if relaxes:
+                releases = speed <= 0.0 and y[FORCE + i] < 0.0
+                length_m = relaxation_length(i, more_load, slope, stiffness_n, p)
+                wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if releases else scale) / length_m
                 wheels.work[_PER_STATE, i] = 1.0
             if slip_lags:
-                slope = wheels.work[_PER_STATE, i] = max(slope, LEAST_SLOPE * p.longitudinal_stiffness_n)
-            if force_lags:
+                slope = wheels.work[_PER_STATE, i] = max(slope, LEAST_SLOPE * mean_stiffness_n)
+            if relaxes and not slip_lags:
                 wheels.work[_STEADY, i] = force
                 wheels.force_n[i] = y[FORCE + i]
             else:
@@ -396,10 +466,11 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             wheels.load_n[i] = load_n
             wheels.slip[i] = slip
             slope /= scale
-            wheels.work[_SLOPE_WHEEL, i] = slope * radius_m * (speed / rim if rim == scale else 1.0)
+            wheels.work[_SLOPE_WHEEL, i] = (
+                slope * p.wheel_radius_m[i] * (speed / rim if rim == scale else 1.0)
+            )
             wheels.work[_SLOPE_SPEED, i] = -slope * (rim / speed if speed == scale else 1.0)
-        # At rest it holds the car and never pushes it back.
-        hub_n = most_n if speed > 0.0 else min(most_n, max(total_n - p.mass_kg * p.slope_m_s2, 0.0))
+        drag_n, hub_n = body_resistance(speed, total_n, p)
         error = (total_n - drag_n - hub_n) / p.mass_kg - accel
         accel += error / (1.0 - total_by_accel / p.mass_kg)
         if p.transfer_height_m == 0.0 or abs(error) < ACCELERATION_TOLERANCE_M_S2:
@@ -417,19 +488,16 @@ def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, fi
 
 @inlined
 def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
-    """Omega' of one wheel [rad/s^2]; a resting wheel that nothing drives forward stays at rest."""
-    coefficient = _of_axle(i, p.rolling_coefficient, p.axle_rolling_coefficient)
-    resistance_n = wheels.force_n[i] + coefficient * wheels.load_n[i]
-    inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2) - p.motor_inertia_kg_m2
-    drag_nm = _of_axle(i, p.drag_torque_nm, p.axle_drag_torque_nm)
-    lever_m = _rolling_radius(i, p) + p.lever_more_m
-    rate = (torque_nm - resistance_n * lever_m - drag_nm) / inertia
+    """Acceleration of a wheel [rad/s^2], Eq. (12) in Tian et al. with resistances; they hold a wheel at rest."""
+    resistance_n = wheels.force_n[i] + p.rolling_coefficient[i] * wheels.load_n[i]
+    inertia = p.wheel_inertia_kg_m2[i] - p.motor_inertia_kg_m2
+    rate = (torque_nm - resistance_n * p.lever_m[i] - p.drag_torque_nm[i]) / inertia
     return 0.0 if speed_rad_s <= 0.0 and rate <= 0.0 else rate
 
 
 @inlined
 def _motor_torque(speed_rad_s: float, torque_nm: float) -> tuple[float, float]:
-    """What a motor makes of its torque [N m], and its damping [N m s/rad].
+    """Torque that acts on a motor [N m], and its fall per motor speed [N m s/rad].
 
     A negative torque is a brake, which opposes the motor's motion. Within BRAKE_FADE_RAD_S of rest it acts like a
     damper: a brake that reverses at rest would chatter.
@@ -449,9 +517,9 @@ def _fill_rates(
     total_n = 0.0
     for i in range(4):
         torque = torque_nm[i] + (next_nm[i] - torque_nm[i]) * part
-        if p.motor_inertia_kg_m2 > 0.0:
+        if _has_shafts(p):
             spread = y[MOTOR + i] - y[WHEEL + i]
-            shaft_nm = _shaft_stiffness(i, p) * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
+            shaft_nm = p.shaft_stiffness_nm_rad[i] * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
             motor_nm, wheels.work[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
             wheels.rates[TWIST - WHEEL + i] = spread
             wheels.rates[MOTOR - WHEEL + i] = (motor_nm - shaft_nm) / p.motor_inertia_kg_m2
@@ -459,7 +527,7 @@ def _fill_rates(
         rate = _wheel_rate(i, y[WHEEL + i], torque, p, wheels)
         wheels.free[i] = 0.0 if y[WHEEL + i] <= 0.0 and rate == 0.0 else 1.0
         wheels.rates[i] = rate
-        if p.relaxation_m > 0.0:
+        if _relaxes(p):
             behind = wheels.work[_STEADY, i] - y[FORCE + i]
             wheels.rates[FORCE - WHEEL + i] = wheels.work[_LAG, i] * behind
         total_n += wheels.force_n[i]
@@ -469,8 +537,8 @@ def _fill_rates(
 
 @inlined
 def _shaft(i: int, gh: float, p: DynamicsParameters) -> tuple[float, float]:
-    """What a shaft's twist, and its motor's speed beside the wheel's, add to its torque within gh [N m/(rad/s)]."""
-    stiffness = gh * _shaft_stiffness(i, p)
+    """Torque of a shaft within gh [s] per speed difference: by its twist, and with damping [N m s/rad]."""
+    stiffness = gh * p.shaft_stiffness_nm_rad[i]
     return stiffness, gh * (stiffness + p.shaft_damping_nm_s_rad)
 
 
@@ -485,19 +553,16 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
     pivot = 1.0 + gh * 2.0 * p.drag_kg_m * speed / p.mass_kg
     at = wheels.work
     for i in range(4):
-        inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2)
-        lever_m = _rolling_radius(i, p) + p.lever_more_m
-        per_newton = lever_m / inertia
-        if p.motor_inertia_kg_m2 > 0.0:
+        inertia = p.wheel_inertia_kg_m2[i]
+        if _has_shafts(p):
             _, shaft = _shaft(i, gh, p)
             motor = at[_MOTOR, i] = p.motor_inertia_kg_m2 + gh * at[_BRAKE, i]
             inertia = inertia - p.motor_inertia_kg_m2 + motor / (motor + shaft) * shaft
-            per_newton = lever_m / inertia
         lagged = gh * wheels.work[_LAG, i]
-        share = lagged / (1.0 + lagged) if p.relaxation_m > 0.0 else 1.0
+        share = lagged / (1.0 + lagged) if _relaxes(p) else 1.0
         at[_BY_WHEEL, i] = wheels.work[_SLOPE_WHEEL, i] * share
         at[_BY_SPEED, i] = wheels.work[_SLOPE_SPEED, i] * share
-        at[_GAIN, i] = gh * per_newton * wheels.free[i]
+        at[_GAIN, i] = gh * (p.lever_m[i] / inertia) * wheels.free[i]
         at[_OWN, i] = 1.0 + at[_GAIN, i] * at[_BY_WHEEL, i]
         at[_SHARE, i] = gh * at[_BY_WHEEL, i] / (p.mass_kg * at[_OWN, i])
         pivot -= (gh / p.mass_kg - at[_SHARE, i] * at[_GAIN, i]) * at[_BY_SPEED, i]
@@ -511,18 +576,18 @@ def _solve(
     """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; return the vehicle speed's part."""
     gh = _GAMMA * h
     at = wheels.work
-    has_shaft = p.motor_inertia_kg_m2 > 0.0
+    has_shaft = _has_shafts(p)
     rhs = speed_rhs
     for i in range(4):
         stiffness, shaft = _shaft(i, gh, p)
-        inertia = _of_axle(i, p.wheel_inertia_kg_m2, p.axle_inertia_kg_m2) - p.motor_inertia_kg_m2
+        inertia = p.wheel_inertia_kg_m2[i] - p.motor_inertia_kg_m2
         if has_shaft:
             k[MOTOR - WHEEL + i] *= p.motor_inertia_kg_m2 / at[_MOTOR, i]
         if has_shaft and wheels.free[i] > 0.0:
             passed = stiffness * k[TWIST - WHEEL + i] + shaft * k[MOTOR - WHEEL + i]
             share = at[_MOTOR, i] / (at[_MOTOR, i] + shaft)
             k[i] = (inertia * k[i] + share * passed) / (inertia + share * shaft)
-        if p.relaxation_m > 0.0:
+        if _relaxes(p):
             k[FORCE - WHEEL + i] /= 1.0 + gh * wheels.work[_LAG, i]
             lagging_n = at[_PER_STATE, i] * k[FORCE - WHEEL + i]
             k[i] -= at[_GAIN, i] * lagging_n
@@ -532,7 +597,7 @@ def _solve(
     for i in range(4):
         stiffness, shaft = _shaft(i, gh, p)
         k[i] = (k[i] - at[_GAIN, i] * at[_BY_SPEED, i] * k_speed) / at[_OWN, i]
-        if p.relaxation_m > 0.0:
+        if _relaxes(p):
             k[FORCE - WHEEL + i] += (at[_BY_WHEEL, i] * k[i] + at[_BY_SPEED, i] * k_speed) / at[_PER_STATE, i]
         if has_shaft:
             pull = shaft * k[i] - stiffness * k[TWIST - WHEEL + i]
@@ -545,7 +610,7 @@ def _solve(
 @inlined
 def _states(p: DynamicsParameters) -> int:
     """How many entries of y are in use."""
-    return STATES if p.relaxation_m > 0.0 or p.motor_inertia_kg_m2 > 0.0 else FORCE
+    return STATES if _relaxes(p) or _has_shafts(p) else FORCE
 
 
 @inlined
@@ -579,13 +644,14 @@ def _try_step(
     error = abs(speed_1 + speed_2)
     for j in range(count):
         trial[WHEEL + j] = y[WHEEL + j] + h * (1.5 * k_1[j] + 0.5 * k_2[j])
+    radius_m = _mean_of_wheels(p.wheel_radius_m)
     trial[SPEED] = max(y[SPEED] + h * (1.5 * speed_1 + 0.5 * speed_2), 0.0)
     for i in range(4):
-        error = max(error, p.wheel_radius_m * abs(k_1[i] + k_2[i]))
+        error = max(error, radius_m * abs(k_1[i] + k_2[i]))
         trial[WHEEL + i] = max(trial[WHEEL + i], 0.0)
-        if p.motor_inertia_kg_m2 > 0.0:
+        if _has_shafts(p):
             motor = MOTOR - WHEEL + i
-            error = max(error, p.wheel_radius_m * abs(k_1[motor] + k_2[motor]))
+            error = max(error, radius_m * abs(k_1[motor] + k_2[motor]))
     trial[POSITION] = y[POSITION] + 0.5 * h * (y[SPEED] + trial[SPEED])
     return 0.5 * h * error, accel
 
@@ -673,22 +739,39 @@ def run(
     return states, accels, slip, force_n, load_n, theta
 
 
-FIELDS = len(DynamicsParameters._fields)
-
-
 @compiled
 def between(ends: NDArray, shares: NDArray) -> NDArray:
-    """The first of some ends and shares of the ways from it to the others."""
+    """The first row of `ends` plus each share of the difference from it to each further row, in their unit."""
     values = ends[0].copy()
     for j in range(shares.shape[0]):
         values += shares[j] * (ends[j + 1] - ends[0])
     return values
 
 
+@inlined
+def _four(values: NDArray, field: int) -> PerWheel:
+    """The values of a field that is per wheel, in a row of `DynamicsParameters.as_row`."""
+    at = 4 * field
+    return values[at], values[at + 1], values[at + 2], values[at + 3]
+
+
 @compiled
 def _car_between(ends: NDArray, shares: NDArray) -> DynamicsParameters:
-    values = between(ends, shares)
-    return DynamicsParameters(*to_fixed_tuple(values, FIELDS))  # type: ignore[call-arg]  # its first argument is numba's
+    """The parameters between rows of `DynamicsParameters.as_row`, as `between` has them."""
+    v = between(ends, shares)
+    # to_fixed_tuple is numba's intrinsic, whose first argument its compiler gives.
+    others: Any = to_fixed_tuple(v[4 * PER_WHEEL :], OF_VEHICLE)  # type: ignore[call-arg]
+    return DynamicsParameters(
+        _four(v, 0),
+        _four(v, 1),
+        _four(v, 2),
+        _four(v, 3),
+        _four(v, 4),
+        _four(v, 5),
+        _four(v, 6),
+        _four(v, 7),
+        *others,
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -720,8 +803,8 @@ def follow(
         Time in which a state comes to its measurement [s]; the first rows are averaged instead.
     step_s : float
         Time between the rows [s].
-    ends : array, shape (1 + m, len(DynamicsParameters))
-        The car, and m others that it may vary towards.
+    ends : array, shape (1 + m, VALUES)
+        The car as `DynamicsParameters.as_row`, and m others that it may vary towards.
     start_m, thetas : array, shape (segments,), (1 + m, segments, 2)
         Roads of the same segments, likewise.
     shares : array, shape (n, m)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,115 +14,121 @@ POSITION, SPEED, WHEEL, FORCE, TWIST, MOTOR, STATES = 0, 1, 2, 6, 10, 14, 18
 force [N] or lagging slip [-] (with relaxation), shaft twist [rad] and motor speed [rad/s] (with a driveline); unused
 ones stay as they are."""
 
+PerWheel = tuple[float, float, float, float]
+"""One value per wheel in the order of `trpac_core.vehicle.WHEELS`: fl, fr, rl, rr. Tuples and not arrays: the compiled
+step counts references of each array that it hands on, which took half of all time."""
+
+PER_WHEEL = 8
+"""How many fields of `DynamicsParameters`, the first ones, hold one value per wheel."""
+
 
 class DynamicsParameters(NamedTuple):
     """Everything that the dynamics stage depends on; effects replace fields."""
 
+    wheel_radius_m: PerWheel
+    """Rolling radius: vehicle speed over wheel speed of a wheel that rolls without slip [m]."""
+    lever_m: PerWheel
+    """Lever of the tyre force about the wheel's axle [m]."""
+    wheel_inertia_kg_m2: PerWheel
+    """Moment of inertia of the wheel and its motor about the axle [kg m^2]."""
+    longitudinal_stiffness_n: PerWheel
+    """Longitudinal stiffness C_x of the tyre under the mean static load of all wheels [N]."""
+    rolling_coefficient: PerWheel
+    """Rolling resistance as a moment over load and lever, positive against the rotation [-]."""
+    drag_torque_nm: PerWheel
+    """Constant torque, positive against the rotation [N m]."""
+    relaxation_m: PerWheel
+    """Distance rolled until the tyre force has made 63 % of a step; 0 on all wheels: it follows at once [m]."""
+    shaft_stiffness_nm_rad: PerWheel
+    """Torsional stiffness of the shaft between motor and wheel [N m/rad]."""
     mass_kg: float
+    """Mass of the vehicle [kg]."""
     cog_to_front_axle_m: float
+    """Distance from the centre of gravity forward to the front axle [m]."""
     cog_to_rear_axle_m: float
-    wheel_radius_m: float
-    wheel_inertia_kg_m2: float
-    longitudinal_stiffness_n: float
+    """Distance from the centre of gravity back to the rear axle [m]."""
     transfer_height_m: float = 0.0
     """Height through which acceleration moves load between the axles; 0: static loads [m]."""
     drag_kg_m: float = 0.0
-    """Air drag per squared speed, 0.5 rho C_d A [kg/m]."""
-    rolling_coefficient: float = 0.0
-    """Rolling resistance moment per load and radius [-]."""
+    """Air drag force over squared speed, 0.5 rho C_d A [kg/m]."""
     hub_resistance: float = 0.0
-    """Rolling resistance as a force on the body per load [-]."""
-    drag_torque_nm: float = 0.0
-    """Torque against each wheel's rotation [N m]."""
+    """Rolling resistance as a force on the body over the load, positive against the motion [-]."""
     slope_m_s2: float = 0.0
-    """Gravity's part along the road, positive uphill [m/s^2]."""
+    """Part of gravity along the road, positive uphill [m/s^2]."""
     gravity_m_s2: float = GRAVITY_M_S2
-    """Gravity's part across the road, which loads the wheels [m/s^2]."""
+    """Part of gravity across the road, which loads the wheels [m/s^2]."""
     falloff_s_m: float = 0.0
     """Rate at which adhesion falls with sliding speed; 0: it does not [s/m]."""
     falloff_floor: float = 1.0
     """Share of the adhesion that is left at high sliding speed [-]."""
     falloff_hyperbolic: float = 0.0
-    """1: the fall is a hyperbola of the sliding speed, else exponential [-]."""
+    """1: adhesion falls as a hyperbola of the sliding speed; 0: exponentially [-]."""
     knee: float = 0.0
-    """By how much the tyre's force is off where adhesion begins to give way to sliding [-]."""
+    """Relative deviation of the tyre force where adhesion begins to give way to sliding [-]."""
     crest: float = 0.0
-    """By how much the tyre's force is off near its maximum [-]."""
+    """Relative deviation of the tyre force near its maximum [-]."""
     sliding: float = 0.0
-    """By how much the tyre's force is off where it slides all over [-]."""
+    """Relative deviation of the tyre force where the whole contact patch slides [-]."""
     formula_share: float = 0.0
-    """How far the tyre's curve is from the modified Dugoff one to a magic formula of the same slope and peak [-]."""
+    """Weight of a magic formula of the same initial slope and peak; 0: the modified Dugoff tyre alone [-]."""
     formula_shape: float = 1.4
-    """That formula's shape factor C [-]."""
+    """Shape factor C of the magic formula [-]."""
     formula_curvature: float = 0.0
-    """That formula's curvature factor E [-]."""
-    relaxation_m: float = 0.0
-    """Way over which the tyre force follows its steady value; 0: at once [m]."""
+    """Curvature factor E of the magic formula [-]."""
     relaxation_by_load: float = 0.0
-    """By which that way grows with a wheel's load, in shares of it over the mean static load: 1 in proportion [-]."""
+    """Relative growth of the relaxation length per relative excess of the load over the mean static load [-]."""
     relaxation_by_slope: float = 0.0
-    """Share of that way that shrinks as the force's slope by slip does; 1: all of it [-]."""
-    axle_relaxation_m: float = 0.0
-    """What that way is longer on the front wheels, and shorter on the rear ones [m]."""
-    front_side_relaxation_m: float = 0.0
-    """What it is longer beside that on the front left wheel, and shorter on the front right one [m]."""
-    rear_side_relaxation_m: float = 0.0
-    """The same of the rear wheels [m]."""
+    """Share of the relaxation length that shrinks as the slope of the force by slip does; 1: all of it [-]."""
     slip_lags: float = 0.0
-    """1: over that way it is the slip that follows, and the force is the steady one of the lagging slip [-]."""
-    shaft_stiffness_nm_rad: float = 1e4
+    """1: relaxation delays the slip, and the force is the steady one of that slip; 0: it delays the force [-]."""
     shaft_damping_nm_s_rad: float = 0.0
-    axle_inertia_kg_m2: float = 0.0
-    """What the front wheels' inertia has more than wheel_inertia_kg_m2, and the rear wheels' less [kg m^2]."""
-    axle_drag_torque_nm: float = 0.0
-    """Likewise beside drag_torque_nm [N m]."""
-    axle_rolling_coefficient: float = 0.0
-    """Likewise beside rolling_coefficient [-]."""
-    axle_shaft_stiffness_nm_rad: float = 0.0
-    """Likewise beside shaft_stiffness_nm_rad [N m/rad]."""
-    front_side_shaft_stiffness_nm_rad: float = 0.0
-    """What the front left shaft's stiffness has more beside it, and the front right one's less [N m/rad]."""
-    rear_side_shaft_stiffness_nm_rad: float = 0.0
-    """The same of the rear shafts [N m/rad]."""
-    axle_stiffness_n: float = 0.0
-    """Likewise beside longitudinal_stiffness_n [N]."""
-    front_side_stiffness_n: float = 0.0
-    """What the front left tyre's stiffness has more beside it, and the front right one's less [N]."""
-    rear_side_stiffness_n: float = 0.0
-    """The same of the rear tyres [N]."""
+    """Torsional damping of each shaft [N m s/rad]."""
     stiffness_by_load: float = 0.0
-    """By which stiffness grows with a wheel's load, as relaxation_by_load does [-]."""
-    lever_more_m: float = 0.0
-    """What the forces' lever about the axle has more than the rolling radius [m]."""
-    axle_radius_m: float = 0.0
-    """What the front wheels' rolling radius has more than wheel_radius_m, and the rear wheels' less [m]."""
-    front_side_radius_m: float = 0.0
-    """What the front left wheel's rolling radius has more beside it, and the front right wheel's less [m]."""
-    rear_side_radius_m: float = 0.0
-    """The same of the rear wheels [m]."""
+    """Relative growth of the tyre stiffness per relative excess of the load over the mean static load [-]."""
     motor_inertia_kg_m2: float = 0.0
-    """The part of wheel_inertia_kg_m2 that turns with the motor, behind the shaft; 0: no shaft [kg m^2]."""
+    """Part of wheel_inertia_kg_m2 that turns with the motor, behind the shaft; 0: no shaft [kg m^2]."""
+
+    def as_compiled(self) -> DynamicsParameters:
+        """The same values as the types that the step is compiled for: floats, and tuples of four floats."""
+        values: list[Any] = [
+            tuple(map(float, value)) if isinstance(value, tuple) else float(value) for value in self
+        ]
+        return DynamicsParameters(*values)
+
+    def as_row(self) -> NDArray[np.float64]:
+        """All values in the order of the fields, four of each field that is per wheel, shape (VALUES,)."""
+        return np.hstack(self)
+
+
+OF_VEHICLE = len(DynamicsParameters._fields) - PER_WHEEL
+"""How many fields of `DynamicsParameters`, the last ones, hold one number."""
+VALUES = 4 * PER_WHEEL + OF_VEHICLE
+"""How many numbers `DynamicsParameters` holds."""
 
 
 class RoadTable(NamedTuple):
     """The road as the compiled step reads it; the first segment also holds before its start."""
 
     start_m: NDArray[np.float64]
+    """Where each segment begins, shape (segments,) [m]."""
     theta: NDArray[np.float64]
-    """Friction under the left and the right wheels, shape (segments, 2) [-]."""
+    """Adhesion under the left and the right wheels, shape (segments, 2) [-]."""
 
 
 class Wheels(NamedTuple):
     """Working arrays of one evaluation, shape (4,) each unless said; theta is input, the others are filled."""
 
     theta: NDArray[np.float64]
+    """Adhesion of the road at each contact [-]."""
     force_n: NDArray[np.float64]
-    """What the tyre does; with relaxation it lags behind its steady value."""
+    """Longitudinal tyre force F_x, positive forward; with relaxation it lags behind its steady value [N]."""
     load_n: NDArray[np.float64]
+    """Vertical load F_z [N]."""
     slip: NDArray[np.float64]
+    """Unsigned slip lambda [-]."""
     rates: NDArray[np.float64]
-    """Of y from the wheel speeds on, shape (16,)."""
+    """Time derivatives of y from the wheel speeds on, shape (16,), in units of y per second."""
     free: NDArray[np.float64]
-    """0 for what is held at rest, else 1: four wheels and the vehicle, shape (5,)."""
+    """0 for what is held at rest, else 1: four wheels and the vehicle, shape (5,) [-]."""
     work: NDArray[np.float64]
     """What only the step itself needs, shape (12, 4); dynamics.py names the rows."""

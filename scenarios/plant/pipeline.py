@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenarios.effects import Effect
+from scenarios.effects.base import of_each_wheel
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, Scenario, VehicleFile
 from scenarios.plant import dynamics
 from scenarios.plant.parameters import FORCE, POSITION, SPEED, WHEEL, DynamicsParameters, RoadTable, Wheels
 
 Array = NDArray[Any]
+
+NO_SHAFT_NM_RAD = 1e4
+"""Torsional stiffness that the parameters hold where no effect adds shafts; nothing depends on it [N m/rad]."""
 
 
 @dataclass(frozen=True)
@@ -107,9 +111,14 @@ def make_setup(vehicle: VehicleFile, road: RoadFile) -> PlantSetup:
         mass_kg=float(vehicle.mass_kg),
         cog_to_front_axle_m=float(vehicle.wheelbase_m - vehicle.cog_to_rear_axle_m),
         cog_to_rear_axle_m=float(vehicle.cog_to_rear_axle_m),
-        wheel_radius_m=float(vehicle.wheel_radius_m),
-        wheel_inertia_kg_m2=float(vehicle.wheel_inertia_kg_m2),
-        longitudinal_stiffness_n=float(vehicle.tyre.longitudinal_stiffness_n),
+        wheel_radius_m=of_each_wheel(vehicle.wheel_radius_m),
+        lever_m=of_each_wheel(vehicle.wheel_radius_m),
+        wheel_inertia_kg_m2=of_each_wheel(vehicle.wheel_inertia_kg_m2),
+        longitudinal_stiffness_n=of_each_wheel(vehicle.tyre.longitudinal_stiffness_n),
+        rolling_coefficient=of_each_wheel(0.0),
+        drag_torque_nm=of_each_wheel(0.0),
+        relaxation_m=of_each_wheel(0.0),
+        shaft_stiffness_nm_rad=of_each_wheel(NO_SHAFT_NM_RAD),
     )
     table = RoadTable(
         start_m=np.array([s.start_m for s in road.segments], dtype=np.float64),
@@ -117,7 +126,7 @@ def make_setup(vehicle: VehicleFile, road: RoadFile) -> PlantSetup:
     )
     for effect in vehicle.make_effects():
         parameters, table = effect.dynamics(parameters), effect.road(table)
-    return PlantSetup(DynamicsParameters(*map(float, parameters)), table)
+    return PlantSetup(parameters.as_compiled(), table)
 
 
 def actual_torque(vehicle: VehicleFile, time_s: Array, wheel_torque_nm: Array) -> Array:

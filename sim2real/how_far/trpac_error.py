@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import Effect
+from scenarios.effects.base import mean_of_wheels
 from scenarios.files import VehicleFile
 from scenarios.plant.dynamics import DynamicsParameters
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
@@ -200,8 +201,8 @@ def _inputs(model: Simulation, drive: Drive) -> Inputs:
         torque_nm = effect.actuate(drive.time_s, torque_nm)
     wheel_rad_s, speed_m_s = columns[CHANNELS[WHEEL][0]], columns[CHANNELS[SPEED]]
     turning = wheel_rad_s > 0.0
-    actual_nm = torque_nm[:, 0] - np.where(turning, parameters.drag_torque_nm, 0.0)
-    rim_m_s = wheel_rad_s * parameters.wheel_radius_m
+    actual_nm = torque_nm[:, 0] - np.where(turning, mean_of_wheels(parameters.drag_torque_nm), 0.0)
+    rim_m_s = wheel_rad_s * mean_of_wheels(parameters.wheel_radius_m)
     locked = (rim_m_s < LOCKED_M_S) & (speed_m_s > EstimatorConfig.floor_m_s)
     return Inputs(
         _core(model.vehicle, parameters),
@@ -218,10 +219,10 @@ def _core(vehicle: VehicleFile, parameters: DynamicsParameters) -> Vehicle:
         vehicle.to_core(),
         mass_kg=parameters.mass_kg,
         cog_height_m=parameters.transfer_height_m,
-        wheel_radius_m=parameters.wheel_radius_m,
-        wheel_inertia_kg_m2=parameters.wheel_inertia_kg_m2,
-        longitudinal_stiffness_n=parameters.longitudinal_stiffness_n,
-        rolling_resistance=parameters.rolling_coefficient,
+        wheel_radius_m=mean_of_wheels(parameters.wheel_radius_m),
+        wheel_inertia_kg_m2=mean_of_wheels(parameters.wheel_inertia_kg_m2),
+        longitudinal_stiffness_n=mean_of_wheels(parameters.longitudinal_stiffness_n),
+        rolling_resistance=mean_of_wheels(parameters.rolling_coefficient),
     )
 
 

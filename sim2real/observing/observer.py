@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, Effect
+from scenarios.effects.base import mean_of_wheels
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant import dynamics
@@ -137,7 +138,7 @@ class Simulation:
         parameters, table = bare.parameters, bare.road
         for effect in self.effects:
             parameters, table = effect.dynamics(parameters), effect.road(table)
-        return DynamicsParameters(*map(float, parameters)), table
+        return parameters.as_compiled(), table
 
     def predict(self, drive: Drive, push: Push | None = None, towards: Towards | None = None) -> Prediction:
         """Follow a drive."""
@@ -155,7 +156,7 @@ class Simulation:
             np.column_stack([columns[name] for name in CHANNELS[:6]]),
             self._memory_s,
             drive.step_s,
-            np.array([parameters for parameters, _ in setups]),
+            np.array([parameters.as_row() for parameters, _ in setups]),
             setups[0][1].start_m,
             np.array([table.theta for _, table in setups]),
             blend.shares,
@@ -212,7 +213,7 @@ def start(columns: dict[str, Array], step_s: float, p: DynamicsParameters) -> Ar
     )
     if not np.isfinite(position_m):
         position_m = _before_first_fix(columns["position_m"], columns["vehicle_speed_m_s"], step_s, count)
-    rims_m_s = np.array(wheels) * p.wheel_radius_m
+    rims_m_s = np.array(wheels) * mean_of_wheels(p.wheel_radius_m)
     if not np.isfinite(speed) and np.isfinite(rims_m_s).any():  # not measured yet: as fast as the wheels roll
         speed = float(np.nanmean(rims_m_s))
     y = dynamics.initial_y(max(np.nan_to_num(speed), 0.0), position_m, p)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.effects.base import mean_of_wheels
 from scenarios.files import RoadFile, RoadSegment, VehicleFile
 from sim2real.logs import Log, LogError, resample
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive, make_drive
@@ -148,15 +149,15 @@ def make_inputs(log: Log, vehicle: VehicleFile) -> Inputs:
         torque_nm = effect.actuate(time_s, torque_nm)
     wheels = np.column_stack([columns[name] for name in CHANNELS[WHEEL]])
     speed = columns[CHANNELS[SPEED]]
-    torque_nm = torque_nm - np.where(wheels > 0.0, parameters.drag_torque_nm, 0.0)
+    torque_nm = torque_nm - np.where(wheels > 0.0, mean_of_wheels(parameters.drag_torque_nm), 0.0)
     car = replace(
         vehicle.to_core(),
         mass_kg=parameters.mass_kg,
         cog_height_m=parameters.transfer_height_m or vehicle.cog_height_m,
-        wheel_radius_m=parameters.wheel_radius_m,
-        wheel_inertia_kg_m2=parameters.wheel_inertia_kg_m2,
-        longitudinal_stiffness_n=parameters.longitudinal_stiffness_n,
-        rolling_resistance=parameters.rolling_coefficient,
+        wheel_radius_m=mean_of_wheels(parameters.wheel_radius_m),
+        wheel_inertia_kg_m2=mean_of_wheels(parameters.wheel_inertia_kg_m2),
+        longitudinal_stiffness_n=mean_of_wheels(parameters.longitudinal_stiffness_n),
+        rolling_resistance=mean_of_wheels(parameters.rolling_coefficient),
     )
     locked = (wheels * car.wheel_radius_m < LOCKED_M_S) & (speed > EstimatorConfig.floor_m_s)[:, None]
     zero = np.zeros(len(time_s))
