@@ -14,10 +14,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from fmu_src import archives, doctor
+from fmu_src import doctor
 from fmu_src.contents import CONTENTS_FILE, read_contents, sha256_of
 from fmu_src.doctor import Python, State, UnusableError, examine
 from fmu_src.host_needs import host_needs
+from scenarios.fmu_client import archives
 from trpac_cli.main import app
 
 pytestmark = pytest.mark.e2e
