@@ -114,6 +114,39 @@ def test_time_shows_what_one_reading_hides_and_doubt_still_hides_it() -> None:
     assert shown_after(0.9, 0.0068, 3e-5) is None
 
 
+def test_the_estimate_follows_a_mean_that_has_been_held_at_twice_gamma() -> None:
+    inputs, state = at_rest(0.3, 0.03, 0.0)
+    look, errors = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER), []
+    for _ in range(100):
+        state = fusion_step(state, inputs, look, WHEEL, GAINS, SCHEDULER, None, STEP_S).state
+        errors.append(state.theta_hat - 0.3)
+    assert errors[99] / errors[49] == pytest.approx(math.exp(-2.0 * GAINS.gamma * 0.05), rel=0.05)
+
+
+def test_a_class_hurries_an_estimate_that_follows_a_mean_and_leaves_it_on_the_tyres() -> None:
+    inputs, alone = at_rest(0.4, 0.03, 0.0)
+    look, fused = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER), alone
+    for step in range(300):
+        alone, fused = (
+            fusion_step(state, inputs, look, WHEEL, GAINS, SCHEDULER, theta_img, STEP_S).state
+            for state, theta_img in ((alone, None), (fused, 0.2))
+        )
+        assert 0.4 - 1e-3 < fused.theta_hat <= alone.theta_hat
+        if step == 50:
+            assert fused.theta_hat < alone.theta_hat - 3e-3
+
+
+def test_a_wheel_that_rolled_freely_in_between_begins_a_new_mean() -> None:
+    inputs, state = at_rest(0.3, 0.03, 0.0)
+    rolling = inputs._replace(wheel_torque_nm=0.0, slip=Slip(0.0, 0.0))
+    held_s = []
+    for now in (*[inputs] * 50, rolling, inputs):
+        look = look_at(now, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+        state = fusion_step(state, now, look, WHEEL, GAINS, SCHEDULER, None, STEP_S).state
+        held_s.append(state.steady.held_s)
+    assert held_s[-3:] == [pytest.approx(50 * STEP_S), 0.0, STEP_S]
+
+
 def estimate_after(theta: float, slip: float, doubt: float, theta_img: float | None) -> float:
     """Estimate after 0.3 s of a wheel at rest on the curve [-]."""
     inputs, state = at_rest(theta, slip, doubt)
