@@ -241,6 +241,22 @@ def test_least_theta_never_exceeds_the_truth(theta, slip, deviation):
     assert least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n) <= theta + 1e-6
 
 
+def test_a_tyre_that_does_not_slide_allows_no_road_below_the_one_on_which_it_just_would():
+    inputs = on_road(0.9, slip=0.01)
+    force_n = inputs.wheel_torque_nm / WHEEL.radius_m
+    least = least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n)
+    assert least == pytest.approx(at_sliding_limit(1.0, 0.01))
+    assert least_theta(-force_n, inputs, WHEEL.longitudinal_stiffness_n) == 0.0
+
+
+def test_no_road_beyond_the_greatest_is_shown_or_asked_for():
+    for slip in (0.03, 0.08):
+        inputs = on_road(1.6, slip)
+        force_n = inputs.wheel_torque_nm / WHEEL.radius_m
+        assert visible_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n)[0] in (None, GREATEST_THETA)
+        assert least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n) <= GREATEST_THETA
+
+
 @given(st.floats(0.1, 1.0), st.floats(0.2, 0.9), st.floats(0.0, 0.001), st.floats(0.0, 0.001))
 def test_least_theta_does_not_even_where_slip_is_read_two_deviations_too_small(theta, share, noise, change):
     slip = share * tyre.peak_slip(theta, LOAD_N, WHEEL.longitudinal_stiffness_n)

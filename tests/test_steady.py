@@ -7,7 +7,7 @@ import pytest
 
 from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
 from trpac_core.excitation import FuzzyScheduler
-from trpac_core.sight import WheelInputs, backed_theta, look_at, place_of_mean, shown
+from trpac_core.sight import YOUNG_S, WheelInputs, backed_theta, look_at, place_of_mean, shown
 from trpac_core.slip import Slip
 from trpac_core.steady import (
     ELSEWHERE,
@@ -20,7 +20,7 @@ from trpac_core.steady import (
     quickened,
     unsettled,
 )
-from trpac_core.tyre import force
+from trpac_core.tyre import elastic_friction, force
 
 STEP_S, TAU_S, NOISE = 1e-3, 0.01, 1e-4
 WHEEL, SCHEDULER, GAINS = Wheel(1.2, 0.29, 50_000.0), FuzzyScheduler(), Gains()
@@ -145,6 +145,23 @@ def test_a_wheel_that_rolled_freely_in_between_begins_a_new_mean() -> None:
         state = fusion_step(state, now, look, WHEEL, GAINS, SCHEDULER, None, STEP_S).state
         held_s.append(state.steady.held_s)
     assert held_s[-3:] == [pytest.approx(50 * STEP_S), 0.0, STEP_S]
+
+
+@pytest.mark.parametrize(("held_s", "deviations"), [(0.0, 2.5), (YOUNG_S, 1.5 + 1.0 / math.e), (5.0, 1.5)])
+def test_the_younger_a_mean_the_farther_it_must_be_from_a_tyre_that_does_not_slide(
+    held_s: float, deviations: float
+) -> None:
+    inputs, doubt = at_rest(0.3, 0.03, 0.0)[0]._replace(slip_noise=0.0, slip_doubt=1e-3), 1e-3
+    slides_below = place_of_mean(Steady(0.03, 0.2, 0.0, held_s), inputs, 50_000.0)[2]
+    assert slides_below == pytest.approx(elastic_friction(0.03 - deviations * doubt, inputs.load_n, 50_000.0))
+
+
+@pytest.mark.parametrize("rise", [1e-3, -1e-3])
+def test_a_mean_of_a_tyre_that_is_being_loaded_or_unloaded_proves_less(rise: float) -> None:
+    """Slip's way ahead of its own course counts as a deviation of that size."""
+    inputs = at_rest(0.3, 0.03, 0.0)[0]._replace(slip_noise=0.0, slip_doubt=0.0)
+    slides_below = place_of_mean(Steady(0.03, 0.2, rise, 5.0), inputs, 50_000.0)[2]
+    assert slides_below == pytest.approx(elastic_friction(0.03 - 1.5e-3, inputs.load_n, 50_000.0))
 
 
 def estimate_after(theta: float, slip: float, doubt: float, theta_img: float | None) -> float:
