@@ -12,12 +12,15 @@ from trpac_core.confidence import ConfidenceModel
 from trpac_core.dife import (
     GREATEST_THETA,
     LEAST_THETA,
+    NEVER_SEEN_M,
     OTHER_CLASS_M,
     SEEN_HOLD_M,
     FusionState,
     Gains,
     VisualTerm,
     Wheel,
+    dynamics_step,
+    fused_step,
     fusion_step,
     settled,
 )
@@ -69,10 +72,27 @@ def test_it_converges_on_the_roads_theta_from_anywhere_and_the_force_with_it(the
     assert step.tyre_force_n * WHEEL.radius_m == pytest.approx(inputs.wheel_torque_nm, rel=1e-3)
 
 
-def test_a_braked_wheel_is_seen_as_a_driven_one_is():
+@pytest.mark.parametrize("theta_img", [None, 0.2])
+def test_a_braked_wheel_is_seen_as_a_driven_one_is(theta_img):
     driven = on_road(0.3)
     braked = driven._replace(wheel_torque_nm=-driven.wheel_torque_nm, slip=Slip(driven.slip.size, -1.0))
-    assert run(braked, 0.6, 0.7)[0] == pytest.approx(run(driven, 0.6, 0.7)[0], abs=1e-12)
+    both = [run(inputs, 0.6, 0.7, theta_img=theta_img) for inputs in (braked, driven)]
+    assert both[0][0] == pytest.approx(both[1][0], abs=1e-9)
+    assert both[0][1].tyre_force_n == pytest.approx(-both[1][1].tyre_force_n)
+
+
+@pytest.mark.parametrize("theta_img", [None, 0.2])
+def test_an_estimate_on_its_way_leaves_the_observed_force_alone(theta_img):
+    """Last term of Eq. (15), from a road on which the tyre would not slide to one where it does."""
+    inputs = on_road(0.3)
+    state = settled(FusionState(1.1, 0.0), inputs, WHEEL, GAINS)
+    found = []
+    for _ in range(500):
+        step = stepped(state, inputs, theta_img=theta_img)
+        state = step.state
+        found.append(step.tyre_force_n)
+    assert state.theta_hat < 0.4
+    assert found == pytest.approx([inputs.wheel_torque_nm / WHEEL.radius_m] * 500, rel=3e-3)
 
 
 @pytest.mark.parametrize(("form", "rate"), [(VisualTerm.OUTSIDE, 1.0), (VisualTerm.INSIDE, 6.0)])
@@ -91,6 +111,20 @@ def test_the_camera_hurries_the_estimate_but_does_not_drag_it_off():
     assert np.all(with_camera[1:] < alone[1:])
     wrong = run(inputs, 0.3, 2.0, theta_img=0.8)[0]
     assert wrong == pytest.approx(0.3, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("theta", "start", "theta_img"), [(0.3, 0.6, 0.8), (0.3, 0.5, 0.8), (0.6, 0.45, 0.2)]
+)
+def test_a_class_on_the_other_side_of_the_estimate_than_the_tyre_does_nothing(theta, start, theta_img):
+    inputs = on_road(theta, slip=0.06)
+    assert np.all(run(inputs, start, 0.3, theta_img=theta_img)[0] == run(inputs, start, 0.3)[0])
+
+
+def test_a_class_beyond_what_the_tyre_shows_pulls_as_one_that_says_the_same():
+    inputs = on_road(0.5, slip=0.06)
+    beyond, same = (run(inputs, 0.8, 0.5, theta_img=theta_img)[0] for theta_img in (0.2, 0.5))
+    assert beyond == pytest.approx(same, abs=2e-3)
 
 
 def test_the_right_class_leaves_no_bias_of_its_own():
@@ -138,7 +172,8 @@ def test_a_wheel_that_rolls_freely_shows_no_ice(slip):
     assert visible_theta(0.0, inputs, WHEEL.longitudinal_stiffness_n) == (None, 0.0)
 
 
-def test_noise_at_the_elastic_end_is_not_taken_for_a_slippery_road():
+@pytest.mark.parametrize("known_as", ["slip_deviation", "slip_change"])
+def test_noise_at_the_elastic_end_is_not_taken_for_a_slippery_road(known_as):
     """On 0.9 at L > 1 force and slip lie on the elastic line; a slip read 5 % high looks like a sliding tyre."""
     truth = on_road(0.9, slip=0.016)
     misread = truth._replace(slip=Slip(0.016 * 1.05, 1.0))
@@ -146,7 +181,7 @@ def test_noise_at_the_elastic_end_is_not_taken_for_a_slippery_road():
     fooled, _ = visible_theta(force_n, misread, WHEEL.longitudinal_stiffness_n)
     assert fooled is not None
     assert fooled < 0.7
-    aware = misread._replace(slip_deviation=0.0008)
+    aware = misread._replace(**{known_as: 0.0008})
     assert visible_theta(force_n, aware, WHEEL.longitudinal_stiffness_n) == (None, 0.0)
 
 
@@ -155,6 +190,7 @@ def test_a_wrong_class_dry_does_not_keep_the_estimator_off_a_sliding_tyre():
     inputs = on_road(0.5, slip=0.0195)
     trace, step = run(inputs, 0.3, 2.0, theta_img=0.8)
     assert step.threshold > 0.0195
+    assert step.excited
     assert trace[-1] == pytest.approx(0.5, abs=2e-3)
 
 
@@ -205,6 +241,33 @@ def test_least_theta_never_exceeds_the_truth(theta, slip, deviation):
     assert least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n) <= theta + 1e-6
 
 
+def test_a_tyre_that_does_not_slide_allows_no_road_below_the_one_on_which_it_just_would():
+    inputs = on_road(0.9, slip=0.01)
+    force_n = inputs.wheel_torque_nm / WHEEL.radius_m
+    least = least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n)
+    assert least == pytest.approx(at_sliding_limit(1.0, 0.01))
+    assert least_theta(-force_n, inputs, WHEEL.longitudinal_stiffness_n) == 0.0
+
+
+def test_no_road_beyond_the_greatest_is_shown_or_asked_for():
+    for slip in (0.03, 0.08):
+        inputs = on_road(1.6, slip)
+        force_n = inputs.wheel_torque_nm / WHEEL.radius_m
+        assert visible_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n)[0] in (None, GREATEST_THETA)
+        assert least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n) <= GREATEST_THETA
+
+
+@given(st.floats(0.1, 1.0), st.floats(0.2, 0.9), st.floats(0.0, 0.001), st.floats(0.0, 0.001))
+def test_least_theta_does_not_even_where_slip_is_read_two_deviations_too_small(theta, share, noise, change):
+    slip = share * tyre.peak_slip(theta, LOAD_N, WHEEL.longitudinal_stiffness_n)
+    read = slip - 2.0 * (noise + change)
+    assume(read > 0.0)
+    inputs = on_road(theta, slip, noise, change)
+    misread = inputs._replace(slip=Slip(read, 1.0))
+    least = least_theta(inputs.wheel_torque_nm / WHEEL.radius_m, misread, WHEEL.longitudinal_stiffness_n)
+    assert least <= theta + 1e-6
+
+
 def test_the_camera_rests_for_a_way_after_the_tyre_was_seen():
     """Elastic again after it slid: a wrong class must not undo what the tyre just showed, but may speak later on."""
     elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
@@ -220,13 +283,14 @@ def test_the_camera_rests_for_a_way_after_the_tyre_was_seen():
     assert trace[-1] > 0.5
 
 
-def after_snow(theta_img, metres, flicker_every_m=None):
+def after_snow(theta_img, metres, flicker_every_m=None, flicker=0.2, rests=True):
     """The estimate, seen as 0.5 under the class snow, after a way on which it is not seen and a class is given."""
     elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
-    state = settled(FusionState(0.5, 0.0, 0.0, 0.2, 0.2, 0.0, True), elastic, WHEEL, GAINS)
+    unseen_m = 0.0 if rests else NEVER_SEEN_M
+    state = settled(FusionState(0.5, 0.0, unseen_m, 0.2, 0.2, 0.0, rests), elastic, WHEEL, GAINS)
     for k in range(round(metres / elastic.way_m)):
-        back = flicker_every_m is not None and k % round(flicker_every_m / elastic.way_m) == 0
-        state = stepped(state, elastic, theta_img=0.2 if back else theta_img).state
+        other = flicker_every_m is not None and k % round(flicker_every_m / elastic.way_m) == 0
+        state = stepped(state, elastic, theta_img=flicker if other else theta_img).state
     return state.theta_hat
 
 
@@ -242,6 +306,27 @@ def test_a_class_that_flickers_or_stays_does_not_end_the_rest():
     assert after_snow(0.2, 100.0) == 0.5
 
 
+def test_classes_that_take_turns_do_not_stand_together():
+    assert after_snow(0.8, 20.0, flicker_every_m=OTHER_CLASS_M - 0.1, flicker=0.6) == 0.5
+
+
+def test_once_the_tyre_was_seen_a_class_speaks_after_it_has_stood():
+    """Also on the road of another class than that under which the tyre was seen."""
+    assert after_snow(0.8, OTHER_CLASS_M - 0.05, rests=False) == 0.5
+    assert after_snow(0.8, OTHER_CLASS_M + 0.3, rests=False) > 0.5
+
+
+def test_a_class_under_which_the_tyre_was_seen_says_nothing_more():
+    sliding = on_road(0.5, slip=0.06)._replace(way_m=0.01)
+    elastic = on_road(0.9, slip=0.0235, deviation=1e-4)._replace(way_m=0.01)
+    state = run(sliding, 0.5, 0.1, theta_img=0.8)[1].state
+    seen = state.theta_hat
+    for _ in range(1000):
+        state = stepped(state, elastic, theta_img=0.8).state
+    assert state.unseen_m > 4.0 * SEEN_HOLD_M
+    assert state.theta_hat == seen
+
+
 def test_a_sure_estimate_leaves_less_of_the_difference_to_the_class():
     """Not seen, and 0.3 from the class: half of that or less is within K_v's dead zone."""
     elastic = on_road(0.9, slip=0.0235, deviation=1e-4)
@@ -251,6 +336,15 @@ def test_a_sure_estimate_leaves_less_of_the_difference_to_the_class():
     K_v = [fusion_step(*given, ConfidenceModel(), std * std).K_v for std in (0.05, 0.2, 0.5)]
     assert K_v[0] == 0.0
     assert 0.0 < K_v[1] < K_v[2] == pytest.approx(fusion_step(*given).K_v)
+
+
+def test_beside_a_tyre_that_is_seen_a_class_hurries_a_sure_estimate_as_any():
+    """How sure the estimate is weighs a class that speaks alone."""
+    sliding = on_road(0.3)
+    look = look_at(sliding, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+    given = (settled(FusionState(0.8, 0.0), sliding, WHEEL, GAINS), sliding, look, WHEEL, GAINS, SCHEDULER)
+    sure = fusion_step(*given, 0.2, STEP_S, ConfidenceModel(), 1e-4)
+    assert sure.K_v == fusion_step(*given, 0.2, STEP_S).K_v == pytest.approx(SCHEDULER.K_v(0.5), rel=1e-3)
 
 
 def test_a_locked_wheel_moves_neither_estimate_nor_force():
@@ -280,6 +374,19 @@ def noisy_course(rng, steps=400):
             noisy._replace(way_m=0.01, torque_known=k % 150 < 140, slip_noise=1e-4, slip_doubt=1e-4),
             theta_img,
         )
+
+
+def test_without_a_camera_the_fusion_is_the_dynamics_estimator():
+    fused, unseen_m = FusionState(0.8, 0.0), []
+    alone = fused
+    for inputs, _ in noisy_course(np.random.default_rng(5)):
+        look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+        fused, *said = fused_step(fused, inputs, look, WHEEL, GAINS, SCHEDULER, None, STEP_S)
+        alone, *expected = dynamics_step(alone, inputs, look, WHEEL, GAINS, STEP_S)
+        assert (fused, said) == (alone, expected)
+        unseen_m.append(alone.unseen_m)
+    assert min(unseen_m) == 0.0
+    assert 0.3 < max(unseen_m[100:]) < 4.0
 
 
 @pytest.mark.parametrize("tyre_first", [True, False])

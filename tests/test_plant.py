@@ -407,6 +407,7 @@ def test_step_by_step_is_the_same_motion_bit_for_bit(car):
     state = initial_state(car, road, initial_position_m=-TO_FRONT_M)
     for k in range(1, len(torque)):
         state = advance(state, torque[k], 1e-3)
+        assert state.time_s == pytest.approx(whole.time_s[k])
         assert state.position_m == whole.position_m[k]
         assert state.speed_m_s == whole.speed_m_s[k]
         assert state.accel_x_m_s2 == whole.accel_x_m_s2[k]
@@ -541,6 +542,14 @@ def test_log_has_the_contracts_columns_and_the_curves_maximum(paper):
         found = log["mu_reference"][run.theta[:, 0] == theta]
         assert found.to_numpy() == pytest.approx(peak, abs=1e-4)
         assert peak > 1.02 * theta
+
+
+def test_reference_on_split_friction_is_the_mean_of_the_front_wheels_maxima():
+    run = simulate(NOMINAL, make_road((0.0, 0.3, 0.9), (2.0, 0.5, 0.5)), constant(0.0, 0.5), 1e-3, 5.0, -1.0)
+    left, right, both = (tyre.peak_friction(theta, 3411.48, 5e4) for theta in (0.3, 0.9, 0.5))
+    front = run.position_m + TO_FRONT_M
+    expected = np.where(front < 2.0, 0.5 * (left + right), both)
+    assert make_log(run, NOMINAL)["mu_reference"].to_numpy() == pytest.approx(expected, abs=1e-4)
 
 
 def test_noise_has_the_stated_size_and_repeats_with_its_seed(paper):

@@ -7,7 +7,7 @@ import pytest
 
 from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
 from trpac_core.excitation import FuzzyScheduler
-from trpac_core.sight import WheelInputs, backed_theta, look_at, place_of_mean, shown
+from trpac_core.sight import YOUNG_S, WheelInputs, backed_theta, look_at, place_of_mean, shown
 from trpac_core.slip import Slip
 from trpac_core.steady import (
     ELSEWHERE,
@@ -20,7 +20,7 @@ from trpac_core.steady import (
     quickened,
     unsettled,
 )
-from trpac_core.tyre import force
+from trpac_core.tyre import elastic_friction, force
 
 STEP_S, TAU_S, NOISE = 1e-3, 0.01, 1e-4
 WHEEL, SCHEDULER, GAINS = Wheel(1.2, 0.29, 50_000.0), FuzzyScheduler(), Gains()
@@ -112,6 +112,56 @@ def test_time_shows_what_one_reading_hides_and_doubt_still_hides_it() -> None:
     assert 0.0 < found < 0.2
     assert shown_after(0.18, 0.0068, 5e-4) is None
     assert shown_after(0.9, 0.0068, 3e-5) is None
+
+
+def test_the_estimate_follows_a_mean_that_has_been_held_at_twice_gamma() -> None:
+    inputs, state = at_rest(0.3, 0.03, 0.0)
+    look, errors = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER), []
+    for _ in range(100):
+        state = fusion_step(state, inputs, look, WHEEL, GAINS, SCHEDULER, None, STEP_S).state
+        errors.append(state.theta_hat - 0.3)
+    assert errors[99] / errors[49] == pytest.approx(math.exp(-2.0 * GAINS.gamma * 0.05), rel=0.05)
+
+
+def test_a_class_hurries_an_estimate_that_follows_a_mean_and_leaves_it_on_the_tyres() -> None:
+    inputs, alone = at_rest(0.4, 0.03, 0.0)
+    look, fused = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER), alone
+    for step in range(300):
+        alone, fused = (
+            fusion_step(state, inputs, look, WHEEL, GAINS, SCHEDULER, theta_img, STEP_S).state
+            for state, theta_img in ((alone, None), (fused, 0.2))
+        )
+        assert 0.4 - 1e-3 < fused.theta_hat <= alone.theta_hat
+        if step == 50:
+            assert fused.theta_hat < alone.theta_hat - 3e-3
+
+
+def test_a_wheel_that_rolled_freely_in_between_begins_a_new_mean() -> None:
+    inputs, state = at_rest(0.3, 0.03, 0.0)
+    rolling = inputs._replace(wheel_torque_nm=0.0, slip=Slip(0.0, 0.0))
+    held_s = []
+    for now in (*[inputs] * 50, rolling, inputs):
+        look = look_at(now, WHEEL.longitudinal_stiffness_n, SCHEDULER)
+        state = fusion_step(state, now, look, WHEEL, GAINS, SCHEDULER, None, STEP_S).state
+        held_s.append(state.steady.held_s)
+    assert held_s[-3:] == [pytest.approx(50 * STEP_S), 0.0, STEP_S]
+
+
+@pytest.mark.parametrize(("held_s", "deviations"), [(0.0, 2.5), (YOUNG_S, 1.5 + 1.0 / math.e), (5.0, 1.5)])
+def test_the_younger_a_mean_the_farther_it_must_be_from_a_tyre_that_does_not_slide(
+    held_s: float, deviations: float
+) -> None:
+    inputs, doubt = at_rest(0.3, 0.03, 0.0)[0]._replace(slip_noise=0.0, slip_doubt=1e-3), 1e-3
+    slides_below = place_of_mean(Steady(0.03, 0.2, 0.0, held_s), inputs, 50_000.0)[2]
+    assert slides_below == pytest.approx(elastic_friction(0.03 - deviations * doubt, inputs.load_n, 50_000.0))
+
+
+@pytest.mark.parametrize("rise", [1e-3, -1e-3])
+def test_a_mean_of_a_tyre_that_is_being_loaded_or_unloaded_proves_less(rise: float) -> None:
+    """Slip's way ahead of its own course counts as a deviation of that size."""
+    inputs = at_rest(0.3, 0.03, 0.0)[0]._replace(slip_noise=0.0, slip_doubt=0.0)
+    slides_below = place_of_mean(Steady(0.03, 0.2, rise, 5.0), inputs, 50_000.0)[2]
+    assert slides_below == pytest.approx(elastic_friction(0.03 - 1.5e-3, inputs.load_n, 50_000.0))
 
 
 def estimate_after(theta: float, slip: float, doubt: float, theta_img: float | None) -> float:
