@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import scenarios.effects as effects_module
-from scenarios.effects import EFFECTS, FORMS, Effect, catalogue, make_effect
+from scenarios.effects import EFFECTS, FORMS, ORDER, Effect, catalogue, make_effect
 from scenarios.effects.base import Stage, Subsystem, parameter
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
@@ -107,6 +107,16 @@ def test_each_effect_describes_itself(effect_id):
         assert p.meaning
         low, high = p.bounds(NOMINAL)
         assert low <= p.neutral_value(NOMINAL) <= high
+
+
+def test_every_file_that_defines_an_effect_is_listed_once_and_has_its_id():
+    folder = Path(effects_module.__file__).parent
+    defining = {path.stem for path in folder.glob("*.py") if "(Effect):" in path.read_text(encoding="utf-8")}
+    assert sorted(ORDER) == sorted(defining)
+    for key, forms in FORMS.items():
+        assert {form.id for form in forms} == {key}
+        assert EFFECTS[key] is forms[0]
+        assert len({form.form for form in forms}) == len(forms)
 
 
 def test_every_id_of_the_contract_is_there():

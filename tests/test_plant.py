@@ -21,7 +21,17 @@ from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, SensorNoise, VehicleFile, load_scenario, load_vehicle
 from scenarios.plant import advance, drive, dynamics, initial_state, make_log, simulate, write_log
 from scenarios.plant.dynamics import FLOOR_SPEED_M_S, tyre_force
-from scenarios.plant.parameters import FORCE, MOTOR, POSITION, SPEED, TWIST, WHEEL
+from scenarios.plant.parameters import (
+    FORCE,
+    MOTOR,
+    PER_WHEEL,
+    POSITION,
+    SPEED,
+    TWIST,
+    VALUES,
+    WHEEL,
+    DynamicsParameters,
+)
 from scenarios.plant.pipeline import make_setup
 from trpac_core import tyre
 
@@ -276,6 +286,35 @@ def test_shafts_that_are_unlike_agree_with_the_independent_solver(effect, shares
     assert error[WHEEL:FORCE].max() < 6e-3
     assert error[TWIST:MOTOR].max() < 1e-3
     assert error[MOTOR:].max() < 2e-2
+
+
+PER_WHEEL_FIELDS = DynamicsParameters._fields[:PER_WHEEL]
+
+
+@pytest.mark.parametrize("wheel", range(4))
+@pytest.mark.parametrize(
+    "field", [name for name in PER_WHEEL_FIELDS if not name.startswith(("relax", "shaft"))]
+)
+def test_a_value_of_one_wheel_acts_on_that_wheel(field, wheel):
+    setup = make_setup(NOMINAL, DRY)
+    values = list(getattr(setup.parameters, field))
+    values[wheel] = 1.3 * values[wheel] if values[wheel] else {"drag_torque_nm": 40.0}.get(field, 0.04)
+    runs = []
+    for p in (setup.parameters, setup.parameters._replace(**{field: tuple(values)})):
+        y = dynamics.initial_y(5.0, 0.0, setup.parameters)
+        runs.append(dynamics.run(y, constant(100.0, 0.05), 1e-3, p, setup.road)[2])
+    apart = np.abs(runs[1] - runs[0]).max(axis=0)
+    assert apart[wheel] > 10.0 * np.delete(apart, wheel).max()
+
+
+def test_a_car_between_two_is_between_them_in_every_value_of_every_wheel():
+    p = make_setup(with_effects(**EVERYTHING), DRY).parameters
+    rows = np.array([p.as_row(), np.arange(float(VALUES))])
+    assert dynamics._car_between(rows, np.array([0.0])) == p
+    other = dynamics._car_between(rows, np.array([1.0]))
+    assert other.as_row() == pytest.approx(np.arange(VALUES), abs=1e-9)
+    assert other.longitudinal_stiffness_n == pytest.approx((12.0, 13.0, 14.0, 15.0))
+    assert p.as_compiled() == p
 
 
 def test_standing_start_follows_the_closed_form():

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from scenarios.effects.frames import Frames
 
 if TYPE_CHECKING:
-    from scenarios.plant.dynamics import DynamicsParameters, RoadTable
-    from scenarios.plant.parameters import PerWheel
+    from scenarios.plant.parameters import DynamicsParameters, PerWheel, RoadTable
     from trpac_core.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -44,7 +43,7 @@ Values = tuple[float, ...] | Callable[["Vehicle"], tuple[float, ...]]
 """Numbers, or what they are for a given vehicle."""
 
 LEAST_OFF = 0.25
-"""Share of the mean offset that each wheel's own is at least: where one is nearly right, not all wheels are off [-]."""
+"""Least offset of each wheel, over the mean offset of the four, with which all wheels count as off [-]."""
 
 
 @dataclass(frozen=True)
@@ -89,20 +88,20 @@ def parameter(
 ) -> Any:
     """Declare one effect parameter; values outside [low, high] are refused, fits begin at `starts`.
 
-    `open_share` of it no log can tell, since it stands beside a constant that others may take otherwise; where it is
-    infinite nothing is told but the bounds.
+    `open_share` is the relative error that no log can show, because the value is only known as a product with a
+    constant that others may take otherwise [-]; infinite: a log shows nothing but the bounds.
     """
     about = {"unit": unit, "meaning": meaning, "neutral": neutral, "low": low, "high": high, "starts": starts}
     return field(metadata=about | {"open_share": open_share})
 
 
 def share_of_axles(start: float, most: float) -> Any:
-    """Declare how unlike the axles are, of an effect whose other parameter is the mean of all wheels."""
+    """Declare the parameter `unlike` of `of_each_wheel`, beside a parameter that is the mean of all wheels."""
     return _share_of_mean("the front axle has more and the rear less", start, most)
 
 
 def share_of_sides(axle: str, start: float, most: float) -> Any:
-    """Declare how unlike the two wheels of an axle are, "front" or "rear", as `share_of_axles` does for axles."""
+    """Declare the parameter `front_sides` or `rear_sides` of `of_each_wheel`, for the axle "front" or "rear"."""
     return _share_of_mean(f"the {axle} left wheel has more and the {axle} right one less", start, most)
 
 
@@ -132,7 +131,7 @@ def mean_of_wheels(values: PerWheel) -> float:
 
 
 def all_are_off(values: PerWheel, nominal: float) -> bool:
-    """Whether all wheels are off to the same side; of a single wrong wheel nobody says that the car's are others."""
+    """Whether each wheel is off in the direction of the mean offset, by `LEAST_OFF` of it or more."""
     off = np.array(values) - nominal
     return bool(np.all(off * np.sign(off.mean()) >= LEAST_OFF * abs(off.mean())))
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles
 
 if TYPE_CHECKING:
-    from scenarios.plant.dynamics import DynamicsParameters
-    from scenarios.plant.parameters import PerWheel
+    from scenarios.plant.parameters import DynamicsParameters, PerWheel
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from scenarios.effects.base import (
 )
 
 if TYPE_CHECKING:
-    from scenarios.plant.dynamics import DynamicsParameters
-    from scenarios.plant.parameters import PerWheel
+    from scenarios.plant.parameters import DynamicsParameters, PerWheel
 
 LARGEST_MOTOR_SHARE = 0.8
 """Of a wheel's inertia, the lighter axle's, that may be the motor's: the wheel itself keeps the rest [-]."""

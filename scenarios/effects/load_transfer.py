@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from scenarios.effects.base import Effect, parameter
 
 if TYPE_CHECKING:
-    from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from scenarios.effects.base import Effect, parameter
 
 if TYPE_CHECKING:
-    from scenarios.plant.dynamics import RoadTable
+    from scenarios.plant.parameters import RoadTable
     from trpac_core.vehicle import Vehicle
 
 LEAST_SPLIT = 0.01

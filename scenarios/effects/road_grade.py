@@ -10,7 +10,7 @@ from scenarios.effects.base import Effect, parameter
 from trpac_core.vehicle import GRAVITY_M_S2
 
 if TYPE_CHECKING:
-    from scenarios.plant.dynamics import DynamicsParameters
+    from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from scenarios.effects.base import (
 )
 
 if TYPE_CHECKING:
-    from scenarios.plant.dynamics import DynamicsParameters
-    from scenarios.plant.parameters import PerWheel
+    from scenarios.plant.parameters import DynamicsParameters, PerWheel
     from trpac_core.vehicle import Vehicle
 
 

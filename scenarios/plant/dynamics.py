@@ -18,6 +18,12 @@ it calls into. Its order: tyre, road, wheel and vehicle, driveline, linear equat
 References
 ----------
 .. [1] Tian et al. (2022), Remote Sensing 14, 5583, doi:10.3390/rs14215583.
+.. [2] Bian et al. (2014), SAE 2014-01-0123.
+.. [3] Pacejka (2012), Tire and Vehicle Dynamics.
+.. [4] Canudas de Wit et al. (2003), Vehicle System Dynamics 39, doi:10.1076/vesd.39.3.189.14152.
+.. [5] Gillespie (1992), Fundamentals of Vehicle Dynamics.
+.. [6] Kiencke and Nielsen (2005), Automotive Control Systems.
+.. [7] Verwer, Spee, Blom, Hundsdorfer (1999), SIAM J. Sci. Comput. 20.
 """
 
 from __future__ import annotations
@@ -44,23 +50,6 @@ from scenarios.plant.parameters import (
     RoadTable,
     Wheels,
 )
-
-__all__ = [
-    "DynamicsParameters",
-    "RoadTable",
-    "Wheels",
-    "advance",
-    "by_formula",
-    "forces",
-    "initial_y",
-    "look_up_theta",
-    "new_wheels",
-    "peak_force",
-    "refresh",
-    "reshaped",
-    "run",
-    "tyre_force",
-]
 
 FLOOR_SPEED_M_S = 0.01
 """Least speed that slip is taken relative to: at standstill slip is 0 and not 0/0 [m/s]."""
@@ -131,7 +120,7 @@ def falling_shape(theta: float, slip: float) -> tuple[float, float]:
 
 @inlined
 def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> tuple[float, float, float]:
-    """Modified Dugoff force without side slip, and its slopes.
+    """Modified Dugoff force without side slip [2]_, coefficients as in docs/plant.md, and its slopes.
 
     Parameters
     ----------
@@ -144,10 +133,6 @@ def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> 
     -------
     tuple
         Unsigned force [N], its derivative by slip [N], and by load [-].
-
-    References
-    ----------
-    .. [1] Bian et al. (2014), SAE 2014-01-0123; coefficients as in docs/plant.md.
     """
     shape, shape_by_slip = falling_shape(theta, slip)
     grip_n = theta * load_n
@@ -227,11 +212,7 @@ def by_formula(
 ) -> tuple[float, float, float]:
     """Weighted mean of a tyre's force, and slopes, with a magic formula of the same initial slope and peak.
 
-    The formula is D sin(C arctan(B lambda - E (B lambda - arctan B lambda))), Eq. (4.49) in [1]_, without its shifts.
-
-    References
-    ----------
-    .. [1] Pacejka (2012), Tire and Vehicle Dynamics.
+    The formula is D sin(C arctan(B lambda - E (B lambda - arctan B lambda))), Eq. (4.49) in [3]_, without its shifts.
     """
     force, by_slip, by_load = tyre
     peak_n, peak_by_load = peak_force(theta, load_n, stiffness_n)
@@ -254,18 +235,19 @@ def by_formula(
 
 
 @inlined
+def _mean_of_wheels(values: PerWheel) -> float:
+    """The compiled form of `scenarios.effects.base.mean_of_wheels`."""
+    return 0.25 * ((values[0] + values[1]) + (values[2] + values[3]))
+
+
+@inlined
 def steady_tyre(
-    theta: float,
-    slip: float,
-    load_n: float,
-    stiffness_n: float,
-    mean_stiffness_n: float,
-    p: DynamicsParameters,
+    theta: float, slip: float, load_n: float, stiffness_n: float, p: DynamicsParameters
 ) -> tuple[float, float, float]:
     """Steady force of a tyre as the parameters want its curve, and its slopes; arguments and units as `tyre_force`."""
     tyre = tyre_force(theta, slip, load_n, stiffness_n)
     if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
-        tyre = reshaped(tyre, theta, slip, load_n, mean_stiffness_n, p)
+        tyre = reshaped(tyre, theta, slip, load_n, _mean_of_wheels(p.longitudinal_stiffness_n), p)
     if p.formula_share != 0.0:
         tyre = by_formula(tyre, theta, slip, load_n, stiffness_n, p)
     return tyre
@@ -273,12 +255,7 @@ def steady_tyre(
 
 @inlined
 def adhesion_left(sliding_m_s: float, p: DynamicsParameters) -> float:
-    """Share of the adhesion that a tyre has at a sliding speed [-]: exponential after [1]_, or hyperbolic.
-
-    References
-    ----------
-    .. [1] Canudas de Wit et al. (2003), Vehicle System Dynamics 39, doi:10.1076/vesd.39.3.189.14152.
-    """
+    """Share of the adhesion that a tyre has at a sliding speed [-]: exponential after [4]_, or hyperbolic."""
     if p.falloff_s_m <= 0.0:
         return 1.0
     fallen = p.falloff_s_m * sliding_m_s
@@ -290,22 +267,9 @@ def adhesion_left(sliding_m_s: float, p: DynamicsParameters) -> float:
 def relaxation_length(
     i: int, more_load: float, slope_n: float, stiffness_n: float, p: DynamicsParameters
 ) -> float:
-    """Relaxation length of a wheel's tyre [m], ch. 7 of [1]_.
+    """Relaxation length of the tyre of wheel i [m], ch. 7 of [3]_.
 
-    Parameters
-    ----------
-    i : int
-        The wheel.
-    more_load : float
-        Load over the mean static one, less 1 [-].
-    slope_n, stiffness_n : float
-        Slope of the steady force by slip here, and C_x [N].
-    p : DynamicsParameters
-        relaxation_m and what it goes with.
-
-    References
-    ----------
-    .. [1] Pacejka (2012), Tire and Vehicle Dynamics.
+    more_load is the load over the mean static load less 1 [-], slope_n the slope of the steady force by slip [N].
     """
     gone = p.relaxation_by_slope * max(1.0 - slope_n / (INITIAL_SLOPE * stiffness_n), 0.0)
     return p.relaxation_m[i] * max((1.0 + p.relaxation_by_load * more_load) * (1.0 - gone), LEAST_RELAXATION)
@@ -348,21 +312,9 @@ def new_wheels() -> tuple[Wheels, Wheels]:
 
 
 @inlined
-def _mean_of_wheels(values: PerWheel) -> float:
-    """The compiled form of `scenarios.effects.base.mean_of_wheels`."""
-    return 0.25 * ((values[0] + values[1]) + (values[2] + values[3]))
-
-
-@inlined
 def _relaxes(p: DynamicsParameters) -> bool:
     """Whether tyre forces or slips are states."""
     return p.relaxation_m[0] > 0.0
-
-
-@inlined
-def _has_shafts(p: DynamicsParameters) -> bool:
-    """Whether shaft twists and motor speeds are states."""
-    return p.motor_inertia_kg_m2 > 0.0
 
 
 @compiled
@@ -379,7 +331,7 @@ def initial_y(speed_m_s: float, position_m: float, p: DynamicsParameters) -> NDA
 
 @inlined
 def slip_of(rim_m_s: float, speed_m_s: float) -> tuple[float, float]:
-    """Unsigned slip of a wheel [-], Eq. (13) in Tian et al. with a floor, and the speed it is relative to [m/s]."""
+    """Unsigned slip of a wheel [-], Eq. (13) in [1]_ with a floor, and the speed it is relative to [m/s]."""
     reference_m_s = max(rim_m_s, speed_m_s, FLOOR_SPEED_M_S)
     return abs(rim_m_s - speed_m_s) / reference_m_s, reference_m_s
 
@@ -388,11 +340,7 @@ def slip_of(rim_m_s: float, speed_m_s: float) -> tuple[float, float]:
 def static_loads(p: DynamicsParameters) -> tuple[float, float, float]:
     """Load of a front and of a rear wheel without acceleration [N], and what moves per acceleration [kg].
 
-    F_z,front = m (g l_r - a h) / (2 L), F_z,rear = m (g l_f + a h) / (2 L); ch. 1 of [1]_.
-
-    References
-    ----------
-    .. [1] Gillespie (1992), Fundamentals of Vehicle Dynamics.
+    F_z,front = m (g l_r - a h) / (2 L), F_z,rear = m (g l_f + a h) / (2 L); ch. 1 of [5]_.
     """
     half_base = 0.5 / (p.cog_to_front_axle_m + p.cog_to_rear_axle_m)
     front_n = p.mass_kg * p.gravity_m_s2 * p.cog_to_rear_axle_m * half_base
@@ -404,11 +352,7 @@ def static_loads(p: DynamicsParameters) -> tuple[float, float, float]:
 def body_resistance(speed_m_s: float, tyres_n: float, p: DynamicsParameters) -> tuple[float, float]:
     """Air drag and rolling resistance on the body [N]; the latter holds a standing car and never pushes it back.
 
-    F = 0.5 rho C_d A v^2 + c_hub m g; ch. 4 of [1]_.
-
-    References
-    ----------
-    .. [1] Gillespie (1992), Fundamentals of Vehicle Dynamics.
+    F = 0.5 rho C_d A v^2 + c_hub m g; ch. 4 of [5]_.
     """
     most_n = p.hub_resistance * p.mass_kg * p.gravity_m_s2
     holding_n = min(most_n, max(tyres_n - p.mass_kg * p.slope_m_s2, 0.0))
@@ -424,7 +368,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
     speed = max(y[SPEED], 0.0)
     front_n, rear_n, transfer_kg = static_loads(p)
     per_mean = 4.0 / (p.mass_kg * p.gravity_m_s2)
-    mean_stiffness_n = _mean_of_wheels(p.longitudinal_stiffness_n)
+    least_slope_n = LEAST_SLOPE * _mean_of_wheels(p.longitudinal_stiffness_n)
     relaxes = _relaxes(p)
     slip_lags = relaxes and p.slip_lags > 0.0
     for _ in range(8):
@@ -432,7 +376,8 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
         total_n = 0.0
         total_by_accel = 0.0
         for i in range(4):
-            rim = max(y[WHEEL + i], 0.0) * p.wheel_radius_m[i]
+            radius_m = p.wheel_radius_m[i]
+            rim = max(y[WHEEL + i], 0.0) * radius_m
             slip, scale = slip_of(rim, speed)
             load_n = max(front_n - shift_n, 0.0) if i < 2 else max(rear_n + shift_n, 0.0)
             more_load = load_n * per_mean - 1.0
@@ -443,9 +388,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
             softening = max(1.0 + p.stiffness_by_load * more_load, LEAST_STIFFNESS)
             stiffness_n = p.longitudinal_stiffness_n[i] * softening
-            force, by_slip, by_load = steady_tyre(
-                theta, abs(acting), load_n, stiffness_n, mean_stiffness_n, p
-            )
+            force, by_slip, by_load = steady_tyre(theta, abs(acting), load_n, stiffness_n, p)
             force, by_load = np.copysign(force, acting), np.copysign(by_load, acting)
             # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
             slope = max(by_slip, 0.0)
@@ -455,7 +398,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
                 wheels.work[_LAG, i] = (max(scale, RELEASE_SPEED_M_S) if releases else scale) / length_m
                 wheels.work[_PER_STATE, i] = 1.0
             if slip_lags:
-                slope = wheels.work[_PER_STATE, i] = max(slope, LEAST_SLOPE * mean_stiffness_n)
+                slope = wheels.work[_PER_STATE, i] = max(slope, least_slope_n)
             if relaxes and not slip_lags:
                 wheels.work[_STEADY, i] = force
                 wheels.force_n[i] = y[FORCE + i]
@@ -466,9 +409,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             wheels.load_n[i] = load_n
             wheels.slip[i] = slip
             slope /= scale
-            wheels.work[_SLOPE_WHEEL, i] = (
-                slope * p.wheel_radius_m[i] * (speed / rim if rim == scale else 1.0)
-            )
+            wheels.work[_SLOPE_WHEEL, i] = slope * radius_m * (speed / rim if rim == scale else 1.0)
             wheels.work[_SLOPE_SPEED, i] = -slope * (rim / speed if speed == scale else 1.0)
         drag_n, hub_n = body_resistance(speed, total_n, p)
         error = (total_n - drag_n - hub_n) / p.mass_kg - accel
@@ -488,7 +429,7 @@ def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, fi
 
 @inlined
 def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParameters, wheels: Wheels) -> float:
-    """Acceleration of a wheel [rad/s^2], Eq. (12) in Tian et al. with resistances; they hold a wheel at rest."""
+    """Acceleration of a wheel [rad/s^2], Eq. (12) in [1]_ with resistances; they hold a wheel at rest."""
     resistance_n = wheels.force_n[i] + p.rolling_coefficient[i] * wheels.load_n[i]
     inertia = p.wheel_inertia_kg_m2[i] - p.motor_inertia_kg_m2
     rate = (torque_nm - resistance_n * p.lever_m[i] - p.drag_torque_nm[i]) / inertia
@@ -517,7 +458,7 @@ def _fill_rates(
     total_n = 0.0
     for i in range(4):
         torque = torque_nm[i] + (next_nm[i] - torque_nm[i]) * part
-        if _has_shafts(p):
+        if p.motor_inertia_kg_m2 > 0.0:
             spread = y[MOTOR + i] - y[WHEEL + i]
             shaft_nm = p.shaft_stiffness_nm_rad[i] * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
             motor_nm, wheels.work[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
@@ -537,7 +478,7 @@ def _fill_rates(
 
 @inlined
 def _shaft(i: int, gh: float, p: DynamicsParameters) -> tuple[float, float]:
-    """Torque of a shaft within gh [s] per speed difference: by its twist, and with damping [N m s/rad]."""
+    """Torque of a shaft [6]_ within gh [s] per speed difference: by its twist, and with damping [N m s/rad]."""
     stiffness = gh * p.shaft_stiffness_nm_rad[i]
     return stiffness, gh * (stiffness + p.shaft_damping_nm_s_rad)
 
@@ -554,7 +495,7 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
     at = wheels.work
     for i in range(4):
         inertia = p.wheel_inertia_kg_m2[i]
-        if _has_shafts(p):
+        if p.motor_inertia_kg_m2 > 0.0:
             _, shaft = _shaft(i, gh, p)
             motor = at[_MOTOR, i] = p.motor_inertia_kg_m2 + gh * at[_BRAKE, i]
             inertia = inertia - p.motor_inertia_kg_m2 + motor / (motor + shaft) * shaft
@@ -576,7 +517,7 @@ def _solve(
     """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; return the vehicle speed's part."""
     gh = _GAMMA * h
     at = wheels.work
-    has_shaft = _has_shafts(p)
+    has_shaft = p.motor_inertia_kg_m2 > 0.0
     rhs = speed_rhs
     for i in range(4):
         stiffness, shaft = _shaft(i, gh, p)
@@ -610,7 +551,7 @@ def _solve(
 @inlined
 def _states(p: DynamicsParameters) -> int:
     """How many entries of y are in use."""
-    return STATES if _relaxes(p) or _has_shafts(p) else FORCE
+    return STATES if _relaxes(p) or p.motor_inertia_kg_m2 > 0.0 else FORCE
 
 
 @inlined
@@ -627,7 +568,7 @@ def _try_step(
     first: Wheels,
     second: Wheels,
 ) -> tuple[float, float]:
-    """One two-stage Rosenbrock (ROS2) step from y to trial; return error estimate [m/s], accelerometer."""
+    """One two-stage Rosenbrock step, ROS2 of [7]_, from y to trial; return error estimate [m/s], accelerometer."""
     count = _states(p) - WHEEL
     k_1, k_2 = first.rates, second.rates
     _fill_rates(y, torque_nm, next_torque_nm, begin, p, first)
@@ -649,7 +590,7 @@ def _try_step(
     for i in range(4):
         error = max(error, radius_m * abs(k_1[i] + k_2[i]))
         trial[WHEEL + i] = max(trial[WHEEL + i], 0.0)
-        if _has_shafts(p):
+        if p.motor_inertia_kg_m2 > 0.0:
             motor = MOTOR - WHEEL + i
             error = max(error, radius_m * abs(k_1[motor] + k_2[motor]))
     trial[POSITION] = y[POSITION] + 0.5 * h * (y[SPEED] + trial[SPEED])

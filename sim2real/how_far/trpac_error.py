@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenarios.effects import Effect
 from scenarios.effects.base import mean_of_wheels
 from scenarios.files import VehicleFile
-from scenarios.plant.dynamics import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
 from sim2real.observing.noise import read_noise
 from sim2real.observing.observer import Prediction, Simulation

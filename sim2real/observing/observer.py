@@ -19,7 +19,7 @@ from scenarios.effects.base import mean_of_wheels
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant import dynamics
-from scenarios.plant.dynamics import DynamicsParameters, RoadTable
+from scenarios.plant.parameters import DynamicsParameters, RoadTable
 from scenarios.plant.pipeline import make_setup
 from sim2real.observing.drive import ACCEL, CHANNELS, Drive
 from sim2real.observing.lattice import SmoothCounter
