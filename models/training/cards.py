@@ -16,11 +16,11 @@ from trpac_core.vision.scene import NUMBERS, SceneHead
 from .data import Picture
 from .patches import CAMERA_SPREAD, RENDERED_SPREAD
 from .rendered import FIRST_SCENE_WORLD, SEED_RANGES, STREETS
-from .scores import ClassScore, wilson_interval
+from .scores import ClassScore, Judged, wilson_interval
 
 if TYPE_CHECKING:
     from .calibrate import Reliability
-    from .outcomes import Judged, Outcome, Stage
+    from .outcomes import Outcome, Stage
     from .train_segmenter import SegmentationScore
 
 CLASSES = [surface.label for surface in Surface]

@@ -39,11 +39,3 @@ class Outcome:
     picture_scores: dict[str, ClassScore]
     patch_scores: dict[str, ClassScore]
     readings: dict[str, float]
-
-
-@dataclass(frozen=True)
-class Judged:
-    """Scores of a set, patches alone and in their scenes."""
-
-    alone: ClassScore
-    in_scene: ClassScore

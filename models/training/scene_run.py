@@ -24,7 +24,6 @@ from .annotate import annotate, sha256_of
 from .cards import SCENE_BEGIN, SCENE_END
 from .data import Picture, judged_groups, trained_on
 from .keeping import kept_or_made
-from .outcomes import Judged
 from .patches import draw_weights, judged_patches, thinned, training_patches
 from .rendered import (
     FIRST_SCENE_WORLD,
@@ -51,7 +50,7 @@ Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 def ship_scene(
     file: Path, given: argparse.Namespace, pictures: Sequence[Picture], worlds: dict[str, int], steps: Steps
-) -> dict[str, Judged]:
+) -> dict[str, scores.Judged]:
     """Learn the scene's head of a network file, calibrate it anew, and write both into the file and its card."""
     alone = patches_alone(file, given.threads)
     train = gather(given, pictures, steps)
@@ -199,9 +198,9 @@ def with_section(card: str, section: str, sha256: str, temperature: float) -> st
     return re.sub(r"(Metadata: `temperature` = )[0-9.]+", rf"\g<1>{temperature:.6f}", text)
 
 
-def _judge(classifier: SurfaceClassifier, part: SceneSet, temperature: float) -> Judged:
+def _judge(classifier: SurfaceClassifier, part: SceneSet, temperature: float) -> scores.Judged:
     alone, in_scene = (
         scores.by_picture(part.logits(classifier, alone=alone), part.patches, temperature)
         for alone in (True, False)
     )
-    return Judged(alone, in_scene)
+    return scores.Judged(alone, in_scene)
