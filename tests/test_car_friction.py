@@ -24,6 +24,7 @@ def test_an_even_road_gives_its_friction():
 def test_on_split_friction_the_front_uses_both_sides_and_the_rear_the_lower_one():
     # A quarter of the weight on each wheel: (0.3 + 0.8 + 2 * 0.3) / 4.
     assert car(0.3, 0.8, 0.3, 0.8).theta == pytest.approx(0.425)
+    assert car(0.8, 0.3, 0.8, 0.3).theta == pytest.approx(0.425)
 
 
 def test_wheels_count_with_their_loads():
@@ -38,6 +39,13 @@ def test_a_wheel_that_shows_nothing_takes_its_partners_road():
         assert car_friction(wheels, EVEN, 0.08).theta == pytest.approx(0.3)
     taken, _ = surer(unknown, known, 0.08)
     assert taken == (0.3, pytest.approx(np.hypot(0.02, 0.08)))
+
+
+@pytest.mark.parametrize("silent", range(4))
+def test_a_partner_is_the_wheel_behind_or_ahead_and_not_one_of_the_other_side(silent):
+    wheels = [Friction(theta, 0.02) for theta in (0.3, 0.8, 0.3, 0.8)]
+    wheels[silent] = Friction(0.5, 0.29)
+    assert car_friction(tuple(wheels), EVEN, 0.08).theta == pytest.approx(0.425)
 
 
 def test_a_wheel_that_is_sure_keeps_its_own_road():

@@ -13,6 +13,7 @@ from trpac_core.confidence import (
     advanced_variance,
     bounded_variance,
     camera_share,
+    reading_noise,
     unknown_variance,
     wandered,
     with_camera,
@@ -23,13 +24,13 @@ MODEL = ConfidenceModel()
 LOAD_N, C_X = 3000.0, 50_000.0
 
 
-def settled_std(theta, slip, line_share=0.0, noise_share=0.0):
+def settled_std(theta, slip, line_share=0.0, noise_share=0.0, torque_friction=0.0, model=MODEL):
     """Standard deviation after 2 s of a tyre that shows theta."""
     at = tyre_at_slip(slip, LOAD_N, C_X)
-    evidence = Evidence(theta, at.friction(theta), at, line_share, noise_share, 0.0)
-    variance, lag = unknown_variance(MODEL, theta), 0.0
+    evidence = Evidence(theta, at.friction(theta), at, line_share, noise_share, torque_friction)
+    variance, lag = unknown_variance(model, theta), 0.0
     for _ in range(200):
-        variance, lag = advanced_variance(MODEL, variance, lag, theta, evidence, 0.11, 12.5, 0.0, 0.01)
+        variance, lag = advanced_variance(model, variance, lag, theta, evidence, 0.11, 12.5, 0.0, 0.01)
     return variance**0.5
 
 
@@ -77,6 +78,70 @@ def test_deviation_is_that_of_drawn_errors_of_the_elastic_line():
     found = np.array([at.theta(at.friction(theta) * draw) for draw in draws])
     model = (settled_std(theta, slip, line_share=share) ** 2 - (MODEL.car_share * theta) ** 2) ** 0.5
     assert model == pytest.approx(found.std(), rel=0.1)
+
+
+@pytest.mark.parametrize(("noise_share", "torque_friction"), [(0.05, 0.0), (0.0, 0.01), (0.04, 0.01)])
+def test_noise_of_one_reading_is_that_of_drawn_ones(noise_share, torque_friction):
+    theta, at = 0.3, tyre_at_slip(0.03, LOAD_N, C_X)
+    rng, friction = np.random.default_rng(2), at.friction(theta)
+    draws = friction + friction * noise_share * rng.standard_normal(4000)
+    draws += torque_friction * rng.standard_normal(4000)
+    found = np.std([at.theta(draw) for draw in draws])
+    assert reading_noise(friction, at, noise_share, torque_friction) == pytest.approx(found / theta, rel=0.1)
+
+
+def test_what_no_driving_can_tell_of_load_and_torque_stays():
+    sure = ConfidenceModel(tyre_share=0.0, car_share=0.04)
+    assert settled_std(0.3, 0.05, model=sure) == pytest.approx(0.04 * 0.3)
+
+
+def test_of_noise_as_much_stays_as_the_estimator_leaves():
+    """`settled_std` has an estimator that leaves 0.11 of its variance."""
+    left, friction = 0.11**0.5, tyre_at_slip(0.03, LOAD_N, C_X).friction(0.3)
+    of_slip, of_torque = settled_std(0.3, 0.03, 0.0, 0.06), settled_std(0.3, 0.03, 0.0, 0.0, 0.01)
+    assert of_slip == pytest.approx(settled_std(0.3, 0.03, 0.06 * left), rel=1e-3)
+    assert of_torque == pytest.approx(settled_std(0.3, 0.03, 0.01 / friction * left), rel=1e-3)
+
+
+@pytest.mark.parametrize("two_deviations_off", [-1.0, 0.0, 1.0])
+def test_a_tyre_that_is_not_seen_to_slide_bounds_the_road_from_below(two_deviations_off):
+    """However its force is read within two deviations: no tighter than the true road would."""
+    at = tyre_at_slip(0.015, LOAD_N, C_X)
+    theta, deviation = 0.4, (0.04**2 + 0.03**2 + MODEL.tyre_share**2) ** 0.5
+    friction = at.friction(theta) * (1.0 + 2.0 * deviation * two_deviations_off)
+    evidence = Evidence(None, friction, at, 0.04, 0.03, 0.0)
+
+    def bounded(theta_hat, variance):
+        return advanced_variance(MODEL, variance, 0.0, theta_hat, evidence, 0.11, 12.5, 0.0, 0.01)[0]
+
+    unknown = unknown_variance(MODEL, 1.0)
+    assert bounded_variance(1.0, theta) <= bounded(1.0, unknown) < unknown
+    assert bounded(0.8, 1e-4) == pytest.approx(1e-4), "an estimate within the bound stays as sure as it was"
+    assert bounded(0.06, 1e-4) > 0.01, "one below it is off by that"
+
+
+def test_a_distance_within_the_readings_noise_is_no_error_of_the_estimate():
+    at = tyre_at_slip(0.05, LOAD_N, C_X)
+    evidence = Evidence(0.3, at.friction(0.3), at, 0.0, 0.1, 0.0)
+    variance, lag = 1e-4, 0.0
+    for _ in range(200):
+        variance, lag = advanced_variance(MODEL, variance, lag, 0.32, evidence, 0.11, 12.5, 0.0, 0.01)
+    assert lag == pytest.approx(-0.02)
+    assert variance**0.5 < 0.018
+
+
+@pytest.mark.parametrize("step_s", [0.001, 0.02, 0.1])
+def test_the_smoothed_distance_never_overshoots(step_s):
+    at = tyre_at_slip(0.05, LOAD_N, C_X)
+    evidence = Evidence(0.3, at.friction(0.3), at, 0.01, 0.01, 0.0)
+    _, lag = advanced_variance(MODEL, 1e-4, 0.0, 0.8, evidence, 0.11, 12.5, 0.0, step_s)
+    assert -0.5 <= lag < 0.0
+
+
+def test_no_way_makes_surer_and_no_class_claims_more_than_its_distance():
+    unknown = unknown_variance(MODEL, 0.3)
+    assert wandered(MODEL, 2.0 * unknown, 0.3, 100.0) == 2.0 * unknown
+    assert camera_share(MODEL, 2.0 * unknown, 0.3) == 1.0
 
 
 def test_knowledge_fades_with_the_way_up_to_nothing():

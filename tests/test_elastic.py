@@ -112,6 +112,23 @@ def test_a_reading_is_taken_as_by_kalmans_formula():
     assert after[3:] == pytest.approx(expected[np.triu_indices(3)])
 
 
+@pytest.mark.parametrize("slip", [0.001, 0.02, -0.02])
+@pytest.mark.parametrize("off", [{"ratio": 0.002, "compliance": 0.02}, {"bias": 0.03, "compliance": -0.1}])
+def test_error_of_the_line_is_its_covariance_and_what_was_learned_and_not_used(slip, off):
+    line, v = taught(**off)
+    P = np.array([[line.bb, line.br, line.bc], [line.br, line.rr, line.rc], [line.bc, line.rc, line.cc]])
+    H = np.array([1.0 / v, 1.0, slip])
+    unused = H @ line[:3] - (line.offset(v)[0] + slip * line.compliance())
+    assert unused != 0.0
+    assert line.slip_variance(slip, v) == pytest.approx(H @ P @ H + unused**2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("compliance", "bound"), [(4.0, 1.0), (-0.8, -0.5)])
+def test_no_tyre_is_taken_for_more_than_twice_as_soft_or_as_stiff(compliance, bound):
+    line, _ = taught(ElasticModel(compliance=3.0), compliance=compliance)
+    assert line.c == pytest.approx(bound, abs=0.02)
+
+
 def test_speed_signals_that_drift_are_known_less_from_second_to_second():
     line, _ = taught()
     later = line.drifted(MODEL, 30.0)

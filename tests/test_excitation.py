@@ -43,11 +43,12 @@ def test_surfaces_rise_and_the_class_values_own_scatter_is_left_alone():
     assert SCHEDULER.K_v(0.6) == K_V_LIMIT
 
 
+@pytest.mark.parametrize("load", [2000.0, 2900.0, 4000.0])
 @pytest.mark.parametrize("stiffness", [20e3, 40e3, 50e3, 60e3])
-def test_threshold_follows_the_tyre_at_hand(stiffness):
+def test_threshold_follows_the_tyre_at_hand(stiffness, load):
     """On a wet road the estimator starts where a road 0.1 more slippery than its class begins to show."""
-    slip = SCHEDULER.threshold(0.6, 2900.0, stiffness, 0.0)
-    assert tyre.friction_by_theta(0.5, slip, 2900.0, stiffness) == pytest.approx(0.1, abs=0.05)
+    slip = SCHEDULER.threshold(0.6, load, stiffness, 0.0)
+    assert tyre.friction_by_theta(0.5, slip, load, stiffness) == pytest.approx(0.1, abs=0.05)
 
 
 def test_middle_friction_road_at_50_kN_lies_where_the_tyre_shows_it():

@@ -49,6 +49,19 @@ def test_an_even_pedal_tells_nothing_of_the_slope():
     assert state.variance == 1.0
 
 
+def test_what_was_learned_of_the_slope_is_forgotten_with_time():
+    known = slope_of(0.0, noise=0.05)
+    here = (math.exp(known.log_elastic), math.exp(known.log_theta))
+    assert followed(known, *here, 0.05, 10.0).variance == pytest.approx(known.variance + 0.1)
+    assert followed(known, *here, 0.05, 1e4).variance == 1.0
+
+
+def test_a_reading_far_beyond_noise_teaches_nothing_of_the_slope():
+    known = slope_of(0.0, noise=0.02)
+    after = followed(known, 1.5 * math.exp(known.log_elastic), 3.0 * math.exp(known.log_theta), 0.02, 0.01)
+    assert after.slope == known.slope
+
+
 def pulsed(believed_n, theta, slips=SLIPS):
     """The estimate after pulses on a road, by an estimator that takes the tyre's stiffness for another one."""
     estimator = TrpacEstimator(EstimatorConfig(vehicle=replace(CAR, longitudinal_stiffness_n=believed_n)))

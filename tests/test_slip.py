@@ -21,6 +21,7 @@ def test_driven_braked_and_free():
     assert wheel_slip(11.0 / 0.29, 10.0, 0.29, 1.0) == Slip(pytest.approx(1.0 / 11.0), 1.0)
     assert wheel_slip(9.0 / 0.29, 10.0, 0.29, 1.0) == Slip(pytest.approx(0.1), -1.0)
     assert wheel_slip(0.0, 10.0, 0.29, 1.0) == Slip(GREATEST_SLIP, -1.0)
+    assert wheel_slip(0.9 / 0.29, 1.0, 0.29, 1.0) == Slip(pytest.approx(0.1), -1.0)
 
 
 @pytest.mark.parametrize(("wheel", "vehicle"), [(0.0, 0.0), (3.0, 0.5), (-2.0, 0.0), (0.0, -0.3)])

@@ -63,9 +63,20 @@ def test_it_begins_anew_where_slip_goes_elsewhere_or_the_tyre_is_being_loaded() 
     steady = held(held(NOTHING, 0.01, 0.2, 0.0, NOISE, STEP_S), 0.01, 0.22, 0.0, NOISE, STEP_S)
     assert steady.held_s == pytest.approx(2.0 * STEP_S)
     assert steady.friction == pytest.approx(0.21)
-    away = 0.01 + 1.1 * ELSEWHERE * NOISE
-    assert held(steady, away, 0.3, 0.0, NOISE, STEP_S) == Steady(away, 0.3, 0.0, STEP_S)
-    assert held(steady, 0.01, 0.3, 5.0 * NOISE, NOISE, STEP_S).held_s == STEP_S
+    for side in (1.0, -1.0):
+        away = 0.01 + side * 1.1 * ELSEWHERE * NOISE
+        assert held(steady, away, 0.3, 0.0, NOISE, STEP_S) == Steady(away, 0.3, 0.0, STEP_S)
+        assert held(steady, 0.01, 0.3, side * 5.0 * NOISE, NOISE, STEP_S).held_s == STEP_S
+
+
+def test_a_long_mean_forgets_with_its_memory() -> None:
+    steady = Steady(0.01, 0.2, 0.0, 10.0)
+    for _ in range(round(MEMORY_S / STEP_S)):
+        steady = held(steady, 0.01 + NOISE, 0.3, NOISE, NOISE, STEP_S)
+    new = 1.0 - math.exp(-1.0)
+    assert steady.slip == pytest.approx(0.01 + new * NOISE, abs=5e-3 * NOISE)
+    assert steady.friction == pytest.approx(0.2 + new * 0.1, abs=5e-4)
+    assert steady.rise == pytest.approx(new * NOISE, rel=5e-3)
 
 
 def test_the_estimate_follows_a_mean_quicker_within_bounds() -> None:
@@ -79,6 +90,7 @@ def test_a_moved_slip_is_forgotten_as_the_force_settles_and_noise_does_not_count
     moved = unsettled(0.0, 50.0 * NOISE, NOISE, 0.01)
     assert moved == 50.0 * NOISE
     assert unsettled(moved, 0.0, NOISE, 0.016) == pytest.approx(moved / math.e)
+    assert unsettled(moved, 3.0 * NOISE, NOISE, 0.016) == pytest.approx(moved / math.e)
 
 
 def at_rest(theta: float, slip: float, doubt: float) -> tuple[WheelInputs, FusionState]:
