@@ -58,7 +58,9 @@ def test_a_missing_package_is_one_sentence(missing, arguments, tmp_path):
         [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False
     )
     assert run.returncode == 2
-    assert run.stderr.startswith(f"trpac: needs the package that brings '{missing}'")
+    assert run.stderr.startswith(
+        f"trpac: needs the package '{missing}', which is not installed: pip install "
+    )
     assert run.stderr.count("\n") == 1
 
 

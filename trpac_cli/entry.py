@@ -9,6 +9,8 @@ from typing import NoReturn
 
 from trpac.extras import MissingExtraError, missing
 
+OURS = ("fmu_src", "models", "scenarios", "sim2real", "trpac", "trpac_cli", "trpac_core", "trpac_hil")
+
 
 def main() -> None:
     """Run the command line; exits with 2 where one of its packages is missing, with 143 after SIGTERM."""
@@ -19,9 +21,12 @@ def main() -> None:
 
         app()
     except ModuleNotFoundError as error:
-        text = missing(error)
-        if text is None:
+        module = (error.name or "").partition(".")[0]
+        if module in OURS:
             raise
+        text = (
+            missing(error) or f"needs the package '{module}', which is not installed: pip install trpac-fmu"
+        )
         print(f"trpac: {text}", file=sys.stderr)
         sys.exit(2)
     except MissingExtraError as error:
