@@ -67,10 +67,10 @@ audit:           ## published faults of the locked packages (needs pip-audit on 
 	pip-audit --strict --disable-pip --require-hashes -r requirements/dev.txt
 
 blind: $(READY)  ## the diagnosis on withheld cases, all thresholds (long; BLIND_SEED=n for other cases; newest family of forms)
-	$(BIN)/python -m benchmarks.blind run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --forms tenth --jobs 2
-	$(BIN)/python -m benchmarks.blind score --out out/blind-$(BLIND_SEED)
+	$(BIN)/python -m benchmarks.gap.withheld run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --forms tenth --jobs 2
+	$(BIN)/python -m benchmarks.gap.withheld score --out out/blind-$(BLIND_SEED)
 
-bench: $(READY)  ## step times of estimator and plant, added to benchmarks/history/speed.jsonl (on an idle machine)
+bench: $(READY)  ## step times of estimator and plant, added to out/speed.jsonl (on an idle machine)
 	$(BIN)/python -m benchmarks.speed
 
 clean:           ## remove what was built and measured

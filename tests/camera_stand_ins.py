@@ -14,11 +14,11 @@ import pandas as pd
 import pytest
 from numpy.random import Generator
 
-from benchmarks.blind.generator.camera_road import CLASS_FRICTION, CameraRoad, Passage
-from benchmarks.blind.generator.car import Car
-from benchmarks.blind.generator.driver import Drive, Style
-from benchmarks.blind.generator.kernel import N, V, W, X
-from benchmarks.blind.generator.world import World
+from benchmarks.gap.withheld.generator.camera_road import CLASS_FRICTION, CameraRoad, Passage
+from benchmarks.gap.withheld.generator.car import Car
+from benchmarks.gap.withheld.generator.driver import Drive, Style
+from benchmarks.gap.withheld.generator.kernel import N, V, W, X
+from benchmarks.gap.withheld.generator.world import World
 
 PLAIN = {
     "captures": "even",

@@ -15,18 +15,18 @@ import pytest
 import yaml
 from numpy.testing import assert_allclose
 
-from benchmarks.blind.generator import kernel, severity
-from benchmarks.blind.generator.car import Car, Road
-from benchmarks.blind.generator.cases import make_case
-from benchmarks.blind.generator.details import FLOOR_M_S
-from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.kernel import N, V, begin, integrate
-from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, noise_of, read
-from benchmarks.blind.generator.table import SIZES, Group, Spec, table
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator import kernel, severity
+from benchmarks.gap.withheld.generator.car import Car, Road
+from benchmarks.gap.withheld.generator.cases import make_case
+from benchmarks.gap.withheld.generator.details import FLOOR_M_S
+from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.kernel import N, V, begin, integrate
+from benchmarks.gap.withheld.generator.sensors import Noise, Sensors, make_log, noise_of, read
+from benchmarks.gap.withheld.generator.table import SIZES, Group, Spec, table
+from benchmarks.gap.withheld.generator.world import nominal
 
 ROOT = Path(__file__).resolve().parents[1]
-GENERATOR = ROOT / "benchmarks" / "blind" / "generator"
+GENERATOR = ROOT / "benchmarks" / "gap" / "withheld" / "generator"
 ALLOWED = {"numpy", "numba", "scipy", "pandas", "yaml"}
 OURS = {"scenarios", "trpac_core", "sim2real", "trpac_cli", "fmu_src", "models"}
 CAR = Car()
@@ -60,7 +60,7 @@ def test_generator_imports_nothing_of_the_product(path):
 
 
 def test_generator_loads_nothing_of_the_product():
-    code = "import sys, benchmarks.blind.generator.cases as _; print(*{m.split('.')[0] for m in sys.modules})"
+    code = "import sys, benchmarks.gap.withheld.generator.cases as _; print(*{m.split('.')[0] for m in sys.modules})"
     loaded = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout

@@ -15,27 +15,27 @@ from camera_stand_ins import PLAIN, blaming, rolled
 from long import beyond
 from numpy.testing import assert_allclose
 
-from benchmarks.blind import runner
-from benchmarks.blind.generator import camera_case, camera_gap
-from benchmarks.blind.generator.camera_chain import results
-from benchmarks.blind.generator.camera_family import CameraFamily, draw_forms_of
-from benchmarks.blind.generator.camera_forms import CAMERA_FORMS
-from benchmarks.blind.generator.camera_library import CAMERA_EFFECTS, Scene
-from benchmarks.blind.generator.camera_reference import reference
-from benchmarks.blind.generator.camera_road import (
+from benchmarks.gap.withheld import runner
+from benchmarks.gap.withheld.generator import camera_case, camera_gap
+from benchmarks.gap.withheld.generator.camera_chain import results
+from benchmarks.gap.withheld.generator.camera_family import CameraFamily, draw_forms_of
+from benchmarks.gap.withheld.generator.camera_forms import CAMERA_FORMS
+from benchmarks.gap.withheld.generator.camera_library import CAMERA_EFFECTS, Scene
+from benchmarks.gap.withheld.generator.camera_reference import reference
+from benchmarks.gap.withheld.generator.camera_road import (
     CLASS_FRICTION,
     SURFACES,
     CameraRoad,
     Passage,
     draw_camera_road,
 )
-from benchmarks.blind.generator.camera_system import Chain, Fault, draw_chain
-from benchmarks.blind.generator.camera_telling import columns
-from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.making import make_case
-from benchmarks.blind.generator.table import Group, table
-from benchmarks.blind.scorer import score_run
-from benchmarks.blind.show import draw_confusion
+from benchmarks.gap.withheld.generator.camera_system import Chain, Fault, draw_chain
+from benchmarks.gap.withheld.generator.camera_telling import columns
+from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.making import make_case
+from benchmarks.gap.withheld.generator.table import Group, table
+from benchmarks.gap.withheld.scorer import score_run
+from benchmarks.gap.withheld.show import draw_confusion
 
 TENTH = Family.TENTH
 FIRST = CameraFamily.FIRST

@@ -9,9 +9,9 @@ import pytest
 from camera_stand_ins import PLAIN, ROAD, steady
 from numpy.testing import assert_allclose
 
-from benchmarks.blind.generator import camera_case
-from benchmarks.blind.generator.camera_chain import results
-from benchmarks.blind.generator.camera_family import (
+from benchmarks.gap.withheld.generator import camera_case
+from benchmarks.gap.withheld.generator.camera_chain import results
+from benchmarks.gap.withheld.generator.camera_family import (
     OF_EFFECT,
     ONLY,
     SECOND,
@@ -19,20 +19,20 @@ from benchmarks.blind.generator.camera_family import (
     draw_forms_of,
     is_new,
 )
-from benchmarks.blind.generator.camera_faults import NOD_M
-from benchmarks.blind.generator.camera_forms import CAMERA_FORMS
-from benchmarks.blind.generator.camera_further import ALL_EFFECTS, FURTHER_OUTSIDE
-from benchmarks.blind.generator.camera_gap import Stage, gap_of
-from benchmarks.blind.generator.camera_layouts import LAYOUTS, draw_laid_road
-from benchmarks.blind.generator.camera_library import Scene
-from benchmarks.blind.generator.camera_reference import friction_of, friction_under, reference
-from benchmarks.blind.generator.camera_road import CLASS_FRICTION, ROAD_M, Passage
-from benchmarks.blind.generator.camera_system import Chain, Fault, Results, draw_chain
-from benchmarks.blind.generator.camera_telling import MISTAKEN, voted
-from benchmarks.blind.generator.camera_timing import timing
-from benchmarks.blind.generator.cases import SHOWS
-from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.table import Group, table
+from benchmarks.gap.withheld.generator.camera_faults import NOD_M
+from benchmarks.gap.withheld.generator.camera_forms import CAMERA_FORMS
+from benchmarks.gap.withheld.generator.camera_further import ALL_EFFECTS, FURTHER_OUTSIDE
+from benchmarks.gap.withheld.generator.camera_gap import Stage, gap_of
+from benchmarks.gap.withheld.generator.camera_layouts import LAYOUTS, draw_laid_road
+from benchmarks.gap.withheld.generator.camera_library import Scene
+from benchmarks.gap.withheld.generator.camera_reference import friction_of, friction_under, reference
+from benchmarks.gap.withheld.generator.camera_road import CLASS_FRICTION, ROAD_M, Passage
+from benchmarks.gap.withheld.generator.camera_system import Chain, Fault, Results, draw_chain
+from benchmarks.gap.withheld.generator.camera_telling import MISTAKEN, voted
+from benchmarks.gap.withheld.generator.camera_timing import timing
+from benchmarks.gap.withheld.generator.cases import SHOWS
+from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.table import Group, table
 
 pytestmark = pytest.mark.long
 

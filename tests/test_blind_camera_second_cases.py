@@ -8,19 +8,19 @@ import pandas as pd
 import pytest
 from camera_stand_ins import blaming, check_log, digest_of, rolled
 
-from benchmarks.blind import runner
-from benchmarks.blind.generator import camera_case
-from benchmarks.blind.generator.camera_family import (
+from benchmarks.gap.withheld import runner
+from benchmarks.gap.withheld.generator import camera_case
+from benchmarks.gap.withheld.generator.camera_family import (
     SECOND,
     CameraFamily,
     is_new,
 )
-from benchmarks.blind.generator.camera_further import ALL_EFFECTS
-from benchmarks.blind.generator.cases import SHOWS
-from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.making import make_case
-from benchmarks.blind.generator.table import Group, table
-from benchmarks.blind.scorer import score_run
+from benchmarks.gap.withheld.generator.camera_further import ALL_EFFECTS
+from benchmarks.gap.withheld.generator.cases import SHOWS
+from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.making import make_case
+from benchmarks.gap.withheld.generator.table import Group, table
+from benchmarks.gap.withheld.scorer import score_run
 
 pytestmark = pytest.mark.long
 

@@ -9,9 +9,9 @@ import pytest
 from camera_stand_ins import ROAD, steady
 from numpy.testing import assert_allclose
 
-from benchmarks.blind.generator import camera_case
-from benchmarks.blind.generator.camera_chain import results
-from benchmarks.blind.generator.camera_family import (
+from benchmarks.gap.withheld.generator import camera_case
+from benchmarks.gap.withheld.generator.camera_chain import results
+from benchmarks.gap.withheld.generator.camera_family import (
     ASPECTS,
     OF_EFFECT,
     SECOND,
@@ -20,21 +20,21 @@ from benchmarks.blind.generator.camera_family import (
     draw_forms_of,
     is_new,
 )
-from benchmarks.blind.generator.camera_faults import NOD_M
-from benchmarks.blind.generator.camera_further import ALL_EFFECTS, CAMERA_OUTSIDES, PAIRS_OF
-from benchmarks.blind.generator.camera_gap import Stage, gap_of
-from benchmarks.blind.generator.camera_layouts import draw_laid_road
-from benchmarks.blind.generator.camera_library import CAMERA_LIBRARY, Scene
-from benchmarks.blind.generator.camera_reference import friction_of, friction_under, reference
-from benchmarks.blind.generator.camera_road import CLASS_FRICTION, ROAD_M, Passage
-from benchmarks.blind.generator.camera_system import Chain, Fault, Results, draw_chain
-from benchmarks.blind.generator.camera_telling import columns, voted
-from benchmarks.blind.generator.camera_third import FURTHER
-from benchmarks.blind.generator.camera_third_outside import THIRD_OUTSIDE
-from benchmarks.blind.generator.cases import SHOWS
-from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.severity import find_severity
-from benchmarks.blind.generator.table import TARGETS, Group, table
+from benchmarks.gap.withheld.generator.camera_faults import NOD_M
+from benchmarks.gap.withheld.generator.camera_further import ALL_EFFECTS, CAMERA_OUTSIDES, PAIRS_OF
+from benchmarks.gap.withheld.generator.camera_gap import Stage, gap_of
+from benchmarks.gap.withheld.generator.camera_layouts import draw_laid_road
+from benchmarks.gap.withheld.generator.camera_library import CAMERA_LIBRARY, Scene
+from benchmarks.gap.withheld.generator.camera_reference import friction_of, friction_under, reference
+from benchmarks.gap.withheld.generator.camera_road import CLASS_FRICTION, ROAD_M, Passage
+from benchmarks.gap.withheld.generator.camera_system import Chain, Fault, Results, draw_chain
+from benchmarks.gap.withheld.generator.camera_telling import columns, voted
+from benchmarks.gap.withheld.generator.camera_third import FURTHER
+from benchmarks.gap.withheld.generator.camera_third_outside import THIRD_OUTSIDE
+from benchmarks.gap.withheld.generator.cases import SHOWS
+from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.severity import find_severity
+from benchmarks.gap.withheld.generator.table import TARGETS, Group, table
 
 TENTH = Family.TENTH
 

@@ -13,18 +13,18 @@ import yaml
 from camera_stand_ins import check_log, digest_of
 from long import beyond, long
 
-from benchmarks.blind import runner
-from benchmarks.blind.generator import driver
-from benchmarks.blind.generator.camera_family import ASPECTS, CameraFamily, form
-from benchmarks.blind.generator.camera_further import ALL_EFFECTS
-from benchmarks.blind.generator.camera_road import CLASS_FRICTION, SURFACES
-from benchmarks.blind.generator.camera_third_outside import THIRD_OUTSIDE
-from benchmarks.blind.generator.cases import SHOWS
-from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.kernel import ANGLE, RECORD_STEP_S, N, V, W, X
-from benchmarks.blind.generator.making import make_case
-from benchmarks.blind.generator.table import Group, table
-from benchmarks.blind.outcome import outcome_of
+from benchmarks.gap.withheld import runner
+from benchmarks.gap.withheld.generator import driver
+from benchmarks.gap.withheld.generator.camera_family import ASPECTS, CameraFamily, form
+from benchmarks.gap.withheld.generator.camera_further import ALL_EFFECTS
+from benchmarks.gap.withheld.generator.camera_road import CLASS_FRICTION, SURFACES
+from benchmarks.gap.withheld.generator.camera_third_outside import THIRD_OUTSIDE
+from benchmarks.gap.withheld.generator.cases import SHOWS
+from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.kernel import ANGLE, RECORD_STEP_S, N, V, W, X
+from benchmarks.gap.withheld.generator.making import make_case
+from benchmarks.gap.withheld.generator.table import Group, table
+from benchmarks.gap.withheld.outcome import outcome_of
 
 TENTH = Family.TENTH
 THIRD = CameraFamily.THIRD

@@ -14,13 +14,13 @@ from long import beyond, long
 from numpy.testing import assert_allclose
 from test_blind_plant import CAR, NEUTRAL, QUIET, LimitDrive, carried, roll
 
-from benchmarks.blind.generator import kernel
-from benchmarks.blind.generator.car import Car, Road
-from benchmarks.blind.generator.cases import make_case
-from benchmarks.blind.generator.details import FLOOR_M_S, ROLL_M_S
-from benchmarks.blind.generator.driver import drive
-from benchmarks.blind.generator.falling import fallen
-from benchmarks.blind.generator.forms import (
+from benchmarks.gap.withheld.generator import kernel
+from benchmarks.gap.withheld.generator.car import Car, Road
+from benchmarks.gap.withheld.generator.cases import make_case
+from benchmarks.gap.withheld.generator.details import FLOOR_M_S, ROLL_M_S
+from benchmarks.gap.withheld.generator.driver import drive
+from benchmarks.gap.withheld.generator.falling import fallen
+from benchmarks.gap.withheld.generator.forms import (
     ASPECTS,
     DIGITS,
     EFFECT_FORMS,
@@ -33,12 +33,12 @@ from benchmarks.blind.generator.forms import (
     draw_forms,
     effect_in,
 )
-from benchmarks.blind.generator.kernel import N, V, W, integrate
-from benchmarks.blind.generator.library import LIBRARY
-from benchmarks.blind.generator.sensors import Noise, Sensors, make_log, read
-from benchmarks.blind.generator.table import MORE_PAIRS, PAIRS, Group, table
-from benchmarks.blind.generator.tyre import dugoff
-from benchmarks.blind.generator.world import World, nominal
+from benchmarks.gap.withheld.generator.kernel import N, V, W, integrate
+from benchmarks.gap.withheld.generator.library import LIBRARY
+from benchmarks.gap.withheld.generator.sensors import Noise, Sensors, make_log, read
+from benchmarks.gap.withheld.generator.table import MORE_PAIRS, PAIRS, Group, table
+from benchmarks.gap.withheld.generator.tyre import dugoff
+from benchmarks.gap.withheld.generator.world import World, nominal
 
 FIRST, SECOND, THIRD, FOURTH, FIFTH, SIXTH, SEVENTH, EIGHTH, NINTH, TENTH = Family
 DRAWN = [SECOND, THIRD, FOURTH, FIFTH, SIXTH, SEVENTH, EIGHTH, NINTH, TENTH]

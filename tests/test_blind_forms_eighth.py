@@ -8,15 +8,15 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, with_form
 from test_blind_plant import CAR, carried, roll
 
-from benchmarks.blind.generator import details, kernel
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import HUNT_S, LASH_NM, QUEUE_S
-from benchmarks.blind.generator.falling import EXPONENTIAL, fallen
-from benchmarks.blind.generator.forms import OUTSIDES, Family, is_further
-from benchmarks.blind.generator.forms_eighth import CIRCUIT, SETTLED, SLAB_M
-from benchmarks.blind.generator.kernel import LAG, N, V, W, X
-from benchmarks.blind.generator.physics import Physics
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator import details, kernel
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import HUNT_S, LASH_NM, QUEUE_S
+from benchmarks.gap.withheld.generator.falling import EXPONENTIAL, fallen
+from benchmarks.gap.withheld.generator.forms import OUTSIDES, Family, is_further
+from benchmarks.gap.withheld.generator.forms_eighth import CIRCUIT, SETTLED, SLAB_M
+from benchmarks.gap.withheld.generator.kernel import LAG, N, V, W, X
+from benchmarks.gap.withheld.generator.physics import Physics
+from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 

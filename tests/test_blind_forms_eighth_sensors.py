@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
 from test_blind_plant import QUIET
 
-from benchmarks.blind.generator.kernel import ANGLE, N, V, W, X
-from benchmarks.blind.generator.recording_eighth import (
+from benchmarks.gap.withheld.generator.kernel import ANGLE, N, V, W, X
+from benchmarks.gap.withheld.generator.recording_eighth import (
     BOX_SHARE,
     CLOCK_S,
     by_the_clock,
@@ -19,9 +19,9 @@ from benchmarks.blind.generator.recording_eighth import (
     one_box,
     resampled,
 )
-from benchmarks.blind.generator.scales import AIRED_S, TABLE_M_S
-from benchmarks.blind.generator.sensors import Sensors, read
-from benchmarks.blind.generator.tyre_eighth import COMPOSITE_AT, COMPOSITE_TOP, bristles, composite
+from benchmarks.gap.withheld.generator.scales import AIRED_S, TABLE_M_S
+from benchmarks.gap.withheld.generator.sensors import Sensors, read
+from benchmarks.gap.withheld.generator.tyre_eighth import COMPOSITE_AT, COMPOSITE_TOP, bristles, composite
 
 pytestmark = pytest.mark.long
 

@@ -10,20 +10,20 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
-from benchmarks.blind.generator import details, forms_fifth, kernel
-from benchmarks.blind.generator.air import SHUT_M_S
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import (
+from benchmarks.gap.withheld.generator import details, forms_fifth, kernel
+from benchmarks.gap.withheld.generator.air import SHUT_M_S
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import (
     PROFILE_STEP_M,
     TEXTURE_M,
     USUAL_M_S,
     USUAL_NM,
     USUAL_RAD_S,
 )
-from benchmarks.blind.generator.falling import ARCTANGENT, fallen
-from benchmarks.blind.generator.forms import ASPECTS, OUTSIDES, Family, is_further
-from benchmarks.blind.generator.kernel import LAG, MOTOR, TWIST, N, V, W, X
-from benchmarks.blind.generator.table import Group, table
+from benchmarks.gap.withheld.generator.falling import ARCTANGENT, fallen
+from benchmarks.gap.withheld.generator.forms import ASPECTS, OUTSIDES, Family, is_further
+from benchmarks.gap.withheld.generator.kernel import LAG, MOTOR, TWIST, N, V, W, X
+from benchmarks.gap.withheld.generator.table import Group, table
 
 pytestmark = pytest.mark.long
 

@@ -11,11 +11,11 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
 from test_blind_plant import CAR, QUIET, roll
 
-from benchmarks.blind.generator import forms_fifth, kernel
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import GRAIN_M
-from benchmarks.blind.generator.kernel import ANGLE, V
-from benchmarks.blind.generator.recording_fifth import (
+from benchmarks.gap.withheld.generator import forms_fifth, kernel
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import GRAIN_M
+from benchmarks.gap.withheld.generator.kernel import ANGLE, V
+from benchmarks.gap.withheld.generator.recording_fifth import (
     BITS,
     CHANGES,
     POPS_S,
@@ -31,9 +31,9 @@ from benchmarks.blind.generator.recording_fifth import (
     slow_receiver,
     stones,
 )
-from benchmarks.blind.generator.sensors import read
-from benchmarks.blind.generator.tyre import cubed
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator.sensors import read
+from benchmarks.gap.withheld.generator.tyre import cubed
+from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 

@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, numbered, reading, with_form
 from test_blind_plant import CAR, QUIET, carried, roll
 
-from benchmarks.blind.generator import details, forms_fourth, kernel
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import ROLL_M_S, STRETCH_M, USUAL_M_S, USUAL_RAD_S
-from benchmarks.blind.generator.forms import Family, is_further
-from benchmarks.blind.generator.kernel import ANGLE, LAG, MOTOR, SWAY, TWIST, N, V, W, X
-from benchmarks.blind.generator.recording_fourth import (
+from benchmarks.gap.withheld.generator import details, forms_fourth, kernel
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import ROLL_M_S, STRETCH_M, USUAL_M_S, USUAL_RAD_S
+from benchmarks.gap.withheld.generator.forms import Family, is_further
+from benchmarks.gap.withheld.generator.kernel import ANGLE, LAG, MOTOR, SWAY, TWIST, N, V, W, X
+from benchmarks.gap.withheld.generator.recording_fourth import (
     DIFFERENCED,
     OVERRUNS,
     SHARED,
@@ -26,9 +26,9 @@ from benchmarks.blind.generator.recording_fourth import (
     spiking,
     truncating,
 )
-from benchmarks.blind.generator.sensors import read
-from benchmarks.blind.generator.tyre import brush_falling, brush_uniform
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator.sensors import read
+from benchmarks.gap.withheld.generator.tyre import brush_falling, brush_uniform
+from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 

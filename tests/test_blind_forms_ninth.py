@@ -8,14 +8,14 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, with_form
 from test_blind_plant import CAR, LimitDrive, carried, roll
 
-from benchmarks.blind.generator import air, details, kernel
-from benchmarks.blind.generator.air import BARRIER_M
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import BENDS_M, WARM_S
-from benchmarks.blind.generator.forms import Family, is_further
-from benchmarks.blind.generator.kernel import ANGLE, LAG, SLIP, TWIST, N, V, W, X
-from benchmarks.blind.generator.physics import Physics
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator import air, details, kernel
+from benchmarks.gap.withheld.generator.air import BARRIER_M
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import BENDS_M, WARM_S
+from benchmarks.gap.withheld.generator.forms import Family, is_further
+from benchmarks.gap.withheld.generator.kernel import ANGLE, LAG, SLIP, TWIST, N, V, W, X
+from benchmarks.gap.withheld.generator.physics import Physics
+from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 

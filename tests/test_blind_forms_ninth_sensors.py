@@ -10,19 +10,19 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
 from test_blind_plant import QUIET
 
-from benchmarks.blind.baselines import _on_grid
-from benchmarks.blind.generator.kernel import N, V, W
-from benchmarks.blind.generator.recording_ninth import (
+from benchmarks.gap.withheld.baselines import _on_grid
+from benchmarks.gap.withheld.generator.kernel import N, V, W
+from benchmarks.gap.withheld.generator.recording_ninth import (
     BEFORE_S,
     beating_tones,
     meaned,
     slow_place,
     triggered,
 )
-from benchmarks.blind.generator.scales import MOUNT_M_S, MOUNT_SHARE
-from benchmarks.blind.generator.sensors import read
-from benchmarks.blind.generator.signals import JUMP_S
-from benchmarks.blind.generator.tyre_ninth import brush_elliptic, splined
+from benchmarks.gap.withheld.generator.scales import MOUNT_M_S, MOUNT_SHARE
+from benchmarks.gap.withheld.generator.sensors import read
+from benchmarks.gap.withheld.generator.signals import JUMP_S
+from benchmarks.gap.withheld.generator.tyre_ninth import brush_elliptic, splined
 
 pytestmark = pytest.mark.long
 

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
-from benchmarks.blind.generator import air, details, forms_seventh, kernel
-from benchmarks.blind.generator.air import WAKE_S
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import (
+from benchmarks.gap.withheld.generator import air, details, forms_seventh, kernel
+from benchmarks.gap.withheld.generator.air import WAKE_S
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import (
     GRAVEL_M,
     GRAVEL_SHARE,
     PROFILE_STEP_M,
@@ -21,12 +21,12 @@ from benchmarks.blind.generator.details import (
     WARM_S,
     WEAVE_S,
 )
-from benchmarks.blind.generator.falling import ROOTED, fallen
-from benchmarks.blind.generator.forms import ASPECTS, OUTSIDES, RATES_HZ, Family, is_further
-from benchmarks.blind.generator.kernel import BODY, MOTOR, PITCH, SLIP, N, V, W, X
-from benchmarks.blind.generator.library import LIBRARY
-from benchmarks.blind.generator.table import SEVENTH_PAIRS, Group, table
-from benchmarks.blind.generator.world import World, nominal
+from benchmarks.gap.withheld.generator.falling import ROOTED, fallen
+from benchmarks.gap.withheld.generator.forms import ASPECTS, OUTSIDES, RATES_HZ, Family, is_further
+from benchmarks.gap.withheld.generator.kernel import BODY, MOTOR, PITCH, SLIP, N, V, W, X
+from benchmarks.gap.withheld.generator.library import LIBRARY
+from benchmarks.gap.withheld.generator.table import SEVENTH_PAIRS, Group, table
+from benchmarks.gap.withheld.generator.world import World, nominal
 
 pytestmark = pytest.mark.long
 

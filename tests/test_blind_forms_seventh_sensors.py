@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
 from test_blind_plant import CAR, QUIET, roll
 
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.kernel import MOTOR, N, V, W
-from benchmarks.blind.generator.recording_seventh import (
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.kernel import MOTOR, N, V, W
+from benchmarks.gap.withheld.generator.recording_seventh import (
     LOUDER,
     WAKES_S,
     YAW_SHARE,
@@ -21,10 +21,10 @@ from benchmarks.blind.generator.recording_seventh import (
     working_loose,
     yawing,
 )
-from benchmarks.blind.generator.sensors import Sensors, read
-from benchmarks.blind.generator.signals import JUMP_S
-from benchmarks.blind.generator.tyre import arctangent, sine_rise
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator.sensors import Sensors, read
+from benchmarks.gap.withheld.generator.signals import JUMP_S
+from benchmarks.gap.withheld.generator.tyre import arctangent, sine_rise
+from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 

@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, numbered, with_form
 from test_blind_plant import CAR, carried, roll
 
-from benchmarks.blind.generator import air, details, forms_sixth, kernel
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import (
+from benchmarks.gap.withheld.generator import air, details, forms_sixth, kernel
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import (
     PROFILE_STEP_M,
     ROLL_M_S,
     STALL_S,
@@ -18,11 +18,11 @@ from benchmarks.blind.generator.details import (
     USUAL_NM,
     WARM_S,
 )
-from benchmarks.blind.generator.falling import TWO_RATES, fallen
-from benchmarks.blind.generator.forms import ASPECTS, OUTSIDES, Family, is_further
-from benchmarks.blind.generator.kernel import LAG, SWAY, TWIST, N, V, W
-from benchmarks.blind.generator.table import Group, table
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator.falling import TWO_RATES, fallen
+from benchmarks.gap.withheld.generator.forms import ASPECTS, OUTSIDES, Family, is_further
+from benchmarks.gap.withheld.generator.kernel import LAG, SWAY, TWIST, N, V, W
+from benchmarks.gap.withheld.generator.table import Group, table
+from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 

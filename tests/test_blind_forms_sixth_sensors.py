@@ -11,10 +11,10 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
 from test_blind_plant import CAR, QUIET, roll
 
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import GRAIN_M, USUAL_M_S, USUAL_RAD_S
-from benchmarks.blind.generator.kernel import N, V, W, X
-from benchmarks.blind.generator.recording_sixth import (
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import GRAIN_M, USUAL_M_S, USUAL_RAD_S
+from benchmarks.gap.withheld.generator.kernel import N, V, W, X
+from benchmarks.gap.withheld.generator.recording_sixth import (
     AXLE_SHARE,
     CHIRP_HZ,
     CHIRP_SHARE,
@@ -30,10 +30,10 @@ from benchmarks.blind.generator.recording_sixth import (
     skewed,
     slow_accelerometer,
 )
-from benchmarks.blind.generator.sensors import Sensors, read
-from benchmarks.blind.generator.signals import JUMP_S
-from benchmarks.blind.generator.tyre import blended, plain_dugoff, two_lines
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator.sensors import Sensors, read
+from benchmarks.gap.withheld.generator.signals import JUMP_S
+from benchmarks.gap.withheld.generator.tyre import blended, plain_dugoff, two_lines
+from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 

@@ -9,15 +9,15 @@ from test_blind_forms import by_further, driven, with_form
 from test_blind_forms_ninth import DRY, LOCKED, moving
 from test_blind_plant import CAR, LimitDrive, roll
 
-from benchmarks.blind.generator import details, kernel
-from benchmarks.blind.generator.air import NOD_M_S2
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import STOPS_M_S2, TEXTURE_M, WARM_S
-from benchmarks.blind.generator.falling import LINE_AND_TAIL, fallen
-from benchmarks.blind.generator.forms import Family, is_further
-from benchmarks.blind.generator.kernel import LAG, PITCH, SLIP, STAGE, N, V, W
-from benchmarks.blind.generator.motors import NOTCH_RAD_S
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator import details, kernel
+from benchmarks.gap.withheld.generator.air import NOD_M_S2
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import STOPS_M_S2, TEXTURE_M, WARM_S
+from benchmarks.gap.withheld.generator.falling import LINE_AND_TAIL, fallen
+from benchmarks.gap.withheld.generator.forms import Family, is_further
+from benchmarks.gap.withheld.generator.kernel import LAG, PITCH, SLIP, STAGE, N, V, W
+from benchmarks.gap.withheld.generator.motors import NOTCH_RAD_S
+from benchmarks.gap.withheld.generator.world import nominal
 
 HALF_WARM_S = WARM_S * np.log(2.0)
 

@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, reading, with_form
 from test_blind_plant import QUIET
 
-from benchmarks.blind.baselines import _on_grid
-from benchmarks.blind.generator.kernel import ANGLE, N, V, W, X
-from benchmarks.blind.generator.recording_tenth import (
+from benchmarks.gap.withheld.baselines import _on_grid
+from benchmarks.gap.withheld.generator.kernel import ANGLE, N, V, W, X
+from benchmarks.gap.withheld.generator.recording_tenth import (
     CLOCK_OFF,
     KEPT_SHARE,
     multiplexed,
@@ -20,10 +20,10 @@ from benchmarks.blind.generator.recording_tenth import (
     slow_wheels,
     standing,
 )
-from benchmarks.blind.generator.scales import WAVES_M
-from benchmarks.blind.generator.sensors import read
-from benchmarks.blind.generator.signals import FAN_S, MISLOCK_S, PAD_DAMPING, RELOCK_S
-from benchmarks.blind.generator.tyre_tenth import humped
+from benchmarks.gap.withheld.generator.scales import WAVES_M
+from benchmarks.gap.withheld.generator.sensors import read
+from benchmarks.gap.withheld.generator.signals import FAN_S, MISLOCK_S, PAD_DAMPING, RELOCK_S
+from benchmarks.gap.withheld.generator.tyre_tenth import humped
 
 
 @pytest.mark.parametrize("delay", [0.1, 0.02])

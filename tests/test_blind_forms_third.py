@@ -11,22 +11,22 @@ from numpy.testing import assert_allclose
 from test_blind_forms import by_further, driven, forms_of, numbered, reading, with_form
 from test_blind_plant import CAR, QUIET, carried, roll
 
-from benchmarks.blind.generator import forms_third, kernel, motors
-from benchmarks.blind.generator.car import Road
-from benchmarks.blind.generator.details import PATCH_M, USUAL_RAD_S
-from benchmarks.blind.generator.forms import NOISES, Family, is_further
-from benchmarks.blind.generator.kernel import BODY, PITCH, N, V, W, X
-from benchmarks.blind.generator.recording import (
+from benchmarks.gap.withheld.generator import forms_third, kernel, motors
+from benchmarks.gap.withheld.generator.car import Road
+from benchmarks.gap.withheld.generator.details import PATCH_M, USUAL_RAD_S
+from benchmarks.gap.withheld.generator.forms import NOISES, Family, is_further
+from benchmarks.gap.withheld.generator.kernel import BODY, PITCH, N, V, W, X
+from benchmarks.gap.withheld.generator.recording import (
     DIGITS_THIRD,
     NOISES_THIRD,
     REPEATED,
     losing_runs,
     repeating,
 )
-from benchmarks.blind.generator.recording_fourth import DIGITS_FOURTH, NOISES_FOURTH
-from benchmarks.blind.generator.scales import SWAY_S
-from benchmarks.blind.generator.sensors import Noise, Sensors, read
-from benchmarks.blind.generator.world import nominal
+from benchmarks.gap.withheld.generator.recording_fourth import DIGITS_FOURTH, NOISES_FOURTH
+from benchmarks.gap.withheld.generator.scales import SWAY_S
+from benchmarks.gap.withheld.generator.sensors import Noise, Sensors, read
+from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 

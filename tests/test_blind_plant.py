@@ -9,18 +9,18 @@ import pytest
 from long import beyond, long
 from numpy.testing import assert_allclose
 
-from benchmarks.blind.generator import kernel
-from benchmarks.blind.generator.car import Car, Road, draw_car, draw_road
-from benchmarks.blind.generator.cases import make_case
-from benchmarks.blind.generator.driver import drive
-from benchmarks.blind.generator.forms import Family
-from benchmarks.blind.generator.kernel import N, V, W, X, begin, integrate
-from benchmarks.blind.generator.library import LIBRARY
-from benchmarks.blind.generator.outside import OUTSIDE
-from benchmarks.blind.generator.sensors import Noise, read
-from benchmarks.blind.generator.table import PAIRS, table
-from benchmarks.blind.generator.tyre import dugoff, magic, peaks
-from benchmarks.blind.generator.world import World, nominal, with_magic
+from benchmarks.gap.withheld.generator import kernel
+from benchmarks.gap.withheld.generator.car import Car, Road, draw_car, draw_road
+from benchmarks.gap.withheld.generator.cases import make_case
+from benchmarks.gap.withheld.generator.driver import drive
+from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.kernel import N, V, W, X, begin, integrate
+from benchmarks.gap.withheld.generator.library import LIBRARY
+from benchmarks.gap.withheld.generator.outside import OUTSIDE
+from benchmarks.gap.withheld.generator.sensors import Noise, read
+from benchmarks.gap.withheld.generator.table import PAIRS, table
+from benchmarks.gap.withheld.generator.tyre import dugoff, magic, peaks
+from benchmarks.gap.withheld.generator.world import World, nominal, with_magic
 from scenarios.files import load_road, load_vehicle
 from scenarios.plant import make_log as make_product_log
 from scenarios.plant import simulate

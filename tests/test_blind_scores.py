@@ -12,18 +12,18 @@ from typing import Any
 import pytest
 import yaml
 
-from benchmarks.blind import runner
-from benchmarks.blind.__main__ import Size
-from benchmarks.blind.baselines import cosine
-from benchmarks.blind.command import watch
-from benchmarks.blind.generator.cases import make_case
-from benchmarks.blind.generator.driver import UndrivableError
-from benchmarks.blind.generator.forms import ASPECTS, EFFECT_FORMS, Family
-from benchmarks.blind.generator.table import SIZES, Group, Spec, table
-from benchmarks.blind.outcome import ResultError, outcome_of, read_outcomes
-from benchmarks.blind.scorer import Scores, load_thresholds, score, score_run
-from benchmarks.blind.show import draw_confusion
-from benchmarks.blind.statistics import calibration_error, reliability, wilson
+from benchmarks.gap.withheld import runner
+from benchmarks.gap.withheld.__main__ import Size
+from benchmarks.gap.withheld.baselines import cosine
+from benchmarks.gap.withheld.command import watch
+from benchmarks.gap.withheld.generator.cases import make_case
+from benchmarks.gap.withheld.generator.driver import UndrivableError
+from benchmarks.gap.withheld.generator.forms import ASPECTS, EFFECT_FORMS, Family
+from benchmarks.gap.withheld.generator.table import SIZES, Group, Spec, table
+from benchmarks.gap.withheld.outcome import ResultError, outcome_of, read_outcomes
+from benchmarks.gap.withheld.scorer import Scores, load_thresholds, score, score_run
+from benchmarks.gap.withheld.show import draw_confusion
+from benchmarks.gap.withheld.statistics import calibration_error, reliability, wilson
 
 FIRST = Family.FIRST
 LIMITS = yaml.safe_load(runner.THRESHOLDS.read_text(encoding="utf-8"))
@@ -262,7 +262,7 @@ def test_thresholds_are_frozen_with_the_run(tmp_path, monkeypatch):
     assert load_thresholds(tmp_path) == LIMITS
     easier = tmp_path / "thresholds.yaml"
     easier.write_text(runner.THRESHOLDS.read_text(encoding="utf-8").replace("0.85", "0.50"), encoding="utf-8")
-    monkeypatch.setattr("benchmarks.blind.scorer.THRESHOLDS", easier)
+    monkeypatch.setattr("benchmarks.gap.withheld.scorer.THRESHOLDS", easier)
     with pytest.raises(ResultError, match="sealed with"):
         load_thresholds(tmp_path)
 
