@@ -1,4 +1,6 @@
-"""How often is a claim wrong? Driving, braking, locking, coasting, reversing torque and ABS-like cycling over speed and adhesion; prints JSON.
+"""How often is a claim wrong over speed and adhesion?
+
+Driving, braking, locking, coasting, reversing torque and ABS-like cycling; prints JSON.
 
 .venv/bin/python -m benchmarks.accuracy.manoeuvres
 

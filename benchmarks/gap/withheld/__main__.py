@@ -18,8 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from .generator.camera_family import CameraFamily
-from .generator.forms import Family
+from .generator.forms import NEWEST, PLAIN
 from .generator.making import make_case
 from .generator.table import table
 from .outcome import ResultError
@@ -49,11 +48,19 @@ Cases = Annotated[
 Seed = Annotated[
     int, typer.Option(min=0, help="1 is for development; a seal wants one that nobody has looked at.")
 ]
-Forms = Annotated[
-    Family,
-    typer.Option(help="What is drawn from: one form of everything, or several that no development has seen."),
+
+
+class Forms(StrEnum):
+    """What a case draws among."""
+
+    PLAIN = "plain"
+    NEWEST = "newest"
+
+
+EDITIONS = {Forms.PLAIN: PLAIN, Forms.NEWEST: NEWEST}
+FormsOf = Annotated[
+    Forms, typer.Option(help="What is drawn among: one form of everything, or all that the generator has.")
 ]
-CameraForms = Annotated[CameraFamily, typer.Option(help="The same of the camera's forms, in its cases.")]
 
 
 @app.command("cases")
@@ -61,15 +68,15 @@ def cases_command(
     out: Out,
     cases: Cases = Size.DEV,
     seed: Seed = 1,
-    forms: Forms = Family.FIRST,
-    camera_forms: CameraForms = CameraFamily.FIRST,
+    forms: FormsOf = Forms.PLAIN,
 ) -> None:
     """Only write the cases' files, with their seals beside, to look at."""
     with _progress() as progress:
-        specs = table(cases.value, forms, camera_forms)
+        edition = EDITIONS[forms]
+        specs = table(cases.value, edition)
         task = progress.add_task("cases", total=len(specs))
         for spec in specs:
-            case = make_case(spec, seed, forms, camera_forms)
+            case = make_case(spec, seed, edition)
             folder = write_case(case, seed, out)
             folder.with_suffix(".seal.json").write_text(json.dumps(case.seal(), indent=1), encoding="utf-8")
             progress.advance(task)
@@ -80,18 +87,18 @@ def run_command(
     out: Out,
     cases: Cases = Size.SMALL,
     seed: Seed = 1,
-    forms: Forms = Family.TENTH,
-    camera_forms: CameraForms = CameraFamily.THIRD,
+    forms: FormsOf = Forms.NEWEST,
     jobs: Annotated[int, typer.Option(min=1, help="Cases side by side.")] = 2,
     keep: Annotated[bool, typer.Option(help="Keep the cases' logs.")] = False,
 ) -> None:
     """Make the cases and have each diagnosed; a stopped run goes on where it stopped."""
-    seal_run(out, cases.value, seed, forms, camera_forms)
-    waiting, total = pending(out, cases.value, forms, camera_forms)
+    edition = EDITIONS[forms]
+    seal_run(out, cases.value, seed, edition)
+    waiting, total = pending(out, cases.value, edition)
     failed = 0
     with _progress() as progress:
         task = progress.add_task("diagnoses", total=total, completed=total - len(waiting))
-        for result in run(out, cases.value, seed, forms, jobs, keep, camera_forms):
+        for result in run(out, cases.value, seed, edition, jobs, keep):
             failed += result["error"] is not None
             progress.update(
                 task, advance=1, description=f"diagnoses, {failed} failed" if failed else "diagnoses"

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .baselines import closure, in_sample_bic
-from .generator.camera_family import CameraFamily, is_new
 from .generator.camera_library import CAMERA_LIBRARY
-from .generator.forms import Family, is_further
 from .generator.library import LIBRARY
 from .generator.table import Group
 
@@ -32,8 +30,6 @@ class Outcome:
     ----------
     truth : tuple of str
         Effects that were there.
-    further : frozenset of Family
-        Families that lack the form that one of them has.
     subsystems : tuple of str
         Right answers to where.
     gap : float
@@ -44,15 +40,12 @@ class Outcome:
         Effects and their probabilities as ranked; a cause of several effects gives them in a row.
     camera : bool
         The logs have a camera, so that its effects are candidates too.
-    new_to_camera : frozenset of CameraFamily
-        The camera's families that lack the form that one of them has.
     """
 
     name: str
     group: Group
     truth: tuple[str, ...]
     parameters: Mapping[str, float]
-    further: frozenset[Family]
     subsystems: tuple[str, ...]
     gap: float
     verdict: str
@@ -69,7 +62,6 @@ class Outcome:
     closure: tuple[str, ...]
     error: str | None
     camera: bool = False
-    new_to_camera: frozenset[CameraFamily] = frozenset()
 
     @property
     def blames(self) -> bool:
@@ -160,11 +152,6 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         group=Group(seal["group"]),
         truth=truth,
         parameters=seal["effects"][truth[0]] if truth else {},
-        further=frozenset(
-            family
-            for family in Family
-            if any(is_further(seal.get("forms", {}), effect, family) for effect in truth)
-        ),
         subsystems=tuple(seal["subsystems"]),
         gap=float(seal["gap"]),
         verdict=said["verdict"],
@@ -181,11 +168,6 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         closure=tuple(closure(said, known)),
         error=result["error"],
         camera=camera,
-        new_to_camera=frozenset(
-            family
-            for family in CameraFamily
-            if camera and any(is_new(seal["camera"]["chain"]["forms"], effect, family) for effect in truth)
-        ),
     )
 
 

@@ -22,9 +22,8 @@ from joblib import Parallel, delayed, parallel_config
 
 from .baselines import cosine
 from .command import arguments, watch
-from .generator.camera_family import CameraFamily
 from .generator.cases import Case, UndrivableError
-from .generator.forms import Family
+from .generator.forms import Edition
 from .generator.making import make_case
 from .generator.table import Group, Spec, table
 
@@ -46,15 +45,13 @@ def digest(*paths: Path) -> str:
     return total.hexdigest()
 
 
-def seal_run(
-    out: Path, size: str, seed: int, family: Family, camera: CameraFamily = CameraFamily.FIRST
-) -> None:
+def seal_run(out: Path, size: str, seed: int, edition: Edition) -> None:
     """Write what the run is before any case is made; refuse a folder that holds another one.
 
     Raises
     ------
     RunError
-        `out` holds a run of another seed, size, family of forms or of the camera's, generator or thresholds.
+        `out` holds a run of another seed, size, edition, generator or thresholds.
     """
     commit = subprocess.run(
         ["git", "rev-parse", "HEAD"], cwd=HERE, capture_output=True, text=True, check=False
@@ -62,8 +59,7 @@ def seal_run(
     run = {
         "seed": seed,
         "size": size,
-        "forms": family.value,
-        "camera_forms": camera.value,
+        "edition": asdict(edition),
         "generator_sha256": digest(*(HERE / "generator").glob("*.py")),
         "thresholds_sha256": digest(THRESHOLDS),
     }
@@ -80,12 +76,10 @@ def seal_run(
     _write(path, run | {"commit": commit.stdout.strip() or None})
 
 
-def pending(
-    out: Path, size: str, family: Family, camera: CameraFamily = CameraFamily.FIRST
-) -> tuple[list[Spec], int]:
+def pending(out: Path, size: str, edition: Edition) -> tuple[list[Spec], int]:
     """Cases without a result, and how many there are in all; in mixed order, so that a stopped run is a fair sample."""
     specs = sorted(
-        table(size, family, camera),
+        table(size, edition),
         key=lambda spec: (spec.group is Group.TIMING, zlib.crc32(spec.name.encode())),
     )
     return [spec for spec in specs if not result_path(out, spec).exists()], len(specs)
@@ -100,34 +94,32 @@ def run(
     out: Path,
     size: str,
     seed: int,
-    family: Family,
+    edition: Edition,
     jobs: int,
     keep: bool,
-    camera: CameraFamily = CameraFamily.FIRST,
 ) -> Iterator[dict[str, Any]]:
     """Run what is pending; results come as they are done, the timed cases last and alone."""
-    specs, _ = pending(out, size, family, camera)
+    specs, _ = pending(out, size, edition)
     side_by_side = [spec for spec in specs if spec.group is not Group.TIMING]
     with parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
         yield from Parallel(return_as="generator_unordered")(
-            delayed(run_case)(spec, seed, family, out, keep, camera) for spec in side_by_side
+            delayed(run_case)(spec, seed, edition, out, keep) for spec in side_by_side
         )
     for spec in specs:
         if spec.group is Group.TIMING:
-            yield run_case(spec, seed, family, out, keep, camera)
+            yield run_case(spec, seed, edition, out, keep)
 
 
 def run_case(
     spec: Spec,
     seed: int,
-    family: Family,
+    edition: Edition,
     out: Path,
     keep: bool,
-    camera: CameraFamily = CameraFamily.FIRST,
 ) -> dict[str, Any]:
     """Make one case, have it diagnosed, write the result; a case that cannot be made stays pending."""
     try:
-        case = make_case(spec, seed, family, camera)
+        case = make_case(spec, seed, edition)
     except UndrivableError as problem:
         return {"case": spec.name, "error": f"not made: {problem}"}
     folder = write_case(case, seed, out)

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from .generator.camera_family import CameraFamily
 from .generator.camera_library import CAMERA_LIBRARY
-from .generator.forms import Family
+from .generator.forms import Edition
 from .generator.library import LIBRARY
 from .generator.table import Group, table
 from .outcome import Outcome, ResultError, read_outcomes
@@ -97,8 +96,7 @@ def score_run(folder: Path) -> Scores:
     limits = load_thresholds(folder)
     outcomes = read_outcomes(folder)
     run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    camera = CameraFamily(run.get("camera_forms", CameraFamily.FIRST))
-    specs = table(run["size"], Family(run.get("forms", Family.FIRST)), camera)
+    specs = table(run["size"], Edition(**run["edition"]))
     done = {o.name for o in outcomes}
     return score(outcomes, limits, [spec.name for spec in specs if spec.name not in done])
 
@@ -235,18 +233,6 @@ def _asides(
         aside(f"rich, gap {low:g} to {high:g}: right first", inside, lambda o: o.right_within(1))
     aside("rich, the simulation's tyre: right first", of[Group.RICH], lambda o: o.right_within(1))
     aside("rich, another tyre: right first", of[Group.TYRE], lambda o: o.right_within(1))
-    for family in list(Family)[:-1]:
-        aside(
-            f"rich, a form that the {family} family lacks: right first",
-            [o for o in rich if family in o.further],
-            lambda o: o.right_within(1),
-        )
-    for camera in list(CameraFamily)[:-1]:
-        aside(
-            f"rich, a form that the camera's {camera} family lacks: right first",
-            [o for o in rich if camera in o.new_to_camera],
-            lambda o: o.right_within(1),
-        )
     aside("rich: ranked first, whatever the verdict", rich, lambda o: o.ranked_within(1))
     aside("rich: ranked first or second, whatever the verdict", rich, lambda o: o.ranked_within(2))
     aside("rich: called compound though one effect", rich, lambda o: o.verdict == "compound")

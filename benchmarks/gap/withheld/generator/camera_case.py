@@ -13,21 +13,21 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .camera_chain import results
-from .camera_family import CameraFamily, draw_forms_of, form
 from .camera_faults import jumps_m
-from .camera_further import ALL_EFFECTS
+from .camera_forms import draw_forms_of, form
 from .camera_gap import Stage, crossings, gap_of
 from .camera_layouts import SPEEDS, draw_laid_road
 from .camera_library import Scene
+from .camera_outside import ALL_EFFECTS
+from .camera_outside_faults import shrunk, wandered_m
 from .camera_reference import friction_of, measured_at, reference
 from .camera_road import CLASS_FRICTION, CameraRoad, Passage, draw_camera_road, passage_of
 from .camera_system import Chain, Fault, draw_chain
 from .camera_telling import columns
-from .camera_third_faults import shrunk, wandered_m
 from .car import Car, draw_car
 from .cases import LOGS, MUST_SHOW, SHOWS, Case, Truth, first_drivable, generator_of
 from .driver import Drive, Style, UndrivableError, drive
-from .forms import DIGITS, NOISES, RATES_HZ, STYLES, Family, draw_forms
+from .forms import PLAIN, RATES_HZ, Edition, draw_forms, form_of
 from .kernel import RECORD_STEP_S
 from .sensors import draw_noise, make_log
 from .severity import find_severity
@@ -51,7 +51,7 @@ class CameraCase(Case):
     """A case with what its camera is."""
 
     chain: Chain
-    family: CameraFamily
+    edition: int
 
     @property
     def subsystems(self) -> set[str]:
@@ -65,24 +65,22 @@ class CameraCase(Case):
             for effect, given in self.truth.effects.items()
         }
         camera = {
-            "family": self.family.value,
+            "edition": self.edition,
             "hidden": self.truth.effects,
             "chain": asdict(self.chain),
         }
         return super().seal() | {"effects": effects, "camera": camera}
 
 
-def make_camera_case(
-    spec: Spec, seed: int, family: Family, camera: CameraFamily = CameraFamily.FIRST
-) -> CameraCase:
-    """Draw a case of the camera, with forms of the `camera`'s family; `family` is that of all else.
+def make_camera_case(spec: Spec, seed: int, edition: Edition = PLAIN) -> CameraCase:
+    """Draw a case of the camera, with forms that the `edition` has of it and of all else.
 
     Raises
     ------
     UndrivableError
         No draw gives a car that can be driven and a deviation that shows.
     """
-    return first_drivable(spec, lambda key: _draw(spec, seed, key, family, camera))
+    return first_drivable(spec, lambda key: _draw(spec, seed, key, edition))
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ class _Ground:
 def _ground(spec: Spec, key: str, seed: int, driver: str, chain: Chain, rng: Generator) -> _Ground:
     few = not spec.rich and rng.random() < 0.5
     speeds = SPEEDS[form(chain.forms, "speeds")]
-    style = STYLES[driver] if (rng.random() < 0.4 if spec.rich else few) else speeds
+    style = form_of("driver", driver) if (rng.random() < 0.4 if spec.rich else few) else speeds
     road, elsewhere = (draw_camera_road(rng, "few" if few else "usual") for _ in range(2))
     layout = form(chain.forms, "layout")
     if layout != "usual" and not few:
@@ -125,14 +123,14 @@ def _ground(spec: Spec, key: str, seed: int, driver: str, chain: Chain, rng: Gen
     return _Ground(spec, draw_car(rng, ()), style, roads, durations, (seed, key))
 
 
-def _draw(spec: Spec, seed: int, key: str, family: Family, camera: CameraFamily) -> CameraCase:
-    rng, forms = generator_of(seed, key, "camera"), draw_forms(family, generator_of(seed, key, "forms"))
-    chain = draw_chain(rng, draw_forms_of(camera, generator_of(seed, key, "camera forms")))
+def _draw(spec: Spec, seed: int, key: str, edition: Edition) -> CameraCase:
+    rng, forms = generator_of(seed, key, "camera"), draw_forms(edition.car, generator_of(seed, key, "forms"))
+    chain = draw_chain(rng, draw_forms_of(edition.camera, generator_of(seed, key, "camera forms")))
     if "class_friction_offset" in spec.effects and chain.reference_noise is None:
         raise UndrivableError("nothing measures the friction")
     ground = _ground(spec, key, seed, forms["driver"], chain, rng)
     car, roads, noise = ground.car, ground.roads, draw_noise(rng)
-    rate = float(rng.choice(list(RATES_HZ[family]), p=list(RATES_HZ[family].values())))
+    rate = float(rng.choice(list(RATES_HZ[edition.car]), p=list(RATES_HZ[edition.car].values())))
     driven = ground.drive(roads)
     passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
     driven_on = (c for c in range(3) if all(_driven(chain, passages[n], roads[n], n, c) for n in LOGS))
@@ -150,16 +148,18 @@ def _draw(spec: Spec, seed: int, key: str, family: Family, camera: CameraFamily)
     for name in LOGS:
         done, own = driven[name]
         sensors = nominal(car, told[name]).sensors
-        log = make_log(done.path, done.command, sensors, noise, rate, own, NOISES[forms["noise"]])
+        log = make_log(done.path, done.command, sensors, noise, rate, own, form_of("noise", forms["noise"]))
         log = _with_camera(log, chain, passages[name], roads[name], fault, name)
-        logs[name] = DIGITS[forms["digits"]](log)
+        logs[name] = form_of("digits", forms["digits"])(log)
     gap = gap_of(Stage(chain, passages["holdout"], roads["holdout"], "holdout"), fault, told["holdout"])
     if spec.group in MUST_SHOW and spec.effects and gap.total < SHOWS:
         raise UndrivableError("the deviations cancel")
     drives = {name: done for name, (done, _) in driven.items()}
     base = {name: nominal(car, road) for name, road in told.items()}
     truth = Truth(parts, {}, gap, alone)
-    return CameraCase(spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, chain, camera)
+    return CameraCase(
+        spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, chain, edition.camera
+    )
 
 
 def _check_borders(passage: Passage, road: CameraRoad, rich: bool) -> None:

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .camera_family import form
 from .camera_faults import courses, jumps_m, kept_of, nod_of, outside_kept, pitch_of, shown_s
+from .camera_forms import form
+from .camera_outside_faults import extrapolated_m, rained_on, wandered_m
 from .camera_road import CameraRoad, Passage, Whole
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault, Results
 from .camera_telling import classified, confidence_of, odds_of, voted
-from .camera_third_faults import extrapolated_m, rained_on, wandered_m
 from .camera_timing import delivered, numbers, timing
 
 Array = NDArray[np.floating[Any]]

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from .camera_family import form, function
+from .camera_forms import form, function
+from .camera_outside_faults import set_clock_s, weather_kept
 from .camera_road import Passage, Whole
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault
-from .camera_third_faults import set_clock_s, weather_kept
 
 Array = NDArray[np.floating[Any]]
 

@@ -1,4 +1,4 @@
-"""Further roads, and further drivers that every surface bears: what the camera's second and third family add."""
+"""Roads that are laid otherwise than usual, and drivers that every surface bears."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .camera_road import ALL_SPEEDS, CLASS_FRICTION, ODDS, ROAD_M, CameraRoad
 from .car import Car
 from .driver import COAST, Piece, Style
-from .styles import clock_of, faded, squeezed
+from .pedals import clock_of, faded, squeezed
 
 Array = NDArray[np.floating[Any]]
 Stretches = Iterator[tuple[float, int]]

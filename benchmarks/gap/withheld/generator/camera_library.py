@@ -1,4 +1,4 @@
-"""The contract's effects of the camera, and deviations that its library lacks: how large, and what they change."""
+"""The contract's effects of the camera: how large, and what they change."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from .camera_family import form
+from .camera_forms import form
 from .camera_road import CLASS_FRICTION, SURFACES
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault
 from .details import USUAL_M_S
@@ -85,19 +85,6 @@ def _friction(scene: Scene, rng: Generator) -> Scale:
     return parameters
 
 
-def _confusion(scene: Scene, rng: Generator) -> Scale:
-    begin = float(rng.uniform(50.0, 120.0))
-    return lambda severity: {"from_m": begin, "length_m": 4.0 * 40.0**severity}
-
-
-def _signed(name: str, least: float, most: float) -> Callable[[Scene, Generator], Scale]:
-    def at(scene: Scene, rng: Generator) -> Scale:
-        sign = float(rng.choice([-1.0, 1.0]))
-        return lambda severity: {name: sign * least * (most / least) ** severity}
-
-    return at
-
-
 CAMERA_LIBRARY: dict[str, CameraEffect] = {
     "camera_latency": CameraEffect(
         growing("delay_s", 0.01, 0.6),
@@ -122,38 +109,3 @@ CAMERA_LIBRARY: dict[str, CameraEffect] = {
     ),
 }
 """The five effects of the contract's perception chain."""
-
-CAMERA_PAIRS = (
-    ("camera_latency", "camera_pitch"),
-    ("motion_blur", "exposure_shift"),
-    ("camera_latency", "class_friction_offset"),
-    ("camera_pitch", "motion_blur"),
-    ("exposure_shift", "class_friction_offset"),
-)
-"""A new camera, one in the dark, one on a strange road, one that was knocked, and one at night in another country."""
-
-CAMERA_OUTSIDE: dict[str, CameraEffect] = {
-    "odometer_drift": CameraEffect(
-        _signed("share", 0.001, 0.03), lambda f, g: replace(f, odometer=g["share"]), ("camera", "road")
-    ),
-    "map_borders_off": CameraEffect(
-        growing("spread_m", 0.3, 6.0), lambda f, g: replace(f, map_m=g["spread_m"]), ("road", "camera")
-    ),
-    "sun_glare": CameraEffect(
-        growing("share", 0.05, 0.9), lambda f, g: replace(f, glare=g["share"]), ("camera", "road")
-    ),
-    "stretch_confused": CameraEffect(
-        _confusion,
-        lambda f, g: replace(f, confused_m=g["length_m"], confused_from_m=g["from_m"]),
-        ("camera", "road"),
-    ),
-    "camera_clock_fast": CameraEffect(
-        growing("share", 0.0005, 0.03), lambda f, g: replace(f, clock=g["share"]), ("camera",)
-    ),
-    "camera_freezes": CameraEffect(
-        growing("hold_s", 0.1, 2.5), lambda f, g: replace(f, frozen_s=g["hold_s"]), ("camera",)
-    ),
-}
-"""What the library lacks; any of the subsystems is a right answer."""
-
-CAMERA_EFFECTS = CAMERA_LIBRARY | CAMERA_OUTSIDE

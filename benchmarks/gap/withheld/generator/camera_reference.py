@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import lfilter
 
-from .camera_family import form, function
 from .camera_faults import acceleration
+from .camera_forms import form, function
+from .camera_outside_faults import pushed_share
 from .camera_road import CLASS_FRICTION, CameraRoad, Passage
 from .camera_system import Chain, Fault
-from .camera_third_faults import pushed_share
 from .kernel import RECORD_STEP_S
 
 Array = NDArray[np.floating[Any]]

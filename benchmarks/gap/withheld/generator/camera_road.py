@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .car import Car, Road
 from .driver import COAST, Piece, Style
 from .kernel import RECORD_STEP_S, V, X
-from .styles import clock_of, faded, squeezed
+from .pedals import clock_of, faded, squeezed
 
 Array = NDArray[np.floating[Any]]
 Whole = NDArray[np.integer[Any]]

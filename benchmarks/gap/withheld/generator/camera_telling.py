@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .camera_family import form, function
+from .camera_forms import form, function
 from .camera_road import Whole
 from .camera_system import Chain, Fault, Results
 

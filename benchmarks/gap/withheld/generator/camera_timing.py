@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera_family import form, function
+from .camera_forms import form, function
 from .camera_road import Passage
 from .camera_system import Chain
 

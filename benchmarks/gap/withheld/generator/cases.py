@@ -15,7 +15,7 @@ from numpy.random import Generator
 
 from .car import Car, Road, draw_car, draw_road
 from .driver import Drive, UndrivableError, drive
-from .forms import DIGITS, FOREIGN, NOISES, RATES_HZ, STYLES, Family, Forms, draw_forms, effect_in
+from .forms import PLAIN, RATES_HZ, Edition, Forms, draw_forms, effect_in, form_of
 from .sensors import Noise, draw_noise, make_log
 from .severity import CEILING, Size, drive_or_none, find_severity, residual, size_of
 from .table import Group, Spec
@@ -103,15 +103,15 @@ def generator_of(seed: int, *names: str) -> Generator:
     return np.random.default_rng([seed, *(zlib.crc32(name.encode()) for name in names)])
 
 
-def make_case(spec: Spec, seed: int, family: Family = Family.FIRST) -> Case:
-    """Draw a case, with forms of the `family`.
+def make_case(spec: Spec, seed: int, edition: Edition = PLAIN) -> Case:
+    """Draw a case, with forms that the `edition` has.
 
     Raises
     ------
     UndrivableError
         None of `TRIES` draws gives a car that can be driven.
     """
-    return first_drivable(spec, lambda key: _draw(spec, seed, key, family))
+    return first_drivable(spec, lambda key: _draw(spec, seed, key, edition))
 
 
 def first_drivable(spec: Spec, draw: Callable[[str], AnyCase]) -> AnyCase:
@@ -137,14 +137,14 @@ class _Stage:
     seeds: tuple[int, str, str]
 
     def gap(self, world: World, noise: Noise) -> float:
-        style = STYLES[self.forms["driver"]]
+        style = form_of("driver", self.forms["driver"])
         rng = generator_of(*self.seeds)
         driven = drive_or_none(self.car, world, self.spec.rich, self.duration_s, rng, style)
         return CEILING if driven is None else size_of(residual(world, self.base, driven), noise).total
 
 
-def _draw(spec: Spec, seed: int, key: str, family: Family) -> Case:
-    rng, forms = generator_of(seed, key), draw_forms(family, generator_of(seed, key, "forms"))
+def _draw(spec: Spec, seed: int, key: str, edition: Edition) -> Case:
+    rng, forms = generator_of(seed, key), draw_forms(edition.car, generator_of(seed, key, "forms"))
     car = draw_car(rng, spec.effects)
     road, elsewhere = draw_road(rng, spec.rich), draw_road(rng, spec.rich)
     hold = elsewhere if rng.random() < 0.25 else road
@@ -152,7 +152,7 @@ def _draw(spec: Spec, seed: int, key: str, family: Family) -> Case:
     base = {name: nominal(car, place) for name, place in roads.items()}
     timing = spec.group is Group.TIMING
     durations = {name: 60.0 if timing else float(rng.uniform(24.0, 34.0)) for name in LOGS}
-    rates = RATES_HZ[family]
+    rates = RATES_HZ[edition.car]
     noise = draw_noise(rng)
     rate = 1000.0 if timing else float(rng.choice(list(rates), p=list(rates.values())))
     stage = _Stage(spec, forms, car, base["holdout"], durations["holdout"], (seed, key, "holdout"))
@@ -161,16 +161,24 @@ def _draw(spec: Spec, seed: int, key: str, family: Family) -> Case:
     pulses = int(rng.integers(2**31))
     worlds, logs, drives = {}, {}, {}
     for name in LOGS:
-        world = FOREIGN[forms["foreign_tyre"]].apply(base[name], **tyre) if tyre else base[name]
+        world = (
+            form_of("foreign_tyre", forms["foreign_tyre"]).apply(base[name], **tyre) if tyre else base[name]
+        )
         for effect, parameters in parts.items():
             world = effect_in(forms, effect).apply(world, parameters)
         worlds[name] = world.sensed(seed=pulses)
         own = generator_of(seed, key, name)
-        driven = drive(car, world, spec.rich, durations[name], own, STYLES[forms["driver"]])
+        driven = drive(car, world, spec.rich, durations[name], own, form_of("driver", forms["driver"]))
         log = make_log(
-            driven.path, driven.command, worlds[name].sensors, noise, rate, own, NOISES[forms["noise"]]
+            driven.path,
+            driven.command,
+            worlds[name].sensors,
+            noise,
+            rate,
+            own,
+            form_of("noise", forms["noise"]),
         )
-        drives[name], logs[name] = driven, DIGITS[forms["digits"]](log)
+        drives[name], logs[name] = driven, form_of("digits", forms["digits"])(log)
     gap = size_of(residual(worlds["holdout"], base["holdout"], drives["holdout"]), noise)
     return Case(spec, forms, car, roads, noise, rate, Truth(parts, tyre, gap, gap_of), logs, drives, base)
 
@@ -200,7 +208,7 @@ def _deviations(
 
 def _tyre(stage: _Stage, noise: Noise, rng: Generator) -> Parameters:
     """A share of the foreign curve that leaves `MISMATCH_GAP` at most, and the curve's own parameters."""
-    foreign = FOREIGN[stage.forms["foreign_tyre"]]
+    foreign = form_of("foreign_tyre", stage.forms["foreign_tyre"])
     own = foreign.draw(rng)
     share = find_severity(
         lambda share: stage.gap(foreign.apply(stage.base, share, **own), noise), MISMATCH_GAP

@@ -1,219 +1,125 @@
 """Forms: what the contract leaves open, in several readings, of which each case has one that its seal tells.
 
 A form never changes the nominal car or what a parameter means: it acts only through the effect that is hidden, the
-tyre's foreign share, the noise, the logger or the driver. The first form of each aspect is the first family's only one;
-the families after it draw among theirs, from a generator of its own, so that whatever else is drawn stays as it was.
-What a family adds stands in a file of its own, and its lists are never changed: what was drawn from them stays too.
+tyre's foreign share, the noise, the logger or the driver. Each tells since which edition of the generator it is drawn:
+a case of an edition draws among the forms that there were by then, from a generator of its own, so that whatever else
+is drawn stays as it was. Lists are added to at their ends only: what was drawn from them stays too.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from enum import StrEnum
-from itertools import accumulate
-from operator import or_
+from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.random import Generator
 
-from . import (
-    forms_eighth,
-    forms_fifth,
-    forms_fourth,
-    forms_ninth,
-    forms_second,
-    forms_seventh,
-    forms_sixth,
-    forms_tenth,
-    forms_third,
-)
-from .forms_second import Foreign
+from . import drivers_by_machine as by_machine
+from . import drivers_by_task as by_task
+from . import drivers_by_temper as by_temper
+from .camera_forms import NEWEST_CAMERA
+from .driver import BRISK, Style
+from .effects import EFFECT_FORMS
+from .foreign import FOREIGN
 from .library import LIBRARY
-from .outside import EVEN_FURTHER, FURTHER, OUTSIDE, STILL_FURTHER, YET_FURTHER
-from .outside_eighth import AND_BEYOND
-from .outside_ninth import STILL_BEYOND
-from .outside_seventh import BEYOND
-from .outside_sixth import LAST_FURTHER
-from .outside_tenth import WELL_BEYOND
+from .loggers import DIGITS
+from .noise import NOISES
+from .outside import OUTSIDE, OUTSIDE_SINCE
 from .world import Effect
 
 Forms = dict[str, str]
-Aspects = dict[str, dict[str, Any]]
 
 
-class Family(StrEnum):
-    """Which forms are drawn from; each later one holds all of the earlier ones."""
+@dataclass(frozen=True)
+class Edition:
+    """What the generator draws among: all that it had by then.
 
-    FIRST = "first"
-    """One form of each aspect."""
-    SECOND = "second"
-    """More forms, more log rates, more deviations outside the library."""
-    THIRD = "third"
-    """Forms of nearly every effect; again more of all else."""
-    FOURTH = "fourth"
-    """Forms of every effect; again more of all else."""
-    FIFTH = "fifth"
-    """Again more of everything, and more pairs."""
-    SIXTH = "sixth"
-    """The same once more."""
-    SEVENTH = "seventh"
-    """And again, of nearly everything."""
-    EIGHTH = "eighth"
-    """More of most."""
-    NINTH = "ninth"
-    """More of most, once more."""
-    TENTH = "tenth"
-    """More of nearly everything."""
+    Attributes
+    ----------
+    car : int
+        Forms of effects, tyres, noise, loggers and drivers, log rates, deviations outside the library, and pairs; the
+        first has one form of everything, as the library has it.
+    camera : int
+        The same of the camera's cases; the first has several forms of most aspects.
+    """
+
+    car: int
+    camera: int
 
 
-def _joined(aspects: Aspects, more: Aspects) -> Aspects:
-    """What has had forms before comes first, as do those forms."""
-    return {name: {**aspects.get(name, {}), **more.get(name, {})} for name in {**aspects, **more}}
+PLAIN = Edition(1, 1)
+NEWEST = Edition(10, NEWEST_CAMERA)
 
-
-THIRD: Aspects = _joined(forms_second.ASPECTS, forms_third.MORE)
-FOURTH: Aspects = _joined(THIRD, forms_fourth.MORE)
-FIFTH: Aspects = _joined(FOURTH, forms_fifth.MORE)
-SIXTH: Aspects = _joined(FIFTH, forms_sixth.MORE)
-SEVENTH: Aspects = _joined(SIXTH, forms_seventh.MORE)
-EIGHTH: Aspects = _joined(SEVENTH, forms_eighth.MORE)
-NINTH: Aspects = _joined(EIGHTH, forms_ninth.MORE)
-TENTH: Aspects = _joined(NINTH, forms_tenth.MORE)
-ASPECTS: dict[Family, Aspects] = {
-    Family.FIRST: {name: dict([next(iter(forms.items()))]) for name, forms in forms_second.ASPECTS.items()},
-    Family.SECOND: forms_second.ASPECTS,
-    Family.THIRD: THIRD,
-    Family.FOURTH: FOURTH,
-    Family.FIFTH: FIFTH,
-    Family.SIXTH: SIXTH,
-    Family.SEVENTH: SEVENTH,
-    Family.EIGHTH: EIGHTH,
-    Family.NINTH: NINTH,
-    Family.TENTH: TENTH,
+STYLES: dict[str, tuple[int, Style]] = {
+    "brisk": (1, BRISK),
+    "squeezing": (2, by_temper.SQUEEZING),
+    "restless": (2, by_temper.RESTLESS),
+    "one_pedal": (3, by_temper.ONE_PEDAL),
+    "proving": (3, by_machine.PROVING),
+    "assisted": (4, by_machine.ASSISTED),
+    "hurried": (4, by_temper.HURRIED),
+    "robot": (5, by_machine.ROBOT),
+    "learner": (5, by_temper.LEARNER),
+    "winter": (5, by_task.WINTER),
+    "delivery": (6, by_task.DELIVERY),
+    "saving": (6, by_task.SAVING),
+    "two_feet": (6, by_temper.TWO_FEET),
+    "overtaking": (7, by_task.OVERTAKING),
+    "training": (8, by_task.TRAINING),
+    "cruise_control": (9, by_machine.CRUISE_CONTROL),
+    "commuter": (10, by_task.COMMUTER),
 }
-"""All that has forms in each family; what a family does not list has the library's form."""
-EFFECT_FORMS: Aspects = {name: forms for name, forms in TENTH.items() if name in LIBRARY}
-FOREIGN: dict[str, Foreign] = TENTH["foreign_tyre"]
-NOISES, DIGITS, STYLES = TENTH["noise"], TENTH["digits"], TENTH["driver"]
 
-RATES_HZ: dict[Family, dict[float, float]] = {
-    Family.FIRST: {100.0: 0.35, 200.0: 0.4, 500.0: 0.15, 1000.0: 0.1},
-    Family.SECOND: {
-        100.0: 0.2,
-        200.0: 0.2,
-        250.0: 0.25,
-        400.0: 0.15,
-        500.0: 0.1,
-        800.0: 0.05,
-        2000.0: 0.05,
-    },
-    Family.THIRD: {100.0: 0.2, 200.0: 0.2, 250.0: 0.1, 300.0: 0.2, 500.0: 0.1, 600.0: 0.15, 1200.0: 0.05},
-    Family.FOURTH: {
-        100.0: 0.2,
-        150.0: 0.15,
-        200.0: 0.2,
-        350.0: 0.15,
-        500.0: 0.1,
-        750.0: 0.1,
-        1000.0: 0.05,
-        1500.0: 0.05,
-    },
-    Family.FIFTH: {
-        100.0: 0.2,
-        200.0: 0.2,
-        250.0: 0.1,
-        450.0: 0.15,
-        550.0: 0.1,
-        900.0: 0.1,
-        1000.0: 0.1,
-        1300.0: 0.05,
-    },
-    Family.SIXTH: {
-        100.0: 0.2,
-        150.0: 0.1,
-        200.0: 0.2,
-        300.0: 0.1,
-        400.0: 0.1,
-        650.0: 0.1,
-        700.0: 0.1,
-        1000.0: 0.1,
-    },
-    Family.SEVENTH: {
-        100.0: 0.15,
-        150.0: 0.1,
-        200.0: 0.2,
-        250.0: 0.15,
-        500.0: 0.1,
-        600.0: 0.1,
-        850.0: 0.1,
-        1000.0: 0.1,
-    },
-    Family.EIGHTH: {
-        100.0: 0.15,
-        150.0: 0.1,
-        200.0: 0.2,
-        250.0: 0.1,
-        400.0: 0.15,
-        500.0: 0.1,
-        950.0: 0.1,
-        1000.0: 0.1,
-    },
-    Family.NINTH: {
-        100.0: 0.15,
-        150.0: 0.1,
-        200.0: 0.2,
-        250.0: 0.1,
-        300.0: 0.15,
-        500.0: 0.1,
-        800.0: 0.1,
-        1000.0: 0.05,
-        1100.0: 0.05,
-    },
-    Family.TENTH: {
-        100.0: 0.15,
-        150.0: 0.1,
-        200.0: 0.15,
-        250.0: 0.1,
-        350.0: 0.15,
-        500.0: 0.1,
-        600.0: 0.1,
-        1000.0: 0.1,
-        1250.0: 0.05,
-    },
+_DRAWN_EARLY = tuple(name for name, forms in EFFECT_FORMS.items() if next(iter(forms.values()))[0] == 1)
+ASPECTS: dict[str, dict[str, tuple[int, Any]]] = {
+    **{name: EFFECT_FORMS[name] for name in _DRAWN_EARLY},
+    "foreign_tyre": FOREIGN,
+    "noise": NOISES,
+    "digits": DIGITS,
+    "driver": STYLES,
+    **{name: forms for name, forms in EFFECT_FORMS.items() if name not in _DRAWN_EARLY},
 }
-"""Log rates and their odds; at each, every second corner of the command at least falls on a row."""
+"""All that has forms, in the order in which they are drawn."""
 
-_ADDED = (
-    OUTSIDE,
-    FURTHER,
-    STILL_FURTHER,
-    YET_FURTHER,
-    EVEN_FURTHER,
-    LAST_FURTHER,
-    BEYOND,
-    AND_BEYOND,
-    STILL_BEYOND,
-    WELL_BEYOND,
-)
-OUTSIDES: dict[Family, dict[str, Effect]] = dict(zip(Family, accumulate(_ADDED, or_), strict=True))
-"""Each family's deviations outside the library."""
+RATES_HZ: dict[int, dict[float, float]] = {
+    1: {100: 0.35, 200: 0.4, 500: 0.15, 1000: 0.1},
+    2: {100: 0.2, 200: 0.2, 250: 0.25, 400: 0.15, 500: 0.1, 800: 0.05, 2000: 0.05},
+    3: {100: 0.2, 200: 0.2, 250: 0.1, 300: 0.2, 500: 0.1, 600: 0.15, 1200: 0.05},
+    4: {100: 0.2, 150: 0.15, 200: 0.2, 350: 0.15, 500: 0.1, 750: 0.1, 1000: 0.05, 1500: 0.05},
+    5: {100: 0.2, 200: 0.2, 250: 0.1, 450: 0.15, 550: 0.1, 900: 0.1, 1000: 0.1, 1300: 0.05},
+    6: {100: 0.2, 150: 0.1, 200: 0.2, 300: 0.1, 400: 0.1, 650: 0.1, 700: 0.1, 1000: 0.1},
+    7: {100: 0.15, 150: 0.1, 200: 0.2, 250: 0.15, 500: 0.1, 600: 0.1, 850: 0.1, 1000: 0.1},
+    8: {100: 0.15, 150: 0.1, 200: 0.2, 250: 0.1, 400: 0.15, 500: 0.1, 950: 0.1, 1000: 0.1},
+    9: {100: 0.15, 150: 0.1, 200: 0.2, 250: 0.1, 300: 0.15, 500: 0.1, 800: 0.1, 1000: 0.05, 1100: 0.05},
+    10: {100: 0.15, 150: 0.1, 200: 0.15, 250: 0.1, 350: 0.15, 500: 0.1, 600: 0.1, 1000: 0.1, 1250: 0.05},
+}
+"""Log rates of each edition and their odds; at each, every second corner of the command at least falls on a row."""
 
 
-def draw_forms(family: Family, rng: Generator) -> Forms:
-    """A form of each of the family's aspects, all equally likely."""
-    aspects = ASPECTS[family]
-    if family is Family.FIRST:
-        return {aspect: next(iter(forms)) for aspect, forms in aspects.items()}
-    return {aspect: str(rng.choice(list(forms))) for aspect, forms in aspects.items()}
+def names_by(edition: int) -> dict[str, list[str]]:
+    """Each aspect's forms that the generator had by an edition; what is not listed has the library's."""
+    known = {
+        aspect: [form for form, (since, _) in forms.items() if since <= edition]
+        for aspect, forms in ASPECTS.items()
+    }
+    return {aspect: forms for aspect, forms in known.items() if forms}
+
+
+def outside_by(edition: int) -> dict[str, Effect]:
+    """Deviations outside the library that the generator had by an edition."""
+    return {name: effect for name, (since, effect) in OUTSIDE_SINCE.items() if since <= edition}
+
+
+def draw_forms(edition: int, rng: Generator) -> Forms:
+    """A form of each aspect, all equally likely."""
+    return {aspect: str(rng.choice(forms)) for aspect, forms in names_by(edition).items()}
+
+
+def form_of(aspect: str, name: str) -> Any:
+    """What a form is."""
+    return ASPECTS[aspect][name][1]
 
 
 def effect_in(forms: Forms, name: str) -> Effect:
     """An effect or outside deviation as a case with these forms has it."""
-    effect = {**LIBRARY, **OUTSIDES[Family.TENTH]}[name]
-    return replace(effect, apply=EFFECT_FORMS[name][forms[name]]) if name in forms else effect
-
-
-def is_further(forms: Forms, name: str, family: Family) -> bool:
-    """Whether an effect has a form that the `family` lacks."""
-    known = ASPECTS[family].get(name) or list(EFFECT_FORMS.get(name, {}))[:1]
-    return name in forms and forms[name] not in known
+    effect = LIBRARY[name] if name in LIBRARY else OUTSIDE[name]
+    return replace(effect, apply=form_of(name, forms[name])) if name in forms else effect

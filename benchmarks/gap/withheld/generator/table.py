@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from .camera_family import CameraFamily
-from .camera_further import CAMERA_OUTSIDES, PAIRS_OF
 from .camera_library import CAMERA_LIBRARY
-from .forms import OUTSIDES, Family
+from .camera_outside import camera_outside_by
+from .forms import PLAIN, Edition, outside_by
 from .library import LIBRARY
 
 
@@ -32,88 +31,95 @@ class Group(StrEnum):
     """A log of 60 s at 1 kHz, by the command, alone on the machine."""
 
 
-PAIRS = (
-    ("aero_drag", "rolling_resistance"),
-    ("aero_drag", "mass_offset"),
-    ("aero_drag", "torque_delay"),
-    ("rolling_resistance", "wheel_radius_offset"),
-    ("rolling_resistance", "torque_lag"),
-    ("road_grade", "vehicle_speed_scale"),
-    ("road_grade", "accelerometer_bias"),
-    ("road_grade", "torque_gain"),
-    ("mass_offset", "tyre_stiffness_offset"),
-    ("mass_offset", "accelerometer_bias"),
-    ("mass_offset", "friction_offset"),
-    ("wheel_radius_offset", "torque_lag"),
-    ("wheel_radius_offset", "wheel_speed_delay"),
-    ("load_transfer", "aero_drag"),
-    ("load_transfer", "torque_delay"),
-    ("tyre_relaxation", "vehicle_speed_delay"),
-    ("tyre_relaxation", "brake_drag"),
-    ("tyre_stiffness_offset", "friction_offset"),
-    ("friction_falloff", "torque_gain"),
-    ("mu_split", "vehicle_speed_delay"),
-    ("torque_gain", "vehicle_speed_scale"),
-    ("torque_delay", "wheel_speed_quantisation"),
-    ("driveline_compliance", "vehicle_speed_scale"),
-    ("wheel_inertia_offset", "aero_drag"),
-)
-"""Pairs that one car may well have together."""
-
-FURTHER_PAIRS = (
-    ("wheel_radius_offset", "tyre_stiffness_offset"),
-    ("mass_offset", "load_transfer"),
-    ("friction_offset", "friction_falloff"),
-    ("brake_drag", "torque_gain"),
-    ("wheel_speed_delay", "vehicle_speed_delay"),
-)
-"""Pairs of one cause: other tyres, a load, a polished road, worn brakes, a slow bus. From the fifth family on."""
-
-LAST_PAIRS = (
-    ("mass_offset", "rolling_resistance"),
-    ("wheel_radius_offset", "wheel_inertia_offset"),
-    ("tyre_relaxation", "tyre_stiffness_offset"),
-    ("torque_gain", "torque_lag"),
-)
-"""More of the same: a load, other wheels, other tyres, a weak inverter. From the sixth family on."""
-
-SEVENTH_PAIRS = (
-    ("mass_offset", "road_grade"),
-    ("wheel_speed_delay", "wheel_speed_quantisation"),
-    ("vehicle_speed_scale", "accelerometer_bias"),
-)
-"""And more: a journey to the mountains, cheap wheel sensors, one box for speed and acceleration. From the seventh."""
-
-EIGHTH_PAIRS = (
-    ("torque_delay", "wheel_speed_delay"),
-    ("rolling_resistance", "tyre_stiffness_offset"),
-    ("mass_offset", "brake_drag"),
-)
-"""And more: a busy bus both ways, winter tyres, a load on brakes that stick. From the eighth family on."""
-
-NINTH_PAIRS = (
-    ("rolling_resistance", "friction_offset"),
-    ("vehicle_speed_delay", "vehicle_speed_scale"),
-    ("aero_drag", "wheel_radius_offset"),
-)
-"""And more: saving tyres, a cheap receiver, a kit for rough country. From the ninth family on."""
-
-TENTH_PAIRS = (
-    ("friction_falloff", "tyre_stiffness_offset"),
-    ("wheel_inertia_offset", "torque_gain"),
-    ("mass_offset", "wheel_radius_offset"),
-)
-"""And more: tyres that have aged, other motors, a load on soft tyres. From the tenth family on."""
-
-MORE_PAIRS = {
-    Family.FIFTH: FURTHER_PAIRS,
-    Family.SIXTH: LAST_PAIRS,
-    Family.SEVENTH: SEVENTH_PAIRS,
-    Family.EIGHTH: EIGHTH_PAIRS,
-    Family.NINTH: NINTH_PAIRS,
-    Family.TENTH: TENTH_PAIRS,
+Pairs = tuple[tuple[str, str], ...]
+PAIRS: dict[int, Pairs] = {
+    1: (
+        ("aero_drag", "rolling_resistance"),
+        ("aero_drag", "mass_offset"),
+        ("aero_drag", "torque_delay"),
+        ("rolling_resistance", "wheel_radius_offset"),
+        ("rolling_resistance", "torque_lag"),
+        ("road_grade", "vehicle_speed_scale"),
+        ("road_grade", "accelerometer_bias"),
+        ("road_grade", "torque_gain"),
+        ("mass_offset", "tyre_stiffness_offset"),
+        ("mass_offset", "accelerometer_bias"),
+        ("mass_offset", "friction_offset"),
+        ("wheel_radius_offset", "torque_lag"),
+        ("wheel_radius_offset", "wheel_speed_delay"),
+        ("load_transfer", "aero_drag"),
+        ("load_transfer", "torque_delay"),
+        ("tyre_relaxation", "vehicle_speed_delay"),
+        ("tyre_relaxation", "brake_drag"),
+        ("tyre_stiffness_offset", "friction_offset"),
+        ("friction_falloff", "torque_gain"),
+        ("mu_split", "vehicle_speed_delay"),
+        ("torque_gain", "vehicle_speed_scale"),
+        ("torque_delay", "wheel_speed_quantisation"),
+        ("driveline_compliance", "vehicle_speed_scale"),
+        ("wheel_inertia_offset", "aero_drag"),
+    ),
+    # Other tyres, a load, a polished road, worn brakes, a slow bus.
+    5: (
+        ("wheel_radius_offset", "tyre_stiffness_offset"),
+        ("mass_offset", "load_transfer"),
+        ("friction_offset", "friction_falloff"),
+        ("brake_drag", "torque_gain"),
+        ("wheel_speed_delay", "vehicle_speed_delay"),
+    ),
+    # A load, other wheels, other tyres, a weak inverter.
+    6: (
+        ("mass_offset", "rolling_resistance"),
+        ("wheel_radius_offset", "wheel_inertia_offset"),
+        ("tyre_relaxation", "tyre_stiffness_offset"),
+        ("torque_gain", "torque_lag"),
+    ),
+    # A journey to the mountains, cheap wheel sensors, one box for speed and acceleration.
+    7: (
+        ("mass_offset", "road_grade"),
+        ("wheel_speed_delay", "wheel_speed_quantisation"),
+        ("vehicle_speed_scale", "accelerometer_bias"),
+    ),
+    # A busy bus both ways, winter tyres, a load on brakes that stick.
+    8: (
+        ("torque_delay", "wheel_speed_delay"),
+        ("rolling_resistance", "tyre_stiffness_offset"),
+        ("mass_offset", "brake_drag"),
+    ),
+    # Saving tyres, a cheap receiver, a kit for rough country.
+    9: (
+        ("rolling_resistance", "friction_offset"),
+        ("vehicle_speed_delay", "vehicle_speed_scale"),
+        ("aero_drag", "wheel_radius_offset"),
+    ),
+    # Tyres that have aged, other motors, a load on soft tyres.
+    10: (
+        ("friction_falloff", "tyre_stiffness_offset"),
+        ("wheel_inertia_offset", "torque_gain"),
+        ("mass_offset", "wheel_radius_offset"),
+    ),
 }
-"""What each family adds to those of the one before."""
+"""Pairs that one car may well have together, by the edition that added them."""
+
+CAMERA_PAIRS: dict[int, Pairs] = {
+    1: (
+        ("camera_latency", "camera_pitch"),
+        ("motion_blur", "exposure_shift"),
+        ("camera_latency", "class_friction_offset"),
+        ("camera_pitch", "motion_blur"),
+        ("exposure_shift", "class_friction_offset"),
+    ),
+    2: (
+        ("camera_latency", "exposure_shift"),
+        ("camera_pitch", "class_friction_offset"),
+        ("camera_latency", "motion_blur"),
+    ),
+    3: (
+        ("camera_pitch", "exposure_shift"),
+        ("motion_blur", "class_friction_offset"),
+    ),
+}
+"""The same of one camera: new, in the dark, on a strange road, knocked, slow, behind a tinted windscreen."""
 
 TARGETS = (5.5, 10.0, 20.0)
 """Wanted gaps [noise floors]; the first a little above five, so that most of its cases count."""
@@ -182,19 +188,16 @@ SIZES: dict[str, Counts] = {
         rich=1, tyre=0, mild=1, no_gap=2, pairs=1, outside=1, removed=0, timing=0, every=3, camera=True
     ),
 }
-"""Full: 22 x 5 rich, 22 with another tyre, 22 x 2 mild, 75 without a gap, 24 pairs, 22 x 2 removed, and 3 of each
-deviation outside: 15, in the second family 18, in the third 23, in the fourth 28, in the fifth 34 and 5 pairs more, in
-the sixth 42 and 4 pairs more again, in the seventh 48 and 3 pairs more, in the eighth 53 and 3 pairs more,
-in the ninth 58 and 3 pairs more, in the tenth 63 and 3 pairs more. Camera: 5 x 6 rich, 5 x 3 mild, 25 without a gap,
-5 x 2 pairs, 6 x 2 outside and 5 x 2 removed, in the camera's second family 8 x 2 pairs and 15 x 2 outside, in its
-third 10 x 2 pairs and 23 x 2 outside; the other family is that of what is not the camera's."""
+"""Cases of each size; the edition says what lies outside and which pairs there are, and so how many."""
 
 
-def table(size: str, family: Family = Family.FIRST, camera: CameraFamily = CameraFamily.FIRST) -> list[Spec]:
+def table(size: str, edition: Edition = PLAIN) -> list[Spec]:
     """All cases of a size, in a fixed order."""
     counts = SIZES[size]
     library, beyond = (
-        (CAMERA_LIBRARY, CAMERA_OUTSIDES[camera]) if counts.camera else (LIBRARY, OUTSIDES[family])
+        (CAMERA_LIBRARY, camera_outside_by(edition.camera))
+        if counts.camera
+        else (LIBRARY, outside_by(edition.car))
     )
     inside, outside = list(library)[:: counts.every], list(beyond)[:: counts.every]
     specs = [_single(Group.RICH, e, i) for e in inside for i in range(counts.rich)]
@@ -203,7 +206,7 @@ def table(size: str, family: Family = Family.FIRST, camera: CameraFamily = Camer
     for i in range(counts.no_gap):
         name = f"no_gap-{i}-{'calm' if i % 3 == 2 else 'rich'}"
         specs.append(Spec(name, Group.NO_GAP, (), 1.0, name))
-    for pair in _pairs(counts, family, camera):
+    for pair in _pairs(counts, edition):
         for i in range(counts.pairs):
             name = f"pair-{pair[0]}-{pair[1]}-{i}"
             specs.append(Spec(name, Group.PAIR, pair, 10.0, name))
@@ -218,14 +221,10 @@ def table(size: str, family: Family = Family.FIRST, camera: CameraFamily = Camer
     return [replace(spec, camera=True) for spec in specs] if counts.camera else specs
 
 
-def _pairs(counts: Counts, family: Family, camera: CameraFamily) -> tuple[tuple[str, str], ...]:
-    if counts.camera:
-        return tuple(pair for added in PAIRS_OF[camera] for pair in added[:: counts.every])
-    pairs = PAIRS[:: counts.every]
-    known = list(Family)[: list(Family).index(family) + 1]
-    for more in [MORE_PAIRS[since] for since in known if since in MORE_PAIRS]:
-        pairs += more[:: counts.every]
-    return pairs
+def _pairs(counts: Counts, edition: Edition) -> Pairs:
+    known, by = (CAMERA_PAIRS, edition.camera) if counts.camera else (PAIRS, edition.car)
+    added = [pairs[:: counts.every] for since, pairs in known.items() if since <= by]
+    return tuple(pair for pairs in added for pair in pairs)
 
 
 def _single(group: Group, effect: str, i: int) -> Spec:

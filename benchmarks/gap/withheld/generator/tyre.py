@@ -1,4 +1,8 @@
-"""Longitudinal tyre curves: the modified Dugoff tyre, and foreign ones of the same initial slope and peak."""
+"""Longitudinal tyre curves: the modified Dugoff tyre, and foreign ones of the same initial slope and peak.
+
+Foreign curves take the unsigned slip [-], the force per slip at zero [N], well above the peak, the largest force [N],
+and parameters of their own.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiling import compiled
-from .tyre_eighth import bristles, composite
-from .tyre_ninth import brush_elliptic, splined
-from .tyre_tenth import humped
 
 Array = NDArray[np.floating[Any]]
 
@@ -21,6 +22,8 @@ MAGIC, BRUSH, RATIONAL, DECAYING, SATURATED, BRUSH_UNIFORM, BRUSH_FALLING, CUBED
 BLENDED, TWO_LINES, PLAIN_DUGOFF, SINE_RISE, ARCTANGENT, BRISTLES, COMPOSITE = range(9, 16)
 BRUSH_ELLIPTIC, SPLINED, HUMPED = range(16, 19)
 """Codes of the foreign curves."""
+COMPOSITE_AT, COMPOSITE_TOP = 2.1045880, 0.99907098
+"""Where the composite slip's function has its peak, and how large that is [-]."""
 
 
 @compiled
@@ -55,16 +58,7 @@ def dugoff(slip: float, stiffness: float, theta: float, load: float) -> float:
 def magic(slip: float, slope: float, peak: float, shape: float, curvature: float) -> float:
     """Force of the magic formula [N] (Pacejka 2012, Tire and Vehicle Dynamics, Eq. 4.49).
 
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero, the product B C D [N].
-    peak : float
-        Largest force, D [N].
-    shape, curvature : float
-        C and E [-].
+    shape, curvature: C and E [-].
     """
     if peak <= 0.0:
         return 0.0
@@ -74,17 +68,7 @@ def magic(slip: float, slope: float, peak: float, shape: float, curvature: float
 
 @compiled
 def brush(slip: float, slope: float, peak: float) -> float:
-    """Force of the brush model under a parabolic pressure [N] (Pacejka 2012, Sec. 3.2): cubic, then all of it slides.
-
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero [N].
-    peak : float
-        Largest force [N].
-    """
+    """Force of the brush model under a parabolic pressure [N] (Pacejka 2012, Sec. 3.2): cubic, then it slides."""
     if peak <= 0.0:
         return 0.0
     gripping = max(1.0 - slope * slip / (3.0 * peak), 0.0)
@@ -95,18 +79,8 @@ def brush(slip: float, slope: float, peak: float) -> float:
 def rational(slip: float, slope: float, peak: float, stretch: float, sliding: float) -> float:
     """Force of a rational function up to the peak and a cubic fall beyond [N] (Rill 2013, the TMeasy tyre).
 
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero [N].
-    peak : float
-        Largest force [N].
-    stretch : float
-        Slip of the peak over peak / slope, at least 2 [-].
-    sliding : float
-        Force from five times the peak's slip on, over the peak [-].
+    stretch: slip of the peak over peak / slope, at least 2 [-].
+    sliding: force from five times the peak's slip on, over the peak [-].
     """
     if peak <= 0.0:
         return 0.0
@@ -121,16 +95,7 @@ def rational(slip: float, slope: float, peak: float, stretch: float, sliding: fl
 def decaying(slip: float, slope: float, peak: float, loss: float) -> float:
     """Force of c (1 - exp(-b s) - `loss` s) [N] (Burckhardt 1993, Fahrwerktechnik: Radschlupf-Regelsysteme).
 
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero [N].
-    peak : float
-        Largest force [N].
-    loss : float
-        What a locked wheel's force lacks, over c; above 0 [-].
+    loss: what a locked wheel's force lacks, over c; above 0 [-].
     """
     if peak <= 0.0:
         return 0.0
@@ -143,17 +108,7 @@ def decaying(slip: float, slope: float, peak: float, loss: float) -> float:
 
 @compiled
 def saturated(slip: float, slope: float, peak: float) -> float:
-    """Force of a straight line, then a hyperbola that has its peak at the locked wheel [N] (Fiala's, as Adams has it).
-
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero, above `peak` [N].
-    peak : float
-        Largest force [N].
-    """
+    """Force of a line, then a hyperbola that has its peak at the locked wheel [N] (Fiala's, as Adams has it)."""
     if peak <= 0.0:
         return 0.0
     grip = 2.0 * slope * (1.0 - np.sqrt(max(1.0 - peak / slope, 0.0)))
@@ -164,17 +119,7 @@ def saturated(slip: float, slope: float, peak: float) -> float:
 
 @compiled
 def brush_uniform(slip: float, slope: float, peak: float) -> float:
-    """Force of the brush model under an even pressure [N]: a parabola, then all of it slides.
-
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero [N].
-    peak : float
-        Largest force [N].
-    """
+    """Force of the brush model under an even pressure [N]: a parabola, then all of it slides."""
     if peak <= 0.0:
         return 0.0
     x = min(0.5 * slope * slip / peak, 1.0)
@@ -188,16 +133,7 @@ def brush_falling(slip: float, slope: float, peak: float, kinetic: float) -> flo
     With the share that holds, l = 1 - slope s / (3 hold), and r the friction's ratio, the force over `hold` is
     3 (1 - l) l^2 + r (1 - 3 l^2 + 2 l^3), largest at l = 2 (1 - r) / (3 - 2 r) (Pacejka 2012, Sec. 3.2, extended).
 
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero [N].
-    peak : float
-        Largest force [N].
-    kinetic : float
-        Friction of what slides over that of what holds, below 1 [-].
+    kinetic: friction of what slides over that of what holds, below 1 [-].
     """
     if peak <= 0.0:
         return 0.0
@@ -213,16 +149,7 @@ def cubed(slip: float, slope: float, peak: float, curvature: float) -> float:
 
     The static part of the UniTire model (Guo, Lu 2007, Vehicle System Dynamics 45, 79-99).
 
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero [N].
-    peak : float
-        Largest force, that of a wheel that slides [N].
-    curvature : float
-        E [-].
+    curvature: E [-].
     """
     if peak <= 0.0:
         return 0.0
@@ -234,16 +161,7 @@ def cubed(slip: float, slope: float, peak: float, curvature: float) -> float:
 def blended(slip: float, slope: float, peak: float, order: float) -> float:
     """Force of a line and a level blended, (1/line^n + 1/level^n)^(-1/n), with its peak at the locked wheel [N].
 
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero, above `peak` [N].
-    peak : float
-        Largest force [N].
-    order : float
-        n [-].
+    order: n [-].
     """
     if peak <= 0.0 or slip <= 0.0:
         return 0.0
@@ -255,16 +173,7 @@ def blended(slip: float, slope: float, peak: float, order: float) -> float:
 def two_lines(slip: float, slope: float, peak: float, sliding: float) -> float:
     """Force of a parabola up to the peak and a straight fall to the locked wheel's [N].
 
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero, above twice `peak` [N].
-    peak : float
-        Largest force [N].
-    sliding : float
-        Force of the locked wheel over the peak [-].
+    sliding: force of the locked wheel over the peak [-].
     """
     if peak <= 0.0:
         return 0.0
@@ -277,17 +186,7 @@ def two_lines(slip: float, slope: float, peak: float, sliding: float) -> float:
 
 @compiled
 def plain_dugoff(slip: float, slope: float, peak: float) -> float:
-    """Force of Dugoff's tyre without the modified one's shape, with its peak at the locked wheel [N].
-
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero [N].
-    peak : float
-        Largest force [N].
-    """
+    """Force of Dugoff's tyre without the modified one's shape, with its peak at the locked wheel [N]."""
     if peak <= 0.0:
         return 0.0
     adhesion = slope * slip / max(1.0 - slip, 1e-12)
@@ -298,16 +197,7 @@ def plain_dugoff(slip: float, slope: float, peak: float) -> float:
 def sine_rise(slip: float, slope: float, peak: float, sliding: float) -> float:
     """Force of a quarter of a sine up to the peak, and a bell's fall to `sliding` of it over five times as far [N].
 
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero [N].
-    peak : float
-        Largest force [N].
-    sliding : float
-        Force of a wheel that slides over the peak [-].
+    sliding: force of a wheel that slides over the peak [-].
     """
     if peak <= 0.0:
         return 0.0
@@ -320,23 +210,97 @@ def sine_rise(slip: float, slope: float, peak: float, sliding: float) -> float:
 
 @compiled
 def arctangent(slip: float, slope: float, peak: float) -> float:
-    """Force of an arctangent whose peak is the locked wheel's [N].
-
-    Parameters
-    ----------
-    slip : float
-        Unsigned slip [-].
-    slope : float
-        Force per slip at zero, well above `peak` [N].
-    peak : float
-        Largest force [N].
-    """
+    """Force of an arctangent whose peak is the locked wheel's [N]."""
     if peak <= 0.0:
         return 0.0
     top = peak
     for _ in range(8):
         top = 0.5 * np.pi * peak / np.arctan(0.5 * np.pi * slope / top)
     return top * 2.0 / np.pi * np.arctan(0.5 * np.pi * slope * slip / top)
+
+
+@compiled
+def bristles(slip: float, slope: float, peak: float) -> float:
+    """Force of bristles with even load that give way [N]: 1 - (1 - exp(-2 x)) / (2 x) of `slope` s over it.
+
+    The steady state of the distributed LuGre tyre with one friction (Canudas-de-Wit et al. 2003, Vehicle System
+    Dynamics 39, 189-226); its peak is the locked wheel's.
+    """
+    if peak <= 0.0 or slip <= 0.0:
+        return 0.0
+    top = peak
+    for _ in range(8):
+        x = 2.0 * slope / top
+        top = peak / (1.0 + np.expm1(-x) / x)
+    x = 2.0 * slope * slip / top
+    return top * (1.0 + np.expm1(-x) / x)
+
+
+@compiled
+def composite(slip: float, slope: float, peak: float, fading: float) -> float:
+    """Force of a ratio of cubics in the composite slip, less `fading` of it for the locked wheel [N].
+
+    The saturation function (c^3 + 0.34 c^2 + 4 c / pi) / (c^3 + 0.57 c^2 + 0.32 c + 1) of a radial tyre (Szostak,
+    Allen, Rosenthal 1988, DOT HS 807 271), whose largest value is `COMPOSITE_TOP`; the fading begins beyond it.
+
+    fading: what a locked wheel's force lacks, over the peak [-].
+    """
+    if peak <= 0.0 or slip <= 0.0:
+        return 0.0
+    per_slip = 0.25 * np.pi * slope * COMPOSITE_TOP / peak
+    c = per_slip * slip
+    rise = c * (4.0 / np.pi + c * (0.34 + c)) / (1.0 + c * (0.32 + c * (0.57 + c)))
+    best = COMPOSITE_AT / per_slip
+    if slip > best:
+        rise *= 1.0 - fading * (slip - best) / (1.0 - best)
+    return peak * rise / COMPOSITE_TOP
+
+
+@compiled
+def brush_elliptic(slip: float, slope: float, peak: float) -> float:
+    """Force of the brush model under an elliptic pressure, as Hertz has it of a stiff belt [N].
+
+    With k = pi `slope` s / (4 `peak`), the bristles hold from the leading edge to u = (k^2 - 1) / (k^2 + 1) of half the
+    contact, and slide behind it; the peak is approached as the slip grows.
+    """
+    if peak <= 0.0:
+        return 0.0
+    k = 0.25 * np.pi * slope * slip / peak
+    over = 1.0 + k * k
+    u = (k * k - 1.0) / over
+    holds = 2.0 * k / over**2
+    slides = 0.5 * (2.0 * u * k / over + np.arcsin(u)) + 0.25 * np.pi
+    return peak * 2.0 / np.pi * (holds + slides)
+
+
+@compiled
+def splined(slip: float, slope: float, peak: float, stretch: float, sliding: float) -> float:
+    """Force of two cubics, as of a table with three points: at rest, at the peak, of the locked wheel [N].
+
+    stretch: slip of the peak over peak / slope, at most 3 [-].
+    sliding: force of the locked wheel over the peak [-].
+    """
+    if peak <= 0.0:
+        return 0.0
+    best = stretch * peak / slope
+    x = slip / best
+    if x <= 1.0:
+        return peak * x * (stretch * (1.0 - x) ** 2 + x * (3.0 - 2.0 * x))
+    z = (slip - best) / (1.0 - best)
+    return peak * (1.0 - (1.0 - sliding) * z * z * (3.0 - 2.0 * z))
+
+
+@compiled
+def humped(slip: float, slope: float, peak: float, sliding: float) -> float:
+    """Force of z exp(1 - z) up to the peak at z = 1, and beyond it of the same fall to `sliding` [N].
+
+    sliding: force of a wheel that slides over the peak [-].
+    """
+    if peak <= 0.0:
+        return 0.0
+    z = slope * slip / (np.e * peak)
+    hump = z * np.exp(1.0 - z)
+    return peak * (hump if z <= 1.0 else sliding + (1.0 - sliding) * hump)
 
 
 @compiled

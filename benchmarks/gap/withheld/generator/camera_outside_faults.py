@@ -1,4 +1,4 @@
-"""How the deviations outside the library that the third family adds come about."""
+"""How the deviations outside the library come about, but for the simplest."""
 
 from __future__ import annotations
 
