@@ -18,6 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from .frozen import run_frozen, write_list
 from .generator.forms import NEWEST, PLAIN
 from .generator.making import make_case
 from .generator.table import table
@@ -113,6 +114,40 @@ def score_command(out: Out) -> None:
     (out / "scores.json").write_text(json.dumps(scores.to_json(), indent=1), encoding="utf-8")
     draw_confusion(scores, out / "confusion.png")
     if any(line.n and not line.holds for line in scores.lines):
+        raise typer.Exit(1)
+
+
+@app.command("frozen")
+def frozen_command(
+    out: Out,
+    only: Annotated[str, typer.Option(help="Part of the names of the cases to run; all by default.")] = "",
+    jobs: Annotated[int, typer.Option(min=1, help="Cases side by side.")] = 2,
+    record: Annotated[bool, typer.Option(help="Freeze what is said now; needs all cases.")] = False,
+) -> None:
+    """Run the frozen cases and hold them to what was said when they were frozen. Exit code 1 where one got worse."""
+    if record and only:
+        raise typer.BadParameter("--record freezes all cases: leave --only out")
+    now, worse = [], 0
+    for before, after in run_frozen(out, jobs, only):
+        now.append(after)
+        lost = before.right == "yes" and after.right == "no"
+        worse += lost
+        mark = (
+            "LOST"
+            if lost
+            else ""
+            if before.right == after.right
+            else "not run before"
+            if not before.right
+            else "won"
+        )
+        then = f"{before.verdict or '-'} {before.first}".strip()
+        said = f"{after.spec.name}: {after.verdict} {after.first} (right: {after.right}; then: {then}) {mark}"
+        console.print(said, highlight=False)
+    console.print(f"{sum(case.right == 'yes' for case in now)} of {len(now)} right, {worse} lost")
+    if record:
+        write_list(now)
+    if worse:
         raise typer.Exit(1)
 
 

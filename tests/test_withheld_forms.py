@@ -1,4 +1,4 @@
-"""The families of forms: opened ones stay as they were, all keep the nominal car and what parameters mean."""
+"""Forms of the withheld cases: drawn as they were, they keep the nominal car and what parameters mean."""
 
 from __future__ import annotations
 
@@ -12,39 +12,38 @@ import numpy as np
 import pytest
 from long import beyond, long
 from numpy.testing import assert_allclose
-from test_blind_plant import CAR, NEUTRAL, QUIET, LimitDrive, carried, roll
+from test_withheld_plant import CAR, NEUTRAL, QUIET, LimitDrive, carried, roll
 
 from benchmarks.gap.withheld.generator import kernel
 from benchmarks.gap.withheld.generator.car import Car, Road
 from benchmarks.gap.withheld.generator.cases import make_case
 from benchmarks.gap.withheld.generator.details import FLOOR_M_S, ROLL_M_S
 from benchmarks.gap.withheld.generator.driver import drive
+from benchmarks.gap.withheld.generator.effects import EFFECT_FORMS
 from benchmarks.gap.withheld.generator.falling import fallen
+from benchmarks.gap.withheld.generator.foreign import FOREIGN
 from benchmarks.gap.withheld.generator.forms import (
     ASPECTS,
     DIGITS,
-    EFFECT_FORMS,
-    FOREIGN,
+    NEWEST,
     NOISES,
-    OUTSIDES,
+    PLAIN,
     RATES_HZ,
     STYLES,
-    Family,
+    Edition,
     draw_forms,
     effect_in,
+    names_by,
 )
 from benchmarks.gap.withheld.generator.kernel import N, V, W, integrate
 from benchmarks.gap.withheld.generator.library import LIBRARY
+from benchmarks.gap.withheld.generator.outside import OUTSIDE, OUTSIDE_SINCE
 from benchmarks.gap.withheld.generator.sensors import Noise, Sensors, make_log, read
-from benchmarks.gap.withheld.generator.table import MORE_PAIRS, PAIRS, Group, table
+from benchmarks.gap.withheld.generator.table import PAIRS, Group, table
 from benchmarks.gap.withheld.generator.tyre import dugoff
 from benchmarks.gap.withheld.generator.world import World, nominal
 
-FIRST, SECOND, THIRD, FOURTH, FIFTH, SIXTH, SEVENTH, EIGHTH, NINTH, TENTH = Family
-DRAWN = [SECOND, THIRD, FOURTH, FIFTH, SIXTH, SEVENTH, EIGHTH, NINTH, TENTH]
-DRAWS = [464962544, 2607503357, 2724598211, 2904162615, 609898683, 2586606653, 1195626187, 3538627478]
-"""Checksums of what the opened families but the first drew when they were opened."""
-CASES = {spec.name: spec for spec in table("full", TENTH)}
+CASES = {spec.name: spec for spec in table("full", NEWEST)}
 
 
 def numbered(items):
@@ -52,23 +51,26 @@ def numbered(items):
     return [pytest.param(item, id=str(i)) for i, item in enumerate(items)]
 
 
-def forms_of(*effects: str, but: tuple[str, ...] = (), later: bool = True):
-    """Forms of effects but some, and but those of the fifth family on, where they have tests of their own."""
-    older = [ASPECTS[family] for family in (SECOND, THIRD, FOURTH)]
-    known = {(key, form) for aspects in older for key, forms in aspects.items() for form in forms}
-    chosen = ((effect, form) for effect in effects for form in EFFECT_FORMS[effect] if form not in but)
-    return numbered(item for item in chosen if later or item in known)
+def forms_of(*effects: str, but: tuple[str, ...] = (), by: int = NEWEST.car):
+    """Forms of effects up to an edition but some, which have tests of their own."""
+    chosen = (
+        (effect, form, since) for effect in effects for form, (since, _) in EFFECT_FORMS[effect].items()
+    )
+    return numbered((effect, form) for effect, form, since in chosen if form not in but and since <= by)
 
 
-def newest(chosen):
-    """Aspects with their forms; but for the first of each, those of families before the last are long."""
-    always = {(aspect, next(iter(forms))) for aspect, forms in ASPECTS[TENTH].items()}
+def few(chosen):
+    """Aspects with their forms; but for the first and the last of each they are long."""
+    always = {
+        (aspect, form) for aspect, forms in ASPECTS.items() for form in (next(iter(forms)), list(forms)[-1])
+    }
     return [
-        pytest.param(
-            item, id=str(i), marks=long if item[1] in ASPECTS[NINTH][item[0]] and item not in always else ()
-        )
-        for i, item in enumerate(chosen)
+        pytest.param(item, id=str(i), marks=() if item in always else long) for i, item in enumerate(chosen)
     ]
+
+
+def by_further(name: str, **given: float) -> World:
+    return OUTSIDE[name].apply(nominal(CAR, Road()), given)
 
 
 def with_form(effect: str, form: str, car: Car = CAR, road: Road | None = None, **given: float) -> World:
@@ -97,187 +99,53 @@ def reading(path: np.ndarray, sensors: Sensors) -> tuple[np.ndarray, np.ndarray,
     return at, read(path, Sensors(), at), read(path, sensors, at)
 
 
-# --- the families
+# --- editions
 
 
-OPENED = [
-    (
-        FIRST,
-        "no_gap-2-calm",
-        2590,
-        [2.654038, 5.794179, 73.006508, 73.008343, 73.0164, 73.017294, 22.752997, 0.036643, 313.767558],
-    ),
-    (
-        NINTH,
-        "no_gap-2-calm",
-        3885,
-        [
-            -3.358301,
-            4.494723,
-            72.829255,
-            72.830309,
-            72.857891,
-            72.857666,
-            22.705442,
-            0.004159,
-            315.407296,
-        ],
-    ),
-    (
-        SECOND,
-        "no_gap-2-calm",
-        2590,
-        [8.847051, 6.864563, 73.757385, 73.746643, 73.753448, 73.741436, 22.983636, 0.069498, 315.250653],
-    ),
-    (
-        THIRD,
-        "no_gap-2-calm",
-        2590,
-        [
-            -5.249183,
-            -1.063537,
-            71.022835,
-            71.002791,
-            71.048135,
-            71.026794,
-            22.138505,
-            -0.023851,
-            306.76425,
-        ],
-    ),
-    (
-        FOURTH,
-        "no_gap-2-calm",
-        2590,
-        [12.901892, 10.382003, 76.903632, 76.901394, 76.892471, 76.892213, 23.956712, 0.098, 324.025806],
-    ),
-    (
-        FIFTH,
-        "no_gap-2-calm",
-        2590,
-        [4.700745, 1.201473, 73.33288, 73.329822, 73.319396, 73.319787, 22.852346, 0.023536, 313.361189],
-    ),
-    (
-        SIXTH,
-        "no_gap-2-calm",
-        2590,
-        [-1.959653, 2.226641, 73.700229, 73.700253, 73.716277, 73.71402, 22.974608, 0.000483, 315.023154],
-    ),
-    (
-        SIXTH,
-        "rich-tyre_relaxation-0",
-        8445,
-        [
-            35.556706,
-            43.637911,
-            48.599246,
-            48.59822,
-            49.770487,
-            49.772179,
-            16.559829,
-            0.199407,
-            234.185583,
-        ],
-    ),
-    (
-        SEVENTH,
-        "no_gap-2-calm",
-        3885,
-        [
-            -21.042728,
-            -18.17426,
-            63.711133,
-            63.708945,
-            63.719289,
-            63.720262,
-            19.878692,
-            -0.165943,
-            287.657046,
-        ],
-    ),
-    (
-        EIGHTH,
-        "no_gap-2-calm",
-        3885,
-        [
-            -21.042728,
-            -18.17426,
-            63.710312,
-            63.70987,
-            63.721059,
-            63.721211,
-            19.879134,
-            -0.166088,
-            287.657046,
-        ],
-    ),
-]
-"""Family, case, rows, and means of the columns of its second log as the family made it when it was opened."""
+DRAWS = [464962544, 2607503357, 2724598211, 2904162615, 609898683, 2586606653, 1195626187, 3538627478]
+"""Checksums of what the editions from 2 to 9 draw."""
 
 
-@pytest.mark.parametrize(("family", "name", "rows", "means"), beyond(1, OPENED))
-def test_opened_families_are_as_they_were(family, name, rows, means):
-    log = make_case(CASES[name], 1, family).logs["fit_2"]
-    assert len(log) == rows
-    told = log.drop(columns=["time_s", "wheel_torque_fr_nm", "wheel_torque_rr_nm"]).mean()
-    assert_allclose(told, means, rtol=1e-5, atol=1e-5)
+def test_editions_draw_the_forms_that_they_drew():
+    for edition, draws in enumerate(DRAWS, start=2):
+        drawn = [draw_forms(edition, np.random.default_rng(seed)) for seed in range(40)]
+        assert zlib.crc32(json.dumps(drawn, sort_keys=True).encode()) == draws
 
 
-@pytest.mark.parametrize(("family", "draws"), list(zip(DRAWN[:-1], DRAWS, strict=True)))
-def test_opened_families_draw_the_forms_that_they_drew(family, draws):
-    drawn = [draw_forms(family, np.random.default_rng(seed)) for seed in range(40)]
-    assert zlib.crc32(json.dumps(drawn, sort_keys=True).encode()) == draws
+def test_the_plain_edition_has_one_form_of_everything():
+    assert all(len(forms) == 1 for forms in names_by(PLAIN.car).values())
 
 
-def test_the_first_family_has_one_form_of_everything():
-    only = {aspect: next(iter(forms)) for aspect, forms in ASPECTS[SECOND].items()}
-    assert all(draw_forms(FIRST, np.random.default_rng(seed)) == only for seed in range(3))
+def test_the_newest_edition_draws_every_form():
+    drawn = [draw_forms(NEWEST.car, np.random.default_rng(seed)) for seed in range(250)]
+    assert {a: {forms[a] for forms in drawn} for a in ASPECTS} == {a: set(f) for a, f in ASPECTS.items()}
 
 
-@pytest.mark.parametrize("family", DRAWN)
-def test_later_families_draw_every_form(family):
-    drawn, aspects = (
-        [draw_forms(family, np.random.default_rng(seed)) for seed in range(250)],
-        ASPECTS[family],
-    )
-    assert {a: {forms[a] for forms in drawn} for a in aspects} == {a: set(f) for a, f in aspects.items()}
-
-
-def test_each_family_holds_the_one_before():
-    for less, more in pairwise(Family):
-        assert all(list(ASPECTS[more][a])[: len(f)] == list(f) for a, f in ASPECTS[less].items())
-        assert list(OUTSIDES[more])[: len(OUTSIDES[less])] == list(OUTSIDES[less])
+def test_editions_add_at_the_end_and_say_so():
+    for forms in (*ASPECTS.values(), OUTSIDE_SINCE):
+        since = [edition for edition, _ in forms.values()]
+        assert since == sorted(since)
+        assert 1 <= since[0] <= since[-1] <= NEWEST.car
+    for less, more in pairwise(Edition(car, 1) for car in RATES_HZ):
         assert {s.name for s in table("full", less)} <= {s.name for s in table("full", more)}
+        rates = RATES_HZ[more.car]
+        assert sum(rates.values()) == pytest.approx(1.0)
+        assert all(rate % 50.0 == 0.0 and 50.0 <= rate <= 2000.0 for rate in rates)
+    every = [set(pair) for pairs in PAIRS.values() for pair in pairs]
+    assert all(pair < set(LIBRARY) and every.count(pair) == 1 for pair in every)
 
 
-@pytest.mark.parametrize(
-    ("family", "forms", "effects", "outside", "pairs"),
-    [(EIGHTH, 25, 18, 5, [36, 39]), (NINTH, 25, 18, 5, [39, 42]), (TENTH, 25, 19, 5, [42, 45])],
-)
-def test_what_a_family_adds_is_what_the_page_says(family, forms, effects, outside, pairs):
-    families = list(Family)
-    last = families[families.index(family) - 1]
-    before, now = ASPECTS[last], ASPECTS[family]
-    assert set(before) == set(now)
-    assert sum(len(now[aspect]) - len(had) for aspect, had in before.items()) == forms
-    assert sum(len(now[effect]) > len(before[effect]) for effect in LIBRARY) == effects
-    assert len(OUTSIDES[family]) - len(OUTSIDES[last]) == outside
-    assert [[s.group for s in table("full", f)].count(Group.PAIR) for f in (last, family)] == pairs
-    every = [set(pair) for pair in (*PAIRS, *(pair for more in MORE_PAIRS.values() for pair in more))]
-    assert all(set(pair) < set(LIBRARY) and every.count(set(pair)) == 1 for pair in MORE_PAIRS[family])
-    rates = RATES_HZ[family]
-    assert sum(rates.values()) == pytest.approx(1.0)
-    assert all(rate % 50.0 == 0.0 and 50.0 <= rate <= 2000.0 for rate in rates)
-
-
-def test_what_had_no_form_begins_with_the_librarys():
-    new = set(EFFECT_FORMS) - set(ASPECTS[SECOND])
-    assert all(next(iter(EFFECT_FORMS[effect].values())) is LIBRARY[effect].apply for effect in new)
+def test_forms_begin_with_the_librarys():
+    assert all(
+        next(iter(forms.values()))[1] is LIBRARY[effect].apply for effect, forms in EFFECT_FORMS.items()
+    )
 
 
 @pytest.mark.long
 def test_forms_change_no_other_draw(tmp_path):
-    first, *others = (make_case(CASES["no_gap-0-rich"], 4, family) for family in (FIRST, SECOND, TENTH))
+    first, *others = (
+        make_case(CASES["no_gap-0-rich"], 4, edition) for edition in (PLAIN, Edition(2, 1), NEWEST)
+    )
     first.write(tmp_path / "first")
     for i, other in enumerate(others):
         assert (first.car, first.roads, first.noise) == (other.car, other.roads, other.noise)
@@ -287,19 +155,20 @@ def test_forms_change_no_other_draw(tmp_path):
         assert other.truth.gap.total < 1.05
 
 
-@pytest.mark.parametrize("family", beyond(1, [TENTH, SECOND]))
-def test_the_seal_tells_the_forms(family):
-    case = make_case(CASES["no_gap-2-calm"], 3, family)
+@pytest.mark.parametrize("edition", beyond(1, [NEWEST, Edition(2, 1)]))
+def test_the_seal_tells_the_forms(edition):
+    case = make_case(CASES["no_gap-2-calm"], 3, edition)
     seal = json.loads(json.dumps(case.seal()))
-    assert set(seal["forms"]) == set(ASPECTS[family])
-    assert all(seal["forms"][aspect] in forms for aspect, forms in ASPECTS[family].items())
+    known = names_by(edition.car)
+    assert set(seal["forms"]) == set(known)
+    assert all(seal["forms"][aspect] in forms for aspect, forms in known.items())
 
 
 @pytest.mark.long
 def test_removed_cases_show_the_forms_and_logs_of_their_twins():
     removed = next(s for s in CASES.values() if s.group is Group.REMOVED)
     assert removed.exclude == CASES[removed.data].effects
-    shown, told = make_case(removed, 5, THIRD), make_case(CASES[removed.data], 5, THIRD)
+    shown, told = make_case(removed, 5, NEWEST), make_case(CASES[removed.data], 5, NEWEST)
     assert shown.forms == told.forms
     assert shown.logs["holdout"].equals(told.logs["holdout"])
 
@@ -313,7 +182,7 @@ def limit():
 
 
 @pytest.mark.parametrize(
-    "chosen", newest((effect, form) for effect, forms in EFFECT_FORMS.items() for form in forms)
+    "chosen", few((effect, form) for effect, forms in EFFECT_FORMS.items() for form in forms)
 )
 @long
 def test_a_neutral_effect_is_the_nominal_car_in_every_form(chosen, limit):
@@ -323,7 +192,7 @@ def test_a_neutral_effect_is_the_nominal_car_in_every_form(chosen, limit):
 
 
 @pytest.mark.parametrize(
-    "chosen", newest((effect, form) for effect, forms in EFFECT_FORMS.items() for form in forms)
+    "chosen", few((effect, form) for effect, forms in EFFECT_FORMS.items() for form in forms)
 )
 @long
 def test_the_severest_effect_shows_in_every_form(chosen, limit):
@@ -433,7 +302,7 @@ def test_counts_are_whole_and_keep_the_mean_speed(chosen):
 # --- tyres, noise, logger, drivers
 
 
-@pytest.mark.parametrize("foreign", numbered(FOREIGN.values()))
+@pytest.mark.parametrize("foreign", numbered([foreign for _, foreign in FOREIGN.values()]))
 @long
 def test_foreign_tyres_have_the_slope_and_the_peak(foreign):
     own = foreign.draw(np.random.default_rng(0))
@@ -450,14 +319,14 @@ def test_foreign_tyres_have_the_slope_and_the_peak(foreign):
         assert force[-1] > 0.5 * expected[-1]
 
 
-@pytest.mark.parametrize("foreign", numbered(FOREIGN.values()))
+@pytest.mark.parametrize("foreign", numbered([foreign for _, foreign in FOREIGN.values()]))
 @long
 def test_a_foreign_share_of_nothing_is_the_nominal_tyre(foreign, limit):
     none = foreign.apply(limit.world, share=0.0, **foreign.draw(np.random.default_rng(0)))
     assert limit.is_nominal(none)
 
 
-@pytest.mark.parametrize("noisy", beyond(9, NOISES.values()), ids=range(len(NOISES)))
+@pytest.mark.parametrize("noisy", beyond(9, [noise for _, noise in NOISES.values()]), ids=range(len(NOISES)))
 @long
 def test_noise_of_every_kind_has_its_size(noisy):
     noise = Noise(0.05, 0.02, 0.1, 0.0, 0.4, 0.01, 0.0, 0.0)
@@ -470,7 +339,7 @@ def test_noise_of_every_kind_has_its_size(noisy):
     "digits",
     numbered(
         form
-        for name, form in DIGITS.items()
+        for name, (_, form) in DIGITS.items()
         if name not in ("repeating", "losing_runs", "overrunning", "slow_receiver", "in_ticks")
         and name
         not in ("losing_frames", "slow_accelerometer", "in_turns", "waking", "filled_in", "by_the_clock")
@@ -489,11 +358,11 @@ def test_digits_take_no_more_than_the_noise(digits):
 
 
 @pytest.mark.parametrize("rich", [True, False])
-@pytest.mark.parametrize("chosen", newest(("driver", name) for name in STYLES))
+@pytest.mark.parametrize("chosen", few(("driver", name) for name in STYLES))
 @long
 def test_every_driver_stays_within_the_car_and_excites_what_he_should(chosen, rich):
     world = nominal(CAR, Road((0.0, 60.0, 120.0), (0.9, 0.3, 0.9)) if rich else Road())
-    done = drive(CAR, world, rich, 30.0, np.random.default_rng(6), STYLES[chosen[1]])
+    done = drive(CAR, world, rich, 30.0, np.random.default_rng(6), STYLES[chosen[1]][1])
     speed, wheels = done.path[:, V], done.path[:, W : W + 4]
     slides = np.any(np.abs(wheels * CAR.wheel_radius_m - speed[:, None]) > 0.15 * speed[:, None], axis=1)
     assert speed.min() > FLOOR_M_S
@@ -505,23 +374,14 @@ def test_every_driver_stays_within_the_car_and_excites_what_he_should(chosen, ri
 # --- deviations outside the library
 
 
-def by_further(name: str, **given: float) -> World:
-    return OUTSIDES[TENTH][name].apply(nominal(CAR, Road()), given)
+SHOWN_ELSEWHERE = ("slip_controller", "regeneration_fades", "road_borders_blurred")
+"""They act where a driven wheel slips, in slow braking and where a border is passed at the limit, not on this drive."""
 
 
-SHOWN_IN_DRIVING = tuple(
-    n
-    for n in OUTSIDES[TENTH]
-    if n not in OUTSIDES[FIRST] and n not in ("slip_controller", "regeneration_fades", "road_borders_blurred")
-)
-"""Those act where a driven wheel slips, in slow braking and where a border is passed at the limit, as in tests of their
-own and not on this drive."""
-
-
-@pytest.mark.parametrize("name", numbered(SHOWN_IN_DRIVING))
+@pytest.mark.parametrize("name", numbered(name for name in OUTSIDE if name not in SHOWN_ELSEWHERE))
 @long
 def test_further_deviations_show(name, limit):
-    entry = OUTSIDES[TENTH][name]
+    entry = OUTSIDE[name]
     assert limit.shows(entry.apply(limit.world, entry.at(CAR, np.random.default_rng(0))(1.0)))
 
 

@@ -1,4 +1,4 @@
-"""The second family of the camera's forms: what it adds, what parameters mean, and that the first stays as it was."""
+"""A camera's chain in its forms up to edition 2: it tells the road, and parameters mean what they should."""
 
 from __future__ import annotations
 
@@ -11,36 +11,32 @@ from numpy.testing import assert_allclose
 
 from benchmarks.gap.withheld.generator import camera_case
 from benchmarks.gap.withheld.generator.camera_chain import results
-from benchmarks.gap.withheld.generator.camera_family import (
-    OF_EFFECT,
-    ONLY,
-    SECOND,
-    CameraFamily,
-    draw_forms_of,
-    is_new,
-)
 from benchmarks.gap.withheld.generator.camera_faults import NOD_M
-from benchmarks.gap.withheld.generator.camera_forms import CAMERA_FORMS
-from benchmarks.gap.withheld.generator.camera_further import ALL_EFFECTS, FURTHER_OUTSIDE
+from benchmarks.gap.withheld.generator.camera_forms import CAMERA_FORMS, draw_forms_of
 from benchmarks.gap.withheld.generator.camera_gap import Stage, gap_of
 from benchmarks.gap.withheld.generator.camera_layouts import LAYOUTS, draw_laid_road
 from benchmarks.gap.withheld.generator.camera_library import Scene
+from benchmarks.gap.withheld.generator.camera_outside import ALL_EFFECTS, CAMERA_OUTSIDE
 from benchmarks.gap.withheld.generator.camera_reference import friction_of, friction_under, reference
 from benchmarks.gap.withheld.generator.camera_road import CLASS_FRICTION, ROAD_M, Passage
 from benchmarks.gap.withheld.generator.camera_system import Chain, Fault, Results, draw_chain
 from benchmarks.gap.withheld.generator.camera_telling import MISTAKEN, voted
 from benchmarks.gap.withheld.generator.camera_timing import timing
 from benchmarks.gap.withheld.generator.cases import SHOWS
-from benchmarks.gap.withheld.generator.forms import Family
-from benchmarks.gap.withheld.generator.table import Group, table
 
 pytestmark = pytest.mark.long
 
-TENTH = Family.TENTH
-
 
 ROWS = np.arange(0.01, 60.0, 0.01)
-FORMS = [(aspect, name) for aspect, forms in SECOND.items() for name in forms]
+KNOWN = {
+    aspect: {name: what for name, (since, what) in forms.items() if since <= 2}
+    for aspect, forms in CAMERA_FORMS.items()
+}
+ONLY = {
+    aspect: next(iter(forms)) for aspect, forms in CAMERA_FORMS.items() if next(iter(forms.values()))[0] == 2
+}
+FURTHER_OUTSIDE = {name: effect for name, (since, effect) in CAMERA_OUTSIDE.items() if since == 2}
+FORMS = [(aspect, name) for aspect, forms in KNOWN.items() for name in forms]
 OF_CHAIN = [
     (aspect, name) for aspect, name in FORMS if aspect not in ("layout", "speeds", "position", "friction_off")
 ]
@@ -50,7 +46,7 @@ QUIET = {"none_says": "zero", "begins": "before", **PLAIN, **ONLY}
 def chain_of(seed: int = 0, **forms: str) -> Chain:
     """Drawn, with forms of one's own, and neither errors nor noise."""
     rng = np.random.default_rng(seed)
-    chain = draw_chain(rng, {**draw_forms_of(CameraFamily.FIRST, rng), **QUIET, **forms})
+    chain = draw_chain(rng, {**draw_forms_of(1, rng), **QUIET, **forms})
     none = {"dropped": 0.0, "errors": 0.0, "none": 0.0, "spread": 0.0, "border_dip": 0.0}
     return replace(chain, rate_hz=50.0, work_s=0.03, preview_m=5.0, window_m=0.8, **none)
 
@@ -66,38 +62,6 @@ def said(chain: Chain, fault: Fault, passage: Passage | None = None) -> Results:
 
 
 # --- which forms there are
-
-
-def test_the_second_family_draws_among_the_firsts_forms_too():
-    drawn = [draw_forms_of(CameraFamily.SECOND, np.random.default_rng(seed)) for seed in range(150)]
-    for aspect, forms in SECOND.items():
-        assert {forms[aspect] for forms in drawn} == set(forms)
-    for aspect, forms in CAMERA_FORMS.items():
-        assert list(forms) == list(SECOND[aspect])[: len(forms)]
-
-
-def test_a_new_form_is_told_from_an_old_one():
-    old = draw_forms_of(CameraFamily.FIRST, np.random.default_rng(0))
-    assert not any(is_new(old, effect) for effect in OF_EFFECT)
-    for effect, aspects in OF_EFFECT.items():
-        for aspect in aspects:
-            assert is_new({**old, aspect: list(SECOND[aspect])[-1]}, effect)
-    assert not is_new(old, "odometer_drift")
-
-
-def test_table_has_the_stated_counts():
-    groups = [spec.group for spec in table("camera", TENTH, CameraFamily.SECOND)]
-    assert {group: groups.count(group) for group in set(groups)} == {
-        Group.RICH: 30,
-        Group.MILD: 15,
-        Group.NO_GAP: 25,
-        Group.PAIR: 16,
-        Group.OUTSIDE: 30,
-        Group.REMOVED: 10,
-    }
-    small = ({s.name for s in table("camera_small", TENTH, family)} for family in CameraFamily)
-    first, second, *_ = small
-    assert first < second
 
 
 # --- the nominal chain
@@ -141,7 +105,7 @@ def test_no_effect_draws_anew_what_is_not_its_own(aspect, name):
     """A vanishing deviation takes the way of a real one, and all that is random stays."""
     lateness = {} if aspect == "lateness" else {"lateness": "constant"}
     rng = np.random.default_rng(4)
-    forms = {**draw_forms_of(CameraFamily.SECOND, rng), **lateness, "told_confidence": "as_is", aspect: name}
+    forms = {**draw_forms_of(2, rng), **lateness, "told_confidence": "as_is", aspect: name}
     chain = draw_chain(rng, forms)
     nominal = said(chain, Fault(), uneven(30.0))
     for effect, given in TINY.items():
@@ -183,7 +147,7 @@ def test_a_further_deviation_is_none_at_its_neutral_value_and_grows(name):
 # --- what the parameters mean
 
 
-@pytest.mark.parametrize("lateness", SECOND["lateness"])
+@pytest.mark.parametrize("lateness", KNOWN["lateness"])
 def test_latency_is_the_mean_delay(lateness):
     for passage in (steady(8.0), steady(24.0)):
         shift = said(chain_of(lateness=lateness), Fault(delay_s=0.15), passage).shift_m
@@ -191,7 +155,7 @@ def test_latency_is_the_mean_delay(lateness):
         assert shift.std() < 0.7 * shift.mean()
 
 
-@pytest.mark.parametrize("mounting", SECOND["mounting"])
+@pytest.mark.parametrize("mounting", KNOWN["mounting"])
 def test_pitch_is_the_mean_angle_whatever_the_speed(mounting):
     distance = 0.4 + 5.0 + 0.4
     for pitch in (0.04, -0.03):
@@ -201,17 +165,17 @@ def test_pitch_is_the_mean_angle_whatever_the_speed(mounting):
             assert shift.mean() == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.parametrize("law", SECOND["blur_law"])
+@pytest.mark.parametrize("law", KNOWN["blur_law"])
 def test_laws_fall_from_all_to_little(law):
     amount = np.linspace(0.0, 6.0, 200)
-    kept = SECOND["blur_law"][law](amount)
+    kept = KNOWN["blur_law"][law](amount)
     assert kept[0] == 1.0
     assert np.all(np.diff(kept) <= 0.0)
     assert np.all(kept > 0.0)
     assert kept[-1] < 0.35
 
 
-@pytest.mark.parametrize("course", SECOND["exposure_course"])
+@pytest.mark.parametrize("course", KNOWN["exposure_course"])
 def test_stops_and_milliseconds_are_means_about_which_a_course_varies(course):
     """With a law that is straight about here, what is lost tells the amount; three classes that last alike."""
     chain = chain_of(exposure_course=course, exposure_law="linear", blur_law="linear")
@@ -219,7 +183,7 @@ def test_stops_and_milliseconds_are_means_about_which_a_course_varies(course):
         amount = abs(stops) / chain.stops * (chain.over if stops > 0.0 else 1.0)
         lost = 1.0 - said(chain, Fault(stops=stops)).kept
         assert lost.mean() == pytest.approx(0.98 * 0.3 * amount, rel=0.05)
-    if course in SECOND["blur_course"]:
+    if course in KNOWN["blur_course"]:
         chain = chain_of(blur_course=course, exposure_law="linear", blur_law="linear")
         for speed in (8.0, 16.0):
             lost = 1.0 - said(chain, Fault(exposure_s=0.01), steady(speed)).kept
@@ -233,7 +197,7 @@ REFERENCE = ("reference", "reference_filter", "reference_rate", "reference_when"
 @pytest.mark.parametrize("aspect", [*REFERENCE, "friction_off"])
 def test_class_friction_is_what_the_reference_reads(aspect):
     fault = Fault(friction=(0.7, 0.6, 0.3))
-    for name in SECOND[aspect]:
+    for name in KNOWN[aspect]:
         chain = replace(chain_of(**{"reference": "white", aspect: name}), reference_noise=0.01)
         under = ROAD.class_at(uneven().at(ROWS))
         for of, expected in ((Fault(), CLASS_FRICTION), (fault, fault.friction)):
@@ -271,7 +235,7 @@ def test_a_filtered_reference_follows_and_never_leads(kind):
 
 @pytest.mark.parametrize("aspect", ["captures", "work"])
 def test_pictures_come_at_their_rate(aspect):
-    for name, draw in SECOND[aspect].items():
+    for name, draw in KNOWN[aspect].items():
         if draw is not None:
             mean = draw(0.04, 100_000, np.random.default_rng(0)).mean()
             assert mean == pytest.approx(0.04, rel=0.03), name
@@ -287,13 +251,13 @@ def test_pictures_by_way_come_with_the_way_and_at_the_rate_in_the_mean():
 
 @pytest.mark.parametrize("aspect", ["confidence", "reference"])
 def test_noise_has_its_size(aspect):
-    for name, noise in SECOND[aspect].items():
+    for name, noise in KNOWN[aspect].items():
         values = noise(400_000, 0.02, np.random.default_rng(0))
         assert values.mean() == pytest.approx(0.0, abs=0.03), name
         assert values.std() == pytest.approx(1.0, rel=0.03), name
 
 
-@pytest.mark.parametrize("kind", SECOND["error_odds"])
+@pytest.mark.parametrize("kind", KNOWN["error_odds"])
 def test_errors_have_their_share_in_the_mean(kind):
     shares = []
     for seed in range(12):
@@ -302,7 +266,7 @@ def test_errors_have_their_share_in_the_mean(kind):
     assert np.mean(shares) == pytest.approx(0.04, rel=0.15)
 
 
-@pytest.mark.parametrize("kind", SECOND["mistaken_for"])
+@pytest.mark.parametrize("kind", KNOWN["mistaken_for"])
 def test_a_wrong_class_is_another_one(kind):
     assert_allclose(MISTAKEN[kind].sum(axis=1), 1.0)
     assert_allclose(np.diag(MISTAKEN[kind]), 0.0)
@@ -320,7 +284,7 @@ def test_neighbours_outvote_an_error_and_keep_the_place():
         assert np.all(later[:-1] == ready[1:])
 
 
-@pytest.mark.parametrize("numbering", SECOND["numbering"])
+@pytest.mark.parametrize("numbering", KNOWN["numbering"])
 def test_each_result_has_a_number_of_its_own(numbering):
     number = said(chain_of(numbering=numbering), Fault()).number
     assert np.all(np.diff(number) != 0)

@@ -1,4 +1,4 @@
-"""Cases of the camera with the third family's forms: their files and seals; and that the second's stay as they were."""
+"""Cases of the camera: their files and seals."""
 
 from __future__ import annotations
 
@@ -10,25 +10,21 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from camera_stand_ins import check_log, digest_of
+from camera_stand_ins import check_log
 from long import beyond, long
 
-from benchmarks.gap.withheld import runner
 from benchmarks.gap.withheld.generator import driver
-from benchmarks.gap.withheld.generator.camera_family import ASPECTS, CameraFamily, form
-from benchmarks.gap.withheld.generator.camera_further import ALL_EFFECTS
+from benchmarks.gap.withheld.generator.camera_forms import CAMERA_FORMS
+from benchmarks.gap.withheld.generator.camera_outside import ALL_EFFECTS, CAMERA_OUTSIDE
 from benchmarks.gap.withheld.generator.camera_road import CLASS_FRICTION, SURFACES
-from benchmarks.gap.withheld.generator.camera_third_outside import THIRD_OUTSIDE
 from benchmarks.gap.withheld.generator.cases import SHOWS
-from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.forms import NEWEST
 from benchmarks.gap.withheld.generator.kernel import ANGLE, RECORD_STEP_S, N, V, W, X
 from benchmarks.gap.withheld.generator.making import make_case
 from benchmarks.gap.withheld.generator.table import Group, table
-from benchmarks.gap.withheld.outcome import outcome_of
 
-TENTH = Family.TENTH
-THIRD = CameraFamily.THIRD
-CASES = {spec.name: spec for spec in table("camera", TENTH, THIRD)}
+CASES = {spec.name: spec for spec in table("camera", NEWEST)}
+LATER_OUTSIDE = [name for name, (since, _) in CAMERA_OUTSIDE.items() if since == 3]
 HARDEST_M_S2 = 4.0
 """Of a car that has no wheels to slide on."""
 
@@ -61,24 +57,24 @@ NAMES = [
     "mild-class_friction_offset-1",
     "no_gap-0-rich",
     "pair-motion_blur-class_friction_offset-0",
-    f"outside-{next(iter(THIRD_OUTSIDE))}-0",
+    f"outside-{LATER_OUTSIDE[0]}-0",
     "rich-camera_pitch-3",
     "rich-exposure_shift-1",
     "rich-motion_blur-3",
     "no_gap-2-calm",
     "no_gap-6-rich",
-    *(f"outside-{name}-0" for name in list(THIRD_OUTSIDE)[1:]),
+    *(f"outside-{name}-0" for name in LATER_OUTSIDE[1:]),
 ]
 
 
 @pytest.mark.parametrize("name", beyond(6, NAMES))
 @long
 def test_files_keep_the_contract_and_the_secret(name, tmp_path):
-    made = make_case(CASES[name], 1, TENTH, THIRD)
+    made = make_case(CASES[name], 1, NEWEST)
     made.write(tmp_path)
     seal = json.loads(json.dumps(made.seal()))
-    assert seal["camera"]["family"] == "third"
-    assert set(seal["camera"]["chain"]["forms"]) == set(ASPECTS[THIRD])
+    assert seal["camera"]["edition"] == 3
+    assert set(seal["camera"]["chain"]["forms"]) == set(CAMERA_FORMS)
     assert list(seal["effects"]) == list(seal["camera"]["hidden"]) == list(CASES[name].effects)
     if made.spec.group is Group.NO_GAP:
         assert made.truth.gap.total == 1.0
@@ -110,7 +106,7 @@ def check_road(folder: Path, seal: dict[str, Any]) -> None:
 def test_where_nothing_is_hidden_classes_change_at_the_borders():
     """Over all such cases the median border is where road.yaml has it, to less than what a picture is apart."""
     for name in ("no_gap-0-rich", "no_gap-1-rich", "no_gap-3-rich", "no_gap-4-rich"):
-        made = make_case(CASES[name], 1, TENTH, THIRD)
+        made = make_case(CASES[name], 1, NEWEST)
         log, borders = made.logs["holdout"], np.array(made.roads["holdout"].start_m[1:])
         seen = log[log["frame_id"].diff().fillna(1.0) != 0.0].dropna(subset=["image_class", "image_from_m"])
         middle = 0.5 * (seen["image_from_m"] + seen["image_to_m"]).to_numpy()
@@ -124,52 +120,9 @@ def test_where_nothing_is_hidden_classes_change_at_the_borders():
 
 def test_a_case_repeats_and_a_removed_one_has_the_same_logs():
     rich = CASES["rich-exposure_shift-1"]
-    first, again = (make_case(rich, 1, TENTH, THIRD) for _ in range(2))
-    removed = make_case(CASES["removed-exposure_shift-1"], 1, TENTH, THIRD)
+    first, again = (make_case(rich, 1, NEWEST) for _ in range(2))
+    removed = make_case(CASES["removed-exposure_shift-1"], 1, NEWEST)
     for name, log in first.logs.items():
         pd.testing.assert_frame_equal(log, again.logs[name])
         pd.testing.assert_frame_equal(log, removed.logs[name])
     assert first.seal() == again.seal()
-
-
-def test_a_folder_keeps_to_the_third_family(tmp_path):
-    runner.seal_run(tmp_path, "camera_small", 1, TENTH, THIRD)
-    assert json.loads((tmp_path / "run.json").read_text())["camera_forms"] == "third"
-    with pytest.raises(runner.RunError, match="camera_forms: third there, second now"):
-        runner.seal_run(tmp_path, "camera_small", 1, TENTH, CameraFamily.SECOND)
-
-
-def test_an_outcome_knows_which_families_lack_its_form():
-    seal = make_case(CASES["rich-camera_latency-0"], 1, TENTH, THIRD).seal()
-    forms = seal["camera"]["chain"]["forms"]
-    result = {"case": "a", "seal": seal, "diagnosis": None, "error": "none was asked for"}
-    for lateness, lacking in (("constant", 0), ("warming", 1), ("sent_again", 2)):
-        forms["lateness"] = lateness
-        assert outcome_of(result).new_to_camera == frozenset(list(CameraFamily)[:lacking])
-    assert form(forms, "lateness") == "sent_again"
-
-
-# --- the second family stays as it was
-
-SECOND_DIGESTS = {
-    "rich-camera_latency-0": "3e19062cc67bd8bb",
-    "rich-camera_pitch-1": "781ab48d06d2ec3c",
-    "rich-exposure_shift-2": "eb8983db9ae454a9",
-    "rich-motion_blur-0": "2c826becf012cd0e",
-    "rich-class_friction_offset-1": "4cd6c57c72316349",
-    "mild-motion_blur-1": "b032f6316f48785f",
-    "no_gap-0-rich": "cb6e6f5876bbae7a",
-    "no_gap-2-calm": "c29f86d7bf2da8d2",
-    "pair-camera_pitch-class_friction_offset-0": "f0c5dfe3a00fbbc7",
-    "outside-map_labels_old-0": "4e475aee1791c5cd",
-    "outside-reference_late-1": "848be992d2f0ef7c",
-    "outside-position_jumps-1": "1ccf82377d2813c0",
-}
-"""SHA-256 over the files and the seal of cases, as the second family made them before there was a third."""
-
-
-@pytest.mark.parametrize("name", beyond(3, SECOND_DIGESTS))
-@long
-def test_the_second_familys_cases_stay_what_they_were(name, tmp_path):
-    spec = {spec.name: spec for spec in table("camera", TENTH, CameraFamily.SECOND)}[name]
-    assert digest_of(make_case(spec, 1, TENTH, CameraFamily.SECOND), tmp_path) == SECOND_DIGESTS[name]

@@ -1,4 +1,4 @@
-"""The third family of the camera's forms: what it adds, what parameters mean, and deviations that no effect is."""
+"""A camera's chain in its forms since edition 3: what parameters mean, and deviations that no effect is."""
 
 from __future__ import annotations
 
@@ -11,38 +11,30 @@ from numpy.testing import assert_allclose
 
 from benchmarks.gap.withheld.generator import camera_case
 from benchmarks.gap.withheld.generator.camera_chain import results
-from benchmarks.gap.withheld.generator.camera_family import (
-    ASPECTS,
-    OF_EFFECT,
-    SECOND,
-    THIRD,
-    CameraFamily,
-    draw_forms_of,
-    is_new,
-)
 from benchmarks.gap.withheld.generator.camera_faults import NOD_M
-from benchmarks.gap.withheld.generator.camera_further import ALL_EFFECTS, CAMERA_OUTSIDES, PAIRS_OF
+from benchmarks.gap.withheld.generator.camera_forms import CAMERA_FORMS, draw_forms_of
 from benchmarks.gap.withheld.generator.camera_gap import Stage, gap_of
 from benchmarks.gap.withheld.generator.camera_layouts import draw_laid_road
 from benchmarks.gap.withheld.generator.camera_library import CAMERA_LIBRARY, Scene
+from benchmarks.gap.withheld.generator.camera_outside import ALL_EFFECTS, CAMERA_OUTSIDE
 from benchmarks.gap.withheld.generator.camera_reference import friction_of, friction_under, reference
 from benchmarks.gap.withheld.generator.camera_road import CLASS_FRICTION, ROAD_M, Passage
 from benchmarks.gap.withheld.generator.camera_system import Chain, Fault, Results, draw_chain
 from benchmarks.gap.withheld.generator.camera_telling import columns, voted
-from benchmarks.gap.withheld.generator.camera_third import FURTHER
-from benchmarks.gap.withheld.generator.camera_third_outside import THIRD_OUTSIDE
 from benchmarks.gap.withheld.generator.cases import SHOWS
-from benchmarks.gap.withheld.generator.forms import Family
 from benchmarks.gap.withheld.generator.severity import find_severity
-from benchmarks.gap.withheld.generator.table import TARGETS, Group, table
-
-TENTH = Family.TENTH
+from benchmarks.gap.withheld.generator.table import TARGETS
 
 ROWS = np.arange(0.01, 60.0, 0.01)
-FORMS = [(aspect, name) for aspect, forms in FURTHER.items() for name in forms]
+LATER = {
+    aspect: {name: what for name, (since, what) in forms.items() if since == 3}
+    for aspect, forms in CAMERA_FORMS.items()
+}
+LATER_OUTSIDE = {name: effect for name, (since, effect) in CAMERA_OUTSIDE.items() if since == 3}
+FORMS = [(aspect, name) for aspect, forms in LATER.items() for name in forms]
 OF_CASE = ("layout", "speeds", "position", "friction_off")
 OF_CHAIN = [(aspect, name) for aspect, name in FORMS if aspect not in OF_CASE]
-USUAL = {aspect: next(iter(forms)) for aspect, forms in THIRD.items()} | {
+USUAL = {aspect: next(iter(forms)) for aspect, forms in CAMERA_FORMS.items()} | {
     "begins": "before",
     "stamp": "window",
 }
@@ -67,55 +59,6 @@ def said(chain: Chain, fault: Fault, passage: Passage | None = None) -> Results:
 
 
 # --- which forms there are
-
-
-def test_the_third_family_draws_among_the_earlier_ones_forms_too():
-    drawn = [draw_forms_of(CameraFamily.THIRD, np.random.default_rng(seed)) for seed in range(200)]
-    for aspect, forms in THIRD.items():
-        assert {forms[aspect] for forms in drawn} == set(forms)
-    for aspect, forms in SECOND.items():
-        assert list(forms) == list(THIRD[aspect])[: len(forms)]
-    assert set(THIRD) == set(SECOND)
-    assert 25 <= len(FORMS) <= 35
-
-
-def test_every_effect_and_most_of_the_chain_have_a_further_form():
-    for aspects in OF_EFFECT.values():
-        assert set(aspects) & set(FURTHER)
-    assert len(set(THIRD) - set(FURTHER)) < len(FURTHER)
-
-
-def test_a_new_form_is_told_from_those_of_each_family():
-    second = draw_forms_of(CameraFamily.SECOND, np.random.default_rng(0))
-    assert not any(is_new(second, effect, CameraFamily.SECOND) for effect in OF_EFFECT)
-    for effect, aspects in OF_EFFECT.items():
-        for aspect in set(aspects) & set(FURTHER):
-            forms = {**second, aspect: next(iter(FURTHER[aspect]))}
-            assert [is_new(forms, effect, family) for family in CameraFamily] == [True, True, False]
-
-
-def test_table_has_the_stated_counts():
-    groups = [spec.group for spec in table("camera", TENTH, CameraFamily.THIRD)]
-    assert {group: groups.count(group) for group in set(groups)} == {
-        Group.RICH: 30,
-        Group.MILD: 15,
-        Group.NO_GAP: 25,
-        Group.PAIR: 20,
-        Group.OUTSIDE: 46,
-        Group.REMOVED: 10,
-    }
-    names = [{s.name for s in table("camera_small", TENTH, family)} for family in CameraFamily]
-    assert names[0] < names[1] < names[2]
-    assert [len(n) for n in names] == [10, 14, 18]
-
-
-def test_pairs_and_deviations_are_named_once():
-    pairs = [frozenset(pair) for added in PAIRS_OF[CameraFamily.THIRD] for pair in added]
-    assert len(set(pairs)) == len(pairs) == 10
-    outside = CAMERA_OUTSIDES[CameraFamily.THIRD]
-    assert len(outside) == 23
-    assert not set(outside) & set(CAMERA_LIBRARY)
-    assert set(ASPECTS) == set(CAMERA_OUTSIDES) == set(PAIRS_OF) == set(CameraFamily)
 
 
 # --- the nominal chain
@@ -175,14 +118,14 @@ TINY = {
 @pytest.mark.parametrize("effect", NEUTRAL)
 def test_a_neutral_value_is_the_nominal_chain(effect):
     assert ALL_EFFECTS[effect].apply(Fault(), NEUTRAL[effect]) == Fault()
-    assert set(NEUTRAL) == {*CAMERA_LIBRARY, *THIRD_OUTSIDE}
+    assert set(NEUTRAL) == {*CAMERA_LIBRARY, *LATER_OUTSIDE}
 
 
 @pytest.mark.parametrize(("aspect", "name"), OF_CHAIN)
 def test_no_deviation_draws_anew_what_is_not_its_own(aspect, name):
     """A vanishing deviation takes the way of a real one, and all that is random stays."""
     rng = np.random.default_rng(4)
-    forms = {**draw_forms_of(CameraFamily.THIRD, rng), "lateness": "constant", "told_confidence": "as_is"}
+    forms = {**draw_forms_of(3, rng), "lateness": "constant", "told_confidence": "as_is"}
     chain = draw_chain(rng, {**forms, aspect: name})
     nominal = said(chain, Fault(), uneven(30.0))
     for effect, given in TINY.items():
@@ -196,7 +139,7 @@ def test_no_deviation_draws_anew_what_is_not_its_own(aspect, name):
 # --- what the parameters mean
 
 
-@pytest.mark.parametrize("lateness", FURTHER["lateness"])
+@pytest.mark.parametrize("lateness", LATER["lateness"])
 def test_latency_is_the_mean_delay(lateness):
     for passage in (steady(8.0), steady(24.0)):
         shift = said(chain_of(lateness=lateness), Fault(delay_s=0.15), passage).shift_m
@@ -204,7 +147,7 @@ def test_latency_is_the_mean_delay(lateness):
         assert shift.std() < 0.7 * shift.mean()
 
 
-@pytest.mark.parametrize("mounting", FURTHER["mounting"])
+@pytest.mark.parametrize("mounting", LATER["mounting"])
 def test_pitch_is_the_mean_angle_whatever_the_speed(mounting):
     distance = 0.4 + 5.0 + 0.4
     for pitch in (0.04, -0.03):
@@ -214,27 +157,27 @@ def test_pitch_is_the_mean_angle_whatever_the_speed(mounting):
             assert shift.mean() == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.parametrize("law", FURTHER["blur_law"])
+@pytest.mark.parametrize("law", LATER["blur_law"])
 def test_laws_fall_from_all_to_little(law):
     amount = np.linspace(0.0, 6.0, 200)
-    kept = FURTHER["blur_law"][law](amount)
+    kept = LATER["blur_law"][law](amount)
     assert kept[0] == 1.0
     assert np.all(np.diff(kept) <= 0.0)
     assert np.all(kept > 0.0)
     assert kept[-1] < 0.35
-    assert 0.25 < FURTHER["exposure_law"][law](np.array([1.0]))[0] < 0.8
+    assert 0.25 < LATER["exposure_law"][law](np.array([1.0]))[0] < 0.8
 
 
 def test_stops_and_milliseconds_are_means_about_which_a_course_varies():
     """With a law that is straight about here, what is lost tells the amount."""
     laws = {"exposure_law": "linear", "blur_law": "linear"}
-    for course in FURTHER["exposure_course"]:
+    for course in LATER["exposure_course"]:
         chain = chain_of(exposure_course=course, **laws)
         for stops in (1.0, -1.0):
             amount = abs(stops) / chain.stops * (chain.over if stops > 0.0 else 1.0)
             lost = 1.0 - said(chain, Fault(stops=stops)).kept
             assert lost.mean() == pytest.approx(0.98 * 0.3 * amount, rel=0.06)
-    for course in FURTHER["blur_course"]:
+    for course in LATER["blur_course"]:
         chain = chain_of(blur_course=course, **laws)
         for speed in (8.0, 16.0):
             lost = 1.0 - said(chain, Fault(exposure_s=0.01), steady(speed, 60.0)).kept
@@ -300,14 +243,14 @@ def test_a_surveyed_stretch_has_its_error_in_every_drive():
 
 @pytest.mark.parametrize("aspect", ["captures", "work"])
 def test_pictures_come_at_their_rate(aspect):
-    for name, draw in FURTHER[aspect].items():
+    for name, draw in LATER[aspect].items():
         mean = draw(0.04, 100_000, np.random.default_rng(0)).mean()
         assert mean == pytest.approx(0.04, rel=0.01), name
 
 
 def test_noise_has_its_size():
     for aspect in ("confidence", "reference"):
-        for noise in filter(None, FURTHER[aspect].values()):
+        for noise in filter(None, LATER[aspect].values()):
             values = noise(400_000, 0.02, np.random.default_rng(0))
             assert values.mean() == pytest.approx(0.0, abs=0.03)
             assert values.std() == pytest.approx(1.0, rel=0.03)
@@ -355,7 +298,7 @@ def test_a_system_that_waits_for_speed_says_nothing_below_it():
 # --- roads
 
 
-@pytest.mark.parametrize("layout", FURTHER["layout"])
+@pytest.mark.parametrize("layout", LATER["layout"])
 def test_a_laid_road_is_long_and_changes_at_every_border(layout):
     road = draw_laid_road(np.random.default_rng(5), layout)
     assert road.start_m[-1] >= ROAD_M
@@ -373,7 +316,7 @@ STAGE = Stage(replace(chain_of(), reference_noise=0.01), uneven(), ROAD, "holdou
 
 
 def fault_at(name: str, severity: float) -> Fault:
-    entry = THIRD_OUTSIDE[name]
+    entry = LATER_OUTSIDE[name]
     parameters = entry.at(Scene(STAGE.chain, (0, 1, 2)), np.random.default_rng(1))
     return entry.apply(Fault(), parameters(severity))
 
@@ -383,7 +326,7 @@ def gap_at(name: str, severity: float) -> float:
     return gap_of(STAGE, fault, camera_case._told(STAGE.chain, ROAD, fault)).total
 
 
-@pytest.mark.parametrize("name", THIRD_OUTSIDE)
+@pytest.mark.parametrize("name", LATER_OUTSIDE)
 def test_a_further_deviation_grows_and_shows(name):
     assert 1.0 <= gap_at(name, 0.1) < gap_at(name, 1.0)
     assert gap_at(name, 1.0) > SHOWS
@@ -396,7 +339,7 @@ def left_over(shown: np.ndarray, *known: np.ndarray) -> float:
     return float(np.sqrt(np.mean(rest**2) / np.mean(shown**2)))
 
 
-@pytest.mark.parametrize("name", THIRD_OUTSIDE)
+@pytest.mark.parametrize("name", LATER_OUTSIDE)
 def test_a_further_deviation_is_no_effect_with_another_name(name):
     """Most of it is left where a delay and an angle, an exposure and a blur, and other class values take their best."""
     fault = fault_at(name, find_severity(lambda severity: gap_at(name, severity), TARGETS[1]))

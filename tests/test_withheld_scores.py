@@ -18,14 +18,13 @@ from benchmarks.gap.withheld.baselines import cosine
 from benchmarks.gap.withheld.command import watch
 from benchmarks.gap.withheld.generator.cases import make_case
 from benchmarks.gap.withheld.generator.driver import UndrivableError
-from benchmarks.gap.withheld.generator.forms import ASPECTS, EFFECT_FORMS, Family
+from benchmarks.gap.withheld.generator.forms import NEWEST, PLAIN
 from benchmarks.gap.withheld.generator.table import SIZES, Group, Spec, table
 from benchmarks.gap.withheld.outcome import ResultError, outcome_of, read_outcomes
 from benchmarks.gap.withheld.scorer import Scores, load_thresholds, score, score_run
 from benchmarks.gap.withheld.show import draw_confusion
 from benchmarks.gap.withheld.statistics import calibration_error, reliability, wilson
 
-FIRST = Family.FIRST
 LIMITS = yaml.safe_load(runner.THRESHOLDS.read_text(encoding="utf-8"))
 
 
@@ -135,32 +134,6 @@ def test_only_a_blamed_effect_is_right():
     assert scores.verdicts["rich"] == {"identified": 1, "ambiguous": 1, "unknown": 1, "error": 1}
 
 
-def test_further_forms_are_told_apart():
-    effect = "rolling_resistance"  # one that each family has more forms of
-    forms = EFFECT_FORMS[effect]
-    cases = [result("rich", {effect: {}}, answer("identified", cause(effect, 0.9))) for _ in forms]
-    for case, form in zip(cases, forms, strict=True):
-        case["seal"]["forms"] = {effect: form}
-    further = {a.text: (a.hits, a.n) for a in scored(*cases, result("rich", LAG, RIGHT)).asides}
-    n, known = len(forms), {family: len(ASPECTS[family].get(effect, [None])) for family in list(Family)[:-1]}
-    assert list(known.values()) == sorted({*known.values()} - {n})
-    for family, of_family in known.items():
-        lacks = f"rich, a form that the {family} family lacks: right first"
-        assert further[lacks] == (n - of_family, n - of_family)
-
-
-def test_forms_of_effects_that_had_one_are_further_than_both_families():
-    effect, forms = next((e, f) for e, f in EFFECT_FORMS.items() if e not in ASPECTS[Family.SECOND])
-    sizes = [len(ASPECTS[family].get(effect, [None])) for family in Family]
-    cases = [result("rich", {effect: {}}, RIGHT) for _ in forms]
-    for case, form in zip(cases, forms, strict=True):
-        case["seal"]["forms"] = {effect: form}
-    assert [outcome_of(case).further for case in cases] == [
-        frozenset(lacking for lacking, n in zip(Family, sizes, strict=True) if n <= i)
-        for i in range(len(forms))
-    ]
-
-
 def test_small_gaps_do_not_count():
     scores = scored(result("rich", LAG, RIGHT), result("rich", LAG, SHY, gap=4.9))
     assert counted(scores, "right_first") == (1, 1)
@@ -247,18 +220,18 @@ def test_calibration_error():
 
 
 def test_a_folder_keeps_one_run(tmp_path):
-    runner.seal_run(tmp_path, "small", 7, FIRST)
-    runner.seal_run(tmp_path, "small", 7, FIRST)
+    runner.seal_run(tmp_path, "small", 7, PLAIN)
+    runner.seal_run(tmp_path, "small", 7, PLAIN)
     with pytest.raises(runner.RunError, match="seed: 7 there, 8 now"):
-        runner.seal_run(tmp_path, "small", 8, FIRST)
-    with pytest.raises(runner.RunError, match="forms: first there, second now"):
-        runner.seal_run(tmp_path, "small", 7, Family.SECOND)
+        runner.seal_run(tmp_path, "small", 8, PLAIN)
+    with pytest.raises(runner.RunError, match=r"edition: .* there, .* now"):
+        runner.seal_run(tmp_path, "small", 7, NEWEST)
     run = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
-    assert (run["seed"], run["forms"]) == (7, "first")
+    assert (run["seed"], run["edition"]) == (7, {"car": 1, "camera": 1})
 
 
 def test_thresholds_are_frozen_with_the_run(tmp_path, monkeypatch):
-    runner.seal_run(tmp_path, "small", 7, FIRST)
+    runner.seal_run(tmp_path, "small", 7, PLAIN)
     assert load_thresholds(tmp_path) == LIMITS
     easier = tmp_path / "thresholds.yaml"
     easier.write_text(runner.THRESHOLDS.read_text(encoding="utf-8").replace("0.85", "0.50"), encoding="utf-8")
@@ -312,7 +285,7 @@ BIAS = Spec(
 
 
 def test_the_diagnosis_sees_files_and_no_truth(tmp_path, fake_diagnose):
-    runner.run_case(BIAS, 1, FIRST, tmp_path, keep=False)
+    runner.run_case(BIAS, 1, PLAIN, tmp_path, keep=False)
     (names, options), *_ = fake_diagnose.calls
     assert options["exclude"] == ("accelerometer_bias",)
     assert not any("bias" in str(path.relative_to(tmp_path)) or path.stem == "fresh" for path in names)
@@ -327,10 +300,10 @@ def test_the_diagnosis_sees_files_and_no_truth(tmp_path, fake_diagnose):
 
 def test_a_diagnosis_that_fails_is_counted_and_not_repeated(tmp_path, fake_diagnose):
     fake_diagnose.problem = ValueError("no such column")
-    waiting, total = runner.pending(tmp_path, "small", FIRST)
+    waiting, total = runner.pending(tmp_path, "small", PLAIN)
     spec = next(s for s in waiting if s.group is Group.NO_GAP)
-    assert runner.run_case(spec, 1, FIRST, tmp_path, keep=True)["error"] == "ValueError: no such column"
-    assert runner.pending(tmp_path, "small", FIRST)[0] == [s for s in waiting if s != spec]
+    assert runner.run_case(spec, 1, PLAIN, tmp_path, keep=True)["error"] == "ValueError: no such column"
+    assert runner.pending(tmp_path, "small", PLAIN)[0] == [s for s in waiting if s != spec]
     assert len(waiting) == total
     assert counted(score(read_outcomes(tmp_path), LIMITS), "false_alarm") == (1, 1)
 
@@ -340,14 +313,14 @@ def test_a_case_that_cannot_be_made_stays_pending_and_stops_no_run(tmp_path, mon
         raise UndrivableError("nothing in the drive shows the deviation")
 
     monkeypatch.setattr(runner, "make_case", nothing_shows)
-    assert "not made: nothing in the drive" in runner.run_case(BIAS, 1, FIRST, tmp_path, keep=False)["error"]
+    assert "not made: nothing in the drive" in runner.run_case(BIAS, 1, PLAIN, tmp_path, keep=False)["error"]
     assert not list(tmp_path.iterdir())
 
 
 def test_scores_tell_what_is_pending_and_are_drawn(tmp_path, fake_diagnose):
-    runner.seal_run(tmp_path, "small", 1, FIRST)
+    runner.seal_run(tmp_path, "small", 1, PLAIN)
     runner.run_case(
-        next(s for s in table("small") if s.group is Group.NO_GAP), 1, FIRST, tmp_path, keep=False
+        next(s for s in table("small") if s.group is Group.NO_GAP), 1, PLAIN, tmp_path, keep=False
     )
     scores = score_run(tmp_path)
     assert len(scores.pending) == len(table("small")) - 1

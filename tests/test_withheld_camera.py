@@ -18,9 +18,9 @@ from numpy.testing import assert_allclose
 from benchmarks.gap.withheld import runner
 from benchmarks.gap.withheld.generator import camera_case, camera_gap
 from benchmarks.gap.withheld.generator.camera_chain import results
-from benchmarks.gap.withheld.generator.camera_family import CameraFamily, draw_forms_of
-from benchmarks.gap.withheld.generator.camera_forms import CAMERA_FORMS
-from benchmarks.gap.withheld.generator.camera_library import CAMERA_EFFECTS, Scene
+from benchmarks.gap.withheld.generator.camera_forms import CAMERA_FORMS, draw_forms_of
+from benchmarks.gap.withheld.generator.camera_library import CAMERA_LIBRARY, Scene
+from benchmarks.gap.withheld.generator.camera_outside import camera_outside_by
 from benchmarks.gap.withheld.generator.camera_reference import reference
 from benchmarks.gap.withheld.generator.camera_road import (
     CLASS_FRICTION,
@@ -31,14 +31,17 @@ from benchmarks.gap.withheld.generator.camera_road import (
 )
 from benchmarks.gap.withheld.generator.camera_system import Chain, Fault, draw_chain
 from benchmarks.gap.withheld.generator.camera_telling import columns
-from benchmarks.gap.withheld.generator.forms import Family
+from benchmarks.gap.withheld.generator.forms import Edition
 from benchmarks.gap.withheld.generator.making import make_case
 from benchmarks.gap.withheld.generator.table import Group, table
 from benchmarks.gap.withheld.scorer import score_run
 from benchmarks.gap.withheld.show import draw_confusion
 
-TENTH = Family.TENTH
-FIRST = CameraFamily.FIRST
+EARLY = Edition(10, 1)
+CAMERA_EFFECTS = CAMERA_LIBRARY | camera_outside_by(1)
+FORMS = {
+    a: {f: what for f, (since, what) in forms.items() if since == 1} for a, forms in CAMERA_FORMS.items()
+}
 CASES = {spec.name: spec for size in ("camera", "camera_small") for spec in table(size)}
 ROAD = CameraRoad(
     (0.0, *(45.0 + 31.7 * np.arange(30))),
@@ -51,7 +54,7 @@ ROAD = CameraRoad(
 def chain_of(seed: int = 0, **forms: str) -> Chain:
     """Drawn, with forms of one's own, and neither errors nor noise."""
     rng = np.random.default_rng(seed)
-    chain = draw_chain(rng, {**draw_forms_of(FIRST, rng), **PLAIN, **forms})
+    chain = draw_chain(rng, {**draw_forms_of(1, rng), **PLAIN, **forms})
     return replace(
         chain, rate_hz=50.0, work_s=0.03, dropped=0.0, errors=0.0, none=0.0, spread=0.0, border_dip=0.0
     )
@@ -81,7 +84,7 @@ def shown(chain: Chain, passage: Passage, fault: Fault) -> pd.DataFrame:
 @pytest.mark.parametrize("seed", range(12))
 def test_the_nominal_chain_is_the_roads(seed):
     rng = np.random.default_rng(seed)
-    chain = draw_chain(rng, draw_forms_of(FIRST, rng))
+    chain = draw_chain(rng, draw_forms_of(1, rng))
     said = results(chain, uneven(), ROAD, Fault(), "fit_1")
     assert_allclose(said.shift_m, 0.0, atol=1e-12)
     assert np.all(said.kept == 1.0)
@@ -120,7 +123,7 @@ def test_a_neutral_value_leaves_the_nominal_columns(effect):
 def test_no_effect_draws_anew_what_is_not_its_own(effect, seed):
     """A vanishing deviation takes the way of a real one, and all that is random stays."""
     rng = np.random.default_rng(seed)
-    chain = draw_chain(rng, {**draw_forms_of(FIRST, rng), "lateness": "constant"})
+    chain = draw_chain(rng, {**draw_forms_of(1, rng), "lateness": "constant"})
     nominal, tiny = (
         results(chain, uneven(), ROAD, fault, "fit_1")
         for fault in (Fault(), CAMERA_EFFECTS[effect].apply(Fault(), TINY[effect]))
@@ -142,7 +145,7 @@ def moved_m(chain: Chain, passage: Passage, fault: Fault) -> np.ndarray:
     return there - ROAD.borders[np.argmin(np.abs(ROAD.borders - there[:, None]), axis=1)]
 
 
-@pytest.mark.parametrize("lateness", CAMERA_FORMS["lateness"])
+@pytest.mark.parametrize("lateness", FORMS["lateness"])
 @pytest.mark.parametrize("speed", [8.0, 24.0])
 def test_latency_moves_class_changes_by_speed_times_delay(lateness, speed):
     chain = chain_of(lateness=lateness)
@@ -166,7 +169,7 @@ def test_pitch_moves_class_changes_by_the_geometry_whatever_the_speed(speed, pit
     assert mean == pytest.approx(expected, rel=0.04)
 
 
-@pytest.mark.parametrize("law", CAMERA_FORMS["blur_law"])
+@pytest.mark.parametrize("law", FORMS["blur_law"])
 def test_blur_goes_with_speed_times_exposure_and_exposure_not_with_speed(law):
     chain = chain_of(blur_law=law, exposure_law=law)
 
@@ -188,7 +191,7 @@ def test_an_exponential_loss_is_proportional_to_speed():
     assert_allclose(np.array(lost) / speed, lost[0] / speed[0], rtol=2e-3)
 
 
-@pytest.mark.parametrize("kind", CAMERA_FORMS["reference"])
+@pytest.mark.parametrize("kind", FORMS["reference"])
 def test_class_friction_is_what_the_reference_reads_and_the_place_stays(kind):
     chain = replace(chain_of(reference=kind), reference_noise=0.01)
     fault = Fault(friction=(0.7, 0.6, 0.3))
@@ -201,16 +204,16 @@ def test_class_friction_is_what_the_reference_reads_and_the_place_stays(kind):
     pd.testing.assert_frame_equal(shown(chain, uneven(), Fault()), shown(chain, uneven(), fault))
 
 
-@pytest.mark.parametrize("errors", CAMERA_FORMS["errors"])
+@pytest.mark.parametrize("errors", FORMS["errors"])
 def test_errors_have_their_share(errors):
     odds = np.full(200_000, 0.08)
-    wrong = CAMERA_FORMS["errors"][errors](odds, np.random.default_rng(0))
+    wrong = FORMS["errors"][errors](odds, np.random.default_rng(0))
     assert wrong.mean() == pytest.approx(0.08, rel=0.05)
 
 
 @pytest.mark.parametrize("aspect", ["confidence", "reference"])
 def test_noise_has_its_size(aspect):
-    for name, noise in CAMERA_FORMS[aspect].items():
+    for name, noise in FORMS[aspect].items():
         values = noise(200_000, 0.02, np.random.default_rng(0))
         assert values.mean() == pytest.approx(0.0, abs=0.03), name
         assert values.std() == pytest.approx(1.0, rel=0.03), name
@@ -218,7 +221,7 @@ def test_noise_has_its_size(aspect):
 
 @pytest.mark.parametrize("aspect", ["captures", "work"])
 def test_pictures_come_at_their_rate(aspect):
-    for name, draw in CAMERA_FORMS[aspect].items():
+    for name, draw in FORMS[aspect].items():
         assert draw(0.04, 100_000, np.random.default_rng(0)).mean() == pytest.approx(0.04, rel=0.02), name
 
 
@@ -251,7 +254,7 @@ def test_gap_of_a_delay_is_its_way_over_the_spread_of_a_border():
 @pytest.mark.parametrize("name", beyond(2, [spec.name for spec in table("camera_small")]))
 def test_files_keep_the_contract_and_the_secret(name, tmp_path, monkeypatch):
     monkeypatch.setattr(camera_case, "drive", rolled)
-    made = make_case(CASES[name], 1, TENTH)
+    made = make_case(CASES[name], 1, EARLY)
     made.write(tmp_path)
     seal = json.loads(json.dumps(made.seal()))
     assert list(seal["effects"]) == list(CASES[name].effects)
@@ -290,7 +293,7 @@ def check_road(folder: Path, seal: dict[str, Any]) -> None:
 
 @pytest.mark.long
 def test_a_rich_case_has_borders_at_many_speeds_and_its_gap():
-    drawn = make_case(CASES["rich-camera_latency-0"], 1, TENTH)
+    drawn = make_case(CASES["rich-camera_latency-0"], 1, EARLY)
     assert drawn.truth.gap.total == pytest.approx(drawn.spec.target, rel=0.15)
     for name, log in drawn.logs.items():
         place = log["position_m"].to_numpy()
@@ -303,8 +306,8 @@ def test_a_rich_case_has_borders_at_many_speeds_and_its_gap():
 def test_a_case_repeats_and_a_removed_one_has_the_same_logs(monkeypatch):
     monkeypatch.setattr(camera_case, "drive", rolled)
     rich = CASES["rich-camera_latency-0"]
-    first, again, other = (make_case(rich, seed, TENTH) for seed in (1, 1, 2))
-    removed = make_case(replace(rich, name="removed", group=Group.REMOVED), 1, TENTH)
+    first, again, other = (make_case(rich, seed, EARLY) for seed in (1, 1, 2))
+    removed = make_case(replace(rich, name="removed", group=Group.REMOVED), 1, EARLY)
     for name, log in first.logs.items():
         pd.testing.assert_frame_equal(log, again.logs[name])
         pd.testing.assert_frame_equal(log, removed.logs[name])
@@ -340,9 +343,9 @@ def test_roads_have_every_surface_and_uneven_borders():
 def test_a_run_is_made_and_scored_with_the_cameras_effects_as_candidates(tmp_path, monkeypatch):
     blaming(monkeypatch)
     monkeypatch.setattr(camera_case, "drive", rolled)
-    runner.seal_run(tmp_path, "camera_small", 1, TENTH)
+    runner.seal_run(tmp_path, "camera_small", 1, EARLY)
     for name in ("rich-camera_latency-0", "no_gap-0-rich"):
-        runner.run_case(CASES[name], 1, TENTH, tmp_path, keep=False)
+        runner.run_case(CASES[name], 1, EARLY, tmp_path, keep=False)
     scores = score_run(tmp_path)
     assert len(scores.pending) == 8
     hits = {line.name: (line.hits, line.n) for line in scores.lines}
