@@ -7,8 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_withheld_forms import forms_of, numbered, with_form
 from test_withheld_plant import CAR, carried, roll
+from withheld_cars import (
+    DRY,
+    HALF_WARM_S,
+    LOCKED,
+    NO_COMMAND,
+    SLIDING,
+    _slip,
+    _warmth,
+    forms_of,
+    moving,
+    numbered,
+    slopes,
+    with_form,
+)
 
 from benchmarks.gap.withheld.generator import air, details, kernel
 from benchmarks.gap.withheld.generator.air import BARRIER_M, NOD_M_S2, SHUT_M_S, WAKE_S
@@ -19,30 +32,13 @@ from benchmarks.gap.withheld.generator.details import (
     STOPS_M_S2,
     TEXTURE_M,
     USUAL_M_S,
-    WARM_S,
 )
 from benchmarks.gap.withheld.generator.kernel import BODY, PITCH, SWAY, N, V, W, X
-from benchmarks.gap.withheld.generator.physics import Physics
 from benchmarks.gap.withheld.generator.world import World, nominal
 
 pytestmark = pytest.mark.long
 
-WET = Road((0.0,), (0.5,))
-LOCKED = 0.79 * 0.9 * 9.81
-"""Deceleration with locked wheels on a dry road [m/s^2]."""
-HALF_WARM_S = WARM_S * np.log(2.0)
-"""When what warms up is as on the mean."""
-NO_COMMAND = np.zeros((2, 4))
-DRY, WET_2 = 0.9, 0.5
-LOCKED_2 = 0.79 * 9.81
-"""Deceleration with locked wheels over the friction [m/s^2]."""
-
-
-def _slip(world, speed: float, torque: float, seconds: float = 0.6) -> np.ndarray:
-    """Of each wheel in the end, over its size as the simulation has it [-]."""
-    path = roll(world, speed, seconds, torque)
-    rims = path[-1, W : W + 4] * CAR.wheel_radius_m
-    return (rims - path[-1, V]) / np.maximum(rims, path[-1, V])
+WET_ROAD = Road((0.0,), (0.5,))
 
 
 def _slowing(world: World, speed: float, at_s: float) -> float:
@@ -50,35 +46,6 @@ def _slowing(world: World, speed: float, at_s: float) -> float:
     rows = round(at_s * 1000.0)
     path = roll(world, speed, at_s + 0.3)
     return float((path[rows - 200, V] - path[rows + 200, V]) / 0.4)
-
-
-def _warmth(at_s: float) -> float:
-    return float(1.0 - 2.0 * np.exp(-at_s / WARM_S))
-
-
-def moving(p: Physics, slip: float = 0.0, speed: float = 20.0) -> tuple[np.ndarray, np.ndarray, float]:
-    """State of a car whose wheels all slip alike, its derivative, and what an accelerometer reads [m/s^2]."""
-    y = kernel.begin(p, 0.0, speed, np.full(4, speed / p.radius), 0.0, NO_COMMAND)
-    y[W : W + 4] = speed / p.radius / (1.0 - slip)
-    dy = np.zeros(N)
-    return y, dy, kernel.slope(p, y, 0.0, NO_COMMAND, dy)
-
-
-def moving_2(
-    p: Physics, slip: float = 0.0, speed: float = 20.0, time: float = 0.0, place: float = 0.0, **state: float
-) -> tuple[np.ndarray, float]:
-    """Derivative of a car whose wheels all slip alike, and what an accelerometer reads [m/s^2].
-
-    `state` is what else is set, by the kernel's names: of the body, and else of all wheels.
-    """
-    y = kernel.begin(p, 0.0, speed, np.full(4, speed / p.radius), time, NO_COMMAND)
-    y[X] = place
-    y[W : W + 4] = speed / p.radius / (1.0 - slip)
-    for name, value in state.items():
-        first = getattr(kernel, name)
-        y[first : first + (1 if name == "PITCH" else 4)] = value
-    dy = np.zeros(N)
-    return dy, kernel.slope(p, y, time, NO_COMMAND, dy)
 
 
 @pytest.mark.parametrize("chosen", forms_of("aero_drag", by=4))
@@ -138,7 +105,7 @@ def test_lift_at_the_rear_leaves_the_front():
     assert 2.0 * (0.25 * p.lift - tilt) == pytest.approx(0.2 * p.drag)
 
 
-@pytest.mark.parametrize(("road", "factor"), [(Road(), 1.0), (WET, 1.0 + 0.2)])
+@pytest.mark.parametrize(("road", "factor"), [(Road(), 1.0), (WET_ROAD, 1.0 + 0.2)])
 def test_water_adds_to_the_resistance_of_a_dry_road(road, factor):
     path = roll(with_form("rolling_resistance", "more_when_wet", road=road, coefficient=0.015), 20.0, 5.0)
     lost = 5.0 * factor * 0.015 * CAR.mass_kg * 9.81 / carried(CAR)
@@ -297,7 +264,7 @@ def test_the_sides_resist_by_their_mean():
 
 
 @pytest.mark.parametrize("form", numbered(("bridges", "pass")))
-def test_profiles_of_the_road_close_and_are_even_on_the_whole_2(form):
+def test_profiles_with_bridges_and_bends_are_even_on_the_whole(form):
     profile = with_form("road_grade", form, grade=0.03).physics.profile
     assert profile.size * PROFILE_STEP_M > 300.0
     assert profile.mean() == pytest.approx(0.0, abs=1e-12)
@@ -424,7 +391,7 @@ def test_slabs_have_the_grade_on_the_whole():
 def test_a_drag_is_less_in_shelter(part, share):
     p = with_form("aero_drag", "sheltered_stretches", drag_area_m2=0.8).physics
     told = -share * 0.5 * 1.225 * 0.8 * 20.0**2 / CAR.mass_kg
-    assert moving_2(p, place=part * BARRIER_M)[1] == pytest.approx(told, rel=1e-3)
+    assert slopes(p, place=part * BARRIER_M)[1] == pytest.approx(told, rel=1e-3)
     places = np.linspace(0.0, BARRIER_M, 1000, endpoint=False)
     assert np.mean([air.sheltered(0.15, at) for at in places]) == pytest.approx(1.0, abs=1e-9)
 
@@ -433,7 +400,7 @@ def test_a_drag_is_less_in_shelter(part, share):
 def test_a_seal_resists_more_when_slow(speed):
     p = with_form("rolling_resistance", "seals_when_slow", coefficient=0.012).physics
     share = 1.0 + 0.4 * (np.exp(-speed / 8.0) - np.exp(-17.0 / 8.0))
-    lost = -np.mean(moving_2(p, speed=speed)[0][W : W + 4]) * 1.2
+    lost = -np.mean(slopes(p, speed=speed)[0][W : W + 4]) * 1.2
     assert lost == pytest.approx(share * 0.012 * 0.25 * CAR.mass_kg * 9.81 * 0.29, rel=1e-6)
     assert 0.9 < share < 1.2
 
@@ -443,7 +410,7 @@ def test_a_load_on_one_side_presses_that_side_s_tyres():
     assert p.mass == pytest.approx(CAR.mass_kg + 300.0)
     assert p.load_side * p.mass * 0.75 == pytest.approx(300.0 * 0.4)
     path = roll(with_form("mass_offset", "on_one_side", mass_kg=300.0), 25.0, 1.0, -3000.0)
-    assert_allclose(path[500:, N], -LOCKED_2 * DRY, rtol=1e-3)
+    assert_allclose(path[500:, N], -SLIDING * DRY, rtol=1e-3)
     spins = roll(with_form("mass_offset", "on_one_side", mass_kg=300.0), 10.0, 0.5, 900.0)[-1, W : W + 4]
     assert np.all(spins[[1, 3]] > spins[[0, 2]])
 
@@ -469,16 +436,16 @@ def test_a_drag_is_more_of_a_car_that_squats(pushed):
     p = with_form("aero_drag", "nodding", drag_area_m2=0.8).physics
     share = 1.0 + 0.1 * np.tanh(pushed / NOD_M_S2)
     told = -share * 0.5 * 1.225 * 0.8 * 20.0**2 / CAR.mass_kg
-    assert moving(p, PITCH=pushed)[0][V] == pytest.approx(told, rel=1e-9)
+    assert slopes(p, PITCH=pushed)[0][V] == pytest.approx(told, rel=1e-9)
 
 
 def test_a_flat_spot_resists_once_a_turn():
     p = with_form("rolling_resistance", "flat_spots", coefficient=0.012).physics
     told = 0.012 * 0.25 * CAR.mass_kg * 9.81 * 0.29
     angles = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
-    lost = np.array([-np.mean(moving(p, ANGLE=angle)[0][W : W + 4]) for angle in angles]) * 1.2
+    lost = np.array([-np.mean(slopes(p, ANGLE=angle)[0][W : W + 4]) for angle in angles]) * 1.2
     assert lost.mean() == pytest.approx(told, rel=1e-6)
-    front = np.array([-moving(p, ANGLE=angle)[0][W] for angle in (0.0, np.pi)]) * 1.2
+    front = np.array([-slopes(p, ANGLE=angle)[0][W] for angle in (0.0, np.pi)]) * 1.2
     assert front[0] / front[1] == pytest.approx(1.3 / 0.7, rel=1e-6)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import zlib
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -13,9 +12,18 @@ import pytest
 from long import beyond, long
 from numpy.testing import assert_allclose
 from test_withheld_plant import CAR, NEUTRAL, QUIET, LimitDrive, carried, roll
+from withheld_cars import (
+    by_further,
+    driven,
+    forms_of,
+    numbered,
+    pulled,
+    reading,
+    with_form,
+)
 
 from benchmarks.gap.withheld.generator import kernel
-from benchmarks.gap.withheld.generator.car import Car, Road
+from benchmarks.gap.withheld.generator.car import Road
 from benchmarks.gap.withheld.generator.cases import make_case
 from benchmarks.gap.withheld.generator.details import FLOOR_M_S, ROLL_M_S
 from benchmarks.gap.withheld.generator.driver import drive
@@ -35,28 +43,15 @@ from benchmarks.gap.withheld.generator.forms import (
     effect_in,
     names_by,
 )
-from benchmarks.gap.withheld.generator.kernel import N, V, W, integrate
+from benchmarks.gap.withheld.generator.kernel import N, V, W
 from benchmarks.gap.withheld.generator.library import LIBRARY
 from benchmarks.gap.withheld.generator.outside import OUTSIDE, OUTSIDE_SINCE
-from benchmarks.gap.withheld.generator.sensors import Noise, Sensors, make_log, read
+from benchmarks.gap.withheld.generator.sensors import Noise, Sensors, make_log
 from benchmarks.gap.withheld.generator.table import PAIRS, Group, table
 from benchmarks.gap.withheld.generator.tyre import dugoff
-from benchmarks.gap.withheld.generator.world import World, nominal
+from benchmarks.gap.withheld.generator.world import nominal
 
 CASES = {spec.name: spec for spec in table("full", NEWEST)}
-
-
-def numbered(items):
-    """Parameters without their names in the test's: what the forms are is for the seal to tell."""
-    return [pytest.param(item, id=str(i)) for i, item in enumerate(items)]
-
-
-def forms_of(*effects: str, but: tuple[str, ...] = (), by: int = NEWEST.car):
-    """Forms of effects up to an edition but some, which have tests of their own."""
-    chosen = (
-        (effect, form, since) for effect in effects for form, (since, _) in EFFECT_FORMS[effect].items()
-    )
-    return numbered((effect, form) for effect, form, since in chosen if form not in but and since <= by)
 
 
 def few(chosen):
@@ -67,36 +62,6 @@ def few(chosen):
     return [
         pytest.param(item, id=str(i), marks=() if item in always else long) for i, item in enumerate(chosen)
     ]
-
-
-def by_further(name: str, **given: float) -> World:
-    return OUTSIDE[name].apply(nominal(CAR, Road()), given)
-
-
-def with_form(effect: str, form: str, car: Car = CAR, road: Road | None = None, **given: float) -> World:
-    return effect_in({effect: form}, effect).apply(nominal(car, road or Road()), given)
-
-
-def driven(world: World, command: np.ndarray) -> np.ndarray:
-    """Path of a car that begins freely rolling at 10 m/s."""
-    rows = 10 * (len(command) - 1)
-    path = np.zeros((rows + 1, N + 1))
-    y = kernel.begin(world.physics, 0.0, 10.0, np.full(4, 10.0 / world.physics.radius), 0.0, command)
-    path[0, :N] = y
-    integrate(world.physics, y, 0, rows, world.split, command, path)
-    return path
-
-
-@cache
-def pulled() -> np.ndarray:
-    """Path of the nominal car as it gathers speed for 20 s."""
-    return roll(nominal(CAR, Road()), 10.0, 20.0, 50.0)
-
-
-def reading(path: np.ndarray, sensors: Sensors) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows' times, ideal readings and the sensors', away from the path's ends."""
-    at = np.arange(1.0, len(path) * 1e-3 - 1.0, 0.0137)
-    return at, read(path, Sensors(), at), read(path, sensors, at)
 
 
 # --- editions

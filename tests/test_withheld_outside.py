@@ -5,8 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_withheld_forms import by_further, driven, reading
 from test_withheld_plant import CAR, carried, roll
+from withheld_cars import (
+    DRY,
+    NO_COMMAND,
+    SLIDING,
+    _slip,
+    by_further,
+    driven,
+    reading,
+    slopes,
+)
 
 from benchmarks.gap.withheld.generator import details, kernel, motors
 from benchmarks.gap.withheld.generator.car import Road
@@ -20,47 +29,17 @@ from benchmarks.gap.withheld.generator.details import (
 )
 from benchmarks.gap.withheld.generator.kernel import LAG, SWAY, N, V, W, X
 from benchmarks.gap.withheld.generator.motors import NOTCH_RAD_S
-from benchmarks.gap.withheld.generator.physics import Physics
 from benchmarks.gap.withheld.generator.sensors import Sensors, read
 from benchmarks.gap.withheld.generator.signals import MISLOCK_S, PAD_DAMPING, RELOCK_S
 from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 
-LOCKED = 0.79 * 0.9 * 9.81
-"""Deceleration with locked wheels on a dry road [m/s^2]."""
-NO_COMMAND = np.zeros((2, 4))
-DRY, WET_2 = 0.9, 0.5
-
-
-def _slip(world, speed: float, torque: float, seconds: float = 0.6) -> np.ndarray:
-    """Of each wheel in the end, over its size as the simulation has it [-]."""
-    path = roll(world, speed, seconds, torque)
-    rims = path[-1, W : W + 4] * CAR.wheel_radius_m
-    return (rims - path[-1, V]) / np.maximum(rims, path[-1, V])
-
 
 @pytest.fixture(scope="module")
-def ramp():
+def short_ramp():
     """Path of a car that speeds up evenly."""
     return roll(nominal(CAR, Road()), 10.0, 10.0, 100.0)
-
-
-def moving_2(
-    p: Physics, slip: float = 0.0, speed: float = 20.0, time: float = 0.0, place: float = 0.0, **state: float
-) -> tuple[np.ndarray, float]:
-    """Derivative of a car whose wheels all slip alike, and what an accelerometer reads [m/s^2].
-
-    `state` is what else is set, by the kernel's names: of the body, and else of all wheels.
-    """
-    y = kernel.begin(p, 0.0, speed, np.full(4, speed / p.radius), time, NO_COMMAND)
-    y[X] = place
-    y[W : W + 4] = speed / p.radius / (1.0 - slip)
-    for name, value in state.items():
-        first = getattr(kernel, name)
-        y[first : first + (1 if name == "PITCH" else 4)] = value
-    dy = np.zeros(N)
-    return dy, kernel.slope(p, y, time, NO_COMMAND, dy)
 
 
 def test_a_motors_power_is_its_limit():
@@ -181,14 +160,14 @@ def test_slush_slows_where_the_road_is_slippery():
     assert path[-1, V] == pytest.approx(20.0 / (1.0 + rate * 10.0), rel=1e-3)
 
 
-def test_an_accelerometer_that_pitches_reads_gravity_too(ramp):
-    at, true, told = reading(ramp, by_further("accelerometer_pitches", share=0.1).sensors)
+def test_an_accelerometer_that_pitches_reads_gravity_too(short_ramp):
+    at, true, told = reading(short_ramp, by_further("accelerometer_pitches", share=0.1).sensors)
     assert at.size > 100
     assert_allclose(told[:, 5], 1.1 * true[:, 5], rtol=1e-3)
 
 
-def test_a_speed_in_steps_is_below_the_speed(ramp):
-    _, true, told = reading(ramp, by_further("speed_in_steps", step_m_s=0.25).sensors)
+def test_a_speed_in_steps_is_below_the_speed(short_ramp):
+    _, true, told = reading(short_ramp, by_further("speed_in_steps", step_m_s=0.25).sensors)
     assert_allclose(told[:, 4] / 0.25, np.round(told[:, 4] / 0.25), atol=1e-9)
     off = (true - told)[:, 4]
     assert off.min() >= 0.0
@@ -239,10 +218,10 @@ def test_tyres_of_two_makes_have_the_mean_of_the_told_stiffness():
     assert stiffness.mean() == pytest.approx(plain.mean(), rel=0.01)
 
 
-def test_wheel_speeds_stand_together_where_messages_stay_out(ramp):
+def test_wheel_speeds_stand_together_where_messages_stay_out(short_ramp):
     at = np.arange(0.0, 10.0, 1e-3)
-    told = read(ramp, by_further("wheel_speed_dropouts", hold_s=0.3).sensors, at)
-    true = read(ramp, Sensors(), at)
+    told = read(short_ramp, by_further("wheel_speed_dropouts", hold_s=0.3).sensors, at)
+    true = read(short_ramp, Sensors(), at)
     stands = np.diff(told[:, :4], axis=0) == 0.0
     assert 3 * 290 < stands[:, 0].sum() < 8 * 310
     assert np.all(stands == stands[:, :1])
@@ -257,8 +236,8 @@ def test_an_accelerometer_is_late_by_its_delay():
     assert_allclose(told, np.sin(2.0 * (at - 0.15)), atol=1e-6)
 
 
-def test_a_predicted_speed_is_ahead_by_its_time(ramp):
-    at, true, told = reading(ramp, by_further("speed_predicted_ahead", ahead_s=0.2).sensors)
+def test_a_predicted_speed_is_ahead_by_its_time(short_ramp):
+    at, true, told = reading(short_ramp, by_further("speed_predicted_ahead", ahead_s=0.2).sensors)
     ahead = (told - true)[:, 4] / np.gradient(true[:, 4], at)
     assert_allclose(ahead, 0.2, rtol=0.01)
 
@@ -364,7 +343,7 @@ def test_bends_slow_the_car_by_their_drag():
     for part, share in ((0.25, 1.0), (0.5, 0.5), (0.75, 0.0)):
         for speed in (10.0, 20.0):
             told = -share * 300.0 * (speed / 20.0) ** 2 / CAR.mass_kg
-            reads = moving_2(p, speed=speed, place=part * BENDS_M)[1]
+            reads = slopes(p, speed=speed, place=part * BENDS_M)[1]
             assert reads == pytest.approx(told, rel=1e-3, abs=1e-4)
     path = roll(by_further("cornering_drag", force_n=300.0), 20.0, 5.0)
     bends = [details.winding(at) for at in path[:, X]]
@@ -417,7 +396,7 @@ def test_one_axle_grips_more(more):
     p = world.physics
     tilt = (p.rear_arm - p.front_arm) / (p.front_arm + p.rear_arm)
     path = roll(world, 25.0, 1.0, -3000.0)
-    assert_allclose(path[500:, N], -LOCKED * DRY * (1.0 + more * tilt), rtol=1e-3)
+    assert_allclose(path[500:, N], -SLIDING * DRY * (1.0 + more * tilt), rtol=1e-3)
 
 
 def test_wheels_are_told_in_part_by_their_mean(ramp):

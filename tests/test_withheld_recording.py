@@ -8,8 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from test_withheld_forms import numbered
 from test_withheld_plant import CAR, QUIET, LimitDrive, roll
+from withheld_cars import (
+    DRY,
+    WET,
+    numbered,
+)
 
 from benchmarks.gap.withheld.baselines import _on_grid
 from benchmarks.gap.withheld.generator import details, kernel
@@ -108,11 +112,9 @@ from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 
-DRY, WET_2 = 0.9, 0.5
-
 
 @pytest.fixture(scope="module")
-def log():
+def steady_log():
     rng = np.random.default_rng(3)
     columns = [
         "time_s",
@@ -128,7 +130,7 @@ def log():
 
 
 @pytest.fixture(scope="module")
-def log_2():
+def quiet_log():
     rng = np.random.default_rng(3)
     columns = [
         "wheel_torque_fl_nm",
@@ -143,7 +145,7 @@ def log_2():
 
 
 @pytest.fixture(scope="module")
-def log_3():
+def walking_log():
     rng = np.random.default_rng(3)
     columns = ["wheel_torque_fl_nm", "wheel_speed_fl_rad_s", "vehicle_speed_m_s", "accel_x_m_s2"]
     made = pd.DataFrame(np.cumsum(0.01 * rng.normal(size=(3000, 4)), axis=0), columns=columns)
@@ -154,7 +156,7 @@ def log_3():
 
 
 @pytest.fixture(scope="module")
-def log_4():
+def uneven_log():
     rng = np.random.default_rng(3)
     columns = ["wheel_torque_fl_nm", "wheel_speed_fl_rad_s", "wheel_speed_rr_rad_s", "vehicle_speed_m_s"]
     made = pd.DataFrame(rng.normal(20.0, 9.0, (6000, 4)), columns=columns)
@@ -178,29 +180,29 @@ def test_noise_has_its_size_in_a_log_and_little_of_it_is_slow(noisy, rate):
 
 
 @pytest.mark.parametrize("digits", numbered(digits for since, digits in DIGITS.values() if since in (3, 4)))
-def test_loggers_leave_clock_command_and_places(digits, log):
-    kept = digits(log)
-    assert list(kept) == list(log)
-    assert len(kept) == len(log)
-    assert kept["time_s"].equals(log["time_s"])
-    assert_allclose(kept["wheel_torque_fl_nm"], log["wheel_torque_fl_nm"], atol=0.051)
-    assert_allclose(kept["position_m"], log["position_m"], atol=0.0051)
+def test_loggers_leave_clock_command_and_places(digits, steady_log):
+    kept = digits(steady_log)
+    assert list(kept) == list(steady_log)
+    assert len(kept) == len(steady_log)
+    assert kept["time_s"].equals(steady_log["time_s"])
+    assert_allclose(kept["wheel_torque_fl_nm"], steady_log["wheel_torque_fl_nm"], atol=0.051)
+    assert_allclose(kept["position_m"], steady_log["position_m"], atol=0.0051)
 
 
-def test_a_repeated_sample_is_the_one_before(log):
-    kept = repeating(log)
+def test_a_repeated_sample_is_the_one_before(steady_log):
+    kept = repeating(steady_log)
     for name in ("wheel_speed_fl_rad_s", "vehicle_speed_m_s", "accel_x_m_s2"):
-        changed = np.flatnonzero(kept[name].to_numpy() != log[name].to_numpy())
-        assert 0.5 * REPEATED < changed.size / len(log) < 2.0 * REPEATED
+        changed = np.flatnonzero(kept[name].to_numpy() != steady_log[name].to_numpy())
+        assert 0.5 * REPEATED < changed.size / len(steady_log) < 2.0 * REPEATED
         assert np.array_equal(kept[name].to_numpy()[changed], kept[name].to_numpy()[changed - 1])
     assert not kept.isna().any().any()
 
 
-def test_lost_runs_are_few_and_the_rest_is_kept(log):
-    kept = losing_runs(log)
-    lost = kept.isna() & log.notna()
+def test_lost_runs_are_few_and_the_rest_is_kept(steady_log):
+    kept = losing_runs(steady_log)
+    lost = kept.isna() & steady_log.notna()
     assert 20 < lost.to_numpy().sum() < 200
-    assert kept[~lost].equals(log[~lost])
+    assert kept[~lost].equals(steady_log[~lost])
     ends = lost.to_numpy().astype(int)
     assert (np.diff(ends, axis=0) == 1).sum() <= 12
 
@@ -234,14 +236,14 @@ def test_noise_has_its_spectrum():
     assert 0.001 < outliers.mean() < 0.003
 
 
-def test_steps_are_dropped_downwards_by_little(log_2):
-    off = (log_2 - truncating(log_2))[["wheel_speed_fl_rad_s", "vehicle_speed_m_s", "accel_x_m_s2"]]
+def test_steps_are_dropped_downwards_by_little(quiet_log):
+    off = (quiet_log - truncating(quiet_log))[["wheel_speed_fl_rad_s", "vehicle_speed_m_s", "accel_x_m_s2"]]
     assert off.to_numpy().min() >= 0.0
     assert np.all(off.mean() < 0.21 * QUIET.sigmas[3:])
 
 
-def test_overruns_lose_what_is_measured_at_once(log_2):
-    lost = overrunning(log_2).isna()
+def test_overruns_lose_what_is_measured_at_once(quiet_log):
+    lost = overrunning(quiet_log).isna()
     measured = ["wheel_speed_fl_rad_s", "vehicle_speed_m_s", "accel_x_m_s2"]
     assert not lost.drop(columns=measured).to_numpy().any()
     assert lost[measured].nunique(axis=1).eq(1).all()
@@ -278,31 +280,31 @@ def test_noise_has_its_kind():
     assert np.all(np.mean(hits**4, axis=0) > 3.3)
 
 
-def test_a_converter_has_whole_steps(log_3):
-    told = converted_in_bits(log_3)
+def test_a_converter_has_whole_steps(walking_log):
+    told = converted_in_bits(walking_log)
     steps = told["wheel_speed_fl_rad_s"] / (RANGES["wheel_speed"] / 2**BITS)
     assert_allclose(steps, np.round(steps), atol=1e-9)
     assert RANGES["wheel_speed"] > 45.0 / 0.285
-    assert told["position_m"].equals(log_3["position_m"])
+    assert told["position_m"].equals(walking_log["position_m"])
 
 
-def test_a_value_stands_until_it_has_changed(log_3):
-    told, least = on_change(log_3), CHANGES["accel"]
-    off = (told - log_3)["accel_x_m_s2"]
+def test_a_value_stands_until_it_has_changed(walking_log):
+    told, least = on_change(walking_log), CHANGES["accel"]
+    off = (told - walking_log)["accel_x_m_s2"]
     assert off.abs().max() < least
     moved = told["accel_x_m_s2"].dropna().diff().iloc[1:]
     assert np.all((moved == 0.0) | (moved.abs() >= least))
     assert 0.1 < (moved == 0.0).mean() < 0.9
-    assert told["time_s"].equals(log_3["time_s"])
+    assert told["time_s"].equals(walking_log["time_s"])
 
 
-def test_a_slow_receiver_leaves_every_second_row_without_a_speed(log_3):
-    told = slow_receiver(log_3)
+def test_a_slow_receiver_leaves_every_second_row_without_a_speed(walking_log):
+    told = slow_receiver(walking_log)
     assert told["vehicle_speed_m_s"].isna().to_numpy().tolist() == [False, True] * 1500
-    assert told.drop(columns="vehicle_speed_m_s").equals(log_3.drop(columns="vehicle_speed_m_s"))
+    assert told.drop(columns="vehicle_speed_m_s").equals(walking_log.drop(columns="vehicle_speed_m_s"))
 
 
-def test_tyres_at_known_points_2():
+def test_blended_and_plain_tyres_at_known_points():
     slope, peak = 60_000.0, 3000.0
     level = (peak**-2.0 - slope**-2.0) ** -0.5
     assert blended(0.05, slope, peak, 2.0) == pytest.approx((3000.0**-2.0 + level**-2.0) ** -0.5)
@@ -316,7 +318,7 @@ def test_tyres_at_known_points_2():
     assert plain_dugoff(0.5 * slip, slope, peak) == pytest.approx(slope / 41.0)
 
 
-def test_noise_has_its_kind_2():
+def test_noise_of_roads_and_axles_has_its_kind():
     white = replace(QUIET, coloured_share=0.0)
     clock, rng = np.arange(100_000) * 5e-3, np.random.default_rng(0)
     loud = np.abs(rough_stretches(white, clock, rng) / white.sigmas).reshape(-1, 40, 6).mean(axis=1)
@@ -343,27 +345,27 @@ def test_readings_have_their_own_colours():
     assert np.all((near > 0.02) & (near < 0.62))
 
 
-def test_rows_are_stamped_in_ticks_and_stay_in_order(log_4):
-    told = in_ticks(log_4)
+def test_rows_are_stamped_in_ticks_and_stay_in_order(uneven_log):
+    told = in_ticks(uneven_log)
     ticks = told["time_s"] / TICK_S
     assert_allclose(ticks, np.round(ticks), atol=1e-6)
-    assert np.abs(told["time_s"] - log_4["time_s"]).max() <= 0.5 * TICK_S + 1e-9
+    assert np.abs(told["time_s"] - uneven_log["time_s"]).max() <= 0.5 * TICK_S + 1e-9
     assert np.diff(told["time_s"]).min() > 0.0
-    assert told.drop(columns="time_s").equals(log_4.drop(columns="time_s"))
+    assert told.drop(columns="time_s").equals(uneven_log.drop(columns="time_s"))
 
 
-def test_values_have_so_many_figures(log_4):
+def test_values_have_so_many_figures(uneven_log):
     told = significant_digits(
-        log_4.assign(vehicle_speed_m_s=[0.0, np.nan, 12.3456, -0.98768, 9.99996, 123.45] * 1000)
+        uneven_log.assign(vehicle_speed_m_s=[0.0, np.nan, 12.3456, -0.98768, 9.99996, 123.45] * 1000)
     )
     assert_allclose(told["vehicle_speed_m_s"].to_numpy()[:6], [0.0, np.nan, 12.35, -0.9877, 10.0, 123.4])
-    figures = [float(f"{value:.3g}") for value in log_4["accel_x_m_s2"]]
+    figures = [float(f"{value:.3g}") for value in uneven_log["accel_x_m_s2"]]
     assert_allclose(told["accel_x_m_s2"], figures, atol=1e-9)
-    assert told["time_s"].equals(log_4["time_s"])
+    assert told["time_s"].equals(uneven_log["time_s"])
 
 
-def test_messages_get_lost_with_all_that_they_carry(log_4):
-    lost = losing_frames(log_4).isna()
+def test_messages_get_lost_with_all_that_they_carry(uneven_log):
+    lost = losing_frames(uneven_log).isna()
     assert lost["wheel_speed_fl_rad_s"].equals(lost["wheel_speed_rr_rad_s"])
     for column in ("wheel_speed_fl_rad_s", "vehicle_speed_m_s", "accel_x_m_s2"):
         assert lost[column].mean() == pytest.approx(FRAME_LOST, rel=0.5)
@@ -371,13 +373,13 @@ def test_messages_get_lost_with_all_that_they_carry(log_4):
     assert not lost[["time_s", "wheel_torque_fl_nm", "position_m"]].to_numpy().any()
 
 
-def test_a_slow_accelerometer_leaves_every_second_row_without_it(log_4):
-    told = slow_accelerometer(log_4)
+def test_a_slow_accelerometer_leaves_every_second_row_without_it(uneven_log):
+    told = slow_accelerometer(uneven_log)
     assert told["accel_x_m_s2"].isna().to_numpy().tolist() == [False, True] * 3000
-    assert told.drop(columns="accel_x_m_s2").equals(log_4.drop(columns="accel_x_m_s2"))
+    assert told.drop(columns="accel_x_m_s2").equals(uneven_log.drop(columns="accel_x_m_s2"))
 
 
-def test_tyres_at_known_points_3():
+def test_risen_tyres_at_known_points():
     slope, peak = 60_000.0, 3000.0
     assert sine_rise(np.pi / 6.0 / 20.0, slope, peak, 0.8) == pytest.approx(0.5 * peak)
     assert sine_rise(np.pi / 2.0 / 20.0, slope, peak, 0.8) == pytest.approx(peak)
@@ -388,7 +390,7 @@ def test_tyres_at_known_points_3():
     assert 0.4 < arctangent(0.05, slope, peak) / peak < 0.7
 
 
-def test_noise_has_its_kind_3():
+def test_noise_of_yawing_and_looseness_has_its_kind():
     white = replace(QUIET, coloured_share=0.0)
     clock, rng = np.arange(200_000) * 5e-3, np.random.default_rng(0)
     alike = np.corrcoef(yawing(white, clock, rng).T)
@@ -425,11 +427,11 @@ def test_senders_wake_one_after_another(log):
 
 
 def test_locked_wheels_feel_a_blurred_border_over_its_length():
-    road = Road((0.0, 30.0), (DRY, WET_2))
+    road = Road((0.0, 30.0), (DRY, WET))
     blurs = OUTSIDE["road_borders_blurred"].apply(nominal(CAR, road), {"over_m": 16.0})
     path = roll(blurs, 30.0, 2.5, -3000.0)[300:]
     axles = [path[:, X] + CAR.wheelbase_m - CAR.cog_to_rear_axle_m, path[:, X] - CAR.cog_to_rear_axle_m]
-    share = [np.interp(at, [22.0, 38.0], [DRY, WET_2]) for at in axles]
+    share = [np.interp(at, [22.0, 38.0], [DRY, WET]) for at in axles]
     front = CAR.cog_to_rear_axle_m / CAR.wheelbase_m
     told = -0.79 * 9.81 * (front * share[0] + (1.0 - front) * share[1])
     assert_allclose(path[:, N], told, rtol=2e-3)
@@ -437,7 +439,7 @@ def test_locked_wheels_feel_a_blurred_border_over_its_length():
     assert path[0, X] < 15.0
 
 
-def test_tyres_at_known_points_4():
+def test_bristled_tyres_at_known_points():
     slope, peak = 60_000.0, 3000.0
     assert bristles(1.0, slope, peak) == pytest.approx(peak, rel=1e-6)
     assert bristles(1e-6, slope, peak) == pytest.approx(0.06, rel=1e-4)
@@ -451,7 +453,7 @@ def test_tyres_at_known_points_4():
     assert 0.78 < composite(1.0, slope, peak, 0.2) / peak < 0.81
 
 
-def test_noise_has_its_kind_4():
+def test_noise_of_one_box_has_its_kind():
     white = replace(QUIET, coloured_share=0.0)
     clock, rng = np.arange(100_000) * 2e-3, np.random.default_rng(0)
     alike = np.corrcoef(one_box(white, clock, rng).T)
@@ -487,7 +489,7 @@ def test_rows_are_stamped_by_the_time_of_day(log):
     assert told.drop(columns="time_s").equals(log.drop(columns="time_s"))
 
 
-def test_what_the_family_adds_to_the_physics_is_none_of_the_nominal_car():
+def test_physics_of_nothing_is_the_nominal_car():
     """All that is neutral at nothing, set by hand, is the nominal car bit for bit."""
     limit = LimitDrive()
     names = ("height_jack", "load_side", "radius_wet", "inertia_speed", "grip_sign", "grip_slide", "lag_warm")
@@ -499,7 +501,7 @@ def test_what_the_family_adds_to_the_physics_is_none_of_the_nominal_car():
     assert limit.is_nominal(of_none)
 
 
-def test_tyres_at_known_points_5():
+def test_splined_tyres_at_known_points():
     slope, peak = 60_000.0, 3000.0
     assert brush_elliptic(1e-6, slope, peak) == pytest.approx(0.06, rel=1e-4)
     half = brush_elliptic(4.0 / np.pi * peak / slope, slope, peak)
@@ -513,7 +515,7 @@ def test_tyres_at_known_points_5():
     assert splined(0.5 * (best + 1.0), slope, peak, 2.5, 0.8) == pytest.approx(0.9 * peak)
 
 
-def test_noise_has_its_kind_5():
+def test_noise_of_tones_has_its_kind():
     white = replace(QUIET, coloured_share=0.0)
     clock, rng = np.arange(100_000) * 2e-3, np.random.default_rng(0)
     values = beating_tones(white, clock, rng) / white.sigmas
@@ -555,7 +557,7 @@ def test_a_simple_ranker_reads_such_logs(log):
         assert_allclose(there, place, rtol=0, atol=1e-3)
 
 
-def test_what_the_family_adds_to_the_physics_is_none_of_the_nominal_car_2():
+def test_scaled_physics_of_nothing_is_the_nominal_car():
     """All that is neutral at nothing, set by hand, is the nominal car bit for bit."""
     limit = LimitDrive()
     scaled = ("drag_nod", "roll_flat", "relaxation_side", "grip_load", "gain_power", "brake_texture")
@@ -575,7 +577,7 @@ def test_a_tyre_at_known_points():
     assert humped(1.0, slope, peak, 0.8) == pytest.approx(0.8 * peak, rel=5e-3)
 
 
-def test_noise_has_its_kind_6():
+def test_noise_that_stands_has_its_kind():
     white = replace(QUIET, coloured_share=0.0)
     clock, rng = np.arange(100_000) * 2e-3, np.random.default_rng(0)
     together = np.corrcoef(multiplexed(white, clock, rng).T)
@@ -605,7 +607,7 @@ def test_a_logger_has_its_own_clock(log):
     assert told.drop(columns="time_s").equals(log.drop(columns="time_s"))
 
 
-def test_a_simple_ranker_reads_such_logs_2(log):
+def test_a_simple_ranker_reads_slow_and_off_clocks(log):
     slow = log.assign(**{c: 20.0 + np.sin(log["time_s"]) for c in log if c.startswith("wheel_speed")})
     shown, place = _on_grid(slow, 8000)
     for other in (slow_wheels(slow), own_clock(slow)):

@@ -7,8 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_withheld_forms import forms_of, reading, with_form
 from test_withheld_plant import CAR, roll
+from withheld_cars import (
+    forms_of,
+    reading,
+    with_form,
+)
 
 from benchmarks.gap.withheld.generator.car import Road
 from benchmarks.gap.withheld.generator.details import GRAIN_M, USUAL_M_S, USUAL_RAD_S
@@ -29,7 +33,7 @@ pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
-def ramp():
+def short_ramp():
     """Path of a car that speeds up evenly."""
     return roll(nominal(CAR, Road()), 10.0, 10.0, 100.0)
 
@@ -99,54 +103,56 @@ def test_scale_and_bias_are_stated_at_the_usual_speed():
     assert_allclose(nodding / true - 1.0, 0.04 * (1.0 + nod), rtol=1e-3)
 
 
-def test_wheels_are_read_in_turn(ramp):
-    at, true, late = reading(ramp, with_form("wheel_speed_delay", "in_turn", delay_s=0.05).sensors)
+def test_wheels_are_read_in_turn(short_ramp):
+    at, true, late = reading(short_ramp, with_form("wheel_speed_delay", "in_turn", delay_s=0.05).sensors)
     ages = ((true - late)[:, :4] / np.gradient(true[:, :4], at, axis=0)).mean(axis=0)
     assert_allclose(ages, [0.044, 0.048, 0.052, 0.056], atol=2e-4)
 
 
 @pytest.mark.parametrize(("effect", "column"), [("wheel_speed_delay", 2), ("vehicle_speed_delay", 4)])
-def test_messages_get_lost(ramp, effect, column):
+def test_messages_get_lost(short_ramp, effect, column):
     at = np.arange(1.0, 9.0, 1e-3)
     sensors = with_form(effect, "losing_messages", delay_s=0.05).sensors
-    changes = np.diff(read(ramp, sensors, at)[:, column]) != 0.0
+    changes = np.diff(read(short_ramp, sensors, at)[:, column]) != 0.0
     assert changes.sum() == pytest.approx(400 * (1.0 - 0.08), rel=0.05)
 
 
-def test_a_receiver_tells_the_mean_over_its_epoch(ramp):
+def test_a_receiver_tells_the_mean_over_its_epoch(short_ramp):
     at = np.arange(1.0, 9.0, 1e-3)
-    told = read(ramp, with_form("vehicle_speed_delay", "epochs", delay_s=0.2).sensors, at)[:, 4]
+    told = read(short_ramp, with_form("vehicle_speed_delay", "epochs", delay_s=0.2).sensors, at)[:, 4]
     changes = np.flatnonzero(np.diff(told))
     assert_allclose(np.diff(changes), 100, atol=1)
-    ages = at - np.interp(told, ramp[:, V], np.arange(len(ramp)) * 1e-3)
+    ages = at - np.interp(told, short_ramp[:, V], np.arange(len(short_ramp)) * 1e-3)
     assert ages.min() == pytest.approx(0.15, abs=2e-3)
     assert ages.max() == pytest.approx(0.25, abs=2e-3)
 
 
-def test_a_late_tasks_windows_differ_and_lose_nothing(ramp):
-    """By the time of a pulse in the log_3; here by more, to be seen among more teeth."""
+def test_a_late_tasks_windows_differ_and_lose_nothing(short_ramp):
+    """By the time of a pulse in the walking_log; here by more, to be seen among more teeth."""
     coarse = with_form("wheel_speed_quantisation", "late_task", teeth=64.0, window_s=0.02).sensors
     assert coarse.wheel_window_jitter * 0.02 == pytest.approx(2.0 * np.pi / 64.0 / 65.0)
     sensors = replace(coarse, wheel_teeth=40_000.0, wheel_window_jitter=0.15)
     at = np.arange(1.0, 9.0, 1e-4)
-    counted = read(ramp, sensors, at)[:, 0]
+    counted = read(short_ramp, sensors, at)[:, 0]
     ends = at[np.flatnonzero(np.diff(counted))]
     assert_allclose(np.diff(ends).mean(), 0.02, rtol=1e-3)
-    turned = np.interp(at[[0, -1]], np.arange(len(ramp)) * 1e-3, ramp[:, ANGLE])
+    turned = np.interp(at[[0, -1]], np.arange(len(short_ramp)) * 1e-3, short_ramp[:, ANGLE])
     told = np.sum(counted[::200]) * 0.02
     assert told == pytest.approx(turned[1] - turned[0], rel=5e-3)
-    plain = read(ramp, replace(sensors, wheel_window_jitter=0.0), at)[:, 0]
+    plain = read(short_ramp, replace(sensors, wheel_window_jitter=0.0), at)[:, 0]
     off = (counted / plain - 1.0).std()
     assert off == pytest.approx(0.15 / np.sqrt(6.0), rel=0.1)
 
 
-def test_scattered_teeth_come_at_their_own_moments_and_none_is_lost(ramp):
+def test_scattered_teeth_come_at_their_own_moments_and_none_is_lost(short_ramp):
     speed = 2.0 * np.pi / 0.04 * CAR.wheel_radius_m
     path, at = roll(nominal(CAR, Road()), speed, 3.0), np.arange(1.0, 2.9, 0.0137)
     whole = with_form("wheel_speed_quantisation", "scattered_teeth", teeth=64.0, window_s=0.04).sensors
     assert_allclose(read(path, whole, at)[:, :4] * 0.04 / (2.0 * np.pi), 1.0, atol=1e-9)
     own, even = (
-        read(ramp, replace(whole, wheel_window_s=0.01, wheel_scatter=scatter), np.arange(1.0, 9.0, 0.01))
+        read(
+            short_ramp, replace(whole, wheel_window_s=0.01, wheel_scatter=scatter), np.arange(1.0, 9.0, 0.01)
+        )
         for scatter in (whole.wheel_scatter, 1e-9)
     )
     off = np.abs(own - even)[:, :4] * 0.64 / (2.0 * np.pi)
@@ -165,23 +171,26 @@ def test_scale_differs_on_coarse_stretches_and_while_it_warms_up():
         assert share.mean() == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_sensor_mounted_askew_reads_gravity_and_less_of_all_else(ramp):
+def test_a_sensor_mounted_askew_reads_gravity_and_less_of_all_else(short_ramp):
     askew = np.arcsin(0.6 / 9.81)
-    at, true, told = reading(ramp, with_form("accelerometer_bias", "tilted", bias_m_s2=-0.6).sensors)
+    at, true, told = reading(short_ramp, with_form("accelerometer_bias", "tilted", bias_m_s2=-0.6).sensors)
     assert at.size > 100
     assert_allclose(told[:, 5], true[:, 5] * np.cos(askew) - 9.81 * np.sin(askew), atol=2e-6)
 
 
-def test_a_bias_wanders_about_itself(ramp):
+def test_a_bias_wanders_about_itself(short_ramp):
     sensors = with_form("accelerometer_bias", "wandering", bias_m_s2=0.3).sensors
     at = np.arange(0.0, 3000.0, 0.1)
-    bias = read(ramp, sensors, at)[:, 5] - read(ramp, replace(sensors, accel_bias_m_s2=0.0), at)[:, 5]
+    bias = (
+        read(short_ramp, sensors, at)[:, 5]
+        - read(short_ramp, replace(sensors, accel_bias_m_s2=0.0), at)[:, 5]
+    )
     assert bias.mean() == pytest.approx(0.3, rel=5e-3)
     assert 0.3 * 0.15 < np.abs(bias - 0.3).max() <= 0.3 * 0.25
 
 
-def test_rear_wheels_are_read_later_than_front_ones(ramp):
-    at, true, late = reading(ramp, with_form("wheel_speed_delay", "unlike_axles", delay_s=0.05).sensors)
+def test_rear_wheels_are_read_later_than_front_ones(short_ramp):
+    at, true, late = reading(short_ramp, with_form("wheel_speed_delay", "unlike_axles", delay_s=0.05).sensors)
     ages = ((true - late)[:, :4] / np.gradient(true[:, :4], at, axis=0)).mean(axis=0)
     assert_allclose(ages, [0.045, 0.045, 0.055, 0.055], atol=2e-4)
 
@@ -190,8 +199,8 @@ def test_rear_wheels_are_read_later_than_front_ones(ramp):
     ("effect", "column", "usual"),
     [("wheel_speed_delay", 1, USUAL_RAD_S), ("vehicle_speed_delay", 4, USUAL_M_S)],
 )
-def test_a_value_that_takes_a_distance_is_older_when_slow(ramp, effect, column, usual):
-    at, true, late = reading(ramp, with_form(effect, "older_when_slow", delay_s=0.05).sensors)
+def test_a_value_that_takes_a_distance_is_older_when_slow(short_ramp, effect, column, usual):
+    at, true, late = reading(short_ramp, with_form(effect, "older_when_slow", delay_s=0.05).sensors)
     ages = ((true - late)[:, column]) / np.gradient(true[:, column], at)
     assert_allclose(ages, 0.05 * (0.7 + 0.3 * usual / true[:, column]), rtol=0.01)
     standing = with_form(effect, "older_when_slow", delay_s=0.05).sensors
@@ -201,16 +210,16 @@ def test_a_value_that_takes_a_distance_is_older_when_slow(ramp, effect, column, 
     assert slow == pytest.approx(0.05 * (0.7 + 0.3 * 3.0), rel=1e-3)
 
 
-def test_of_two_windows_one_is_told(ramp):
+def test_of_two_windows_one_is_told(short_ramp):
     given = {"teeth": 100_000.0, "window_s": 0.02}
     at = np.arange(1.0, 9.0, 1e-3)
     both, half = (
-        read(ramp, with_form("wheel_speed_quantisation", form, **given).sensors, at)[:, 0]
+        read(short_ramp, with_form("wheel_speed_quantisation", form, **given).sensors, at)[:, 0]
         for form in ("window_by_window", "every_second_window")
     )
     assert np.sum(np.diff(both) != 0.0) == pytest.approx(400, abs=2)
     assert np.sum(np.diff(half) != 0.0) == pytest.approx(200, abs=2)
-    ages = at - np.interp(half, ramp[:, W], np.arange(len(ramp)) * 1e-3)
+    ages = at - np.interp(half, short_ramp[:, W], np.arange(len(short_ramp)) * 1e-3)
     assert ages.mean() == pytest.approx(0.02 + 0.01, abs=2e-3)
 
 

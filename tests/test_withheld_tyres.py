@@ -7,8 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_withheld_forms import forms_of, with_form
 from test_withheld_plant import CAR, roll
+from withheld_cars import (
+    AIRBORNE,
+    DRY,
+    HALF_WARM_S,
+    LOCKED,
+    NO_COMMAND,
+    SLIDING,
+    WET,
+    _slip,
+    _warmth,
+    forms_of,
+    moving,
+    slopes,
+    with_form,
+)
 
 from benchmarks.gap.withheld.generator import details, kernel
 from benchmarks.gap.withheld.generator.car import Road
@@ -31,22 +45,11 @@ from benchmarks.gap.withheld.generator.falling import (
 )
 from benchmarks.gap.withheld.generator.kernel import MOTOR, SLIP, N, V, W, X
 from benchmarks.gap.withheld.generator.outside import OUTSIDE
-from benchmarks.gap.withheld.generator.physics import Physics
 from benchmarks.gap.withheld.generator.world import nominal
 
 pytestmark = pytest.mark.long
 
 SPLIT = {"left_factor": 0.5, "right_factor": 1.0}
-LOCKED = 0.79 * 0.9 * 9.81
-"""Deceleration with locked wheels on a dry road [m/s^2]."""
-AIRBORNE = Road((0.0,), (1e-9,))
-HALF_WARM_S = WARM_S * np.log(2.0)
-"""When what warms up is as on the mean."""
-NO_COMMAND = np.zeros((2, 4))
-DRY, WET_2 = 0.9, 0.5
-LOCKED_2 = 0.79 * 9.81
-"""Deceleration with locked wheels over the friction [m/s^2]."""
-HALF_WARM_S_2 = WARM_S * np.log(2.0)
 
 
 def _stiffnesses(form: str, torque: float) -> np.ndarray:
@@ -55,25 +58,6 @@ def _stiffnesses(form: str, torque: float) -> np.ndarray:
     slips = (rims - path[-1, V]) / np.maximum(rims, path[-1, V])
     forces = CAR.mass_kg * path[-1, N] / 4.0
     return forces / (1.27 * slips)
-
-
-def _slip(world, speed: float, torque: float, seconds: float = 0.6) -> np.ndarray:
-    """Of each wheel in the end, over its size as the simulation has it [-]."""
-    path = roll(world, speed, seconds, torque)
-    rims = path[-1, W : W + 4] * CAR.wheel_radius_m
-    return (rims - path[-1, V]) / np.maximum(rims, path[-1, V])
-
-
-def _warmth(at_s: float) -> float:
-    return float(1.0 - 2.0 * np.exp(-at_s / WARM_S))
-
-
-def moving(p: Physics, slip: float = 0.0, speed: float = 20.0) -> tuple[np.ndarray, np.ndarray, float]:
-    """State of a car whose wheels all slip alike, its derivative, and what an accelerometer reads [m/s^2]."""
-    y = kernel.begin(p, 0.0, speed, np.full(4, speed / p.radius), 0.0, NO_COMMAND)
-    y[W : W + 4] = speed / p.radius / (1.0 - slip)
-    dy = np.zeros(N)
-    return y, dy, kernel.slope(p, y, 0.0, NO_COMMAND, dy)
 
 
 @pytest.mark.parametrize("chosen", forms_of("wheel_radius_offset", but=("warming",)))
@@ -361,7 +345,7 @@ def test_a_radius_goes_in_part_with_the_load(radius):
 
 
 def test_a_stiffness_is_told_on_dry_road():
-    for road, told in ((DRY, 30_000.0), (WET_2, 30_000.0 + 0.3 * 20_000.0)):
+    for road, told in ((DRY, 30_000.0), (WET, 30_000.0 + 0.3 * 20_000.0)):
         world = with_form(
             "tyre_stiffness_offset", "less_when_wet", road=Road((0.0,), (road,)), stiffness_n=3e4
         )
@@ -373,7 +357,7 @@ def test_a_stiffness_is_told_on_dry_road():
 
 
 def test_a_falloff_is_told_on_dry_road():
-    for road, told in ((DRY, 0.1), (WET_2, 0.13)):
+    for road, told in ((DRY, 0.1), (WET, 0.13)):
         world = with_form(
             "friction_falloff", "sooner_when_wet", road=Road((0.0,), (road,)), falloff_s_m=0.1, floor=0.5
         )
@@ -383,18 +367,18 @@ def test_a_falloff_is_told_on_dry_road():
 
 
 def test_a_friction_deviates_more_on_slippery_road():
-    road = Road((0.0, 50.0), (DRY, WET_2))
+    road = Road((0.0, 50.0), (DRY, WET))
     p = with_form("friction_offset", "more_when_wet", road=road, factor=0.7).physics
     told = [details.friction(p, w, at, 20.0) for at in (10.0, 80.0) for w in (0, 3)]
-    assert_allclose(told, np.repeat([DRY * (1.0 - 0.3 * 0.85), WET_2 * (1.0 - 0.3 * 1.15)], 2))
+    assert_allclose(told, np.repeat([DRY * (1.0 - 0.3 * 0.85), WET * (1.0 - 0.3 * 1.15)], 2))
     p = with_form("mu_split", "more_when_wet", road=road, left_factor=0.6, right_factor=1.0).physics
     told = [details.friction(p, w, at, 20.0) for at in (10.0, 80.0) for w in (0, 3)]
-    assert_allclose(told, [DRY * (1.0 - 0.4 * 0.85), DRY, WET_2 * (1.0 - 0.4 * 1.15), WET_2])
+    assert_allclose(told, [DRY * (1.0 - 0.4 * 0.85), DRY, WET * (1.0 - 0.4 * 1.15), WET])
 
 
 def test_a_blurred_border_goes_straight_from_one_road_to_the_next():
     world = OUTSIDE["road_borders_blurred"].apply(
-        nominal(CAR, Road((0.0, 50.0, 100.0), (DRY, WET_2, DRY))), {"over_m": 20.0}
+        nominal(CAR, Road((0.0, 50.0, 100.0), (DRY, WET, DRY))), {"over_m": 20.0}
     )
     p = world.physics
     places = np.array([20.0, 40.0, 45.0, 49.999, 50.0, 55.0, 60.0, 75.0, 95.0, 105.0, 150.0])
@@ -405,7 +389,7 @@ def test_a_blurred_border_goes_straight_from_one_road_to_the_next():
 
 @pytest.mark.parametrize("radius", [0.30, 0.28])
 def test_a_radius_is_told_on_dry_road(radius):
-    for road, told in ((DRY, radius), (WET_2, radius - 0.25 * (radius - 0.29))):
+    for road, told in ((DRY, radius), (WET, radius - 0.25 * (radius - 0.29))):
         world = with_form("wheel_radius_offset", "less_when_wet", road=Road((0.0,), (road,)), radius_m=radius)
         path = roll(world, 20.0, 1.0)[-1]
         assert_allclose(path[V] / path[W : W + 4], told, rtol=1e-5)
@@ -437,7 +421,7 @@ def test_a_tyre_lets_its_force_go_sooner():
 
 def test_a_friction_deviates_more_in_braking():
     brakes = roll(with_form("friction_offset", "more_in_braking", factor=0.7), 25.0, 1.0, -3000.0)
-    assert_allclose(brakes[500:, N], -LOCKED_2 * DRY * (1.0 - 0.3 * 1.15), rtol=1e-3)
+    assert_allclose(brakes[500:, N], -SLIDING * DRY * (1.0 - 0.3 * 1.15), rtol=1e-3)
     p = with_form("friction_offset", "more_in_braking", factor=0.7).physics
     told = [details.friction(p, 1, 5.0, 20.0, 0.0, details.gripping(p, rub)) for rub in (5.0, 0.0, -5.0)]
     assert_allclose(told, DRY * (1.0 - 0.3 * np.array([0.85, 1.0, 1.15])), rtol=1e-9)
@@ -447,7 +431,7 @@ def test_a_sliding_wheel_sweeps_the_slippery_side():
     given = {"left_factor": 0.6, "right_factor": 1.0}
     path = roll(with_form("mu_split", "swept_away", **given), 28.0, 1.0, -3000.0)
     told = 0.5 + 0.5 * (1.0 - 0.4 * 0.875)
-    assert_allclose(path[500:, N], -LOCKED_2 * DRY * told, rtol=2e-3)
+    assert_allclose(path[500:, N], -SLIDING * DRY * told, rtol=2e-3)
     p = with_form("mu_split", "swept_away", **given).physics
     grips = [1.0 + details.gripping(p, rub) for rub in (0.0, 2.0 * np.arctanh(0.5), 30.0, -30.0)]
     assert_allclose(grips, [1.125, 1.0, 0.875, 0.875], rtol=1e-9)
@@ -462,7 +446,7 @@ def test_one_tyre_has_not_been_changed():
 
 def test_each_tyre_relaxes_over_a_length_of_its_own():
     p = with_form("tyre_relaxation", "each_its_own", length_m=0.5).physics
-    lengths = -0.01 * 20.0 / moving(p, SLIP=0.01)[0][SLIP : SLIP + 4]
+    lengths = -0.01 * 20.0 / slopes(p, SLIP=0.01)[0][SLIP : SLIP + 4]
     assert_allclose(lengths, [0.6, 0.4, 0.4, 0.6], rtol=1e-9)
     assert lengths.mean() == pytest.approx(0.5)
 
@@ -470,7 +454,7 @@ def test_each_tyre_relaxes_over_a_length_of_its_own():
 @pytest.mark.parametrize("stiffness", [30_000.0, 70_000.0])
 def test_tyres_of_one_side_are_more_worn(stiffness):
     p = with_form("tyre_stiffness_offset", "unlike_sides", stiffness_n=stiffness).physics
-    at, still = moving(p, slip=1e-4)[0], moving(p)[0]
+    at, still = slopes(p, slip=1e-4)[0], slopes(p)[0]
     force = -(at - still)[W : W + 4] * 1.2 / 0.29
     told = stiffness + 0.2 * (stiffness - 50_000.0) * np.array([1.0, -1.0, 1.0, -1.0])
     assert_allclose(force, 1.27 * 1e-4 * told, rtol=2e-3)
@@ -489,7 +473,7 @@ def test_a_friction_deviates_less_under_load():
     told = [details.friction(p, 1, 5.0, 20.0, 0.0, details.gripping(p, 0.0, x)) for x in (0.5, 1.0, 2.0, 3.0)]
     assert_allclose(told, DRY * (1.0 - 0.3 * np.array([1.15, 1.0, 0.7, 0.7])), rtol=1e-9)
     brakes = roll(with_form("friction_offset", "less_under_load", factor=0.7), 25.0, 1.0, -3000.0)
-    assert_allclose(brakes[500:, N], -LOCKED * DRY * 0.7, rtol=2e-3)
+    assert_allclose(brakes[500:, N], -SLIDING * DRY * 0.7, rtol=2e-3)
 
 
 def test_a_friction_told_with_loads_that_shift_is_that_under_them():
@@ -507,7 +491,7 @@ def test_a_friction_told_with_loads_that_shift_is_that_under_them():
     assert front > 1.2 * quarter
 
 
-@pytest.mark.parametrize(("time", "share"), [(0.0, 1.25), (HALF_WARM_S_2, 1.0), (150.0, 0.75)])
+@pytest.mark.parametrize(("time", "share"), [(0.0, 1.25), (HALF_WARM_S, 1.0), (150.0, 0.75)])
 def test_a_slippery_side_thaws(time, share):
     p = with_form("mu_split", "thawing", left_factor=0.6, right_factor=1.0).physics
     told = [details.friction(p, wheel, 5.0, 20.0, time) for wheel in range(4)]
