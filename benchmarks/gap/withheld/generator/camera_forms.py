@@ -307,6 +307,18 @@ def _choices(*since: tuple[int, str]) -> FormsOf:
     return {name: (edition, None) for edition, names in since for name in names.split()}
 
 
+LAWS: FormsOf = {
+    "exponential": (1, exponential),
+    "gaussian": (1, gaussian),
+    "threshold": (1, threshold),
+    "hyperbolic": (1, hyperbolic),
+    "linear": (2, linear),
+    "knee": (2, knee),
+    "bell": (2, bell),
+    "saturating": (2, saturating),
+    "box": (3, box),
+    "rounded": (3, rounded),
+}
 CAMERA_FORMS: dict[str, FormsOf] = {
     "captures": {
         "even": (1, even),
@@ -351,30 +363,8 @@ CAMERA_FORMS: dict[str, FormsOf] = {
         "standing": (2, standing),
         "wiped": (3, wiped),
     },
-    "blur_law": {
-        "exponential": (1, exponential),
-        "gaussian": (1, gaussian),
-        "threshold": (1, threshold),
-        "hyperbolic": (1, hyperbolic),
-        "linear": (2, linear),
-        "knee": (2, knee),
-        "bell": (2, bell),
-        "saturating": (2, saturating),
-        "box": (3, box),
-        "rounded": (3, rounded),
-    },
-    "exposure_law": {
-        "exponential": (1, exponential),
-        "gaussian": (1, gaussian),
-        "threshold": (1, threshold),
-        "hyperbolic": (1, hyperbolic),
-        "linear": (2, linear),
-        "knee": (2, knee),
-        "bell": (2, bell),
-        "saturating": (2, saturating),
-        "box": (3, box),
-        "rounded": (3, rounded),
-    },
+    "blur_law": LAWS,
+    "exposure_law": LAWS,
     "kept": _choices((1, "to_nothing to_a_guess"), (2, "to_a_sixth")),
     "begins": _choices((1, "with_the_log before"), (2, "late"), (3, "ends_early")),
     "reference": {
