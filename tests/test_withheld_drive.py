@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_withheld_plant import CAR, QUIET, carried, roll
+from test_withheld_plant import CAR, carried, roll
 from withheld_cars import (
     AIRBORNE,
     DRY,
@@ -31,7 +31,6 @@ from benchmarks.gap.withheld.generator.details import (
     USUAL_RAD_S,
     WARM_S,
 )
-from benchmarks.gap.withheld.generator.forms import NOISES
 from benchmarks.gap.withheld.generator.kernel import ANGLE, LAG, MOTOR, STAGE, TWIST, N, V, W
 from benchmarks.gap.withheld.generator.sensors import read
 from benchmarks.gap.withheld.generator.world import nominal
@@ -105,11 +104,6 @@ def test_drag_at_the_wheels_slows_by_its_mean(chosen):
     path = roll(with_form(*chosen, torque_nm=15.0), 20.0, 5.0)
     lost = 5.0 * 4.0 * 15.0 / 0.29 / carried(CAR)
     assert 20.0 - path[-1, V] == pytest.approx(lost, rel=5e-3)
-
-
-def test_kinds_of_noise_are_told_apart():
-    assert len({noisy(QUIET, np.arange(900) / 100.0, np.random.default_rng(0)).tobytes()
-                for noisy in NOISES.values()}) == len(NOISES)  # fmt: skip
 
 
 def test_a_controlled_current_swings_over_by_its_damping():

@@ -614,3 +614,9 @@ def test_a_simple_ranker_reads_slow_and_off_clocks(log):
         told, there = _on_grid(other, 8000)
         assert_allclose(told[:, :4], shown[:, :4], rtol=0, atol=2e-3)
         assert_allclose(there, place, rtol=0, atol=0.05)
+
+
+def test_kinds_of_noise_are_told_apart():
+    clock = np.arange(900) / 100.0
+    kinds = {noisy(QUIET, clock, np.random.default_rng(0)).tobytes() for _, noisy in NOISES.values()}
+    assert len(kinds) == len(NOISES)
