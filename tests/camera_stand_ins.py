@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import sys
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -14,11 +11,11 @@ import pandas as pd
 import pytest
 from numpy.random import Generator
 
-from benchmarks.blind.generator.camera_road import CLASS_FRICTION, CameraRoad, Passage
-from benchmarks.blind.generator.car import Car
-from benchmarks.blind.generator.driver import Drive, Style
-from benchmarks.blind.generator.kernel import N, V, W, X
-from benchmarks.blind.generator.world import World
+from benchmarks.gap.withheld.generator.camera_road import CLASS_FRICTION, CameraRoad, Passage
+from benchmarks.gap.withheld.generator.car import Car
+from benchmarks.gap.withheld.generator.driver import Drive, Style
+from benchmarks.gap.withheld.generator.kernel import N, V, W, X
+from benchmarks.gap.withheld.generator.world import World
 
 PLAIN = {
     "captures": "even",
@@ -84,15 +81,3 @@ def steady(speed_m_s: float, seconds: float = 40.0) -> Passage:
     """A way at one speed."""
     clock = np.arange(round(1000 * seconds) + 1) * 1e-3
     return Passage(2.0 + speed_m_s * clock, np.full(clock.size, speed_m_s))
-
-
-def digest_of(case: Any, folder: Path) -> str:
-    """Of a case's seal, its figures in six digits, and its files, which are written to a folder."""
-    case.write(folder)
-    seal = json.loads(json.dumps(case.seal()), parse_float=lambda x: f"{float(x):.6g}")
-    if seal["camera"].get("family") == "first":  # seals did not name it when there was but one
-        seal["camera"].pop("family")
-    total = hashlib.sha256(json.dumps(seal, sort_keys=True).encode())
-    for path in sorted(folder.iterdir()):
-        total.update(path.name.encode() + path.read_bytes())
-    return total.hexdigest()[:16]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.gap_development import BARE, Case, drives
+from benchmarks.gap.development_drives import BARE, Case, drives
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant import simulate
 from sim2real.observing.drive import CHANNELS, make_drive

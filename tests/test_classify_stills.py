@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from road_picture import road_picture
 
-from benchmarks.classify_stills import main
+from benchmarks.vision.classify_stills import main
 from models.training.data import COLUMNS, LABELS, MANIFEST
 from scenarios.stills import classify_pictures
 

@@ -6,12 +6,12 @@ import pytest
 from foreign_clients import need_client
 from long import beyond
 
-from benchmarks.conformance.cases import CASES
-from benchmarks.conformance.clients import CLIENTS
-from benchmarks.conformance.matrix import Bench, Place, prepare, run_cells
-from benchmarks.conformance.operations import OPERATIONS
-from benchmarks.conformance.outcome import Cell, Outcome
-from benchmarks.conformance.table import DOCUMENT, document, read_cells
+from benchmarks.robustness.conformance.cases import CASES
+from benchmarks.robustness.conformance.clients import CLIENTS
+from benchmarks.robustness.conformance.matrix import Bench, Place, prepare, run_cells
+from benchmarks.robustness.conformance.operations import OPERATIONS
+from benchmarks.robustness.conformance.outcome import Cell, Outcome
+from benchmarks.robustness.conformance.table import DOCUMENT, document, read_cells
 
 UNIT = "TrpacEstimator"
 SHORT = {

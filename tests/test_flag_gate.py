@@ -5,8 +5,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from benchmarks import flag_gate
-from benchmarks.table4.judge import COLUMNS
+from benchmarks.vision import flag_gate
+from benchmarks.vision.table4.judge import COLUMNS
 from trpac_core.vision.ife_config import IfeConfig
 
 

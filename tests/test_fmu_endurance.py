@@ -1,4 +1,4 @@
-"""Short versions of benchmarks/endurance_fmu.py and benchmarks/fuzz, and what they have found."""
+"""Short versions of benchmarks/robustness/endurance_fmu.py and benchmarks/robustness/fuzz, and what they have found."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 from fmu_unit import DRIVING, Unit
 from long import beyond
 
-from benchmarks.endurance_fmu import (
+from benchmarks.robustness.endurance_fmu import (
     MOST_INSTANCE_GROWTH_MB,
     MOST_STEP_GROWTH_MB,
     can_mount,
@@ -23,8 +23,8 @@ from benchmarks.endurance_fmu import (
     measured,
     small_disk,
 )
-from benchmarks.fuzz.files import KINDS
-from benchmarks.fuzz.run import run_kind
+from benchmarks.robustness.fuzz.files import KINDS
+from benchmarks.robustness.fuzz.run import run_kind
 from fmu_src.packaging import write_archive
 from scenarios.whole_files import written_whole
 
@@ -86,8 +86,8 @@ def test_damage_is_damage() -> None:
     """The fuzzing would find what it looks for: a reader that takes anything is found out."""
     import numpy as np
 
-    from benchmarks.fuzz.files import judge, workplace
-    from benchmarks.fuzz.mutations import damaged
+    from benchmarks.robustness.fuzz.files import judge, workplace
+    from benchmarks.robustness.fuzz.mutations import damaged
 
     kind = KINDS["picture_png"]
     with workplace(kind) as (path, good, right):

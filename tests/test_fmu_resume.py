@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from long import beyond
 
-from benchmarks.conformance.cases import CASES, write_pictures
-from benchmarks.conformance.operations import Unit
-from benchmarks.conformance.transports import Fmpy, fmpy_apart
+from benchmarks.robustness.conformance.cases import CASES, write_pictures
+from benchmarks.robustness.conformance.operations import Unit
+from benchmarks.robustness.conformance.transports import Fmpy, fmpy_apart
 
 pytestmark = pytest.mark.e2e
 

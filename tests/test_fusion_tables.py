@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from benchmarks import fusion_tables
+from benchmarks.accuracy import fusion_tables
 from scenarios.figure17 import draw_figure17
 from scenarios.files import load_scenario
 from scenarios.plant.pipeline import drive
@@ -77,9 +77,9 @@ def test_the_page_is_written_between_its_markers(short_sweep, tmp_path, monkeypa
     parts.open()
     for key in run_keys(short_sweep):
         parts.keep(key.index, run_one(short_sweep, key).rows, 0.25)
-    page, history = tmp_path / "fusion.md", tmp_path / "history" / "fusion.jsonl"
+    page, scores = tmp_path / "fusion.md", tmp_path / "out" / "scores.jsonl"
     page.write_text(f"before\n{fusion_tables.BEGIN}\nold\n{fusion_tables.END}\nafter\n")
-    for name, path in (("PAGE", page), ("HISTORY", history), ("PICTURES", tmp_path / "pictures")):
+    for name, path in (("PAGE", page), ("PICTURES", tmp_path / "pictures")):
         monkeypatch.setattr(fusion_tables, name, path)
     for _ in range(2):
         fusion_tables.write(tmp_path / "out", pictures=False)
@@ -89,7 +89,7 @@ def test_the_page_is_written_between_its_markers(short_sweep, tmp_path, monkeypa
     assert "old" not in text
     assert "paper_simulation 2 of 2" in text
     assert "0.25 s (class_process)" in text
-    lines = [json.loads(line) for line in history.read_text().splitlines()]
+    lines = [json.loads(line) for line in scores.read_text().splitlines()]
     assert len(lines) == 2
     assert set(lines[0]["sweeps"]["paper_simulation"]["levels"][0]["estimators"]) == {"IFE", "DE", "DIFE"}
     shares = [

@@ -12,7 +12,7 @@ import yaml
 from gap_drives import DRY, MODEL, clean, noisy, pulses, random_drives, remeasured, road_of, trace
 
 import sim2real
-from benchmarks.gap_development import BARE
+from benchmarks.gap.development_drives import BARE
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.errors import ScenarioError
 from sim2real.demo import VEHICLE

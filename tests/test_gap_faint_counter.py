@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from long import beyond
 
-from benchmarks.gap_development import Levels
+from benchmarks.gap.development_drives import Levels
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import diagnose, find
 from sim2real.observing.drive import WHEEL

@@ -7,7 +7,7 @@ import pytest
 from gap_drives import BARE, MODEL, clean, noisy, pulses, random_drives, remeasured, rms, trace
 from long import beyond
 
-from benchmarks.gap_development import SEVERITY, Levels
+from benchmarks.gap.development_drives import SEVERITY, Levels
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.mass_offset import MassOffset
 from scenarios.effects.torque_gain import TorqueGain

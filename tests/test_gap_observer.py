@@ -20,7 +20,7 @@ from gap_drives import (
     trace,
 )
 
-from benchmarks.gap_development import SEVERITY
+from benchmarks.gap.development_drives import SEVERITY
 from scenarios.effects import EFFECTS
 from scenarios.effects.aero_drag import AeroDrag
 from scenarios.effects.mass_offset import MassOffset

@@ -1,7 +1,7 @@
 """Files that were made to do harm, given to the commands as a user would: refused in a line, or read harmlessly.
 
 Each is handled within 5 s and 500 MB by a process that has everything loaded, as the first command of a session has
-after its start. `benchmarks.fuzz` does the same with files that were damaged by chance.
+after its start. `benchmarks.robustness.fuzz` does the same with files that were damaged by chance.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.bench_manoeuvres import MANOEUVRES, measure
+from benchmarks.accuracy.manoeuvres import MANOEUVRES, measure
 
 
 @pytest.mark.parametrize("name", list(MANOEUVRES))

@@ -18,7 +18,7 @@ import yaml
 from fmu_unit import DRIVING, Unit
 from typer.testing import CliRunner
 
-from benchmarks.odd_pictures import KINDS, verdicts
+from benchmarks.vision.odd_pictures import KINDS, verdicts
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.library import networks_folder

@@ -9,14 +9,14 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from benchmarks.patch_width import changes, table
-from benchmarks.table4 import __main__ as command
-from benchmarks.table4 import drives
-from benchmarks.table4.clips import ASSUMED, AssumedFile, camera_over
-from benchmarks.table4.judge import COLUMNS, Networks, judged, near_corners, within
-from benchmarks.table4.report import Measured, history_line, tables
-from benchmarks.table4.scores import blocks_of, confusion, gate, n_w, share, wilson
-from benchmarks.table4.sequences import Sequence, majority
+from benchmarks.vision.patch_width import changes, table
+from benchmarks.vision.table4 import __main__ as command
+from benchmarks.vision.table4 import drives
+from benchmarks.vision.table4.clips import ASSUMED, AssumedFile, camera_over
+from benchmarks.vision.table4.judge import COLUMNS, Networks, judged, near_corners, within
+from benchmarks.vision.table4.report import Measured, figures_of, tables
+from benchmarks.vision.table4.scores import blocks_of, confusion, gate, n_w, share, wilson
+from benchmarks.vision.table4.sequences import Sequence, majority
 from models.training.rendered import SEED_RANGES
 from scenarios.camera.renderer import Renderer
 from scenarios.library import networks_folder
@@ -241,7 +241,7 @@ def test_kept_verdicts_are_read_as_they_were_written(tmp_path, monkeypatch, netw
         again.assign(networks="full", consecutive=True), (), False, None, 0.0, 0.0, {"full": {"a": "b"}}
     )
     assert "| w/ interference | IFE | 12.8 | " in tables(measured)
-    assert json.loads(json.dumps(history_line(measured)))["networks"] == {"full": {"a": "b"}}
+    assert json.loads(json.dumps(figures_of(measured)))["networks"] == {"full": {"a": "b"}}
 
 
 def test_wider_patches_are_cut_wider_and_the_table_tells_their_errors(tmp_path, monkeypatch, networks):

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.training_seeds import interval, main, rows
+from benchmarks.vision.training_seeds import interval, main, rows
 from models.training.data import COLUMNS, MANIFEST, Picture
 from models.training.scores import wilson_interval
 from trpac_core.vision.classes import Surface
