@@ -24,9 +24,9 @@ demo: $(READY)   ## build the unit, drive it over the paper's road, write out/de
 	$(BIN)/python build_fmu.py --out dist
 	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo
 
-COMPILING := tests/test_gap_observer.py::test_a_log_without_measurements_is_the_plain_simulation_from_rest \
-  tests/test_withheld_plant.py::test_neutral_effect_is_the_nominal_car \
-  tests/test_gap_report.py::TestRating::test_the_same_curve_is_rated_one
+COMPILING := tests/sim2real/test_gap_observer.py::test_a_log_without_measurements_is_the_plain_simulation_from_rest \
+  tests/benchmarks/test_withheld_plant.py::test_neutral_effect_is_the_nominal_car \
+  tests/sim2real/test_gap_report.py::TestRating::test_the_same_curve_is_rated_one
 
 # Three workers for two cores: some tests wait for processes, rigs and clusters. One thread each: the threads of one's
 # matrix products would wait for the other's. The seed is for random inputs; pytest by itself draws others every time.
@@ -77,7 +77,7 @@ wheel-test: wheel ## install the wheel into fresh environments, run the README's
 	  $$python -m venv $$place/env; \
 	  $$place/env/bin/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[all]"; \
 	  mkdir $$place/empty; \
-	  (cd $$place/empty && env -u PYTHONPATH $$place/env/bin/python $(CURDIR)/tests/wheel_check.py $(CURDIR)/README.md); \
+	  (cd $$place/empty && env -u PYTHONPATH $$place/env/bin/python $(CURDIR)/tests/support/wheel_check.py $(CURDIR)/README.md); \
 	  rm -rf $$place; \
 	done
 

@@ -127,7 +127,7 @@ def _opener(folder: Path) -> Iterator[Callable[..., Unit]]:
 @pytest.fixture(scope="session")
 def ramp() -> np.ndarray:
     """Path of a withheld car that speeds up evenly, for its sensors; not to be changed."""
-    from test_withheld_plant import CAR, roll
+    from withheld_plant import CAR, roll
 
     from benchmarks.gap.withheld.generator.car import Road
     from benchmarks.gap.withheld.generator.world import nominal

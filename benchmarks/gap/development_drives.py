@@ -1,8 +1,7 @@
 """Drives of the product's own plant with known effects: what the tests of the diagnosis are held on, and a first look.
 
-No command: `tests/gap_drives.py` uses them. They flatter it, since plant and library share their forms: its gates
-were set on opened cases of
-`benchmarks/gap/withheld`.
+No command: `tests/support/gap_drives.py` uses them. They flatter it, since plant and library share their forms:
+its gates were set on opened cases of `benchmarks/gap/withheld`.
 """
 
 from __future__ import annotations
