@@ -24,9 +24,9 @@ demo: $(READY)   ## build the unit, drive it over the paper's road, write out/de
 	$(BIN)/python build_fmu.py --out dist
 	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo
 
-COMPILING := tests/test_gap_observer.py::test_a_log_without_measurements_is_the_plain_simulation_from_rest \
-  tests/test_blind_plant.py::test_neutral_effect_is_the_nominal_car \
-  tests/test_gap_report.py::TestRating::test_the_same_curve_is_rated_one
+COMPILING := tests/sim2real/test_gap_observer.py::test_a_log_without_measurements_is_the_plain_simulation_from_rest \
+  tests/benchmarks/test_withheld_plant.py::test_neutral_effect_is_the_nominal_car \
+  tests/sim2real/test_gap_report.py::TestRating::test_the_same_curve_is_rated_one
 
 # Three workers for two cores: some tests wait for processes, rigs and clusters. One thread each: the threads of one's
 # matrix products would wait for the other's. The seed is for random inputs; pytest by itself draws others every time.
@@ -77,18 +77,18 @@ wheel-test: wheel ## install the wheel into fresh environments, run the README's
 	  $$python -m venv $$place/env; \
 	  $$place/env/bin/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[all]"; \
 	  mkdir $$place/empty; \
-	  (cd $$place/empty && env -u PYTHONPATH $$place/env/bin/python $(CURDIR)/tests/wheel_check.py $(CURDIR)/README.md); \
+	  (cd $$place/empty && env -u PYTHONPATH $$place/env/bin/python $(CURDIR)/tests/support/wheel_check.py $(CURDIR)/README.md); \
 	  rm -rf $$place; \
 	done
 
 audit:           ## published faults of the locked packages (needs pip-audit on PATH, and the network)
 	pip-audit --strict --disable-pip --require-hashes -r requirements/dev.txt
 
-blind: $(READY)  ## the diagnosis on withheld cases, all thresholds (long; BLIND_SEED=n for other cases; newest family of forms)
-	$(BIN)/python -m benchmarks.blind run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --forms tenth --jobs 2
-	$(BIN)/python -m benchmarks.blind score --out out/blind-$(BLIND_SEED)
+blind: $(READY)  ## the diagnosis on withheld cases, all thresholds (long; BLIND_SEED=n for other cases)
+	$(BIN)/python -m benchmarks.gap.withheld run --out out/blind-$(BLIND_SEED) --cases full --seed $(BLIND_SEED) --jobs 2
+	$(BIN)/python -m benchmarks.gap.withheld score --out out/blind-$(BLIND_SEED)
 
-bench: $(READY)  ## step times of estimator and plant, added to benchmarks/history/speed.jsonl (on an idle machine)
+bench: $(READY)  ## step times of estimator and plant, added to out/speed.jsonl (on an idle machine)
 	$(BIN)/python -m benchmarks.speed
 
 clean:           ## remove what was built and measured

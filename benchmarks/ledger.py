@@ -1,4 +1,4 @@
-"""Lines of benchmarks/history: when, of which code and on what machine a figure was measured, and the figures."""
+"""Lines of results: when, of which code and on what machine a figure was measured, and the figures."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def circumstances() -> dict[str, Any]:
     }
 
 
-def append(history: Path, figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Add one line of circumstances and figures to a history, and return it."""
+def append(results: Path, figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Add one line of circumstances and figures to a file, and return it."""
     line = circumstances() | dict(figures)
-    history.parent.mkdir(parents=True, exist_ok=True)
-    with history.open("a", encoding="utf-8") as file:
+    results.parent.mkdir(parents=True, exist_ok=True)
+    with results.open("a", encoding="utf-8") as file:
         file.write(json.dumps(line) + "\n")
     return line

@@ -31,7 +31,8 @@ CONFIDENCE_MEMORY_S = 0.15
 """Time over which the confidence forgets itself: neighbouring pictures show much the same road [s]."""
 WRONG_SHARE = 0.02
 """Share of pictures whose class is wrong though nothing disturbs them: the paper's 1.5 of 100, rounded up; our
-networks are wrong in 12 on rendered roads (docs/camera_scores.md), in runs, as in benchmarks/random_drives.py [-]."""
+networks are wrong in 12 on rendered roads (docs/camera_scores.md), in runs, as in
+benchmarks/accuracy/random_drives.py [-]."""
 BORDER_BLEND_M = 0.1
 """Way about a border over which either class may be given: borders are no sharp lines, and the position wanders [m]."""
 REFERENCE_NOISE = 0.01

@@ -127,10 +127,10 @@ def _opener(folder: Path) -> Iterator[Callable[..., Unit]]:
 @pytest.fixture(scope="session")
 def ramp() -> np.ndarray:
     """Path of a withheld car that speeds up evenly, for its sensors; not to be changed."""
-    from test_blind_plant import CAR, roll
+    from withheld_plant import CAR, roll
 
-    from benchmarks.blind.generator.car import Road
-    from benchmarks.blind.generator.world import nominal
+    from benchmarks.gap.withheld.generator.car import Road
+    from benchmarks.gap.withheld.generator.world import nominal
 
     path = roll(nominal(CAR, Road()), 10.0, 16.0, 60.0)
     path.flags.writeable = False

@@ -12,8 +12,8 @@ from scenarios.effects.frames import Frames
 TOLERATED_STOPS = 4.3
 """Exposure error that leaves 1/e of the right classes [stops].
 
-By ``benchmarks/measure_camera_laws.py``: the shipped networks are right on 0.96, 0.80, 0.49 of what they are right on
-undisturbed, at 1, 2, 3 stops to either side (60 rendered roads; 0.95, 0.81, 0.61 by this law).
+By ``benchmarks/vision/measure_camera_laws.py``: the shipped networks are right on 0.96, 0.80, 0.49 of what they are
+right on undisturbed, at 1, 2, 3 stops to either side (60 rendered roads; 0.95, 0.81, 0.61 by this law).
 """
 
 
@@ -34,7 +34,7 @@ class ExposureShift(Effect):
     stage = "perception"
     subsystem = "camera"
     equation = "Q_v and share of right classes times exp(-(stops / 4.3)^2); linear light times 2^stops"
-    source = "measured on the shipped networks, benchmarks/measure_camera_laws.py"
+    source = "measured on the shipped networks, benchmarks/vision/measure_camera_laws.py"
     excited_by = "any drive with a known normal confidence, best with the pictures themselves"
     look_alikes = ("motion_blur",)
 

@@ -13,8 +13,8 @@ from scenarios.effects.frames import Frames
 TOLERATED_SMEAR_M = 4.0
 """Smear on the road that leaves 1/e of the right classes [m].
 
-By ``benchmarks/measure_camera_laws.py``: the shipped networks are right on 0.88 and 0.79 of what they are right on
-undisturbed, at a smear of 0.5 and 1 m (60 rendered roads; 0.88 and 0.78 by this law).
+By ``benchmarks/vision/measure_camera_laws.py``: the shipped networks are right on 0.88 and 0.79 of what they are
+right on undisturbed, at a smear of 0.5 and 1 m (60 rendered roads; 0.88 and 0.78 by this law).
 """
 
 
@@ -31,7 +31,7 @@ class MotionBlur(Effect):
     stage = "perception"
     subsystem = "camera"
     equation = "Q_v and share of right classes times exp(-v exposure / 4 m)"
-    source = "measured on the shipped networks, benchmarks/measure_camera_laws.py"
+    source = "measured on the shipped networks, benchmarks/vision/measure_camera_laws.py"
     excited_by = "driving slowly and fast on the same surface"
     look_alikes = ("exposure_shift",)
 

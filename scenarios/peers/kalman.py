@@ -33,7 +33,7 @@ THETA = 2
 
 @dataclass(frozen=True)
 class KalmanTuning:
-    """Noise of a filter; found by `benchmarks/tune_peers.py`.
+    """Noise of a filter; found by `benchmarks/accuracy/tune_peers.py`.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ from trpac_core.tyre import correction
 
 @dataclass(frozen=True)
 class SlipSlopeTuning:
-    """Settings; found by `benchmarks/tune_peers.py`.
+    """Settings; found by `benchmarks/accuracy/tune_peers.py`.
 
     Attributes
     ----------

@@ -1,0 +1,335 @@
+"""All figures of docs/fusion.md, by one command.
+
+``python -m benchmarks.accuracy.fusion_tables run --out out/fusion --jobs 2`` runs the shipped sweeps (what is there
+already is kept), ``... write --out out/fusion`` writes their tables between the markers of docs/fusion.md, the
+pictures beside it, and one line of JSON at the end of scores.jsonl in `--out`. ``write`` also takes sweeps that are
+not finished, and says how many runs each table rests on.
+"""
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import Progress, TaskID
+
+from benchmarks.ledger import append
+from scenarios.figure17 import draw_figure17
+from scenarios.sweep import figures
+from scenarios.sweep.draw import plan_run, run_keys
+from scenarios.sweep.execute import execute
+from scenarios.sweep.files import load_sweep
+from scenarios.sweep.store import Parts
+from scenarios.sweep.summary import distribution, shown_enough, slippery, summarise
+from scenarios.sweep.trace import trace
+
+ROOT = Path(__file__).resolve().parents[2]
+SWEEPS = ROOT / "scenarios" / "sweeps"
+PAGE, PICTURES = ROOT / "docs" / "fusion.md", ROOT / "docs" / "fusion"
+NAMES = ("paper_simulation", "peers", "road_test", "road_test_brakes", "degradation", "rendered")
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+DASH = "–"
+LEAST_RUNS = 5
+"""Levels with fewer runs are left out of tables and pictures."""
+FRICTION_EDGES = (0.1, 0.15, 0.2, 0.25, 0.35, 0.4, 0.45, 0.5, 0.55, 0.7)
+
+
+def run(out: Path, names: list[str], runs: int | None, jobs: int | None, scheduler: str | None) -> None:
+    for name in names:
+        sweep = load_sweep(SWEEPS / f"{name}.yaml")
+        if runs is not None:
+            sweep = replace(sweep, file=sweep.file.model_copy(update={"runs": runs}))
+        with Progress() as bars:
+            told = partial(show, bars, bars.add_task(name))
+            _, failures = execute(sweep, out / name, scheduler, jobs, told)
+        if failures:
+            raise SystemExit(f"{name}: {len(failures)} runs failed, the first: {failures[0]}")
+
+
+def show(bars: Progress, task: TaskID, done: int, total: int) -> None:
+    bars.update(task, completed=done, total=total)
+
+
+def collected(folder: Path) -> dict[str, Any]:
+    """What a sweep's folder holds: its table, how many runs of how many, processor time, code."""
+    described = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    parts = Parts(folder, described)
+    table = parts.table()
+    if (table["parameter"] != "").any():
+        runs_of_level = table.groupby(["parameter", "level"])["run"].transform("nunique")
+        table = table[runs_of_level >= LEAST_RUNS]
+    file = described["sweep"]
+    asked = file["runs"] * max(1, sum(len(axis["levels"]) for axis in file["vary"]))
+    cpu_s = parts.cpu_s()
+    return {
+        "table": table,
+        "runs": int(table["run"].nunique()),
+        "asked": asked,
+        "cpu_s_per_run": float(np.median(cpu_s)),
+        "cpu_s": float(np.sum(cpu_s)),
+        "camera": file["camera"]["source"],
+        "source_sha256": described["source_sha256"],
+    }
+
+
+def cell(value: float | None, digits: int, missing: str = DASH) -> str:
+    return missing if value is None else f"{value:.{digits}f}"
+
+
+def pair(measure: dict[str, Any], digits: int, missing: str = DASH) -> str:
+    return f"{cell(measure['median'], digits, missing)} / {cell(measure['percentile_95'], digits, missing)}"
+
+
+def markdown(heads: list[str], rows: list[list[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def accuracy(found: dict[str, Any]) -> str:
+    """Median / 95th percentile of error and times, by where the stretch lies and by surface."""
+    table = found["table"]
+    judged = shown_enough(slippery(table))
+    groups = {
+        "slippery, after a change of road": judged[judged["stretch"] > 0],
+        "slippery, from standstill": judged[judged["stretch"] == 0],
+        "wet, after a change": judged[(judged["surface"] == "wet") & (judged["stretch"] > 0)],
+        "snow and ice, after a change": judged[(judged["surface"] == "snow_ice") & (judged["stretch"] > 0)],
+        "slippery, all of the above": judged,
+    }
+    rows = []
+    for where, part in groups.items():
+        for name in names_of(table):
+            mine = distribution(part[part["estimator"] == name])
+            rows.append(
+                [
+                    where,
+                    name,
+                    str(mine["stretches"]),
+                    pair(mine["steady_state_error"], 4),
+                    pair(mine["convergence_time_s"], 2, "never"),
+                    pair(mine["shown_convergence_time_s"], 2, "never"),
+                    pair(mine["wall_convergence_time_s"], 2, "never"),
+                    pair(mine["band_time_s"], 2, "never"),
+                ]
+            )
+    heads = [
+        "stretches",
+        "estimator",
+        "number",
+        "steady-state error",
+        "5 % of the step, excited [s]",
+        "shown [s]",
+        "elapsed [s]",
+        "within 0.02, excited [s]",
+    ]
+    return markdown(heads, rows)
+
+
+def by_friction(found: dict[str, Any]) -> str:
+    """DIFE after a change of road over true friction: where errors and slow convergence come from."""
+    table = found["table"]
+    judged = shown_enough(slippery(table[(table["estimator"] == "DIFE") & (table["stretch"] > 0)]))
+    rows = []
+    for low, high in pairwise(FRICTION_EDGES):
+        mine = distribution(judged[(judged["theta"] >= low) & (judged["theta"] < high)])
+        measures = (
+            pair(mine["steady_state_error"], 4),
+            pair(mine["convergence_time_s"], 2, "never"),
+            pair(mine["band_time_s"], 2, "never"),
+        )
+        rows.append([f"{low:g} to {high:g}", str(mine["stretches"]), *measures])
+    heads = ["true friction", "stretches", "steady-state error", "5 % of the step [s]", "within 0.02 [s]"]
+    return markdown(heads, rows)
+
+
+def names_of(table: Any) -> list[str]:
+    """Estimators in a table, ours first."""
+    own = [n for n in ("IFE", "DE", "DIFE") if n in set(table["estimator"])]
+    return own + sorted(set(table["estimator"]) - set(own))
+
+
+def not_shown(found: dict[str, Any]) -> str:
+    """Where nothing could be seen: how many stretches, and how far off the estimate stays there."""
+    slick = slippery(found["table"])
+    rows = []
+    for surface, part in slick.groupby("surface"):
+        for name in names_of(part):
+            mine = part[part["estimator"] == name]
+            dark = mine[mine["shown_s"] < 0.5]
+            error = f"{np.average(dark['error_mean'], weights=dark['time_s']):.3f}" if len(dark) else DASH
+            rows.append([str(surface), name, f"{len(dark)} of {len(mine)}", error])
+    return markdown(["surface", "estimator", "stretches not shown", "mean error there"], rows)
+
+
+def coverage_rows(found: dict[str, dict[str, Any]]) -> str:
+    rows = []
+    for sweep, part in found.items():
+        for name in names_of(part["table"]):
+            of = (
+                summarise(part["table"][part["table"]["parameter"] == ""])["levels"]
+                if sweep != "degradation"
+                else []
+            )
+            for level in of:
+                estimator = level["estimators"].get(name)
+                if estimator is None or estimator["coverage"] is None:
+                    continue
+                whole = estimator["coverage"]
+                rows.append([sweep, name, "all", *(cell(whole[k], 3) for k in KINDS)])
+                for surface, mine in estimator["coverage_by_surface"].items():
+                    if mine is not None:
+                        rows.append([sweep, name, surface, *(cell(mine[k], 3) for k in KINDS)])
+    return markdown(["sweep", "estimator", "road", "all time", "while shown", "end of stretch"], rows)
+
+
+KINDS = ("all_time", "while_shown", "at_the_end_of_a_stretch")
+
+
+def table_5(found: dict[str, dict[str, Any]]) -> str:
+    """The paper's Table 5: condition, method, steady-state error, convergence."""
+    rows = []
+    for sweep in ("paper_simulation", "road_test", "road_test_brakes"):
+        if sweep not in found:
+            continue
+        table = found[sweep]["table"]
+        judged = slippery(table) if sweep == "paper_simulation" else table
+        judged = shown_enough(judged)
+        judged = judged[judged["stretch"] > 0] if sweep == "paper_simulation" else judged
+        for name in names_of(table):
+            mine = distribution(judged[judged["estimator"] == name])
+            times = [
+                pair(mine[k], 2, "never") if mine["stretches"] else DASH
+                for k in ("convergence_time_s", "shown_convergence_time_s", "wall_convergence_time_s")
+            ]
+            whole = slippery(table) if sweep == "paper_simulation" else table
+            whole = whole[whole["estimator"] == name]
+            mean = f"{np.average(whole['error_mean'], weights=whole['time_s']):.3f}"
+            rows.append([sweep, name, pair(mine["steady_state_error"], 3), *times, mean])
+    heads = [
+        "condition",
+        "method",
+        "steady-state error",
+        "convergence, excited [s]",
+        "shown [s]",
+        "elapsed [s]",
+        "mean, all time",
+    ]
+    return markdown(heads, rows)
+
+
+def degradation(found: dict[str, Any]) -> str:
+    rows = []
+    for level in summarise(found["table"])["levels"]:
+        for name, mine in level["estimators"].items():
+            shown, covered = mine["shown"], mine["coverage"]
+            rows.append(
+                [
+                    f"{level['parameter']} {level['level']:g}",
+                    str(level["runs"]),
+                    name,
+                    pair(shown["steady_state_error"], 3),
+                    pair(shown["band_time_s"], 2, "never"),
+                    cell(mine["mean_error_slippery"], 3),
+                    cell(covered["all_time"] if covered else None, 2),
+                ]
+            )
+    heads = [
+        "level",
+        "runs",
+        "estimator",
+        "steady-state error",
+        "within 0.02 [s]",
+        "mean error, all time",
+        "in 2 std",
+    ]
+    return markdown(heads, rows)
+
+
+def blocks(found: dict[str, dict[str, Any]]) -> Iterator[str]:
+    """The page's measured part."""
+    state = ", ".join(f"{n} {f['runs']} of {f['asked']}" for n, f in found.items())
+    cpu = ", ".join(f"{n} {f['cpu_s_per_run']:.2f} s ({f['camera']})" for n, f in found.items())
+    yield f"Runs: {state}. Processor time per run: {cpu}. Each pair is median / 95th percentile.\n"
+    yield "### In the form of Table 5\n\n" + table_5(found)
+    if "paper_simulation" in found:
+        yield "### The simulation condition\n\n" + accuracy(found["paper_simulation"])
+        yield "DIFE after a change of road, by true friction:\n\n" + by_friction(found["paper_simulation"])
+        yield "Where the tyre never showed its friction for 0.5 s:\n\n" + not_shown(found["paper_simulation"])
+    if "peers" in found:
+        yield "### Peers, on the first of these roads\n\n" + accuracy(found["peers"])
+    yield "### Coverage of 2 TRPAC_std\n\n" + coverage_rows(found)
+    if "degradation" in found:
+        yield "### Degradation\n\n" + degradation(found["degradation"])
+
+
+def write(out: Path, pictures: bool) -> None:
+    found = {n: collected(out / n) for n in NAMES if any((out / n / "parts").glob("*.json"))}
+    if not found:
+        raise SystemExit(
+            f"{out}: no sweep there; run `python -m benchmarks.accuracy.fusion_tables run --out {out}` first"
+        )
+    text = PAGE.read_text(encoding="utf-8")
+    head, rest = text.split(BEGIN)
+    tail = rest.split(END)[1]
+    PAGE.write_text(head + BEGIN + "\n\n" + "\n".join(blocks(found)) + "\n" + END + tail, encoding="utf-8")
+    sweeps = {
+        name: {k: v for k, v in part.items() if k != "table"} | slim(summarise(part["table"]))
+        for name, part in found.items()
+    }
+    append(out / "scores.jsonl", {"sweeps": sweeps})
+    if pictures:
+        draw(found)
+
+
+def slim(value: Any) -> Any:
+    """A summary without what the tables do not show, in four digits."""
+    if isinstance(value, dict):
+        return {
+            k: slim(v) for k, v in value.items() if k not in ("by_surface", "coverage_by_surface", "slippery")
+        }
+    if isinstance(value, list):
+        return [slim(v) for v in value]
+    return float(f"{value:.4g}") if isinstance(value, float) else value
+
+
+def draw(found: dict[str, dict[str, Any]]) -> None:
+    """The page's pictures: both drives in the form of Figures 17 and 19, distributions, coverage."""
+    PICTURES.mkdir(exist_ok=True)
+    for name in ("road_test", "road_test_brakes"):
+        sweep = load_sweep(SWEEPS / f"{name}.yaml")
+        draw_figure17(trace(plan_run(sweep, run_keys(sweep)[0])), PICTURES / f"{name}.png")
+    if "paper_simulation" in found:
+        table = found["paper_simulation"]["table"]
+        (PICTURES / "distributions.png").write_bytes(figures.distributions(table))
+        (PICTURES / "errors.png").write_bytes(figures.errors_by_friction(table))
+        covered = figures.coverage_figure(table)
+        if covered is not None:
+            (PICTURES / "coverage.png").write_bytes(covered)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    running = commands.add_parser("run", help="run the sweeps")
+    running.add_argument("--out", type=Path, default=Path("out/fusion"))
+    running.add_argument("--only", choices=NAMES, nargs="+", default=list(NAMES))
+    running.add_argument("--runs", type=int, help="in place of each sweep's own number")
+    running.add_argument("--jobs", type=int)
+    running.add_argument("--scheduler")
+    writing = commands.add_parser("write", help="write tables, figures and pictures")
+    writing.add_argument("--out", type=Path, default=Path("out/fusion"))
+    writing.add_argument("--no-pictures", action="store_true")
+    options = parser.parse_args()
+    if options.command == "run":
+        run(options.out, options.only, options.runs, options.jobs, options.scheduler)
+    else:
+        write(options.out, not options.no_pictures)
+
+
+if __name__ == "__main__":
+    main()

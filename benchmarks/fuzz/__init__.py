@@ -1,1 +1,0 @@
-"""Rubbish into every input and every file that the project reads: ``python -m benchmarks.fuzz``."""

@@ -1,0 +1,1 @@
+"""How often is the diagnosis of the sim-to-real gap right?"""

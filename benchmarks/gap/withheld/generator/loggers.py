@@ -1,0 +1,284 @@
+"""Loggers: what becomes of values, rows and stamps on their way into the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating[Any]]
+
+DECIMALS = {"torque": 1, "wheel_speed": 2, "vehicle_speed": 2, "accel": 2, "position": 2}
+"""Of a tool that writes tables."""
+REPEATED, RUN_ROWS, RUNS = 0.005, (3, 12), 12
+"""Share of samples that a late row repeats; rows of a run of lost ones, and how many runs a log has."""
+MEASURED = ("wheel_speed", "vehicle_speed", "accel")
+BUS_STEPS = {
+    "torque": 0.5,
+    "wheel_speed": 1 / 32,
+    "vehicle_speed": 1 / 64,
+    "accel": 1 / 32,
+    "position": 1 / 32,
+}
+"""Of signals on a vehicle's bus, each below the noise of a production car's sensor [N m, rad/s, m/s, m/s^2, m]."""
+STEPS_DOWN = {
+    "torque": 0.05,
+    "wheel_speed": 1 / 128,
+    "vehicle_speed": 1 / 256,
+    "accel": 1 / 128,
+    "position": 1 / 200,
+}
+"""Of a bus that drops what is below a step; half a step is at most a fifth of the best sensor's noise."""
+UNITS = {
+    "torque": 0.1,
+    "wheel_speed": 0.1 * 2.0 * np.pi / 60.0,
+    "vehicle_speed": 0.01 / 3.6,
+    "accel": 0.001 * 9.80665,
+    "position": 0.01,
+}
+"""Last digits of a log in rpm, km/h and g, in this one's units."""
+OVERRUNS, OVERRUN_S = 4, (0.02, 0.15)
+"""How often a logger cannot keep up, and how long."""
+RANGES = {
+    "torque": 4000.0,
+    "wheel_speed": 250.0,
+    "vehicle_speed": 80.0,
+    "accel": 60.0,
+}
+"""Of a converter with `BITS`; half a step is at most four tenths of the best sensor's noise."""
+BITS = 14
+CHANGES = {"wheel_speed": 0.01, "vehicle_speed": 0.005, "accel": 0.015, "position": 0.005}
+"""Less than which a recorder does not write anew: half of the best sensor's noise."""
+SLOW_COLUMN = "vehicle_speed_m_s"
+"""Of a receiver that is slower than the log."""
+TICK_S = 1e-4
+"""Of a logger's clock."""
+FRAME_LOST = 0.004
+"""Messages on the bus, each with its readings; share of them that is lost."""
+SPARSE_COLUMN = "accel_x_m_s2"
+"""Of a sensor that is slower than the log."""
+FRONT, REAR = ("wheel_speed_fl", "wheel_speed_fr"), ("wheel_speed_rl", "wheel_speed_rr")
+"""What two messages carry that come in turn."""
+WAKES_S = (0.1, 1.2)
+"""Senders that are awake only a while after the logger is."""
+GAPS, GAP_ROWS = 12, (2, 9)
+"""How often a log has lost a few rows of a signal, and how many, before a tool has filled them in."""
+CLOCK_S = (20_000.0, 80_000.0)
+"""Time of day that a drive begins at."""
+BEFORE_S = (2.0, 9.0)
+"""What a triggered recorder keeps of the time before its trigger, which is its zero."""
+CLOCK_OFF = 2e-4
+"""By which a logger's clock may be fast or slow, over the true time."""
+DIGITS_KEPT = {"torque": 4, "wheel_speed": 4, "vehicle_speed": 4, "accel": 3, "position": 5}
+"""Of a log that keeps so many figures."""
+
+
+def all_digits(log: pd.DataFrame) -> pd.DataFrame:
+    """Values as they are."""
+    return log
+
+
+def bus_digits(log: pd.DataFrame) -> pd.DataFrame:
+    """Values in the steps of `BUS_STEPS`."""
+    steps = {str(c): step for c in log for name, step in BUS_STEPS.items() if name in str(c)}
+    return log.assign(**{column: np.round(log[column] / step) * step for column, step in steps.items()})
+
+
+def decimals(log: pd.DataFrame) -> pd.DataFrame:
+    """Values with few decimals."""
+    return log.round({str(c): n for c in log for name, n in DECIMALS.items() if name in str(c)})
+
+
+def _measured(log: pd.DataFrame) -> list[str]:
+    return [str(c) for c in log if str(c).startswith(MEASURED)]
+
+
+def every_second(log: pd.DataFrame, *columns: str) -> pd.DataFrame:
+    """With these columns in every second row; the log has no value between."""
+    between = np.arange(len(log)) % 2 != 0
+    return log.assign(**{column: log[column].mask(between) for column in columns})
+
+
+def repeating(log: pd.DataFrame) -> pd.DataFrame:
+    """A lost sample is the one before; now and then another is too."""
+    columns = _measured(log)
+    late = np.random.default_rng(len(log)).random((len(log), len(columns))) < REPEATED
+    return log.assign(**log[columns].mask(late).ffill().bfill())
+
+
+def losing_runs(log: pd.DataFrame) -> pd.DataFrame:
+    """A signal at a time is lost for a few rows on end."""
+    rng, columns, kept = np.random.default_rng(len(log)), _measured(log), log.copy()
+    for start in rng.integers(0, len(log), RUNS):
+        rows = slice(int(start), int(start + rng.integers(*RUN_ROWS)))
+        kept.loc[kept.index[rows], rng.choice(columns)] = np.nan
+    return kept
+
+
+def _steps(log: pd.DataFrame, steps: dict[str, float]) -> dict[str, float]:
+    return {str(c): step for c in log for name, step in steps.items() if name in str(c)}
+
+
+def truncating(log: pd.DataFrame) -> pd.DataFrame:
+    """Values in the steps of `STEPS_DOWN`, what is below a step dropped."""
+    return log.assign(**{c: np.floor(log[c] / step) * step for c, step in _steps(log, STEPS_DOWN).items()})
+
+
+def converted(log: pd.DataFrame) -> pd.DataFrame:
+    """Values that were written in other units, with few digits."""
+    return log.assign(**{c: np.round(log[c] / step) * step for c, step in _steps(log, UNITS).items()})
+
+
+def overrunning(log: pd.DataFrame) -> pd.DataFrame:
+    """Now and then all that is measured is lost at once, for some hundredths of a second."""
+    rng, kept = np.random.default_rng(len(log)), log.copy()
+    measured = [str(c) for c in log if str(c).startswith(MEASURED)]
+    clock = log["time_s"].to_numpy()
+    for start in rng.choice(clock, OVERRUNS):
+        kept.loc[(clock >= start) & (clock < start + rng.uniform(*OVERRUN_S)), measured] = np.nan
+    return kept
+
+
+def converted_in_bits(log: pd.DataFrame) -> pd.DataFrame:
+    """Values in the steps of a converter."""
+    steps = {str(c): span / 2**BITS for c in log for name, span in RANGES.items() if name in str(c)}
+    return log.assign(**{c: np.round(log[c] / step) * step for c, step in steps.items()})
+
+
+def on_change(log: pd.DataFrame) -> pd.DataFrame:
+    """Values that stand until they have changed by as much as `CHANGES`."""
+    steps = {str(c): least for c in log for name, least in CHANGES.items() if str(c).startswith(name)}
+    return log.assign(**{c: _standing(log[c].to_numpy(), least) for c, least in steps.items()})
+
+
+def _standing(values: Array, least: float) -> Array:
+    kept, last = values.copy(), np.inf
+    for i, value in enumerate(values.tolist()):
+        if abs(value - last) >= least:
+            last = value
+        elif value == value:
+            kept[i] = last
+    return kept
+
+
+def slow_receiver(log: pd.DataFrame) -> pd.DataFrame:
+    """A vehicle speed that comes with every second row; the log has no value between."""
+    return every_second(log, SLOW_COLUMN)
+
+
+def in_ticks(log: pd.DataFrame) -> pd.DataFrame:
+    """Rows stamped by a clock with coarse ticks."""
+    return log.assign(time_s=np.round(np.round(log["time_s"] / TICK_S) * TICK_S, 7))
+
+
+def significant_digits(log: pd.DataFrame) -> pd.DataFrame:
+    """Values with as many figures as `DIGITS_KEPT`."""
+    kept = {str(c): n for c in log for name, n in DIGITS_KEPT.items() if name in str(c)}
+    return log.assign(**{c: _figures(log[c].to_numpy(), n) for c, n in kept.items()})
+
+
+def _figures(values: Array, digits: int) -> Array:
+    size = np.where(np.isfinite(values) & (values != 0.0), np.abs(values), 1.0)
+    step = 10.0 ** (np.floor(np.log10(size)) - digits + 1)
+    return np.asarray(np.round(values / step) * step)
+
+
+def losing_frames(log: pd.DataFrame) -> pd.DataFrame:
+    """Now and then a message is lost, with all readings that it carries."""
+    rng, kept = np.random.default_rng(len(log)), log.copy()
+    for frame in MEASURED:
+        columns = [str(c) for c in log if str(c).startswith(frame)]
+        kept.loc[rng.random(len(log)) < FRAME_LOST, columns] = np.nan
+    return kept
+
+
+def slow_accelerometer(log: pd.DataFrame) -> pd.DataFrame:
+    """An accelerometer that comes with every second row; the log has no value between."""
+    return every_second(log, SPARSE_COLUMN)
+
+
+def in_turns(log: pd.DataFrame) -> pd.DataFrame:
+    """Speeds of the front wheels with one row, of the rear ones with the next; the log has no value between."""
+    odd = np.arange(len(log)) % 2 != 0
+    columns = {str(c): odd for c in log if str(c).startswith(FRONT)}
+    columns |= {str(c): ~odd for c in log if str(c).startswith(REAR)}
+    return log.assign(**{column: log[column].mask(gone) for column, gone in columns.items()})
+
+
+def waking(log: pd.DataFrame) -> pd.DataFrame:
+    """What a sender measures is not there until it is awake."""
+    rng, kept = np.random.default_rng(len(log)), log.copy()
+    clock = log["time_s"].to_numpy()
+    for sender in MEASURED:
+        columns = [str(c) for c in log if str(c).startswith(sender)]
+        kept.loc[clock < clock[0] + rng.uniform(*WAKES_S), columns] = np.nan
+    return kept
+
+
+def filled_in(log: pd.DataFrame) -> pd.DataFrame:
+    """What was lost, and now and then a few rows of a signal on end, is a straight line."""
+    rng, kept = np.random.default_rng(len(log)), log.copy()
+    measured = [str(c) for c in log if str(c).startswith(MEASURED)]
+    for start in rng.integers(1, len(log), GAPS):
+        kept.loc[kept.index[start : start + rng.integers(*GAP_ROWS)], rng.choice(measured)] = np.nan
+    lines = kept.set_index("time_s")[measured].interpolate(method="index", limit_direction="both")
+    return kept.assign(**{column: lines[column].to_numpy() for column in measured})
+
+
+def by_the_clock(log: pd.DataFrame) -> pd.DataFrame:
+    """Rows stamped by the time of day."""
+    begun = np.round(np.random.default_rng(len(log)).uniform(*CLOCK_S), 3)
+    return log.assign(time_s=np.round(log["time_s"] + begun, 7))
+
+
+def slow_place(log: pd.DataFrame) -> pd.DataFrame:
+    """A position that comes with every second row; the log has no value between."""
+    return every_second(log, "position_m")
+
+
+def triggered(log: pd.DataFrame) -> pd.DataFrame:
+    """Rows stamped from a trigger on, some of them before it."""
+    before = np.round(np.random.default_rng(len(log)).uniform(*BEFORE_S), 3)
+    return log.assign(time_s=np.round(log["time_s"] - before, 7))
+
+
+def slow_wheels(log: pd.DataFrame) -> pd.DataFrame:
+    """Wheel speeds that come with every second row; the log has no value between."""
+    return every_second(log, *(str(c) for c in log if str(c).startswith("wheel_speed")))
+
+
+def own_clock(log: pd.DataFrame) -> pd.DataFrame:
+    """Rows stamped by a clock that is a little fast or slow."""
+    rate = 1.0 + np.random.default_rng(len(log)).uniform(-CLOCK_OFF, CLOCK_OFF)
+    return log.assign(time_s=np.round(rate * log["time_s"], 7))
+
+
+DIGITS: dict[str, tuple[int, Callable[[pd.DataFrame], pd.DataFrame]]] = {
+    "all": (1, all_digits),
+    "bus": (2, bus_digits),
+    "decimals": (3, decimals),
+    "repeating": (3, repeating),
+    "losing_runs": (3, losing_runs),
+    "truncating": (4, truncating),
+    "converted": (4, converted),
+    "overrunning": (4, overrunning),
+    "converted_in_bits": (5, converted_in_bits),
+    "on_change": (5, on_change),
+    "slow_receiver": (5, slow_receiver),
+    "in_ticks": (6, in_ticks),
+    "significant_digits": (6, significant_digits),
+    "losing_frames": (6, losing_frames),
+    "slow_accelerometer": (6, slow_accelerometer),
+    "in_turns": (7, in_turns),
+    "waking": (7, waking),
+    "filled_in": (8, filled_in),
+    "by_the_clock": (8, by_the_clock),
+    "slow_place": (9, slow_place),
+    "triggered": (9, triggered),
+    "slow_wheels": (10, slow_wheels),
+    "own_clock": (10, own_clock),
+}
+"""With the edition of the generator that each came with."""

@@ -1,0 +1,1 @@
+"""How often is the camera side wrong, and on what does that hang?"""

@@ -1,0 +1,76 @@
+"""How often `trpac vision classify` is right on real pictures that the networks were not trained on.
+
+``python -m benchmarks.vision.classify_stills --data ROAD_IMAGES`` prints accuracy and recall per class with their 95 %
+intervals for each set of pictures, and how often a verdict of a given confidence is right.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.vision.training_seeds import sets_of_pictures
+from models.training.data import Picture
+from models.training.scores import wilson_interval
+from scenarios.stills import classify_pictures
+from trpac_core.vision.classes import Surface
+
+SETS = {
+    "web stills, validation": ("condition_web", "val"),
+    "web stills, test": ("condition_web", "test"),
+    "other cameras, test": ("other_cameras/", "test"),
+}
+"""What the sources of each set begin with, and its split."""
+CONFIDENCES = (0.0, 0.6, 0.75, 0.9, 1.0)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print both tables; one line and exit code 1 where a set has no pictures in the folder."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.vision.classify_stills", description=__doc__)
+    parser.add_argument(
+        "--data", type=Path, required=True, help="folder of road pictures with its manifest.csv"
+    )
+    folder = parser.parse_args(arguments).data
+    sets = sets_of_pictures(folder, SETS, "classify_stills")
+    judged = {name: _judged(pictures) for name, pictures in sets.items()}
+    print("| pictures | n | accuracy |" + "|".join(f" recall {s.label} (n) " for s in Surface) + "|")
+    print("|---" * (3 + len(Surface)) + "|")
+    for name, table in judged.items():
+        cells = [_share(table["right"])]
+        cells += [f"{_share(own)} ({len(own)})" for own in _by_class(table)]
+        print(" | ".join([f"| {name}", str(len(table)), *cells]) + " |")
+    print("\n| confidence | pictures | right |\n|---|---|---|")
+    every = pd.concat(judged.values())
+    for low, high in pairwise(CONFIDENCES):
+        right = every["right"][(every["confidence"] > low) & (every["confidence"] <= high)]
+        print(f"| above {low} to {high} | {len(right)} | {_share(right)} |")
+
+
+def _judged(pictures: Sequence[Picture]) -> pd.DataFrame:
+    """What the command says of the pictures; one that it refuses counts as wrong."""
+    found = classify_pictures([picture.path for picture in pictures])[0].set_index("file")
+    table = found.reindex([str(picture.path) for picture in pictures])
+    table["true"] = [picture.surface.label for picture in pictures]
+    table["right"] = table["class"] == table["true"]
+    return table
+
+
+def _by_class(table: pd.DataFrame) -> list[pd.Series]:
+    return [table["right"][table["true"] == surface.label] for surface in Surface]
+
+
+def _share(right: pd.Series) -> str:
+    """A share of hits with Wilson's interval [-]."""
+    if not len(right):
+        return "-"
+    low, high = wilson_interval(int(right.sum()), len(right))
+    return f"{np.mean(right):.3f} [{low:.2f}, {high:.2f}]"
+
+
+if __name__ == "__main__":
+    main()

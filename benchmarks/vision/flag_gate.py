@@ -1,0 +1,122 @@
+"""From which mass on the class of a frame is believed: what the flag holds back of wrong frames, and of right ones.
+
+``python -m benchmarks.vision.flag_gate [--data ROAD_IMAGES] [--models DIR] [--out DIR]`` judges drives of
+development, on which nothing is scored, and prints a row per value of `least_mass`: shares of wrong and of right
+frames with flag 0, and what is wrong among those with flag 1 [%]. The value chosen is the least that holds back more
+than half of the wrong frames in every set and scenario.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+from trpac_core.vision.ife_config import IfeConfig
+
+from .development_drives import add_options, verdicts
+from .table4.scores import gate, method_of
+
+MASSES = tuple(np.round(np.arange(0.5, 0.96, 0.025), 3).tolist())
+ENOUGH_PERCENT = 50.0
+RENDERED, REAL = "rendered", "real clips"
+HELD_BACK, COST, LEFT = "wrong frames with flag 0", "right frames with flag 0", "n_w, flag 1"
+
+
+def main() -> None:
+    given = _options()
+    shares = shares_by_mass(method_of(verdicts(given, {"IFE": {}}), "IFE"))
+    print(as_markdown(shares))
+    print(f"chosen: {chosen(shares)}")
+    draw(shares, given.out / "flag_gate.png")
+
+
+def shares_by_mass(judged: pd.DataFrame) -> pd.DataFrame:
+    """A row per set, scenario and least mass: what the flag is worth there [%].
+
+    Parameters
+    ----------
+    judged : DataFrame
+        Of `verdicts`, one method.
+    """
+    sets = np.where(judged["source"].str.startswith("rendered"), RENDERED, REAL)
+    rows = []
+    for (name, scenario), part in judged.groupby([sets, "scenario"], sort=False):
+        for mass in MASSES:
+            worth = gate(part.assign(flag=flags(part, mass)))
+            rows.append(
+                {"set": name, "scenario": scenario, "least_mass": mass}
+                | {key: worth[key].value for key in (HELD_BACK, COST, LEFT)}
+            )
+    return pd.DataFrame(rows)
+
+
+def flags(judged: pd.DataFrame, mass: float) -> pd.Series:
+    """The estimator's flags with another least mass (groups of one patch or none have mass 0)."""
+    return (judged["Q_v"] > IfeConfig().flag_threshold) & (judged["m_0"] >= mass)
+
+
+def chosen(shares: pd.DataFrame) -> float | None:
+    """The least mass at which most wrong frames of every set and scenario carry flag 0; None: at no mass."""
+    least = shares.groupby("least_mass")[HELD_BACK].min()
+    enough = least[least > ENOUGH_PERCENT]
+    return float(enough.index[0]) if len(enough) else None
+
+
+def as_markdown(shares: pd.DataFrame) -> str:
+    """Per least mass a row, per set and scenario a cell: held back / cost (left); - where no frame is wrong."""
+    cells = shares.assign(
+        cell=[_cell(*row) for row in shares[[HELD_BACK, COST, LEFT]].itertuples(index=False, name=None)],
+        column=shares["set"] + ", " + shares["scenario"],
+    )
+    wide = cells.pivot_table("cell", "least_mass", "column", aggfunc="first", sort=False)
+    lines = [f"| least_mass | {' | '.join(wide.columns)} |", "|---" * (1 + len(wide.columns)) + "|"]
+    lines += [
+        f"| {mass:g} | {' | '.join(row)} |" for mass, row in zip(wide.index, wide.to_numpy(), strict=True)
+    ]
+    return "\n".join(lines)
+
+
+def _cell(held_back: float, cost: float, left: float) -> str:
+    held = "-" if np.isnan(held_back) else f"{held_back:.0f}"
+    return f"{held} / {cost:.0f} ({left:.1f})"
+
+
+def draw(shares: pd.DataFrame, path: Path) -> None:
+    """Held back against cost, a line per set and scenario with wrong frames, the units' least mass marked."""
+    figure, axes = plt.subplots(figsize=(7.0, 4.5), layout="constrained")
+    for (name, scenario), part in shares.dropna(subset=HELD_BACK).groupby(["set", "scenario"], sort=False):
+        (line,) = axes.plot(part[COST], part[HELD_BACK], ".-", label=f"{name}, {scenario}")
+        now = part[np.isclose(part["least_mass"], IfeConfig().least_mass)]
+        axes.plot(now[COST], now[HELD_BACK], "o", ms=11, mfc="none", color=line.get_color())
+    axes.axhline(50.0, color="0.6", lw=0.8)
+    axes.set(
+        xlabel="right frames with flag 0 [%]",
+        ylabel="wrong frames with flag 0 [%]",
+        xlim=(0, 60),
+        ylim=(0, 100),
+    )
+    axes.set_title(f"What the flag holds back; ring: least_mass {IfeConfig().least_mass:g}")
+    axes.legend(loc="lower right")
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.vision.flag_gate",
+        description=__doc__,
+        formatter_class=argparse.RawTextHelpFormatter,
+    )
+    add_options(parser, drives=96)
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

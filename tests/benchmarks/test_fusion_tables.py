@@ -1,0 +1,101 @@
+"""The road test's scenarios, a run in full, and the generator of docs/fusion.md."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from benchmarks.accuracy import fusion_tables
+from scenarios.figure17 import draw_figure17
+from scenarios.files import load_scenario
+from scenarios.plant.pipeline import drive
+from scenarios.sweep.draw import plan_run, run_keys
+from scenarios.sweep.execute import run_one
+from scenarios.sweep.files import load_sweep
+from scenarios.sweep.run import believed_config, shown, step_all
+from scenarios.sweep.store import Parts, identity
+from scenarios.sweep.trace import trace
+
+ROOT = Path(__file__).parents[2]
+TO_FRONT_M = 1.112
+
+
+@pytest.fixture
+def short_sweep(tmp_path):
+    """Two runs over six metres."""
+    content = {
+        "schema": 1,
+        "name": "short",
+        "scenario": str(ROOT / "scenarios" / "paper_simulation.yaml"),
+        "runs": 2,
+        "road": {"stretch_m": 3.0, "friction": {"dry": [0.8, 0.9], "snow_ice": [0.2, 0.3]}},
+        "pedal": {},
+    }
+    path = tmp_path / "short.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return load_sweep(path)
+
+
+def test_the_road_test_is_the_papers():
+    scenario = load_scenario(ROOT / "scenarios" / "road_test.yaml")
+    assert [(s.start_m, s.mu_left) for s in scenario.road.segments] == [(0.0, 1.0), (50.0, 0.8)]
+    trajectory = drive(scenario)
+    front_m = trajectory.position_m + TO_FRONT_M
+    assert trajectory.time_s[np.argmax(front_m >= 50.0)] == pytest.approx(13.3, abs=0.2)
+    assert trajectory.time_s[-1] == pytest.approx(20.0, abs=0.3)
+    assert front_m[-1] == pytest.approx(150.0, abs=0.1)
+
+
+def test_the_motors_show_nothing_of_the_road_tests_friction():
+    scenario = load_scenario(ROOT / "scenarios" / "road_test.yaml")
+    assert not shown(scenario, drive(scenario)).any()
+
+
+def test_brake_pulses_show_both_parts_and_lock_no_wheel():
+    scenario = load_scenario(ROOT / "scenarios" / "road_test_brakes.yaml")
+    trajectory = drive(scenario)
+    visible = shown(scenario, trajectory)
+    for theta in (1.0, 0.8):
+        assert visible[trajectory.theta[:, 0] == theta].sum() * scenario.step_s > 0.5
+    assert trajectory.slip[trajectory.speed_m_s > 1.0, 0].max() < 0.15
+
+
+def test_a_run_in_full_is_the_run_that_is_scored(short_sweep, tmp_path):
+    plan = plan_run(short_sweep, run_keys(short_sweep)[0])
+    full = trace(plan)
+    tracks = step_all(plan, drive(plan.scenario), believed_config(plan, {}), ["IFE", "DE", "DIFE"])
+    np.testing.assert_array_equal(full.table["TRPAC"], tracks.by_name["DIFE"].TRPAC)
+    np.testing.assert_array_equal(full.table["excitation_flag"], tracks.excited)
+    draw_figure17(full, tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_page_is_written_between_its_markers(short_sweep, tmp_path, monkeypatch):
+    parts = Parts(tmp_path / "out" / "paper_simulation", identity(short_sweep))
+    parts.open()
+    for key in run_keys(short_sweep):
+        parts.keep(key.index, run_one(short_sweep, key).rows, 0.25)
+    page, scores = tmp_path / "fusion.md", tmp_path / "out" / "scores.jsonl"
+    page.write_text(f"before\n{fusion_tables.BEGIN}\nold\n{fusion_tables.END}\nafter\n")
+    for name, path in (("PAGE", page), ("PICTURES", tmp_path / "pictures")):
+        monkeypatch.setattr(fusion_tables, name, path)
+    for _ in range(2):
+        fusion_tables.write(tmp_path / "out", pictures=False)
+    text = page.read_text()
+    assert text.startswith("before\n")
+    assert text.endswith("\nafter\n")
+    assert "old" not in text
+    assert "paper_simulation 2 of 2" in text
+    assert "0.25 s (class_process)" in text
+    lines = [json.loads(line) for line in scores.read_text().splitlines()]
+    assert len(lines) == 2
+    assert set(lines[0]["sweeps"]["paper_simulation"]["levels"][0]["estimators"]) == {"IFE", "DE", "DIFE"}
+    shares = [
+        float(line.split("|")[4])
+        for line in text.splitlines()
+        if line.startswith("| paper_simulation | DIFE | all")
+    ]
+    found = lines[0]["sweeps"]["paper_simulation"]["levels"][0]["estimators"]["DIFE"]["coverage"]["all_time"]
+    assert shares == [pytest.approx(found, abs=1e-3)]

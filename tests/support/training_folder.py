@@ -1,0 +1,32 @@
+"""A folder of training pictures with its manifest."""
+
+import csv
+
+import cv2
+
+COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height"]
+
+
+def row(file, split, label, *, mask="", sequence="", size=(64, 64)):
+    return {
+        "file": file,
+        "split": split,
+        "task": "seg" if mask else "cls",
+        "label": label,
+        "mask": mask,
+        "sequence_id": sequence or f"{file}-{split}",
+        "licence": "made up",
+        "width": size[0],
+        "height": size[1],
+    }
+
+
+def write_folder(folder, rows, pictures):
+    for name, picture in pictures.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        assert cv2.imwrite(str(folder / name), picture)
+    with (folder / "manifest.csv").open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder

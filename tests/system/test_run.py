@@ -1,0 +1,185 @@
+"""A scenario through the command line, from files to report, on the real unit."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from fmu_src.packaging import build_unit
+from fmu_src.units import UNITS
+from scenarios.errors import ScenarioError
+from scenarios.files import load_scenario
+from scenarios.fmu_client.estimator import INPUTS, run_unit
+from scenarios.pictures import frame_name, record
+from scenarios.plant.pipeline import drive
+from scenarios.runner import run_scenario
+from trpac_cli.main import app
+
+ROOT = Path(__file__).parents[2]
+
+SHORT_ROAD = {
+    "schema": 1,
+    "segments": [
+        {"start_m": 0.0, "mu_left": 0.9, "mu_right": 0.9, "surface": "dry"},
+        {"start_m": 4.0, "mu_left": 0.3, "mu_right": 0.3, "surface": "snow_ice"},
+    ],
+}
+STRANGE = "short <i>$x_{$ [/bold]"
+"""A name that is no markup, no mathematics and no HTML."""
+SCORE_KEYS = {
+    "start_m",
+    "theta",
+    "steady_state_error",
+    "max_error_after_convergence",
+    "convergence_time_s",
+    "wall_convergence_time_s",
+    "excited_time_s",
+}
+PULSES = {
+    "schema": 1,
+    "name": "launch and pulse",
+    "pulses": [
+        {"start_s": 0.02, "end_s": 1.3, "torque_nm": 300.0, "ramp_s": 0.05},
+        {"start_s": 1.7, "end_s": 2.4, "torque_nm": 250.0, "ramp_s": 0.05},
+    ],
+}
+
+
+@pytest.fixture
+def scenario_file(tmp_path):
+    """Seven metres of road, a quarter of the paper's picture size."""
+    root = ROOT / "scenarios"
+    camera = yaml.safe_load((root / "cameras" / "paper.yaml").read_text())
+    for key in ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px"):
+        camera[key] = camera[key] / 4
+    camera |= {"width_px": 480, "height_px": 300}
+    files = {
+        "camera.yaml": camera,
+        "road.yaml": SHORT_ROAD,
+        "manoeuvre.yaml": PULSES,
+        "vehicle.yaml": yaml.safe_load((root / "vehicles" / "four_in_wheel_motor_ev.yaml").read_text()),
+        "scenario.yaml": {
+            "schema": 1,
+            "name": STRANGE,
+            "vehicle": "vehicle.yaml",
+            "road": "road.yaml",
+            "camera": "camera.yaml",
+            "manoeuvre": "manoeuvre.yaml",
+            "step_s": 0.001,
+            "end": {"position_m": 9.0, "time_s": 2.6},
+            "sensors": {"vehicle_speed_noise_m_s": 0.003, "wheel_speed_noise_rad_s": 0.01},
+            "pictures": {"disturbance": "paper", "fps": 10.0},
+            "seed": 4,
+        },
+    }
+    for name, content in files.items():
+        (tmp_path / name).write_text(yaml.safe_dump(content))
+    return tmp_path / "scenario.yaml"
+
+
+@pytest.mark.e2e
+def test_run_writes_report_figure_log_and_scores(scenario_file, unit_file, tmp_path):
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["run", str(scenario_file), "--fmu", str(unit_file), "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in out.iterdir()) == ["figure17.png", "log.csv", "report.html", "summary.json"]
+    summary = json.loads((out / "summary.json").read_text())
+    assert set(summary["estimators"]) == {"IFE", "DE", "DIFE"}
+    assert {"fmu_sha256", "seed", "versions"} <= set(summary)
+    for scores in summary["estimators"].values():
+        assert [set(score) for score in scores] == [SCORE_KEYS, SCORE_KEYS]
+    slippery = summary["estimators"]["DIFE"][1]
+    assert slippery["theta"] == 0.3
+    assert slippery["steady_state_error"] < 0.02
+    log = pd.read_csv(out / "log.csv")
+    assert {"time_s", "TRPAC", "flag", "K_v", "theta_true"} <= set(log.columns)
+    assert np.isfinite(log["TRPAC"]).all()
+    report = (out / "report.html").read_text()
+    assert "short &lt;i&gt;" in report
+    assert "<i>" not in report
+    assert 'src="http' not in report
+    assert report.count("data:image/") == 2
+
+
+@pytest.mark.long
+@pytest.mark.e2e
+def test_a_run_repeats_bit_by_bit(scenario_file, unit_file, tmp_path):
+    scenario = load_scenario(scenario_file)
+    first, second = (run_scenario(scenario, unit_file, tmp_path / name) for name in ("a", "b"))
+    pd.testing.assert_frame_equal(first.table, second.table, check_exact=True)
+    assert first.summary == second.summary
+
+
+@pytest.mark.long
+@pytest.mark.e2e
+def test_pictures_are_of_the_place_and_repeat(scenario_file, tmp_path):
+    scenario = load_scenario(scenario_file)
+    trajectory = drive(scenario)
+    once, again = (record(scenario, trajectory, tmp_path / name) for name in ("a", "b"))
+    assert list(once["frame"]) == list(again["frame"])
+    assert len(once) == len(trajectory) // 100 + 1
+    front = trajectory.position_m + scenario.vehicle.to_core().cog_to_front_axle_m
+    assert once["front_axle_m"].to_numpy() == pytest.approx(front[once["row"]])
+    for number in (1, len(once)):
+        first, second = ((tmp_path / name / frame_name(number)).read_bytes() for name in ("a", "b"))
+        assert first == second
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        ({"road": "elsewhere.yaml"}, "elsewhere.yaml"),
+        ({"stepp_s": 0.001}, "step_s"),
+        ({"step_s": -1.0}, "step_s"),
+    ],
+)
+def test_unusable_scenarios_end_with_one_message_and_nothing_written(scenario_file, tmp_path, edit, named):
+    content = yaml.safe_load(scenario_file.read_text()) | edit
+    scenario_file.write_text(yaml.safe_dump(content))
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["run", str(scenario_file), "--out", str(out)])
+    assert result.exit_code == 2
+    assert named in result.stderr
+    assert not out.exists()
+
+
+def test_a_missing_unit_is_said(scenario_file, tmp_path):
+    arguments = [
+        "run",
+        str(scenario_file),
+        "--fmu",
+        str(tmp_path / "none.fmu"),
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2
+    assert "none.fmu" in result.stderr
+    assert "build_fmu.py" in result.stderr
+
+
+ONE_ROW = pd.DataFrame({name: [1.0] for name in INPUTS})
+NO_FRAMES = pd.DataFrame({"row": [], "path": [], "frame": []})
+
+
+def test_another_unit_of_ours_is_said(tmp_path):
+    archive = build_unit(UNITS["TrpacEstimator4W"], tmp_path / "other.fmu")
+    with pytest.raises(ScenarioError, match=r"other\.fmu: is TrpacEstimator4W; expected TrpacEstimator"):
+        run_unit(archive, {}, ONE_ROW, NO_FRAMES, 0.001)
+
+
+def test_settings_that_the_unit_refuses_are_said(unit_file):
+    with pytest.raises(ScenarioError, match="refuses the scenario's settings or a step"):
+        run_unit(unit_file, {"tyre.longitudinal_stiffness": 1.0}, ONE_ROW, NO_FRAMES, 0.001)
+
+
+def test_an_output_that_is_a_file_is_said_before_the_work(scenario_file, tmp_path):
+    out = tmp_path / "out"
+    out.write_text("mine")
+    result = CliRunner().invoke(app, ["run", str(scenario_file), "--out", str(out)])
+    assert result.exit_code == 2
+    assert out.read_text() == "mine"
