@@ -27,7 +27,7 @@ from trpac_core.vision.networks import (
     calibrated_probabilities,
 )
 from trpac_core.vision.region import LEAST_CONTRAST
-from trpac_core.vision.regions import cut_box, road_shares
+from trpac_core.vision.roi_sampling import cut_box, road_shares
 from trpac_core.vision.scene import scene_of
 
 CLASSIFY_COLUMNS = ("file", "class", "confidence", "p_dry", "p_wet", "p_snow_ice")

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
-from scenarios.film import Film, Strip, dark, shown
 from scenarios.library import networks_folder
+from scenarios.overlay_video import Film, Strip, dark, shown
 from scenarios.stills import PICTURE_ENDINGS, Progress, cell_of, pictures_in, silent
 from scenarios.whole_files import written_whole
 from trpac_core.files import FileError, file_sha256, quoted, require_file

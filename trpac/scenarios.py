@@ -121,9 +121,9 @@ class ScenarioRun:
 
     def write(self, folder: str | Path, progress: Told = _silent) -> tuple[Path, ...]:
         """Write report.html, figure17.png, log.csv and summary.json, all or none; returns their paths."""
-        from scenarios.looks import draw_looks
         from scenarios.report import write_report
         from scenarios.runner import write_run
+        from scenarios.vision_overlay import draw_looks
         from scenarios.whole_files import written_whole
 
         with written_whole(Path(folder)) as made:

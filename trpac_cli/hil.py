@@ -15,7 +15,7 @@ from trpac_cli.console import Terminal, complain, refuse, require_folder
 
 if TYPE_CHECKING:
     from trpac_hil.bus import BusSettings
-    from trpac_hil.partner import PartnerJob
+    from trpac_hil.plant_node import PartnerJob
 
 COMMAND, PLANT_COMMAND = "trpac hil", "trpac hil-plant"
 EXIT_NO_LOG = 4
@@ -169,7 +169,7 @@ def hil_plant(
     """
     from scenarios.errors import ScenarioError
     from trpac_hil.deadlines import SystemClock
-    from trpac_hil.partner import open_partner
+    from trpac_hil.plant_node import open_partner
     from trpac_hil.rig import RUN_UP_NS, Stopper
 
     try:
@@ -216,7 +216,7 @@ def _plant_job(
     bus: BusSettings, dbc: Path | None, scenario: Path | None, rate_hz: float, sees: bool
 ) -> PartnerJob:
     from trpac_hil.codec import DBC_FILE
-    from trpac_hil.partner import PLAIN_SCENARIO, PartnerJob
+    from trpac_hil.plant_node import PLAIN_SCENARIO, PartnerJob
 
     return PartnerJob(
         scenario or PLAIN_SCENARIO, bus, dbc or DBC_FILE, rate_hz, camera_fps=20.0 if sees else 0.0

@@ -12,7 +12,7 @@ camera.py               pictures, in a process of their own
 recorder.py, mdf.py     log, figures and terminal, in a process of their own
 figures.py, screen.py   spreads of timing and ages, and how the terminal shows them
 shared.py               memory that these processes share
-driver.py, partner.py   the reference plant as the car on the bus
+driver.py, plant_node.py the reference plant as the car on the bus
 settings.py             what a run is told
 rig.py                  all of it put together
 ======================  ==================================================================================

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from trpac_hil.quantile_sketch import Spread
 from trpac_hil.records import AGED, Column
-from trpac_hil.spread import Spread
 
 SPREADS = {
     "jitter_us": "lateness_us",

@@ -40,8 +40,8 @@ from trpac_hil.helper import CONTEXT, Body, Control, begin
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Loop
 from trpac_hil.mdf import SCRATCH_PREFIX
-from trpac_hil.partner import play
 from trpac_hil.placing import UNIT_PREVIEW, Placing
+from trpac_hil.plant_node import play
 from trpac_hil.realtime import as_before, loop_core, memory_mb, pin, raise_priority, undisturbed
 from trpac_hil.recorder import LOG_FAILED, ROWS_KEPT, RecorderJob, record
 from trpac_hil.records import columns

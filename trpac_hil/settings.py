@@ -9,7 +9,7 @@ from pathlib import Path
 from trpac_hil.bus import BusSettings
 from trpac_hil.codec import DBC_FILE
 from trpac_hil.deadlines import SPIN_NS
-from trpac_hil.partner import PartnerJob
+from trpac_hil.plant_node import PartnerJob
 
 
 @dataclass(frozen=True)

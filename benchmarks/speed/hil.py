@@ -25,7 +25,7 @@ from scenarios.pictures import PictureJob, draw
 from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock, wait_until
 from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.loop import LONG_NS
-from trpac_hil.partner import PLAIN_SCENARIO, PartnerJob
+from trpac_hil.plant_node import PLAIN_SCENARIO, PartnerJob
 from trpac_hil.realtime import loop_core, pin, raise_priority, undisturbed
 from trpac_hil.rig import run_hil
 from trpac_hil.settings import HilSettings

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from trpac_core.vision.regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
+from trpac_core.vision.roi_sampling import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
 
 from .data import Image, Picture
 from .patches import MIN_WIDTH_PX, reduced

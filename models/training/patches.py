@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from trpac_core.vision.regions import LEAST_ROAD, MOST_ASPECT, ROI_ASPECT, cut_box, cut_patch
+from trpac_core.vision.roi_sampling import LEAST_ROAD, MOST_ASPECT, ROI_ASPECT, cut_box, cut_patch
 
 from .data import Image, Picture, family_of, pixel_box
 

@@ -17,7 +17,7 @@ from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import RenderedFrame, SceneLook, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.regions import roi_box, roi_width_px
+from trpac_core.vision.roi_sampling import roi_box, roi_width_px
 from trpac_core.vision.scene import scene_of
 
 from .data import IGNORE, Image

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trpac_core.vision.networks import SurfaceClassifier
-from trpac_core.vision.regions import PATCH_WIDTH_PX
+from trpac_core.vision.roi_sampling import PATCH_WIDTH_PX
 from trpac_core.vision.scene import SCENE_HEIGHT_PX, SCENE_WIDTH_PX, scene_of
 
 from .augment import camera_look

@@ -21,8 +21,8 @@ import numpy as np
 
 from scenarios.camera.disturbances import disturb
 from scenarios.files import RoadFile, RoadSegment, Scenario, load_scenario
-from scenarios.looks import image_estimator
 from scenarios.pictures import DISTURBANCES, scene
+from scenarios.vision_overlay import image_estimator
 from scenarios.yaml_text import to_yaml
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import IfeState

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from scenarios.files import Scenario
 from scenarios.fmu_client.estimator import parameters
-from scenarios.looks import image_estimator
 from scenarios.metrics import score_run
 from scenarios.peers import PeerSetup
 from scenarios.plant.pipeline import PlantTrajectory, drive
@@ -21,6 +20,7 @@ from scenarios.runner import segment_starts, under_the_wheel
 from scenarios.sweep.camera import RenderedFrames, class_verdicts
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.trackers import OWN, make_peer
+from scenarios.vision_overlay import image_estimator
 from trpac_core.dife import GREATEST_THETA, LEAST_SENSITIVITY, LEAST_THETA
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.parameters.configuration import configuration

@@ -25,7 +25,7 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.networks import RoadMasks
-from trpac_core.vision.regions import LEAST_ROI_WIDTH_PX, cut_box, project
+from trpac_core.vision.roi_sampling import LEAST_ROI_WIDTH_PX, cut_box, project
 from trpac_core.vision.trajectory import Motion
 
 SOURCES = load_strict(ASSUMED, AssumedFile).sources

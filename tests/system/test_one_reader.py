@@ -44,7 +44,7 @@ OPENED = {
 OWN = {
     "fmu_src/packaging.py": {"ZipFile", "read_bytes"},  # sources into a unit
     "fmu_src/ssp.py": {"read_bytes"},  # units into a package
-    "scenarios/film.py": {"VideoCapture"},  # the video that it has written
+    "scenarios/overlay_video.py": {"VideoCapture"},  # the video that it has written
     "scenarios/report.py": {"read_bytes"},  # a figure into a report
     "scenarios/sweep/execute.py": {"open"},  # `Parts.open`
     "scenarios/sweep/store.py": {"loads", "open", "read_bytes"},  # sources for their hash; parts, to write

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from scenarios import film, stills
+from scenarios import overlay_video, stills
 from scenarios.camera.renderer import Renderer
 from scenarios.camera.scene import SceneLook, SurfaceSegment
 from scenarios.library import networks_folder
@@ -525,7 +525,7 @@ def test_without_an_encoder_there_is_the_strip_and_the_run_says_so(
         def isOpened(self):
             return False
 
-    monkeypatch.setattr(film.cv2, "VideoWriter", NoEncoder)
+    monkeypatch.setattr(overlay_video.cv2, "VideoWriter", NoEncoder)
     result = drive(folder, camera_file, out)
     assert result.exit_code == 0, result.stderr
     assert "strip.jpg in place of annotated.mp4" in result.stdout
@@ -535,7 +535,7 @@ def test_without_an_encoder_there_is_the_strip_and_the_run_says_so(
 
 @given(st.integers(1, 400))
 def test_the_strip_spreads_evenly_over_a_run_of_any_length(count):
-    strip = film.Strip()
+    strip = overlay_video.Strip()
     for number in range(count):
         strip.add(np.full((2, 480, 3), number % 256, np.uint8))
     kept = len(strip._tiles)

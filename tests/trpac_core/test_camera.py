@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from trpac_core.vision.camera import Camera
-from trpac_core.vision.regions import project
+from trpac_core.vision.roi_sampling import project
 
 WIDE_LENSES = [(-0.3, 0.1, 0.001, -0.001, 0.0), (-0.35, 0.12, 0.0, 0.0, -0.02), (0.2, 0.0, 0.0, 0.0, 0.0)]
 

@@ -38,7 +38,7 @@ from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier
-from trpac_core.vision.regions import road_shares
+from trpac_core.vision.roi_sampling import road_shares
 from trpac_core.vision.scene import scene_of
 from trpac_core.vision.trajectory import Motion
 from trpac_core.vision.voting import Voting, VotingConfig

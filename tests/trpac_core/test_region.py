@@ -15,10 +15,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from trpac_core.vision.evidence import WeightLaw, basic_probability, combine
 from trpac_core.vision.ife import Ife, IfeState
-from trpac_core.vision.lines import KNOWN_WITHIN_M
 from trpac_core.vision.networks import PatchVerdicts
 from trpac_core.vision.region import BODIES_OF_SECTION, Region, Way
-from trpac_core.vision.regions import MOST_ASPECT, Corners, roi_box, roi_boxes
+from trpac_core.vision.roi_sampling import MOST_ASPECT, Corners, roi_box, roi_boxes
+from trpac_core.vision.surface_edges import KNOWN_WITHIN_M
 from trpac_core.vision.trajectory import Motion
 
 REACH_M = (0.5, 7.5)

@@ -8,8 +8,8 @@ from ife_scene import CAMERA, DRY, SNOW, SPLIT, Masks, Middle, paint, split_road
 from trpac_core.vision import ife as ife_module
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
-from trpac_core.vision.lines import lines_across
 from trpac_core.vision.sides import SidesIfe, SidesState
+from trpac_core.vision.surface_edges import lines_across
 from trpac_core.vision.trajectory import Motion
 
 STRAIGHT = Motion(12.0)

@@ -32,14 +32,14 @@ from trpac_hil.events import Events
 from trpac_hil.ferry import Ferry, Wire, ferry_ring
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
-from trpac_hil.partner import PLAIN_SCENARIO, Partner, PartnerJob
 from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
+from trpac_hil.plant_node import PLAIN_SCENARIO, Partner, PartnerJob
+from trpac_hil.quantile_sketch import Spread
 from trpac_hil.realtime import as_before, loop_core, pin
 from trpac_hil.records import columns
 from trpac_hil.rig import Rig, _vision
 from trpac_hil.settings import HilSettings
 from trpac_hil.shared import Ring
-from trpac_hil.spread import Spread
 from trpac_hil.unit import Wiring
 
 CODEC = load_codec()

@@ -26,8 +26,8 @@ from trpac_cli.main import app
 from trpac_hil.bus import BusSettings
 from trpac_hil.codec import load_codec
 from trpac_hil.errors import HilError
-from trpac_hil.partner import PartnerJob
 from trpac_hil.placing import UNIT_PREVIEW
+from trpac_hil.plant_node import PartnerJob
 from trpac_hil.rig import Rig, run_hil
 from trpac_hil.settings import HilSettings
 

@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .classes import Surface
 from .evidence import EvidenceState, basic_probability, combine, update_weights, visual_confidence
-from .foresight import BEHIND_M, Look, due, recalled, road_passed, within_reach
 from .ife_config import GROUP_NAMES, SIDES, IfeConfig
 from .images import ImageError
-from .lines import KNOWN_WITHIN_M, ends_m, lines_across
-from .neighbours import Passed, among_neighbours
+from .lookahead import BEHIND_M, Look, due, recalled, road_passed, within_reach
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
 from .region import Heard, Lines, Region, Way
-from .regions import (
+from .results import FrameResult, FrameView, GroupResult, GroupView
+from .roi_sampling import (
     LANE_HALF_WIDTH_M,
     TRIES,
     classify_corners,
@@ -30,8 +29,9 @@ from .regions import (
     sample,
     sample_across,
 )
-from .results import FrameResult, FrameView, GroupResult, GroupView
 from .scene import scene_of
+from .surface_edges import KNOWN_WITHIN_M, ends_m, lines_across
+from .surface_hmm import Passed, among_neighbours
 from .trajectory import Ellipses, Motion, path_curvature, reckon
 
 MASK_THRESHOLD = 0.5

@@ -15,7 +15,7 @@ from trpac_core.errors import TrpacError
 from .classes import Surface
 from .onnx_runtime import ort, ort_errors
 from .picture import LOOK_HEIGHT_PX, LOOK_WIDTH_PX, picture_looks
-from .regions import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
+from .roi_sampling import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
 from .scene import SceneHead
 
 MASK_WIDTH_PX = 256

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .classes import Surface
 from .evidence import combine
-from .regions import (
+from .roi_sampling import (
     Corners,
     cut_box,
     middle_ground_m,

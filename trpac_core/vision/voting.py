@@ -14,7 +14,7 @@ from .camera import Camera
 from .classes import Surface
 from .ife import MASK_THRESHOLD, fit_camera
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter
-from .regions import cut_patch, roi_widths_px
+from .roi_sampling import cut_patch, roi_widths_px
 from .scene import scene_of
 
 

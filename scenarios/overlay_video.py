@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.looks import annotate
+from scenarios.vision_overlay import annotate
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.results import FrameResult
 

@@ -12,7 +12,7 @@ from ife_scene import CAMERA, ground
 from numpy.testing import assert_allclose
 
 from trpac_core.vision.camera import Camera
-from trpac_core.vision.lines import (
+from trpac_core.vision.surface_edges import (
     HALF_WIDTH_M,
     KNOWN_PLAINNESS,
     LEAST_PLAINNESS,

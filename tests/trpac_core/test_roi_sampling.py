@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from trpac_core.vision.camera import Camera
-from trpac_core.vision.regions import (
+from trpac_core.vision.roi_sampling import (
     LEAST_ROI_WIDTH_PX,
     TRIES,
     Corners,

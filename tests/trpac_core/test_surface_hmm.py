@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from trpac_core.vision.neighbours import (
+from trpac_core.vision.surface_hmm import (
     CELL_M,
     CHANGES_AT_LINE,
     CHANGES_PER_M,

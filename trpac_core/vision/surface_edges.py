@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .regions import project
+from .roi_sampling import project
 from .trajectory import wheel_track
 
 SAMPLE_M = 0.025

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from ife_scene import CAMERA, DRY, SNOW, WET, Masks, Middle, half, paint, plain
 from numpy.testing import assert_allclose, assert_array_equal
 
-from trpac_core.vision.foresight import BEHIND_M, LOOK_EVERY_M, Look, due, recalled, within_reach
 from trpac_core.vision.ife import PATCHES_AHEAD, Ife, IfeState
-from trpac_core.vision.neighbours import passed_by
-from trpac_core.vision.regions import LANE_HALF_WIDTH_M, TRIES, sample
+from trpac_core.vision.lookahead import BEHIND_M, LOOK_EVERY_M, Look, due, recalled, within_reach
+from trpac_core.vision.roi_sampling import LANE_HALF_WIDTH_M, TRIES, sample
 from trpac_core.vision.sides import SidesIfe, SidesState
+from trpac_core.vision.surface_hmm import passed_by
 from trpac_core.vision.trajectory import Motion
 
 NEAR_M, REACH_M = (2.5, 4.5), (2.5, 7.5)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .classes import Surface
-from .neighbours import Passed, passed_by
+from .surface_hmm import Passed, passed_by
 
 LOOK_EVERY_M = 0.4
 """Way between the looks that are remembered: closer ones show the same, and a car that stands must not add any [m]."""
