@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,18 +17,16 @@ from scenarios.library import located, networks_folder
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
 from sim2real.replay.estimate import TABLE_3, estimate_log
-from sim2real.replay.run import Replay, silent
+from sim2real.replay.run import Replay
 from trpac.extras import extras
 from trpac.files import read_log, the_vehicle
 from trpac.picture import Picture
+from trpac.progress import Told, silent
 from trpac_core.errors import TrpacError
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.readings import Sensors
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
-
-Told = Callable[[str, int, int], None]
-"""Told a stage, and how much of how much of it is done."""
 
 
 @dataclass(frozen=True, repr=False)

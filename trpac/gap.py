@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,9 @@ from sim2real.result import Cause, Gap, Place, Verdict, needed
 from sim2real.result import Diagnosis as Said
 from trpac.extras import extras
 from trpac.files import Vehicle, read_log, the_road, the_vehicle
+from trpac.progress import Told, silent
 
 AnyLog = Log | pd.DataFrame | str | Path
-Told = Callable[[str, int, int], None]
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    """Progress that nobody is told."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -102,7 +98,7 @@ def diagnose(
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
-    progress: Told = _silent,
+    progress: Told = silent,
 ) -> Diagnosis:
     """Diagnose recorded logs against the simulation of a car on one road.
 

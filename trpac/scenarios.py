@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,14 +19,9 @@ from scenarios.plant import simulate as run_plant
 from trpac.extras import extras
 from trpac.files import Vehicle, the_road, the_vehicle
 from trpac.picture import Picture
+from trpac.progress import Told, silent
 from trpac_core.errors import TrpacError
 from trpac_core.vehicle import WHEELS
-
-Told = Callable[[str, int, int], None]
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    """Progress that nobody is told."""
 
 
 def simulate(
@@ -119,7 +114,7 @@ class ScenarioRun:
         draw_figure17(self._run, path)
         return Picture(path.read_bytes())
 
-    def write(self, folder: str | Path, progress: Told = _silent) -> tuple[Path, ...]:
+    def write(self, folder: str | Path, progress: Told = silent) -> tuple[Path, ...]:
         """Write report.html, figure17.png, log.csv and summary.json, all or none; returns their paths."""
         from scenarios.report import write_report
         from scenarios.runner import write_run
@@ -144,7 +139,7 @@ def run(
     seed: int | None = None,
     stiffness_n: float | None = None,
     fmu: str | Path | None = None,
-    progress: Told = _silent,
+    progress: Told = silent,
 ) -> ScenarioRun:
     """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
 
