@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -36,25 +37,23 @@ def load_strict(path: str | Path, model: type[Model]) -> Model:
     if not isinstance(data, dict):
         # Not a word of it: whoever named the wrong file need not see it in a log.
         raise ScenarioError(f"{name}: holds no keys at its top; expected lines of `key: value`.")
-    return made(model.model_validate, model, name, data)
+    return made(partial(model.model_validate, data), model, name)
 
 
-def made(make: Callable[..., Made], model: type[BaseModel], name: str, data: dict[str, Any]) -> Made:
-    """What `make` gives for the values of a model; all that is wrong with them in one ScenarioError.
+def made(make: Callable[[], Made], model: type[BaseModel], name: str) -> Made:
+    """What `make` gives, which makes a model of values; all that is wrong with these in one ScenarioError.
 
     Parameters
     ----------
     make : callable
-        The model's own making: from one mapping, or from keywords.
+        The making, with the values.
     model : type
         The model, whose keys are known.
     name : str
         What messages call the values.
-    data : dict
-        The values.
     """
     try:
-        return make(data) if getattr(make, "__name__", "") == "model_validate" else make(**data)
+        return make()
     except ValidationError as error:
         raise ScenarioError("\n".join(f"{name}: {text}" for text in _problems(error, model))) from error
 

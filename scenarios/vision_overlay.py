@@ -17,7 +17,6 @@ from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import decode_image
-from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.results import FrameResult
 from trpac_core.vision.trajectory import Motion
 
@@ -42,11 +41,7 @@ def image_estimator(scenario: Scenario) -> Ife:
         wheelbase_m=car.wheelbase_m,
         side="left" if scenario.wheel.endswith("l") else "right",
     )
-    return Ife(
-        config,
-        Segmenter(networks_folder() / "segmenter.onnx"),
-        SurfaceClassifier(networks_folder() / "surface.onnx"),
-    )
+    return Ife.load(config, networks_folder())
 
 
 def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArray[np.uint8]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.readings import Sensors
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
+from trpac_core.vision.ife import Ife
 
 
 @dataclass(frozen=True, repr=False)
@@ -200,9 +201,8 @@ class Estimator:
         config = EstimatorConfig(vehicle=car, front_axle=wheel.startswith("f"), left_side=wheel.endswith("l"))
         ife = None
         if camera is not None:
-            from trpac.vision import image_estimator
-
-            ife = image_estimator(networks_folder(), config.image_settings, load_camera(camera))
+            settings = replace(config.image_settings, camera=load_camera(camera))
+            ife = Ife.load(settings, networks_folder())
         self._estimator = TrpacEstimator(config, ife)
         self._time_s: float | None = None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as MappingOf
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -50,7 +51,9 @@ class Vehicle(VehicleFile):
         if "longitudinal_stiffness_n" in values:
             stiffness_n = values.pop("longitudinal_stiffness_n")
             values["tyre"] = {"model": "modified_dugoff", "longitudinal_stiffness_n": stiffness_n}
-        made(super().__init__, VehicleFile, "Vehicle", {"schema": 1, "name": "car"} | values)
+        made(
+            partial(super().__init__, **dict[str, Any](schema=1, name="car") | values), VehicleFile, "Vehicle"
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -82,7 +85,7 @@ class Road(RoadFile):
     """
 
     def __init__(self, **values: Any) -> None:
-        made(super().__init__, RoadFile, "Road", {"schema": 1} | values)
+        made(partial(super().__init__, **dict[str, Any](schema=1) | values), RoadFile, "Road")
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

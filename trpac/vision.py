@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -19,7 +19,6 @@ from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import check_size, decode_image
-from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.trajectory import Motion
 
 Order = Literal["bgr", "rgb"]
@@ -89,12 +88,6 @@ def classify(image: str | Path | NDArray[np.uint8], *, order: Order = "bgr") -> 
     return PictureClass(Surface(best).label, float(shares[best]), probabilities, bool(shares[best] > 0.5))
 
 
-def image_estimator(networks: Path, settings: IfeConfig, camera: Camera) -> Ife:
-    """The image estimator of a camera."""
-    loaded = Segmenter(networks / "segmenter.onnx"), SurfaceClassifier(networks / "surface.onnx")
-    return Ife(replace(settings, camera=camera), *loaded)
-
-
 class VisionEstimator:
     """The image estimator over the frames of one drive; it remembers the road that it has seen.
 
@@ -111,7 +104,7 @@ class VisionEstimator:
 
     def __init__(self, camera: str | Path | Camera) -> None:
         lens = camera if isinstance(camera, Camera) else load_camera(camera)
-        self._ife = image_estimator(networks_folder(), IfeConfig(), lens)
+        self._ife = Ife.load(IfeConfig(camera=lens), networks_folder())
         self._state, self._time_s, self._way_m = IfeState(), 0.0, 0.0
 
     def step(

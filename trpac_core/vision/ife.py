@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,14 @@ from .evidence import EvidenceState, basic_probability, combine, update_weights,
 from .ife_config import GROUP_NAMES, SIDES, IfeConfig
 from .images import ImageError
 from .lookahead import BEHIND_M, Look, due, recalled, road_passed, within_reach
-from .networks import PatchClassifier, RoadMasks, RoadSegmenter, calibrated_probabilities
+from .networks import (
+    PatchClassifier,
+    RoadMasks,
+    RoadSegmenter,
+    Segmenter,
+    SurfaceClassifier,
+    calibrated_probabilities,
+)
 from .region import Heard, Lines, Region, Way
 from .results import FrameResult, FrameView, GroupResult, GroupView
 from .roi_sampling import (
@@ -92,6 +100,11 @@ class Ife:
         self.config = config
         self._segmenter = segmenter
         self._classifier = classifier
+
+    @classmethod
+    def load(cls, config: IfeConfig, folder: Path) -> Ife:
+        """The estimator with segmenter.onnx and surface.onnx of a folder; raises ModelError."""
+        return cls(config, Segmenter(folder / "segmenter.onnx"), SurfaceClassifier(folder / "surface.onnx"))
 
     def process(
         self,
