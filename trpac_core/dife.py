@@ -88,6 +88,7 @@ class Gains:
     gamma: float = 12.5
     visual_term: VisualTerm = VisualTerm.OUTSIDE
     tyre_first: bool = True
+    innovation: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +228,7 @@ def _unaided(
             theta_tyre, sensitivity = shown(friction, look[0], elastic_friction(look[1], load_n, C_x))
         if theta_tyre is not None:
             rate = gains.gamma * quickened(steady, inputs[12])
+            rate *= 1.0 + gains.innovation * abs(theta_tyre - theta_hat)
             theta_next = _driven(theta_hat, rate, rate * theta_tyre, step_s)
             if theta_next != theta_hat and step_s > 0.0:
                 theta_rate = (theta_next - theta_hat) / step_s

@@ -10,12 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import paper as printed
 from .camera_side import RoadUnderWheel, take_frame
 from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
-from .dife import FusionState, Outcome, Wheel, dynamics_step, fused_step, settled, unread
+from .dife import (
+    GREATEST_THETA,
+    FusionState,
+    Outcome,
+    VisualTerm,
+    Wheel,
+    dynamics_step,
+    fused_step,
+    settled,
+    unread,
+)
 from .elastic import ElasticLine, learned
-from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Rates, RoadClass
+from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Method, Rates, RoadClass
 from .mismatch import followed
+from .paper import PrintedStep, PrintedWheel, printed_step
 from .readings import (
     GREATEST_ACCELERATION_M_S2,
     LONGEST_STEP_S,
@@ -25,6 +37,9 @@ from .readings import (
     plain,
     unusable,
 )
+from .robust import roads
+from .robust.belief import WheelModel
+from .robust.wheel import INNOVATION, Sample, begun, point, setup, stepped
 from .sight import Look, WheelInputs, look_at
 from .steady import quickened, unsettled
 from .tyre import TyreAtSlip, cubic_at_slip
@@ -46,6 +61,8 @@ LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
 _LEAST_FRICTION = 1e-6
 """Used friction below which a reading says nothing of the tyre's curve, whatever the noise is said to be [-]."""
+BOUNDS = 2.0
+"""Standard deviations from TRPAC to the ends of the interval where it is symmetric [-]."""
 _new = tuple.__new__
 
 
@@ -80,6 +97,21 @@ class TrpacEstimator:
         self._radius_m, self._least_load_n = car.wheel_radius_m, LEAST_LOAD * self._static_load_n
         self._road = RoadUnderWheel(self._preview)
         self._softened_by: tuple[ElasticLine | None, Wheel] = (None, self._wheel)
+        self._robust = None
+        self._gains = config.gains
+        if config.method is Method.ROBUST:
+            self._gains = replace(config.gains, innovation=INNOVATION)
+            mean_load_n = 0.5 * (car.wheel_load(True) + car.wheel_load(False))
+            self._robust = setup(
+                WheelModel(
+                    car.longitudinal_stiffness_n, mean_load_n, car.wheel_inertia_kg_m2, car.wheel_radius_m
+                ),
+                car.rolling_resistance,
+                config.sliding_speed_noise_m_s,
+                config.confidence.torque_noise_nm,
+                config.elastic,
+                config.class_theta,
+            )
         self.reset()
 
     def reset(self) -> None:
@@ -88,6 +120,14 @@ class TrpacEstimator:
         stiffness_n, start = self._wheel.longitudinal_stiffness_n, FusionState(theta, 0.0)
         variance = unknown_variance(config.confidence, theta)
         self._state = EstimatorState(start, start, (0.0, 0.0, 0.0), config.elastic.start, variance)
+        self._state.printed = self._state.printed_alone = printed.begun(theta)
+        low, high, expected, expected_deviation = 0.0, GREATEST_THETA, theta, math.sqrt(variance)
+        if self._robust is not None:
+            self._state.robust = robust = begun(self._robust)
+            said = robust.said
+            low, high, expected, expected_deviation = said.low, said.high, said.mean, said.std
+            theta, deviation = point(robust, theta)
+            variance = deviation * deviation
         self._last = Estimate(
             TRPAC=theta,
             flag=False,
@@ -103,6 +143,10 @@ class TrpacEstimator:
             TRPAC_std=math.sqrt(variance),
             load_n=self._static_load_n,
             longitudinal_stiffness_n=stiffness_n,
+            TRPAC_low=low,
+            TRPAC_high=high,
+            TRPAC_expected=expected,
+            TRPAC_expected_std=expected_deviation,
         )
 
     @property
@@ -201,7 +245,7 @@ class TrpacEstimator:
     ) -> Estimate:
         """Run both estimators over the step with the road that lies under the wheel at its start."""
         config, state = self.config, self._state
-        scheduler, gains = config.scheduler, config.gains
+        scheduler, gains = config.scheduler, self._gains
         softened_by, wheel = self._softened_by
         if softened_by is not state.line:
             wheel = self._softened(state.line)
@@ -223,7 +267,7 @@ class TrpacEstimator:
         look = look_at(inputs, C_x, scheduler)
         alone = dynamics_step(dynamics, inputs, look, wheel, gains, step_s)
         fused = alone
-        if theta_img is not None or fusion != dynamics:
+        if config.method is Method.DIFE and (theta_img is not None or fusion != dynamics):
             model, known = config.confidence, state.variance
             fused = fused_step(
                 fusion,
@@ -243,9 +287,9 @@ class TrpacEstimator:
         theta, class_after, class_before = after[0], after[3], fusion[3]
         unasked_s = state.unasked_s + step_s
         if unasked_s >= config.sensor_filter_s or class_after != class_before:
-            variance, lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
+            if config.method is Method.DIFE:
+                state.variance, state.lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
             state.line = self._learned(state, alone, inputs, read_slip, unasked_s)
-            state.variance, state.lag = variance, lag
             unasked_s = 0.0
         state.fusion, state.dynamics, state.readings = after, alone[0], readings
         state.unasked_s, state.locked_s, state.smoothed_slip = unasked_s, locked_s, smoothed_slip
@@ -256,6 +300,25 @@ class TrpacEstimator:
         state.step_s, state.settled = step_s or state.step_s, True
         if outcome is not None:
             age_s = state.time_s - outcome.captured_s
+        theta_alone, slip, force_n = alone[0][0], inputs[3][0], unaided[3]
+        deviation = math.sqrt(with_camera(config.confidence, state.variance, theta, theta_img))
+        low, high = max(theta - BOUNDS * deviation, 0.0), min(theta + BOUNDS * deviation, GREATEST_THETA)
+        expected, expected_deviation = theta, deviation
+        if state.robust is not None and self._robust is not None:
+            given = roads.NONE if outcome is None or not flag else int(outcome.surface)
+            sample = Sample(
+                sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s, load_n
+            )
+            seen = unaided[4] is not None
+            state.robust = stepped(state.robust, self._robust, sample, given, step_s, inputs[7], seen)
+            said = state.robust.said
+            theta, deviation = point(state.robust, theta_alone)
+            low, high, expected, expected_deviation = said.low, said.high, said.mean, said.std
+            K_v = scheduler.K_v(abs(theta_img - theta)) if excited and theta_img is not None else 0.0
+        elif config.method is Method.AS_PRINTED:
+            step, theta_alone = self._as_printed(sensors, load_n, theta_img, step_s)
+            _, slip, force_n, threshold, excited, K_v = step
+            theta = expected = step.state.theta_hat
         self._last = _new(
             Estimate,
             (
@@ -264,19 +327,43 @@ class TrpacEstimator:
                 K_v,
                 excited,
                 threshold,
-                inputs[3][0],
-                unaided[3],
+                slip,
+                force_n,
                 theta_seen,
-                alone[0][0],
+                theta_alone,
                 Q_v,
                 age_s,
-                math.sqrt(with_camera(config.confidence, state.variance, theta, theta_img)),
+                deviation,
                 load_n,
                 C_x,
+                low,
+                high,
+                expected,
+                expected_deviation,
                 None,
             ),
         )
         return self._last
+
+    def _as_printed(
+        self, sensors: Sensors, load_n: float, theta_img: float | None, step_s: float
+    ) -> tuple[PrintedStep, float]:
+        """A step of Eqs. (12) to (19) with the camera, and the estimate of the same without it [-]."""
+        state, gains, wheel = self._state, self.config.gains, self._wheel
+        told = PrintedWheel(
+            wheel.inertia_kg_m2,
+            wheel.radius_m,
+            wheel.longitudinal_stiffness_n,
+            gains.K,
+            gains.gamma,
+            gains.visual_term is VisualTerm.INSIDE,
+            self.config.floor_m_s,
+        )
+        read = sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s, load_n
+        with_picture = printed_step(state.printed, told, *read, theta_img, step_s)
+        alone = printed_step(state.printed_alone, told, *read, None, step_s)
+        state.printed, state.printed_alone = with_picture.state, alone.state
+        return with_picture, alone.state.theta_hat
 
     def _softened(self, line: ElasticLine) -> Wheel:
         """The wheel with the stiffness that was learnt, kept until the line changes."""
@@ -403,6 +490,12 @@ class TrpacEstimator:
             state.fusion = FusionState(theta, state.fusion.s)
             state.dynamics = FusionState(state.dynamics.theta_hat, state.dynamics.s)
         state.lag, state.settled = 0.0, False
+        if state.robust is not None and self._robust is not None:
+            state.robust = (
+                begun(self._robust)
+                if step_s > LONGEST_STEP_S
+                else stepped(state.robust, self._robust, None, roads.NONE, passed_s, way_m, False)
+            )
         outcome = self._road.at(state.preview, state.position_m - self._setback_m)
         theta_seen, Q_v, age_s = self._last.TRPAC_image, 0.0, -1.0
         if outcome is not None:
@@ -415,10 +508,30 @@ class TrpacEstimator:
             TRPAC_image=theta_seen,
             image_confidence=Q_v,
             frame_age_s=age_s,
-            TRPAC_std=math.sqrt(state.variance),
+            **self._held_bounds(),
             problem=problem,
         )
         return self._last
+
+    def _held_bounds(self) -> dict[str, float]:
+        """Deviation and interval of the estimate that is held; of the robust one with its expectation too."""
+        state, theta = self._state, self._last.TRPAC
+        deviation = math.sqrt(state.variance)
+        if state.robust is None:
+            return {
+                "TRPAC_std": deviation,
+                "TRPAC_low": max(theta - BOUNDS * deviation, 0.0),
+                "TRPAC_high": min(theta + BOUNDS * deviation, GREATEST_THETA),
+                "TRPAC_expected_std": deviation,
+            }
+        said = state.robust.said
+        return {
+            "TRPAC_std": math.hypot(said.std, said.mean - theta),
+            "TRPAC_low": said.low,
+            "TRPAC_high": said.high,
+            "TRPAC_expected": said.mean,
+            "TRPAC_expected_std": said.std,
+        }
 
     def state(self) -> dict[str, Any]:
         """All that is remembered as JSON-able values; floats survive the round trip bit by bit."""

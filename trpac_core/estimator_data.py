@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from enum import Enum
 from typing import Any, NamedTuple
 
 from .confidence import ConfidenceModel
-from .dife import FusionState, Gains
+from .dife import GREATEST_THETA, FusionState, Gains
 from .elastic import ElasticLine, ElasticModel
 from .excitation import FuzzyScheduler
 from .mismatch import Following
 from .observer import seen_at
+from .paper import Printed
 from .readings import (
     GREATEST_ACCELERATION_M_S2,
     JUMP_M_S,
@@ -21,6 +23,7 @@ from .readings import (
     Readings,
     filter_share,
 )
+from .robust.wheel import RobustState
 from .steady import Steady
 from .tyre import peak_friction
 from .vehicle import Vehicle
@@ -36,6 +39,30 @@ class RoadClass:
 
     surface: Surface
     confidence: float
+
+
+class Method(Enum):
+    """Which estimator makes TRPAC."""
+
+    AS_PRINTED = 0
+    """Eqs. (12) to (19) of the paper as they are printed."""
+    DIFE = 1
+    """The paper's, with what noise, wrong classes and a car that is not as told ask for."""
+    ROBUST = 2
+    """Beliefs about road and tyre beside the observer: what the car is told to be may be wrong."""
+
+    @property
+    def label(self) -> str:
+        """Its name in files and on the command line."""
+        return self.name.lower()
+
+    @classmethod
+    def of(cls, label: str) -> Method:
+        """The method of a name; ValueError with the names there are."""
+        known = {method.label: method for method in cls}
+        if label not in known:
+            raise ValueError(f"estimator method is {label!r}; expected one of {', '.join(known)}.")
+        return known[label]
 
 
 @dataclass(frozen=True)
@@ -71,6 +98,8 @@ class EstimatorConfig:
         Standard deviation of the sliding speed omega R - v per sample: that of the car's sensors [m/s].
     acceleration_filter_s : float
         Time constant for the acceleration that the load follows where it is differentiated from speed [s].
+    method : Method
+        Which estimator makes TRPAC.
     """
 
     vehicle: Vehicle = field(default_factory=Vehicle)
@@ -92,6 +121,7 @@ class EstimatorConfig:
     sensor_filter_s: float = 0.010
     sliding_speed_noise_m_s: float = 0.0042
     acceleration_filter_s: float = 0.05
+    method: Method = Method.DIFE
 
     @property
     def image_settings(self) -> IfeConfig:
@@ -136,6 +166,14 @@ class Estimate(NamedTuple):
     """Vertical load that all this rests on [N]."""
     longitudinal_stiffness_n: float
     """Likewise C_x [N]."""
+    TRPAC_low: float = 0.0
+    """Lower bound of the interval that holds the road's TRPAC with 95 % [-]."""
+    TRPAC_high: float = GREATEST_THETA
+    """Its upper bound [-]."""
+    TRPAC_expected: float = math.nan
+    """Expected friction, whatever the tyre shows now [-]."""
+    TRPAC_expected_std: float = math.nan
+    """Its standard deviation [-]."""
     problem: str | None = None
     """One sentence where the input was unusable and the last good estimate is held."""
 
@@ -161,6 +199,11 @@ OUTPUTS = (
     "TRPAC_std",
 )
 """What of an estimate a table or a bus shows."""
+
+
+def nothing_printed() -> Printed:
+    """The state of the estimator as printed before it begins."""
+    return Printed(0.0, math.nan)
 
 
 @dataclass(slots=True)
@@ -198,6 +241,11 @@ class EstimatorState:
     frame_failed: bool = False
     ife: IfeState = field(default_factory=IfeState)
     preview: PreviewState = field(default_factory=PreviewState)
+    robust: RobustState | None = None
+    """None with another method."""
+    printed: Printed = field(default_factory=nothing_printed)
+    printed_alone: Printed = field(default_factory=nothing_printed)
+    """Of the estimator as printed, with the camera and without."""
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
@@ -206,7 +254,10 @@ class EstimatorState:
             values[name] = list(values[name])
         values["fusion"][-1], values["dynamics"][-1] = list(self.fusion.steady), list(self.dynamics.steady)
         values["locked_s"] = None if math.isinf(self.locked_s) else self.locked_s
+        for name in ("printed", "printed_alone"):
+            values[name] = [None if math.isnan(value) else value for value in values[name]]
         values["ife"], values["preview"] = self.ife.to_json(), self.preview.to_json()
+        values["robust"] = None if self.robust is None else self.robust.to_json()
         return values
 
     @classmethod
@@ -216,8 +267,12 @@ class EstimatorState:
         for name, kind in _PARTS.items():
             values[name] = kind(*values[name])
         values["locked_s"] = math.inf if values["locked_s"] is None else values["locked_s"]
+        for name in ("printed", "printed_alone"):
+            theta, s = values[name]
+            values[name] = Printed(theta, math.nan if s is None else s)
         values["ife"] = IfeState.from_json(values["ife"])
         values["preview"] = PreviewState.from_json(values["preview"])
+        values["robust"] = None if values["robust"] is None else RobustState.from_json(values["robust"])
         return cls(**values)
 
 

@@ -19,10 +19,11 @@ from scenarios.plant.sensors import make_scenario_log
 from scenarios.runner import segment_starts, under_the_wheel
 from scenarios.sweep.camera import RenderedFrames, class_verdicts
 from scenarios.sweep.draw import RunPlan
-from scenarios.sweep.trackers import OWN, make_peer
+from scenarios.sweep.trackers import METHODS, OWN, make_peer
 from scenarios.vision_overlay import image_estimator
 from trpac_core.dife import GREATEST_THETA, LEAST_SENSITIVITY, LEAST_THETA
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.estimator_data import Method
 from trpac_core.parameters.configuration import configuration
 from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
 from trpac_core.readings import Sensors
@@ -101,9 +102,17 @@ def step_all(
 ) -> Tracks:
     """Step ours and the peers over the run's signals; raises ValueError where an estimate is not finite."""
     frames, ife = camera_of(plan, trajectory)
-    estimator, step_s = TrpacEstimator(config, ife), plan.scenario.step_s
-    peers = {name: make_peer(name, told_of(plan, config)) for name in estimators if name not in OWN}
-    names = [*OWN, *peers]
+    estimator = TrpacEstimator(replace(config, method=Method.DIFE), ife)
+    step_s = plan.scenario.step_s
+    methods = {
+        name: TrpacEstimator(replace(config, method=Method.of(name)), ife)
+        for name in estimators
+        if name in METHODS
+    }
+    peers = {
+        name: make_peer(name, told_of(plan, config)) for name in estimators if name not in (*OWN, *METHODS)
+    }
+    names = [*OWN, *methods, *peers]
     theta = np.empty((len(trajectory), len(names)))
     std = np.full((len(trajectory), len(names)), np.nan)
     excited = np.empty(len(trajectory), dtype=bool)
@@ -112,11 +121,15 @@ def step_all(
         zip(*signals_of(plan, trajectory), strict=True)
     ):
         sensors = Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
-        estimate = estimator.step(step_s, sensors, frames.get(row))
+        frame = frames.get(row)
+        estimate = estimator.step(step_s, sensors, frame)
         theta[row, : len(OWN)] = estimate.TRPAC_image, estimate.TRPAC_dynamics, estimate.TRPAC
         std[row, fused] = estimate.TRPAC_std
         excited[row] = estimate.excitation_flag
-        for column, peer in enumerate(peers.values(), start=len(OWN)):
+        for column, other in enumerate(methods.values(), start=len(OWN)):
+            its = other.step(step_s, sensors, frame)
+            theta[row, column], std[row, column] = its.TRPAC, its.TRPAC_std
+        for column, peer in enumerate(peers.values(), start=len(OWN) + len(methods)):
             said = peer.step(step_s, sensors)
             theta[row, column], std[row, column] = said.TRPAC, said.TRPAC_std
     strange = [name for i, name in enumerate(names) if not np.isfinite(theta[:, i]).all()]

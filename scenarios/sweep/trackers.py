@@ -13,10 +13,13 @@ from collections.abc import Callable
 from scenarios import peers
 from scenarios.errors import suggestion
 from scenarios.peers import Peer, PeerSetup
+from trpac_core.estimator_data import Method
 from trpac_core.files import quoted
 
 OWN = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
 """The estimators of this project, and the output of the fused one that holds each."""
+METHODS = tuple(method.label for method in Method if method is not Method.DIFE)
+"""The other methods of this project's estimator."""
 
 ADDRESS = re.compile(r"\w+(\.\w+)*:\w+")
 """package.module:function, which no formula, markup or relative import is."""
@@ -24,12 +27,12 @@ ADDRESS = re.compile(r"\w+(\.\w+)*:\w+")
 
 def problem_of_tracker(name: str) -> str | None:
     """One sentence on what is wrong with an estimator's name in a sweep file; None where it is good, or an address."""
-    if name in OWN or name in peers.PEERS or ADDRESS.fullmatch(name):
+    if name in OWN or name in METHODS or name in peers.PEERS or ADDRESS.fullmatch(name):
         return None
     problem = f"estimators names {quoted(repr(name))}"
     if ":" in name:
         return f"{problem}; expected package.module:function."
-    return f"{problem}; {suggestion(name, [*OWN, *peers.PEERS])}"
+    return f"{problem}; {suggestion(name, [*OWN, *METHODS, *peers.PEERS])}"
 
 
 def problem_of_address(name: str) -> str | None:

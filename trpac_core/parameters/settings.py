@@ -6,6 +6,7 @@ A parameter's start is the default of the estimator's own configuration, so that
 from __future__ import annotations
 
 from trpac_core.dife import GREATEST_THETA, VisualTerm
+from trpac_core.estimator_data import Method
 from trpac_core.excitation import K_V_LIMIT
 from trpac_core.parameters.estimator_parameter import parameter
 from trpac_core.parameters.image_settings import CAMERA_PARAMETERS, IMAGE_PARAMETERS
@@ -58,6 +59,14 @@ _VEHICLE_PARAMETERS = (
 )
 
 _FUSION_PARAMETERS = (
+    parameter(
+        "estimator.method",
+        "",
+        "method",
+        "Which estimator makes TRPAC: 0 the paper's as printed, 1 DIFE, 2 robust",
+        min(method.value for method in Method),
+        max(method.value for method in Method),
+    ),
     parameter("estimator.K", "1/s", "gains.K", "Bandwidth of the force observer", 1e-3, 1e6),
     parameter("estimator.gamma", "1/s", "gains.gamma", "Rate of the estimator", 0.0, 1e6),
     parameter(
@@ -72,7 +81,7 @@ _FUSION_PARAMETERS = (
         "estimator.tyre_first",
         "",
         "gains.tyre_first",
-        "The visual term never pulls against what the tyre shows; false: Eqs. (17) and (18) as printed",
+        "The visual term never pulls against what the tyre shows, in DIFE",
     ),
     parameter(
         "estimator.theta_initial",

@@ -1,0 +1,263 @@
+r"""The filter: how likely each friction is under each tyre, and what each pair makes of the tyre's slip offset and stiffness.
+
+In cell theta_j and tyre l the wheel's slip offset r and softness c are two Gaussian states of an extended Kalman filter
+that predicts the used friction
+
+.. math:: f = \mu_l(\theta_j, \lambda - r;\ C_x e^{-c}) + e .
+
+The road changes with the way driven: a share of the belief goes back to what the camera makes likely. r and c go with
+the tyre, not with the road, so that what goes over takes the mean of the tyre along. The likelihood of a reading counts
+with a power below 1: readings 10 ms apart are not independent, and no model of a tyre is exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import Array, exp, log, total
+from .blocks import Reading
+from .tyres import FORMULAS, Tyre, curves
+
+POWER_PER_S = 20.0
+"""Power with which the likelihood of a second of readings counts, as of independent readings [1/s]."""
+INDEPENDENT_1_S = 1.0
+"""How often a second the normalisation of the likelihood counts: operating points are new about once a second [1/s]."""
+MODEL_SHARE = 0.02
+"""Standard deviation of the used friction by load, torque and curve, as a share of it [-]."""
+SLIDING_SHARE = 0.2
+"""What is added to it where the tyre slides all over: a locked wheel has 0.6 to 1 of the peak (Pacejka 2012) [-]."""
+RELAXATION_M = 0.3
+"""Way over which a tyre's force follows its slip: car tyres have 0.1 to 0.6 m (Pacejka 2012, ch. 7) [m]."""
+DRIFT = 0.02
+"""How far a tyre's slip offset and softness wander per root of a second, over their standard deviations [1/sqrt(s)]."""
+SOFTER = 0.03
+"""Standard deviation that the softness of a tyre of unknown curve gains where the road changes [-]."""
+FORGETTING_1_S = 0.1
+"""Share of the tyres' weights that goes back to the first ones per second: no tyre stays sure by chance [1/s]."""
+LEAST_SLOPE = 0.5
+"""Slope of the curve by slip below which it does not count in the normalisation [-]."""
+LEAST_SPEED_M_S, LEAST_RIM_M_S = 1.5, 0.5
+"""Speed below which slip says nothing, and rim speed below which the brake's torque is not the road's [m/s]."""
+NEVER = 1e-30
+"""Weight that each cell keeps [-]."""
+
+
+class Hypotheses(NamedTuple):
+    """The tyres as arrays, shape (tyres, 1) each but for the weights; attributes as in `Tyre`."""
+
+    weight: Array
+    """Shape (tyres,)."""
+    offset_variance: Array
+    softness_variance: Array
+    mean_softness: Array
+    peak: Array
+    fall: Array
+    softer: Array
+    """Variance that the softness gains where the road changes [-]."""
+
+
+def hypotheses(tyres: tuple[Tyre, ...]) -> Hypotheses:
+    """The tyres as arrays."""
+
+    def column(values: Iterable[float]) -> Array:
+        return np.array([[value] for value in values])
+
+    return Hypotheses(
+        np.array([tyre.weight for tyre in tyres]),
+        column(tyre.slip_offset**2 for tyre in tyres),
+        column(tyre.softness**2 for tyre in tyres),
+        column(tyre.mean_softness for tyre in tyres),
+        column(tyre.peak for tyre in tyres),
+        column(tyre.fall for tyre in tyres),
+        column(SOFTER**2 if tyre.peak > 0.0 else 0.0 for tyre in tyres),
+    )
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known of road and tyre.
+
+    Attributes
+    ----------
+    tyre : array, shape (tyres,)
+        Probability of each tyre [-].
+    road : array, shape (tyres, cells)
+        Probability of each cell under a tyre; each row sums to 1 [-].
+    offset, softness : array, shape (tyres, cells)
+        Mean of the slip offset r and of the softness c there [-].
+    offset_variance, covariance, softness_variance : array, shape (tyres, cells)
+        Their covariance matrix.
+    """
+
+    tyre: Array
+    road: Array
+    offset: Array
+    softness: Array
+    offset_variance: Array
+    covariance: Array
+    softness_variance: Array
+
+
+def unread(tyres: Hypotheses, prior: Array) -> Belief:
+    """The belief before anything was read, with the cells as likely as the prior says, shape (cells,) [-]."""
+    like = np.zeros((len(tyres.weight), len(prior)))
+    return Belief(
+        tyres.weight,
+        like + prior,
+        like,
+        like + tyres.mean_softness,
+        like + tyres.offset_variance,
+        like,
+        like + tyres.softness_variance,
+    )
+
+
+def driven(
+    belief: Belief,
+    tyres: Hypotheses,
+    prior: Array,
+    changed: float,
+    duration_s: float,
+    slip_drift: float = 0.0,
+) -> Belief:
+    """The belief after a way on which the road may have changed.
+
+    Parameters
+    ----------
+    belief, tyres, prior
+        Before; the tyres; probability of each cell of a new road, shape (cells,) [-].
+    changed, duration_s : float
+        Share of the belief that goes to the prior [-], time [s].
+    slip_drift : float
+        Variance that the slip offset gains because an error of the speed is another share of another speed [-].
+    """
+    road, offset, softness = belief.road, belief.offset, belief.softness
+    mean_offset, mean_softness = total(road * offset), total(road * softness)
+    off, soft = offset - mean_offset, softness - mean_softness
+    mean_oo = total(road * (belief.offset_variance + off * off))
+    mean_os = total(road * (belief.covariance + off * soft))
+    mean_ss = total(road * (belief.softness_variance + soft * soft)) + tyres.softer
+    # On another road the tyre is not less known than before anything was read.
+    o_share = np.minimum(1.0, (tyres.offset_variance + slip_drift) / mean_oo)
+    s_share = np.minimum(1.0, tyres.softness_variance / mean_ss)
+    mean_oo, mean_ss, mean_os = mean_oo * o_share, mean_ss * s_share, mean_os * o_share * s_share
+    came = changed * prior
+    after = (1.0 - changed) * road + came
+    share = came / after
+    # Of two that merge: the mean of both, the variances of both and what their means are apart.
+    stays, apart = 1.0 - share, share * (1.0 - share)
+    drift = DRIFT * DRIFT * duration_s
+    return Belief(
+        belief.tyre,
+        after,
+        offset - share * off,
+        softness - share * soft,
+        stays * belief.offset_variance
+        + share * mean_oo
+        + apart * off * off
+        + drift * tyres.offset_variance
+        + slip_drift,
+        stays * belief.covariance + share * mean_os + apart * off * soft,
+        stays * belief.softness_variance
+        + share * mean_ss
+        + apart * soft * soft
+        + drift * tyres.softness_variance,
+    )
+
+
+@dataclass(frozen=True)
+class WheelModel:
+    """What a wheel is told to be: C_x at a load [N], I [kg m^2], R [m]."""
+
+    stiffness_n: float
+    mean_load_n: float
+    inertia_kg_m2: float
+    radius_m: float
+
+
+def shows(reading: Reading) -> bool:
+    """Whether the tyre says anything: the car drives and the wheel turns."""
+    return reading.speed_m_s > LEAST_SPEED_M_S and reading.rim_m_s > LEAST_RIM_M_S
+
+
+def read(
+    belief: Belief,
+    tyres: Hypotheses,
+    theta: Array,
+    reading: Reading,
+    wheel: WheelModel,
+    wheel_noise: float,
+    speed_noise: float,
+    torque_noise_nm: float,
+) -> Belief:
+    """The belief after a reading.
+
+    Parameters
+    ----------
+    belief, tyres, theta, reading, wheel
+        Before; the tyres; the cells; what was read; what the wheel is told to be.
+    wheel_noise, speed_noise : float
+        Variance of a sample of wheel speed [rad^2/s^2] and of vehicle speed [m^2/s^2].
+    torque_noise_nm : float
+        Standard deviation of a sample of the torque [N m].
+    """
+    samples, duration_s, radius_m = reading.samples, reading.duration_s, wheel.radius_m
+    inertial = 2.0 * (wheel.inertia_kg_m2 / duration_s) ** 2 * wheel_noise / samples
+    # The force follows the slip over the relaxation length, and both change within a block.
+    lag = 1.0 + RELAXATION_M / (reading.speed_m_s * duration_s)
+    friction_variance = (torque_noise_nm**2 / samples + inertial) / (radius_m * reading.load_n) ** 2 + (
+        lag * reading.friction_change
+    ) ** 2
+    speed_variance = (wheel_noise * radius_m**2 + speed_noise) / samples
+    slip_variance = speed_variance / reading.speed_m_s**2 + (0.5 * reading.slip_change) ** 2
+    slip = reading.slip - belief.offset
+    direction = np.where(slip >= 0.0, 1.0, -1.0)
+    curve = curves(
+        theta,
+        slip,
+        belief.softness,
+        reading.load_n,
+        wheel.stiffness_n,
+        wheel.mean_load_n,
+        tyres.peak,
+        tyres.fall,
+    )
+    error = reading.friction - direction * curve.friction
+    by_slip, by_softness = curve.by_slip, -direction * curve.by_stiffness
+    to_offset = belief.covariance * by_softness - belief.offset_variance * by_slip
+    to_softness = belief.softness_variance * by_softness - belief.covariance * by_slip
+    model = (MODEL_SHARE + SLIDING_SHARE * curve.sliding) * curve.friction
+    variance = (
+        friction_variance
+        + model * model
+        + by_slip * by_slip * slip_variance
+        - by_slip * to_offset
+        + by_softness * to_softness
+    )
+    power = POWER_PER_S * duration_s
+    normalisation = np.maximum(np.abs(by_slip), LEAST_SLOPE) / np.sqrt(variance)
+    likelihood = -0.5 * power * error * error / variance + INDEPENDENT_1_S * duration_s * log(normalisation)
+    gain_offset, gain_softness = power * to_offset / variance, power * to_softness / variance
+    road = belief.road * exp(likelihood - likelihood.max())
+    mass = total(road)
+    tyre = belief.tyre * mass[:, 0]
+    forgotten = FORGETTING_1_S * duration_s
+    return Belief(
+        (1.0 - forgotten) * tyre / total(tyre) + forgotten * tyres.weight,
+        (road + NEVER) / (mass + NEVER * len(theta)),
+        belief.offset + gain_offset * error,
+        belief.softness + gain_softness * error,
+        belief.offset_variance - gain_offset * to_offset,
+        belief.covariance - gain_offset * to_softness,
+        belief.softness_variance - gain_softness * to_softness,
+    )
+
+
+def told_formula(belief: Belief) -> float:
+    """Probability that the tyre has the told formula [-]."""
+    return float(math.fsum(belief.tyre[:FORMULAS].tolist()))

@@ -1,0 +1,143 @@
+"""The cells of road friction, and what the camera's class makes likely before the tyre has shown anything."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import Array, exp
+
+LEAST, GREATEST = 0.02, 1.2
+"""Frictions of the first and about the last cell: wet ice, and a racing tyre on a dry road [-]."""
+CELL, CELL_SHARE = 0.006, 0.025
+"""Width of a cell: the greater of a number and of a share of its friction. It is below the standard deviation that the
+tyre leaves after half a second of sliding [-]."""
+SLIPPERY, SLIPPERY_SHARE = 0.05, 0.2
+"""Roads below this friction are rarer without a camera: wet ice near 0 degrees alone; by this share [-]."""
+CLASS_SCATTER, NEW_SCATTER = 0.13, 0.15
+"""Standard deviation of a road from its class's value: of a class that has stood, and of a new one [-]."""
+WRONG_CLASS, NEW_WRONG = 0.04, 0.2
+"""Probability that the class is wrong and says nothing: of one that has stood, and of a new one [-]."""
+STOOD_M = 4.0
+"""Way for which the camera gives a class until it has stood: two near groups of the picture [m]."""
+TURNED, NEW_TURNED = 0.9, 0.36
+"""Share of the belief that goes to the class's prior: where it has stood, and where it is new [-]."""
+CHANGE_PER_M = 0.02
+"""Share of the belief that goes back to the prior per way: a road changes about every 50 m [1/m]."""
+
+
+def cells() -> Array:
+    """Frictions of the cells, shape (cells,) [-]."""
+    values = [LEAST]
+    while values[-1] < GREATEST:
+        values.append(values[-1] + max(CELL, CELL_SHARE * values[-1]))
+    return np.array(values)
+
+
+def unseen(theta: Array) -> Array:
+    """Probability of each cell without a camera, shape (cells,): all frictions alike, the most slippery ones rarer."""
+    likely = np.gradient(theta) * np.where(theta < SLIPPERY, SLIPPERY_SHARE, 1.0)
+    return likely / likely.sum()
+
+
+def of_class(theta: Array, value: float, greatest: bool, scatter: float, wrong: float) -> Array:
+    """Probability of each cell for a class, shape (cells,).
+
+    Parameters
+    ----------
+    theta : array, shape (cells,)
+        Frictions [-].
+    value : float
+        Adhesion of the class [-].
+    greatest : bool
+        Whether no class has more: then all frictions above its value are alike.
+    scatter, wrong : float
+        Standard deviation of a road from the value, and the probability that the class says nothing [-].
+    """
+    off = (theta - value) / scatter
+    if greatest:
+        off = np.minimum(off, 0.0)
+    likely = exp(-0.5 * off * off) * np.gradient(theta)
+    return (1.0 - wrong) * likely / likely.sum() + wrong * unseen(theta)
+
+
+class Priors(NamedTuple):
+    """Probability of each cell by what the camera says."""
+
+    new: Array
+    """Of a class that is new, shape (classes, cells)."""
+    stood: Array
+    """Of one that has stood, shape (classes, cells)."""
+    none: Array
+    """Without one, shape (cells,)."""
+
+
+def priors(theta: Array, class_theta: tuple[float, ...]) -> Priors:
+    """The priors for classes of these adhesions [-]."""
+    most = max(class_theta)
+    return Priors(
+        np.array([of_class(theta, value, value == most, NEW_SCATTER, NEW_WRONG) for value in class_theta]),
+        np.array(
+            [of_class(theta, value, value == most, CLASS_SCATTER, WRONG_CLASS) for value in class_theta]
+        ),
+        unseen(theta),
+    )
+
+
+NONE = -1
+"""No class."""
+
+
+class ClassUnderWheel(NamedTuple):
+    """What the camera has said of the road under the wheel."""
+
+    last: int = NONE
+    """Class that was given last, or none."""
+    way_m: float = 0.0
+    """Way for which it has been given [m]."""
+    stood: int = NONE
+    """Class that stood last, or none."""
+    silent_m: float = 0.0
+    """Way since a class was given [m]."""
+
+
+class Change(NamedTuple):
+    """How sure it is that the road has changed."""
+
+    memory: ClassUnderWheel
+    """What the camera has said up to now."""
+    share: float
+    """Share of the belief that goes to the prior [-]."""
+    stood: bool
+    """Whether a class stands from now on that is another one than before."""
+
+
+def advanced(memory: ClassUnderWheel, given: int, way_m: float) -> Change:
+    """What the camera has said after a way [m], and what follows for the road.
+
+    `given` is the class under the wheel now, or none. A class that stood is forgotten after `STOOD_M` without any.
+    """
+    share = 1.0 - math.exp(-CHANGE_PER_M * abs(way_m))
+    last, driven_m, stood, silent_m = memory
+    if given == NONE:
+        silent_m += abs(way_m)
+        kept = NONE if silent_m > STOOD_M else stood
+        return Change(ClassUnderWheel(last, driven_m, kept, silent_m), share, False)
+    if given != last:
+        driven_m = 0.0
+        if given != stood:
+            share = max(share, NEW_TURNED)
+    driven_m += abs(way_m)
+    turned = driven_m >= STOOD_M and given != stood
+    if turned:
+        stood, share = given, max(share, TURNED)
+    return Change(ClassUnderWheel(given, driven_m, stood, 0.0), share, turned)
+
+
+def prior_of(memory: ClassUnderWheel, given: int, known: Priors) -> Array:
+    """Probability of each cell by what the camera says now and has said, shape (cells,) [-]."""
+    if given not in (NONE, memory.stood):
+        return known.new[given]
+    return known.none if memory.stood == NONE else known.stood[memory.stood]

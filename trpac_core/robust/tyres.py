@@ -1,0 +1,152 @@
+"""The tyres that a wheel may have, and their curves of used friction over slip.
+
+Nobody knows a tyre's curve. Four hypotheses stand beside each other: the told modified Dugoff tyre, the same with
+another stiffness, and two rational curves that bend from the first slip on, whose stiffness goes with the load. The
+two differ in where their peak lies and in what they lose beyond it; magic formulas lie near the first, brush models
+and exponential curves near the second.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import Array, exp
+
+LEAST_SLIP = 1e-9
+"""Slip below which the tyre is taken at this slip: its formula divides by slip [-]."""
+GREATEST_SLIP = 0.99
+"""Slip above which the tyre is taken at this slip: the formula divides by 1 - slip [-]."""
+
+
+@dataclass(frozen=True)
+class Tyre:
+    """One hypothesis of what the tyre is.
+
+    Parameters
+    ----------
+    weight : float
+        Probability before anything is known [-].
+    slip_offset : float
+        Standard deviation of the slip that a wheel without force reads: radius and speed sensor [-].
+    softness : float
+        Standard deviation of ln(told stiffness / stiffness) [-].
+    mean_softness : float
+        Mean of it. C_x may be told as the slope at slip 0 or as that over the modified Dugoff tyre's 1.27; exp(0.1)
+        lies between [-].
+    peak : float
+        Normalised slip C lambda / (theta F_z) of the curve's peak; 0 for the told formula [-].
+    fall : float
+        Share of the bare curve's loss beyond its peak that the tyre has [-].
+    """
+
+    weight: float
+    slip_offset: float
+    softness: float
+    mean_softness: float = 0.0
+    peak: float = 0.0
+    fall: float = 0.0
+
+
+TOLD = 0
+"""Which of the tyres is as told, within what is told of the tolerances."""
+TYRES = (
+    Tyre(0.35, slip_offset=0.003, softness=0.05),
+    Tyre(0.15, slip_offset=0.005, softness=0.15),
+    Tyre(0.30, slip_offset=0.005, softness=0.20, mean_softness=-0.1, peak=2.15, fall=0.8),
+    Tyre(0.20, slip_offset=0.005, softness=0.20, mean_softness=-0.1, peak=3.0, fall=0.4),
+)
+"""The hypotheses. A magic formula of shape factor 1.65 has its peak at 2.15, a brush or TMeasy curve at 3 (Pacejka 2012,
+ch. 3 and 4); beyond it steep magic formulas lose to 0.6 at three times the peak's slip, which is `fall` 1."""
+FORMULAS = 2
+"""How many of the tyres, the first ones, have the told formula."""
+
+
+class Curve(NamedTuple):
+    """Used friction at a slip and its slopes, shape (tyres, cells) each [-]."""
+
+    friction: Array
+    by_slip: Array
+    by_stiffness: Array
+    """By the logarithm of the stiffness."""
+    sliding: Array
+    """From 0 where the tyre adheres to 1 where it slides all over."""
+
+
+SLIDES_AT = 5.0
+"""Normalised slip at which a tyre counts as half sliding: about twice that of its peak [-]."""
+
+
+def sliding(normalised_slip: Array) -> Array:
+    """How far a tyre slides all over at a normalised slip C lambda / (theta F_z), shape as given [-]."""
+    square = normalised_slip * normalised_slip
+    return square / (square + SLIDES_AT * SLIDES_AT)
+
+
+def dugoff(theta: Array, slip: Array, load_n: float, stiffness_n: Array) -> Curve:
+    """Curve of the modified Dugoff tyre at unsigned slips, shapes that broadcast [-], [N]; source in `trpac_core.tyre`."""
+    rolls = 1.0 - slip
+    elastic = stiffness_n * slip / rolls / load_n
+    shape = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * rolls * theta
+    shape_by_slip = 2.3 * slip - 1.63 + 0.75 * (1.0 - 2.0 * slip) * theta
+    elastic_by_slip = stiffness_n / (load_n * rolls * rolls)
+    slides = theta < 2.0 * elastic
+    share = np.where(slides, theta * (1.0 - 0.25 * theta / elastic), elastic)
+    share_by_elastic = np.where(slides, 0.25 * theta * theta / (elastic * elastic), 1.0)
+    return Curve(
+        share * shape,
+        share_by_elastic * elastic_by_slip * shape + share * shape_by_slip,
+        share_by_elastic * elastic * shape,
+        sliding(elastic / theta),
+    )
+
+
+def peaked(theta: Array, slip: Array, stiffness: Array, peak: Array, fall: Array) -> Curve:
+    """Curve theta phi(x), x = K q / theta, at slips q over the road's speed, shapes that broadcast [-].
+
+    phi = x / (1 + s (s + p - 2)) with s = x / p starts with slope 1 and has its maximum 1 at x = p. K is the stiffness
+    over the load.
+    """
+    rate = stiffness / theta
+    s = rate * slip / peak
+    below = 1.0 + s * (s + peak - 2.0)
+    share, by_x = peak * s / below, (1.0 - s * s) / (below * below)
+    beyond = s > 1.0
+    share = np.where(beyond, 1.0 - fall * (1.0 - share), share)
+    by_x = np.where(beyond, fall * by_x, by_x)
+    return Curve(theta * share, by_x * stiffness, by_x * stiffness * slip, sliding(rate * slip))
+
+
+def curves(
+    theta: Array,
+    slip: Array,
+    softness: Array,
+    load_n: float,
+    stiffness_n: float,
+    mean_load_n: float,
+    peak: Array,
+    fall: Array,
+) -> Curve:
+    """Curve of each tyre in each cell, shape (tyres, cells).
+
+    Parameters
+    ----------
+    theta : array, shape (cells,)
+        Peak friction [-].
+    slip, softness : array, shape (tyres, cells)
+        Signed slip, positive where it drives, and ln(told stiffness / stiffness) [-].
+    load_n, stiffness_n, mean_load_n : float
+        Load, told C_x, and the load that it is told for [N].
+    peak, fall : array, shape (tyres, 1)
+        As in `Tyre` [-].
+    """
+    size = np.minimum(np.maximum(np.abs(slip), LEAST_SLIP), GREATEST_SLIP)
+    stiffness = stiffness_n * exp(-softness)
+    told = dugoff(theta, size[:FORMULAS], load_n, stiffness[:FORMULAS])
+    own = size[FORMULAS:]
+    # A braked wheel's slip is already taken over the road's speed.
+    over_road = np.where(slip[FORMULAS:] > 0.0, own / (1.0 - own), own)
+    other = peaked(theta, over_road, stiffness[FORMULAS:] / mean_load_n, peak[FORMULAS:], fall[FORMULAS:])
+    return Curve(*(np.concatenate(both) for both in zip(told, other, strict=True)))

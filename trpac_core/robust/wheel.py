@@ -1,0 +1,317 @@
+"""The robust estimator of one wheel: readings in blocks, the belief about road and tyre, the point value.
+
+The point value follows the observer of Eqs. (14) to (16) as far as the told formula is believed and the road is the one
+that the observer has read; else it is the mean of the belief. Either way it lies within the belief's bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..elastic import ElasticModel
+from .arrays import Array
+from .belief import Belief, Hypotheses, WheelModel, driven, hypotheses, read, shows, told_formula, unread
+from .blocks import BLOCK_S, Filling, Means, Noise, heard, means_of, reading
+from .interval import Interval, interval
+from .roads import STOOD_M, ClassUnderWheel, Priors, advanced, cells, prior_of, priors
+from .tyres import TOLD, TYRES
+
+INNOVATION = 20.0
+"""How much faster the observer's estimate follows per distance from what the tyre shows: at 0.1 twice as fast [-]."""
+DOUBTED, BELIEVED = 0.05, 0.2
+"""Probability of the told formula up to which the observer does not count, and from which it counts fully [-]."""
+LEAST_TOLERANCE = 1e-4
+"""Tolerance of radius and stiffness below which they are not taken: a filter divides by what it does not know [-]."""
+SCALE_DEVIATION = 0.04
+"""Standard deviation of TRPAC by mass, torque and load, as a share of it [-]."""
+
+
+@dataclass(frozen=True)
+class RobustSetup:
+    """What stays as it is while the wheel drives.
+
+    Attributes
+    ----------
+    theta : array, shape (cells,)
+        Friction of the cells [-].
+    known : Priors
+        By the camera's class.
+    tyres : Hypotheses
+        What the tyre may be.
+    wheel : WheelModel
+        What the wheel is told to be.
+    rolling_resistance : float
+        [-].
+    wheel_noise, speed_noise : float
+        Least variance of a sample of wheel speed [rad^2/s^2] and of vehicle speed [m^2/s^2].
+    torque_noise_nm : float
+        Standard deviation of a sample of the torque [N m].
+    speed_bias_m_s : float
+        Standard deviation of a constant error of the sliding speed [m/s].
+    """
+
+    theta: Array
+    known: Priors
+    tyres: Hypotheses
+    wheel: WheelModel
+    rolling_resistance: float
+    wheel_noise: float
+    speed_noise: float
+    torque_noise_nm: float
+    speed_bias_m_s: float
+
+
+def setup(
+    wheel: WheelModel,
+    rolling_resistance: float,
+    sliding_speed_noise_m_s: float,
+    torque_noise_nm: float,
+    tolerance: ElasticModel,
+    class_theta: tuple[float, ...],
+) -> RobustSetup:
+    """The set-up of a wheel; the told noise of the sliding speed [m/s] is shared evenly by its two sensors."""
+    told = replace(
+        TYRES[TOLD],
+        slip_offset=max(tolerance.ratio, LEAST_TOLERANCE),
+        softness=max(tolerance.compliance, LEAST_TOLERANCE),
+    )
+    theta, half = cells(), 0.5 * sliding_speed_noise_m_s**2
+    return RobustSetup(
+        theta,
+        priors(theta, class_theta),
+        hypotheses((told, *TYRES[TOLD + 1 :])),
+        wheel,
+        rolling_resistance,
+        half / wheel.radius_m**2,
+        half,
+        torque_noise_nm,
+        tolerance.speed_bias_m_s,
+    )
+
+
+@dataclass(frozen=True)
+class RobustState:
+    """What the robust estimator remembers.
+
+    Attributes
+    ----------
+    belief : Belief
+        About road and tyre.
+    said : Interval
+        What it says of the road.
+    memory : ClassUnderWheel
+        What the camera has said.
+    filling, before : Filling, Means or None
+        The block that fills, and the one before it.
+    friction : float
+        Used friction that was read last, 0 before any [-].
+    slowness_s_m : float
+        One over the speed of the last reading, 0 before any [s/m].
+    way_m : float
+        Way since the last block was full [m].
+    wheel_noise, speed_noise : Noise
+        Of the readings.
+    unread_m : float
+        Way since the observer last read the road [m].
+    stale : bool
+        Whether the camera has since found another road.
+    """
+
+    belief: Belief
+    said: Interval
+    memory: ClassUnderWheel
+    filling: Filling
+    before: Means | None
+    friction: float
+    slowness_s_m: float
+    way_m: float
+    wheel_noise: Noise
+    speed_noise: Noise
+    unread_m: float
+    stale: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """The state as JSON-able values, exact."""
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        values["belief"] = {f.name: getattr(self.belief, f.name).tolist() for f in fields(Belief)}
+        return values
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> RobustState:
+        """The state that `to_json` wrote."""
+        before = data["before"]
+        return cls(
+            Belief(**{name: np.array(values) for name, values in data["belief"].items()}),
+            Interval(*data["said"]),
+            ClassUnderWheel(*data["memory"]),
+            Filling(*data["filling"]),
+            None if before is None else Means(*before),
+            data["friction"],
+            data["slowness_s_m"],
+            data["way_m"],
+            Noise(*data["wheel_noise"]),
+            Noise(*data["speed_noise"]),
+            data["unread_m"],
+            data["stale"],
+        )
+
+
+def begun(known: RobustSetup) -> RobustState:
+    """The state before anything was read."""
+    belief = unread(known.tyres, known.known.none)
+    return RobustState(
+        belief,
+        interval(belief, known.theta),
+        ClassUnderWheel(),
+        Filling(),
+        None,
+        0.0,
+        0.0,
+        0.0,
+        Noise(known.wheel_noise),
+        Noise(known.speed_noise),
+        unread_m=0.0,
+        stale=True,
+    )
+
+
+class Sample(NamedTuple):
+    """Readings of a step."""
+
+    wheel_speed_rad_s: float
+    wheel_torque_nm: float
+    vehicle_speed_m_s: float
+    load_n: float
+
+
+def stepped(
+    state: RobustState,
+    known: RobustSetup,
+    sample: Sample | None,
+    given: int,
+    step_s: float,
+    way_m: float,
+    observed: bool,
+) -> RobustState:
+    """The state after a step.
+
+    Parameters
+    ----------
+    state, known
+        Before, and the set-up.
+    sample : Sample or None
+        Readings; None where they are unusable.
+    given : int
+        Class that the camera gives the road under the wheel, or `roads.NONE`.
+    step_s, way_m : float
+        Step [s] and way over it [m].
+    observed : bool
+        Whether the observer reads the road in this step.
+    """
+    unread_m, stale = (0.0, False) if observed else (state.unread_m + way_m, state.stale)
+    way_m += state.way_m
+    if sample is None:
+        filled = Filling(duration_s=state.filling.duration_s + step_s)
+        state = replace(state, filling=filled, before=None, way_m=way_m, unread_m=unread_m, stale=stale)
+        if filled.duration_s < BLOCK_S:
+            return state
+        return _on_road(state, known, None, given, filled.duration_s)
+    wheel_noise, speed_noise = state.wheel_noise, state.speed_noise
+    new = wheel_noise.values == 0 or sample.wheel_speed_rad_s != wheel_noise.before
+    wheel_noise = heard(wheel_noise, sample.wheel_speed_rad_s, step_s, known.wheel_noise)
+    speed_noise = heard(speed_noise, sample.vehicle_speed_m_s, step_s, known.speed_noise)
+    old = state.filling
+    filling = Filling(
+        old.wheel_speed + step_s * sample.wheel_speed_rad_s,
+        old.wheel_torque + step_s * sample.wheel_torque_nm,
+        old.vehicle_speed + step_s * sample.vehicle_speed_m_s,
+        old.load + step_s * sample.load_n,
+        old.duration_s + step_s,
+        old.samples + new,
+    )
+    state = replace(
+        state,
+        filling=filling,
+        way_m=way_m,
+        wheel_noise=wheel_noise,
+        speed_noise=speed_noise,
+        unread_m=unread_m,
+        stale=stale,
+    )
+    if filling.duration_s < BLOCK_S:
+        return state
+    return _on_road(state, known, means_of(filling), given, filling.duration_s)
+
+
+def _on_road(
+    state: RobustState,
+    known: RobustSetup,
+    means: Means | None,
+    given: int,
+    duration_s: float,
+) -> RobustState:
+    """The state after a block, with its means where it has any."""
+    memory, changed, stood = advanced(state.memory, given, state.way_m)
+    now, friction, slowness, slip_drift = None, 0.0, state.slowness_s_m, 0.0
+    if means is not None and state.before is not None:
+        wheel = known.wheel
+        now = reading(
+            state.before,
+            means,
+            state.friction,
+            wheel.inertia_kg_m2,
+            wheel.radius_m,
+            known.rolling_resistance,
+        )
+        friction = now.friction
+        if shows(now):
+            # A constant error of the speed is another slip at another speed.
+            slowness = 1.0 / now.speed_m_s
+            slip_drift = (
+                known.speed_bias_m_s**2
+                * abs(slowness - state.slowness_s_m)
+                * max(slowness, state.slowness_s_m)
+            )
+        else:
+            now = None
+    belief = driven(
+        state.belief, known.tyres, prior_of(memory, given, known.known), changed, duration_s, slip_drift
+    )
+    if now is not None:
+        belief = read(
+            belief,
+            known.tyres,
+            known.theta,
+            now,
+            known.wheel,
+            state.wheel_noise.variance,
+            state.speed_noise.variance,
+            known.torque_noise_nm,
+        )
+    return replace(
+        state,
+        belief=belief,
+        said=interval(belief, known.theta),
+        memory=memory,
+        filling=Filling(),
+        before=means,
+        friction=friction,
+        slowness_s_m=slowness,
+        way_m=0.0,
+        # What the observer reads on the class's own road is not undone by it.
+        stale=state.stale or (stood and state.unread_m > STOOD_M),
+    )
+
+
+def point(state: RobustState, observer: float) -> tuple[float, float]:
+    """TRPAC and its standard deviation, with the observer's theta_hat [-]."""
+    said = state.said
+    believed = min(max((told_formula(state.belief) - DOUBTED) / (BELIEVED - DOUBTED), 0.0), 1.0)
+    share = 0.0 if state.stale else believed
+    theta = min(max(share * observer + (1.0 - share) * said.mean, said.clip), said.unmoved_high)
+    off, scale = said.mean - theta, SCALE_DEVIATION * said.mean
+    return theta, (said.std * said.std + off * off + scale * scale) ** 0.5
