@@ -14,7 +14,7 @@ from joblib import Parallel, delayed
 from scenarios.camera.disturbances import NONE, PAPER, disturb
 from scenarios.camera.files import load_camera
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
 from scenarios.plant.pipeline import PlantTrajectory
@@ -22,7 +22,7 @@ from scenarios.plant.pipeline import PlantTrajectory
 WORKERS = 2
 """Processes that render: each holds one world of some 100 MB."""
 DISTURBANCES = {"none": NONE, "paper": PAPER}
-LOOK_STREAM = 101
+SCENE_STREAM = 101
 """Keeps the scenario's world apart from the streams of its sensors and disturbances."""
 
 
@@ -36,20 +36,20 @@ class PictureJob:
     folder: Path
 
 
-def scene(scenario: Scenario) -> Renderer:
+def scene_renderer(scenario: Scenario) -> Renderer:
     """The scenario's world; the same seed gives the same one. Raises ScenarioError where there is no camera."""
     if scenario.camera_path is None:
         raise ScenarioError(
             f"{scenario.path}: camera: missing; expected a camera file, to draw pictures through."
         )
     segments = [SurfaceSegment(s.start_m, s.surface_class) for s in scenario.road.segments]
-    look = SceneLook.random(np.random.default_rng([scenario.seed, LOOK_STREAM]))
-    return Renderer(load_camera(scenario.camera_path), segments, look)
+    scene = Scene.random(np.random.default_rng([scenario.seed, SCENE_STREAM]))
+    return Renderer(load_camera(scenario.camera_path), segments, scene)
 
 
 def draw(job: PictureJob) -> int:
     """Draw one job's frames; returns how many."""
-    renderer, pictures = scene(job.scenario), job.scenario.pictures
+    renderer, pictures = scene_renderer(job.scenario), job.scenario.pictures
     quality = [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality]
     for number, position_m in job.frames:
         image = renderer.frame(position_m).image
@@ -99,7 +99,7 @@ def record(
     rows = np.arange(0, len(trajectory), frame_steps(scenario))
     front_axle_m = trajectory.position_m[rows] + scenario.vehicle.to_core().cog_to_front_axle_m
     folder.mkdir(parents=True, exist_ok=True)
-    frames = [(number, float(place)) for number, place in enumerate(front_axle_m, start=1)]
+    frames = [(number, float(axle_m)) for number, axle_m in enumerate(front_axle_m, start=1)]
     batch = max(1, -(-len(frames) // (4 * WORKERS)))
     jobs = [PictureJob(scenario, tuple(frames[i : i + batch]), folder) for i in range(0, len(frames), batch)]
     done = 0

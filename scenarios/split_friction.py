@@ -23,7 +23,7 @@ import pandas as pd
 from fmpy.fmi2 import FMU2Slave
 
 from scenarios.camera.files import load_camera
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.camera.split import SplitRenderer
 from scenarios.files import load_road, load_vehicle
 from scenarios.fmu_client.archives import UnitFileError
@@ -178,8 +178,8 @@ def _measured(plant: Unit, torques: list[float], rng: np.random.Generator) -> di
 def _world(road: Path, seed: int) -> SplitRenderer:
     segments = load_road(road).segments
     left, right = ([SurfaceSegment(s.start_m, s.surface_classes[side]) for s in segments] for side in (0, 1))
-    look = SceneLook(seed=seed, sky="overcast", sun_share=0.0, trees_per_100_m=0.0, bridges_per_100_m=0.0)
-    return SplitRenderer(load_camera(CAMERA), _joined(left), _joined(right), look)
+    scene = Scene(seed=seed, sky="overcast", sun_share=0.0, trees_per_100_m=0.0, bridges_per_100_m=0.0)
+    return SplitRenderer(load_camera(CAMERA), _joined(left), _joined(right), scene)
 
 
 def _joined(segments: list[SurfaceSegment]) -> list[SurfaceSegment]:

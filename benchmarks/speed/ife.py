@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision import ife as ife_module
 from trpac_core.vision import region as region_module
 from trpac_core.vision.camera import Camera
@@ -86,7 +86,7 @@ def main() -> None:
 
     segmenter = Segmenter(options.models / "segmenter.onnx", options.threads)
     classifier = SurfaceClassifier(options.models / "surface.onnx", options.threads)
-    renderer = Renderer(Camera(), [SurfaceSegment(0.0, Surface.WET)], SceneLook(seed=1))
+    renderer = Renderer(Camera(), [SurfaceSegment(0.0, Surface.WET)], Scene(seed=1))
     pictures = [renderer.frame(float(position)).image for position in range(0, 50, 10)]
     jpeg = cv2.imencode(".jpg", pictures[0])[1].tobytes()
 

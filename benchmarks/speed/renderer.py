@@ -8,7 +8,7 @@ import numpy as np
 
 from scenarios.camera.disturbances import PAPER, disturb
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 
@@ -34,13 +34,13 @@ def main():
         camera = Camera().scaled(factor)
         size = f"{camera.width_px}x{camera.height_px}"
         for surface in Surface:
-            renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], SceneLook())
+            renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], Scene())
             times = cpu_ms(lambda i, renderer=renderer: renderer.frame(2.0 * i))
             print(f"{size + ' frame, ' + surface.label:34} {times[0]:8.1f} {times[1]:8.1f}")
-        looks = [SceneLook.random(np.random.default_rng(seed)) for seed in range(FRAMES)]
+        looks = [Scene.random(np.random.default_rng(seed)) for seed in range(FRAMES)]
         times = cpu_ms(lambda i, camera=camera, looks=looks: Renderer(camera, segments, looks[i]))
         print(f"{size + ' new world':34} {times[0]:8.1f} {times[1]:8.1f}")
-        image = Renderer(camera, segments, SceneLook()).frame(0.0).image
+        image = Renderer(camera, segments, Scene()).frame(0.0).image
         times = cpu_ms(lambda i, image=image: disturb(image, PAPER, i))
         print(f"{size + ' disturbance':34} {times[0]:8.1f} {times[1]:8.1f}")
 

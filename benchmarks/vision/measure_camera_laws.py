@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.camera.disturbances import DISPLAY_GAMMA
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
@@ -64,7 +64,7 @@ def main() -> None:
     found: dict[tuple[str, float], list[tuple[float, bool, Surface]]] = {}
     for world in range(arguments.worlds):
         for surface in Surface:
-            look = SceneLook.random(np.random.default_rng([world, int(surface), 77]), surface)
+            look = Scene.random(np.random.default_rng([world, int(surface), 77]), surface)
             renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], look)
             for key, image in disturbed(renderer, 30.0):
                 _, result = ife.process(IfeState(), image, Motion(15.0))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from models.training.rendered import random_camera
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
@@ -62,7 +62,7 @@ def road(rng: np.random.Generator, pitch_rad: float | None = None, **look: float
     camera = random_camera(rng, SCALE)
     camera = camera if pitch_rad is None else replace(camera, pitch_rad=pitch_rad)
     surface = Surface(int(rng.integers(3)))
-    drawn = replace(SceneLook.random(rng, surface), **look)  # type: ignore[arg-type]
+    drawn = replace(Scene.random(rng, surface), **look)  # type: ignore[arg-type]
     return Renderer(camera, [SurfaceSegment(0.0, surface)], drawn).frame(0.0).image
 
 

@@ -12,7 +12,7 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 
 from .renderer import Renderer
-from .scene import SceneLook, SurfaceSegment
+from .scene import Scene, SurfaceSegment
 
 SHADOW_TINT = np.array([0, 0, 128], dtype=np.uint8)
 
@@ -25,7 +25,7 @@ def contact_sheet(seed: int, columns: int, rows_per_surface: int, labels: bool) 
     for surface in [surface for surface in Surface for _ in range(rows_per_surface)]:
         pictures = []
         for _ in range(columns):
-            renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], SceneLook.random(rng, surface))
+            renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], Scene.random(rng, surface))
             frame = renderer.frame(rng.uniform(0.0, 200.0), rng.normal(0.0, 0.3), rng.normal(0.0, 0.02))
             picture = frame.image
             if labels:

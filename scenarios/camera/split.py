@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from trpac_core.vision.camera import Camera
 
 from .renderer import Renderer, ground_beside
-from .scene import RenderedFrame, SceneLook, SurfaceSegment
+from .scene import RenderedFrame, Scene, SurfaceSegment
 
 
 class _Side(Renderer):
@@ -36,9 +36,9 @@ class SplitRenderer:
         camera: Camera,
         left: Sequence[SurfaceSegment],
         right: Sequence[SurfaceSegment],
-        look: SceneLook,
+        scene: Scene,
     ) -> None:
-        self._left, self._right = _Side(camera, left, look), _Side(camera, right, look)
+        self._left, self._right = _Side(camera, left, scene), _Side(camera, right, scene)
         self._left.other, self._right.other = self._right, self._left
         self._on_left = ground_beside(camera) > 0.0
 

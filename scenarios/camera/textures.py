@@ -81,9 +81,9 @@ def _spectrum_noise(
     return (noise / noise.std()).astype(np.float32)
 
 
-def _to_bytes(noise: Float, spread: float = 42.0) -> Texture:
-    """Normalised noise as bytes around 127.5, ``spread`` per standard deviation."""
-    return np.clip(127.5 + spread * noise, 0, 255).astype(np.uint8)
+def _to_bytes(noise: Float, bytes_per_deviation: float = 42.0) -> Texture:
+    """Normalised noise as bytes around 127.5, ``bytes_per_deviation`` per standard deviation."""
+    return np.clip(127.5 + bytes_per_deviation * noise, 0, 255).astype(np.uint8)
 
 
 def _cracks(rng: np.random.Generator, shape: tuple[int, int]) -> Texture:
@@ -91,7 +91,7 @@ def _cracks(rng: np.random.Generator, shape: tuple[int, int]) -> Texture:
     along, across = shape
     canvas = np.zeros((along * 2, across * 2), dtype=np.uint8)
 
-    def wander(start: NDArray[np.float64], heading: float, steps: int, turn: float) -> None:
+    def draw_crack(start: NDArray[np.float64], heading: float, steps: int, turn: float) -> None:
         points = [start]
         for _ in range(steps):
             heading += rng.normal(0.0, turn)
@@ -103,13 +103,13 @@ def _cracks(rng: np.random.Generator, shape: tuple[int, int]) -> Texture:
                 cv2.polylines(canvas, [shifted], False, int(rng.integers(120, 256)), 1, cv2.LINE_AA)
 
     for _ in range(5):
-        wander(rng.uniform((0, 0), shape), rng.normal(0.0, 0.15), 150, 0.18)
+        draw_crack(rng.uniform((0, 0), shape), rng.normal(0.0, 0.15), 150, 0.18)
     for _ in range(7):
-        wander(rng.uniform((0, 0), shape), np.pi / 2 + rng.normal(0.0, 0.2), 60, 0.25)
+        draw_crack(rng.uniform((0, 0), shape), np.pi / 2 + rng.normal(0.0, 0.2), 60, 0.25)
     for _ in range(12):
         centre = rng.uniform((0, 0), shape)
         for _ in range(10):
-            wander(centre + rng.normal(0.0, 40.0, 2), rng.uniform(0, 2 * np.pi), 10, 0.6)
+            draw_crack(centre + rng.normal(0.0, 40.0, 2), rng.uniform(0, 2 * np.pi), 10, 0.6)
     top, left = along // 2, across // 2
     return canvas[top : top + along, left : left + across]
 

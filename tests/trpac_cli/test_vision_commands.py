@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from scenarios import overlay_video, stills
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.library import networks_folder
 from scenarios.stills import CLASSIFY_COLUMNS, StillNetworks, patch_logs
 from scenarios.vision_runs import FRAME_COLUMNS, Frames, run_frames
@@ -44,7 +44,7 @@ BROKEN = b"\xff\xd8\xff\xe0 not a picture"
 
 
 def road(*segments):
-    return Renderer(SMALL, [SurfaceSegment(at, surface) for at, surface in segments], SceneLook(seed=4))
+    return Renderer(SMALL, [SurfaceSegment(at, surface) for at, surface in segments], Scene(seed=4))
 
 
 @pytest.fixture(scope="module")
