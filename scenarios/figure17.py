@@ -93,11 +93,11 @@ def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray) -> None:
     axis.plot(time, table["theta_true"], color=TRUTH, lw=2.2, label="true TRPAC")
     for name, column in ESTIMATORS.items():
         axis.plot(time, table[column], color=COLOURS[name], lw=WIDTHS[name], label=name)
-    spread = 2.0 * table["TRPAC_std"]
+    two_std = 2.0 * table["TRPAC_std"]
     axis.fill_between(
         time,
-        table["TRPAC"] - spread,
-        table["TRPAC"] + spread,
+        table["TRPAC"] - two_std,
+        table["TRPAC"] + two_std,
         color=COLOURS["DIFE"],
         alpha=0.10,
         lw=0,

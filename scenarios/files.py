@@ -36,7 +36,7 @@ Inertia = Annotated[float, Field(ge=1e-4, le=1e6)]
 PeakTorque = Annotated[float, Field(ge=0.01, le=1e6)]
 Torque = Annotated[float, Field(ge=-1e6, le=1e6)]
 Stiffness = Annotated[float, Field(ge=100.0, le=1e9)]
-Place = Annotated[float, Field(ge=-1e7, le=1e7)]
+Position = Annotated[float, Field(ge=-1e7, le=1e7)]
 Time = Annotated[float, Field(ge=0.0, le=1e5)]
 Duration = Annotated[float, Field(ge=1e-3, le=1e5)]
 Noise = Annotated[float, Field(ge=0.0, le=1e5)]
@@ -133,7 +133,7 @@ class VehicleFile(_FileModel):
 class RoadSegment(_FileModel):
     """One stretch of road; it holds to the next one's start. Its sides may have other surfaces than `surface`."""
 
-    start_m: Place
+    start_m: Position
     mu_left: Friction
     mu_right: Friction
     surface: SurfaceName

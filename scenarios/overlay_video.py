@@ -13,7 +13,7 @@ from scenarios.vision_overlay import annotate
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.results import FrameResult
 
-CANVAS_PX, FILM_PX, STRIP_TILE_PX = 1920, 960, 480
+CANVAS_PX, VIDEO_PX, STRIP_TILE_PX = 1920, 960, 480
 STRIP_TILES, STRIP_COLUMNS = 12, 3
 
 
@@ -32,7 +32,7 @@ def shown(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArra
         )
         lines_px = factor * result.view.lines_px
         result = replace(result, view=replace(result.view, groups=groups, lines_px=lines_px))
-    return _at_width(annotate(image, result, caption), FILM_PX)
+    return _at_width(annotate(image, result, caption), VIDEO_PX)
 
 
 def _at_width(image: NDArray[np.uint8], width_px: int) -> NDArray[np.uint8]:
@@ -58,12 +58,12 @@ def dark(size: tuple[int, int], caption: str) -> NDArray[np.uint8]:
     return shown
 
 
-class Film:
+class OverlayVideo:
     """annotated.mp4, begun with the first frame; every frame is fitted to the camera's shape."""
 
     def __init__(self, path: Path, camera: Camera, fps: float) -> None:
         self._path, self._fps = path, fps
-        self.size = (FILM_PX, even_height(FILM_PX, camera.width_px, camera.height_px))
+        self.size = (VIDEO_PX, even_height(VIDEO_PX, camera.width_px, camera.height_px))
         self._writer: cv2.VideoWriter | None = None
         self._count = 0
 
@@ -109,8 +109,8 @@ class Strip:
 
     def write(self, path: Path) -> None:
         """Write the sheet; raises OSError."""
-        places = np.linspace(0, len(self._tiles) - 1, min(STRIP_TILES, len(self._tiles))).round().astype(int)
-        tiles = [self._tiles[place] for place in places]
+        chosen = np.linspace(0, len(self._tiles) - 1, min(STRIP_TILES, len(self._tiles))).round().astype(int)
+        tiles = [self._tiles[place] for place in chosen]
         height = max(tile.shape[0] for tile in tiles)
         columns = min(STRIP_COLUMNS, len(tiles))
         sheet = np.full((-(-len(tiles) // columns) * height, columns * STRIP_TILE_PX, 3), 40, dtype=np.uint8)

@@ -25,7 +25,7 @@ Columns = dict[str, NDArray]
 
 NORMAL_CONFIDENCE = 0.95
 """Median Q_v of undisturbed pictures: 0.97 of our networks on rendered roads, a little less for a real one [-]."""
-CONFIDENCE_SPREAD = 0.8
+CONFIDENCE_DEVIATION = 0.8
 """Standard deviation of the confidence's logit; with the median above 90 % of the pictures lie above 0.86 [-]."""
 CONFIDENCE_MEMORY_S = 0.15
 """Time over which the confidence forgets itself: neighbouring pictures show much the same road [s]."""
@@ -109,7 +109,9 @@ def plain_frames(
         stamp_camera_m=camera_m,
         stamped_m=ahead,
         seen_m=ahead,
-        confidence=expit(logit(NORMAL_CONFIDENCE) + CONFIDENCE_SPREAD * _wandering(len(time_s), fps, random)),
+        confidence=expit(
+            logit(NORMAL_CONFIDENCE) + CONFIDENCE_DEVIATION * _autoregression(len(time_s), fps, random)
+        ),
         wrong_share=np.full(len(time_s), WRONG_SHARE),
         camera_height_m=camera.height_m,
         class_friction=np.array([CLASS_THETA[s] for s in Surface]),
@@ -125,7 +127,7 @@ def surfaces_at(road: RoadFile, position_m: Array) -> NDArray[np.intp]:
     return classes[np.searchsorted(starts, position_m, side="right")]
 
 
-def _wandering(count: int, fps: float, random: np.random.Generator) -> Array:
+def _autoregression(count: int, fps: float, random: np.random.Generator) -> Array:
     """A first-order autoregression of unit variance."""
     from scipy.signal import lfilter  # here, since its import is slow
 

@@ -12,7 +12,7 @@ TEMPLATE = Path(__file__).with_name("report.html.jinja")
 DASH = "–"
 
 
-def write_report(run: Run, figure: Path, looks: Path | None, path: Path) -> None:
+def write_report(run: Run, figure: Path, overlay: Path | None, path: Path) -> None:
     """Write the report of a run around its figure and, where there was a camera, its sheet of pictures."""
     text = page(
         TEMPLATE,
@@ -20,9 +20,9 @@ def write_report(run: Run, figure: Path, looks: Path | None, path: Path) -> None
         run=run,
         summary=run.summary,
         rows=score_rows(run.summary),
-        verdict=verdict(run.summary),
+        conclusion=conclusion(run.summary),
         figure=data_address(figure.read_bytes()),
-        looks=data_address(looks.read_bytes(), "image/jpeg") if looks is not None else None,
+        overlay=data_address(overlay.read_bytes(), "image/jpeg") if overlay is not None else None,
     )
     path.write_text(text, encoding="utf-8")
 
@@ -34,7 +34,7 @@ def score_rows(summary: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     return [(name, estimators[name][i]) for i in range(stretches) for name in estimators]
 
 
-def verdict(summary: dict[str, Any]) -> str:
+def conclusion(summary: dict[str, Any]) -> str:
     """What the run showed, in sentences that follow from its numbers."""
     sentences = []
     for before, (dife, alone) in _steps(summary):

@@ -228,8 +228,8 @@ def main() -> int:
     )
     for option, name in (("--plant", PLANT), ("--estimator", ESTIMATOR)):
         file = Path("dist") / f"{name}.fmu"
-        told = f"unit that build_fmu.py --slave {name} makes (default: %(default)s)"
-        parser.add_argument(option, type=Path, default=file, help=told)
+        text = f"unit that build_fmu.py --slave {name} makes (default: %(default)s)"
+        parser.add_argument(option, type=Path, default=file, help=text)
     parser.add_argument(
         "--out", type=Path, default=Path("out/split_friction"), help="folder (default: %(default)s)"
     )

@@ -44,7 +44,7 @@ LEAST_USABLE = 0.7
 """Share of a look that must be road out of the shadow [-]."""
 LEAST_ROAD = 0.05
 """Probability of readable road that at least one look must have: the lowest of validation stills was 0.08 [-]."""
-LEAST_LOOKS = 2
+LEAST_CROPS = 2
 """With fewer looks at usable road, all are taken."""
 _LEAST_PROBABILITY = 1e-12
 
@@ -138,27 +138,28 @@ def patch_logs(
     Raises ImageError where the lower centre shows nothing at all, or nothing that could be read: a covered, blinded or
     dark camera, a picture without road.
     """
-    boxes = _looks(image.shape[1], image.shape[0])
+    boxes = _crops(image.shape[1], image.shape[0])
     patches = np.stack([cut_box(image, box) for box in boxes])
     contrast = patches.std(axis=(1, 2)).max(axis=1) >= LEAST_CONTRAST
     if not contrast.any():
         raise ImageError(
             f"{name}: one even colour where the road should be. Is the lens covered, or the picture dark?"
         )
-    verdicts = classifier.verdicts(patches, scene_of(image))
-    if verdicts.readable[contrast].max() < LEAST_ROAD:
+    judged = classifier.verdicts(patches, scene_of(image))
+    if judged.readable[contrast].max() < LEAST_ROAD:
         raise ImageError(
             f"{name}: no road that could be read where it should be, the lower centre. Is it a picture of a road, in "
             "focus and lit?"
         )
     usable = usable_road(masks, remove_shadow=True)
     share = road_shares(np.array(boxes), usable, image.shape[1], image.shape[0])
-    readable = contrast & (verdicts.readable >= LEAST_READABLE)
+    readable = contrast & (judged.readable >= LEAST_READABLE)
     on_road = readable & (share >= LEAST_USABLE)
     best = next(
-        (looks for looks, least in ((on_road, LEAST_LOOKS), (readable, 1)) if looks.sum() >= least), contrast
+        (chosen for chosen, least in ((on_road, LEAST_CROPS), (readable, 1)) if chosen.sum() >= least),
+        contrast,
     )
-    probabilities = calibrated_probabilities(verdicts.logits[best], classifier.temperature)
+    probabilities = calibrated_probabilities(judged.logits[best], classifier.temperature)
     return np.asarray(np.log(np.maximum(probabilities, _LEAST_PROBABILITY)).mean(axis=0))
 
 
@@ -192,7 +193,7 @@ class StillNetworks:
         return calibrated_probabilities(both[None], 1.0)[0]
 
 
-def _looks(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:
+def _crops(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:
     """The wide look, the lower centre and its four parts: left, top, right, bottom of each [px]."""
     left, top, right, bottom = LOWER_CENTRE
     columns, rows = PART * (right - left), PART * (bottom - top)

@@ -63,21 +63,21 @@ def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
     texts: list[str] = []
     every = error.errors(include_url=False)
     for item in every[:MOST_PROBLEMS]:
-        place, known = _place(model, item["loc"])
+        path, known = _location(model, item["loc"])
         if item["type"] == "extra_forbidden":
-            texts.append(f"{place}: unknown key; {suggestion(quoted(item['loc'][-1]), known)}")
+            texts.append(f"{path}: unknown key; {suggestion(quoted(item['loc'][-1]), known)}")
         elif item["type"] == "missing":
-            texts.append(f"{place}: missing; expected this key.")
+            texts.append(f"{path}: missing; expected this key.")
         elif item["type"] == "value_error":
-            prefix = f"{place}: " if place else ""
+            prefix = f"{path}: " if path else ""
             texts.extend(prefix + line for line in str(item["ctx"]["error"]).splitlines())
         else:
             texts.append(
-                f"{place or 'file'}: is {_shown(item['input'])}; {item['msg'][0].lower()}{item['msg'][1:]}."
+                f"{path or 'file'}: is {_shown(item['input'])}; {item['msg'][0].lower()}{item['msg'][1:]}."
             )
-    told = [quoted(text, LONGEST_PROBLEM) for text in texts[:MOST_PROBLEMS]]
-    more = len(texts) + len(every[MOST_PROBLEMS:]) - len(told)
-    return [*told, f"and {more} more problems."] if more else told
+    named = [quoted(text, LONGEST_PROBLEM) for text in texts[:MOST_PROBLEMS]]
+    more = len(texts) + len(every[MOST_PROBLEMS:]) - len(named)
+    return [*named, f"and {more} more problems."] if more else named
 
 
 def _shown(value: Any) -> str:
@@ -87,26 +87,26 @@ def _shown(value: Any) -> str:
     return quoted(repr(value))
 
 
-def _place(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
+def _location(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
     """Where in the file a problem is, and the keys that are known there.
 
     Among the keys pydantic names the type that it tried, where there are several: those are left out.
     """
-    place, known = "", list(_fields([model]))
+    path, known = "", list(_fields([model]))
     types: list[type] = [model]
     for key in location:
         if isinstance(key, int):
-            place += f"[{key}]"
+            path += f"[{key}]"
             continue
         fields = _fields(types)
         tried = [t for t in types if re.search(rf"\b{re.escape(t.__name__)}\b", key)]
         if key not in fields and len(types) > 1 and tried:
             types = tried
             continue
-        place += f".{key}"
+        path += f".{key}"
         known = list(fields)
         types = _types(fields[key]) if key in fields else types
-    return quoted(place.lstrip(".")), known
+    return quoted(path.lstrip(".")), known
 
 
 def _fields(types: Iterable[type]) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
         if np.isfinite(line).all():
             left, right = np.round(line).astype(np.int32).tolist()
             cv2.line(shown, left, right, LINE_BGR, NEAR_LINE_PX, cv2.LINE_AA)
-    verdict = (
+    found = (
         f"{result.surface.label}  Q_v {result.Q_v:.2f} (p_util {result.p_util:.2f}, P {result.P_fusion:.2f})"
         f"  flag {int(result.flag)}"
     )
@@ -81,13 +81,13 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
     cv2.rectangle(shown, (0, 0), (14, 150), CLASS_BGR[result.surface], cv2.FILLED)
     if not result.flag:
         cv2.rectangle(shown, (0, 138), (shown.shape[1], 150), FLAG_DOWN_BGR, cv2.FILLED)
-    for row, text in enumerate((caption, verdict)):
+    for row, text in enumerate((caption, found)):
         place = (24, 60 + 64 * row)
         cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 4, cv2.LINE_AA)
     return shown
 
 
-def draw_looks(
+def draw_overlay_sheet(
     run: Run, path: Path, progress: Callable[[int, int], None] = lambda done, total: None, count: int = 6
 ) -> None:
     """Write a sheet of the run's pictures, evenly spread, as the estimator saw them.

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.library import networks_folder
-from scenarios.overlay_video import Film, Strip, dark, shown
+from scenarios.overlay_video import OverlayVideo, Strip, dark, shown
 from scenarios.stills import PICTURE_ENDINGS, Progress, cell_of, pictures_in, silent
 from scenarios.whole_files import written_whole
 from trpac_core.files import FileError, file_sha256, quoted, require_file
@@ -52,7 +52,7 @@ MOST_VIDEO_BYTES = 100_000_000_000
 LOWEST_FPS, HIGHEST_FPS = 0.01, 1000.0
 FASTEST_M_S = 150.0
 PACKAGES = ("numpy", "onnxruntime", "opencv-python-headless", "trpac-fmu")
-WRITTEN = FRAMES_CSV, SUMMARY, FILM, STRIP = "frames.csv", "summary.json", "annotated.mp4", "strip.jpg"
+WRITTEN = FRAMES_CSV, SUMMARY, VIDEO, STRIP = "frames.csv", "summary.json", "annotated.mp4", "strip.jpg"
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def run_frames(
         Segmenter(networks_folder() / "segmenter.onnx"),
         SurfaceClassifier(networks_folder() / "surface.onnx"),
     )
-    watcher = _Watcher(
+    estimators = _Estimators(
         segmenter,
         Ife(IfeConfig(camera=camera), segmenter, classifier),
         Voting(VotingConfig(camera=camera), segmenter, classifier),
@@ -189,28 +189,28 @@ def run_frames(
         Motion(speed_m_s),
     )
     with written_whole(out) as scratch:
-        film, strip = Film(scratch / FILM, camera, fps), Strip()
+        video, strip = OverlayVideo(scratch / VIDEO, camera, fps), Strip()
         rows, unreadable = [], []
         for number, (name, image) in enumerate(frames):
             caption = f"{name}  {number / fps:.2f} s"
             try:
-                row, shown = watcher.look(number, name, image, caption)
+                row, shown = estimators.process(number, name, image, caption)
             except ImageError as error:
                 unreadable.append({"frame": name, "reason": str(error)})
-                row, shown = (name, "", None, None, None, 0, "", None), dark(film.size, caption)
+                row, shown = (name, "", None, None, None, 0, "", None), dark(video.size, caption)
             rows.append(row)
-            film.add(shown)
+            video.add(shown)
             strip.add(shown)
             progress(number + 1, max(frames.count, number + 1))
         table = pd.DataFrame(rows, columns=list(FRAME_COLUMNS))
         if len(unreadable) == len(rows):
             raise ScenarioError(_nothing_usable(frames, unreadable))
-        summary = _summary(table, unreadable, frames, camera_file, speed_m_s, fps, film.finish())
+        summary = _summary(table, unreadable, frames, camera_file, speed_m_s, fps, video.finish())
         strip.write(scratch / STRIP)
         table.to_csv(scratch / FRAMES_CSV, index=False, float_format="%.6g")
         (scratch / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        if not (scratch / FILM).exists():
-            (out / FILM).unlink(missing_ok=True)  # of an earlier run
+        if not (scratch / VIDEO).exists():
+            (out / VIDEO).unlink(missing_ok=True)  # of an earlier run
     return Drive(table, summary, out)
 
 
@@ -234,7 +234,7 @@ def _nothing_usable(frames: Frames, unreadable: Sequence[dict[str, str]]) -> str
     )
 
 
-class _Watcher:
+class _Estimators:
     """Both estimators over successive frames; the memory of the image estimator lies here."""
 
     def __init__(self, segmenter: Segmenter, ife: Ife, voting: Voting, step_m: float, motion: Motion) -> None:
@@ -242,7 +242,7 @@ class _Watcher:
         self._step_m, self._motion = step_m, motion
         self._state = IfeState()
 
-    def look(
+    def process(
         self, number: int, name: str, image: NDArray[np.uint8] | ImageError, caption: str
     ) -> tuple[tuple[Any, ...], NDArray[np.uint8]]:
         """Row of the table and annotated picture; raises ImageError, and then nothing is remembered."""
@@ -259,8 +259,8 @@ class _Watcher:
         vote = self._voting.process(self._state.frame_count, image, masks=masks)
         self._state = after
         voted = "" if vote.surface is None else vote.surface.label
-        verdict = (result.surface.label, result.P_fusion, result.p_util, result.Q_v, int(result.flag))
-        return (name, *verdict, voted, ms), shown(image, result, f"{caption}  voting: {voted or 'no road'}")
+        found = (result.surface.label, result.P_fusion, result.p_util, result.Q_v, int(result.flag))
+        return (name, *found, voted, ms), shown(image, result, f"{caption}  voting: {voted or 'no road'}")
 
 
 def _summary(
@@ -270,7 +270,7 @@ def _summary(
     camera_file: Path,
     speed_m_s: float,
     fps: float,
-    film: bool,
+    video: bool,
 ) -> dict[str, Any]:
     """What a run found, and what is needed to repeat it; shares are of the frames that could be used."""
     seen = table[table["class"] != ""]
@@ -287,7 +287,7 @@ def _summary(
         "fps": fps,
         "source": str(frames.path),
         "camera": str(camera_file),
-        "annotated": FILM if film else None,
+        "annotated": VIDEO if video else None,
         "strip": STRIP,
         "versions": {package: version(package) for package in PACKAGES},
         "model_sha256": {

@@ -25,8 +25,8 @@ def written_whole(folder: Path) -> Iterator[Path]:
         The folder cannot be written to, the disk is full, or a folder has the name of a file.
     """
     whole = folder.absolute()
-    place = next(place for place in (whole, *whole.parents) if place.exists())
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=place) as made:
+    existing = next(above for above in (whole, *whole.parents) if above.exists())
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=existing) as made:
         yield Path(made)
         _move_all(Path(made), whole)
 

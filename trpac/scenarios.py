@@ -118,16 +118,18 @@ class ScenarioRun:
         """Write report.html, figure17.png, log.csv and summary.json, all or none; returns their paths."""
         from scenarios.report import write_report
         from scenarios.runner import write_run
-        from scenarios.vision_overlay import draw_looks
+        from scenarios.vision_overlay import draw_overlay_sheet
         from scenarios.whole_files import written_whole
 
         with written_whole(Path(folder)) as made:
-            looks = None
+            overlay = None
             if len(self._run.frames):
-                looks = Path(self._scratch.name) / "looks.jpg"
-                draw_looks(self._run, looks, lambda done, total: progress("drawing the report", done, total))
+                overlay = Path(self._scratch.name) / "overlay.jpg"
+                draw_overlay_sheet(
+                    self._run, overlay, lambda done, total: progress("drawing the report", done, total)
+                )
             figure = self.figure17().save(made / "figure17.png")
-            write_report(self._run, figure, looks, made / "report.html")
+            write_report(self._run, figure, overlay, made / "report.html")
             write_run(self._run, made)
             names = sorted(path.name for path in made.iterdir())
         return tuple(Path(folder) / name for name in names)

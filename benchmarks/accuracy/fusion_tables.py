@@ -24,9 +24,9 @@ from scenarios.sweep import figures
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import execute
 from scenarios.sweep.files import load_sweep
+from scenarios.sweep.full_run import full_run
 from scenarios.sweep.store import Parts
 from scenarios.sweep.summary import distribution, shown_enough, slippery, summarise
-from scenarios.sweep.trace import trace
 
 ROOT = Path(__file__).resolve().parents[2]
 SWEEPS = ROOT / "scenarios" / "sweeps"
@@ -302,7 +302,7 @@ def draw(found: dict[str, dict[str, Any]]) -> None:
     PICTURES.mkdir(exist_ok=True)
     for name in ("road_test", "road_test_brakes"):
         sweep = load_sweep(SWEEPS / f"{name}.yaml")
-        draw_figure17(trace(plan_run(sweep, run_keys(sweep)[0])), PICTURES / f"{name}.png")
+        draw_figure17(full_run(plan_run(sweep, run_keys(sweep)[0])), PICTURES / f"{name}.png")
     if "paper_simulation" in found:
         table = found["paper_simulation"]["table"]
         (PICTURES / "distributions.png").write_bytes(figures.distributions(table))

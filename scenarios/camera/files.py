@@ -17,7 +17,7 @@ Focal = Annotated[float, Field(ge=10.0, le=1e6)]
 Point = Annotated[float, Field(ge=-1e5, le=1e5)]
 Distortion = Annotated[float, Field(ge=-1e3, le=1e3)]
 Height = Annotated[float, Field(ge=0.1, le=20.0)]
-Place = Annotated[float, Field(ge=-50.0, le=50.0)]
+Offset = Annotated[float, Field(ge=-50.0, le=50.0)]
 Rate = Annotated[float, Field(ge=0.01, le=1e4)]
 Angle = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
@@ -36,8 +36,8 @@ class CameraFile(BaseModel):
     cy_px: Point
     distortion: Annotated[list[Distortion], Field(min_length=5, max_length=5)]
     height_m: Height
-    x_from_front_axle_m: Place
-    y_m: Place
+    x_from_front_axle_m: Offset
+    y_m: Offset
     pitch_rad: Angle
     yaw_rad: Angle
     roll_rad: Angle

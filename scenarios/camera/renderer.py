@@ -15,7 +15,7 @@ from trpac_core.vision.classes import Surface
 
 from .decals import LENGTH_M, LEVELS, SHAPE, TEXEL_M, decal_map
 from .scene import RenderedFrame, Scene, SurfaceSegment
-from .shading import TONE_RANGE, TONE_STEPS_PER_UNIT, SceneScalars, Maps, Pixels, CarPose, shade
+from .shading import TONE_RANGE, TONE_STEPS_PER_UNIT, CarPose, Maps, Pixels, SceneScalars, shade
 from .sky import AZIMUTH_RAD, LOWEST_RAD, Panorama, build_panorama
 from .textures import (
     FINE_LEVELS,

@@ -158,7 +158,7 @@ class Effect:
     equation: ClassVar[str]
     source: ClassVar[str]
     excited_by: ClassVar[str]
-    look_alikes: ClassVar[tuple[str, ...]]
+    confounders: ClassVar[tuple[str, ...]]
 
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:

@@ -22,7 +22,7 @@ class BrakeDrag(Effect):
     equation = "I omega' = T - F_x R - T_drag"
     source = "Eq. (12) of Tian et al. 2022, doi:10.3390/rs14215583, with a further torque"
     excited_by = "coasting at any speed"
-    look_alikes = ("rolling_resistance", "road_grade", "aero_drag", "torque_gain")
+    confounders = ("rolling_resistance", "road_grade", "aero_drag", "torque_gain")
 
     torque_nm: float = parameter(
         "N m",

@@ -41,7 +41,7 @@ class DrivelineCompliance(Effect):
     )
     source = "Kiencke and Nielsen (2005), Automotive Control Systems, drive-shaft model"
     excited_by = "tip-in and tip-out: wheel-speed oscillation after a step of torque"
-    look_alikes = ("torque_lag", "torque_delay", "tyre_relaxation", "wheel_inertia_offset")
+    confounders = ("torque_lag", "torque_delay", "tyre_relaxation", "wheel_inertia_offset")
 
     stiffness_nm_rad: float = parameter(
         "N m/rad",

@@ -21,7 +21,7 @@ class FrictionOffset(Effect):
     equation = "theta_true = factor theta"
     source = "definition"
     excited_by = "driving or braking near the grip limit"
-    look_alikes = ("mu_split", "tyre_stiffness_offset", "friction_falloff", "load_transfer")
+    confounders = ("mu_split", "tyre_stiffness_offset", "friction_falloff", "load_transfer")
 
     factor: float = parameter(
         "-",

@@ -21,7 +21,7 @@ class LoadTransfer(Effect):
     equation = "F_z,front = m (g l_r - a_x h) / (2 L) per wheel, F_z,rear = m (g l_f + a_x h) / (2 L)"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 1, dynamic axle loads on level ground"
     excited_by = "strong acceleration or braking on a tyre near its grip limit"
-    look_alikes = ("friction_offset", "tyre_stiffness_offset")
+    confounders = ("friction_offset", "tyre_stiffness_offset")
 
     cog_height_m: float = parameter(
         "m",

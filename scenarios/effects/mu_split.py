@@ -30,7 +30,7 @@ class MuSplit(Effect):
     equation = "theta_left = left_factor theta, theta_right = right_factor theta"
     source = "definition; manoeuvre as in ISO 14512"
     excited_by = "driving or braking near the grip limit: one side's wheels slip more"
-    look_alikes = ("friction_offset", "friction_falloff")
+    confounders = ("friction_offset", "friction_falloff")
 
     left_factor: float = parameter(
         "-",

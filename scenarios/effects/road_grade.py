@@ -26,7 +26,7 @@ class RoadGrade(Effect):
     equation = "F = -m g s / sqrt(1 + s^2); loads times 1 / sqrt(1 + s^2)"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 1, loads on grades"
     excited_by = "any driving, best with little torque; speed against accelerometer shows it"
-    look_alikes = ("accelerometer_bias", "rolling_resistance", "mass_offset", "aero_drag")
+    confounders = ("accelerometer_bias", "rolling_resistance", "mass_offset", "aero_drag")
 
     grade: float = parameter(
         "-",

@@ -22,7 +22,7 @@ class RollingResistance(Effect):
     equation = "I omega' = T - F_x R - c F_z R"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 4; ISO 28580 defines the coefficient"
     excited_by = "coasting at low speed"
-    look_alikes = ("brake_drag", "road_grade", "torque_gain")
+    confounders = ("brake_drag", "road_grade", "torque_gain")
 
     coefficient: float = parameter(
         "-",

@@ -29,7 +29,7 @@ class TyreFormula(Effect):
     )
     source = "Pacejka (2012), Tyre and Vehicle Dynamics, Eq. (4.49)"
     excited_by = "slip near and beyond the force's maximum"
-    look_alikes = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
+    confounders = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
 
     share: float = parameter(
         "-",

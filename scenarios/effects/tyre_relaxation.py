@@ -22,7 +22,7 @@ class TyreRelaxation(Effect):
     equation = "F_x' = (V / length) (F_steady - F_x), V = max(omega R, v, 0.01 m/s)"
     source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 7, single-point contact patch model"
     excited_by = "steps of torque at low speed: the lag is length / v"
-    look_alikes = ("torque_lag", "torque_delay", "wheel_speed_delay", "driveline_compliance")
+    confounders = ("torque_lag", "torque_delay", "wheel_speed_delay", "driveline_compliance")
 
     length_m: float = parameter(
         "m",

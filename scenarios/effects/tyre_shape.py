@@ -28,7 +28,7 @@ class TyreShape(Effect):
     )
     source = "own: smooth deviations, as between the formulas in Pacejka (2012), Tyre and Vehicle Dynamics"
     excited_by = "slip near and beyond the force's maximum"
-    look_alikes = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
+    confounders = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
 
     knee: float = parameter(
         "-",

@@ -30,7 +30,7 @@ class TyreStiffnessOffset(Effect):
     equation = "F_x(lambda) with the true C_x"
     source = "Bian et al. (2014), SAE 2014-01-0123"
     excited_by = "strong torque below the grip limit: slip per force"
-    look_alikes = ("friction_offset", "wheel_radius_offset", "vehicle_speed_scale", "load_transfer")
+    confounders = ("friction_offset", "wheel_radius_offset", "vehicle_speed_scale", "load_transfer")
 
     stiffness_n: float = parameter(
         "N",

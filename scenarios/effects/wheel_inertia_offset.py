@@ -22,7 +22,7 @@ class WheelInertiaOffset(Effect):
     equation = "I omega' = T - F_x R with the true I"
     source = "Eq. (12) of Tian et al. 2022, doi:10.3390/rs14215583"
     excited_by = "quick changes of wheel speed: spinning up and locking wheels on a slippery road"
-    look_alikes = ("mass_offset", "torque_gain", "torque_lag", "driveline_compliance")
+    confounders = ("mass_offset", "torque_gain", "torque_lag", "driveline_compliance")
 
     inertia_kg_m2: float = parameter(
         "kg m^2",

@@ -30,7 +30,7 @@ class WheelRadiusOffset(Effect):
     equation = "rim speed omega R and moment F_x R with the true R"
     source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 1, effective rolling radius"
     excited_by = "free rolling: v per omega at torque zero"
-    look_alikes = ("vehicle_speed_scale", "tyre_stiffness_offset", "mass_offset", "torque_gain")
+    confounders = ("vehicle_speed_scale", "tyre_stiffness_offset", "mass_offset", "torque_gain")
 
     radius_m: float = parameter(
         "m",

@@ -91,10 +91,10 @@ class KalmanPeer(ABC):
             self._bound()
         x, P = self._state()
         self._theta, self._variance = float(x[THETA]), float(P[THETA, THETA])
-        said = PeerEstimate(self._theta, math.sqrt(self._variance), self._excited(x, taken))
+        estimate = PeerEstimate(self._theta, math.sqrt(self._variance), self._excited(x, taken))
         if step_s > 0.0:
             self._predict(taken, step_s, self._process_noise(taken, step_s))
-        return said
+        return estimate
 
     def _process_noise(self, taken: Taken, step_s: float) -> Array:
         """Q of a step."""

@@ -72,8 +72,10 @@ class SlipSlopePeer:
         self._filtered: Taken | None = None
         self._sliding: float | None = None
         car = self._setup.vehicle
-        elastic = correction(0.0, 0.0) * car.longitudinal_stiffness_n / car.wheel_load(self._setup.front_axle)
-        self._regression = FilterRLS(1, mu=1.0, eps=1e-3, w=np.array([elastic]))
+        initial_slope = (
+            correction(0.0, 0.0) * car.longitudinal_stiffness_n / car.wheel_load(self._setup.front_axle)
+        )
+        self._regression = FilterRLS(1, mu=1.0, eps=1e-3, w=np.array([initial_slope]))
 
     @property
     def slope(self) -> float | None:

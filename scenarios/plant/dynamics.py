@@ -285,7 +285,7 @@ def segment_at(start_m: NDArray, contact_m: float) -> int:
 
 
 @inlined
-def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, theta: NDArray) -> float:
+def fill_theta(position_m: float, p: DynamicsParameters, road: RoadTable, theta: NDArray) -> float:
     """Fill theta under the wheels; return the least distance from a contact to the border ahead of it [m]."""
     front_m = position_m + p.cog_to_front_axle_m
     rear_m = position_m - p.cog_to_rear_axle_m
@@ -423,7 +423,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
 @inlined
 def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, first: Wheels) -> float:
     """Make `first` hold what `advance` needs after y was changed from outside; return the accelerometer [m/s^2]."""
-    look_up_theta(y[POSITION], p, road, first.theta)
+    fill_theta(y[POSITION], p, road, first.theta)
     return forces(y, accel, p, first)
 
 
@@ -459,10 +459,12 @@ def _fill_rates(
     for i in range(4):
         torque = torque_nm[i] + (next_nm[i] - torque_nm[i]) * part
         if p.motor_inertia_kg_m2 > 0.0:
-            spread = y[MOTOR + i] - y[WHEEL + i]
-            shaft_nm = p.shaft_stiffness_nm_rad[i] * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
+            speed_difference = y[MOTOR + i] - y[WHEEL + i]
+            shaft_nm = (
+                p.shaft_stiffness_nm_rad[i] * y[TWIST + i] + p.shaft_damping_nm_s_rad * speed_difference
+            )
             motor_nm, wheels.work[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
-            wheels.rates[TWIST - WHEEL + i] = spread
+            wheels.rates[TWIST - WHEEL + i] = speed_difference
             wheels.rates[MOTOR - WHEEL + i] = (motor_nm - shaft_nm) / p.motor_inertia_kg_m2
             torque = shaft_nm
         rate = _wheel_rate(i, y[WHEEL + i], torque, p, wheels)
@@ -621,7 +623,7 @@ def advance(
     count = _states(p)
     at_s = 0.0
     held_s = 0.0
-    ahead_m = look_up_theta(y[POSITION], p, road, first.theta)
+    ahead_m = fill_theta(y[POSITION], p, road, first.theta)
     while step_s - at_s > 1e-9 * step_s:
         h = min(h, step_s - at_s)
         if y[SPEED] * h > ahead_m:
@@ -639,7 +641,7 @@ def advance(
         held_s = h if at_s == 0.0 else held_s
         at_s += h
         h *= min(0.9 * np.sqrt(tolerance / max(error, 1e-3 * tolerance)), 10.0)
-        ahead_m = look_up_theta(y[POSITION], p, road, first.theta)
+        ahead_m = fill_theta(y[POSITION], p, road, first.theta)
         accel = forces(y, new_accel, p, first)
     return accel, held_s
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from scenarios.camera.disturbances import disturb
 from scenarios.files import Scenario
-from scenarios.pictures import DISTURBANCES, frame_steps, scene
+from scenarios.pictures import DISTURBANCES, frame_steps, scene_renderer
 from scenarios.plant.pipeline import PlantTrajectory
 from scenarios.sweep.draw import Camera
 from scenarios.yaml_text import parse_yaml
@@ -110,7 +110,7 @@ def frames_of(
     return Frames(taken[kept], taken[kept] + late, front_m[kept], wrong[kept])
 
 
-def class_verdicts(
+def road_classes(
     scenario: Scenario,
     trajectory: PlantTrajectory,
     camera: Camera,
@@ -136,28 +136,28 @@ class RenderedFrames:
     Parameters
     ----------
     scenario, trajectory, camera, seed
-        As for `class_verdicts`; the world follows the scenario's seed.
+        As for `road_classes`; the world follows the scenario's seed.
     """
 
     def __init__(self, scenario: Scenario, trajectory: PlantTrajectory, camera: Camera, seed: int) -> None:
         self._scenario = scenario
-        self._renderer = scene(scenario)
+        self._renderer = scene_renderer(scenario)
         disturbing = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
         frames = frames_of(scenario, trajectory, camera, measured_process(), disturbing)
-        self._frames = {int(row): place for place, row in enumerate(frames.arrives)}
+        self._frames = {int(row): index for index, row in enumerate(frames.arrives)}
         self._taken, self._front_m, self._wrong = frames.taken, frames.front_m, frames.wrong
 
     def get(self, row: int) -> NDArray[np.uint8] | RoadClass | None:
         """The picture that arrives at a step, a wrong class in its place, or None where none arrives."""
-        place = self._frames.get(row)
-        if place is None:
+        index = self._frames.get(row)
+        if index is None:
             return None
-        if self._wrong[place] >= 0:
-            return RoadClass(Surface(int(self._wrong[place])), CERTAIN)
+        if self._wrong[index] >= 0:
+            return RoadClass(Surface(int(self._wrong[index])), CERTAIN)
         pictures = self._scenario.pictures
-        image = self._renderer.frame(float(self._front_m[place])).image
+        image = self._renderer.frame(float(self._front_m[index])).image
         seed = int(
-            np.random.SeedSequence([self._scenario.seed, int(self._taken[place])]).generate_state(1)[0]
+            np.random.SeedSequence([self._scenario.seed, int(self._taken[index])]).generate_state(1)[0]
         )
         image = disturb(image, DISTURBANCES[pictures.disturbance], seed)
         _, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality])
@@ -165,17 +165,17 @@ class RenderedFrames:
 
 
 def _played_back(
-    scenario: Scenario, place_m: NDArray[np.float64], process: CameraProcess, random: np.random.Generator
+    scenario: Scenario, position_m: NDArray[np.float64], process: CameraProcess, random: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Class and confidence for the road at places."""
     world = process.worlds[int(random.integers(len(process.worlds)))]
-    given, Q_v = np.empty(len(place_m), dtype=np.int64), np.empty(len(place_m))
+    given, Q_v = np.empty(len(position_m), dtype=np.int64), np.empty(len(position_m))
     starts = np.array([s.start_m for s in scenario.road.segments])
-    stretch = np.clip(np.searchsorted(starts, place_m, side="right") - 1, 0, None)
+    stretch = np.clip(np.searchsorted(starts, position_m, side="right") - 1, 0, None)
     for index, segment in enumerate(scenario.road.segments):
         record, here = world[segment.surface_class], stretch == index
         offset = int(random.integers(len(record.given)))
-        cell = np.floor((place_m[here] - starts[index]) / process.spacing_m).astype(np.int64)
+        cell = np.floor((position_m[here] - starts[index]) / process.spacing_m).astype(np.int64)
         at = (offset + cell) % len(record.given)
         given[here], Q_v[here] = record.given[at], record.Q_v[at]
     return given, Q_v
@@ -192,10 +192,10 @@ def _wrong_way(
     gap_m = camera.wrong_length_m * (1.0 - camera.wrong_share) / camera.wrong_share
     wrong = bool(random.uniform() < camera.wrong_share)
     borders, states = [-np.inf], [wrong]
-    place = float(front_m[0])
-    while place < front_m[-1]:
-        place += float(random.exponential(camera.wrong_length_m if wrong else gap_m))
+    border_m = float(front_m[0])
+    while border_m < front_m[-1]:
+        border_m += float(random.exponential(camera.wrong_length_m if wrong else gap_m))
         wrong = not wrong
-        borders.append(place)
+        borders.append(border_m)
         states.append(wrong)
     return np.array(states)[np.searchsorted(np.array(borders), front_m, side="right") - 1]

@@ -63,9 +63,9 @@ def security_of(scheduler: str) -> Security:
         certificates.
     """
     name = f"--scheduler {quoted(scheduler)}"
-    scheme, place = parse_address(scheduler)
+    scheme, address = parse_address(scheduler)
     try:
-        here = _is_here(*parse_host_port(place))
+        here = _is_here(*parse_host_port(address))
     except (OSError, ValueError) as error:  # of a name that nobody knows, or that is none
         raise ScenarioError(
             f"{name}: {quoted(error)}; expected tls://HOST:PORT, or an address of this machine, such as "

@@ -86,8 +86,8 @@ def run_keys(sweep: Sweep) -> list[RunKey]:
     file = sweep.file
     levels = [(axis.parameter, level) for axis in file.vary for level in axis.levels] or [("", float("nan"))]
     return [
-        RunKey(place * file.runs + number, parameter, level, number)
-        for place, (parameter, level) in enumerate(levels)
+        RunKey(index * file.runs + number, parameter, level, number)
+        for index, (parameter, level) in enumerate(levels)
         for number in range(file.runs)
     ]
 
@@ -168,8 +168,8 @@ def draw_road(draw: RoadDraw, random: np.random.Generator) -> tuple[RoadFile, fl
     if draw.order == "random":
         surfaces = [surfaces[i] for i in random.permutation(len(surfaces))]
     segments = []
-    for place, surface in enumerate(surfaces):
+    for index, surface in enumerate(surfaces):
         low, high = draw.friction[surface]
         mu = float(random.uniform(low, high))
-        segments.append(RoadSegment(start_m=place * draw.stretch_m, mu_left=mu, mu_right=mu, surface=surface))
+        segments.append(RoadSegment(start_m=index * draw.stretch_m, mu_left=mu, mu_right=mu, surface=surface))
     return RoadFile(schema=1, segments=segments), len(segments) * draw.stretch_m

@@ -128,14 +128,16 @@ def coverage_figure(table: pd.DataFrame) -> bytes | None:
         figure, axis = plt.subplots(figsize=(8.0, 3.8))
         axis.axhspan(*COVERAGE_SPAN, color="#2c9c5a", alpha=0.15, lw=0, label="asked for")
         for name in names:
-            for column, weight, style, said in kinds:
+            for column, weight, style, caption in kinds:
                 mine = rows[(rows["estimator"] == name) & rows[column].notna()]
                 groups = list(mine.groupby(np.floor(mine["theta"] / THETA_BIN).astype(int)))
                 centres = [
                     THETA_BIN * (float(part["theta"].iloc[0]) // THETA_BIN + 0.5) for _, part in groups
                 ]
                 shares = [np.average(part[column], weights=part[weight]) for _, part in groups]
-                axis.plot(centres, shares, style, color=colour(name, names), label=f"{plain(name)}, {said}")
+                axis.plot(
+                    centres, shares, style, color=colour(name, names), label=f"{plain(name)}, {caption}"
+                )
         axis.set_ylim(0.0, 1.02)
         axis.set_xlabel("true TRPAC [-]")
         axis.set_ylabel("share within 2 TRPAC_std")

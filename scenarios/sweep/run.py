@@ -17,7 +17,7 @@ from scenarios.peers import PeerSetup
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.runner import segment_starts, under_the_wheel
-from scenarios.sweep.camera import RenderedFrames, class_verdicts
+from scenarios.sweep.camera import RenderedFrames, road_classes
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.trackers import OWN, make_peer
 from scenarios.vision_overlay import image_estimator
@@ -76,11 +76,11 @@ def run_plan(plan: RunPlan, estimators: list[str], unit: dict[str, float]) -> li
 def believed_config(plan: RunPlan, unit: dict[str, float]) -> EstimatorConfig:
     """The estimator's configuration as the unit's would be, with what the run has it believe wrongly."""
     believed = plan.believed
-    told = dict(parameters(replace(plan.scenario, sensors=believed.noise)))
-    told["vehicle.mass"] *= believed.mass_factor
-    told["vehicle.wheel_radius"] *= believed.radius_factor
-    told["tyre.longitudinal_stiffness"] *= believed.stiffness_factor
-    values: dict[str, Any] = {v.name: v.start for v in ESTIMATOR_PARAMETERS} | told | unit
+    settings = dict(parameters(replace(plan.scenario, sensors=believed.noise)))
+    settings["vehicle.mass"] *= believed.mass_factor
+    settings["vehicle.wheel_radius"] *= believed.radius_factor
+    settings["tyre.longitudinal_stiffness"] *= believed.stiffness_factor
+    values: dict[str, Any] = {v.name: v.start for v in ESTIMATOR_PARAMETERS} | settings | unit
     for surface in Surface:
         name = f"estimator.theta_{surface.label}"
         values[name] = min(max(values[name] + plan.camera.class_value_offset, LEAST_THETA), GREATEST_THETA)
@@ -102,7 +102,7 @@ def step_all(
     """Step ours and the peers over the run's signals; raises ValueError where an estimate is not finite."""
     frames, ife = camera_of(plan, trajectory)
     estimator, step_s = TrpacEstimator(config, ife), plan.scenario.step_s
-    peers = {name: make_peer(name, told_of(plan, config)) for name in estimators if name not in OWN}
+    peers = {name: make_peer(name, peer_setup(plan, config)) for name in estimators if name not in OWN}
     names = [*OWN, *peers]
     theta = np.empty((len(trajectory), len(names)))
     std = np.full((len(trajectory), len(names)), np.nan)
@@ -117,8 +117,8 @@ def step_all(
         std[row, fused] = estimate.TRPAC_std
         excited[row] = estimate.excitation_flag
         for column, peer in enumerate(peers.values(), start=len(OWN)):
-            said = peer.step(step_s, sensors)
-            theta[row, column], std[row, column] = said.TRPAC, said.TRPAC_std
+            peer_estimate = peer.step(step_s, sensors)
+            theta[row, column], std[row, column] = peer_estimate.TRPAC, peer_estimate.TRPAC_std
     strange = [name for i, name in enumerate(names) if not np.isfinite(theta[:, i]).all()]
     if strange:
         raise ValueError(f"{strange[0]} gives an estimate that is no finite number.")
@@ -134,10 +134,10 @@ def camera_of(plan: RunPlan, trajectory: PlantTrajectory) -> tuple[Frames, Ife |
     if camera.source == "rendered":
         cv2.setNumThreads(1)
         return RenderedFrames(scenario, trajectory, camera, plan.camera_seed), image_estimator(scenario)
-    return class_verdicts(scenario, trajectory, camera, plan.camera_seed), None
+    return road_classes(scenario, trajectory, camera, plan.camera_seed), None
 
 
-def told_of(plan: RunPlan, config: EstimatorConfig) -> PeerSetup:
+def peer_setup(plan: RunPlan, config: EstimatorConfig) -> PeerSetup:
     """What peers are told: what ours is told."""
     noise = plan.believed.noise
     return PeerSetup(
@@ -167,7 +167,7 @@ def rows_of(
         segment_starts(scenario), segment, theta, theta_initial, estimates, visible, scenario.step_s
     )
     rows = []
-    for place, index in enumerate(np.unique(segment)):
+    for position, index in enumerate(np.unique(segment)):
         here = segment == index
         road = scenario.road.segments[int(index)]
         truth = {
@@ -178,15 +178,15 @@ def rows_of(
             "seed": scenario.seed,
             "stretch": int(index),
             "surface": road.surface,
-            "theta_before": theta_initial if place == 0 else float(theta[np.argmax(here) - 1]),
+            "theta_before": theta_initial if position == 0 else float(theta[np.argmax(here) - 1]),
             "shown_s": float(visible[here].sum()) * scenario.step_s,
             "time_s": float(here.sum()) * scenario.step_s,
         }
         for name, track in tracks.by_name.items():
             part = Track(track.TRPAC[here], track.TRPAC_std[here])
             measures = extra_scores(part, theta[here], tracks.excited[here], visible[here], scenario.step_s)
-            measures["shown_convergence_time_s"] = by_shown_time[name][place]["convergence_time_s"]
-            rows.append(truth | {"estimator": name} | scores[name][place] | measures)
+            measures["shown_convergence_time_s"] = by_shown_time[name][position]["convergence_time_s"]
+            rows.append(truth | {"estimator": name} | scores[name][position] | measures)
     return rows
 
 

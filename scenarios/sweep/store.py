@@ -95,9 +95,9 @@ class Parts:
     def open(self) -> set[int]:
         """Numbers of the runs that are there; raises ScenarioError where the folder holds anything else."""
         known = self._out / IDENTITY
-        for place in (self._out, self._folder):
-            if os.path.lexists(place) and not place.is_dir():
-                raise ScenarioError(f"{quoted(place)}: a file. Expected a folder to write into.")
+        for folder in (self._out, self._folder):
+            if os.path.lexists(folder) and not folder.is_dir():
+                raise ScenarioError(f"{quoted(folder)}: a file. Expected a folder to write into.")
         if os.path.lexists(known):
             before = _read(known, "what identifies the folder's sweep")
             if not isinstance(before, dict):
@@ -202,9 +202,9 @@ def _is_number(value: Any) -> bool:
 
 def _is_complete(rows: list[dict[str, Any]], estimators: list[str]) -> bool:
     """Whether each estimator has one row on each stretch that was driven."""
-    places = [(row["stretch"], row["estimator"]) for row in rows]
-    wanted = product({stretch for stretch, _ in places}, estimators)
-    return bool(rows) and sorted(places) == sorted(wanted) and all(row.keys() == COLUMNS for row in rows)
+    pairs = [(row["stretch"], row["estimator"]) for row in rows]
+    wanted = product({stretch for stretch, _ in pairs}, estimators)
+    return bool(rows) and sorted(pairs) == sorted(wanted) and all(row.keys() == COLUMNS for row in rows)
 
 
 def as_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:

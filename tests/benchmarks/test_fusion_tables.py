@@ -14,9 +14,9 @@ from scenarios.plant.pipeline import drive
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import run_one
 from scenarios.sweep.files import load_sweep
+from scenarios.sweep.full_run import full_run
 from scenarios.sweep.run import believed_config, shown, step_all
 from scenarios.sweep.store import Parts, identity
-from scenarios.sweep.trace import trace
 
 ROOT = Path(__file__).parents[2]
 TO_FRONT_M = 1.112
@@ -64,7 +64,7 @@ def test_brake_pulses_show_both_parts_and_lock_no_wheel():
 
 def test_a_run_in_full_is_the_run_that_is_scored(short_sweep, tmp_path):
     plan = plan_run(short_sweep, run_keys(short_sweep)[0])
-    full = trace(plan)
+    full = full_run(plan)
     tracks = step_all(plan, drive(plan.scenario), believed_config(plan, {}), ["IFE", "DE", "DIFE"])
     np.testing.assert_array_equal(full.table["TRPAC"], tracks.by_name["DIFE"].TRPAC)
     np.testing.assert_array_equal(full.table["excitation_flag"], tracks.excited)

@@ -99,8 +99,8 @@ def test_each_effect_describes_itself(effect_id):
     assert effect.excited_by
     assert effect.stage in get_args(Stage)
     assert effect.subsystem in get_args(Subsystem)
-    assert effect.look_alikes
-    assert set(effect.look_alikes) <= CONTRACT_IDS - {effect_id}
+    assert effect.confounders
+    assert set(effect.confounders) <= CONTRACT_IDS - {effect_id}
     assert effect.parameters()
     for p in effect.parameters():
         assert p.unit

@@ -20,7 +20,7 @@ RENAMED = {"tyre_force_n": "tyre_force", "frame_age_s": "frame_age"}
 """Fields of an estimate whose column has the unit's name."""
 
 
-def trace(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:
+def full_run(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:
     """A run as `runner.run_scenario` gives it, stepped in Python with the sweep's camera.
 
     Parameters
