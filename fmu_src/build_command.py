@@ -55,7 +55,7 @@ def run_build(program: str, load: Callable[[], Product], name: str) -> int:
         What to build.
     """
 
-    def say(text: str) -> None:
+    def complain(text: str) -> None:
         print(f"{program}: {text}", file=sys.stderr)
 
     try:
@@ -64,27 +64,27 @@ def run_build(program: str, load: Callable[[], Product], name: str) -> int:
 
         from .packaging import BuildError
     except ImportError as error:
-        say(f"{error}. Run it with the project's interpreter: .venv/bin/python {program}")
+        complain(f"{error}. Run it with the project's interpreter: .venv/bin/python {program}")
         return EXIT_BUILD
     if name not in product.known:
-        say(f"'{name}' is not a {product.kind}. Known: {', '.join(sorted(product.known))}.")
+        complain(f"'{name}' is not a {product.kind}. Known: {', '.join(sorted(product.known))}.")
         return EXIT_USAGE
     started = time.perf_counter()
     try:
         path = product.build(name)
     except (BuildError, OSError) as error:
-        say(str(error))
+        complain(str(error))
         return EXIT_BUILD
     print(f"built      {path.stat().st_size / 1e6:.2f} MB in {time.perf_counter() - started:.1f} s")
     problems = product.validate(path)
     if problems:
-        say("\n".join([f"the {product.noun} does not validate:", *problems]))
+        complain("\n".join([f"the {product.noun} does not validate:", *problems]))
         return EXIT_INVALID
     print(f"validated  {product.valid}")
     try:
         done = product.run(path)
     except Exception as error:  # noqa: BLE001 - fmpy raises bare Exceptions; the exit code tells that the run failed
-        say(f"the {product.noun} does not run: {error}")
+        complain(f"the {product.noun} does not run: {error}")
         return EXIT_RUN
     print(f"ran        {done}")
     print(f"{product.noun:<10} {path}")

@@ -88,7 +88,7 @@ class CameraSlave(GuardedSlave):
         """Hand sensors and a new frame to the estimator, whose last estimate the outputs show."""
         sensors = self.sensors()
         if not self.values[BUFFERS_ENABLED] and in_memory(self.values):
-            self._tell_buffers_off()
+            self._report_buffers_off()
         try:
             self._frame, frame, problem = next_frame(self._frame, self.values, self.bus)
         finally:
@@ -107,7 +107,7 @@ class CameraSlave(GuardedSlave):
             about = [part.partition(" is ")[0] for part in text.split("; ")]
             self.report(f"sensors {kind} {about}", Fmi2Status.warning, f"{self.modelName}: {text}")
 
-    def _tell_buffers_off(self) -> None:
+    def _report_buffers_off(self) -> None:
         text = (
             f"the inputs image.* point to a picture in memory, which is not read: the parameter {BUFFERS_ENABLED} is "
             "false. Set it to true before the initialisation ends, or give pictures by image_path."

@@ -33,7 +33,7 @@ TESTED_PYTHON = (3, 11)
 ISOLATED = ("-I",)
 """No folder of the caller's, no PYTHONPATH and no packages of the user's own are imported from: it includes -P, which
 Pythons before 3.11 do not know."""
-MISSAID = (ValueError, IndexError, KeyError, TypeError, AttributeError)
+UNREADABLE_ANSWER = (ValueError, IndexError, KeyError, TypeError, AttributeError)
 """What an answer of a side process may end in that is none."""
 
 PROBE = """
@@ -105,7 +105,7 @@ def examine(
     path: Path,
     python: str = sys.executable,
     run: bool = True,
-    tell: Callable[[str], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> Examination:
     """Look at a unit's file and try it out in a child process, which runs the unit's own code.
 
@@ -117,7 +117,7 @@ def examine(
         The interpreter that shall run it.
     run : bool
         Whether it is tried out; its code is not run otherwise.
-    tell : callable
+    notify : callable
         Is given a sentence before the unit's code is run.
 
     Raises
@@ -125,7 +125,7 @@ def examine(
     UnusableError
         If the file is not an FMU, or the interpreter cannot be started.
     """
-    contents, (*of_file, described) = look_at_file(path)
+    contents, (*of_file, described) = examine_file(path)
     findings = [*of_file, described]
     named = set(contents.packages) if contents else set()
     if unknown := sorted(named - set(KNOWN_PACKAGES)):
@@ -139,7 +139,7 @@ def examine(
     findings += _python(probed, modules if contents else None)
     intact = all(finding.state is not State.PROBLEM for finding in of_file)
     if intact and run:
-        tell(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
+        notify(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
         findings.append(_trial(path, python))
     else:
         why = "the file is not what was built" if run else "as it was asked for"
@@ -148,7 +148,7 @@ def examine(
     return Examination(quoted(name), tuple(findings), probed, intact and run)
 
 
-def look_at_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
+def examine_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
     """The record of the build, if it can be read, and findings on archive, contents and description.
 
     Raises
@@ -232,12 +232,16 @@ def _probe(python: str, modules: list[str]) -> Python:
     """What the interpreter is and can import; raises UnusableError if it cannot be started."""
     try:
         done = _run([python, *ISOLATED, "-c", PROBE, *modules], PROBE_LIMIT_S)
-        said = parse_json(done.stdout.splitlines()[-1], "its answer")
-        packages = {module: (bool(good), quoted(text)) for module, (good, text) in said["packages"].items()}
+        answer = parse_json(done.stdout.splitlines()[-1], "its answer")
+        packages = {module: (bool(good), quoted(text)) for module, (good, text) in answer["packages"].items()}
         return Python(
-            said["executable"] or python, tuple(said["version"]), said["prefix"], said["libpython"], packages
+            answer["executable"] or python,
+            tuple(answer["version"]),
+            answer["prefix"],
+            answer["libpython"],
+            packages,
         )
-    except (OSError, *MISSAID, subprocess.TimeoutExpired) as error:
+    except (OSError, *UNREADABLE_ANSWER, subprocess.TimeoutExpired) as error:
         raise UnusableError(
             f"{quoted(python)}: cannot be run as a Python interpreter ({quoted(error)})."
         ) from error
@@ -300,16 +304,16 @@ def _judged(done: subprocess.CompletedProcess[str]) -> Finding:
         text = f"the process died of {next(names, f'signal {-done.returncode}')}; {last_words}".strip("; ")
         return Finding("trial", State.PROBLEM, text)
     try:
-        said: dict[str, Any] = parse_json(done.stdout.splitlines()[-1], "its answer")
-        log = _some(said["log"])
-        if not said["ran"]:
-            text = "; ".join(filter(None, [quoted(said["error"], LONGEST_PROBLEM), log, last_words]))
+        answer: dict[str, Any] = parse_json(done.stdout.splitlines()[-1], "its answer")
+        log = _some(answer["log"])
+        if not answer["ran"]:
+            text = "; ".join(filter(None, [quoted(answer["error"], LONGEST_PROBLEM), log, last_words]))
             return Finding("trial", State.PROBLEM, text)
-        if said["not_finite"] or done.returncode:
-            text = f"outputs not finite: {quoted(said['not_finite'])}; exit {done.returncode}"
+        if answer["not_finite"] or done.returncode:
+            text = f"outputs not finite: {quoted(answer['not_finite'])}; exit {done.returncode}"
             return Finding("trial", State.PROBLEM, text)
-        text = f"instantiates and steps, {said['step_us']:.0f} us a step; ends in order"
-    except MISSAID:
+        text = f"instantiates and steps, {answer['step_us']:.0f} us a step; ends in order"
+    except UNREADABLE_ANSWER:
         text = f"the process ended with {done.returncode}: {last_words or 'nothing said'}"
         return Finding("trial", State.PROBLEM, text)
     if log:

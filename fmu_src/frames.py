@@ -88,8 +88,8 @@ def next_frame(
 
 
 def _source(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> str:
-    for place in bus:
-        if values[place.surface] != NO_ROAD_CLASS:
+    for bus_class in bus:
+        if values[bus_class.surface] != NO_ROAD_CLASS:
             return BUS
     if values[BUFFERS_ENABLED] and in_memory(values):
         return BUFFER
@@ -132,25 +132,25 @@ def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
 
 def _by_bus(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> RoadClass | SideClasses | None:
     """The class of the road, or those of its sides, of which one may be none; all problems in one ValueError."""
-    problems = [text for place in bus for text in _problems(place, values)]
+    problems = [text for bus_class in bus for text in _problems(bus_class, values)]
     if problems:
         raise ValueError("; ".join(problems) + ".")
-    classes = [_road_class(place, values) for place in bus]
+    classes = [_road_class(bus_class, values) for bus_class in bus]
     return SideClasses(*classes) if bus == CLASS_PER_SIDE else classes[0]
 
 
-def _road_class(place: BusClass, values: Mapping[str, Any]) -> RoadClass | None:
-    surface = SURFACES.get(values[place.surface])
-    return None if surface is None else RoadClass(surface, values[place.confidence])
+def _road_class(bus_class: BusClass, values: Mapping[str, Any]) -> RoadClass | None:
+    surface = SURFACES.get(values[bus_class.surface])
+    return None if surface is None else RoadClass(surface, values[bus_class.confidence])
 
 
-def _problems(place: BusClass, values: Mapping[str, Any]) -> list[str]:
-    number, confidence = values[place.surface], values[place.confidence]
+def _problems(bus_class: BusClass, values: Mapping[str, Any]) -> list[str]:
+    number, confidence = values[bus_class.surface], values[bus_class.confidence]
     problems = []
     if number not in SURFACES and number != NO_ROAD_CLASS:
         problems.append(
-            f"{place.surface} is {number}, expected -1 (none), 0 (dry), 1 (wet) or 2 (snow or ice)"
+            f"{bus_class.surface} is {number}, expected -1 (none), 0 (dry), 1 (wet) or 2 (snow or ice)"
         )
     if number != NO_ROAD_CLASS and not 0.0 <= confidence <= 1.0:
-        problems.append(f"{place.confidence} is {confidence}, expected 0 to 1")
+        problems.append(f"{bus_class.confidence} is {confidence}, expected 0 to 1")
     return problems

@@ -65,7 +65,7 @@ def guarded(fallback: Callable[..., Any]) -> Callable[[Callable[..., Any]], Call
                 with suppress(
                     BaseException
                 ):  # nor what goes wrong as it is told: there is nobody left to tell
-                    self.tell_fault(callback.__name__, error)
+                    self.report_fault(callback.__name__, error)
             return fallback(*arguments)
 
         return run
@@ -114,7 +114,7 @@ def holes(items: list[Any]) -> list[int]:
     if address is None:
         return []
     return [
-        place for place, item in enumerate((ctypes.c_void_p * len(items)).from_address(address)) if not item
+        index for index, item in enumerate((ctypes.c_void_p * len(items)).from_address(address)) if not item
     ]
 
 
@@ -166,7 +166,7 @@ class GuardedSlave(Fmi2Slave):
         }
         self._settable = self._inputs_and_parameters
         self._reported: set[str] = set()
-        self._ready = self._looked_at = False
+        self._ready = self._computed = False
         self._initialising = self._stale = False
         try:
             self.prepare()
@@ -210,16 +210,16 @@ class GuardedSlave(Fmi2Slave):
     def _view(self, name: str) -> Value:
         if name not in self.views:
             raise KeyError(name)
-        return self.shown(name) if self._ready or self._looked_at else self._starts[name]
+        return self.shown(name) if self._ready or self._computed else self._starts[name]
 
-    def _look_ahead(self) -> None:
+    def _compute_outputs(self) -> None:
         """Work the outputs out by what is set so far, for a host that reads them while it initialises."""
-        self._stale = self._looked_at = False
+        self._stale = self._computed = False
         try:
             self.initialise()
         except ValueError:  # told when the initialisation ends, if it is so still
             return
-        self._looked_at = True
+        self._computed = True
 
     def clear_volatile(self) -> None:
         """Forget the inputs that hold for one step only."""
@@ -235,7 +235,7 @@ class GuardedSlave(Fmi2Slave):
             with suppress(OSError, ValueError):  # standard error may be closed, and the log has it
                 print(quoted(message, LONGEST_LOG), file=sys.stderr)
 
-    def tell_fault(self, name: str, error: BaseException) -> None:
+    def report_fault(self, name: str, error: BaseException) -> None:
         """Log what went wrong in the callback of this name; an interrupt is handed to the host."""
         if isinstance(error, KeyboardInterrupt):
             threading.Timer(INTERRUPT_DELAY_S, interrupt_main).start()
@@ -265,7 +265,7 @@ class GuardedSlave(Fmi2Slave):
         except ValueError as error:
             message = f"{self.modelName} cannot be initialised, and every step will be discarded: {error}"
             self.report("initialise", Fmi2Status.error, message)
-            self._looked_at = False
+            self._computed = False
         else:
             self._ready = True
 
@@ -302,7 +302,7 @@ class GuardedSlave(Fmi2Slave):
 
     def _get(self, kind: Kind, references: list[int]) -> list[Any]:
         if self._stale:
-            self._look_ahead()
+            self._compute_outputs()
         names, values, python = self._names[kind], self.values, PYTHON[kind]
         try:
             return [python(values[names[reference]]) for reference in references]
@@ -349,10 +349,10 @@ class GuardedSlave(Fmi2Slave):
             self.report(
                 "set String encoding",
                 Fmi2Status.error,
-                f"{self.modelName}: the texts for value references {[vrs[place] for place in unreadable]} are "
+                f"{self.modelName}: the texts for value references {[vrs[index] for index in unreadable]} are "
                 "not UTF-8, as FMI 2.0 has them, and were taken as empty.",
             )
-        texts = ["" if place in unreadable else values[place] or "" for place in range(len(values))]
+        texts = ["" if index in unreadable else values[index] or "" for index in range(len(values))]
         self._set(Kind.STRING, vrs, texts)
 
     @guarded(lambda vrs: [0.0] * len(vrs))
@@ -410,7 +410,7 @@ class GuardedSlave(Fmi2Slave):
             return
         self._settable = self._inputs if content["initialised"] else self._inputs_and_parameters
         self.values = Held(content["values"], self._view)
-        self._ready, self._looked_at = content["ready"], False
+        self._ready, self._computed = content["ready"], False
         self._initialising = self._stale = not content["initialised"]
 
     def _read_state(self, state: bytes) -> tuple[dict[str, Any], tuple[str, str] | None]:

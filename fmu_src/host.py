@@ -66,7 +66,7 @@ def interpreter() -> str:
     """The Python that runs this, as a command: within another program `sys.executable` may be that program."""
     if Path(sys.executable).name.lower().startswith("python"):
         return sys.executable
-    found = (Path(sys.prefix) / place for place in ("bin/python3", "python.exe"))
+    found = (Path(sys.prefix) / path for path in ("bin/python3", "python.exe"))
     return next((str(path) for path in found if path.is_file()), f"python{LEAST_PYTHON[0]}.{LEAST_PYTHON[1]}")
 
 

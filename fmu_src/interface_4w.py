@@ -21,15 +21,15 @@ PER_SIDE = ("road_class", "road_class_confidence")
 SIDES = ("left", "right")
 WHICH_WHEEL = ("wheel.front", "wheel.left")
 """Parameters of the one-wheel unit that say which wheel it is."""
-PLACES = dict(zip(WHEELS, ("front left", "front right", "rear left", "rear right"), strict=True))
+WHEEL_NAMES = dict(zip(WHEELS, ("front left", "front right", "rear left", "rear right"), strict=True))
 
 
 def _at_each_wheel(variable: Variable) -> Iterator[Variable]:
-    for wheel, place in PLACES.items():
+    for wheel, wheel_name in WHEEL_NAMES.items():
         yield replace(
             variable,
             name=f"{variable.name}.{wheel}",
-            description=f"{_capital(place)} wheel: {variable.description}",
+            description=f"{_capital(wheel_name)} wheel: {variable.description}",
         )
 
 

@@ -28,14 +28,14 @@ def _at_each_wheel(
             Kind.REAL,
             causality,
             "continuous",
-            f"{place[0].upper()}{place[1:]} wheel: {description}",
+            f"{wheel_name[0].upper()}{wheel_name[1:]} wheel: {description}",
             unit,
             0.0 if causality == "input" else None,
             minimum,
             maximum,
             nominal,
         )
-        for wheel, place in WHEELS.items()
+        for wheel, wheel_name in WHEELS.items()
     )
 
 

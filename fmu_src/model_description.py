@@ -99,14 +99,14 @@ def model_description(
     for reference, variable in enumerate(variables):
         _variable(listed, reference, variable, flat)
     structure = SubElement(root, "ModelStructure")
-    outputs = [place for place, v in enumerate(variables, start=1) if v.causality == "output"]
+    outputs = [index for index, v in enumerate(variables, start=1) if v.causality == "output"]
     for group in ("Outputs", "InitialUnknowns"):
         entries = SubElement(structure, group)
         # Within a step outputs stay what the step before has made of the inputs: no input reaches them at once. At the
         # start they depend on the parameters, which is what leaving the attribute out means.
         known = {"dependencies": ""} if group == "Outputs" else {}
-        for place in outputs:
-            SubElement(entries, "Unknown", {"index": str(place), **known})
+        for index in outputs:
+            SubElement(entries, "Unknown", {"index": str(index), **known})
     indent(root)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
 

@@ -130,11 +130,11 @@ def write_archive(target: Path, content: Mapping[str, bytes]) -> Path:
     return target
 
 
-def _module_files(place: str, path: Path) -> dict[str, bytes]:
+def _module_files(target: str, path: Path) -> dict[str, bytes]:
     if path.is_file():
-        return {place: path.read_bytes()}
+        return {target: path.read_bytes()}
     return {
-        f"{place}/{file.relative_to(path).as_posix()}": file.read_bytes()
+        f"{target}/{file.relative_to(path).as_posix()}": file.read_bytes()
         for file in path.rglob("*.py")
         if "__pycache__" not in file.parts
     }
@@ -143,8 +143,8 @@ def _module_files(place: str, path: Path) -> dict[str, bytes]:
 def _resources(slave: Slave) -> dict[str, bytes]:
     here, wrapper = Path(__file__).parent, _folder(pythonfmu)
     files: dict[str, bytes] = {}
-    for place, path in slave.modules.items():
-        files |= {f"resources/{name}": data for name, data in _module_files(place, path).items()}
+    for target, path in slave.modules.items():
+        files |= {f"resources/{name}": data for name, data in _module_files(target, path).items()}
     for name in (*SLAVE_FILES, *slave.files):
         files[f"resources/fmu_src/{name}"] = (here / name).read_bytes()
     for name in PYTHONFMU_FILES:

@@ -50,10 +50,10 @@ def rolling(name: str) -> float | None:
 
 def library(folder: Path, name: str) -> Path:
     """The wrapper of a unit for this platform; raises FileNotFoundError."""
-    place, suffix = PLATFORMS.get(sys.platform, (sys.platform, ".so"))
-    path = folder / "binaries" / place / f"{name}{suffix}"
+    platform, suffix = PLATFORMS.get(sys.platform, (sys.platform, ".so"))
+    path = folder / "binaries" / platform / f"{name}{suffix}"
     if not path.is_file():
-        raise FileNotFoundError(f"the unit holds no library for this platform ({place})")
+        raise FileNotFoundError(f"the unit holds no library for this platform ({platform})")
     return path
 
 
@@ -68,7 +68,7 @@ class Instance:
         self.scalars = [(s.attrib, s[0].tag) for s in root.iter("ScalarVariable")]
         self.log: list[str] = []
         self._dll = ctypes.CDLL(str(library(folder, simulation.attrib["modelIdentifier"])))
-        self._callbacks = _Callbacks(_LOGGER(self._told), _ALLOCATE(0), _FREE(0), None, None)
+        self._callbacks = _Callbacks(_LOGGER(self._log_message), _ALLOCATE(0), _FREE(0), None, None)
         instantiate = self._dll.fmi2Instantiate
         instantiate.restype = _POINTER
         resources = (folder.resolve() / "resources").as_uri().encode()
@@ -86,7 +86,7 @@ class Instance:
         if not self._component:
             raise RuntimeError("fmi2Instantiate gave no instance")
 
-    def _told(self, _: int, __: bytes, ___: int, ____: bytes, message: bytes) -> None:
+    def _log_message(self, _: int, __: bytes, ___: int, ____: bytes, message: bytes) -> None:
         self.log.append(message.decode("utf-8", "replace").replace("%%", "%"))
 
     def call(self, name: str, *arguments: Any) -> None:

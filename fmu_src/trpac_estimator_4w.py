@@ -20,8 +20,8 @@ from .guarded_slave import Value
 from .interface_4w import TRPAC_ESTIMATOR_4W
 
 _OF_WHEEL = {
-    f"{name}.{wheel}": (place, of_estimate)
-    for place, wheel in enumerate(WHEELS)
+    f"{name}.{wheel}": (index, of_estimate)
+    for index, wheel in enumerate(WHEELS)
     for name, of_estimate in OF_ESTIMATE.items()
 }
 _OF_CAR = {"TRPAC.vehicle": attrgetter("TRPAC"), "TRPAC_std.vehicle": attrgetter("TRPAC_std")}
@@ -74,8 +74,8 @@ class TrpacEstimator4W(CameraSlave):
         if name in _OF_CAR:
             of_car: Value = _OF_CAR[name](estimate)
             return of_car
-        place, of_estimate = _OF_WHEEL[name]
-        of_wheel: Value = of_estimate(estimate.wheels[place])
+        index, of_estimate = _OF_WHEEL[name]
+        of_wheel: Value = of_estimate(estimate.wheels[index])
         return of_wheel
 
     def problems(self, estimate: CarEstimate) -> Iterable[tuple[str, str]]:

@@ -16,8 +16,8 @@ from .packaging import Slave
 
 ROOT = Path(__file__).parent.parent
 CORE_FILES = {
-    place: ROOT / place
-    for place in (
+    path: ROOT / path
+    for path in (
         "trpac_core/__init__.py",
         "trpac_core/errors.py",
         "trpac_core/files.py",
@@ -102,7 +102,7 @@ UNITS = {
         modules={
             "scenarios/plant/__init__.py": Path(__file__).parent / "carried_plant.py",
             **CORE_FILES,
-            **{place: ROOT / place for place in PLANT_MODULES},
+            **{path: ROOT / path for path in PLANT_MODULES},
         },
         packages=PLANT_PACKAGES,
         resources=(),

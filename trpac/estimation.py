@@ -252,7 +252,7 @@ class Estimator:
             frame = RoadClass(Surface(known.index(road_class)), road_class_confidence)
         elif image is not None and not self._estimator.sees:
             raise TrpacError("image is given and no camera: Estimator(vehicle, camera=...) has one.")
-        said = self._estimator.step(
+        estimate = self._estimator.step(
             t - before_s,
             Sensors(
                 wheel_speed,
@@ -266,22 +266,22 @@ class Estimator:
             frame,
         )
         self._time_s = t
-        if said.problem:
-            why = said.problem
-        elif said.excitation_flag:
+        if estimate.problem:
+            why = estimate.problem
+        elif estimate.excitation_flag:
             why = "The tyre slips enough to show the road."
-        elif said.flag:
+        elif estimate.flag:
             why = "The tyre does not slip enough; the camera's class of the road is used."
         else:
             why = "The tyre does not slip enough: the estimate holds what it had."
         return Estimate(
-            theta=said.TRPAC,
-            std=said.TRPAC_std,
-            peak=said.TRPAC_peak,
-            flag=bool(said.flag),
-            K_v=said.K_v,
-            excited=bool(said.excitation_flag),
-            slip=said.slip,
-            tyre_force_n=said.tyre_force_n,
+            theta=estimate.TRPAC,
+            std=estimate.TRPAC_std,
+            peak=estimate.TRPAC_peak,
+            flag=bool(estimate.flag),
+            K_v=estimate.K_v,
+            excited=bool(estimate.excitation_flag),
+            slip=estimate.slip,
+            tyre_force_n=estimate.tyre_force_n,
             why=why,
         )

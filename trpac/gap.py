@@ -13,7 +13,7 @@ from scenarios.files import RoadFile, VehicleFile
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
 from sim2real.result import Cause, Gap, Place, Verdict, needed
-from sim2real.result import Diagnosis as Said
+from sim2real.result import Diagnosis as Result
 from trpac.extras import extras
 from trpac.files import Vehicle, read_log, the_road, the_vehicle
 from trpac.progress import Told, silent
@@ -23,12 +23,12 @@ AnyLog = Log | pd.DataFrame | str | Path
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """What a diagnosis says; `said` has all of it."""
+    """What a diagnosis says; `result` has all of it."""
 
-    said: Said
+    result: Result
 
     def __repr__(self) -> str:
-        return f"Diagnosis {self.verdict}: {self.said.sentence}"
+        return f"Diagnosis {self.verdict}: {self.result.sentence}"
 
     def _repr_html_(self) -> str:
         rows = [(c.effect, c.probability, c.gap_after, c.shrink_percent.value) for c in self.causes]
@@ -39,22 +39,22 @@ class Diagnosis:
     @property
     def verdict(self) -> Verdict:
         """The outcome in a word: identified, ambiguous, compound, unknown or no_gap."""
-        return self.said.verdict
+        return self.result.verdict
 
     @property
     def causes(self) -> tuple[Cause, ...]:
         """The candidates, likeliest first."""
-        return self.said.causes
+        return self.result.causes
 
     @property
     def gap(self) -> Gap:
         """The gap on the hold-out before and after, in noise floors."""
-        return self.said.gap
+        return self.result.gap
 
     @property
     def where(self) -> tuple[Place, ...]:
         """Where the gap lies: signal, subsystem, regime and time."""
-        return self.said.where
+        return self.result.where
 
     def apply_to(self, vehicle: VehicleFile) -> Vehicle:
         """The car with the effects that the verdict names, ready for `simulate`; as it was where it names none."""
@@ -64,20 +64,20 @@ class Diagnosis:
         return car.with_effects(
             [
                 form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()})
-                for c in needed(self.said)
+                for c in needed(self.result)
             ]
         )
 
     def to_json(self) -> dict[str, Any]:
         """What diagnosis.json holds."""
-        return self.said.to_json()
+        return self.result.to_json()
 
     def to_html(self, path: str | Path) -> Path:
         """Write the report; returns its path."""
         with extras("to_html", "gap"):
             from sim2real.telling.report import rated, render
 
-            Path(path).write_text(render(rated(self.said)), encoding="utf-8")
+            Path(path).write_text(render(rated(self.result)), encoding="utf-8")
         return Path(path)
 
     def write(self, folder: str | Path) -> tuple[Path, Path]:
@@ -85,7 +85,7 @@ class Diagnosis:
         with extras("write", "gap"):
             from sim2real.telling.report import rated, write_diagnosis
 
-            return write_diagnosis(rated(self.said), folder)
+            return write_diagnosis(rated(self.result), folder)
 
 
 def diagnose(

@@ -48,12 +48,12 @@ def bars() -> Iterator[Told]:
     with Progress(named, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()) as shown:
         tasks: dict[str, TaskID] = {}
 
-        def told(stage: str, done: int, total: int) -> None:
+        def progress(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
                 tasks[stage] = shown.add_task(stage, total=total)
             shown.update(tasks[stage], completed=done, total=total)
 
-        yield told
+        yield progress
 
 
 def require_folder(command: str, out: Path) -> None:

@@ -34,7 +34,7 @@ app.command()(hil)
 app.command("hil-plant")(hil_plant)
 
 
-def _tell_version(asked: bool) -> None:
+def _print_version(asked: bool) -> None:
     if asked:
         print(f"trpac {version('trpac-fmu')}")
         raise typer.Exit
@@ -42,9 +42,9 @@ def _tell_version(asked: bool) -> None:
 
 @app.callback()
 def _root(
-    told: Annotated[
+    version_asked: Annotated[
         bool,
-        typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and exit."),
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
     ] = False,
 ) -> None:
     """What holds for all commands."""

@@ -54,8 +54,8 @@ def classify(
         files, problems = find_pictures(paths)
         if os.path.realpath(out) in {os.path.realpath(file) for file in files}:
             refuse(command, f"{out}: one of the pictures. Expected the name of a CSV file to write.")
-        with _bar("pictures") as told:
-            table, unusable = classify_pictures(files, told)
+        with _bar("pictures") as progress:
+            table, unusable = classify_pictures(files, progress)
         problems += unusable
         if table.empty:
             refuse(command, _listed("nothing to classify", problems))
@@ -92,8 +92,8 @@ def run(
     require_folder(command, out)
     try:
         found = Frames.find(frames)
-        with _bar("frames") as told:
-            drive = run_frames(found, camera, speed_m_s, fps, out, told)
+        with _bar("frames") as progress:
+            drive = run_frames(found, camera, speed_m_s, fps, out, progress)
     except (ScenarioError, ModelError, OSError) as error:
         refuse(command, error)
     _show(drive)

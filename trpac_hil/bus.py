@@ -13,7 +13,7 @@ from can.interfaces import BACKENDS
 
 from trpac_core.files import quoted
 from trpac_hil.errors import HilError
-from trpac_hil.inputs import Say
+from trpac_hil.inputs import ReportEvent
 
 RETRY_S = 0.5
 """Pause between attempts to open a lost bus anew [s]."""
@@ -72,13 +72,15 @@ class Link:
     ----------
     open_bus : callable
         Opens the bus, or raises one of `BUS_ERRORS`.
-    say : callable
+    report : callable
         Told when the bus is lost and when it is back.
     """
 
-    def __init__(self, open_bus: Callable[[], can.BusABC], say: Say, retry_s: float = RETRY_S) -> None:
+    def __init__(
+        self, open_bus: Callable[[], can.BusABC], report: ReportEvent, retry_s: float = RETRY_S
+    ) -> None:
         """Open the bus; raises HilError where it cannot be opened at the start."""
-        self._open, self._say, self._retry_s = open_bus, say, retry_s
+        self._open, self._report, self._retry_s = open_bus, report, retry_s
         self.losses = self.unsent = self.error_frames = self.garbled = self.backlogs = 0
         self._found: can.BusABC | None = None
         self._closing = threading.Event()
@@ -124,7 +126,7 @@ class Link:
 
     def _leave_aside(self, why: object) -> None:
         self.garbled += 1
-        self._say(
+        self._report(
             "garbled",
             f"What came is no CAN message and was left aside ({quoted(why)}). "
             "Something else sends to the bus's address; give the bus one of its own.",
@@ -148,7 +150,7 @@ class Link:
         except can.CanOperationError as error:
             # A full transmit buffer is no lost bus: nobody acknowledges, or too much is sent.
             self.unsent += 1
-            self._say("unsent", f"A message could not be sent: {quoted(error)}")
+            self._report("unsent", f"A message could not be sent: {quoted(error)}")
             return False
         except BUS_ERRORS as error:
             self.unsent += 1
@@ -170,7 +172,7 @@ class Link:
 
     def _lose(self, why: str) -> None:
         self.losses += 1
-        self._say(
+        self._report(
             "bus lost", f"The bus was lost ({why}). TRPAC is held with flag 0; trying to open it again."
         )
         lost, self._bus = self._bus, None
@@ -191,7 +193,7 @@ class Link:
     def _back(self) -> can.BusABC | None:
         if self._found is not None:
             self._bus, self._found = self._found, None
-            self._say("bus back", "The bus is back.")
+            self._report("bus back", "The bus is back.")
         return self._bus
 
     def close(self) -> None:

@@ -29,7 +29,7 @@ FAILED = -1.0
 MOTION = ("speed_m_s", "acceleration_m_s2", "steering_angle_rad", "yaw_rate_rad_s", "way_m")
 """What the loop shares of the car's motion; the yaw rate is NaN where it is not measured."""
 HEAD = 5
-"""Numbers of a result before the verdicts: picture, time taken, time ready [ns], pictures left out, work [ms]."""
+"""Numbers of a result before the classes: picture, time taken, time ready [ns], pictures left out, work [ms]."""
 RESULTS_KEPT = 64
 LONGEST_SLEEP_NS = 50_000_000
 
@@ -48,7 +48,7 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True)
-class Folder:
+class PictureFolder:
     """Pictures of a folder, over and over again."""
 
     files: tuple[Path, ...]
@@ -87,7 +87,7 @@ class CameraJob:
 
 
 @dataclass
-class Eyes:
+class ImageEstimator:
     """The image estimator of one side or of both, with its memory."""
 
     job: CameraJob
@@ -108,8 +108,8 @@ class Eyes:
             side: Any = job.sides[0]
             self._ife, self.state = Ife(replace(config, side=side), *networks), IfeState()
 
-    def look(self, image: NDArray[np.uint8], motion: Motion) -> Sequence[FrameResult]:
-        """Verdicts of a picture; raises ImageError or ModelError, and then nothing is remembered."""
+    def process(self, image: NDArray[np.uint8], motion: Motion) -> Sequence[FrameResult]:
+        """Results of a picture, one per side; raises ImageError or ModelError, and then nothing is remembered."""
         self.state, *results = self._ife.process(self.state, image, motion)
         return results
 
@@ -120,24 +120,26 @@ def motion_of(numbers: Sequence[float]) -> Motion:
     return Motion(speed, acceleration, steering, None if math.isnan(yaw) else yaw, way)
 
 
-def watch(job: CameraJob, motion: Numbers, results: Ring, control: Control) -> None:
+def run_camera(job: CameraJob, motion: Numbers, results: Ring, control: Control) -> None:
     """Body of the process: take each picture when it is due, and share what it shows; ends with the loop."""
     with helper(job.core):
         cv2.setNumThreads(1)
         try:
-            eyes = Eyes(job)
+            estimator = ImageEstimator(job)
             first = job.source.picture(0)
-            eyes.look(first, Motion(10.0))
+            estimator.process(first, Motion(10.0))
         except (ModelError, ImageError) as error:
             control.refuse(str(error))
             return
-        eyes.state = type(eyes.state)()
+        estimator.state = type(estimator.state)()
         control.ready()
         if control.wait_for_start():
-            _play(job, eyes, motion, results, control)
+            _play(job, estimator, motion, results, control)
 
 
-def _play(job: CameraJob, eyes: Eyes, motion: Numbers, results: Ring, control: Control) -> None:
+def _play(
+    job: CameraJob, estimator: ImageEstimator, motion: Numbers, results: Ring, control: Control
+) -> None:
     clock = SystemClock()
     deadlines = Deadlines(control.start_ns, round(1e9 / job.fps))
     done, left_out = -1, 0
@@ -151,18 +153,20 @@ def _play(job: CameraJob, eyes: Eyes, motion: Numbers, results: Ring, control: C
         number = deadlines.next_slot(done, now_ns)
         left_out += number - done - 1
         done = number
-        verdicts = _verdicts(job, eyes, number, motion, control)
+        classes = _classes(job, estimator, number, motion, control)
         ready_ns = clock.now_ns()
         work_ms = (ready_ns - now_ns) * 1e-6
-        results.write([number, deadlines.due_ns(number), ready_ns, left_out, work_ms, *verdicts])
+        results.write([number, deadlines.due_ns(number), ready_ns, left_out, work_ms, *classes])
 
 
-def _verdicts(job: CameraJob, eyes: Eyes, number: int, motion: Numbers, control: Control) -> list[float]:
+def _classes(
+    job: CameraJob, estimator: ImageEstimator, number: int, motion: Numbers, control: Control
+) -> list[float]:
     moving = motion_of(motion.get())
     try:
-        seen = eyes.look(job.source.picture(number), moving)
+        seen = estimator.process(job.source.picture(number), moving)
     except (ImageError, ModelError) as error:
-        control.tell("picture", f"A picture could not be used: {error}")
+        control.send("picture", f"A picture could not be used: {error}")
         return [FAILED, 0.0] * len(job.sides)
     return [
         number

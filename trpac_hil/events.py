@@ -20,22 +20,22 @@ class Events:
 
     Parameters
     ----------
-    tell : callable
+    show : callable
         Given the time [s] and the sentence of a kind's first event.
     now_s : callable
         Time since the start [s].
     """
 
-    def __init__(self, tell: Callable[[float, str], None], now_s: Callable[[], float]) -> None:
+    def __init__(self, show: Callable[[float, str], None], now_s: Callable[[], float]) -> None:
         self.kinds: dict[str, Event] = {}
-        self._tell, self._now_s = tell, now_s
+        self._show, self._now_s = show, now_s
 
-    def say(self, kind: str, text: str) -> None:
+    def report(self, kind: str, text: str) -> None:
         """An event happened."""
         known = self.kinds.get(kind)
         if known is None:
             self.kinds[kind] = Event(self._now_s(), text)
-            self._tell(self.kinds[kind].time_s, text)
+            self._show(self.kinds[kind].time_s, text)
         else:
             known.count += 1
 

@@ -34,7 +34,7 @@ class Control:
     def __init__(self, name: str) -> None:
         self.name = name
         self._numbers = Numbers(2)
-        self._said: SimpleQueue[tuple[str, Any]] = CONTEXT.SimpleQueue()
+        self._messages: SimpleQueue[tuple[str, Any]] = CONTEXT.SimpleQueue()
         self._parent_seen_s = 0.0
 
     # The loop's side
@@ -43,8 +43,8 @@ class Control:
         """Wait until the process can begin; raises HilError where it cannot."""
         end_s = time.monotonic() + START_TIMEOUT_S
         while time.monotonic() < end_s:
-            if not self._said.empty():
-                kind, text = self._said.get()
+            if not self._messages.empty():
+                kind, text = self._messages.get()
                 if kind == "ready":
                     return
                 raise HilError(str(text))
@@ -63,27 +63,27 @@ class Control:
 
     def heard(self) -> list[tuple[str, Any]]:
         """What the process has said since: kind and text."""
-        said = []
+        messages = []
         try:
-            while not self._said.empty():
-                said.append(self._said.get())
+            while not self._messages.empty():
+                messages.append(self._messages.get())
         except (EOFError, OSError, queue.Empty):
-            return said
-        return said
+            return messages
+        return messages
 
     # The process's side
 
     def ready(self) -> None:
         """Say that the clock may start."""
-        self._said.put(("ready", ""))
+        self._messages.put(("ready", ""))
 
     def refuse(self, text: str) -> None:
         """Say why the process cannot begin."""
-        self._said.put(("refused", text))
+        self._messages.put(("refused", text))
 
-    def tell(self, kind: str, content: Any) -> None:
+    def send(self, kind: str, content: Any) -> None:
         """Say something to the loop's side."""
-        self._said.put((kind, content))
+        self._messages.put((kind, content))
 
     def wait_for_start(self) -> bool:
         """Wait for the start; False if it was called off."""

@@ -29,7 +29,7 @@ OVERFULL = 1.1
 """How far beyond what is too much both are counted on [-]: so it ends soon after the second sender."""
 HELD_NS = 1_000_000_000
 """For how long after the last sign of a second sender its message is not believed [ns]."""
-Say = Callable[[str, str], None]
+ReportEvent = Callable[[str, str], None]
 """Told a kind of event and a sentence; each kind is said once."""
 
 
@@ -55,7 +55,7 @@ class Senders:
     _orderly: int = 0
     _at_ns: int = 0
 
-    def look(self, at_ns: int, went_on: bool, odd: bool) -> str:
+    def count(self, at_ns: int, went_on: bool, odd: bool) -> str:
         """Count a message; returns what gives a second sender away when there begins to be one, else "".
 
         `went_on` is whether the counter went on by one, and `odd` whether it is where one sender's never is.
@@ -133,19 +133,21 @@ class Inputs:
         Messages.
     names : tuple of str
         Those that are listened to.
-    say : callable
+    report : callable
         Told what is wrong with messages.
     counters : bool
         Whether a message whose counter stands still is old news; False for senders that do not count.
     """
 
-    def __init__(self, codec: Codec, names: tuple[str, ...], say: Say, counters: bool = True) -> None:
+    def __init__(
+        self, codec: Codec, names: tuple[str, ...], report: ReportEvent, counters: bool = True
+    ) -> None:
         self.heard: Mapping[str, Heard] = {
             name: Heard(codec[name], Senders(codec[name].cycle_ns)) for name in names
         }
         self._by_id = {key: self.heard[c.message.name] for key, c in codec.by_id(names).items()}
         self._message_of = {signal: h for h in self.heard.values() for signal in h.coded.signals}
-        self._say, self._counters = say, counters
+        self._report, self._counters = report, counters
 
     def take(self, frame_id: int, extended: bool, data: bytes, at_ns: int) -> str:
         """Take a message in; returns its name if it brought something new, else "".
@@ -161,7 +163,7 @@ class Inputs:
             values, count = heard.coded.decode(data)
         except ValueError as error:
             heard.broken += 1
-            self._say(f"broken {name}", f"A message was left aside: {quoted(error)}")
+            self._report(f"broken {name}", f"A message was left aside: {quoted(error)}")
             return ""
         ahead, went_on, odd = 1, False, False
         if self._counters and count >= 0 and heard.count >= 0:
@@ -170,16 +172,16 @@ class Inputs:
             # Of two senders one's counts run back behind the other's, or are the other's with another content.
             odd = 2 * ahead > heard.coded.counts or (ahead == 0 and heard.new and data != heard.data)
         heard.new = ahead > 0
-        seen = heard.senders.look(at_ns, went_on, odd)
+        seen = heard.senders.count(at_ns, went_on, odd)
         if seen:
-            self._say(
+            self._report(
                 f"two senders {name}",
                 f"{name}: {seen}, so two devices send it. TRPAC is held with flag 0 until "
                 f"{HELD_NS * 1e-9:g} s after the last sign of it. Take one off the bus, or correct its cycle time.",
             )
         if ahead == 0:
             heard.frozen += 1
-            self._say(
+            self._report(
                 f"frozen {name}",
                 f"{name}: its counter stood still at {count}, so the message is old news. "
                 "A sender that does not count needs --no-counters.",

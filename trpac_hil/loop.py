@@ -9,15 +9,15 @@ from typing import Protocol
 
 import can
 
+from trpac_hil.camera_input import CameraInput
 from trpac_hil.codec import Codec
 from trpac_hil.deadlines import SPIN_NS, Clock, Deadlines, WallWatch, wait_until
 from trpac_hil.delays import Delays
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
-from trpac_hil.placing import Odometer
+from trpac_hil.preview_stamps import Odometer
 from trpac_hil.records import AGED, LOGGED
 from trpac_hil.shared import Ring
-from trpac_hil.sight import Sight
 from trpac_hil.unit import Estimates, Wiring
 
 HEALTH_EVERY_NS = 100_000_000
@@ -99,7 +99,7 @@ class Loop:
         Time, and when each cycle is due.
     bus, unit, codec, inputs : Bus, SteppedUnit, Codec, Inputs
         What is read, stepped and sent.
-    sight : Sight
+    camera_input : CameraInput
         Results of pictures.
     ring : Ring
         Where each cycle's row goes.
@@ -119,7 +119,7 @@ class Loop:
         unit: SteppedUnit,
         codec: Codec,
         inputs: Inputs,
-        sight: Sight,
+        camera_input: CameraInput,
         ring: Ring,
         events: Events,
         delays: Delays,
@@ -129,7 +129,7 @@ class Loop:
         self.counts, self.odometer = Counts(), Odometer()
         self._clock, self._deadlines, self._spin_ns = clock, deadlines, spin_ns
         self._bus, self._unit, self._codec, self._inputs = bus, unit, codec, inputs
-        self._sight, self._ring, self._events, self._check = sight, ring, events, check
+        self._camera_input, self._ring, self._events, self._check = camera_input, ring, events, check
         self._delays = delays
         self._wall = WallWatch(clock)
         self._polled_ns = clock.now_ns()
@@ -179,13 +179,13 @@ class Loop:
         fresh = self._receive(began_ns)
         values = self._snapshot(began_ns)
         self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
-        sight = self._sight
-        sight.share_motion(self.odometer, values)
+        camera_input = self._camera_input
+        camera_input.share_motion(self.odometer, values)
         heard, doubted = self._inputs.heard["RoadClass"], self._inputs.doubted(began_ns)
-        if sight.news(
-            heard, "RoadClass" in fresh, "RoadClass" in doubted, self.odometer, began_ns, self._events.say
+        if camera_input.news(
+            heard, "RoadClass" in fresh, "RoadClass" in doubted, self.odometer, began_ns, self._events.report
         ):
-            self._unit.give_class(sight.classes, sight.number)
+            self._unit.give_class(camera_input.classes, camera_input.number)
         readings = self._readings(values)
         unit_began_ns = self._clock.now_ns()
         step_s = (slot - self._unit_slot) * self._deadlines.period_ns * 1e-9
@@ -199,7 +199,7 @@ class Loop:
         if status != RUNNING:
             estimates = estimates.held()
         self._send_estimate(estimates, status)
-        self._look_after(began_ns)
+        self._check_and_send_health(began_ns)
         ended_ns, cpu_ns = self._clock.now_ns(), self._clock.cpu_ns() - cpu_began_ns
         missed_ns = max(0, self._deadlines.missed_by_ns(slot, ended_ns))
         self._count(missed_ns, cpu_ns, status)
@@ -232,12 +232,12 @@ class Loop:
             here = 0 <= age_ns <= limit_ns
             if self._fresh.get(name, False) and not here:
                 self.counts.lost[name] = self.counts.lost.get(name, 0) + 1
-                self._events.say(
+                self._events.report(
                     f"lost {name}",
                     f"{name}: none for more than {limit_ns * 1e-6:g} ms. TRPAC is held with flag 0 until it is back.",
                 )
             elif here and not self._fresh.get(name, True):
-                self._events.say(f"back {name}", f"{name} is back.")
+                self._events.report(f"back {name}", f"{name} is back.")
             if here or name in self._fresh:
                 self._fresh[name] = here
         return values
@@ -256,7 +256,7 @@ class Loop:
             return HELD_BUS
         if estimates is None:
             self.counts.discarded += 1
-            self._events.say(
+            self._events.report(
                 "discarded",
                 "The unit discarded a step: the last estimate is held with flag 0, and the loop goes on.",
             )
@@ -299,7 +299,7 @@ class Loop:
         self._sent[name] += 1
         self._bus.send(coded.message.frame_id, coded.message.is_extended_frame, data)
 
-    def _look_after(self, now_ns: int) -> None:
+    def _check_and_send_health(self, now_ns: int) -> None:
         """What needs no look in every cycle."""
         if now_ns >= self._next_check_ns:
             self._next_check_ns = now_ns + CHECK_EVERY_NS
@@ -308,13 +308,13 @@ class Loop:
             jump_ns = self._wall.jump_ns()
             if jump_ns:
                 self.counts.clock_jumps += 1
-                self._events.say(
+                self._events.report(
                     "clock jump",
                     f"The wall clock was set by {jump_ns * 1e-9:+.3f} s. The loop runs by another clock and goes on.",
                 )
         if now_ns >= self._next_health_ns:
             self._next_health_ns = now_ns + HEALTH_EVERY_NS
-            picture_ms = self._sight.picture_age_ms(now_ns)
+            picture_ms = self._camera_input.picture_age_ms(now_ns)
             ages_ns = [self._inputs.age_ns(name, now_ns) for name in REQUIRED_MESSAGES]
             self._send(
                 "Health",
@@ -349,16 +349,16 @@ class Loop:
         now_ns: int,
     ) -> None:
         """The cycle's row, in the order of `trpac_hil.records.columns`."""
-        age_ns, sight = self._inputs.age_ns, self._sight
+        age_ns, camera_input = self._inputs.age_ns, self._camera_input
         self._ring.write(
             [
                 slot * self._deadlines.period_ns * 1e-9,
                 step_s,
                 self.odometer.position_m,
                 *(values[signal] for signal in LOGGED.values()),
-                sight.number,
-                *(surface for surface, _ in sight.classes),
-                *(Q_v for _, Q_v in sight.classes),
+                camera_input.number,
+                *(surface for surface, _ in camera_input.classes),
+                *(Q_v for _, Q_v in camera_input.classes),
                 estimates.TRPAC,
                 estimates.TRPAC_std,
                 estimates.K_v,
@@ -372,7 +372,7 @@ class Loop:
                 left_out,
                 self.counts.overruns,
                 *(age * 1e-6 if (age := age_ns(name, now_ns)) >= 0 else NAN for name in AGED),
-                sight.picture_age_ms(now_ns),
-                sight.age_under_wheel_ms(now_ns),
+                camera_input.picture_age_ms(now_ns),
+                camera_input.age_under_wheel_ms(now_ns),
             ]
         )

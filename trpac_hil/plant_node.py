@@ -15,10 +15,10 @@ from scenarios.files import SensorNoise, load_scenario
 from scenarios.library import shipped
 from trpac_core.vehicle import WHEELS
 from trpac_hil.bus import BUS_ERRORS, BusSettings, Link
+from trpac_hil.bus_relay import RelayedBus
 from trpac_hil.codec import DBC_FILE, Codec, load_codec
 from trpac_hil.deadlines import Clock, Deadlines, SystemClock, wait_until
 from trpac_hil.driver import EndlessDrive
-from trpac_hil.ferry import Wire
 from trpac_hil.helper import Control, helper
 from trpac_hil.realtime import raise_priority
 from trpac_hil.shared import Ring
@@ -32,7 +32,7 @@ CONFIDENCE = 0.9
 
 
 @dataclass(frozen=True)
-class PartnerJob:
+class PlantJob:
     """What the plant on the bus needs to know.
 
     Attributes
@@ -70,10 +70,10 @@ class _Picture:
     classes: tuple[int, int]
 
 
-class Partner:
+class PlantNode:
     """The plant with its sensors and its camera, and the messages that they send. Raises ScenarioError, HilError."""
 
-    def __init__(self, job: PartnerJob, open_link: Callable[[], Any], clock: Clock) -> None:
+    def __init__(self, job: PlantJob, open_link: Callable[[], Any], clock: Clock) -> None:
         scenario = load_scenario(job.scenario)
         self.drive = EndlessDrive(scenario, 1.0 / job.rate_hz)
         self.left_out = 0
@@ -166,16 +166,18 @@ class Partner:
         self._link.send(message.frame_id, message.is_extended_frame, coded.encode(values, count))
 
 
-def open_partner(job: PartnerJob, say: Callable[[str, str], None], wire: Ring | None = None) -> Partner:
+def open_plant_node(job: PlantJob, report: Callable[[str, str], None], wire: Ring | None = None) -> PlantNode:
     """The plant with its end of the bus, or of a wire to it; raises ScenarioError and HilError."""
-    return Partner(job, lambda: Link(job.bus.open, say) if wire is None else Wire(wire), SystemClock())
+    return PlantNode(
+        job, lambda: Link(job.bus.open, report) if wire is None else RelayedBus(wire), SystemClock()
+    )
 
 
-def play(job: PartnerJob, wire: Ring | None, control: Control) -> None:
+def play(job: PlantJob, wire: Ring | None, control: Control) -> None:
     """Body of a process that drives beside the loop, and ends with it; without a wire it opens the bus itself."""
     with helper(job.core):
         try:
-            partner = open_partner(job, control.tell, wire)
+            node = open_plant_node(job, control.send, wire)
         except (ScenarioError, *BUS_ERRORS) as error:
             control.refuse(str(error))
             return
@@ -183,5 +185,5 @@ def play(job: PartnerJob, wire: Ring | None, control: Control) -> None:
             raise_priority()
         control.ready()
         if control.wait_for_start():
-            partner.run(control.start_ns, lambda: control.stopped)
-        partner.close()
+            node.run(control.start_ns, lambda: control.stopped)
+        node.close()

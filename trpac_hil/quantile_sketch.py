@@ -12,7 +12,7 @@ LEAST, GREATEST, RATIO = 1e-3, 1e9, 1.005
 _BINS = math.ceil(math.log(GREATEST / LEAST) / math.log(RATIO)) + 2
 
 
-class Spread:
+class QuantileSketch:
     """Counts of values at or above 0; others count as 0. NaN is no value."""
 
     def __init__(self) -> None:

@@ -90,14 +90,14 @@ def as_before() -> Iterator[None]:
             os.sched_setaffinity(0, cores)
 
 
-def loop_core(told: int | None, realtime: bool) -> int | None:
+def loop_core(asked: int | None, realtime: bool) -> int | None:
     """The loop's core: as told; with real-time priority else the last one, where the rest has another.
 
     Linux takes the processor from real-time threads for up to 50 ms in a second where ordinary work waits on their core
     (sched_rt_runtime_us, since 6.12 the fair server), so the loop must not share its core with any.
     """
-    if told is not None or not realtime or not hasattr(os, "sched_getaffinity"):
-        return told
+    if asked is not None or not realtime or not hasattr(os, "sched_getaffinity"):
+        return asked
     cores = os.sched_getaffinity(0)
     return max(cores) if len(cores) > 1 else None
 

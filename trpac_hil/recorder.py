@@ -52,7 +52,7 @@ class RecorderJob:
     core: int | None = None
 
 
-def record(job: RecorderJob, ring: Ring, control: Control, words: Any) -> None:
+def record(job: RecorderJob, ring: Ring, control: Control, event_queue: Any) -> None:
     """Body of the process: drain the ring until the loop ends, then finish the log and hand the figures back."""
     with helper(job.core):
         figures, log = Figures(job.columns), _open(job, control)
@@ -65,19 +65,19 @@ def record(job: RecorderJob, ring: Ring, control: Control, words: Any) -> None:
                     rows = ring.read()
                     figures.add(rows)
                     log = _kept(log, rows, control)
-                    screen.show(figures, _words(words))
+                    screen.show(figures, _new_events(event_queue))
                     if not over:
                         time.sleep(EVERY_S)
-            screen.show(figures, _words(words))
+            screen.show(figures, _new_events(event_queue))
         written = _finished(log, control)
-        control.tell("done", {"figures": figures.summary(), "log_rows": written, "rows_lost": ring.lost})
+        control.send("done", {"figures": figures.summary(), "log_rows": written, "rows_lost": ring.lost})
 
 
-def _words(words: Any) -> list[tuple[float, str]]:
-    said = []
-    while not words.empty():
-        said.append(words.get())
-    return said
+def _new_events(event_queue: Any) -> list[tuple[float, str]]:
+    texts = []
+    while not event_queue.empty():
+        texts.append(event_queue.get())
+    return texts
 
 
 def _open(job: RecorderJob, control: Control) -> MdfLog | None:
@@ -98,7 +98,7 @@ def _kept(log: MdfLog | None, rows: NDArray[np.float64], control: Control) -> Md
         log.add(rows)
     except OSError as error:
         log.drop()
-        control.tell(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
+        control.send(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
         print(f"trpac hil: {log.path}: the log cannot be written ({error}).", file=sys.stderr)
         return None
     return log
@@ -114,12 +114,12 @@ def _finished(log: MdfLog | None, control: Control) -> int:
     try:
         log.finish()
     except OSError as error:
-        control.tell(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
+        control.send(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
         return 0
     return log.rows
 
 
 def _screen(job: RecorderJob) -> Any:
-    from trpac_hil.screen import Lines, Screen  # rich takes a moment, and tests need it not
+    from trpac_hil.screen import EventLines, Screen  # rich takes a moment, and tests need it not
 
-    return Screen(job.title) if job.live else Lines()
+    return Screen(job.title) if job.live else EventLines()

@@ -9,7 +9,7 @@ from pathlib import Path
 from trpac_hil.bus import BusSettings
 from trpac_hil.codec import DBC_FILE
 from trpac_hil.deadlines import SPIN_NS
-from trpac_hil.plant_node import PartnerJob
+from trpac_hil.plant_node import PlantJob
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class HilSettings:
     frames: Path | None = None
     fps: float = 20.0
     parameters: Mapping[str, float] = field(default_factory=dict)
-    plant: PartnerJob | None = None
+    plant: PlantJob | None = None
     log: bool = True
     counters: bool = True
     live: bool = False

@@ -68,13 +68,13 @@ class Wiring:
     @classmethod
     def of_one(cls, wheel: str) -> Wiring:
         """The unit of one wheel, wired to that wheel's signals."""
-        place = wheel.upper()
+        suffix = wheel.upper()
         required = {
-            "wheel_speed": f"WheelSpeed_{place}",
-            "wheel_torque": f"WheelTorque_{place}",
+            "wheel_speed": f"WheelSpeed_{suffix}",
+            "wheel_torque": f"WheelTorque_{suffix}",
             "vehicle_speed": "VehicleSpeed",
         }
-        optional = {"vertical_load": f"VerticalLoad_{place}", **_OF_THE_CAR}
+        optional = {"vertical_load": f"VerticalLoad_{suffix}", **_OF_THE_CAR}
         side = "left" if wheel.endswith("l") else "right"
         return cls((wheel,), required, optional, (("road_class", "road_class_confidence"),), (side,))
 

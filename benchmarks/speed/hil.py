@@ -25,7 +25,7 @@ from scenarios.pictures import PictureJob, draw
 from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock, wait_until
 from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.loop import LONG_NS
-from trpac_hil.plant_node import PLAIN_SCENARIO, PartnerJob
+from trpac_hil.plant_node import PLAIN_SCENARIO, PlantJob
 from trpac_hil.realtime import loop_core, pin, raise_priority, undisturbed
 from trpac_hil.rig import run_hil
 from trpac_hil.settings import HilSettings
@@ -107,7 +107,7 @@ def main() -> None:
             frames=options.frames or pictures(folder / "frames"),
             camera=Path("scenarios/cameras/paper.yaml"),
             fps=options.fps,
-            plant=PartnerJob(camera_fps=0.0),
+            plant=PlantJob(camera_fps=0.0),
             realtime=options.realtime,
             core=options.core,
             log=not options.no_log,

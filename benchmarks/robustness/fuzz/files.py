@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from fmu_src.doctor import State, UnusableError, look_at_file
+from fmu_src.doctor import State, UnusableError, examine_file
 from fmu_src.units import ROOT
 from scenarios.library import networks_folder
 
@@ -263,7 +263,7 @@ class ProblemFoundError(Exception):
 
 def _examine(path: Path) -> Any:
     """What a unit holds that the doctor finds nothing in."""
-    problems = [found.text for found in look_at_file(path)[1] if found.state is State.PROBLEM]
+    problems = [found.text for found in examine_file(path)[1] if found.state is State.PROBLEM]
     if problems:
         raise ProblemFoundError("; ".join(problems))
     return _read_unit(path)

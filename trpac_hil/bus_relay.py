@@ -21,12 +21,12 @@ _BYTES = struct.Struct("<II")
 """A classic message's eight bytes as two numbers that a float64 holds exactly."""
 
 
-def ferry_ring() -> Ring:
-    """The shared memory between a `Wire` and its `Ferry`."""
+def relay_ring() -> Ring:
+    """The shared memory between a `RelayedBus` and its `BusRelay`."""
     return Ring(_COLUMNS, MESSAGES_KEPT)
 
 
-class Wire:
+class RelayedBus:
     """The far end: a bus that takes messages and hears nothing. Stands where `Link` stands."""
 
     def __init__(self, ring: Ring) -> None:
@@ -45,7 +45,7 @@ class Wire:
         """Nothing to shut."""
 
 
-class Ferry:
+class BusRelay:
     """The near end: takes over what has come, once per period.
 
     Parameters

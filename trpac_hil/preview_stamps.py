@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from trpac_core.vision.classes import Surface
+from trpac_core.estimator import RoadClass
 from trpac_core.vision.preview import (
     Outcome,
     PreviewConfig,
@@ -66,14 +66,6 @@ class Odometer:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What a picture says of one side's track."""
-
-    surface: Surface
-    Q_v: float
-
-
-@dataclass(frozen=True)
 class CameraResult:
     """What came of one picture.
 
@@ -83,18 +75,18 @@ class CameraResult:
         Of the picture.
     captured_ns, arrived_ns : int
         When it was taken, and when its result was there [ns].
-    verdicts : tuple
+    classes : tuple
         One per side that the unit asks for; None where the picture could not be used.
     """
 
     number: int
     captured_ns: int
     arrived_ns: int
-    verdicts: tuple[Verdict | None, ...]
+    classes: tuple[RoadClass | None, ...]
 
 
 @dataclass
-class Placed:
+class StampCounts:
     """How the results fared.
 
     `late` came when the wheel was past the near edge of what they show, `in_vain` when it was past the far edge;
@@ -108,11 +100,11 @@ class Placed:
     unplaced: int = 0
 
 
-class Placing:
+class PreviewStamps:
     """Stamps of the results on the road, for each side that the unit asks for."""
 
     def __init__(self, config: PreviewConfig, frame_interval_s: float, sides: int) -> None:
-        self.counts = Placed()
+        self.counts = StampCounts()
         self.newest: CameraResult | None = None
         self._config, self._interval_s = config, frame_interval_s
         self._states = [PreviewState()] * sides
@@ -130,10 +122,12 @@ class Placing:
             self.forget()
         self.newest = result
         near_m = captured_m + self._config.P_0_m
-        for side, verdict in enumerate(result.verdicts):
-            self._states[side] = self._stamped(side, verdict, captured_m, 1e-9 * result.captured_ns, odometer)
-            self._failed[side] = verdict is None
-        self.counts.failed += None in result.verdicts
+        for side, road_class in enumerate(result.classes):
+            self._states[side] = self._stamped(
+                side, road_class, captured_m, 1e-9 * result.captured_ns, odometer
+            )
+            self._failed[side] = road_class is None
+        self.counts.failed += None in result.classes
         if odometer.position_m > near_m:
             self.counts.late += 1
             self.counts.in_vain += all(self.on_road(s, odometer.position_m) is None for s in self._sides)
@@ -143,12 +137,17 @@ class Placing:
         return range(len(self._states))
 
     def _stamped(
-        self, side: int, verdict: Verdict | None, captured_m: float, captured_s: float, odometer: Odometer
+        self,
+        side: int,
+        road_class: RoadClass | None,
+        captured_m: float,
+        captured_s: float,
+        odometer: Odometer,
     ) -> PreviewState:
         state = prune(self._states[side], self._config, odometer.position_m)
-        if verdict is not None:
+        if road_class is not None:
             # Whether it counts says the unit, by its own threshold.
-            outcome = Outcome(verdict.surface, verdict.Q_v, True, captured_s)
+            outcome = Outcome(road_class.surface, road_class.confidence, True, captured_s)
         elif state.stamps:
             outcome = Outcome(state.stamps[-1].outcome.surface, 0.0, False, captured_s)
         else:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from trpac_core.estimator import RoadClass
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.preview import Outcome
 from trpac_hil.camera import FAILED, HEAD
-from trpac_hil.inputs import Heard, Say
-from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
+from trpac_hil.inputs import Heard, ReportEvent
+from trpac_hil.preview_stamps import CameraResult, Odometer, PreviewStamps
 from trpac_hil.shared import Numbers, Ring
 from trpac_hil.unit import NO_CLASS
 
@@ -18,12 +19,12 @@ STEEPEST_RAD = 1.5
 """Steering angle beyond which a reading is none [rad]."""
 
 
-class Sight:
+class CameraInput:
     """What is known of the road under the front wheel.
 
     Parameters
     ----------
-    placing : Placing
+    stamps : PreviewStamps
         Stamps of the results.
     stale_ns : int
         Time without a result after which the camera is lost [ns].
@@ -44,18 +45,18 @@ class Sight:
 
     def __init__(
         self,
-        placing: Placing,
+        stamps: PreviewStamps,
         stale_ns: int,
         side_names: tuple[str, ...],
         results: Ring | None = None,
         motion: Numbers | None = None,
     ) -> None:
-        self.placing, self.number, self.losses, self.left_out = placing, 0, 0, 0
+        self.stamps, self.number, self.losses, self.left_out = stamps, 0, 0, 0
         self.classes = [(NO_CLASS, 0.0)] * len(side_names)
         self.work_ms: list[float] = []
         self._stale_ns, self._side_names = stale_ns, side_names
         self._results, self._motion = results, motion
-        self._told: tuple[Outcome | None, ...] = (None,) * len(side_names)
+        self._given: tuple[Outcome | None, ...] = (None,) * len(side_names)
         self._number_by_bus = math.nan
 
     def share_motion(self, odometer: Odometer, values: Mapping[str, float]) -> None:
@@ -73,37 +74,37 @@ class Sight:
             )
 
     def news(
-        self, heard: Heard, fresh: bool, doubted: bool, odometer: Odometer, now_ns: int, say: Say
+        self, heard: Heard, fresh: bool, doubted: bool, odometer: Odometer, now_ns: int, report: ReportEvent
     ) -> bool:
         """Take results in; returns whether the unit is to be told something new.
 
         `heard` is the newest message RoadClass, `fresh` whether it has just come, and `doubted` whether two devices
         send it: then nothing that came by bus counts.
         """
-        placing = self.placing
+        stamps = self.stamps
         by_bus = self._results is None
         if by_bus and doubted:
             fresh = False
-            placing.forget()
-        for result in self._by_bus(heard, fresh, now_ns, say) if by_bus else self._shared(now_ns):
-            placing.take(result, odometer, self._stale_ns)
-        newest = placing.newest
+            stamps.forget()
+        for result in self._by_bus(heard, fresh, now_ns, report) if by_bus else self._shared(now_ns):
+            stamps.take(result, odometer, self._stale_ns)
+        newest = stamps.newest
         if newest is not None and now_ns - newest.arrived_ns > self._stale_ns:
-            placing.newest = None
-            placing.forget()
+            stamps.newest = None
+            stamps.forget()
             self.losses += 1
-            say(
+            report(
                 "lost camera",
                 f"No result of a picture for {self._stale_ns * 1e-6:g} ms: on without the camera.",
             )
-        known = tuple(placing.known(side, odometer.position_m) for side in range(len(self._told)))
-        if known == self._told:
+        known = tuple(stamps.known(side, odometer.position_m) for side in range(len(self._given)))
+        if known == self._given:
             return False
         self.classes = [
             (before[0], 0.0) if outcome is None else (int(outcome.surface), outcome.Q_v)
             for outcome, before in zip(known, self.classes, strict=True)
         ]
-        self._told, self.number = known, self.number + 1
+        self._given, self.number = known, self.number + 1
         return True
 
     def _shared(self, now_ns: int) -> list[CameraResult]:
@@ -119,14 +120,14 @@ class Sight:
                 int(row[1]),
                 now_ns,
                 tuple(
-                    None if row[at] == FAILED else Verdict(SURFACES[row[at]], float(row[at + 1]))
+                    None if row[at] == FAILED else RoadClass(SURFACES[row[at]], float(row[at + 1]))
                     for at in range(HEAD, len(row), 2)
                 ),
             )
             for row in rows
         ]
 
-    def _by_bus(self, heard: Heard, fresh: bool, now_ns: int, say: Say) -> list[CameraResult]:
+    def _by_bus(self, heard: Heard, fresh: bool, now_ns: int, report: ReportEvent) -> list[CameraResult]:
         """The result that another device sent, if it is a new one; taken `RoadClass_Age` before it was sent."""
         if not fresh or heard.values["RoadClass_Number"] == self._number_by_bus:
             return []
@@ -135,24 +136,24 @@ class Sight:
         age_ms = values["RoadClass_Age"]
         if math.isnan(age_ms):
             age_ms = 0.0
-            say(
+            report(
                 "class without age",
                 "RoadClass_Age is not available: results count as if their pictures were taken when they came.",
             )
-        verdicts = []
+        classes = []
         for side in self._side_names:
             surface = SURFACES.get(values[f"RoadClass_{side.capitalize()}"])
             Q_v = values[f"RoadClassConfidence_{side.capitalize()}"]
-            verdicts.append(Verdict(surface, Q_v) if surface is not None and 0.0 <= Q_v <= 1.0 else None)
+            classes.append(RoadClass(surface, Q_v) if surface is not None and 0.0 <= Q_v <= 1.0 else None)
         captured_ns = now_ns - round(age_ms * 1e6)
-        return [CameraResult(int(self._number_by_bus), captured_ns, now_ns, tuple(verdicts))]
+        return [CameraResult(int(self._number_by_bus), captured_ns, now_ns, tuple(classes))]
 
     def picture_age_ms(self, now_ns: int) -> float:
         """Time since the newest picture was taken, NaN without one [ms]."""
-        newest = self.placing.newest
+        newest = self.stamps.newest
         return math.nan if newest is None else (now_ns - newest.captured_ns) * 1e-6
 
     def age_under_wheel_ms(self, now_ns: int) -> float:
         """Time since the picture of the road under the front wheel was taken, of two the older; NaN: none [ms]."""
-        ages = [now_ns * 1e-6 - outcome.captured_s * 1e3 for outcome in self._told if outcome is not None]
+        ages = [now_ns * 1e-6 - outcome.captured_s * 1e3 for outcome in self._given if outcome is not None]
         return max(ages) if ages else math.nan
