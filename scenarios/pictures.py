@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
 from scenarios.plant.pipeline import PlantTrajectory
+from scenarios.progress import Progress, silent
 
 WORKERS = 2
 """Processes that render: each holds one world of some 100 MB."""
@@ -75,7 +75,7 @@ def record(
     scenario: Scenario,
     trajectory: PlantTrajectory,
     folder: Path,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = silent,
 ) -> pd.DataFrame:
     """Draw all pictures of a drive.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +19,7 @@ from scenarios.metrics import score_run
 from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
+from scenarios.progress import StageProgress, silent
 from trpac_core.files import file_sha256
 from trpac_core.vehicle import WHEELS
 
@@ -35,9 +36,6 @@ PACKAGES = (
     "opencv-python-headless",
     "albumentations",
 )
-
-Progress = Callable[[str, int, int], None]
-"""Told the stage, and how much of how much is done."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,7 @@ def run_scenario(
     scenario: Scenario,
     fmu: Path,
     frames_folder: Path,
-    progress: Progress = lambda stage, done, total: None,
+    progress: StageProgress = silent,
     overrides: Mapping[str, float] | None = None,
 ) -> Run:
     """Drive the plant, draw the pictures, step the unit over both, score.

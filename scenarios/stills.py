@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from scenarios.library import networks_folder
+from scenarios.progress import Progress, silent
 from scenarios.whole_files import written_whole
 from trpac_core.files import quoted
 from trpac_core.vision.classes import Surface
@@ -47,13 +48,6 @@ LEAST_ROAD = 0.05
 LEAST_CROPS = 2
 """With fewer looks at usable road, all are taken."""
 _LEAST_PROBABILITY = 1e-12
-
-Progress = Callable[[int, int], None]
-"""Told how much of how much is done."""
-
-
-def silent(done: int, total: int) -> None:
-    """Progress that nobody follows."""
 
 
 def find_pictures(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario
 from scenarios.library import networks_folder
+from scenarios.progress import Progress, silent
 from scenarios.runner import Run
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
@@ -87,9 +87,7 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
     return shown
 
 
-def draw_overlay_sheet(
-    run: Run, path: Path, progress: Callable[[int, int], None] = lambda done, total: None, count: int = 6
-) -> None:
+def draw_overlay_sheet(run: Run, path: Path, progress: Progress = silent, count: int = 6) -> None:
     """Write a sheet of the run's pictures, evenly spread, as the estimator saw them.
 
     The sheet replays every picture up to the last one shown with the checkout's networks, so that its verdicts rest on

@@ -20,7 +20,8 @@ from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.library import networks_folder
 from scenarios.overlay_video import OverlayVideo, Strip, dark, shown
-from scenarios.stills import PICTURE_ENDINGS, Progress, cell_of, pictures_in, silent
+from scenarios.progress import Progress, silent
+from scenarios.stills import PICTURE_ENDINGS, cell_of, pictures_in
 from scenarios.whole_files import written_whole
 from trpac_core.files import FileError, file_sha256, quoted, require_file
 from trpac_core.vision.classes import Surface

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scenarios.camera.files import load_camera
 from scenarios.files import VehicleFile
 from scenarios.library import located, networks_folder
+from scenarios.progress import StageProgress, silent
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
 from sim2real.replay.estimate import TABLE_3, estimate_log
@@ -21,7 +22,6 @@ from sim2real.replay.run import Replay
 from trpac.extras import extras
 from trpac.files import read_log, the_vehicle
 from trpac.picture import Picture
-from trpac.progress import Told, silent
 from trpac_core.errors import TrpacError
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.readings import Sensors
@@ -91,7 +91,7 @@ def estimate(
     mapping: Mapping | str | Path | None = None,
     camera: str | Path | None = None,
     peers: bool = False,
-    progress: Told = silent,
+    progress: StageProgress = silent,
 ) -> Estimates:
     """Estimate the road's adhesion along a recorded drive.
 

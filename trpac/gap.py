@@ -10,13 +10,13 @@ from typing import Any
 import pandas as pd
 
 from scenarios.files import RoadFile, VehicleFile
+from scenarios.progress import StageProgress, silent
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
 from sim2real.result import Cause, Gap, Place, Verdict, needed
 from sim2real.result import Diagnosis as Result
 from trpac.extras import extras
 from trpac.files import Vehicle, read_log, the_road, the_vehicle
-from trpac.progress import Told, silent
 
 AnyLog = Log | pd.DataFrame | str | Path
 
@@ -98,7 +98,7 @@ def diagnose(
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
-    progress: Told = silent,
+    progress: StageProgress = silent,
 ) -> Diagnosis:
     """Diagnose recorded logs against the simulation of a car on one road.
 

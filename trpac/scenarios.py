@@ -16,10 +16,10 @@ from scenarios.effects import Effect
 from scenarios.files import RoadFile, Scenario, SensorNoise, VehicleFile, load_scenario
 from scenarios.plant import make_log
 from scenarios.plant import simulate as run_plant
+from scenarios.progress import StageProgress, silent
 from trpac.extras import extras
 from trpac.files import Vehicle, the_road, the_vehicle
 from trpac.picture import Picture
-from trpac.progress import Told, silent
 from trpac_core.errors import TrpacError
 from trpac_core.vehicle import WHEELS
 
@@ -114,7 +114,7 @@ class ScenarioRun:
         draw_figure17(self._run, path)
         return Picture(path.read_bytes())
 
-    def write(self, folder: str | Path, progress: Told = silent) -> tuple[Path, ...]:
+    def write(self, folder: str | Path, progress: StageProgress = silent) -> tuple[Path, ...]:
         """Write report.html, figure17.png, log.csv and summary.json, all or none; returns their paths."""
         from scenarios.report import write_report
         from scenarios.runner import write_run
@@ -141,7 +141,7 @@ def run(
     seed: int | None = None,
     stiffness_n: float | None = None,
     fmu: str | Path | None = None,
-    progress: Told = silent,
+    progress: StageProgress = silent,
 ) -> ScenarioRun:
     """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
 

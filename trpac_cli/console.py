@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.text import Text
 
+from scenarios.progress import StageProgress
 from trpac_core.files import quoted
 
 EXIT_INPUT = 2
@@ -22,8 +31,6 @@ LONGEST_LINE = 900
 """Characters of that line: the problems that fit are named, the rest are counted."""
 LONGEST_SHOWN = 10_000
 """Characters of a line on the terminal."""
-
-Told = Callable[[str, int, int], None]
 
 
 class Terminal(Console):
@@ -42,10 +49,11 @@ class Terminal(Console):
 
 
 @contextmanager
-def bars() -> Iterator[Told]:
-    """A progress bar per stage, and what to tell them."""
+def bars() -> Iterator[StageProgress]:
+    """Show a progress bar per stage; the context's value is what the work calls."""
     named = TextColumn("{task.description:>20}", markup=False)
-    with Progress(named, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()) as shown:
+    times = (TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(named, BarColumn(), MofNCompleteColumn(), *times, console=Terminal()) as shown:
         tasks: dict[str, TaskID] = {}
 
         def progress(stage: str, done: int, total: int) -> None:

@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 
 from scenarios.errors import ScenarioError
-from trpac_cli.console import Terminal, complain, refuse, require_folder
+from trpac_cli.console import Terminal, bars, complain, refuse, require_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,27 +49,13 @@ def sweep(
     from scenarios.sweep.execute import execute
     from scenarios.sweep.files import load_sweep
 
-    columns = (
-        TextColumn("runs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
     console = Terminal()
     try:
         _require(scheduler, jobs)
         require_folder("trpac sweep", out)
         loaded = load_sweep(file, allow_code=allow_code)
-        with Progress(*columns, console=console) as bars:
-            task = bars.add_task("runs", total=None)
-            parts, failures = execute(
-                loaded,
-                out,
-                scheduler,
-                jobs,
-                lambda done, total: bars.update(task, completed=done, total=total),
-            )
+        with bars() as progress:
+            parts, failures = execute(loaded, out, scheduler, jobs, partial(progress, "runs"))
         if not parts.empty():
             _finish(loaded, parts, failures, out, console)
     except (ScenarioError, OSError) as error:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from trpac_cli.console import Terminal, refuse, require_folder
+from trpac_cli.console import Terminal, bars, refuse, require_folder
 from trpac_core.files import quoted
 
 if TYPE_CHECKING:
-    from scenarios.stills import Progress as Told
     from scenarios.vision_runs import Drive
 
 EXIT_SOME_UNREADABLE = 1
@@ -54,8 +52,8 @@ def classify(
         files, problems = find_pictures(paths)
         if os.path.realpath(out) in {os.path.realpath(file) for file in files}:
             refuse(command, f"{out}: one of the pictures. Expected the name of a CSV file to write.")
-        with _bar("pictures") as progress:
-            table, unusable = classify_pictures(files, progress)
+        with bars() as progress:
+            table, unusable = classify_pictures(files, partial(progress, "pictures"))
         problems += unusable
         if table.empty:
             refuse(command, _listed("nothing to classify", problems))
@@ -92,8 +90,8 @@ def run(
     require_folder(command, out)
     try:
         found = Frames.find(frames)
-        with _bar("frames") as progress:
-            drive = run_frames(found, camera, speed_m_s, fps, out, progress)
+        with bars() as progress:
+            drive = run_frames(found, camera, speed_m_s, fps, out, partial(progress, "frames"))
     except (ScenarioError, ModelError, OSError) as error:
         refuse(command, error)
     _show(drive)
@@ -120,15 +118,6 @@ def _show(drive: Drive) -> None:
             f"The video ends {missing} frames before the {summary['frames_announced']} it announces."
         )
     console.print(f"Table: {drive.out / 'frames.csv'}", soft_wrap=True)
-
-
-@contextmanager
-def _bar(what: str) -> Iterator[Told]:
-    """A progress bar, and what to tell it."""
-    columns = (TextColumn("{task.description:>18}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns) as bars:
-        task = bars.add_task(what, total=None)
-        yield lambda done, total: bars.update(task, completed=done, total=total)
 
 
 def _counted(classes: Sequence[str]) -> str:

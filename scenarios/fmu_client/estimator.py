@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from scenarios.fmu_client.archives import UnitFileError
 from scenarios.fmu_client.opening import opened_unit
 from scenarios.fmu_client.unpacking import unpack_unit
 from scenarios.pictures import frame_steps
+from scenarios.progress import Progress, silent
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
 
@@ -95,7 +96,7 @@ def run_unit(
     signals: pd.DataFrame,
     frames: pd.DataFrame,
     step_s: float,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = silent,
 ) -> pd.DataFrame:
     """Step the unit over recorded signals and pictures, as a host would.
 
@@ -170,7 +171,7 @@ def _step_all(
     signals: pd.DataFrame,
     frames: pd.DataFrame,
     step_s: float,
-    progress: Callable[[int, int], None],
+    progress: Progress,
 ) -> pd.DataFrame:
     inputs = [references[name][0] for name in INPUTS]
     reals, flags = ([references[name][0] for name in names] for names in (OUTPUTS, FLAGS))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -13,6 +13,7 @@ from distributed import Client, Future, as_completed
 from joblib import cpu_count
 
 from scenarios.errors import ScenarioError
+from scenarios.progress import Progress, silent
 from scenarios.sweep.cluster import connected, security_of
 from scenarios.sweep.draw import RunKey, plan_run, run_keys
 from scenarios.sweep.files import Sweep
@@ -22,9 +23,6 @@ from trpac_core.files import quoted
 
 AHEAD = 8
 """Runs handed to Dask per worker thread: enough to keep it busy, few enough to stop quickly."""
-
-Progress = Callable[[int, int], None]
-"""Told how many of how many runs are done."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def execute(
     out: Path,
     scheduler: str | None = None,
     jobs: int | None = None,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = silent,
 ) -> tuple[Parts, list[Failure]]:
     """Do all runs that are not there yet.
 
