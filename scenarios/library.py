@@ -17,6 +17,8 @@ FOLDERS = {
     "sweep": "sweeps",
 }
 """Folder of each kind of file."""
+PAPER_VEHICLE = "four_in_wheel_motor_ev"
+"""Shipped vehicle with the values of Table 3 in Tian et al. 2022."""
 
 
 def networks_folder() -> Path:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from scenarios.car_and_road import Vehicle, as_road, as_vehicle
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.progress import StageProgress, silent
 from sim2real.logs import Log
@@ -16,7 +17,7 @@ from sim2real.logs.mapping import Mapping
 from sim2real.result import Cause, Gap, Place, Verdict, needed
 from sim2real.result import Diagnosis as Result
 from trpac.extras import extras
-from trpac.files import Vehicle, read_log, the_road, the_vehicle
+from trpac.files import read_log
 
 AnyLog = Log | pd.DataFrame | str | Path
 
@@ -126,7 +127,7 @@ def diagnose(
     MissingExtraError
         Without the extra 'gap'.
     """
-    car, course = the_vehicle(vehicle), the_road(road)
+    car, course = as_vehicle(vehicle), as_road(road)
     logs = [read_log(log, mapping=mapping) for log in (*fit, holdout)]
     with extras("diagnose", "gap"):
         from sim2real.diagnose import diagnose_sources

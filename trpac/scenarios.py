@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from scenarios.car_and_road import Vehicle, as_road, as_vehicle
 from scenarios.effects import Effect
 from scenarios.files import RoadFile, Scenario, SensorNoise, VehicleFile, load_scenario
 from scenarios.plant import make_log
 from scenarios.plant import simulate as run_plant
 from scenarios.progress import StageProgress, silent
 from trpac.extras import extras
-from trpac.files import Vehicle, the_road, the_vehicle
 from trpac.picture import Picture
 from trpac_core.errors import TrpacError
 from trpac_core.vehicle import WHEELS
@@ -66,10 +66,10 @@ def simulate(
         if len(steps) == 0 or not np.allclose(steps, steps[0], rtol=1e-6, atol=1e-9) or steps[0] <= 0.0:
             raise TrpacError("torque has times that are not equally apart; expected a uniform time_s.")
         step_s = float(steps[0])
-    car = the_vehicle(vehicle)
+    car = as_vehicle(vehicle)
     if effects:
         car = Vehicle(**car.model_dump(by_alias=True)).with_effects(effects)
-    trajectory = run_plant(car, the_road(road), np.asarray(torque, dtype=float), step_s, speed)
+    trajectory = run_plant(car, as_road(road), np.asarray(torque, dtype=float), step_s, speed)
     return make_log(trajectory, car, noise or SensorNoise(), seed)
 
 
