@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 from rich.progress import Progress, TaskID
 
+from benchmarks.accuracy.full_run import full_run
 from benchmarks.ledger import append
 from scenarios.figure17 import draw_figure17
 from scenarios.sweep import figures
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import execute
 from scenarios.sweep.files import load_sweep
-from scenarios.sweep.full_run import full_run
 from scenarios.sweep.store import Parts
 from scenarios.sweep.summary import distribution, shown_enough, slippery, summarise
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,20 +22,6 @@ from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
 
 UNIT = "TrpacEstimator"
-OUTPUTS = (
-    "TRPAC",
-    "K_v",
-    "excitation_threshold",
-    "slip",
-    "tyre_force",
-    "TRPAC_image",
-    "TRPAC_dynamics",
-    "TRPAC_peak",
-    "image_confidence",
-    "frame_age",
-    "TRPAC_std",
-)
-FLAGS = ("flag", "excitation_flag")
 INPUTS = ("wheel_speed", "wheel_torque", "vehicle_speed", "longitudinal_acceleration")
 
 
@@ -118,7 +104,7 @@ def run_unit(
     Returns
     -------
     DataFrame
-        One row per step: the unit's outputs at the step's end.
+        One row per step: the unit's Real and Boolean outputs at the step's end.
 
     Raises
     ------
@@ -136,12 +122,13 @@ def run_unit(
         except UnitFileError as error:
             raise ScenarioError(str(error)) from error
         references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
+        outputs = [v.name for v in description.modelVariables if v.causality == "output"]
         try:
             unit.setupExperiment(startTime=0.0)
             _set(unit, references, settings)
             unit.enterInitializationMode()
             unit.exitInitializationMode()
-            outputs = _step_all(unit, references, signals, frames, step_s, progress)
+            table = _step_all(unit, references, outputs, signals, frames, step_s, progress)
             unit.terminate()
         except FMICallException as error:
             raise ScenarioError(
@@ -152,7 +139,7 @@ def run_unit(
             unit.freeInstance()
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-    return outputs
+    return table
 
 
 def _set(
@@ -168,28 +155,32 @@ def _set(
 def _step_all(
     unit: FMU2Slave,
     references: Mapping[str, tuple[int, str]],
+    outputs: Sequence[str],
     signals: pd.DataFrame,
     frames: pd.DataFrame,
     step_s: float,
     progress: Progress,
 ) -> pd.DataFrame:
     inputs = [references[name][0] for name in INPUTS]
-    reals, flags = ([references[name][0] for name in names] for names in (OUTPUTS, FLAGS))
+    real_names, flag_names = (
+        [n for n in outputs if references[n][1] == kind] for kind in ("Real", "Boolean")
+    )
+    reals, flags = ([references[name][0] for name in names] for names in (real_names, flag_names))
     path, number = references["image_path"][0], references["frame_id"][0]
     pictures = {
         int(row): (str(file), int(frame)) for row, file, frame in frames[["row", "path", "frame"]].values
     }
     values = signals[list(INPUTS)].to_numpy(dtype=float)
-    results = np.empty((len(values), len(OUTPUTS) + len(FLAGS)))
+    results = np.empty((len(values), len(reals) + len(flags)))
     for row, readings in enumerate(values):
         if row in pictures:
             unit.setString([path], [pictures[row][0]])
             unit.setInteger([number], [pictures[row][1]])
         unit.setReal(inputs, readings)
         unit.doStep(currentCommunicationPoint=row * step_s, communicationStepSize=step_s)
-        results[row, : len(OUTPUTS)] = unit.getReal(reals)
-        results[row, len(OUTPUTS) :] = unit.getBoolean(flags)
+        results[row, : len(reals)] = unit.getReal(reals)
+        results[row, len(reals) :] = unit.getBoolean(flags)
         if row % 500 == 0 or row == len(values) - 1:
             progress(row + 1, len(values))
-    table = pd.DataFrame(results, columns=[*OUTPUTS, *FLAGS])
-    return table.astype(dict.fromkeys(FLAGS, bool))
+    table = pd.DataFrame(results, columns=[*real_names, *flag_names])
+    return table.astype(dict.fromkeys(flag_names, bool))

@@ -1,6 +1,6 @@
 """The camera of a run without pictures: verdicts drawn from records of the real image estimator.
 
-`camera_process.yaml` holds what the image estimator said along rendered, disturbed worlds (`measure_camera.py`). A run
+`camera_process.yaml` holds what the image estimator said along rendered, disturbed worlds (`benchmarks/vision/measure_camera_process.py`). A run
 draws one of these worlds and, for each stretch of road, a place in that world's record of the surface; from there
 on the record is played back by the way driven. So wrong classes come as often, as long and with as high a confidence
 as they did there, and worlds that are hard stay hard for the whole run. A verdict comes in the step of its picture, as

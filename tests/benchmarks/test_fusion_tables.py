@@ -8,13 +8,13 @@ import pytest
 import yaml
 
 from benchmarks.accuracy import fusion_tables
+from benchmarks.accuracy.full_run import full_run
 from scenarios.figure17 import draw_figure17
 from scenarios.files import load_scenario
 from scenarios.plant.pipeline import drive
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import run_one
 from scenarios.sweep.files import load_sweep
-from scenarios.sweep.full_run import full_run
 from scenarios.sweep.run import believed_config, shown, step_all
 from scenarios.sweep.store import Parts, identity
 

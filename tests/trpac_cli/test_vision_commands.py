@@ -265,14 +265,14 @@ def test_one_even_colour_is_refused():
 
 
 @given(st.integers(64, 8000), st.integers(64, 8000))
-def test_looks_lie_in_pictures_of_any_shape(width, height):
-    looks = stills._looks(width, height)
-    assert len(looks) == 6
-    for left, top, right, bottom in looks:
+def test_crops_lie_in_pictures_of_any_shape(width, height):
+    crops = stills._crops(width, height)
+    assert len(crops) == 6
+    for left, top, right, bottom in crops:
         assert 0 <= left < right <= width
         assert height // 2 <= top < bottom <= height
-    assert looks[0][0] <= 0.1 * width
-    assert looks[0][2] >= 0.9 * width
+    assert crops[0][0] <= 0.1 * width
+    assert crops[0][2] >= 0.9 * width
 
 
 class Blind(Certain):

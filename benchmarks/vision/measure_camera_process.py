@@ -1,6 +1,6 @@
 """Measures what the camera side says of rendered, disturbed roads: the source of camera_process.yaml.
 
-``python -m scenarios.sweep.measure_camera --worlds 24`` draws that many random worlds, each with the three surfaces in
+``python -m benchmarks.vision.measure_camera_process --worlds 24`` draws that many random worlds, each with the three surfaces in
 a random order over 20 m each, passes pictures every 0.75 m through the disturbances of the scenario, the JPEG
 encoder and the image estimator with the shipped networks, and writes down every verdict on ground of one surface.
 The worlds' seeds begin at 900 000, apart from those of any scenario or sweep in this project.
@@ -22,6 +22,7 @@ import numpy as np
 from scenarios.camera.disturbances import disturb
 from scenarios.files import RoadFile, RoadSegment, Scenario, load_scenario
 from scenarios.pictures import DISTURBANCES, scene_renderer
+from scenarios.sweep.camera import RECORDS
 from scenarios.vision_overlay import image_estimator
 from scenarios.yaml_text import to_yaml
 from trpac_core.vision.classes import Surface
@@ -34,8 +35,6 @@ STRETCH_M = 20.0
 SPACING_M = 0.75
 """Way between pictures: three frames of 20 Hz at 5 m/s [m]."""
 SPEED_M_S = 7.0
-SCENARIO = Path(__file__).resolve().parents[1] / "paper_simulation.yaml"
-OUT = Path(__file__).with_name("camera_process.yaml")
 
 
 @dataclass(frozen=True)
@@ -142,10 +141,10 @@ def main() -> None:
     """Command line of the measurement."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--worlds", type=int, default=24)
-    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--out", type=Path, default=RECORDS)
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    base = load_scenario(SCENARIO)
+    base = load_scenario("paper_simulation")
     seeds = range(FIRST_SEED, FIRST_SEED + options.worlds)
     worlds = []
     for seed in seeds:
