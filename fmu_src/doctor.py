@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from inspect import getsource
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from trpac_core.files import parse_json, quoted
 
 from .contents import CONTENTS_FILE, ContentError, Contents, deviations, read_contents
 from .host import LEAST_PYTHON
+from .trial import end_with_parent
 from .units import UNITS
 
 RECORD = f"resources/{CONTENTS_FILE}"
@@ -36,20 +38,21 @@ Pythons before 3.11 do not know."""
 UNREADABLE_ANSWER = (ValueError, IndexError, KeyError, TypeError, AttributeError)
 """What an answer of a side process may end in that is none."""
 
-PROBE = """
+PROBE = f"""
 import ctypes, importlib, json, sys, sysconfig
-if sys.platform.startswith("linux"):
-    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG, SIGKILL
-packages = {}
+{getsource(end_with_parent)}
+end_with_parent()
+packages = {{}}
 for module in sys.argv[1:]:
     try:
         packages[module] = [True, str(getattr(importlib.import_module(module), "__version__", ""))]
     except Exception as error:
         packages[module] = [False, str(error)]
 library = "%s/%s" % (sysconfig.get_config_var("LIBDIR"), sysconfig.get_config_var("INSTSONAME"))
-print(json.dumps({"executable": sys.executable, "version": list(sys.version_info[:3]), "prefix": sys.prefix,
-                  "libpython": library, "packages": packages}))
+print(json.dumps({{"executable": sys.executable, "version": list(sys.version_info[:3]), "prefix": sys.prefix,
+                  "libpython": library, "packages": packages}}))
 """
+"""Program of the side process: prints the interpreter, and which of the modules in its arguments it can import."""
 
 
 class State(Enum):

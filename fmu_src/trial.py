@@ -21,8 +21,6 @@ ROLLING = {"wheel_speed": 34.5, "vehicle_speed": 10.0, "wheel_torque": 20.0}
 STEPS, STEP_S = 20, 0.001
 PLATFORMS = {"linux": ("linux64", ".so"), "win32": ("win64", ".dll")}
 CO_SIMULATION = 1
-PR_SET_PDEATHSIG, SIGKILL = 1, 9
-"""What asks Linux to end this process with its parent (prctl(2))."""
 OK = 0
 
 _POINTER, _TEXT = ctypes.c_void_p, ctypes.c_char_p
@@ -162,9 +160,9 @@ def run(folder: Path, steps: int) -> dict[str, Any]:
 
 
 def end_with_parent() -> None:
-    """Let this process be killed as soon as the one that started it ends, on Linux."""
+    """Have Linux kill this process when its parent ends; stands alone, for its source is run in other processes too."""
     if sys.platform.startswith("linux"):
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, SIGKILL)
+        ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG, SIGKILL: prctl(2)
 
 
 if __name__ == "__main__":

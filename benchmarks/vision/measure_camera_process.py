@@ -1,8 +1,8 @@
-"""Measures what the camera side says of rendered, disturbed roads: the source of camera_process.yaml.
+"""Measures the classes that the camera side gives rendered, disturbed roads: the source of camera_process.yaml.
 
-``python -m benchmarks.vision.measure_camera_process --worlds 24`` draws that many random worlds, each with the three surfaces in
-a random order over 20 m each, passes pictures every 0.75 m through the disturbances of the scenario, the JPEG
-encoder and the image estimator with the shipped networks, and writes down every verdict on ground of one surface.
+``python -m benchmarks.vision.measure_camera_process --worlds 24`` draws that many random worlds, each with the three
+surfaces in a random order over 20 m each, passes pictures every 0.75 m through the disturbances of the scenario, the
+JPEG encoder and the image estimator with the shipped networks, and writes the class of every picture of one surface.
 The worlds' seeds begin at 900 000, apart from those of any scenario or sweep in this project.
 """
 

@@ -170,6 +170,11 @@ class Effect:
         """The effect with all parameters at their neutral values for this vehicle."""
         return cls(**{p.name: p.neutral_value(vehicle) for p in cls.parameters()})
 
+    def per_wheel(self, mean: float) -> PerWheel:
+        """Values of the wheels fl, fr, rl, rr, by those shares of `of_each_wheel` that this form has as parameters."""
+        shares = {"unlike", "front_sides", "rear_sides"} & {f.name for f in fields(self)}
+        return of_each_wheel(mean, **{name: getattr(self, name) for name in shares})
+
     def is_itself(self, vehicle: Vehicle) -> bool:
         """Whether these values are this effect on this vehicle, not a look-alike of fewer parameters."""
         return True

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles
+from scenarios.effects.base import Effect, parameter, share_of_axles
 
 if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel
+    from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,9 @@ class RollingResistance(Effect):
         starts=(0.008, 0.02, 0.05),
     )
 
-    def coefficients(self) -> PerWheel:
-        """Coefficients of the wheels fl, fr, rl, rr [-]."""
-        return of_each_wheel(self.coefficient)
-
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The moment is proportional to each wheel's own load."""
-        return parameters._replace(rolling_coefficient=self.coefficients())
+        return parameters._replace(rolling_coefficient=self.per_wheel(self.coefficient))
 
 
 @dataclass(frozen=True)
@@ -62,7 +58,3 @@ class RollingResistanceOfAxles(RollingResistance):
     equation = "c (1 + unlike) in front, c (1 - unlike) in the rear"
 
     unlike: float = share_of_axles(start=0.3, most=1.0)
-
-    def coefficients(self) -> PerWheel:
-        """Coefficients of the wheels fl, fr, rl, rr [-]."""
-        return of_each_wheel(self.coefficient, self.unlike)

@@ -1,11 +1,10 @@
-"""The camera of a run without pictures: verdicts drawn from records of the real image estimator.
+"""Road classes of a run without pictures, drawn from records of the real image estimator.
 
-`camera_process.yaml` holds what the image estimator said along rendered, disturbed worlds (`benchmarks/vision/measure_camera_process.py`). A run
-draws one of these worlds and, for each stretch of road, a place in that world's record of the surface; from there
-on the record is played back by the way driven. So wrong classes come as often, as long and with as high a confidence
-as they did there, and worlds that are hard stay hard for the whole run. A verdict comes in the step of its picture, as
-from the unit, which stamps a picture onto the road where it was taken however long it then thinks; `late_s` is what
-a bus adds to that.
+`camera_process.yaml` holds the image estimator's classes along rendered, disturbed worlds; it is written by
+`python -m benchmarks.vision.measure_camera_process`. A run draws one world and, for each stretch of road, an offset in
+that world's record of the surface; from there the record is played back by distance driven. Frequency, length and
+confidence of wrong classes are those of the record, and one world holds for the whole run. A class arrives in the step
+in which its picture was taken, as in the unit, plus the delay `late_s` of a bus.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ CERTAIN = 0.95
 
 
 class Record(NamedTuple):
-    """Verdicts along one surface of one world, at equal spacing: class index and Q_v, shape (n,) each."""
+    """Classes along one surface of one world, at equal spacing: class index and Q_v, shape (n,) each."""
 
     given: NDArray[np.int64]
     Q_v: NDArray[np.float64]
@@ -44,7 +43,7 @@ class Record(NamedTuple):
 
 @dataclass(frozen=True)
 class CameraProcess:
-    """The records, with the way between their verdicts, and ahead of the wheel to what they speak of [m]."""
+    """The records, the distance between their entries [m], and from the front wheel to the road that they show [m]."""
 
     spacing_m: float
     near_m: float
@@ -68,12 +67,12 @@ def _record(entry: dict[str, Any]) -> Record:
 
 
 class Frames(NamedTuple):
-    """The frames of a drive that arrive, and what disturbs them, shape (n,) each."""
+    """The frames of a drive that arrive, and their disturbances, shape (n,) each."""
 
     taken: NDArray[np.int64]
     """Step at which the picture is taken."""
     arrives: NDArray[np.int64]
-    """Step at which its verdict comes."""
+    """Step at which its class arrives."""
     front_m: NDArray[np.float64]
     """Where the front axle is when the picture is taken [m]."""
     wrong: NDArray[np.int64]
@@ -96,7 +95,7 @@ def frames_of(
     camera : Camera
         How much disturbs the frames.
     process : CameraProcess
-        For how far ahead the verdict's middle lies.
+        Holds the distance from the front axle to what is classified.
     random : Generator
         Where the disturbances are drawn from.
     """
@@ -117,7 +116,7 @@ def road_classes(
     seed: int,
     process: CameraProcess | None = None,
 ) -> dict[int, RoadClass]:
-    """Verdicts of a drive, by the step at which they arrive; world and disturbances are drawn from the seed."""
+    """Road classes of a drive by the step at which they arrive; world and disturbances are drawn from the seed."""
     process = process or measured_process()
     random, disturbing = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
     frames = frames_of(scenario, trajectory, camera, process, disturbing)
@@ -167,7 +166,7 @@ class RenderedFrames:
 def _played_back(
     scenario: Scenario, position_m: NDArray[np.float64], process: CameraProcess, random: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Class and confidence for the road at places."""
+    """Class index and confidence at road positions, shape (n,) each."""
     world = process.worlds[int(random.integers(len(process.worlds)))]
     given, Q_v = np.empty(len(position_m), dtype=np.int64), np.empty(len(position_m))
     starts = np.array([s.start_m for s in scenario.road.segments])
@@ -184,7 +183,7 @@ def _played_back(
 def _wrong_way(
     front_m: NDArray[np.float64], camera: Camera, random: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """Where on the way a wrong class is given: stretches and gaps of exponential length in the asked share."""
+    """Whether a wrong class is given, shape (n,); stretches and gaps have exponentially distributed lengths."""
     if camera.wrong_share <= 0.0:
         return np.zeros(len(front_m), dtype=bool)
     if camera.wrong_share >= 1.0:
