@@ -53,8 +53,8 @@ def dark(size: tuple[int, int], caption: str) -> NDArray[np.uint8]:
     """What stands for a frame that could not be used."""
     shown = np.full((size[1], size[0], 3), 40, dtype=np.uint8)
     for row, text in enumerate((caption, "frame not usable")):
-        place = (12, 30 + 32 * row)
-        cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.9, (255, 255, 255), 2, cv2.LINE_AA)
+        corner = (12, 30 + 32 * row)
+        cv2.putText(shown, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.9, (255, 255, 255), 2, cv2.LINE_AA)
     return shown
 
 
@@ -110,12 +110,12 @@ class Strip:
     def write(self, path: Path) -> None:
         """Write the sheet; raises OSError."""
         chosen = np.linspace(0, len(self._tiles) - 1, min(STRIP_TILES, len(self._tiles))).round().astype(int)
-        tiles = [self._tiles[place] for place in chosen]
+        tiles = [self._tiles[index] for index in chosen]
         height = max(tile.shape[0] for tile in tiles)
         columns = min(STRIP_COLUMNS, len(tiles))
         sheet = np.full((-(-len(tiles) // columns) * height, columns * STRIP_TILE_PX, 3), 40, dtype=np.uint8)
-        for place, tile in enumerate(tiles):
-            top, left = place // columns * height, place % columns * STRIP_TILE_PX
+        for index, tile in enumerate(tiles):
+            top, left = index // columns * height, index % columns * STRIP_TILE_PX
             sheet[top : top + tile.shape[0], left : left + STRIP_TILE_PX] = tile
         if not cv2.imwrite(str(path), sheet, [cv2.IMWRITE_JPEG_QUALITY, 88]):
             raise OSError(f"{path.name}: the strip could not be written; is the disk full?")

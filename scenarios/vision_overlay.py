@@ -82,8 +82,8 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
     if not result.flag:
         cv2.rectangle(shown, (0, 138), (shown.shape[1], 150), FLAG_DOWN_BGR, cv2.FILLED)
     for row, text in enumerate((caption, found)):
-        place = (24, 60 + 64 * row)
-        cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 4, cv2.LINE_AA)
+        corner = (24, 60 + 64 * row)
+        cv2.putText(shown, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 4, cv2.LINE_AA)
     return shown
 
 
@@ -96,16 +96,16 @@ def draw_overlay_sheet(run: Run, path: Path, progress: Progress = silent, count:
     ife, state = image_estimator(run.scenario), IfeState()
     chosen = {round(share * (len(run.frames) - 1)) for share in np.linspace(0.06, 0.94, count)}
     tiles = []
-    for place in range(max(chosen) + 1):
-        frame = run.frames.iloc[place]
-        progress(place + 1, max(chosen) + 1)
+    for index in range(max(chosen) + 1):
+        frame = run.frames.iloc[index]
+        progress(index + 1, max(chosen) + 1)
         image = decode_image(Path(frame["path"]))
         row = run.table.iloc[int(frame["row"])]
         motion = Motion(
             float(row["vehicle_speed_m_s"]), float(row["accel_x_m_s2"]), way_m=float(frame["front_axle_m"])
         )
-        state, result = ife.process(state, image, motion, with_view=place in chosen)
-        if place in chosen:
+        state, result = ife.process(state, image, motion, with_view=index in chosen)
+        if index in chosen:
             caption = f"t {frame['time_s']:.2f} s, front axle at {frame['front_axle_m']:.1f} m"
             tile = annotate(image, result, caption)
             height = round(TILE_PX * tile.shape[0] / tile.shape[1])

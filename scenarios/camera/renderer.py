@@ -32,7 +32,7 @@ PROFILE_STEP_M = 0.02
 MARKING_REPEAT_M = 144.0
 """A multiple of every period of dashed lines [m]."""
 WATER_INDEX = 1.33
-FINEST_SKY_PX_RAD = 0.0009
+FINEST_SKY_PIXEL_RAD = 0.0009
 METERED_M = (3.0, 30.0)
 """The stretch of road ahead on which the automatic exposure looks [m]."""
 SHARPNESS = 0.5
@@ -83,7 +83,7 @@ class Renderer:
     def _build(self) -> None:
         scene, camera = self.scene, self.camera
         self._pixels = _pixels(camera)
-        sky = build_panorama(scene, max(FINEST_SKY_PX_RAD, 1.0 / camera.fx_px))
+        sky = build_panorama(scene, max(FINEST_SKY_PIXEL_RAD, 1.0 / camera.fx_px))
         macro, fine, decal = macro_texture(), fine_texture(), decal_map(scene)
         distance = self._pixels.distance
         self._maps = Maps(
@@ -100,7 +100,7 @@ class Renderer:
             profile=_profile(scene),
             clear=np.exp(-np.maximum(distance, 0.0) / np.float32(scene.visibility_m)),
         )
-        horizon = sky.sharp[int((0.05 - LOWEST_RAD) / sky.sharp_px_rad)].mean(axis=0)
+        horizon = sky.sharp[int((0.05 - LOWEST_RAD) / sky.sharp_pixel_rad)].mean(axis=0)
         self._scalars = _scalars_of(scene, horizon, sky)
         self._sky_mean = float(sky.mean.mean())
         self._starts = np.array([segment.start_m for segment in self.segments])
@@ -348,7 +348,7 @@ def _scalars_of(scene: Scene, horizon: NDArray[np.float32], sky: Panorama) -> Sc
         veil=scene.veil,
         reach=AZIMUTH_RAD,
         lowest=LOWEST_RAD,
-        sharp_px=sky.sharp_px_rad,
-        rough_px=sky.rough_px_rad,
+        sharp_px=sky.sharp_pixel_rad,
+        rough_px=sky.rough_pixel_rad,
     )
     return SceneScalars(*(np.float32(value) for value in values))

@@ -32,8 +32,8 @@ class Panorama:
 
     sharp: Float
     rough: Float
-    sharp_px_rad: float
-    rough_px_rad: float
+    sharp_pixel_rad: float
+    rough_pixel_rad: float
     mean: Float
 
 
@@ -62,26 +62,26 @@ def _ridge(rng: np.random.Generator, columns: int, roughness: float) -> Float:
     return (0.5 + 0.2 * line / line.std()).astype(np.float32)
 
 
-def build_panorama(scene: Scene, px_rad: float) -> Panorama:
-    """The panorama of one look with pixels of ``px_rad`` [rad]."""
+def build_panorama(scene: Scene, pixel_rad: float) -> Panorama:
+    """The panorama of one look with pixels of ``pixel_rad`` [rad]."""
     rng = np.random.default_rng([scene.seed, 23])
-    columns = int(2 * AZIMUTH_RAD / px_rad)
-    rows = int((HIGHEST_RAD - LOWEST_RAD) / px_rad)
-    elevation = (LOWEST_RAD + (np.arange(rows) + 0.5) * px_rad).astype(np.float32)
-    azimuth = (AZIMUTH_RAD - (np.arange(columns) + 0.5) * px_rad).astype(np.float32)
+    columns = int(2 * AZIMUTH_RAD / pixel_rad)
+    rows = int((HIGHEST_RAD - LOWEST_RAD) / pixel_rad)
+    elevation = (LOWEST_RAD + (np.arange(rows) + 0.5) * pixel_rad).astype(np.float32)
+    azimuth = (AZIMUTH_RAD - (np.arange(columns) + 0.5) * pixel_rad).astype(np.float32)
     light = _sky(scene, rng, elevation, azimuth)
-    haze = light[int(0.06 / px_rad)].mean(axis=0)
+    haze = light[int(0.06 / pixel_rad)].mean(axis=0)
     _land(scene, rng, light, elevation, haze)
     _houses(scene, light, elevation, azimuth)
-    rough_px_rad = max(px_rad, 0.006)
-    factor = px_rad / rough_px_rad
+    rough_pixel_rad = max(pixel_rad, 0.006)
+    factor = pixel_rad / rough_pixel_rad
     small = cv2.resize(light, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     rough = np.asarray(
         cv2.GaussianBlur(small, (0, 0), sigmaX=2.5, sigmaY=14.0, borderType=cv2.BORDER_REPLICATE),
         dtype=np.float32,
     )
     mean = light.mean(axis=(0, 1)).astype(np.float32)
-    return Panorama(light, rough, px_rad, HIGHEST_RAD / rough.shape[0] * 1.03, mean)
+    return Panorama(light, rough, pixel_rad, HIGHEST_RAD / rough.shape[0] * 1.03, mean)
 
 
 def _sky(scene: Scene, rng: np.random.Generator, elevation: Float, azimuth: Float) -> Float:
