@@ -1,4 +1,4 @@
-"""Pictures, worked on in a process of their own: a folder of frames played at a rate, class and confidence out."""
+"""The camera's process: plays a folder of pictures at a fixed rate and shares class and confidence of each."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from trpac_hil.helper import Control, helper
 from trpac_hil.shared import Numbers, Ring
 
 FAILED = -1.0
-"""In the place of a class: the picture could not be used."""
+"""Value of the class where the picture could not be used."""
 MOTION = ("speed_m_s", "acceleration_m_s2", "steering_angle_rad", "yaw_rate_rad_s", "way_m")
-"""What the loop shares of the car's motion; the yaw rate is NaN where it is not measured."""
+"""Numbers of the car's motion that the loop shares; the yaw rate is NaN where it is not measured."""
 HEAD = 5
 """Numbers of a result before the classes: picture, time taken, time ready [ns], pictures left out, work [ms]."""
 RESULTS_KEPT = 64
@@ -35,12 +35,12 @@ LONGEST_SLEEP_NS = 50_000_000
 
 
 def result_columns(sides: int) -> int:
-    """Numbers of a result: the head, and class and confidence of each side."""
+    """How many numbers a result has: the head, and class and confidence of each side."""
     return HEAD + 2 * sides
 
 
 class Source(Protocol):
-    """Where pictures come from."""
+    """A source of pictures."""
 
     def picture(self, number: int) -> NDArray[np.uint8]:
         """The picture of that number, counted from 0; raises ImageError."""
@@ -49,7 +49,7 @@ class Source(Protocol):
 
 @dataclass(frozen=True)
 class PictureFolder:
-    """Pictures of a folder, over and over again."""
+    """The pictures of a folder, repeated without end."""
 
     files: tuple[Path, ...]
 
@@ -60,22 +60,22 @@ class PictureFolder:
 
 @dataclass(frozen=True)
 class CameraJob:
-    """What the camera's process needs to know.
+    """Settings of the camera's process.
 
     Attributes
     ----------
     source : Source
         Pictures.
     vision : IfeConfig
-        Settings of the image estimator: camera, car, and what the unit's parameters `image.*` say.
+        Settings of the image estimator: camera, car, and the unit's parameters `image.*`.
     fps : float
         Pictures per second.
     sides : tuple of str
-        Tracks that are asked for: 'left', 'right', or both in this order.
+        Tracks to classify: 'left', 'right', or both in this order.
     threads : int
-        Of each network; 1 leaves the loop its core.
+        Threads of each network.
     core : int or None
-        The loop's core, to keep off.
+        The loop's core, which this process does not use.
     """
 
     source: Source
@@ -109,19 +109,19 @@ class ImageEstimator:
             self._ife, self.state = Ife(replace(config, side=side), *networks), IfeState()
 
     def process(self, image: NDArray[np.uint8], motion: Motion) -> Sequence[FrameResult]:
-        """Results of a picture, one per side; raises ImageError or ModelError, and then nothing is remembered."""
+        """Results of a picture, one per side; where ImageError or ModelError is raised the state is unchanged."""
         self.state, *results = self._ife.process(self.state, image, motion)
         return results
 
 
 def motion_of(numbers: Sequence[float]) -> Motion:
-    """Motion from the numbers `MOTION` that the loop shares."""
+    """The motion that the numbers `MOTION` describe."""
     speed, acceleration, steering, yaw, way = numbers
     return Motion(speed, acceleration, steering, None if math.isnan(yaw) else yaw, way)
 
 
 def run_camera(job: CameraJob, motion: Numbers, results: Ring, control: Control) -> None:
-    """Body of the process: take each picture when it is due, and share what it shows; ends with the loop."""
+    """Body of the process: classify each picture when it is due and share the result, until the loop ends."""
     with helper(job.core):
         cv2.setNumThreads(1)
         try:
@@ -149,7 +149,7 @@ def _play(
         if now_ns < due_ns:
             clock.sleep_ns(min(due_ns - now_ns, LONGEST_SLEEP_NS))
             continue
-        # Too slow for the rate: the newest picture counts, those in between are left out.
+        # Too slow for the rate: the newest picture is used, those in between are left out.
         number = deadlines.next_slot(done, now_ns)
         left_out += number - done - 1
         done = number

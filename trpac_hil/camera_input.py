@@ -1,4 +1,4 @@
-"""The loop's end of the camera: results of pictures in, what the unit is to be told of the road out."""
+"""Camera results as the loop uses them: from the camera's process or the bus to the inputs of the unit."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from trpac_hil.unit import NO_CLASS
 
 SURFACES = {float(surface.value): surface for surface in Surface}
 STEEPEST_RAD = 1.5
-"""Steering angle beyond which a reading is none [rad]."""
+"""Steering angles of this size or more are not used [rad]."""
 
 
 class CameraInput:
-    """What is known of the road under the front wheel.
+    """The road class under the front wheel.
 
     Parameters
     ----------
     stamps : PreviewStamps
         Stamps of the results.
     stale_ns : int
-        Time without a result after which the camera is lost [ns].
+        Time without a result after which the camera counts as lost [ns].
     side_names : tuple of str
-        Tracks that the unit asks for: 'left', 'right', or both.
+        Tracks of the unit: 'left', 'right', or both.
     results, motion : Ring, Numbers
-        Shared with the camera's process; None where results come by bus.
+        Memory shared with the camera's process; None where results come by bus.
 
     Attributes
     ----------
     classes : list of (int, float)
-        Class and confidence per side as the unit is to be told; after a first class none is confidence 0.
+        Class and confidence per side for the unit; confidence 0 where there is no result any more.
     number : int
-        How often that has changed.
+        How often these have changed.
     losses, left_out, work_ms : int, int, list of float
-        How often the camera was lost, pictures that its process was too slow for, and its work on each [ms].
+        How often the camera was lost, pictures that its process left out, and its time for each [ms].
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class CameraInput:
         self._number_by_bus = math.nan
 
     def share_motion(self, odometer: Odometer, values: Mapping[str, float]) -> None:
-        """Let the camera's process know how the car moves; what is lost counts as 0, the yaw rate as not measured."""
+        """Share the car's motion with the camera's process; lost signals are 0, a lost yaw rate is NaN."""
         if self._motion is not None:
             accel, steering = values["AccelX"], values["SteeringAngle"]
             self._motion.set(
@@ -76,10 +76,10 @@ class CameraInput:
     def news(
         self, heard: Heard, fresh: bool, doubted: bool, odometer: Odometer, now_ns: int, report: ReportEvent
     ) -> bool:
-        """Take results in; returns whether the unit is to be told something new.
+        """Stamp new results; returns whether the classes for the unit have changed.
 
         `heard` is the newest message RoadClass, `fresh` whether it has just come, and `doubted` whether two devices
-        send it: then nothing that came by bus counts.
+        send it: then no result of the bus is used.
         """
         stamps = self.stamps
         by_bus = self._results is None
@@ -108,7 +108,7 @@ class CameraInput:
         return True
 
     def _shared(self, now_ns: int) -> list[CameraResult]:
-        """Results of the camera's process."""
+        """New results of the camera's process."""
         if self._results is None or not self._results.waiting:
             return []
         rows = self._results.read()
@@ -128,7 +128,7 @@ class CameraInput:
         ]
 
     def _by_bus(self, heard: Heard, fresh: bool, now_ns: int, report: ReportEvent) -> list[CameraResult]:
-        """The result that another device sent, if it is a new one; taken `RoadClass_Age` before it was sent."""
+        """The result in the message RoadClass where it is new; its picture was taken `RoadClass_Age` before."""
         if not fresh or heard.values["RoadClass_Number"] == self._number_by_bus:
             return []
         values = heard.values
@@ -154,6 +154,6 @@ class CameraInput:
         return math.nan if newest is None else (now_ns - newest.captured_ns) * 1e-6
 
     def age_under_wheel_ms(self, now_ns: int) -> float:
-        """Time since the picture of the road under the front wheel was taken, of two the older; NaN: none [ms]."""
+        """Time since the picture of the road under the front wheel was taken, the older of two [ms]; NaN: none."""
         ages = [now_ns * 1e-6 - outcome.captured_s * 1e3 for outcome in self._given if outcome is not None]
         return max(ages) if ages else math.nan

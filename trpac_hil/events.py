@@ -1,4 +1,4 @@
-"""Events of the loop: each kind is said once and counted ever after."""
+"""Events of the loop: the first of each kind is shown, all are counted."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Event:
-    """One kind: when it first happened [s], what was said, and how often it happened."""
+    """A kind of event: time of its first occurrence [s], text, and number of occurrences."""
 
     time_s: float
     text: str
@@ -16,14 +16,14 @@ class Event:
 
 
 class Events:
-    """Said once, counted always.
+    """Events by kind.
 
     Parameters
     ----------
     show : callable
-        Given the time [s] and the sentence of a kind's first event.
+        Called with time [s] and text of the first event of a kind.
     now_s : callable
-        Time since the start [s].
+        Returns the time since the start [s].
     """
 
     def __init__(self, show: Callable[[float, str], None], now_s: Callable[[], float]) -> None:
@@ -31,7 +31,7 @@ class Events:
         self._show, self._now_s = show, now_s
 
     def report(self, kind: str, text: str) -> None:
-        """An event happened."""
+        """Count an event; show the first of its kind."""
         known = self.kinds.get(kind)
         if known is None:
             self.kinds[kind] = Event(self._now_s(), text)

@@ -1,4 +1,4 @@
-"""Figures of a run: spreads of timing and ages, as the terminal and summary.json have them."""
+"""Quantiles of timing and ages of a run, for the terminal and summary.json."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ SKETCHED_COLUMNS = {
     "age_picture_ms": "age_picture_ms",
     "age_under_wheel_ms": "age_under_wheel_ms",
 }
-"""Figures of summary.json, and the column of each."""
+"""Keys of summary.json, and the log column of each."""
 
 
 class Figures:
-    """Spreads of timing and ages over all rows, and the newest row."""
+    """Quantiles of timing and ages over all rows, and the newest row."""
 
     def __init__(self, columns: Sequence[Column]) -> None:
         self._at = {column.name: index for index, column in enumerate(columns)}
@@ -32,7 +32,7 @@ class Figures:
         self.rows = 0
 
     def add(self, rows: NDArray[np.float64]) -> None:
-        """Count rows, shape (n, columns)."""
+        """Add rows, shape (n, columns)."""
         if not len(rows):
             return
         for name, column in SKETCHED_COLUMNS.items():

@@ -1,4 +1,4 @@
-"""The cycle: read the bus, step the unit, send; each at its time, whatever happens."""
+"""The cycle in real time: read the bus, step the unit, send."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ from trpac_hil.shared import Ring
 from trpac_hil.unit import Estimates, Wiring
 
 HEALTH_EVERY_NS = 100_000_000
+"""Cycle time of the message Health [ns]."""
 CHECK_EVERY_NS = 100_000_000
-"""How often bus state, wall clock and helpers are looked at [ns]."""
+"""Time between checks of bus state, time of day and helper processes [ns]."""
 LONG_NS = 5_000_000
-"""Overruns beyond this are counted on their own [ns]."""
+"""Overruns beyond this are also counted as long ones [ns]."""
 REQUIRED_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion")
 STARTING, RUNNING, HELD_INPUT, HELD_BUS, HELD_UNIT, ENDED = 0, 1, 2, 3, 4, 7
 """Values of the signal Status."""
@@ -32,7 +33,7 @@ NAN = math.nan
 
 
 class Bus(Protocol):
-    """What the loop needs of the bus; see `trpac_hil.bus.Link`."""
+    """The methods of `trpac_hil.bus.Link` that the loop calls."""
 
     losses: int
 
@@ -47,7 +48,7 @@ class Bus(Protocol):
 
 
 class SteppedUnit(Protocol):
-    """What the loop needs of the unit; see `trpac_hil.unit.Unit`."""
+    """The methods of `trpac_hil.unit.Unit` that the loop calls."""
 
     wiring: Wiring
 
@@ -65,7 +66,7 @@ class SteppedUnit(Protocol):
 
 @dataclass
 class Counts:
-    """What the loop counts itself.
+    """Counts of the loop.
 
     `overruns` are cycles that ended after their deadline and cycles left out; `long_overruns` those of them by more
     than 5 ms, by `trpac_hil.delays.CAUSES` in `long_causes`; `worst_ns` is the greatest time by which a deadline was
@@ -86,29 +87,29 @@ class Counts:
 
     @property
     def overruns(self) -> int:
-        """Deadlines that were not met."""
+        """Number of deadlines that were missed."""
         return self.late_ends + self.left_out
 
 
 class Loop:
-    """One run.
+    """One run of the loop.
 
     Parameters
     ----------
     clock, deadlines : Clock, Deadlines
         Time, and when each cycle is due.
     bus, unit, codec, inputs : Bus, SteppedUnit, Codec, Inputs
-        What is read, stepped and sent.
+        Bus, unit, coding and newest values of the messages.
     camera_input : CameraInput
         Results of pictures.
     ring : Ring
-        Where each cycle's row goes.
+        Shared memory for each cycle's row.
     events : Events
-        Told what happens.
+        Record of what happens.
     delays : Delays
-        Told of each cycle, to know what long overruns came of.
+        Counts of long overruns by cause.
     check : callable
-        Looks after the helpers, ten times a second.
+        Checks the helper processes, ten times a second.
     """
 
     def __init__(
@@ -142,10 +143,10 @@ class Loop:
         self._next_check_ns = self._next_health_ns = 0
 
     def run(self, stop: Callable[[], bool], slots: int | None = None) -> Counts:
-        """Cycle until told to stop, or for a number of slots."""
+        """Run cycles until `stop` returns True, or for a number of slots; returns the counts."""
         deadlines, clock, done = self._deadlines, self._clock, -1
         self._polled_ns = wait_until(clock, deadlines.due_ns(-1), self._spin_ns)
-        self._bus.receive()  # what has come by now may be of any age
+        self._bus.receive()  # messages received so far may be of any age
         self._delays.start()
         while not stop() and (slots is None or done + 1 < slots):
             due_ns, longs = deadlines.due_ns(done + 1), self.counts.long_overruns
@@ -163,14 +164,14 @@ class Loop:
         return self.counts
 
     def _leave_out(self, first: int, number: int, now_ns: int) -> None:
-        """Count cycles that were left out: each missed its deadline."""
+        """Count cycles that were left out, each as a missed deadline."""
         if number <= 0:
             return
         counts, period_ns = self.counts, self._deadlines.period_ns
         counts.left_out += number
         missed_ns = self._deadlines.missed_by_ns(first, now_ns)
         counts.worst_ns = max(counts.worst_ns, missed_ns)
-        # Of the slots in a row that were left out each missed its own deadline by a period less than the one before.
+        # Each slot of a row that was left out missed its deadline by one period less than the slot before.
         counts.long_overruns += max(0, min(number, -(-(missed_ns - LONG_NS) // period_ns)))
 
     def _cycle(self, slot: int, left_out: int, began_ns: int) -> None:
@@ -213,7 +214,7 @@ class Loop:
         self._record(slot, step_s, values, estimates, status, timing, left_out, began_ns)
 
     def _receive(self, now_ns: int) -> set[str]:
-        """Take in what came; it came after the last look at the earliest."""
+        """Store received messages, which came after the last poll at the earliest; returns names of new ones."""
         earliest_ns, self._polled_ns = self._polled_ns, now_ns
         take = self._inputs.take
         return {
@@ -223,7 +224,7 @@ class Loop:
         }
 
     def _snapshot(self, now_ns: int) -> dict[str, float]:
-        """All signals as they count now, NaN where lost; a message that stopped coming is said."""
+        """Current value of all signals, NaN where lost; reports required messages that are lost or back."""
         value = self._inputs.value
         values = {signal: value(signal, now_ns) for signal in LOGGED.values()}
         for name in REQUIRED_MESSAGES:
@@ -243,7 +244,7 @@ class Loop:
         return values
 
     def _readings(self, values: dict[str, float]) -> list[float]:
-        """Inputs of the unit; an optional signal counts from the first time it comes, and is missed from then on."""
+        """Values of the unit's inputs; an optional signal is used, and can be lost, from its first value on."""
         for variable, signal in self._unit.wiring.optional.items():
             if variable not in self._wired and values[signal] == values[signal]:
                 self._wired[variable] = signal
@@ -251,7 +252,7 @@ class Loop:
         return [values[signal] for signal in self._wired.values()]
 
     def _judge(self, estimates: Estimates | None, readings: Sequence[float], doubted: bool) -> int:
-        """What the signal Status says of this cycle."""
+        """Value of the signal Status in this cycle."""
         if not self._bus.up:
             return HELD_BUS
         if estimates is None:
@@ -267,7 +268,7 @@ class Loop:
         return HELD_INPUT if doubted else RUNNING
 
     def _missing(self, readings: Sequence[float]) -> bool:
-        """Whether signals are lost without which no wheel can be estimated; one wheel's own hold that wheel alone."""
+        """Whether lost signals prevent the estimate of all wheels; signals of one wheel hold that wheel alone."""
         lost = [name for name, reading in zip(self._wired, readings, strict=True) if reading != reading]
         if not lost:
             return False
@@ -300,7 +301,7 @@ class Loop:
         self._bus.send(coded.message.frame_id, coded.message.is_extended_frame, data)
 
     def _check_and_send_health(self, now_ns: int) -> None:
-        """What needs no look in every cycle."""
+        """Check bus, helpers and time of day, and send the message Health, where these are due."""
         if now_ns >= self._next_check_ns:
             self._next_check_ns = now_ns + CHECK_EVERY_NS
             self._bus.check()
@@ -348,7 +349,7 @@ class Loop:
         left_out: int,
         now_ns: int,
     ) -> None:
-        """The cycle's row, in the order of `trpac_hil.records.columns`."""
+        """Write the cycle's row, in the order of `trpac_hil.records.columns`."""
         age_ns, camera_input = self._inputs.age_ns, self._camera_input
         self._ring.write(
             [

@@ -1,4 +1,4 @@
-"""The rig: unit, bus, camera, recorder and plant, put together for one run."""
+"""The rig: unit, bus, camera, recorder and plant of one run."""
 
 from __future__ import annotations
 
@@ -53,29 +53,29 @@ from trpac_hil.unit import Unit
 
 LOG, SUMMARY = "log.mf4", "summary.json"
 PATIENCE_S, RECORDERS_PATIENCE_S = 60.0, 3600.0
-"""How long a helper that has been told to stop may go on before it is ended [s]."""
+"""Longest time from the request to stop until a process is killed, and until the recorder, which has a log, is [s]."""
 RUN_UP_NS = 200_000_000
-"""From the word to start until slot 0, for all processes to hear it [ns]."""
+"""Time from the start message until slot 0, for all processes to receive it [ns]."""
 CLASS_MESSAGE, CLASS_SIGNAL = "RoadClass", "RoadClass_Number"
 
 
 class Stopper:
-    """Set by Ctrl-C, SIGTERM or whoever holds it."""
+    """A request to stop, by Ctrl-C, SIGTERM or `ask`."""
 
     def __init__(self) -> None:
         self.asked = False
 
     def __call__(self) -> bool:
-        """Whether to stop."""
+        """Whether a stop was requested."""
         return self.asked
 
     def ask(self, *_: object) -> None:
-        """Stop at the end of the cycle."""
+        """Request a stop at the end of the cycle."""
         self.asked = True
 
     @contextmanager
     def by_signal(self) -> Iterator[None]:
-        """Ctrl-C and SIGTERM end the loop, not the program; from another thread than the main one they cannot."""
+        """Context in which Ctrl-C and SIGTERM end the loop, not the program; without effect outside the main thread."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -88,14 +88,14 @@ class Stopper:
 
 
 class Rig:
-    """Helpers of a run: processes that start before the loop and end after it."""
+    """The processes of a run, which start before the loop and end after it."""
 
     def __init__(self) -> None:
         self._helpers: list[tuple[Control, Any]] = []
         self.dead: list[str] = []
 
     def add(self, name: str, body: Callable[..., None], *arguments: Any) -> Control:
-        """Start a process, its control in the place of `...`; the recorder alone, which saves a log, may outlive us."""
+        """Start a process, with its control for the argument `...`. Only the recorder may outlive this process."""
         control = Control(name)
         passed = [control if argument is ... else argument for argument in arguments]
         process = CONTEXT.Process(
@@ -106,17 +106,17 @@ class Rig:
         return control
 
     def wait_until_ready(self) -> None:
-        """Wait for all of them; raises HilError."""
+        """Wait until all processes are ready; raises HilError."""
         for control, process in self._helpers:
             control.wait_until_ready(process)
 
     def start(self, start_ns: int) -> None:
-        """Tell all of them when slot 0 begins."""
+        """Send all processes the time at which slot 0 begins."""
         for control, _ in self._helpers:
             control.start(start_ns)
 
     def check(self, events: Events) -> None:
-        """Pass on what they say; a process that has died is said and left behind."""
+        """Report the messages of the processes, and those that have died."""
         for control, process in self._helpers:
             for kind, text in control.heard() if control.name != "recorder" else ():
                 events.report(kind, text)
@@ -127,10 +127,9 @@ class Rig:
                 )
 
     def end(self, control: Control | None = None, patience_s: float = PATIENCE_S) -> dict[str, Any]:
-        """Stop all, wait for them, and return what one of them said last, by kind.
+        """Stop all processes and wait for them; returns the last messages of the one of `control`, by kind.
 
-        One that is still at work after `patience_s` is ended; the recorder, which may have a long log to write, after
-        an hour.
+        A process that still runs after `patience_s` is killed; the recorder after `RECORDERS_PATIENCE_S`.
         """
         for each, _ in self._helpers:
             each.stop()
@@ -151,12 +150,12 @@ class Rig:
 
 
 def run_hil(settings: HilSettings, stopper: Stopper | None = None) -> dict[str, Any]:
-    """Run the loop to its end; writes log.mf4 and summary.json and returns what the latter holds.
+    """Run the loop to its end and write log.mf4 and summary.json; returns the content of summary.json.
 
     Raises
     ------
     HilError, ScenarioError
-        Before the loop begins, where something cannot be used; the folder then holds nothing new.
+        Before the loop begins, where a setting cannot be used; the folder is then unchanged.
     """
     stopper = stopper or Stopper()
     with ExitStack() as stack:
@@ -178,7 +177,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
     seen = None if settings.frames is None else _camera_job(settings, unit)
     link = Link(settings.bus.open, events.report)
     stack.callback(link.close)
-    # What can be refused has been refused: only now the processes, which take seconds.
+    # All settings are checked by now: the processes take seconds to start.
     stack.callback(rig.end)
     settings.out.mkdir(parents=True, exist_ok=True)
     ring = Ring(len(columns(unit.wiring)), ROWS_KEPT)
@@ -227,7 +226,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
         messages = rig.end(recorder)
     summary = summarise(settings, unit, counts, events, inputs, link, camera_input, messages, system, ended)
     if before_mb is not None and after_mb is not None:
-        # The garbage collector is off: what grows here would grow for ever.
+        # The garbage collector is off, so that growth here would not end.
         summary["system"]["memory_mb"] = {"before": round(before_mb, 1), "after": round(after_mb, 1)}
     summary["log"] = _log_outcome(settings, messages)
     write_summary(summary, settings.out / SUMMARY)
@@ -250,12 +249,12 @@ def _vehicle(settings: HilSettings) -> Vehicle:
 
 
 def _parameters(settings: HilSettings) -> dict[str, Any]:
-    """The unit's parameters; results are placed by the rig, so the unit's own preview is switched off."""
+    """Parameters of the unit; its own preview is off, because the rig stamps the results."""
     return car_parameters(_vehicle(settings), settings.wheel) | dict(settings.parameters) | UNIT_PREVIEW
 
 
 def _preview(settings: HilSettings) -> PreviewConfig:
-    """What the rig places results by; raises HilError."""
+    """Settings of the rig's stamps; raises HilError."""
     names = {"preview.P_0": "P_0_m", "preview.hold": "hold_m", "preview.resolution": "resolution_m"}
     chosen = {names[key]: float(value) for key, value in settings.parameters.items() if key in names}
     try:
@@ -291,7 +290,7 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
 
 
 def _vision(settings: HilSettings, camera: Camera) -> IfeConfig:
-    """The image estimator's settings by the unit's parameters, which the unit itself has taken already."""
+    """Settings of the image estimator by the unit's parameters, which the unit has accepted before."""
     given = _parameters(settings)
     variables = [v for v in ESTIMATOR_PARAMETERS if v.name.startswith("image.")]
     kinds = {Kind.INTEGER: int, Kind.BOOLEAN: bool, Kind.REAL: float}
@@ -305,7 +304,7 @@ def _vision(settings: HilSettings, camera: Camera) -> IfeConfig:
 def _plant(
     settings: HilSettings, rig: Rig, events: Events, over: threading.Event, stack: ExitStack
 ) -> Callable[[int], None] | None:
-    """The plant, in a process of its own; to a bus within this process a thread here hands on what it sends."""
+    """Start the plant's process; for a bus of this process, returns what starts the relay of its messages."""
     job = settings.plant
     if job is None:
         return None
@@ -320,7 +319,7 @@ def _plant(
     relay = BusRelay(wire, link, SystemClock())
 
     def start(start_ns: int) -> None:
-        # Half a period apart the two do not ask for the interpreter at the same time.
+        # Half a period apart, loop and relay do not need the interpreter at the same time.
         period_ns = round(1e9 / job.rate_hz)
         arguments = (start_ns + period_ns // 2, period_ns, over.is_set)
         thread = threading.Thread(target=relay.run, args=arguments, name="relay", daemon=True)
@@ -332,7 +331,7 @@ def _plant(
 
 
 def _system(settings: HilSettings) -> dict[str, Any]:
-    """Priority and core of the loop, as far as the system grants them."""
+    """Ask for core and priority of the loop; returns the outcomes as in summary.json."""
     granted: dict[str, Any] = {"cpus": os.cpu_count(), "platform": sys.platform}
     if settings.core is not None:
         granted["core"] = pin(settings.core)

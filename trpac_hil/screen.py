@@ -1,4 +1,4 @@
-"""What the terminal shows while the loop runs."""
+"""The terminal while the loop runs."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from trpac_hil.records import AGED
 
 STATUS = {0: "starting", 1: "running", 2: "held: inputs", 3: "held: bus", 4: "held: unit"}
 MOST_WORDS = 8
-"""Newest events that the table shows; all are in summary.json."""
+"""Newest events that are shown; all are in summary.json."""
 EventTexts = Sequence[tuple[float, str]]
 
 
 class EventLines:
-    """Events alone, a line each: for logs and pipes."""
+    """Events alone, one line each, for logs and pipes."""
 
     def __init__(self) -> None:
         self._console = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -33,13 +33,13 @@ class EventLines:
         return None
 
     def show(self, figures: Figures, texts: EventTexts) -> None:
-        """Print what was said since."""
+        """Print the new events."""
         for time_s, text in texts:
             self._console.print(escape(f"{time_s:9.3f} s  {text}"))
 
 
 class Screen:
-    """A table that is drawn anew a few times a second, the newest events below."""
+    """A table, redrawn a few times a second, with the newest events below."""
 
     def __init__(self, title: str) -> None:
         self._title = title
@@ -54,7 +54,7 @@ class Screen:
         self._live.stop()
 
     def show(self, figures: Figures, texts: EventTexts) -> None:
-        """Draw the figures as they are now."""
+        """Redraw the table."""
         self._texts = [*self._texts, *texts][-MOST_WORDS:]
         events = [Text(f"{time_s:9.3f} s  {text}", style="yellow") for time_s, text in self._texts]
         self._live.update(Group(_estimate(figures, self._title), _timing(figures), *events), refresh=True)

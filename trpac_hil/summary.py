@@ -1,4 +1,4 @@
-"""summary.json: what a run counted and measured."""
+"""summary.json: counts and measurements of a run."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def summarise(
     system: Mapping[str, Any],
     ended: str,
 ) -> dict[str, Any]:
-    """What summary.json holds; docs/hil.md has its fields."""
+    """The content of summary.json; docs/hil.md has its fields."""
     done = messages.get("done")
     return {
         "unit": unit.name,
@@ -110,7 +110,7 @@ def _camera(settings: HilSettings, camera_input: CameraInput) -> dict[str, Any]:
 
 
 def write_summary(summary: Mapping[str, Any], path: Path) -> None:
-    """Write the summary under another name, then give it its own."""
+    """Write the summary under another name, then rename it."""
     scratch = path.with_name(f".{path.name}.part")
     scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     scratch.replace(path)

@@ -1,4 +1,4 @@
-"""The estimator's unit through fmpy, its variables wired to the bus's signals."""
+"""The estimator's unit through fmpy, with the bus's signals as its inputs."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from trpac_hil.errors import HilError
 
 NO_CLASS = -1
 WARM_UP_STEPS = 300
-"""Steps before the clock starts: the first ones load code and are slow."""
+"""Steps before the run: the first ones load code and are slow."""
 WARM_UP_INPUTS = {"wheel_speed": 52.0, "wheel_torque": 150.0, "vehicle_speed": 15.0}
 
 
 class Estimates(NamedTuple):
-    """What the loop sends: those of the car, or of the one wheel; then theta_hat and flag of each wheel, if any."""
+    """Estimates of the car or of the one wheel; then theta_hat and flag of each wheel of four."""
 
     TRPAC: float
     TRPAC_std: float
@@ -37,7 +37,7 @@ class Estimates(NamedTuple):
     wheel_flags: tuple[bool, ...]
 
     def held(self) -> Estimates:
-        """The same estimate, with nothing that says that it is live."""
+        """The same estimate with flags and K_v at 0: it is not updated."""
         return self._replace(
             flag=False, excitation=False, K_v=0.0, wheel_flags=(False,) * len(self.wheel_flags)
         )
@@ -45,16 +45,16 @@ class Estimates(NamedTuple):
 
 @dataclass(frozen=True)
 class Wiring:
-    """Which signals of the bus go to which variables.
+    """Signals of the bus by the unit's variables.
 
     Attributes
     ----------
     wheels : tuple of str
         Wheels that the unit estimates.
     required, optional : mapping
-        Signal by variable; optional ones are set from the first time they come.
+        Signal by variable; optional ones are set from their first value on.
     sides : tuple of pairs
-        Variables of class and confidence, for each side that the unit asks for.
+        Variables of class and confidence, for each side of the unit.
     side_names : tuple of str
         'left', 'right'.
     """
@@ -67,7 +67,7 @@ class Wiring:
 
     @classmethod
     def of_one(cls, wheel: str) -> Wiring:
-        """The unit of one wheel, wired to that wheel's signals."""
+        """The wiring of the unit of one wheel."""
         suffix = wheel.upper()
         required = {
             "wheel_speed": f"WheelSpeed_{suffix}",
@@ -80,7 +80,7 @@ class Wiring:
 
     @classmethod
     def of_four(cls) -> Wiring:
-        """The unit of four wheels."""
+        """The wiring of the unit of four wheels."""
         required = {f"wheel_speed.{w}": f"WheelSpeed_{w.upper()}" for w in WHEELS}
         required |= {f"wheel_torque.{w}": f"WheelTorque_{w.upper()}" for w in WHEELS}
         optional = {f"vertical_load.{w}": f"VerticalLoad_{w.upper()}" for w in WHEELS}
@@ -146,7 +146,7 @@ class Unit:
         self._last = self._read()
 
     def _typed(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Settings as their variables' types; raises HilError for what is no parameter, or no number of its kind."""
+        """Settings converted to the types of their variables; raises HilError for unknown names and wrong values."""
         kinds = {"Integer": int, "Boolean": bool, "Real": float}
         usable = {name for name in self._parameters if self._references[name][1] in kinds}
         unknown = sorted(set(settings) - usable - set(WHICH_WHEEL))
@@ -174,7 +174,7 @@ class Unit:
         slave.exitInitializationMode()
 
     def _warm_up(self) -> None:
-        """Steps whose results are thrown away; a unit that discards them cannot be used with these settings."""
+        """Take steps whose results are discarded; raises HilError where the unit refuses them with these settings."""
         values = [WARM_UP_INPUTS[name.partition(".")[0]] for name in self.wiring.required]
         references = self.references(tuple(self.wiring.required))
         for number in range(WARM_UP_STEPS):
@@ -189,7 +189,7 @@ class Unit:
         return self._slave
 
     def references(self, variables: Sequence[str]) -> list[int]:
-        """Value references of variables."""
+        """Value references of the variables."""
         return [self._references[name][0] for name in variables]
 
     def give_class(self, classes: Sequence[tuple[int, float]], number: int) -> None:
@@ -201,7 +201,7 @@ class Unit:
     def step(
         self, time_s: float, step_s: float, references: Sequence[int], values: Sequence[float]
     ) -> Estimates | None:
-        """Set inputs and step; None where the unit discards the step."""
+        """Set inputs and step; returns the estimates, or None where the unit discards the step."""
         slave = self._instance
         try:
             slave.setReal(references, values)
