@@ -1,1 +1,1 @@
-"""The reference plant as the unit carries it: without its sensors and what they need."""
+"""`scenarios.plant` within a unit: without its sensors and their imports."""

@@ -1,4 +1,4 @@
-"""What is wrong with a unit's file, or with the Python that shall run it, found out without risk to the caller."""
+"""Examination of a unit's file and of the Python that runs it; the unit's code runs in a child process."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from .units import UNITS
 RECORD = f"resources/{CONTENTS_FILE}"
 DESCRIPTION = "modelDescription.xml"
 KNOWN_PACKAGES = {module: package for slave in UNITS.values() for module, package in slave.packages.items()}
-"""What units of this project may need, and what brings it: nothing else that a file names is imported."""
+"""Modules that units of this project need, and their packages; no other module that a file names is imported."""
 PROBE_LIMIT_S, TRIAL_LIMIT_S = 60.0, 300.0
-"""How long the interpreter may take to import the packages, and the unit to start: the plant compiles first [s]."""
+"""Longest time to import the packages, and to start the unit, where the plant compiles first [s]."""
 MOST_NAMED, LONGEST_PROBLEM = 5, 400
-"""Problems of one kind that a finding names; the rest are counted. Characters of one: two hashes and a quoted name."""
+"""Problems of one kind that a finding names, and characters of one; further problems are counted."""
 TESTED_PYTHON = (3, 11)
 ISOLATED = ("-I",)
-"""No folder of the caller's, no PYTHONPATH and no packages of the user's own are imported from: it includes -P, which
-Pythons before 3.11 do not know."""
+"""Python's isolated mode: without the current folder, PYTHONPATH and the user's own packages. It includes -P, which
+Pythons before 3.11 do not have."""
 UNREADABLE_ANSWER = (ValueError, IndexError, KeyError, TypeError, AttributeError)
-"""What an answer of a side process may end in that is none."""
+"""Exceptions where the answer of a child process cannot be read."""
 
 PROBE = f"""
 import ctypes, importlib, json, sys, sysconfig
@@ -52,11 +52,11 @@ library = "%s/%s" % (sysconfig.get_config_var("LIBDIR"), sysconfig.get_config_va
 print(json.dumps({{"executable": sys.executable, "version": list(sys.version_info[:3]), "prefix": sys.prefix,
                   "libpython": library, "packages": packages}}))
 """
-"""Program of the side process: prints the interpreter, and which of the modules in its arguments it can import."""
+"""Program of the child process: prints the interpreter, and which of the modules in its arguments it can import."""
 
 
 class State(Enum):
-    """What a finding means."""
+    """Severity of a finding."""
 
     OK = "ok"
     NOTE = "note"
@@ -65,7 +65,7 @@ class State(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: what it is, how it is, and what to do about it."""
+    """A result of the examination: subject, state, text and remedy."""
 
     what: str
     state: State
@@ -75,7 +75,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Python:
-    """The interpreter that shall run the unit."""
+    """The interpreter that runs the unit."""
 
     command: str
     version: tuple[int, ...] = ()
@@ -86,7 +86,7 @@ class Python:
 
 @dataclass(frozen=True)
 class Examination:
-    """All findings on a unit, in the order in which they were made."""
+    """All findings on a unit, in their order."""
 
     unit: str
     findings: tuple[Finding, ...]
@@ -101,7 +101,7 @@ class Examination:
 
 
 class UnusableError(ValueError):
-    """What was given is no unit, or no Python; the text says what was expected."""
+    """The file is no unit, or the command no Python; the text says what was expected."""
 
 
 def examine(
@@ -110,18 +110,18 @@ def examine(
     run: bool = True,
     notify: Callable[[str], None] = lambda _: None,
 ) -> Examination:
-    """Look at a unit's file and try it out in a child process, which runs the unit's own code.
+    """Findings on a unit's file, and on a trial in a child process, which runs the unit's own code.
 
     Parameters
     ----------
     path : Path
         The unit's archive.
     python : str
-        The interpreter that shall run it.
+        The interpreter that runs it.
     run : bool
-        Whether it is tried out; its code is not run otherwise.
+        Whether to make the trial; without it the unit's code is not run.
     notify : callable
-        Is given a sentence before the unit's code is run.
+        Called with a sentence before the unit's code is run.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def examine(
 
 
 def examine_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
-    """The record of the build, if it can be read, and findings on archive, contents and description.
+    """The record of the build, None where it cannot be read, and findings on archive, contents and description.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def _archive(archive: Archive) -> Finding:
 
 
 def _contents(archive: Archive) -> tuple[Contents | None, Finding]:
-    """The record of the build, and whether the files are those of the record: networks first."""
+    """The record of the build, and the finding on whether the files are those of the record, networks first."""
     names = archive.names
     if RECORD not in names:
         text = f"no {RECORD}: another tool's unit, or one of an older version; nothing to compare with"
@@ -232,7 +232,7 @@ def _run(command: list[str], limit_s: float) -> subprocess.CompletedProcess[str]
 
 
 def _probe(python: str, modules: list[str]) -> Python:
-    """What the interpreter is and can import; raises UnusableError if it cannot be started."""
+    """Version, paths and importable modules of the interpreter; raises UnusableError if it cannot be started."""
     try:
         done = _run([python, *ISOLATED, "-c", PROBE, *modules], PROBE_LIMIT_S)
         answer = parse_json(done.stdout.splitlines()[-1], "its answer")
@@ -277,7 +277,7 @@ def _python(python: Python, modules: list[str] | None) -> list[Finding]:
 
 
 def _trial(path: Path, python: str) -> Finding:
-    """Instantiate the unit and take steps, in a child process that may die."""
+    """The finding on instantiating and stepping the unit in a child process."""
     temporary = tempfile.gettempdir()
     if not SAFE_PATH.fullmatch(str(Path(temporary).resolve())):
         text = f"hosts unpack to {temporary}, a path that crashes the unit's wrapper"

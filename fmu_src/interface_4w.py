@@ -1,6 +1,6 @@
 """The variables of the unit `TrpacEstimator4W`, in the order of their value references.
 
-They are those of one wheel: what each wheel has is there four times, what each side of the road has is there twice.
+They are those of one wheel, four times for signals of a wheel, twice for signals of a side of the road.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PER_WHEEL = ("wheel_speed", "wheel_torque", "vertical_load")
 PER_SIDE = ("road_class", "road_class_confidence")
 SIDES = ("left", "right")
 WHICH_WHEEL = ("wheel.front", "wheel.left")
-"""Parameters of the one-wheel unit that say which wheel it is."""
+"""Parameters of the one-wheel unit that select its wheel."""
 WHEEL_NAMES = dict(zip(WHEELS, ("front left", "front right", "rear left", "rear right"), strict=True))
 
 

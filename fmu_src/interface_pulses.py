@@ -6,7 +6,7 @@ from trpac_core.parameters.variables import Kind, Variable
 
 WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 MOST_TORQUE_NM = 20_000.0
-"""As the plant takes [N m]."""
+"""Greatest torque, that of the plant [N m]."""
 
 
 def _parameter(

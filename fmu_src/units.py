@@ -27,9 +27,10 @@ CORE_FILES = {
         "trpac_core/parameters/variables.py",
     )
 }
-"""What every unit carries of the core."""
+"""Files of the core in every unit."""
 NETWORKS = (networks_folder() / "segmenter.onnx", networks_folder() / "surface.onnx")
 STEP_S, STOP_S = 0.001, 10.0
+"""Step and end of the default experiment [s]."""
 
 ESTIMATOR_PACKAGES = {"numpy": "numpy", "cv2": "opencv-python-headless", "onnxruntime": "onnxruntime"}
 ESTIMATOR_FILES = (
@@ -57,7 +58,7 @@ PLANT_MODULES = (
     "scenarios/plant/parameters.py",
     "scenarios/plant/pipeline.py",
 )
-"""What the plant is made of, without its sensors and what they need."""
+"""Files of the plant in its unit, without its sensors and their imports."""
 
 
 def _info(name: str, description: str) -> UnitInfo:
@@ -117,4 +118,4 @@ UNITS = {
         resources=(),
     ),
 }
-"""Units by the name that `build_fmu.py --slave` takes."""
+"""Units by the name for `build_fmu.py --slave`."""

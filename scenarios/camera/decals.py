@@ -1,7 +1,4 @@
-"""What lies on one road alone: shadows cast by trees, poles, walls and bridges, and repairs of the asphalt.
-
-All of it is drawn once on a map that repeats along the road.
-"""
+"""Shadows of trees, poles, walls and bridges, and repairs of the asphalt, as a map that repeats along the road."""
 
 from __future__ import annotations
 
@@ -14,20 +11,20 @@ from numpy.typing import NDArray
 from .scene import Scene
 from .textures import RipMap, build_ripmap
 
-TEXEL_M = 0.06
+TEXEL_M = 0.06  # side of a texel
 SHAPE = (4096, 512)  # along, across: 245.76 m x 30.72 m
-LEVELS = (6, 6)
+LEVELS = (6, 6)  # levels of detail along and across
 LENGTH_M = SHAPE[0] * TEXEL_M
-LABEL_BLUR_M = 0.35
-LABEL_SHADE = 0.4  # shade from which, averaged over LABEL_BLUR_M, the ground counts as shadowed
-LONGEST_SHADOW = 7.0  # shadow length over height; a lower sun throws no sharper one
+LABEL_BLUR_M = 0.35  # length over which shade is averaged for the label
+LABEL_SHADE = 0.4  # averaged shade from which the ground is labelled as shadow [-]
+LONGEST_SHADOW = 7.0  # greatest shadow length over height [-]
 
 Points = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 
 def decal_map(scene: Scene) -> RipMap:
-    """Channels: shade (255 is dark), shade for the label (128 is the threshold), tone and gloss of repairs."""
+    """The map; channels are shade (255 is dark), shade for the label (128: threshold), tone and gloss of repairs."""
     rng = np.random.default_rng([scene.seed, 11])
     if scene.casts_shadows:
         shade = _shade(scene, rng)
@@ -56,7 +53,7 @@ def _blurred(image: Image, sigma: float) -> Image:
 
 
 def _fill(canvas: Image, points_m: Points, value: int) -> None:
-    """Fills a polygon given as (along, across from the map's right rim) [m], with its repeats along the road."""
+    """Fill a polygon given as (along, across from the map's right rim) [m], with its repeats along the road."""
     pixels = points_m[:, ::-1] / TEXEL_M
     for turn in (-1, 0, 1):
         shifted = pixels + np.array([0.0, turn * SHAPE[0]])
@@ -69,7 +66,7 @@ def _count(rng: np.random.Generator, per_100_m: float) -> int:
 
 
 def _beside(scene: Scene, rng: np.random.Generator, nearest_m: float, farthest_m: float) -> Points:
-    """A place beside the road, on either side, in map coordinates [m]."""
+    """A random point beside the road, in map coordinates [m]."""
     right, left = scene.road_edges_m
     away = rng.uniform(nearest_m, farthest_m)
     across = left + away if rng.random() < 0.5 else right - away
@@ -93,7 +90,7 @@ def _shade(scene: Scene, rng: np.random.Generator) -> Image:
 
 
 def _tree(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
-    """A trunk and a crown of leaf clusters, which leave flecks of light between them."""
+    """Draw the shadow of a trunk and a crown of leaf clusters with light between them."""
     height = rng.uniform(4.0, 14.0)
     radius = height * rng.uniform(0.18, 0.35)
     _strip(canvas, foot, foot + per_metre * height * 0.6, height * 0.03, 255)
@@ -123,7 +120,7 @@ def _pole(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generat
 
 
 def _block(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
-    """A house, a wall or a lorry: the hull of a box's base and its roof thrown on the ground."""
+    """Draw the shadow of a box, such as a house, a wall or a lorry: the hull of its base and its projected roof."""
     size = rng.uniform((2.0, 1.0), (18.0, 8.0))
     corners = foot + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size / 2
     outline = np.vstack((corners, corners + per_metre * rng.uniform(2.0, 9.0)))

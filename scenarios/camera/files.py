@@ -23,7 +23,7 @@ Angle = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
 
 class CameraFile(BaseModel):
-    """camera.yaml as written."""
+    """The content of camera.yaml."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -45,7 +45,7 @@ class CameraFile(BaseModel):
 
 
 def load_camera(path: str | Path) -> Camera:
-    """Read camera.yaml, or the shipped camera of a name; raises ScenarioError with all problems of the file."""
+    """The camera of camera.yaml, or the shipped one of a name; raises ScenarioError with all problems of the file."""
     values = load_strict(located("camera", path), CameraFile).model_dump(exclude={"schema_"})
     k1, k2, p1, p2, k3 = values.pop("distortion")
     return Camera(distortion=(k1, k2, p1, p2, k3), **values)

@@ -18,7 +18,7 @@ SHADOW_TINT = np.array([0, 0, 128], dtype=np.uint8)
 
 
 def contact_sheet(seed: int, columns: int, rows_per_surface: int, labels: bool) -> NDArray[np.uint8]:
-    """Random looks at 480 x 300, rows of dry, wet and snow/ice; ``labels`` tints the labelled shadows red."""
+    """Random scenes at 480 x 300, rows of dry, wet and snow/ice; ``labels`` tints the labelled shadows red."""
     rng = np.random.default_rng(seed)
     camera = Camera().scaled(0.25)
     rows = []

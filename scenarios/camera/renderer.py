@@ -1,4 +1,4 @@
-"""Draws the road ahead through the camera geometry, with exact labels for every pixel."""
+"""Renders the road ahead through the camera geometry, with exact labels for every pixel."""
 
 from __future__ import annotations
 
@@ -29,18 +29,21 @@ from .textures import (
 )
 
 PROFILE_STEP_M = 0.02
+"""Step of the lateral profile of wheel tracks [m]."""
 MARKING_REPEAT_M = 144.0
-"""A multiple of every period of dashed lines [m]."""
+"""A multiple of every period of dashed markings [m]."""
 WATER_INDEX = 1.33
+"""Refractive index of water [-]."""
 FINEST_SKY_PIXEL_RAD = 0.0009
+"""Least pixel of the panorama [rad]."""
 METERED_M = (3.0, 30.0)
-"""The stretch of road ahead on which the automatic exposure looks [m]."""
+"""Begin and end of the road ahead that the automatic exposure meters [m]."""
 SHARPNESS = 0.5
-"""Levels by which textures are sampled finer than the pixel, as a camera that sharpens its pictures [-]."""
+"""Levels by which textures are sampled finer than the pixel, as by a camera that sharpens its pictures [-]."""
 VERGE_END_M = 130.0
-"""Where a line of trees hides the verge behind it [m]."""
+"""Distance from which a line of trees hides the verge [m]."""
 GREY = 0.20
-"""Light that automatic exposure brings to mid grey, relative to white open ground [-]."""
+"""Light that the automatic exposure maps to mid grey, relative to white open ground [-]."""
 
 _VERGES = {
     "grass": ((0.035, 0.13, 0.085), 0.9),
@@ -51,7 +54,7 @@ _VERGES = {
 
 
 class Renderer:
-    """Pictures of one fixed world: the same road place looks the same from wherever it is seen.
+    """A camera in one fixed world: a point of the road is the same in all pictures.
 
     Parameters
     ----------
@@ -60,7 +63,7 @@ class Renderer:
     segments : sequence of SurfaceSegment
         Ascending starts [m]; the first surface also holds before its start.
     look : SceneLook
-        Everything else; two renderers of one look draw the same world.
+        Everything else; two renderers of one scene render the same world.
 
     Raises
     ------
@@ -110,7 +113,7 @@ class Renderer:
     def frame(
         self, front_axle_position_m: float, lateral_m: float = 0.0, heading_rad: float = 0.0
     ) -> RenderedFrame:
-        """The picture and labels from one place on the road.
+        """The picture and labels at one position on the road.
 
         Parameters
         ----------
@@ -184,13 +187,13 @@ class Renderer:
 
 
 def ground_beside(camera: Camera) -> NDArray[np.float32]:
-    """How far to the left of the car each pixel's ground lies, shape (height, width) [m]; -1 above the horizon."""
+    """Lateral position of each pixel's ground, left positive, shape (height, width) [m]; -1 above the horizon."""
     return _pixels(camera).y
 
 
 @lru_cache(maxsize=3)
 def _pixels(camera: Camera) -> Pixels:
-    """Where each pixel of a camera meets the ground, how large it is there, and where it looks."""
+    """Ground point, footprint on the ground and direction of each pixel of a camera."""
     height, width = camera.height_px, camera.width_px
     grid = (
         np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2).astype(np.float64)
@@ -223,7 +226,7 @@ def _pixels(camera: Camera) -> Pixels:
 
 
 def _levels(foot_x: NDArray[np.float64], foot_y: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Ripmap levels of each pixel for the three textures, dithered so that no seam shows where they change."""
+    """Ripmap levels of each pixel for the three textures, dithered to avoid visible seams."""
     dither = np.random.default_rng(7).uniform(-0.35, 0.35, (2, *foot_x.shape))
     packed = np.zeros(foot_x.shape, dtype=np.uint32)
     along, across = np.log2(foot_x) + dither[0], np.log2(foot_y) + dither[1]
@@ -249,13 +252,13 @@ def _directions(
 
 
 def fresnel_reflectance(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of light that smooth water mirrors at an angle of incidence, Schlick's formula (1994) [-]."""
+    """Fresnel reflectance of smooth water at the cosine of an angle of incidence, by Schlick (1994) [-]."""
     at_right_angle = ((WATER_INDEX - 1.0) / (WATER_INDEX + 1.0)) ** 2
     return at_right_angle + (1.0 - at_right_angle) * (1.0 - cosine) ** 5
 
 
 def _tone_table(contrast: float) -> NDArray[np.uint8]:
-    """Linear light to display bytes: sRGB curve, soft shoulder, contrast about mid grey."""
+    """Table from linear light to display bytes: sRGB curve, soft shoulder, contrast about mid grey."""
     light = np.arange(int(TONE_STEPS_PER_UNIT * TONE_RANGE)) / TONE_STEPS_PER_UNIT
     shoulder = np.where(light < 0.6, light, 0.6 + 0.4 * np.tanh((light - 0.6) / 0.4 * 0.8))
     display = np.where(shoulder < 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)

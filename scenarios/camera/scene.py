@@ -1,4 +1,4 @@
-"""What a rendered road looks like: surfaces along it and one look of road, verge, weather and camera."""
+"""The description of a rendered road: surfaces along it, and markings, verge, weather and camera."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class RenderedFrame:
 
 @dataclass(frozen=True)
 class Scene:
-    """Every choice that is not geometry of the camera or a surface class; the picture follows from it alone.
+    """All parameters of a rendered world except camera geometry and surface classes.
 
     The road coordinate's lateral zero is the middle of the own lane, left positive. Shares and strengths lie in
     0..1 where no unit is given; ``white_balance`` is (blue, green, red) gains. The defaults are a plain two-lane
@@ -115,12 +115,12 @@ class Scene:
 
     @property
     def casts_shadows(self) -> bool:
-        """Whether the sun is strong enough for shadows that one can see (and that are labelled)."""
+        """Whether the sun is strong enough for visible, and so labelled, shadows."""
         return self.sun_on_road > 0.25
 
     @property
     def sun_on_road(self) -> float:
-        """What the sun itself brings to the road, of the light on open ground [-]."""
+        """Direct sunlight on the road, over the light on open ground [-]."""
         return 0.0 if self.open_shade else self.sun_share
 
     @property
@@ -129,13 +129,13 @@ class Scene:
         return 1.0 - self.sun_share if self.open_shade else 1.0
 
     def in_a_street(self, rng: np.random.Generator) -> Scene:
-        """The same road in the open shade of houses that stand on one side or on both, drawn at random."""
+        """The same scene in the open shade of random houses on one side or on both."""
         left, right = rng.uniform(*HOUSE_RISE, 2) * rng.permutation([1.0, rng.choice([0.0, 1.0])])
         return replace(self, open_shade=True, house_rise=(float(left), float(right)))
 
     @classmethod
     def random(cls, rng: np.random.Generator, surface: Surface | None = None) -> Scene:
-        """One look drawn at random; ``surface`` makes its weather likely (any stays possible)."""
+        """A random scene; weather is drawn as likely for ``surface``."""
         kind = Surface(int(rng.integers(3))) if surface is None else surface
         return cls(
             seed=int(rng.integers(2**31)),

@@ -1,8 +1,8 @@
 # mypy: disallow-untyped-defs=False
 # numba infers the types below from the first call.
-"""The compiled inner loop: light from every ground pixel to the lens.
+"""The compiled inner loop: light from every pixel's ground or sky to the lens.
 
-Light is linear and relative to what white open ground sends back; the encoding to bytes comes last.
+Light is linear and relative to that from white open ground; the encoding to bytes comes last.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-WET, SNOW = 1, 2
-TONE_STEPS_PER_UNIT = 4096
-TONE_RANGE = 4.0
+WET, SNOW = 1, 2  # as in Surface
+TONE_STEPS_PER_UNIT = 4096  # of the tone table, per unit of light
+TONE_RANGE = 4.0  # greatest light of the tone table
 F = np.float32
 HALF = F(0.5)
-GLAZE = F(0.25)  # ice and slush that stay where wheels have cleared the snow: a bare track is not this class
+GLAZE = F(0.25)  # least cover: ice and slush stay where wheels have cleared the snow
 ONE = F(1.0)
 
 
 class Maps(NamedTuple):
-    """What the loop looks up: ripmaps (texels as uint32 of four channels, level offsets), panoramas, tables."""
+    """Textures and tables: ripmaps (texels as uint32 of four channels, level offsets), panoramas, tone and markings."""
 
     macro: NDArray[np.uint32]
     macro_at: NDArray[np.int64]
@@ -40,7 +40,7 @@ class Maps(NamedTuple):
 
 
 class Pixels(NamedTuple):
-    """What does not change while one camera drives: shape (H, W) each."""
+    """Constants of the pixels of one camera, shape (H, W) each."""
 
     x: NDArray[np.float32]
     y: NDArray[np.float32]
@@ -54,7 +54,7 @@ class Pixels(NamedTuple):
 
 
 class SceneScalars(NamedTuple):
-    """The scalars of a look that the loop needs, float32 all."""
+    """Scalars of a scene, all float32."""
 
     right: Any
     left: Any
@@ -105,7 +105,7 @@ class SceneScalars(NamedTuple):
 
 
 class CarPose(NamedTuple):
-    """Where the car is: everything float32, textures' origins reduced to their first period."""
+    """Pose of the car and exposure, all float32; texture coordinates are reduced to their first period."""
 
     cos_heading: Any
     sin_heading: Any
@@ -221,7 +221,7 @@ def _asphalt(scene, m0, m1, m2, m3, track, oil, repair):
 
 @njit(inline="always", fastmath=True)
 def _water(scene, m0, m1, m3, f0, f2, track, oil):
-    """A water film: share of standing water, darkening, gloss of the film, and how much grain it drowns."""
+    """A water film: share of standing water, darkening, gloss of the film, and share of the grain that is left."""
     threshold = F(0.62) - F(0.75) * scene.puddles
     pool = m3 + F(0.25) * track + F(0.12) * m1 + F(0.05) * f2
     still = _step(pool, threshold, threshold + F(0.08)) * min(ONE, scene.puddles * F(5.0))
@@ -237,7 +237,7 @@ def _water(scene, m0, m1, m3, f0, f2, track, oil):
 
 @njit(inline="always", fastmath=True)
 def _snow(scene, m0, m1, m3, f0, f1, track):
-    """Snow on the road: cover, its colour, and how far the wheels have packed it."""
+    """Snow on the road: cover, colour, and share packed by wheels."""
     cover = scene.cover - scene.clearing * track * (ONE + F(0.8) * m0)
     cover += F(0.55) * m1 + F(0.3) * m0 + F(0.35) * m3 + F(0.5) * f1 + F(0.25) * f0
     cover = GLAZE + (ONE - GLAZE) * _step(cover, F(0.28), F(0.62))
@@ -252,7 +252,7 @@ def _snow(scene, m0, m1, m3, f0, f1, track):
 
 @njit(inline="always", fastmath=True)
 def _verge(scene, kind, m1, m3, f1, f3):
-    """Ground beside the road, with snow on it where there is any."""
+    """Colour of the ground beside the road, with its snow."""
     value = max(ONE + scene.verge_grain * (F(1.2) * f3 + F(0.9) * m1 + F(0.7) * m3), F(0.15))
     if kind == WET:
         value *= F(0.75)
@@ -269,7 +269,7 @@ def _verge(scene, kind, m1, m3, f1, f3):
 
 @njit(inline="always", fastmath=True)
 def _road(scene, kind, macro, fine, track, oil, repair, bitumen, paint):
-    """Reflectance of the road, gloss of its film, and share of standing water."""
+    """Reflectance of the road, gloss of its water film, and share of standing water."""
     m0, m1, m2, m3 = macro
     f0, f1, f2 = fine
     value = _asphalt(scene, m0, m1, m2, m3, track, oil, repair)
@@ -295,7 +295,7 @@ def _road(scene, kind, macro, fine, track, oil, repair, bitumen, paint):
 
 @njit(inline="always", fastmath=True)
 def _mirrored(scene, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, still, ripple):
-    """Adds what a wet surface mirrors: blurred by the film on rough stone, sharp in standing water."""
+    """Colour with the reflections of a wet surface: blurred on rough stone, sharp in standing water."""
     sway = ripple * F(0.05)
     mb, mg, mr = _panorama(
         rough,
@@ -321,12 +321,12 @@ def _mirrored(scene, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, st
 
 @njit(nogil=True, cache=True, fastmath=True)
 def shade(pixels, maps, scene, pose, starts, surfaces, image, drivable, shadow, surface):
-    """Fills the picture and the label maps.
+    """Fill the picture and the label maps.
 
     ``starts`` are the segments' starts ahead of the front axle [m], ``surfaces`` their classes; the outputs have
     shapes (H, W, 3) and (H, W).
     """
-    # Named here, since taking an array from its tuple costs reference counting at every pixel.
+    # Unpacked here, because reading an array from its tuple costs reference counting at every pixel.
     xs, ys, foot_x, foot_y, level_words, azimuths, elevations, shines, distances = pixels
     macro, macro_at, fine, fine_at, decal, decal_at, sharp, rough, tone, lines, profile, clears = maps
     height, width = xs.shape

@@ -1,4 +1,4 @@
-"""The surroundings at infinity: sky, sun glow, clouds, hills and a line of trees, as one panorama."""
+"""Panorama of the surroundings at infinity: sky, sun glow, clouds, hills and a line of trees."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Float = NDArray[np.float32]
 AZIMUTH_RAD = 1.0  # the panorama reaches this far to either side
 LOWEST_RAD, HIGHEST_RAD = -0.02, 0.62
 HOUSES, HOUSE_LENGTH = 40, 1.0
-"""Houses of a row, of which the last one goes on for ever, and their length over the row's distance aside [-]."""
+"""Houses of a row, of which the last has no end, and their length over the row's distance aside [-]."""
 ROOFS, FACADES, FACADE_TINTS = (0.7, 1.2), (0.08, 0.5), (0.85, 1.15)
 """Height of a house over its row's, reflectance of its wall, and the tint of each of its channels [-]."""
 STOREYS, WINDOWS, GLASS = 4, 3.0, 0.35
@@ -26,8 +26,8 @@ STOREYS, WINDOWS, GLASS = 4, 3.0, 0.35
 class Panorama:
     """Linear BGR light by direction; rows go up from ``LOWEST_RAD``, columns left to right.
 
-    ``sharp`` is what the camera sees, ``rough`` what a wet road mirrors; both shape (rows, columns, 3),
-    relative to the light that white open ground sends back.
+    ``sharp`` is the camera's view, ``rough`` the blurred reflection in a wet road; both shape (rows, columns, 3),
+    relative to the light from white open ground.
     """
 
     sharp: Float
@@ -63,7 +63,7 @@ def _ridge(rng: np.random.Generator, columns: int, roughness: float) -> Float:
 
 
 def build_panorama(scene: Scene, pixel_rad: float) -> Panorama:
-    """The panorama of one look with pixels of ``pixel_rad`` [rad]."""
+    """The panorama of a scene with pixels of ``pixel_rad`` [rad]."""
     rng = np.random.default_rng([scene.seed, 23])
     columns = int(2 * AZIMUTH_RAD / pixel_rad)
     rows = int((HIGHEST_RAD - LOWEST_RAD) / pixel_rad)
@@ -159,7 +159,7 @@ def _land(scene: Scene, rng: np.random.Generator, light: Float, elevation: Float
 
 
 def _houses(scene: Scene, light: Float, elevation: Float, azimuth: Float) -> None:
-    """A row of houses along each side, in place: seen along the street its roofs fall towards the road's end."""
+    """Draw a row of houses along each side into `light`."""
     for side, rise in zip((1.0, -1.0), scene.house_rise, strict=True):
         if rise == 0.0:
             continue
