@@ -14,7 +14,7 @@ from trpac_core.vehicle import WHEELS
 
 COLOURS = {"IFE": "#d08a00", "DE": "#7fb2e5", "DIFE": "#c0272d"}
 WIDTHS = {"IFE": 1.1, "DE": 3.0, "DIFE": 1.3}
-"""DE lies as a band under DIFE, so that both are seen where they agree."""
+"""Line widths; DE is a band under DIFE, so that both are visible where they agree."""
 TRUTH = "#222222"
 ROAD = {"dry": "#eeeeea", "wet": "#d3e0ec", "snow_ice": "#f2f6fb"}
 
@@ -51,7 +51,7 @@ def draw_figure17(run: Run, path: Path) -> None:
 
 
 def _shade_road(axis: Axes, run: Run, time: np.ndarray) -> None:
-    """Colour the background by the surface that lies under the wheel."""
+    """Colour the background by the surface under the wheel."""
     segment = run.table["segment"].to_numpy()
     for index in np.unique(segment):
         here = time[segment == index]

@@ -1,4 +1,4 @@
-"""The camera's pictures of a scenario, rendered, disturbed and written as a camera's recorder would."""
+"""The camera's pictures of a scenario: rendered, disturbed and written as JPEG."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from scenarios.plant.pipeline import PlantTrajectory
 from scenarios.progress import Progress, silent
 
 WORKERS = 2
-"""Processes that render: each holds one world of some 100 MB."""
+"""Rendering processes, of about 100 MB each."""
 DISTURBANCES = {"none": NONE, "paper": PAPER}
 SCENE_STREAM = 101
-"""Keeps the scenario's world apart from the streams of its sensors and disturbances."""
+"""Random stream of the scenario's world, apart from those of sensors and disturbances."""
 
 
 @dataclass(frozen=True)
 class PictureJob:
-    """All that it takes to draw some frames in a process of its own."""
+    """Frames to render in one process."""
 
     scenario: Scenario
     frames: tuple[tuple[int, float], ...]
@@ -37,7 +37,7 @@ class PictureJob:
 
 
 def scene_renderer(scenario: Scenario) -> Renderer:
-    """The scenario's world; the same seed gives the same one. Raises ScenarioError where there is no camera."""
+    """The renderer of the scenario's world, by its seed; raises ScenarioError where there is no camera."""
     if scenario.camera_path is None:
         raise ScenarioError(
             f"{scenario.path}: camera: missing; expected a camera file, to draw pictures through."
@@ -48,7 +48,7 @@ def scene_renderer(scenario: Scenario) -> Renderer:
 
 
 def draw(job: PictureJob) -> int:
-    """Draw one job's frames; returns how many."""
+    """Render and write the frames of a job; returns their number."""
     renderer, pictures = scene_renderer(job.scenario), job.scenario.pictures
     quality = [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality]
     for number, position_m in job.frames:
@@ -77,21 +77,21 @@ def record(
     folder: Path,
     progress: Progress = silent,
 ) -> pd.DataFrame:
-    """Draw all pictures of a drive.
+    """Render and write all pictures of a drive; returns a table of them.
 
     Parameters
     ----------
     scenario, trajectory : Scenario, PlantTrajectory
-        World and camera, and the drive through it.
+        World and camera, and the drive.
     folder : Path
-        Where the pictures go.
+        Folder of the pictures.
     progress : callable
-        Told how many of how many pictures are done.
+        Called with how many of how many pictures are done.
 
     Returns
     -------
     DataFrame
-        frame, row (of the trajectory), time_s, front_axle_m, path. Without a camera it is empty.
+        frame, row (of the trajectory), time_s, front_axle_m, path; empty without a camera.
     """
     columns = ["frame", "row", "time_s", "front_axle_m", "path"]
     if scenario.camera_path is None:

@@ -1,4 +1,4 @@
-"""report.html of a run: one file that needs nothing beside it."""
+"""report.html of a run, in one file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DASH = "–"
 
 
 def write_report(run: Run, figure: Path, overlay: Path | None, path: Path) -> None:
-    """Write the report of a run around its figure and, where there was a camera, its sheet of pictures."""
+    """Write the report of a run with its figure and, where there was a camera, its sheet of pictures."""
     text = page(
         TEMPLATE,
         {"number": number},
@@ -28,14 +28,14 @@ def write_report(run: Run, figure: Path, overlay: Path | None, path: Path) -> No
 
 
 def score_rows(summary: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """Estimator and score, stretch by stretch, as a table shows them."""
+    """Rows of a table: estimator and score, stretch by stretch."""
     estimators = summary["estimators"]
     stretches = len(next(iter(estimators.values())))
     return [(name, estimators[name][i]) for i in range(stretches) for name in estimators]
 
 
 def conclusion(summary: dict[str, Any]) -> str:
-    """What the run showed, in sentences that follow from its numbers."""
+    """Results of the run in sentences."""
     sentences = []
     for before, (dife, alone) in _steps(summary):
         where = f"From {before:g} to {dife['theta']:g}"
@@ -62,5 +62,5 @@ def _convergence(score: dict[str, Any]) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number as the tables show it; a dash where there is none."""
+    """A number as text; a dash for None."""
     return DASH if value is None else f"{value:.{digits}f}"

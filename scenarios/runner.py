@@ -24,7 +24,7 @@ from trpac_core.files import file_sha256
 from trpac_core.vehicle import WHEELS
 
 ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
-"""The estimators that are compared, and the unit's output that holds each."""
+"""Estimators that are compared, and the unit's output of each."""
 PACKAGES = (
     "trpac-fmu",
     "fmpy",
@@ -45,15 +45,15 @@ class Run:
     Attributes
     ----------
     scenario : Scenario
-        What was run.
+        The scenario.
     trajectory : PlantTrajectory
-        The truth.
+        The plant's motion.
     frames : DataFrame
-        The pictures given, see `pictures.record`.
+        The pictures, see `pictures.record`.
     table : DataFrame
         One row per step: the sensors' log, the unit's outputs, theta and segment under the wheel.
     summary : dict
-        What summary.json holds.
+        Content of summary.json.
     """
 
     scenario: Scenario
@@ -70,20 +70,20 @@ def run_scenario(
     progress: StageProgress = silent,
     overrides: Mapping[str, float] | None = None,
 ) -> Run:
-    """Drive the plant, draw the pictures, step the unit over both, score.
+    """Results of a scenario: plant, pictures, unit and scores.
 
     Parameters
     ----------
     scenario : Scenario
-        What to run.
+        The scenario.
     fmu : Path
         The estimator unit.
     frames_folder : Path
-        Where the pictures go.
+        Folder of the pictures.
     progress : callable
-        Told the stage and how much of it is done.
+        Called with the stage, and how many of how many of its items are done.
     overrides : mapping, optional
-        Parameters of the unit, by variable name, in place of the scenario's or the delivered ones.
+        Parameters of the unit by variable name, in place of the scenario's and the default ones.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def run_scenario(
 
 
 def unit_signals(log: pd.DataFrame, wheel: str) -> pd.DataFrame:
-    """The columns of a log that the unit of one wheel takes, under the unit's names."""
+    """Inputs of the unit of one wheel from a log, by the unit's names."""
     return pd.DataFrame(
         {
             "wheel_speed": log[f"wheel_speed_{wheel}_rad_s"],
@@ -119,7 +119,7 @@ def unit_signals(log: pd.DataFrame, wheel: str) -> pd.DataFrame:
 
 
 def under_the_wheel(scenario: Scenario, trajectory: PlantTrajectory) -> pd.DataFrame:
-    """True adhesion and index of the road's stretch at the wheel's contact, columns theta_true and segment."""
+    """Columns theta_true and segment: adhesion and index of the road's stretch at the wheel's contact."""
     car, column = scenario.vehicle.to_core(), WHEELS.index(scenario.wheel)
     offset_m = car.cog_to_front_axle_m if scenario.wheel.startswith("f") else -car.cog_to_rear_axle_m
     starts = segment_starts(scenario)
@@ -134,7 +134,7 @@ def segment_starts(scenario: Scenario) -> NDArray[np.float64]:
 
 
 def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path) -> dict[str, Any]:
-    """The scores of a run and what is needed to repeat it."""
+    """The content of summary.json: scores of a run, and what is needed to repeat it."""
     scores = score_run(
         segment_starts(scenario),
         table["segment"].to_numpy(),

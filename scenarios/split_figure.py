@@ -1,4 +1,4 @@
-"""The figure of a drive on split friction: each wheel on its own side's road, and the car."""
+"""The figure of a drive on split friction: estimates of each wheel and of the car."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PANELS = (("fl", "front left"), ("fr", "front right"), ("rl", "rear left"), ("rr
 
 
 def draw_split(table: pd.DataFrame, path: Path) -> None:
-    """Write the figure: four panels placed as the wheels are, the car below, the speed last."""
+    """Write the figure: a panel per wheel, then the car, then the speed."""
     time = table["time_s"].to_numpy()
     with plt.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}):
         figure, axes = plt.subplot_mosaic(

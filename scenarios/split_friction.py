@@ -2,9 +2,8 @@
 
 ``python -m scenarios.split_friction --plant P.fmu --estimator E.fmu --out DIR [--pictures] [--figure FILE.png]``
 
-The car comes at 22 m/s onto a road whose left side is ice, later its right side, and brakes in pulses. In a pulse each
-wheel is braked to a share of what its own road carries, as anti-lock control does. The camera side is either the
-plant's class by bus or rendered pictures that show each side's surface.
+The car enters at 22 m/s a road whose left side, and later right side, is ice, and brakes in pulses to a share of each
+wheel's theta F_z, as anti-lock control does. The camera side is the plant's class by bus, or rendered pictures.
 """
 
 from __future__ import annotations
@@ -40,18 +39,21 @@ CAMERA = HERE / "cameras" / "paper.yaml"
 PLANT, ESTIMATOR = "ReferencePlant", "TrpacEstimator4W"
 
 STEP_S, FRAME_STEPS = 0.001, 50
+"""Communication step [s], and steps per frame."""
 START_M_S, END_M = 22.0, 95.0
+"""Speed at the start [m/s], and position of the front axle at the end [m]."""
 PULSE_S, PERIOD_S, RAMP_S = 0.4, 0.6, 0.05
+"""Length, period and ramps of a braking pulse [s]."""
 FIRST_PULSE_S = 0.3
 USED_SHARE = 0.9
 """Share of theta F_z that each wheel is braked with in a pulse [-]."""
 NOISE = {"wheel_speed": 0.01, "wheel_torque": 3.2, "vehicle_speed": 0.003, "longitudinal_acceleration": 0.05}
-"""Standard deviations as in the paper's scenario, in the units of the signals."""
+"""Standard deviations of the sensors as in the paper's scenario, in the units of the signals."""
 NAMES = ("TRPAC", "TRPAC_std", "TRPAC_image", "excitation_flag", "flag")
 
 
 class Unit:
-    """A unit in a host's hands, variables by name."""
+    """An instance of a unit, with variables by name."""
 
     def __init__(self, unit: FMU2Slave, description: Any, parameters: Mapping[str, float | str]) -> None:
         self._variables = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
@@ -73,18 +75,18 @@ class Unit:
         return float(getattr(self._unit, f"get{kind}")([reference])[0])
 
     def at_wheels(self, name: str) -> list[float]:
-        """Values of a variable that each wheel has."""
+        """Values of a variable at the wheels fl, fr, rl, rr."""
         references, kinds = zip(*(self._variables[f"{name}.{wheel}"] for wheel in WHEELS), strict=True)
         return [float(value) for value in getattr(self._unit, f"get{kinds[0]}")(list(references))]
 
     def step(self, time_s: float) -> None:
-        """One communication step."""
+        """Take one communication step."""
         self._unit.doStep(time_s, STEP_S)
 
 
 @contextmanager
 def opened(name: str, archive: Path, parameters: Mapping[str, float | str]) -> Iterator[Unit]:
-    """A unit of this name from its file, unpacked and freed for this run alone; raises UnitFileError."""
+    """An instance of the unit of this name, freed at the end of the context; raises UnitFileError."""
     folder = unpack_unit(archive)
     try:
         unit, description = opened_unit(archive, folder, [name], name)
@@ -113,18 +115,18 @@ def run(
     seed: int = 1,
     road: Path = ROAD,
 ) -> pd.DataFrame:
-    """Drive both units over a road; returns one row per step, in the order of time.
+    """Simulate both units on a road; returns one row per step.
 
     Parameters
     ----------
     plant_file, estimator_file : Path
         The units `ReferencePlant` and `TrpacEstimator4W`.
     out : Path
-        Where pictures go.
+        Folder of the pictures.
     pictures : bool
-        Whether the estimator sees rendered pictures, or is given the plant's class.
+        Whether the estimator is given rendered pictures instead of the plant's class.
     seed : int
-        Of the sensors' noise and of the pictures' world.
+        Seed of sensor noise and rendered world.
     road : Path
         The road file.
 
@@ -155,7 +157,7 @@ def run(
             estimator.set(_measured(plant, torques, rng))
             if step % FRAME_STEPS == 0:
                 estimator.set(_frame(plant, world, out / "frames", step // FRAME_STEPS + 1))
-            # Both start at the same time: what the car measures now, and what it is told to do from now on.
+            # Both at the same time: the current measurements, and the torque from now on.
             estimator.step(step * STEP_S)
             rows.append(_row(step * STEP_S, plant, estimator, loads, thetas))
             plant.set({f"wheel_torque.{w}": torque for w, torque in zip(WHEELS, torques, strict=True)})
@@ -165,7 +167,7 @@ def run(
 
 
 def _measured(plant: Unit, torques: list[float], rng: np.random.Generator) -> dict[str, float | str]:
-    """The car's sensors: the plant's truth with noise; torque as commanded for the step to come."""
+    """Inputs of the estimator: the plant's outputs with noise, and the torque commanded for the next step."""
     values: dict[str, float | str] = {}
     for wheel, torque, speed in zip(WHEELS, torques, plant.at_wheels("wheel_speed"), strict=True):
         values[f"wheel_torque.{wheel}"] = torque + NOISE["wheel_torque"] * rng.standard_normal()
@@ -183,12 +185,12 @@ def _world(road: Path, seed: int) -> SplitRenderer:
 
 
 def _joined(segments: list[SurfaceSegment]) -> list[SurfaceSegment]:
-    """Neighbours of one surface as one segment."""
+    """The segments with consecutive ones of the same surface joined."""
     return [s for i, s in enumerate(segments) if i == 0 or s.surface != segments[i - 1].surface]
 
 
 def _frame(plant: Unit, world: SplitRenderer | None, folder: Path, number: int) -> dict[str, float | str]:
-    """The inputs that hand a new frame over: a picture's path, or the plant's class of each side."""
+    """Inputs of a new frame: a picture's path, or the plant's class of each side."""
     if world is None:
         sides = ("left", "right")
         classes = {f"road_class.{side}": int(plant.get(f"road_class.{side}")) for side in sides}

@@ -1,4 +1,4 @@
-"""What the image estimator looks at, drawn onto the pictures of a run for a person to see."""
+"""The image estimator's regions and results, drawn onto the pictures of a run."""
 
 from __future__ import annotations
 
@@ -25,13 +25,15 @@ ROAD_BGR, SHADOW_BGR = (90, 200, 90), (200, 90, 90)
 LINE_BGR = (0, 230, 255)
 FLAG_DOWN_BGR = (60, 60, 230)
 NEAR_LINE_PX, FAR_LINE_PX = 5, 2
+"""Widths of the lines of the near group and of the others [px]."""
 TINT = 0.22
-TILE_PX = 640
-COLUMNS = 3
+"""Opacity of the tint of road and shadow [-]."""
+TILE_PX, COLUMNS = 640, 3
+"""Width of a tile of the sheet [px], and tiles in a row."""
 
 
 def image_estimator(scenario: Scenario) -> Ife:
-    """The image estimator with the shipped networks, set as the unit's is."""
+    """The image estimator with the shipped networks and the unit's settings."""
     if scenario.camera_path is None:
         raise ValueError(f"{scenario.path}: there is no camera, so there are no pictures to look at.")
     car = scenario.vehicle.to_core()
@@ -45,10 +47,10 @@ def image_estimator(scenario: Scenario) -> Ife:
 
 
 def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArray[np.uint8]:
-    """The picture with usable road and shadow tinted, ellipses, lines across the road, patches by their class, verdict.
+    """The picture with tints of road and shadow, ellipses, lines across the road, patches by class, and the result.
 
-    The near group, whose verdict it is, is drawn in thick lines; a bar in the class's colour stands beside the
-    verdict, and a red line stands below it where the flag is down.
+    The near group, which gives the result, has thick lines; a bar beside the result has the colour of its class, and a
+    red line below it means that the flag is down.
 
     Raises ValueError where the result was made without its view.
     """
@@ -88,10 +90,10 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
 
 
 def draw_overlay_sheet(run: Run, path: Path, progress: Progress = silent, count: int = 6) -> None:
-    """Write a sheet of the run's pictures, evenly spread, as the estimator saw them.
+    """Write a sheet of annotated pictures at equal distances of the run.
 
-    The sheet replays every picture up to the last one shown with the checkout's networks, so that its verdicts rest on
-    the same history as the unit's; they are the unit's own where it was built from this checkout.
+    All pictures up to the last one shown are processed with the shipped networks, so that results have the same history
+    as those of the unit, and equal them where the unit was built from the same code.
     """
     ife, state = image_estimator(run.scenario), IfeState()
     chosen = {round(share * (len(run.frames) - 1)) for share in np.linspace(0.06, 0.94, count)}

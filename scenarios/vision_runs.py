@@ -47,11 +47,13 @@ CONTAINERS = (
     "asf",
     "ogg",
 )
-"""FFmpeg's names of the formats that are read: files that hold their pictures, no lists of other files or addresses."""
+"""FFmpeg's names of the formats that are read: those that contain pictures, not lists of other files or addresses."""
 MOST_VIDEO_BYTES = 100_000_000_000
 """Larger videos are refused [bytes]."""
 LOWEST_FPS, HIGHEST_FPS = 0.01, 1000.0
+"""Range of frame rates [1/s]."""
 FASTEST_M_S = 150.0
+"""Greatest speed [m/s]."""
 PACKAGES = ("numpy", "onnxruntime", "opencv-python-headless", "trpac-fmu")
 WRITTEN = FRAMES_CSV, SUMMARY, VIDEO, STRIP = "frames.csv", "summary.json", "annotated.mp4", "strip.jpg"
 
@@ -67,7 +69,7 @@ class Frames:
     files : tuple of Path
         Pictures in their order; empty for a video.
     count : int
-        Number of frames; of a video as announced, which may be wrong or 0.
+        Number of frames; of a video that in its header, which may be wrong or 0.
     """
 
     path: Path
@@ -76,7 +78,7 @@ class Frames:
 
     @classmethod
     def find(cls, path: Path) -> Frames:
-        """Look what is there; raises ScenarioError."""
+        """The frames at a path; raises ScenarioError."""
         if path.is_dir():
             files = tuple(pictures_in(path))
             if not files:
@@ -95,7 +97,7 @@ class Frames:
         return cls(path, (), max(announced, 0))
 
     def __iter__(self) -> Iterator[tuple[str, NDArray[np.uint8] | ImageError]]:
-        """Name of each frame (file name, or number in the video) with the picture or what is wrong with it."""
+        """Name of each frame (file name, or number in the video), with its picture or the error of reading it."""
         if self.files:
             for file in self.files:
                 try:
@@ -115,7 +117,7 @@ class Frames:
 
 
 def _open_video(path: Path) -> cv2.VideoCapture:
-    # The decoder and OpenCV would print their own complaints; one clear error is raised here instead.
+    # Messages of decoder and OpenCV are suppressed; an error is raised here instead.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = f"format_whitelist;{','.join(CONTAINERS)}"
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
@@ -129,14 +131,14 @@ def _open_video(path: Path) -> cv2.VideoCapture:
         raise ScenarioError(
             f"{path}: not a video that can be decoded. Convert it to MP4, or to a folder of pictures."
         )
-    # The camera file is of the pixels as stored, as with pictures.
+    # The camera file describes the pixels as stored, as for pictures.
     capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
     return capture
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A finished run over frames: the table, what summary.json holds, and the folder with all four files."""
+    """A finished run over frames: table, content of summary.json, and folder of the four files."""
 
     table: pd.DataFrame
     summary: dict[str, Any]
@@ -146,12 +148,12 @@ class Drive:
 def run_frames(
     frames: Frames, camera_file: Path, speed_m_s: float, fps: float, out: Path, progress: Progress = silent
 ) -> Drive:
-    """Image estimator, with its memory, and voting baseline over frames taken at a constant speed.
+    """Results of the image estimator and the voting baseline over frames at a constant speed.
 
     Parameters
     ----------
     frames : Frames
-        What the camera saw.
+        Pictures or video.
     camera_file : Path
         camera.yaml.
     speed_m_s, fps : float
@@ -159,12 +161,12 @@ def run_frames(
     out : Path
         Folder for frames.csv, annotated.mp4, strip.jpg and summary.json, which appear together at the end.
     progress : callable
-        Told how many frames are done.
+        Called with how many of how many frames are done.
 
     Raises
     ------
     ScenarioError
-        If the camera file is wrong, the numbers make no sense, or no frame at all could be used.
+        If the camera file is wrong, speed or rate are out of range, or no frame could be used.
     ModelError
         If a network file cannot be used.
     OSError
@@ -236,7 +238,7 @@ def _nothing_usable(frames: Frames, unreadable: Sequence[dict[str, str]]) -> str
 
 
 class _Estimators:
-    """Both estimators over successive frames; the memory of the image estimator lies here."""
+    """Both estimators over successive frames, with the state of the image estimator."""
 
     def __init__(self, segmenter: Segmenter, ife: Ife, voting: Voting, step_m: float, motion: Motion) -> None:
         self._segmenter, self._ife, self._voting = segmenter, ife, voting
@@ -246,11 +248,11 @@ class _Estimators:
     def process(
         self, number: int, name: str, image: NDArray[np.uint8] | ImageError, caption: str
     ) -> tuple[tuple[Any, ...], NDArray[np.uint8]]:
-        """Row of the table and annotated picture; raises ImageError, and then nothing is remembered."""
+        """Row of the table and annotated picture; where ImageError is raised the state is unchanged."""
         if isinstance(image, ImageError):
             raise image
         if not self._state.frame_count:
-            # The networks' first run sets up their memory: it says nothing of a frame's time.
+            # The networks' first run allocates memory, so its time is not representative.
             self._ife.process(self._state, image, self._motion)
         motion = replace(self._motion, way_m=number * self._step_m)
         start = time.perf_counter()
@@ -273,7 +275,7 @@ def _summary(
     fps: float,
     video: bool,
 ) -> dict[str, Any]:
-    """What a run found, and what is needed to repeat it; shares are of the frames that could be used."""
+    """The content of summary.json; shares are of the frames that could be used."""
     seen = table[table["class"] != ""]
     return {
         "frames": len(table),

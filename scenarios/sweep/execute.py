@@ -1,4 +1,4 @@
-"""All runs of a sweep on Dask: local processes, or a running cluster; every finished run is kept at once."""
+"""Runs a sweep on Dask, in local processes or on a running cluster; every finished run is stored at once."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from scenarios.sweep.store import Parts, identity, source_digest
 from trpac_core.files import quoted
 
 AHEAD = 8
-"""Runs handed to Dask per worker thread: enough to keep it busy, few enough to stop quickly."""
+"""Runs that are submitted per worker thread: enough to keep it busy, few enough to stop quickly."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A run that could not be finished, and why."""
+    """A run that failed, and the reason."""
 
     run: int
     why: str
@@ -35,7 +35,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class _Finished:
-    """What comes back from a worker."""
+    """The result of a worker."""
 
     rows: list[dict[str, Any]]
     cpu_s: float
@@ -43,7 +43,7 @@ class _Finished:
 
 
 def run_one(sweep: Sweep, key: RunKey) -> _Finished:
-    """One run, where a worker does it."""
+    """The result of one run; called on a worker."""
     began = time.process_time()
     rows = run_plan(plan_run(sweep, key), sweep.file.estimators, sweep.file.unit)
     return _Finished(rows, time.process_time() - began, source_digest())
@@ -56,31 +56,31 @@ def execute(
     jobs: int | None = None,
     progress: Progress = silent,
 ) -> tuple[Parts, list[Failure]]:
-    """Do all runs that are not there yet.
+    """Run all runs that are not stored yet; returns the stored parts and the failures.
 
     Parameters
     ----------
     sweep : Sweep
-        What to run.
+        The sweep.
     out : Path
         Folder of the parts.
     scheduler : str, optional
         Address of a running cluster; without it processes of this machine.
     jobs : int, optional
-        How many of these; the default is one per core.
+        Number of these; by default one per core.
     progress : callable
-        Told how far it is.
+        Called with how many of how many runs are done.
 
     Returns
     -------
     tuple
-        The parts, and the runs that failed.
+        Stored parts, and failed runs.
 
     Raises
     ------
     ScenarioError
-        A folder that holds another sweep, or a damaged part of it; a scheduler that does not answer, or that strangers
-        could steer; workers with other code.
+        A folder with another sweep or a damaged part; a scheduler that does not answer or is not secure; workers with
+        other code.
     """
     if scheduler is not None:
         security_of(scheduler)  # refused before anything is written
@@ -107,8 +107,8 @@ def execute(
 
 
 def _stream(client: Client, sweep: Sweep, todo: list[RunKey]) -> Iterator[tuple[RunKey, Future]]:
-    """Runs as they finish; only so many are handed out ahead."""
-    # The sweep travels with every task, some kB: scattered data would be lost with the worker that holds it.
+    """Runs as they finish; at most `AHEAD` per thread are submitted at a time."""
+    # The sweep, some kB, is sent with every task: scattered data would be lost with the worker that holds them.
     waiting = iter(todo)
     threads = sum(client.nthreads().values()) or 1
 

@@ -1,4 +1,4 @@
-"""report.html of a sweep: one file that needs nothing beside it."""
+"""report.html of a sweep, in one file."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def write_report(
 
 
 def _pictures(table: pd.DataFrame) -> list[tuple[str, str, bytes]]:
-    """Title, sentence and picture of each figure."""
+    """Title, caption and PNG of each figure."""
     shown = []
     if table["parameter"].nunique() == 1 and table["level"].nunique() <= 1:
         caption = "Share of stretches that are at most so far off, or take at most so long. Crosses: what is asked for."
