@@ -1,4 +1,4 @@
-"""Cars and roads from Python, from files, and those that come with the package by their names."""
+"""Cars and roads from keyword arguments, from files, and those of the package by name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scenarios.strict import load_strict, made
 
 
 class Vehicle(VehicleFile):
-    """A car, with the keys of vehicle.yaml; `longitudinal_stiffness_n` stands for a tyre section [N].
+    """A car, with the keys of vehicle.yaml; `longitudinal_stiffness_n` [N] may replace the section `tyre`.
 
     Examples
     --------
@@ -25,7 +25,7 @@ class Vehicle(VehicleFile):
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     """
 
     def __init__(self, **values: Any) -> None:
@@ -43,11 +43,11 @@ class Vehicle(VehicleFile):
 
     @classmethod
     def builtin(cls, name: str) -> Self:
-        """The car of this name that comes with the package; raises TrpacError."""
+        """The shipped car of this name; raises TrpacError."""
         return load_strict(located("vehicle", name), cls)
 
     def with_effects(self, effects: Sequence[Effect] | Mapping[str, Mapping[str, float]]) -> Vehicle:
-        """The car with further effects, or with other parameters of those that it has."""
+        """The car with these effects added, or their parameters replaced."""
         values = self.model_dump(by_alias=True)
         if not isinstance(effects, Mapping):
             values["forms"] |= {e.id: e.form for e in effects if len(FORMS[e.id]) > 1}
@@ -62,7 +62,7 @@ class Road(RoadFile):
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     """
 
     def __init__(self, **values: Any) -> None:
@@ -75,7 +75,7 @@ class Road(RoadFile):
 
     @classmethod
     def builtin(cls, name: str) -> Self:
-        """The road of this name that comes with the package; raises TrpacError."""
+        """The shipped road of this name; raises TrpacError."""
         return load_strict(located("road", name), cls)
 
     @classmethod
@@ -85,10 +85,10 @@ class Road(RoadFile):
 
 
 def as_vehicle(given: VehicleFile | str | Path) -> VehicleFile:
-    """The car that is meant: itself, that of a file, or a shipped one by its name."""
+    """The car: as given, of a file, or the shipped one of a name."""
     return given if isinstance(given, VehicleFile) else load_strict(located("vehicle", given), Vehicle)
 
 
 def as_road(given: RoadFile | str | Path) -> RoadFile:
-    """The road that is meant: itself, that of a file, or a shipped one by its name."""
+    """The road: as given, of a file, or the shipped one of a name."""
     return given if isinstance(given, RoadFile) else load_strict(located("road", given), Road)

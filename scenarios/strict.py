@@ -1,4 +1,4 @@
-"""YAML files read strictly: every problem of a file in one message, with its place and what was expected."""
+"""YAML files read strictly: all problems of a file in one message, with position and expectation."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Model = TypeVar("Model", bound=BaseModel)
 Made = TypeVar("Made")
 
 MOST_BYTES = 1_000_000
-"""Larger files are refused unread; a road of 10,000 segments has 900,000 [bytes]."""
+"""Largest file that is read; a road of 10,000 segments has 900,000 [bytes]."""
 MOST_PROBLEMS = 20
-"""Problems of a file that are told; the rest is counted."""
+"""Problems of a file that are named; further ones are counted."""
 LONGEST_PROBLEM = 600
-"""Characters of one problem."""
+"""Greatest number of characters of a problem."""
 
 
 def load_strict(path: str | Path, model: type[Model]) -> Model:
-    """Read a YAML file into its model; all of its problems in one ScenarioError."""
+    """The model of a YAML file; raises one ScenarioError with all problems."""
     name = quoted(path)
     try:
         data = parse_yaml(read_text(path, MOST_BYTES, "a YAML file"))
@@ -35,22 +35,22 @@ def load_strict(path: str | Path, model: type[Model]) -> Model:
     except YamlError as error:
         raise ScenarioError(f"{name}: not valid YAML: {error}") from error
     if not isinstance(data, dict):
-        # Not a word of it: whoever named the wrong file need not see it in a log.
+        # The content is not repeated: the file may be a wrong one, and must not appear in logs.
         raise ScenarioError(f"{name}: holds no keys at its top; expected lines of `key: value`.")
     return made(partial(model.model_validate, data), model, name)
 
 
 def made(make: Callable[[], Made], model: type[BaseModel], name: str) -> Made:
-    """What `make` gives, which makes a model of values; all that is wrong with these in one ScenarioError.
+    """The result of `make`, which makes a model of values; raises one ScenarioError with all problems of these.
 
     Parameters
     ----------
     make : callable
-        The making, with the values.
+        Makes the model.
     model : type
-        The model, whose keys are known.
+        Class of the model.
     name : str
-        What messages call the values.
+        Name of the values in messages.
     """
     try:
         return make()
@@ -59,7 +59,7 @@ def made(make: Callable[[], Made], model: type[BaseModel], name: str) -> Made:
 
 
 def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
-    """One sentence per problem: key, what is wrong, what was expected."""
+    """Problems as sentences: key, problem, expectation."""
     texts: list[str] = []
     every = error.errors(include_url=False)
     for item in every[:MOST_PROBLEMS]:
@@ -81,16 +81,16 @@ def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
 
 
 def _shown(value: Any) -> str:
-    """A value as a message repeats it; of lists and mappings the kind alone."""
+    """A value as text in messages; of lists and mappings only kind and length."""
     if value and isinstance(value, (list, dict)):
         return f"a {'list' if isinstance(value, list) else 'mapping'} of {len(value)}"
     return quoted(repr(value))
 
 
 def _location(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
-    """Where in the file a problem is, and the keys that are known there.
+    """Path of a problem in the file, and the keys that are known there.
 
-    Among the keys pydantic names the type that it tried, where there are several: those are left out.
+    Where a value may have several types, pydantic's location contains the type that it tried, which is left out.
     """
     path, known = "", list(_fields([model]))
     types: list[type] = [model]

@@ -22,24 +22,24 @@ from trpac_core.vision.ife import Ife
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the estimator of one wheel says at a time.
+    """The estimate of one wheel at a time.
 
     Attributes
     ----------
     theta, std : float
         TRPAC and its standard deviation [-].
     peak : float
-        Maximum of the tyre's curve at theta: what a brake test measures [-].
+        Maximum of the tyre's curve at theta, which a brake test measures [-].
     flag : bool
-        Whether the camera's verdict on the road under the wheel is used.
+        Whether the camera's class of the road under the wheel is used.
     K_v : float
         Visual gain [1/s].
     excited : bool
-        Whether the tyre slips enough to show the road.
+        Whether slip is large enough to estimate theta.
     slip, tyre_force_n : float
         Longitudinal slip [-] and observed force [N].
     why : str
-        What the estimate rests on, in a sentence.
+        Basis of the estimate, in a sentence.
     """
 
     theta: float
@@ -63,12 +63,12 @@ class Estimator:
     wheel : str
         fl, fr, rl or rr.
     camera : path or name, optional
-        The camera of the pictures that `step` is given.
+        The camera of the pictures for `step`.
 
     Raises
     ------
     TrpacError
-        A car, wheel or camera that cannot be used.
+        A car, wheel or camera that is wrong.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Estimator:
         road_class_confidence: float = 1.0,
         image: NDArray[np.uint8] | None = None,
     ) -> Estimate:
-        """The estimate at a time.
+        """The estimate after the readings at a time.
 
         Parameters
         ----------
@@ -113,16 +113,16 @@ class Estimator:
         wheel_speed, wheel_torque, vehicle_speed : float
             [rad/s], [N m] with brakes included and positive where it drives, [m/s].
         longitudinal_acceleration, yaw_rate, steering_angle, vertical_load : float, optional
-            [m/s^2], [rad/s] and [rad] positive to the left, [N]; None is not measured.
+            [m/s^2], [rad/s] and [rad] positive to the left, [N]; None: not measured.
         road_class, road_class_confidence : str and float, optional
-            A new result of a camera: dry, wet or snow_ice, and how sure it is [-].
+            A new result of a camera: dry, wet or snow_ice, and its confidence Q_v [-].
         image : array of uint8, shape (height, width, 3), optional
-            A new picture, BGR, in place of a result.
+            A new picture, BGR, instead of a result.
 
         Raises
         ------
         TrpacError
-            Times that do not ascend, an unknown class, a picture without a camera.
+            Times that do not ascend, an unknown class, a picture without camera.
         """
         before_s = t if self._time_s is None else self._time_s
         if not t >= before_s:

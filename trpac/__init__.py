@@ -1,7 +1,7 @@
 """Tyre-road peak adhesion (TRPAC) from Python: estimate, simulate, run scenarios, diagnose a gap, judge pictures.
 
-Everything that the command line does is a function here. Results are small frozen objects; nothing is written and
-nothing is printed unless asked. What is heavy is imported when it is first used.
+Functions for the commands of the command line. Results are small frozen objects; files are written only by methods
+that say so, and nothing is printed. Modules are imported when they are first used.
 """
 
 from __future__ import annotations

@@ -25,14 +25,14 @@ from trpac.picture import Picture
 
 @dataclass(frozen=True, repr=False)
 class Estimates:
-    """The estimators along a drive.
+    """Estimates along a drive.
 
     Attributes
     ----------
     frame : DataFrame
         time_s [s]; TRPAC, TRPAC_std and TRPAC_peak of the car and of each wheel [-]; flag, K_v, excitation_flag.
     summary : dict
-        What `trpac estimate` writes as summary.json.
+        Content of summary.json of `trpac estimate`.
     """
 
     frame: pd.DataFrame
@@ -47,18 +47,18 @@ class Estimates:
 
     @property
     def verdict(self) -> str:
-        """What the drive showed, in sentences."""
+        """Results of the drive in sentences."""
         from sim2real.replay.report import verdict
 
         return verdict(self.summary)
 
     @property
     def warnings(self) -> list[str]:
-        """What is odd about the log, in sentences."""
+        """Warnings about the log in sentences."""
         return list(self.summary["warnings"])
 
     def plot(self) -> Picture:
-        """The car's estimate with its band, the flags, and what the drive was like."""
+        """A figure of the car's estimate with its deviation, the flags and the drive."""
         from sim2real.replay.figures import estimate
 
         return Picture(estimate(self._replay))
@@ -71,7 +71,7 @@ class Estimates:
         return Path(path)
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write report.html, estimates.csv and summary.json, all or none; returns their paths."""
+        """Write report.html, estimates.csv and summary.json; returns their paths."""
         from sim2real.replay.report import write_replay
 
         return write_replay(self._replay, self.summary, Path(folder))
@@ -86,27 +86,27 @@ def estimate(
     peers: bool = False,
     progress: StageProgress = silent,
 ) -> Estimates:
-    """Estimate the road's adhesion along a recorded drive.
+    """Estimates of the road's adhesion along a recorded drive.
 
     Parameters
     ----------
     log : DataFrame or path
         Columns of the log format (docs/logs.md), or those that the mapping names.
     vehicle : Vehicle, path or name, optional
-        The car; without it the paper's (Table 3), and said so.
+        The car; by default that of the paper (Table 3), with a warning.
     mapping, camera : path, optional
-        How the log's columns become those of the log format; the camera of the pictures that column image_path names.
+        Columns of the log in the log format; the camera of the pictures in column image_path.
     peers : bool
-        Whether estimators of the literature run as well.
+        Whether to run estimators of the literature as well.
     progress : callable
-        Told the stage, and how much of how much is done.
+        Called with the stage, and how many of how many of its items are done.
 
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     MissingExtraError
-        Where the log's format, or the peers, need an extra.
+        Without the extra of the log's format or of the peers.
     """
     from sim2real.replay.report import estimates_table
 

@@ -1,4 +1,4 @@
-"""Logs that are read, and tables of what comes with the package."""
+"""Logs from files and tables, and tables of what is shipped with the package."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def read_log(log: Log | pd.DataFrame | str | Path, *, mapping: Mapping | str | P
     Parameters
     ----------
     log : path or DataFrame
-        A log that has been read is given back as it is.
+        A Log is returned unchanged.
     mapping : path, optional
-        How its columns become those of the log format.
+        Its columns in the log format.
 
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     """
     if isinstance(log, Log):
         return log
@@ -39,7 +39,7 @@ def read_log(log: Log | pd.DataFrame | str | Path, *, mapping: Mapping | str | P
 
 
 def list_effects() -> pd.DataFrame:
-    """All effects that the plant models and a diagnosis may name, one row per form and parameter."""
+    """A table of all effects of the plant and the diagnosis, one row per form and parameter."""
     rows = [
         (effect_id, kind.form, kind.stage, kind.subsystem, p.name, p.unit, p.meaning, kind.equation)
         for effect_id, forms in FORMS.items()
@@ -51,7 +51,7 @@ def list_effects() -> pd.DataFrame:
 
 
 def list_scenarios() -> pd.DataFrame:
-    """The scenarios that come with the package: name, title, description, and what each is made of."""
+    """A table of the shipped scenarios: name, title, description, vehicle, manoeuvre and end."""
     found = {name: load_scenario(path) for name, path in shipped("scenario").items()}
     rows = [
         (name, s.name, s.description, s.vehicle.name, s.manoeuvre.name, s.end.time_s)
@@ -61,14 +61,14 @@ def list_scenarios() -> pd.DataFrame:
 
 
 def list_vehicles() -> pd.DataFrame:
-    """The cars that come with the package, one row each."""
+    """A table of the shipped cars."""
     cars = {name: load_strict(path, VehicleFile) for name, path in shipped("vehicle").items()}
     rows = [(name, car.name, car.mass_kg, car.wheelbase_m, car.wheel_radius_m) for name, car in cars.items()]
     return pd.DataFrame(rows, columns=["name", "title", "mass_kg", "wheelbase_m", "wheel_radius_m"])
 
 
 def list_roads() -> pd.DataFrame:
-    """The roads that come with the package, one row per stretch."""
+    """A table of the shipped roads, one row per stretch."""
     rows = [
         (name, s.start_m, s.mu_left, s.mu_right, s.surface)
         for name, path in shipped("road").items()

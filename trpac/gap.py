@@ -24,7 +24,7 @@ AnyLog = Log | pd.DataFrame | str | Path
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """What a diagnosis says; `result` has all of it."""
+    """The outcome of a diagnosis; `result` has all details."""
 
     result: Result
 
@@ -39,26 +39,26 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """The outcome in a word: identified, ambiguous, compound, unknown or no_gap."""
+        """The outcome: identified, ambiguous, compound, unknown or no_gap."""
         return self.result.verdict
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """The candidates, likeliest first."""
+        """The candidate causes, most probable first."""
         return self.result.causes
 
     @property
     def gap(self) -> Gap:
-        """The gap on the hold-out before and after, in noise floors."""
+        """The gap on the hold-out log before and after, in noise floors."""
         return self.result.gap
 
     @property
     def where(self) -> tuple[Place, ...]:
-        """Where the gap lies: signal, subsystem, regime and time."""
+        """Location of the gap: signal, subsystem, regime and time."""
         return self.result.where
 
     def apply_to(self, vehicle: VehicleFile) -> Vehicle:
-        """The car with the effects that the verdict names, ready for `simulate`; as it was where it names none."""
+        """The car with the identified effects, for `simulate`; unchanged without any."""
         car = Vehicle(**vehicle.model_dump(by_alias=True))
         from scenarios.effects import form_of
 
@@ -70,7 +70,7 @@ class Diagnosis:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """What diagnosis.json holds."""
+        """The content of diagnosis.json."""
         return self.result.to_json()
 
     def to_html(self, path: str | Path) -> Path:
@@ -82,7 +82,7 @@ class Diagnosis:
         return Path(path)
 
     def write(self, folder: str | Path) -> tuple[Path, Path]:
-        """Write diagnosis.json and report.html, both or neither; returns their paths."""
+        """Write diagnosis.json and report.html; returns their paths."""
         with extras("write", "gap"):
             from sim2real.telling.report import rated, write_diagnosis
 
@@ -101,29 +101,29 @@ def diagnose(
     jobs: int = 1,
     progress: StageProgress = silent,
 ) -> Diagnosis:
-    """Diagnose recorded logs against the simulation of a car on one road.
+    """The diagnosis of recorded logs against the simulation of a car on one road.
 
     Parameters
     ----------
     vehicle, road : Vehicle and Road, or path or name of each
-        What the simulation knows.
+        Car and road of the simulation.
     fit, holdout : sequence of logs, log
-        DataFrames or paths: those that parameters are fitted to, and the one that the gap is measured on.
+        DataFrames or paths: logs for the fit of parameters, and the log on which the gap is measured.
     mapping : path, optional
-        How the logs' columns become those of the log format.
+        Columns of the logs in the log format.
     seed : int
-        Of the resampling behind the intervals.
+        Seed of the resampling for the intervals.
     exclude : collection of str
-        Effects that are left out.
+        Excluded effects.
     jobs : int
-        Threads.
+        Number of threads.
     progress : callable
-        Told the stage, and how much of how much is done.
+        Called with the stage, and how many of how many of its items are done.
 
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     MissingExtraError
         Without the extra 'gap'.
     """

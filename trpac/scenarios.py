@@ -35,22 +35,22 @@ def simulate(
     noise: SensorNoise | None = None,
     seed: int = 0,
 ) -> pd.DataFrame:
-    """The log of a car that is driven by these wheel torques, with the columns of the log format.
+    """The log of a simulated car under wheel torques, with the columns of the log format.
 
     Parameters
     ----------
     vehicle, road : Vehicle and Road, or path or name of each
-        What drives, and on what.
+        The car and the road.
     torque : DataFrame, or array of shape (n, 4)
         time_s at equal steps and wheel_torque_{fl,fr,rl,rr}_nm; or the torques alone, `step_s` apart [N m].
     step_s : float
-        Of an array [s].
+        Step of an array [s].
     speed : float
-        At the start [m/s].
+        Speed at the start [m/s].
     effects : sequence of Effect
-        On top of those of the vehicle: `trpac.effects.TorqueLag(time_constant_s=0.05)`.
+        Effects in addition to those of the vehicle, such as `trpac.effects.TorqueLag(time_constant_s=0.05)`.
     noise, seed : SensorNoise, int
-        Of the sensors, which are ideal without it.
+        Noise of the sensors, by default none, and its seed.
 
     Raises
     ------
@@ -82,7 +82,7 @@ class ScenarioRun:
     log : DataFrame
         One row per step: the sensors, the unit's outputs, theta and segment under the wheel.
     summary : dict
-        Scores per stretch of road and estimator, as summary.json has them.
+        Content of summary.json: scores per stretch of road and estimator.
     """
 
     log: pd.DataFrame
@@ -92,7 +92,7 @@ class ScenarioRun:
 
     @property
     def frames(self) -> tuple[Path, ...]:
-        """The pictures that the camera took, as files that are there as long as this run is."""
+        """Files of the camera's pictures, which exist as long as this object does."""
         return tuple(Path(path) for path in self._run.frames["path"])
 
     def __repr__(self) -> str:
@@ -115,7 +115,7 @@ class ScenarioRun:
         return Picture(path.read_bytes())
 
     def write(self, folder: str | Path, progress: StageProgress = silent) -> tuple[Path, ...]:
-        """Write report.html, figure17.png, log.csv and summary.json, all or none; returns their paths."""
+        """Write report.html, figure17.png, log.csv and summary.json; returns their paths."""
         from scenarios.report import write_report
         from scenarios.runner import write_run
         from scenarios.vision_overlay import draw_overlay_sheet
@@ -143,16 +143,16 @@ def run(
     fmu: str | Path | None = None,
     progress: StageProgress = silent,
 ) -> ScenarioRun:
-    """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
+    """Results of a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
 
     Parameters
     ----------
     scenario : path or name
         Scenario file, or a shipped one such as "paper_simulation".
     seed, stiffness_n : optional
-        In place of the scenario's seed, and of the vehicle's C_x [N].
+        Replace the scenario's seed, and the vehicle's C_x [N].
     fmu : path, optional
-        The unit; without it one is built.
+        The unit; by default one is built.
     progress : callable
         Told the stage, and how much of how much is done.
 

@@ -1,4 +1,4 @@
-"""What commands share: a terminal that shows text as it is, progress bars, the check of the folder, refusals."""
+"""The common part of the commands: terminal, progress bars, check of the folder, error messages."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from scenarios.progress import StageProgress
 from trpac_core.files import quoted
 
 EXIT_INPUT = 2
-"""Unusable input: one line on standard error, and nothing written."""
+"""Exit code of unusable input, with one line on standard error and no file written."""
 LONGEST_LINE = 900
-"""Characters of that line: the problems that fit are named, the rest are counted."""
+"""Characters of that line: problems that fit are named, further ones are counted."""
 LONGEST_SHOWN = 10_000
-"""Characters of a line on the terminal."""
+"""Greatest number of characters of a line on the terminal."""
 
 
 class Terminal(Console):
-    """A console for text that files may have a part in: brackets are brackets, control characters are shown as codes.
+    """A console for text from files: brackets are no markup, control characters are shown as codes.
 
-    Where a text of ours has markup, `print(..., markup=True)` says so, and what is not ours is escaped.
+    Text with markup is printed by `print(..., markup=True)`, with text from files escaped.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, highlight=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Text ready to be shown."""
+        """The text with control characters as codes."""
         plain = "\n".join(quoted(line, LONGEST_SHOWN) for line in text.split("\n"))
         return super().render_str(plain, **options)
 
@@ -65,7 +65,7 @@ def bars() -> Iterator[StageProgress]:
 
 
 def require_folder(command: str, out: Path) -> None:
-    """Refuse before the work what would fail after it."""
+    """Refuse a folder that cannot be written to, before the work begins."""
     try:
         there = next(p for p in (out, *out.absolute().parents) if p.exists())
     except OSError as error:  # a name that is too long, a folder that may not be entered
@@ -77,13 +77,13 @@ def require_folder(command: str, out: Path) -> None:
 
 
 def refuse(command: str, problem: str | Exception) -> NoReturn:
-    """All problems in one line on standard error, as far as they fit."""
+    """Print all problems as one line on standard error and exit with `EXIT_INPUT`."""
     complain(command, problem)
     raise typer.Exit(EXIT_INPUT)
 
 
 def complain(command: str, problem: str | Exception) -> None:
-    """One line on standard error: the problems, one a line of the text, as far as they fit."""
+    """Print problems, one per line of the text, as one line on standard error, as far as they fit."""
     lines = [line.strip() for line in str(problem).splitlines() if line.strip()]
     shown: list[str] = []
     room = LONGEST_LINE

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sim2real.result import Diagnosis
 
 MOST_CAUSES = 5
-"""Causes that the summary shows."""
+"""Greatest number of causes in the summary."""
 COLOURS = {
     "identified": "cyan",
     "compound": "cyan",
@@ -160,12 +160,12 @@ def demo(
 
 
 def _print_step(console: Terminal, step: str, *sentences: str) -> None:
-    """One step of the demonstration, wrapped to the terminal."""
+    """Print a step of the demonstration."""
     console.print(f"[bold]{step}[/bold] {' '.join(sentences)}\n", markup=True)
 
 
 def _print_case(console: Terminal, case: Case) -> None:
-    """What is hidden from whom."""
+    """Print what is hidden and what the diagnosis gets."""
     _print_step(
         console,
         "1. Hiding something.",
@@ -189,7 +189,7 @@ def _print_case(console: Terminal, case: Case) -> None:
 
 
 def _print_truth(console: Terminal, case: Case, truth: Truth, diagnosis: Diagnosis) -> None:
-    """The end of the demonstration: what was hidden against what was found."""
+    """Print the hidden effect beside the diagnosis."""
     from sim2real.telling.report import estimate
 
     hidden = ", ".join(f"{name} {value:g}" for name, value in truth.parameters.items())
@@ -211,7 +211,7 @@ def _print_truth(console: Terminal, case: Case, truth: Truth, diagnosis: Diagnos
 
 
 def judge(hidden: str, diagnosis: Diagnosis) -> str:
-    """Whether the diagnosis found the hidden effect, in a sentence with colours."""
+    """The sentence, with markup, on whether the diagnosis found the hidden effect."""
     from sim2real.telling.report import percent
 
     ranked = [c.effect for c in diagnosis.causes]
@@ -230,7 +230,7 @@ def judge(hidden: str, diagnosis: Diagnosis) -> str:
 
 
 def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
-    """Verdict, sizes and the first causes on the terminal."""
+    """Print outcome, gap and first causes."""
     from sim2real.result import added
     from sim2real.telling.report import leading
 

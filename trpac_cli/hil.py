@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 COMMAND, PLANT_COMMAND = "trpac hil", "trpac hil-plant"
 EXIT_NO_LOG = 4
-"""The loop ran, but its log could not be written."""
+"""Exit code where the log could not be written."""
 MULTICAST = "239.74.163.2"
-"""Channel of udp_multicast where none is given: python-can's own group for IPv4."""
+"""Default channel of udp_multicast: python-can's group for IPv4."""
 CHANNELS = {"virtual": "trpac", "udp_multicast": MULTICAST, "socketcan": "can0"}
 
 Interface = Annotated[
@@ -226,7 +226,7 @@ def _plant_job(
 
 
 def _show(summary: dict[str, Any], out: Path) -> None:
-    """The outcome on the terminal."""
+    """Print the outcome."""
     console, overruns = Terminal(), summary["overruns"]
     worst = f", the worst by {overruns['worst_ms']:.2f} ms" if overruns["count"] else ""
     console.print(

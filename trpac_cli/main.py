@@ -46,7 +46,7 @@ def _root(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
     ] = False,
 ) -> None:
-    """What holds for all commands."""
+    """Options of all commands."""
 
 
 @app.command()
@@ -87,7 +87,7 @@ def run(
 
 
 def _score_table(summary: dict) -> Table:
-    """Scores as a table for the terminal."""
+    """The table of scores for the terminal."""
     from scenarios.report import number, score_rows
 
     table = Table(title=f"{summary['scenario']}, seed {summary['seed']}")

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from scenarios.sweep.store import Parts
 
 EXIT_SOME_FAILED = 1
-"""Done, but some runs failed; they are named on standard error."""
+"""Exit code where some runs failed; they are named on standard error."""
 MOST_NAMED = 5
+"""Failed runs that are named."""
 
 
 def sweep(
@@ -67,13 +68,13 @@ def sweep(
 
 
 def _require(scheduler: str | None, jobs: int | None) -> None:
-    """Refuse options that say two things."""
+    """Raise ScenarioError for contradicting options."""
     if scheduler is not None and jobs is not None:
         raise ScenarioError("--jobs goes with processes of this machine; leave it out with --scheduler.")
 
 
 def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, console: Terminal) -> None:
-    """Write what the runs make together: all of it, or nothing."""
+    """Write table, summary and report, all or none, and print the summary."""
     from scenarios.sweep.report import write_report
     from scenarios.sweep.store import write_table
     from scenarios.sweep.summary import summarise
@@ -96,7 +97,7 @@ def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, con
 
 
 def _shown(summary: dict[str, Any]) -> Table:
-    """Medians and 95th percentiles for the terminal."""
+    """The table of medians and 95th percentiles for the terminal."""
     from scenarios.report import number
 
     table = Table(

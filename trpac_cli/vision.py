@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from scenarios.vision_runs import Drive
 
 EXIT_SOME_UNREADABLE = 1
-"""Done, but some of the pictures could not be used; they are named on standard error."""
+"""Exit code where some pictures could not be used; they are named on standard error."""
 LONGEST_PROBLEM = 400
-"""Characters of one problem."""
+"""Greatest number of characters of a problem."""
 MOST_NAMED = 20
-"""Unusable pictures that a message names; the rest are counted."""
+"""Unusable pictures that are named; further ones are counted."""
 
 app = typer.Typer(help="The camera side alone: road surface from pictures.", no_args_is_help=True)
 
@@ -100,7 +100,7 @@ def run(
 
 
 def _show(drive: Drive) -> None:
-    """The run's outcome on the terminal."""
+    """Print the outcome."""
     summary, console = drive.summary, Terminal()
     table = Table(title=f"{summary['frames']} frames, {len(summary['unreadable'])} not usable")
     for heading in ("share of frames", "IFE", "voting"):
@@ -121,7 +121,7 @@ def _show(drive: Drive) -> None:
 
 
 def _counted(classes: Sequence[str]) -> str:
-    """How many of each class."""
+    """The number of pictures by class as text."""
     from trpac_core.vision.classes import Surface
 
     return ", ".join(f"{classes.count(surface.label)} {surface.label}" for surface in Surface)
@@ -134,7 +134,7 @@ def _listed(heading: str, problems: Sequence[str]) -> str:
 
 
 def _finish(command: str, heading: str, problems: Sequence[str]) -> None:
-    """Name what could not be used, if anything."""
+    """Exit with `EXIT_SOME_UNREADABLE` and a message where there are problems."""
     if problems:
         print(f"{command}: {_listed(heading, problems)}", file=sys.stderr)
         raise typer.Exit(EXIT_SOME_UNREADABLE)

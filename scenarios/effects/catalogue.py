@@ -1,4 +1,4 @@
-"""The page about all effects, made from their classes.
+"""Writes the page of all effects from their classes.
 
 python -m scenarios.effects.catalogue      # writes docs/effects.md
 """
@@ -16,7 +16,7 @@ from trpac_core.vehicle import Vehicle
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "effects.md"
 
 CAR = Vehicle()
-"""The car whose values stand for those that depend on the vehicle."""
+"""The car for values that depend on the vehicle."""
 
 STAGES = {
     "actuators": "command to torque at the wheels",
@@ -38,7 +38,7 @@ those of the paper's car (Table 3).
 
 
 def page() -> str:
-    """The page's text."""
+    """The page as Markdown text."""
     parts = [HEAD, "| id | stage | subsystem | parameters |\n|---|---|---|---|"]
     parts[-1] += "".join(f"\n{_table_row(effect)}" for effect in EFFECTS.values())
     for stage, meaning in STAGES.items():

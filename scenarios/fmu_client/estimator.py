@@ -1,4 +1,4 @@
-"""The estimator unit as a host sees it: imported, parameterised and stepped through fmpy."""
+"""The estimator unit in a host: imported, parameterised and stepped through fmpy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ INPUTS = ("wheel_speed", "wheel_torque", "vehicle_speed", "longitudinal_accelera
 
 
 def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
-    """What the unit is told of the scenario's car, camera and sensors, by the unit's variable names."""
+    """Parameters of the unit for the scenario's car, camera and sensors, by variable name."""
     car, noise = scenario.vehicle.to_core(), scenario.sensors
     values: dict[str, float | int | bool] = car_parameters(car, scenario.wheel) | {
         "confidence.torque_noise": noise.wheel_torque_noise_nm,
@@ -41,7 +41,7 @@ def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
 
 
 def car_parameters(car: Vehicle, wheel: str) -> dict[str, float | int | bool]:
-    """What the unit of one wheel is told of a car, by the unit's variable names; four wheels take all but the place."""
+    """Parameters of the unit of one wheel for a car, by variable name."""
     return {
         "wheel.front": wheel.startswith("f"),
         "wheel.left": wheel.endswith("l"),
@@ -84,7 +84,7 @@ def run_unit(
     step_s: float,
     progress: Progress = silent,
 ) -> pd.DataFrame:
-    """Step the unit over recorded signals and pictures, as a host would.
+    """Outputs of the unit over recorded signals and pictures.
 
     Parameters
     ----------
@@ -95,11 +95,11 @@ def run_unit(
     signals : DataFrame
         One row per step with the columns `INPUTS`, in the unit's units.
     frames : DataFrame
-        row and path of each picture; it is given with that row's signals.
+        row and path of each picture, which is set with that row's signals.
     step_s : float
         Communication step [s].
     progress : callable
-        Told how many of how many steps are done.
+        Called with how many of how many steps are done.
 
     Returns
     -------
