@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -71,28 +72,26 @@ def _info(name: str, description: str) -> UnitInfo:
     )
 
 
+_estimator = partial(
+    Slave, modules={"trpac_core": ROOT / "trpac_core"}, packages=ESTIMATOR_PACKAGES, resources=NETWORKS
+)
+
 UNITS = {
-    "TrpacEstimator": Slave(
+    "TrpacEstimator": _estimator(
         _info(
             "TrpacEstimator",
             "Peak adhesion coefficient of tyre and road at one wheel, from dynamics and camera",
         ),
         files=(*ESTIMATOR_FILES, "interface.py", "trpac_estimator.py"),
         variables=TRPAC_ESTIMATOR,
-        modules={"trpac_core": ROOT / "trpac_core"},
-        packages=ESTIMATOR_PACKAGES,
-        resources=NETWORKS,
     ),
-    "TrpacEstimator4W": Slave(
+    "TrpacEstimator4W": _estimator(
         _info(
             "TrpacEstimator4W",
             "Peak adhesion coefficient of tyre and road at four wheels and of the car, from dynamics and camera",
         ),
         files=(*ESTIMATOR_FILES, "interface_4w.py", "trpac_estimator_4w.py"),
         variables=TRPAC_ESTIMATOR_4W,
-        modules={"trpac_core": ROOT / "trpac_core"},
-        packages=ESTIMATOR_PACKAGES,
-        resources=NETWORKS,
     ),
     "ReferencePlant": Slave(
         _info(

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from scenarios.runner import ESTIMATORS, Run
+from scenarios.metrics import ESTIMATORS
+from scenarios.runner import Run
 from trpac_core.vehicle import WHEELS
 
 COLOURS = {"IFE": "#d08a00", "DE": "#7fb2e5", "DIFE": "#c0272d"}

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
+"""The estimators of this project, and the unit's output of each."""
 CONVERGED_SHARE = 0.05
 """Error within which an estimator has converged, as a share of the step of friction [-]."""
 STEADY_SHARE = 0.3

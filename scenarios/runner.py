@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from scenarios.files import Scenario
 from scenarios.fmu_client.estimator import parameters, run_unit
-from scenarios.metrics import score_run
+from scenarios.metrics import ESTIMATORS, score_run
 from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
@@ -23,8 +23,6 @@ from scenarios.progress import StageProgress, silent
 from trpac_core.files import file_sha256
 from trpac_core.vehicle import WHEELS
 
-ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
-"""Estimators that are compared, and the unit's output of each."""
 PACKAGES = (
     "trpac-fmu",
     "fmpy",

@@ -9,25 +9,19 @@ wheel's theta F_z, as anti-lock control does. The camera side is the plant's cla
 from __future__ import annotations
 
 import argparse
-import shutil
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pandas as pd
-from fmpy.fmi2 import FMU2Slave
 
 from scenarios.camera.files import load_camera
 from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.camera.split import SplitRenderer
 from scenarios.files import load_road, load_vehicle
 from scenarios.fmu_client.archives import UnitFileError
-from scenarios.fmu_client.opening import opened_unit
-from scenarios.fmu_client.unpacking import unpack_unit
+from scenarios.fmu_client.opening import Instance, opened
 from trpac_core.car_friction import Friction, car_friction
 from trpac_core.vehicle import WHEELS
 
@@ -52,50 +46,9 @@ NOISE = {"wheel_speed": 0.01, "wheel_torque": 3.2, "vehicle_speed": 0.003, "long
 NAMES = ("TRPAC", "TRPAC_std", "TRPAC_image", "excitation_flag", "flag")
 
 
-class Unit:
-    """An instance of a unit, with variables by name."""
-
-    def __init__(self, unit: FMU2Slave, description: Any, parameters: Mapping[str, float | str]) -> None:
-        self._variables = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
-        self._unit = unit
-        self._unit.setupExperiment(startTime=0.0)
-        self.set(parameters)
-        self._unit.enterInitializationMode()
-        self._unit.exitInitializationMode()
-
-    def set(self, values: Mapping[str, float | str]) -> None:
-        """Set variables of any type."""
-        for name, value in values.items():
-            reference, kind = self._variables[name]
-            getattr(self._unit, f"set{kind}")([reference], [value])
-
-    def get(self, name: str) -> float:
-        """A numeric variable's value."""
-        reference, kind = self._variables[name]
-        return float(getattr(self._unit, f"get{kind}")([reference])[0])
-
-    def at_wheels(self, name: str) -> list[float]:
-        """Values of a variable at the wheels fl, fr, rl, rr."""
-        references, kinds = zip(*(self._variables[f"{name}.{wheel}"] for wheel in WHEELS), strict=True)
-        return [float(value) for value in getattr(self._unit, f"get{kinds[0]}")(list(references))]
-
-    def step(self, time_s: float) -> None:
-        """Take one communication step."""
-        self._unit.doStep(time_s, STEP_S)
-
-
-@contextmanager
-def opened(name: str, archive: Path, parameters: Mapping[str, float | str]) -> Iterator[Unit]:
-    """An instance of the unit of this name, freed at the end of the context; raises UnitFileError."""
-    folder = unpack_unit(archive)
-    try:
-        unit, description = opened_unit(archive, folder, [name], name)
-        try:
-            yield Unit(unit, description, parameters)
-        finally:
-            unit.freeInstance()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+def _at_wheels(unit: Instance, name: str) -> list[float]:
+    """Values of a variable at the wheels fl, fr, rl, rr."""
+    return [unit.get(f"{name}.{wheel}") for wheel in WHEELS]
 
 
 def pulse(time_s: float) -> float:
@@ -146,30 +99,30 @@ def run(
     world = _world(road, seed) if pictures else None
     rows = []
     with (
-        opened(PLANT, plant_file, start) as plant,
-        opened(ESTIMATOR, estimator_file, settings) as estimator,
+        opened(plant_file, PLANT, start) as plant,
+        opened(estimator_file, ESTIMATOR, settings) as estimator,
     ):
         step = 0
         while plant.get("position") < END_M and plant.get("vehicle_speed") > 2.0:
             share = USED_SHARE * pulse(step * STEP_S)
-            loads, thetas = plant.at_wheels("vertical_load"), plant.at_wheels("theta")
+            loads, thetas = _at_wheels(plant, "vertical_load"), _at_wheels(plant, "theta")
             torques = [-share * theta * load * radius_m for theta, load in zip(thetas, loads, strict=True)]
             estimator.set(_measured(plant, torques, rng))
             if step % FRAME_STEPS == 0:
                 estimator.set(_frame(plant, world, out / "frames", step // FRAME_STEPS + 1))
             # Both at the same time: the current measurements, and the torque from now on.
-            estimator.step(step * STEP_S)
+            estimator.slave.doStep(step * STEP_S, STEP_S)
             rows.append(_row(step * STEP_S, plant, estimator, loads, thetas))
             plant.set({f"wheel_torque.{w}": torque for w, torque in zip(WHEELS, torques, strict=True)})
-            plant.step(step * STEP_S)
+            plant.slave.doStep(step * STEP_S, STEP_S)
             step += 1
     return pd.DataFrame(rows)
 
 
-def _measured(plant: Unit, torques: list[float], rng: np.random.Generator) -> dict[str, float | str]:
+def _measured(plant: Instance, torques: list[float], rng: np.random.Generator) -> dict[str, float | str]:
     """Inputs of the estimator: the plant's outputs with noise, and the torque commanded for the next step."""
     values: dict[str, float | str] = {}
-    for wheel, torque, speed in zip(WHEELS, torques, plant.at_wheels("wheel_speed"), strict=True):
+    for wheel, torque, speed in zip(WHEELS, torques, _at_wheels(plant, "wheel_speed"), strict=True):
         values[f"wheel_torque.{wheel}"] = torque + NOISE["wheel_torque"] * rng.standard_normal()
         values[f"wheel_speed.{wheel}"] = speed + NOISE["wheel_speed"] * rng.standard_normal()
     for name in ("vehicle_speed", "longitudinal_acceleration"):
@@ -189,7 +142,7 @@ def _joined(segments: list[SurfaceSegment]) -> list[SurfaceSegment]:
     return [s for i, s in enumerate(segments) if i == 0 or s.surface != segments[i - 1].surface]
 
 
-def _frame(plant: Unit, world: SplitRenderer | None, folder: Path, number: int) -> dict[str, float | str]:
+def _frame(plant: Instance, world: SplitRenderer | None, folder: Path, number: int) -> dict[str, float | str]:
     """Inputs of a new frame: a picture's path, or the plant's class of each side."""
     if world is None:
         sides = ("left", "right")
@@ -203,12 +156,12 @@ def _frame(plant: Unit, world: SplitRenderer | None, folder: Path, number: int) 
 
 
 def _row(
-    time_s: float, plant: Unit, estimator: Unit, loads: list[float], thetas: list[float]
+    time_s: float, plant: Instance, estimator: Instance, loads: list[float], thetas: list[float]
 ) -> dict[str, float]:
     row = {"time_s": time_s, "position_m": plant.get("position"), "speed_m_s": plant.get("vehicle_speed")}
     for name in NAMES:
         row |= {
-            f"{name}.{wheel}": value for wheel, value in zip(WHEELS, estimator.at_wheels(name), strict=True)
+            f"{name}.{wheel}": value for wheel, value in zip(WHEELS, _at_wheels(estimator, name), strict=True)
         }
     row |= {f"theta.{wheel}": theta for wheel, theta in zip(WHEELS, thetas, strict=True)}
     row |= {f"vertical_load.{wheel}": load for wheel, load in zip(WHEELS, loads, strict=True)}

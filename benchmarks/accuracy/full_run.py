@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import pandas as pd
 
 from fmu_src.estimate_outputs import OF_ESTIMATE
-from scenarios.metrics import score_run
+from scenarios.metrics import ESTIMATORS, score_run
 from scenarios.plant.pipeline import drive
 from scenarios.plant.sensors import make_scenario_log
-from scenarios.runner import ESTIMATORS, Run, segment_starts, under_the_wheel
+from scenarios.runner import Run, segment_starts, under_the_wheel
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.run import believed_config, camera_of, signals_of
 from trpac_core.estimator import TrpacEstimator

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
 
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario, ScenarioError
 from scenarios.fmu_client.archives import UnitFileError
-from scenarios.fmu_client.opening import opened_unit
-from scenarios.fmu_client.unpacking import unpack_unit
+from scenarios.fmu_client.opening import Instance, opened
 from scenarios.pictures import frame_steps
 from scenarios.progress import Progress, silent
 from trpac_core.vehicle import Vehicle
@@ -113,60 +110,28 @@ def run_unit(
         refuses a setting or a step.
     """
     try:
-        folder = unpack_unit(fmu)
+        with opened(fmu, UNIT, settings) as unit:
+            table = _step_all(unit, signals, frames, step_s, progress)
+            unit.slave.terminate()
     except UnitFileError as error:
         raise ScenarioError(str(error)) from error
-    try:
-        try:
-            unit, description = opened_unit(fmu, folder, [UNIT], "estimator")
-        except UnitFileError as error:
-            raise ScenarioError(str(error)) from error
-        references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
-        outputs = [v.name for v in description.modelVariables if v.causality == "output"]
-        try:
-            unit.setupExperiment(startTime=0.0)
-            _set(unit, references, settings)
-            unit.enterInitializationMode()
-            unit.exitInitializationMode()
-            table = _step_all(unit, references, outputs, signals, frames, step_s, progress)
-            unit.terminate()
-        except FMICallException as error:
-            raise ScenarioError(
-                f"{fmu}: refuses the scenario's settings or a step ({error}); its own words are above. Their ranges "
-                "stand in docs/fmu_variables.md."
-            ) from error
-        finally:
-            unit.freeInstance()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    except FMICallException as error:
+        raise ScenarioError(
+            f"{fmu}: refuses the scenario's settings or a step ({error}); its own words are above. Their ranges "
+            "stand in docs/fmu_variables.md."
+        ) from error
     return table
 
 
-def _set(
-    unit: FMU2Slave,
-    references: Mapping[str, tuple[int, str]],
-    settings: Mapping[str, float | int | bool],
-) -> None:
-    for name, value in settings.items():
-        reference, kind = references[name]
-        getattr(unit, f"set{kind}")([reference], [value])
-
-
 def _step_all(
-    unit: FMU2Slave,
-    references: Mapping[str, tuple[int, str]],
-    outputs: Sequence[str],
-    signals: pd.DataFrame,
-    frames: pd.DataFrame,
-    step_s: float,
-    progress: Progress,
+    unit: Instance, signals: pd.DataFrame, frames: pd.DataFrame, step_s: float, progress: Progress
 ) -> pd.DataFrame:
-    inputs = [references[name][0] for name in INPUTS]
     real_names, flag_names = (
-        [n for n in outputs if references[n][1] == kind] for kind in ("Real", "Boolean")
+        [v.name for v in unit.variables if v.causality == "output" and v.type == kind]
+        for kind in ("Real", "Boolean")
     )
-    reals, flags = ([references[name][0] for name in names] for names in (real_names, flag_names))
-    path, number = references["image_path"][0], references["frame_id"][0]
+    inputs, reals, flags = map(unit.references, (INPUTS, real_names, flag_names))
+    slave, picture, number = unit.slave, unit.references(["image_path"]), unit.references(["frame_id"])
     pictures = {
         int(row): (str(file), int(frame)) for row, file, frame in frames[["row", "path", "frame"]].values
     }
@@ -174,12 +139,12 @@ def _step_all(
     results = np.empty((len(values), len(reals) + len(flags)))
     for row, readings in enumerate(values):
         if row in pictures:
-            unit.setString([path], [pictures[row][0]])
-            unit.setInteger([number], [pictures[row][1]])
-        unit.setReal(inputs, readings)
-        unit.doStep(currentCommunicationPoint=row * step_s, communicationStepSize=step_s)
-        results[row, : len(reals)] = unit.getReal(reals)
-        results[row, len(reals) :] = unit.getBoolean(flags)
+            slave.setString(picture, [pictures[row][0]])
+            slave.setInteger(number, [pictures[row][1]])
+        slave.setReal(inputs, readings)
+        slave.doStep(currentCommunicationPoint=row * step_s, communicationStepSize=step_s)
+        results[row, : len(reals)] = slave.getReal(reals)
+        results[row, len(reals) :] = slave.getBoolean(flags)
         if row % 500 == 0 or row == len(values) - 1:
             progress(row + 1, len(values))
     table = pd.DataFrame(results, columns=[*real_names, *flag_names])

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from scenarios.files import Scenario
 from scenarios.fmu_client.estimator import parameters
-from scenarios.metrics import score_run
+from scenarios.metrics import ESTIMATORS, score_run
 from scenarios.peers import PeerSetup
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.runner import segment_starts, under_the_wheel
 from scenarios.sweep.camera import RenderedFrames, road_classes
 from scenarios.sweep.draw import RunPlan
-from scenarios.sweep.trackers import OWN, make_peer
+from scenarios.sweep.trackers import make_peer
 from scenarios.vision_overlay import image_estimator
 from trpac_core.dife import GREATEST_THETA, LEAST_SENSITIVITY, LEAST_THETA
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
@@ -103,8 +103,8 @@ def step_all(
     """Estimates of ours and of the peers over the run; raises ValueError where one is not finite."""
     frames, ife = camera_of(plan, trajectory)
     estimator, step_s = TrpacEstimator(config, ife), plan.scenario.step_s
-    peers = {name: make_peer(name, peer_setup(plan, config)) for name in estimators if name not in OWN}
-    names = [*OWN, *peers]
+    peers = {name: make_peer(name, peer_setup(plan, config)) for name in estimators if name not in ESTIMATORS}
+    names = [*ESTIMATORS, *peers]
     theta = np.empty((len(trajectory), len(names)))
     std = np.full((len(trajectory), len(names)), np.nan)
     excited = np.empty(len(trajectory), dtype=bool)
@@ -114,10 +114,10 @@ def step_all(
     ):
         sensors = Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
         estimate = estimator.step(step_s, sensors, frames.get(row))
-        theta[row, : len(OWN)] = estimate.TRPAC_image, estimate.TRPAC_dynamics, estimate.TRPAC
+        theta[row, : len(ESTIMATORS)] = estimate.TRPAC_image, estimate.TRPAC_dynamics, estimate.TRPAC
         std[row, fused] = estimate.TRPAC_std
         excited[row] = estimate.excitation_flag
-        for column, peer in enumerate(peers.values(), start=len(OWN)):
+        for column, peer in enumerate(peers.values(), start=len(ESTIMATORS)):
             peer_estimate = peer.step(step_s, sensors)
             theta[row, column], std[row, column] = peer_estimate.TRPAC, peer_estimate.TRPAC_std
     strange = [name for i, name in enumerate(names) if not np.isfinite(theta[:, i]).all()]

@@ -12,11 +12,9 @@ from collections.abc import Callable
 
 from scenarios import peers
 from scenarios.errors import suggestion
+from scenarios.metrics import ESTIMATORS
 from scenarios.peers import Peer, PeerSetup
 from trpac_core.files import quoted
-
-OWN = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
-"""The estimators of this project, and the unit's output of each."""
 
 ADDRESS = re.compile(r"\w+(\.\w+)*:\w+")
 """Pattern of package.module:function."""
@@ -24,12 +22,12 @@ ADDRESS = re.compile(r"\w+(\.\w+)*:\w+")
 
 def problem_of_tracker(name: str) -> str | None:
     """The problem of an estimator's name in a sweep file as a sentence; None for a known name or an address."""
-    if name in OWN or name in peers.PEERS or ADDRESS.fullmatch(name):
+    if name in ESTIMATORS or name in peers.PEERS or ADDRESS.fullmatch(name):
         return None
     problem = f"estimators names {quoted(repr(name))}"
     if ":" in name:
         return f"{problem}; expected package.module:function."
-    return f"{problem}; {suggestion(name, [*OWN, *peers.PEERS])}"
+    return f"{problem}; {suggestion(name, [*ESTIMATORS, *peers.PEERS])}"
 
 
 def problem_of_address(name: str) -> str | None:
