@@ -15,7 +15,7 @@ from scenarios.plant.pipeline import drive
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import run_one
 from scenarios.sweep.files import load_sweep
-from scenarios.sweep.run import believed_config, shown, step_all
+from scenarios.sweep.run import believed_config, identifiable, step_all
 from scenarios.sweep.store import Parts, identity
 
 ROOT = Path(__file__).parents[2]
@@ -50,13 +50,13 @@ def test_the_road_test_is_the_papers():
 
 def test_the_motors_show_nothing_of_the_road_tests_friction():
     scenario = load_scenario(ROOT / "scenarios" / "road_test.yaml")
-    assert not shown(scenario, drive(scenario)).any()
+    assert not identifiable(scenario, drive(scenario)).any()
 
 
 def test_brake_pulses_show_both_parts_and_lock_no_wheel():
     scenario = load_scenario(ROOT / "scenarios" / "road_test_brakes.yaml")
     trajectory = drive(scenario)
-    visible = shown(scenario, trajectory)
+    visible = identifiable(scenario, trajectory)
     for theta in (1.0, 0.8):
         assert visible[trajectory.theta[:, 0] == theta].sum() * scenario.step_s > 0.5
     assert trajectory.slip[trajectory.speed_m_s > 1.0, 0].max() < 0.15
