@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
 
@@ -23,23 +23,6 @@ SEGMENTER_FILE = "segmenter.onnx"
 CLASSIFIER_FILE = "surface.onnx"
 
 
-class Estimator(Protocol):
-    """The estimator that a unit wraps."""
-
-    @property
-    def last(self) -> Any:
-        """The estimate of the step before."""
-
-    def step(self, step_s: float, sensors: Any, frame: Any = None, *, frame_failed: bool = False) -> Any:
-        """One step."""
-
-    def state(self) -> Mapping[str, Any]:
-        """The complete state."""
-
-    def restore(self, data: Mapping[str, Any]) -> None:
-        """Restore what `state` returned."""
-
-
 class CameraSlave(GuardedSlave):
     """A unit with sensors and camera frames as inputs and an estimate as output.
 
@@ -51,10 +34,8 @@ class CameraSlave(GuardedSlave):
     _networks: ClassVar[tuple[Segmenter, SurfaceClassifier] | None] = None
 
     @abstractmethod
-    def build(
-        self, values: Mapping[str, Any], networks: tuple[Segmenter, SurfaceClassifier] | None
-    ) -> Estimator:
-        """The estimator under these parameters; ValueError where they cannot be applied."""
+    def build(self, values: Mapping[str, Any], networks: tuple[Segmenter, SurfaceClassifier] | None) -> Any:
+        """The estimator, TrpacEstimator or FourWheels; ValueError where the parameters cannot be applied."""
 
     @abstractmethod
     def sensors(self) -> Any:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import can
 
 from trpac_hil.bus import Link
-from trpac_hil.deadlines import Clock, Deadlines, wait_until
+from trpac_hil.deadlines import Deadlines, SystemClock, wait_until
 from trpac_hil.shared import Ring
 
 _COLUMNS = 5
@@ -54,11 +54,11 @@ class BusRelay:
         The shared memory.
     link : Link
         The bus.
-    clock : Clock
-        Clock of the period.
+    clock : SystemClock
+        SystemClock of the period.
     """
 
-    def __init__(self, ring: Ring, link: Link, clock: Clock) -> None:
+    def __init__(self, ring: Ring, link: Link, clock: SystemClock) -> None:
         self._ring, self._link, self._clock = ring, link, clock
 
     def run(self, start_ns: int, period_ns: int, stop: Callable[[], bool]) -> None:

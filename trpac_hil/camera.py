@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
@@ -39,14 +39,6 @@ def result_columns(sides: int) -> int:
     return HEAD + 2 * sides
 
 
-class Source(Protocol):
-    """A source of pictures."""
-
-    def picture(self, number: int) -> NDArray[np.uint8]:
-        """The picture of that number, counted from 0; raises ImageError."""
-        ...
-
-
 @dataclass(frozen=True)
 class PictureFolder:
     """The pictures of a folder, repeated without end."""
@@ -54,7 +46,7 @@ class PictureFolder:
     files: tuple[Path, ...]
 
     def picture(self, number: int) -> NDArray[np.uint8]:
-        """The picture of that number; raises ImageError."""
+        """The picture of a number, counted from 0; raises ImageError."""
         return decode_image(self.files[number % len(self.files)])
 
 
@@ -64,7 +56,7 @@ class CameraJob:
 
     Attributes
     ----------
-    source : Source
+    source : PictureFolder
         Pictures.
     vision : IfeConfig
         Settings of the image estimator: camera, car, and the unit's parameters `image.*`.
@@ -78,7 +70,7 @@ class CameraJob:
         The loop's core, which this process does not use.
     """
 
-    source: Source
+    source: PictureFolder
     vision: IfeConfig
     fps: float
     sides: tuple[str, ...] = ("left",)

@@ -4,45 +4,24 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Protocol
 
 SPIN_NS = 60_000
 """Time before a due time at which sleep ends and polling of the clock begins: the overshoot of a Linux sleep [ns]."""
 
 
-class Clock(Protocol):
-    """The clocks that the loop reads."""
+class SystemClock:
+    """The machine's clocks."""
 
     def now_ns(self) -> int:
         """Monotonic time, the same in all processes of the machine [ns]."""
-        ...
-
-    def wall_ns(self) -> int:
-        """Time of day, which may be set [ns]."""
-        ...
-
-    def cpu_ns(self) -> int:
-        """Processor time of the calling thread [ns]."""
-        ...
-
-    def sleep_ns(self, duration_ns: int) -> None:
-        """Sleep for about this time [ns]."""
-        ...
-
-
-class SystemClock:
-    """The machine's own clocks."""
-
-    def now_ns(self) -> int:
-        """CLOCK_MONOTONIC on Linux, the performance counter on Windows [ns]."""
         return time.perf_counter_ns()
 
     def wall_ns(self) -> int:
-        """The system's time of day [ns]."""
+        """Time of day, which may be set [ns]."""
         return time.time_ns()
 
     def cpu_ns(self) -> int:
-        """Of this thread alone; on Windows in steps of 16 ms [ns]."""
+        """Processor time of the calling thread; on Windows in steps of 16 ms [ns]."""
         return time.thread_time_ns()
 
     def sleep_ns(self, duration_ns: int) -> None:
@@ -73,7 +52,7 @@ class Deadlines:
         return max(done + 1, (now_ns - self.start_ns) // self.period_ns)
 
 
-def wait_until(clock: Clock, due_ns: int, spin_ns: int = SPIN_NS) -> int:
+def wait_until(clock: SystemClock, due_ns: int, spin_ns: int = SPIN_NS) -> int:
     """Sleep until `spin_ns` before a time, then poll the clock; returns the time then [ns]."""
     now_ns = clock.now_ns()
     while now_ns < due_ns:
@@ -90,7 +69,7 @@ class WallWatch:
     JUMP_NS = 100_000_000
     """Least step that is reported; smaller ones are a clock being slewed [ns]."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: SystemClock) -> None:
         self._clock = clock
         self._offset_ns = clock.wall_ns() - clock.now_ns()
 

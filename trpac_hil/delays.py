@@ -7,7 +7,6 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 if sys.platform != "win32":
     import resource
@@ -30,14 +29,6 @@ class Spent:
     worked_ns: int
     queued_ns: int | None = None
     blocked: int | None = None
-
-
-class Accounts(Protocol):
-    """A source of a thread's times."""
-
-    def spent(self) -> Spent:
-        """The thread's times up to now."""
-        ...
 
 
 class ThreadAccounts:
@@ -98,7 +89,7 @@ class Delays:
     delay have its cause.
     """
 
-    def __init__(self, accounts: Accounts) -> None:
+    def __init__(self, accounts: ThreadAccounts) -> None:
         self.longs = dict.fromkeys(CAUSES, 0)
         self._accounts = accounts
         self.start()

@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
-import can
-
+from trpac_hil.bus import Link
 from trpac_hil.camera_input import CameraInput
 from trpac_hil.codec import Codec
-from trpac_hil.deadlines import SPIN_NS, Clock, Deadlines, WallWatch, wait_until
+from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.delays import Delays
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
 from trpac_hil.preview_stamps import Odometer
 from trpac_hil.records import AGED, LOGGED
 from trpac_hil.shared import Ring
-from trpac_hil.unit import Estimates, Wiring
+from trpac_hil.unit import Estimates, Unit
 
 HEALTH_EVERY_NS = 100_000_000
 """Cycle time of the message Health [ns]."""
@@ -30,38 +28,6 @@ REQUIRED_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion")
 STARTING, RUNNING, HELD_INPUT, HELD_BUS, HELD_UNIT, ENDED = 0, 1, 2, 3, 4, 7
 """Values of the signal Status."""
 NAN = math.nan
-
-
-class Bus(Protocol):
-    """The methods of `trpac_hil.bus.Link` that the loop calls."""
-
-    losses: int
-
-    @property
-    def up(self) -> bool: ...  # noqa: D102
-
-    def receive(self) -> list[can.Message]: ...  # noqa: D102
-
-    def send(self, frame_id: int, extended: bool, data: bytes) -> bool: ...  # noqa: D102
-
-    def check(self) -> None: ...  # noqa: D102
-
-
-class SteppedUnit(Protocol):
-    """The methods of `trpac_hil.unit.Unit` that the loop calls."""
-
-    wiring: Wiring
-
-    @property
-    def last(self) -> Estimates: ...  # noqa: D102
-
-    def references(self, variables: Sequence[str]) -> list[int]: ...  # noqa: D102
-
-    def give_class(self, classes: Sequence[tuple[int, float]], number: int) -> None: ...  # noqa: D102
-
-    def step(  # noqa: D102
-        self, time_s: float, step_s: float, references: Sequence[int], values: Sequence[float]
-    ) -> Estimates | None: ...
 
 
 @dataclass
@@ -96,9 +62,9 @@ class Loop:
 
     Parameters
     ----------
-    clock, deadlines : Clock, Deadlines
+    clock, deadlines : SystemClock, Deadlines
         Time, and when each cycle is due.
-    bus, unit, codec, inputs : Bus, SteppedUnit, Codec, Inputs
+    bus, unit, codec, inputs : Link, Unit, Codec, Inputs
         Bus, unit, coding and newest values of the messages.
     camera_input : CameraInput
         Results of pictures.
@@ -114,10 +80,10 @@ class Loop:
 
     def __init__(
         self,
-        clock: Clock,
+        clock: SystemClock,
         deadlines: Deadlines,
-        bus: Bus,
-        unit: SteppedUnit,
+        bus: Link,
+        unit: Unit,
         codec: Codec,
         inputs: Inputs,
         camera_input: CameraInput,

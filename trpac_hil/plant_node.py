@@ -17,7 +17,7 @@ from trpac_core.vehicle import WHEELS
 from trpac_hil.bus import BUS_ERRORS, BusSettings, Link
 from trpac_hil.bus_relay import RelayedBus
 from trpac_hil.codec import DBC_FILE, Codec, load_codec
-from trpac_hil.deadlines import Clock, Deadlines, SystemClock, wait_until
+from trpac_hil.deadlines import Deadlines, SystemClock, wait_until
 from trpac_hil.driver import EndlessDrive
 from trpac_hil.helper import Control, helper
 from trpac_hil.realtime import raise_priority
@@ -74,7 +74,7 @@ class _Picture:
 class PlantNode:
     """The plant with its sensors and camera, and their messages; raises ScenarioError and HilError."""
 
-    def __init__(self, job: PlantJob, open_link: Callable[[], Any], clock: Clock) -> None:
+    def __init__(self, job: PlantJob, open_link: Callable[[], Any], clock: SystemClock) -> None:
         scenario = load_scenario(job.scenario)
         self.drive = EndlessDrive(scenario, 1.0 / job.rate_hz)
         self.left_out = 0

@@ -13,7 +13,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from fmu_src.interface_4w import WHICH_WHEEL
 from scenarios.fmu_client.archives import UnitFileError
-from scenarios.fmu_client.opening import opened_unit
+from scenarios.fmu_client.opening import Instance, opened_unit
 from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_core.vehicle import WHEELS
 from trpac_hil.errors import HilError
@@ -130,32 +130,29 @@ class Unit:
         name = description.coSimulation.modelIdentifier
         self.name = name
         self.wiring = Wiring.of_four() if name.endswith("4W") else Wiring.of_one(wheel)
-        self._references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
-        self._parameters = {v.name for v in description.modelVariables if v.causality == "parameter"}
-        outputs = _outputs(self.wiring)
-        self._reals = [self._references[n][0] for n in outputs[0]]
-        self._flags = [self._references[n][0] for n in outputs[1]]
-        self._frame_id = self._references["frame_id"][0]
-        self._classes = [self._references[c][0] for c, _ in self.wiring.sides]
-        self._confidences = [self._references[c][0] for _, c in self.wiring.sides]
-        known = self._typed(settings)
-        self._initialise(known)
+        known = self._typed(
+            settings, {v.name: v.type for v in description.modelVariables if v.causality == "parameter"}
+        )
+        self.references = Instance(slave, description, known).references
+        self._reals, self._flags = map(self.references, _outputs(self.wiring))
+        self._classes, self._confidences = map(self.references, zip(*self.wiring.sides, strict=True))
+        self._frame_id = self.references(["frame_id"])
         self._warm_up()
         slave.reset()
-        self._initialise(known)
+        Instance(slave, description, known)
         self._last = self._read()
 
-    def _typed(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+    def _typed(self, settings: Mapping[str, Any], types: Mapping[str, str]) -> dict[str, Any]:
         """Settings converted to the types of their variables; raises HilError for unknown names and wrong values."""
         kinds = {"Integer": int, "Boolean": bool, "Real": float}
-        usable = {name for name in self._parameters if self._references[name][1] in kinds}
+        usable = {name for name, kind in types.items() if kind in kinds}
         unknown = sorted(set(settings) - usable - set(WHICH_WHEEL))
         if unknown:
             raise HilError(
                 f"{self.archive}: has no parameter {', '.join(unknown)}; see docs/fmu_variables.md."
             )
         known = {name: value for name, value in settings.items() if name in usable}
-        typed = {name: kinds[self._references[name][1]](value) for name, value in known.items()}
+        typed = {name: kinds[types[name]](value) for name, value in known.items()}
         changed = [name for name, value in known.items() if typed[name] != value]
         if changed:
             raise HilError(
@@ -163,15 +160,6 @@ class Unit:
                 f"{'0 or 1' if isinstance(typed[changed[0]], bool) else 'a whole number'}."
             )
         return typed
-
-    def _initialise(self, settings: Mapping[str, Any]) -> None:
-        slave = self._instance
-        slave.setupExperiment(startTime=0.0)
-        for name, value in settings.items():
-            reference, kind = self._references[name]
-            getattr(slave, f"set{kind}")([reference], [value])
-        slave.enterInitializationMode()
-        slave.exitInitializationMode()
 
     def _warm_up(self) -> None:
         """Take steps whose results are discarded; raises HilError where the unit refuses them with these settings."""
@@ -188,14 +176,10 @@ class Unit:
             raise HilError(f"{self.archive}: is closed.")
         return self._slave
 
-    def references(self, variables: Sequence[str]) -> list[int]:
-        """Value references of the variables."""
-        return [self._references[name][0] for name in variables]
-
     def give_class(self, classes: Sequence[tuple[int, float]], number: int) -> None:
         """Set class and confidence of each side, as the result of that number."""
         slave = self._instance
-        slave.setInteger([*self._classes, self._frame_id], [*(surface for surface, _ in classes), number])
+        slave.setInteger([*self._classes, *self._frame_id], [*(surface for surface, _ in classes), number])
         slave.setReal(self._confidences, [confidence for _, confidence in classes])
 
     def step(
