@@ -43,17 +43,7 @@ class Product:
 
 
 def run_build(program: str, load: Callable[[], Product], name: str) -> int:
-    """Build the file of this name and print the outcome; returns the exit code.
-
-    Parameters
-    ----------
-    program : str
-        File name of the program, for messages.
-    load : callable
-        Imports what the build needs; raises ImportError under another interpreter than the project's.
-    name : str
-        What to build.
-    """
+    """Build the file of this name and print the outcome; returns the exit code."""
 
     def complain(text: str) -> None:
         print(f"{program}: {text}", file=sys.stderr)

@@ -72,17 +72,7 @@ def sha256_of(data: bytes) -> str:
 
 
 def deviations(contents: Contents, names: Iterable[str], sha256: Callable[[str], str]) -> list[str]:
-    """One sentence for each named file that is missing or differs from the build.
-
-    Parameters
-    ----------
-    contents : Contents
-        The record.
-    names : iterable of str
-        Paths in the archive.
-    sha256 : callable
-        Returns the current hash at such a path; FileError or KeyError where nothing can be read.
-    """
+    """One sentence for each named file that differs from the build, or for which `sha256` raises FileError or KeyError."""
     problems = []
     for name in names:
         try:

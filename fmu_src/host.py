@@ -38,11 +38,6 @@ def end_in_order(resources: str) -> None:
     wrapper's `finalizePythonInterpreter`, which assigns to the destroyed pointer and so corrupts the heap ("corrupted
     double-linked list"). Exit handlers run last in, first out: a handler that calls the same function and is
     registered now runs before the pointer is destroyed, and leaves it empty.
-
-    Parameters
-    ----------
-    resources : str
-        The resources folder of the unpacked unit, beside which the wrapper lies.
     """
     if resources in _ENDING_IN_ORDER or not sys.platform.startswith("linux"):
         return
@@ -74,13 +69,6 @@ def require_packages(unit: str, modules: Mapping[str, str]) -> None:
     """Import the modules that the unit needs, or raise one error with all problems of this Python.
 
     A per cent sign is doubled: the wrapper hands the text to a printf-like logger.
-
-    Parameters
-    ----------
-    unit : str
-        The unit's name.
-    modules : mapping
-        Module names and the packages that bring them.
 
     Raises
     ------

@@ -82,15 +82,6 @@ class BuildError(TrpacError):
 def build_unit(slave: Slave, target: Path, *, flat: bool = False) -> Path:
     """Write the unit's archive; the same sources give the same bytes.
 
-    Parameters
-    ----------
-    slave : Slave
-        The unit.
-    target : Path
-        The archive; it is complete or unchanged.
-    flat : bool
-        Whether its variables have names without dots.
-
     Returns
     -------
     Path

@@ -146,15 +146,6 @@ SYSTEMS = {"four_wheels": _four_wheels(), "one_wheel": _one_wheel()}
 def build_package(wiring: Wiring, units: Mapping[str, Path], target: Path) -> Path:
     """Write a system's package; the same units give the same bytes.
 
-    Parameters
-    ----------
-    wiring : Wiring
-        The system.
-    units : mapping
-        The built archive of each of its units, by the unit's name.
-    target : Path
-        The package's file.
-
     Raises
     ------
     BuildError

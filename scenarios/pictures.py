@@ -79,15 +79,6 @@ def record(
 ) -> pd.DataFrame:
     """Render and write all pictures of a drive; returns a table of them.
 
-    Parameters
-    ----------
-    scenario, trajectory : Scenario, PlantTrajectory
-        World and camera, and the drive.
-    folder : Path
-        Folder of the pictures.
-    progress : callable
-        Called with how many of how many pictures are done.
-
     Returns
     -------
     DataFrame

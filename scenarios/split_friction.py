@@ -70,19 +70,6 @@ def run(
 ) -> pd.DataFrame:
     """Simulate both units on a road; returns one row per step.
 
-    Parameters
-    ----------
-    plant_file, estimator_file : Path
-        The units `ReferencePlant` and `TrpacEstimator4W`.
-    out : Path
-        Folder of the pictures.
-    pictures : bool
-        Whether the estimator is given rendered pictures instead of the plant's class.
-    seed : int
-        Seed of sensor noise and rendered world.
-    road : Path
-        The road file.
-
     Raises
     ------
     UnitFileError

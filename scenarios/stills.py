@@ -91,13 +91,6 @@ def counting_order(path: Path) -> tuple[list[tuple[int, int, str]], str]:
 def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tuple[pd.DataFrame, list[str]]:
     """Table of the surface in each picture, and problems.
 
-    Parameters
-    ----------
-    files : sequence of Path
-        JPEG or PNG.
-    progress : callable
-        Called with how many of how many pictures are done.
-
     Returns
     -------
     DataFrame, list of str

@@ -41,17 +41,7 @@ def load_strict(path: str | Path, model: type[Model]) -> Model:
 
 
 def made(make: Callable[[], Made], model: type[BaseModel], name: str) -> Made:
-    """The result of `make`, which makes a model of values; raises one ScenarioError with all problems of these.
-
-    Parameters
-    ----------
-    make : callable
-        Makes the model.
-    model : type
-        Class of the model.
-    name : str
-        Name of the values in messages.
-    """
+    """The result of `make`, which makes a model of values; raises one ScenarioError with all problems of these."""
     try:
         return make()
     except ValidationError as error:

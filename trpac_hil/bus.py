@@ -66,15 +66,7 @@ def bus_options(pairs: Sequence[str]) -> dict[str, Any]:
 
 
 class Link:
-    """The bus as the loop uses it: no method waits, and none raises.
-
-    Parameters
-    ----------
-    open_bus : callable
-        Opens the bus, or raises one of `BUS_ERRORS`.
-    report : callable
-        Called when the bus is lost and when it is back.
-    """
+    """The bus as the loop uses it: no method waits, and none raises."""
 
     def __init__(
         self, open_bus: Callable[[], can.BusABC], report: ReportEvent, retry_s: float = RETRY_S

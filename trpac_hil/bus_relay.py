@@ -46,17 +46,7 @@ class RelayedBus:
 
 
 class BusRelay:
-    """Sends what the shared memory holds to the bus, once per period.
-
-    Parameters
-    ----------
-    ring : Ring
-        The shared memory.
-    link : Link
-        The bus.
-    clock : SystemClock
-        SystemClock of the period.
-    """
+    """Sends what the shared memory holds to the bus, once per period."""
 
     def __init__(self, ring: Ring, link: Link, clock: SystemClock) -> None:
         self._ring, self._link, self._clock = ring, link, clock

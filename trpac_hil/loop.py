@@ -58,25 +58,7 @@ class Counts:
 
 
 class Loop:
-    """One run of the loop.
-
-    Parameters
-    ----------
-    clock, deadlines : SystemClock, Deadlines
-        Time, and when each cycle is due.
-    bus, unit, codec, inputs : Link, Unit, Codec, Inputs
-        Bus, unit, coding and newest values of the messages.
-    camera_input : CameraInput
-        Results of pictures.
-    ring : Ring
-        Shared memory for each cycle's row.
-    events : Events
-        Record of what happens.
-    delays : Delays
-        Counts of long overruns by cause.
-    check : callable
-        Checks the helper processes, ten times a second.
-    """
+    """One run of the loop."""
 
     def __init__(
         self,

@@ -17,15 +17,7 @@ Array = NDArray[np.float64]
 
 
 class Ring:
-    """A ring of rows of numbers; a reader that is too slow loses the oldest rows, which `lost` counts.
-
-    Parameters
-    ----------
-    columns : int
-        Numbers in a row.
-    rows : int
-        Rows in the ring.
-    """
+    """A ring of rows of numbers; a reader that is too slow loses the oldest rows, which `lost` counts."""
 
     def __init__(self, columns: int, rows: int) -> None:
         self.columns, self.rows = columns, rows

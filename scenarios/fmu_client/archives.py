@@ -139,13 +139,6 @@ def opened_archive(
 ) -> Iterator[Archive]:
     """An open archive, after checks of all limits and for XML texts without document types.
 
-    Parameters
-    ----------
-    path : str or Path
-        The archive.
-    expected : str
-        Expectation in messages.
-
     Raises
     ------
     UnitFileError

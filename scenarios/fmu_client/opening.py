@@ -20,15 +20,6 @@ from trpac_core.files import quoted
 def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: str) -> tuple[FMU2Slave, Any]:
     """An instance of an unpacked unit before its experiment is set up, and its description.
 
-    Parameters
-    ----------
-    archive, folder : Path
-        The unit's file, for messages, and the folder of `unpack_unit`.
-    expected : sequence of str
-        Accepted units.
-    instance : str
-        Name of the instance.
-
     Returns
     -------
     FMU2Slave, ModelDescription

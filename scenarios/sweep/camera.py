@@ -86,19 +86,7 @@ def frames_of(
     process: CameraProcess,
     random: np.random.Generator,
 ) -> Frames:
-    """The frames of a drive with the run's disturbances drawn.
-
-    Parameters
-    ----------
-    scenario, trajectory : Scenario, PlantTrajectory
-        Road and frame rate, and the drive.
-    camera : Camera
-        How much disturbs the frames.
-    process : CameraProcess
-        Holds the distance from the front axle to what is classified.
-    random : Generator
-        Where the disturbances are drawn from.
-    """
+    """The frames of a drive with the run's disturbances drawn."""
     taken = np.arange(0, len(trajectory), frame_steps(scenario))
     front_m = trajectory.position_m[taken] + scenario.vehicle.to_core().cog_to_front_axle_m
     true = np.array([int(scenario.road.segment_at(float(m)).surface_class) for m in front_m + process.near_m])
@@ -130,13 +118,7 @@ def road_classes(
 
 
 class RenderedFrames:
-    """Pictures of a drive, drawn, disturbed and packed as JPEG when they are asked for.
-
-    Parameters
-    ----------
-    scenario, trajectory, camera, seed
-        As for `road_classes`; the world follows the scenario's seed.
-    """
+    """Pictures of a drive, drawn, disturbed and packed as JPEG when they are asked for."""
 
     def __init__(self, scenario: Scenario, trajectory: PlantTrajectory, camera: Camera, seed: int) -> None:
         self._scenario = scenario

@@ -58,19 +58,6 @@ def execute(
 ) -> tuple[Parts, list[Failure]]:
     """Run all runs that are not stored yet; returns the stored parts and the failures.
 
-    Parameters
-    ----------
-    sweep : Sweep
-        The sweep.
-    out : Path
-        Folder of the parts.
-    scheduler : str, optional
-        Address of a running cluster; without it processes of this machine.
-    jobs : int, optional
-        Number of these; by default one per core.
-    progress : callable
-        Called with how many of how many runs are done.
-
     Returns
     -------
     tuple

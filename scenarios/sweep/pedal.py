@@ -31,17 +31,7 @@ NOTICED_M_S = 1.0
 
 
 def drive_pedal(scenario: Scenario, pedal: PedalDraw, random: np.random.Generator) -> Manoeuvre:
-    """The manoeuvre of a run: pedal pulses along the road.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Car, road and end; its manoeuvre is not used.
-    pedal : PedalDraw
-        Distributions of the pulses.
-    random : Generator
-        Random generator of the draws.
-    """
+    """The manoeuvre of a run: pedal pulses along the road."""
     setup, car, step_s = (
         make_setup(scenario.vehicle, scenario.road),
         scenario.vehicle.to_core(),

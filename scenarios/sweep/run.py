@@ -57,17 +57,7 @@ class Tracks:
 
 
 def run_plan(plan: RunPlan, estimators: list[str], unit: dict[str, float]) -> list[dict[str, Any]]:
-    """Rows of a run: a score per stretch of road and estimator.
-
-    Parameters
-    ----------
-    plan : RunPlan
-        The run.
-    estimators : list of str
-        Estimators to score.
-    unit : dict
-        Parameters of our estimator by the unit's names, in place of the default ones.
-    """
+    """Rows of a run: a score per stretch of road and estimator."""
     trajectory = drive(plan.scenario)
     config = believed_config(plan, unit)
     tracks = step_all(plan, trajectory, config, estimators)
