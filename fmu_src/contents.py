@@ -72,7 +72,7 @@ def sha256_of(data: bytes) -> str:
 
 
 def deviations(contents: Contents, names: Iterable[str], sha256: Callable[[str], str]) -> list[str]:
-    """One sentence for each named file that differs from the build, or for which `sha256` raises FileError or KeyError."""
+    """One sentence for each named file that differs from the build, or where `sha256` raises FileError or KeyError."""
     problems = []
     for name in names:
         try:

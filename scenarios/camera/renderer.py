@@ -62,7 +62,7 @@ class Renderer:
         Geometry and size of the picture.
     segments : sequence of SurfaceSegment
         Ascending starts [m]; the first surface also holds before its start.
-    look : SceneLook
+    scene : Scene
         Everything else; two renderers of one scene render the same world.
 
     Raises
