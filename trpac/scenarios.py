@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from scenarios.car_and_road import Vehicle, as_road, as_vehicle
 from scenarios.effects import Effect
 from scenarios.files import RoadFile, Scenario, SensorNoise, VehicleFile, load_scenario
-from scenarios.plant import make_log
-from scenarios.plant import simulate as run_plant
+from scenarios.plant.pipeline import simulate as run_plant
+from scenarios.plant.sensors import make_log
 from scenarios.progress import StageProgress, silent
 from trpac.extras import extras
 from trpac.picture import Picture

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, Scenario
-from scenarios.plant import dynamics, initial_state
+from scenarios.plant import dynamics
 from scenarios.plant.parameters import FORCE, POSITION, SPEED, WHEEL
+from scenarios.plant.pipeline import initial_state
 from trpac_core.vision.classes import Surface
 
 SLOW_M_S, FAST_M_S = 4.0, 14.0

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import sense
 from sim2real.observing.drive import CHANNELS, Drive, grid_step, make_drive
 from sim2real.observing.lattice import fast_spread

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.files import Scenario, VehicleFile, load_scenario
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "paper_simulation.yaml"
 DURATION_S = 9.8  # the manoeuvre, without the coasting after it

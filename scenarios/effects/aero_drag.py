@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 
 AIR_DENSITY_KG_M3 = 1.225
 """Density of air at sea level and 15 degrees Celsius, ISO 2533 standard atmosphere [kg/m^3]."""

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects.frames import Frames
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel, RoadTable
-    from trpac_core.vehicle import Vehicle
+from scenarios.plant.parameters import DynamicsParameters, PerWheel, RoadTable
+from trpac_core.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Signals = dict[str, Array]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import (
     Effect,
@@ -12,9 +11,7 @@ from scenarios.effects.base import (
     share_of_axles,
     share_of_sides,
 )
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 
 LARGEST_MOTOR_SHARE = 0.8
 """Of a wheel's inertia, the lighter axle's, that may be the motor's: the wheel itself keeps the rest [-]."""

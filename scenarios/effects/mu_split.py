@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import RoadTable
-    from trpac_core.vehicle import Vehicle
+from scenarios.plant.parameters import RoadTable
+from trpac_core.vehicle import Vehicle
 
 LEAST_SPLIT = 0.01
 """Difference of the factors from which the sides differ [-]."""

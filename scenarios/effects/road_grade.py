@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
+from scenarios.plant.parameters import DynamicsParameters
 from trpac_core.vehicle import GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)

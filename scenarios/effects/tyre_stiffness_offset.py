@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import (
     Effect,
@@ -12,10 +11,8 @@ from scenarios.effects.base import (
     share_of_axles,
     share_of_sides,
 )
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
-    from trpac_core.vehicle import Vehicle
+from scenarios.plant.parameters import DynamicsParameters
+from trpac_core.vehicle import Vehicle
 
 
 @dataclass(frozen=True)

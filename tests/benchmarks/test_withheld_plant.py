@@ -21,8 +21,8 @@ from benchmarks.gap.withheld.generator.table import PAIRS, table
 from benchmarks.gap.withheld.generator.tyre import dugoff, magic, peaks
 from benchmarks.gap.withheld.generator.world import World, nominal, with_magic
 from scenarios.files import load_road, load_vehicle
-from scenarios.plant import make_log as make_product_log
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
+from scenarios.plant.sensors import make_log as make_product_log
 
 OUTSIDE = outside_by(PLAIN.car)
 

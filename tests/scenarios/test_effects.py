@@ -11,7 +11,8 @@ from scenarios.effects import EFFECTS, FORMS, ORDER, Effect, catalogue, make_eff
 from scenarios.effects.base import Stage, Subsystem, parameter
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
-from scenarios.plant import initial_state, make_log, simulate
+from scenarios.plant.pipeline import initial_state, simulate
+from scenarios.plant.sensors import make_log
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 CAR = load_vehicle(SCENARIOS / "vehicles" / "four_in_wheel_motor_ev.yaml")

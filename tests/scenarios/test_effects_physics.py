@@ -12,9 +12,9 @@ from scipy.signal import StateSpace, lsim
 from scenarios.effects import form_of
 from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
-from scenarios.plant import dynamics, simulate
+from scenarios.plant import dynamics
 from scenarios.plant.parameters import MOTOR, POSITION, SPEED, TWIST, WHEEL
-from scenarios.plant.pipeline import actual_torque, make_setup
+from scenarios.plant.pipeline import actual_torque, make_setup, simulate
 from trpac_core.tyre import force as tyre_force
 
 CAR = load_vehicle(

@@ -28,7 +28,7 @@ from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.torque_gain import TorqueGain
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.files import VehicleFile
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from sim2real.observing.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL, awake
 from sim2real.observing.evidence import residuals
 from sim2real.observing.lattice import SmoothCounter

@@ -1,1 +1,0 @@
-"""`scenarios.plant` within a unit: without its sensors and their imports."""
