@@ -11,6 +11,17 @@ from pathlib import Path
 from trpac_core.files import quoted
 
 
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file completely or not at all."""
+    scratch = path.with_name(path.name + ".part")
+    scratch.unlink(missing_ok=True)
+    with scratch.open("xb") as file:  # fails on a link or pipe of that name
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(scratch, path)
+
+
 @contextmanager
 def written_whole(folder: Path) -> Iterator[Path]:
     """A scratch folder whose files are moved to `folder` when the block ends without exception.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -20,6 +21,7 @@ from fmu_src.units import UNITS
 from scenarios.camera.files import load_camera
 from scenarios.files import load_scenario, load_vehicle
 from scenarios.fmu_client.estimator import car_parameters
+from scenarios.whole_files import write_whole
 from trpac_core.estimator import EstimatorConfig
 from trpac_core.parameters.configuration import configuration
 from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
@@ -48,7 +50,7 @@ from trpac_hil.recorder import LOG_FAILED, ROWS_KEPT, RecorderJob, record
 from trpac_hil.records import columns
 from trpac_hil.settings import HilSettings
 from trpac_hil.shared import Numbers, Ring
-from trpac_hil.summary import summarise, write_summary
+from trpac_hil.summary import summarise
 from trpac_hil.unit import Unit
 
 LOG, SUMMARY = "log.mf4", "summary.json"
@@ -229,7 +231,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
         # The garbage collector is off, so that growth here would not end.
         summary["system"]["memory_mb"] = {"before": round(before_mb, 1), "after": round(after_mb, 1)}
     summary["log"] = _log_outcome(settings, messages)
-    write_summary(summary, settings.out / SUMMARY)
+    write_whole(settings.out / SUMMARY, json.dumps(summary, indent=2).encode() + b"\n")
     return summary
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -107,10 +105,3 @@ def _camera(settings: HilSettings, camera_input: CameraInput) -> dict[str, Any]:
         if work_ms
         else None,
     }
-
-
-def write_summary(summary: Mapping[str, Any], path: Path) -> None:
-    """Write the summary under another name, then rename it."""
-    scratch = path.with_name(f".{path.name}.part")
-    scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    scratch.replace(path)

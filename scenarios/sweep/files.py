@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -340,8 +340,3 @@ def load_sweep(path: str | Path, *, allow_code: bool = False) -> Sweep:
     if problems:
         raise ScenarioError("\n".join(problems))
     return Sweep(path, file, scenario)
-
-
-def content(file: SweepFile) -> dict[str, Any]:
-    """The file as plain values, defaults filled in."""
-    return file.model_dump(by_alias=True)

@@ -18,7 +18,8 @@ import pandas as pd
 
 from scenarios.errors import ScenarioError
 from scenarios.metrics import SegmentScore
-from scenarios.sweep.files import Sweep, content
+from scenarios.sweep.files import Sweep
+from scenarios.whole_files import write_whole
 from trpac_core.files import FileError, parse_json, quoted, read_bytes, read_text
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -58,7 +59,7 @@ def identity(sweep: Sweep) -> dict[str, Any]:
     """The identity of a sweep's parts: sweep file, scenario with its files, and code; raises FileError."""
     scenario = sweep.scenario
     described = {
-        "sweep": content(sweep.file),
+        "sweep": sweep.file.model_dump(by_alias=True),
         "vehicle": scenario.vehicle.model_dump(by_alias=True),
         "road": scenario.road.model_dump(by_alias=True),
         "manoeuvre": scenario.manoeuvre.model_dump(by_alias=True),
@@ -218,17 +219,6 @@ def as_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 def write_table(table: pd.DataFrame, path: Path) -> None:
     """Write runs.parquet; the same table gives the same bytes."""
     table.to_parquet(path, index=False)
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all."""
-    scratch = path.with_name(path.name + ".part")
-    scratch.unlink(missing_ok=True)
-    with scratch.open("xb") as file:  # fails on a link or pipe of that name
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(scratch, path)
 
 
 def _read(path: Path, expected: str) -> Any:
