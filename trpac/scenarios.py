@@ -55,7 +55,7 @@ def simulate(
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     """
     if isinstance(torque, pd.DataFrame):
         names = ["time_s", *(f"wheel_torque_{wheel}_nm" for wheel in WHEELS)]
@@ -154,12 +154,12 @@ def run(
     fmu : path, optional
         The unit; by default one is built.
     progress : callable
-        Told the stage, and how much of how much is done.
+        Called with the stage, and how many of how many of its items are done.
 
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     MissingExtraError
         Without the extra 'fmu'.
     """

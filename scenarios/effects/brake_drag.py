@@ -31,7 +31,7 @@ class BrakeDrag(Effect):
     )
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each wheel has its torque, whatever its load."""
+        """The drag torques are independent of load."""
         return parameters._replace(drag_torque_nm=self.per_wheel(self.torque_nm))
 
 

@@ -48,5 +48,5 @@ class ExposureShift(Effect):
     )
 
     def perceive(self, frames: Frames) -> Frames:
-        """The picture tells less, whatever the speed."""
+        """Confidence and right classes decrease alike at all speeds."""
         return frames.dimmed(np.full(len(frames.time_s), share_left(self.stops)))

@@ -45,5 +45,5 @@ class MotionBlur(Effect):
     )
 
     def perceive(self, frames: Frames) -> Frames:
-        """The picture tells less, the faster the car."""
+        """Confidence and right classes decrease with speed."""
         return frames.dimmed(share_left(frames.speed_m_s, self.exposure_s))

@@ -220,7 +220,7 @@ def _require_plain_xml(archive: Archive) -> None:
             raise UnitFileError(
                 f"{archive.name}: its entry '{quoted(name)}' declares a document type, expected plain XML. {MEND}"
             ) from error
-        except (expat.ExpatError, UnitFileError):  # told by who reads it
+        except (expat.ExpatError, UnitFileError):  # reported by the reader of the text
             continue
 
 
