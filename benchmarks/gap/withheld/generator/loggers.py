@@ -60,14 +60,10 @@ FRAME_LOST = 0.004
 """Messages on the bus, each with its readings; share of them that is lost."""
 SPARSE_COLUMN = "accel_x_m_s2"
 """Of a sensor that is slower than the log."""
-FRONT, REAR = ("wheel_speed_fl", "wheel_speed_fr"), ("wheel_speed_rl", "wheel_speed_rr")
-"""What two messages carry that come in turn."""
 WAKES_S = (0.1, 1.2)
 """Senders that are awake only a while after the logger is."""
 GAPS, GAP_ROWS = 12, (2, 9)
 """How often a log has lost a few rows of a signal, and how many, before a tool has filled them in."""
-CLOCK_S = (20_000.0, 80_000.0)
-"""Time of day that a drive begins at."""
 BEFORE_S = (2.0, 9.0)
 """What a triggered recorder keeps of the time before its trigger, which is its zero."""
 CLOCK_OFF = 2e-4
@@ -200,14 +196,6 @@ def slow_accelerometer(log: pd.DataFrame) -> pd.DataFrame:
     return every_second(log, SPARSE_COLUMN)
 
 
-def in_turns(log: pd.DataFrame) -> pd.DataFrame:
-    """Speeds of the front wheels with one row, of the rear ones with the next; the log has no value between."""
-    odd = np.arange(len(log)) % 2 != 0
-    columns = {str(c): odd for c in log if str(c).startswith(FRONT)}
-    columns |= {str(c): ~odd for c in log if str(c).startswith(REAR)}
-    return log.assign(**{column: log[column].mask(gone) for column, gone in columns.items()})
-
-
 def waking(log: pd.DataFrame) -> pd.DataFrame:
     """What a sender measures is not there until it is awake."""
     rng, kept = np.random.default_rng(len(log)), log.copy()
@@ -226,12 +214,6 @@ def filled_in(log: pd.DataFrame) -> pd.DataFrame:
         kept.loc[kept.index[start : start + rng.integers(*GAP_ROWS)], rng.choice(measured)] = np.nan
     lines = kept.set_index("time_s")[measured].interpolate(method="index", limit_direction="both")
     return kept.assign(**{column: lines[column].to_numpy() for column in measured})
-
-
-def by_the_clock(log: pd.DataFrame) -> pd.DataFrame:
-    """Rows stamped by the time of day."""
-    begun = np.round(np.random.default_rng(len(log)).uniform(*CLOCK_S), 3)
-    return log.assign(time_s=np.round(log["time_s"] + begun, 7))
 
 
 def slow_place(log: pd.DataFrame) -> pd.DataFrame:
@@ -256,29 +238,26 @@ def own_clock(log: pd.DataFrame) -> pd.DataFrame:
     return log.assign(time_s=np.round(rate * log["time_s"], 7))
 
 
-DIGITS: dict[str, tuple[int, Callable[[pd.DataFrame], pd.DataFrame]]] = {
-    "all": (1, all_digits),
-    "bus": (2, bus_digits),
-    "decimals": (3, decimals),
-    "repeating": (3, repeating),
-    "losing_runs": (3, losing_runs),
-    "truncating": (4, truncating),
-    "converted": (4, converted),
-    "overrunning": (4, overrunning),
-    "converted_in_bits": (5, converted_in_bits),
-    "on_change": (5, on_change),
-    "slow_receiver": (5, slow_receiver),
-    "in_ticks": (6, in_ticks),
-    "significant_digits": (6, significant_digits),
-    "losing_frames": (6, losing_frames),
-    "slow_accelerometer": (6, slow_accelerometer),
-    "in_turns": (7, in_turns),
-    "waking": (7, waking),
-    "filled_in": (8, filled_in),
-    "by_the_clock": (8, by_the_clock),
-    "slow_place": (9, slow_place),
-    "triggered": (9, triggered),
-    "slow_wheels": (10, slow_wheels),
-    "own_clock": (10, own_clock),
+DIGITS: dict[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
+    "all": all_digits,
+    "bus": bus_digits,
+    "decimals": decimals,
+    "repeating": repeating,
+    "losing_runs": losing_runs,
+    "truncating": truncating,
+    "converted": converted,
+    "overrunning": overrunning,
+    "converted_in_bits": converted_in_bits,
+    "on_change": on_change,
+    "slow_receiver": slow_receiver,
+    "in_ticks": in_ticks,
+    "significant_digits": significant_digits,
+    "losing_frames": losing_frames,
+    "slow_accelerometer": slow_accelerometer,
+    "waking": waking,
+    "filled_in": filled_in,
+    "slow_place": slow_place,
+    "triggered": triggered,
+    "slow_wheels": slow_wheels,
+    "own_clock": own_clock,
 }
-"""With the edition of the generator that each came with."""
