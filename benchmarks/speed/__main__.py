@@ -9,7 +9,7 @@ import argparse
 import json
 from pathlib import Path
 
-from benchmarks.ledger import append
+from benchmarks.report import append
 
 from . import estimator, four_wheels, plant
 

@@ -122,6 +122,7 @@ def test_noise_has_its_distribution():
 
 @pytest.mark.parametrize("digits", numbered(DIGITS.values()))
 def test_loggers_keep_columns_rows_order_and_the_command(digits, log):
+    log = log.assign(accel_x_m_s2=0.3 * (log["accel_x_m_s2"] - 20.0))
     kept = digits(log)
     assert list(kept) == list(log)
     assert len(kept) == len(log)
@@ -148,7 +149,7 @@ def test_a_slow_signal_comes_with_every_second_row(name, columns, log):
 
 
 def test_a_repeated_sample_is_the_one_before(log):
-    kept = repeating(log.mask(log.index.to_numpy()[:, None] == 7))
+    kept = repeating(log)
     for name in MEASURED:
         changed = np.flatnonzero(kept[name].to_numpy() != log[name].to_numpy())
         assert 0.5 * REPEATED < changed.size / len(log) < 2.0 * REPEATED

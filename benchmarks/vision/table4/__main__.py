@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import json
 import sys
 import time
 from collections.abc import Sequence as Row
@@ -27,7 +26,7 @@ from rich.progress import Progress
 from .clips import ASSUMED, real_sequences
 from .drives import rendered_drives
 from .judge import COLUMNS, SCENARIOS, Networks, judged
-from .report import Measured, figures_of, tables, write_page
+from .report import Measured, tables, write_page
 from .sequences import Sequence
 from .timing import frame_times
 
@@ -72,7 +71,6 @@ def main(arguments: Row[str] | None = None) -> None:
     )
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "tables.md").write_text(tables(measured), encoding="utf-8")
-    (options.out / "scores.json").write_text(json.dumps(figures_of(measured)) + "\n", encoding="utf-8")
     print(tables(measured))
     if options.page:
         write_page(measured)
