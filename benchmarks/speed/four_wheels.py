@@ -1,13 +1,11 @@
-"""Time of a step of four wheels in Python, and of four single estimators beside it: JSON.
+"""Time of a step of four wheels in Python, and of four single estimators beside it.
 
-``python -m benchmarks.speed.four_wheels``. Both take turns, so that a busy machine slows both alike.
+Both take turns, so that a busy machine slows both alike.
 CPU time of this process, median over rounds [us].
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import statistics
 import time
 from collections.abc import Callable
@@ -84,12 +82,3 @@ def measure() -> dict[str, Any]:
             name: round(cost[f"{name}_four_wheels"] / cost[f"{name}_four_single"], 2) for name in SITUATIONS
         },
     }
-
-
-def main() -> None:
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    print(json.dumps(measure(), indent=2))
-
-
-if __name__ == "__main__":
-    main()
