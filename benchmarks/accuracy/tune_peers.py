@@ -25,7 +25,6 @@ from scipy.optimize import minimize
 
 from scenarios.files import RoadFile, RoadSegment, Scenario, load_scenario
 from scenarios.peers import (
-    PEER_NAMES,
     EkfPeer,
     PeerSetup,
     SlipSlopePeer,
@@ -53,6 +52,8 @@ TUNING_SEEDS = (3000, 3001, 3002, 3003)
 EVERY = 4
 """Of the 1 kHz log each so many samples while tuning (250 Hz)."""
 GRIPPY_WEIGHT = 0.5
+MOST_RUNS = 90
+"""Of the objective, per peer."""
 NOISE = ("torque_share", "acceleration_noise_m_s2", "theta_walk", "measurement_share")
 BOUNDS = {
     "filter_s": (0.005, 0.05),
@@ -178,7 +179,6 @@ def tune(
     finish: Callable,
     drives: Sequence[Drive],
     peer: type,
-    most: int,
 ):
     """Nelder-Mead on the logarithms of the free values; also the objective at the start, at the end, and the runs."""
     best: list = [np.inf, start]
@@ -199,14 +199,14 @@ def tune(
     logs = np.log([getattr(start, n) for n in free])
     simplex = np.vstack([logs, *(logs + 0.8 * row for row in np.eye(len(free)))])
     bounds = [tuple(np.log(BOUNDS[n])) for n in free]
-    options = {"maxfev": most, "initial_simplex": simplex, "fatol": 1e-4, "xatol": 0.02}
+    options = {"maxfev": MOST_RUNS, "initial_simplex": simplex, "fatol": 1e-4, "xatol": 0.02}
     minimize(cost, logs, method="Nelder-Mead", bounds=bounds, options=options)
     print(file=sys.stderr)
     return best[1], {"start": round(first[0], 4), "end": round(best[0], 4), "runs": len(first)}
 
 
-def tune_peers(path: Path, names: Sequence[str], most: int) -> None:
-    """Tune some peers from where the file stands, or from the defaults; the file is written after each."""
+def tune_peers(path: Path) -> None:
+    """Tune the peers from where the file stands, or from the defaults; the file is written after each."""
     drives = [driven(seed, EVERY) for seed in TUNING_SEEDS]
     known = load_tuning(path) if path.is_file() else Tuning()
     how = yaml.safe_load(path.read_text(encoding="utf-8"))["how"] if path.is_file() else {}
@@ -218,11 +218,10 @@ def tune_peers(path: Path, names: Sequence[str], most: int) -> None:
         "objective": "mean abs error where the tyre shows theta, mean of both slippery stretches, "
         f"plus {GRIPPY_WEIGHT} times that on the grippy one",
     }
-    for name in names:
-        attribute, free, peer = TUNED[name]
+    for name, (attribute, free, peer) in TUNED.items():
         finish = (lambda t: calibrated(t, drives)) if name == SlipSlopePeer.name else (lambda t: t)
         start = time.process_time()
-        tuned, found = tune(name, getattr(known, attribute), free, finish, drives, peer, most)
+        tuned, found = tune(name, getattr(known, attribute), free, finish, drives, peer)
         known = replace(known, **{attribute: tuned})
         found["cpu_s"] = round(time.process_time() - start)
         how.setdefault("runs_by_peer", {}).setdefault(attribute, []).append(found)
@@ -233,10 +232,7 @@ def tune_peers(path: Path, names: Sequence[str], most: int) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=TUNING_FILE, help="file to write (default: %(default)s)")
-    parser.add_argument("--peers", nargs="+", choices=PEER_NAMES, default=PEER_NAMES, help="which to tune")
-    parser.add_argument("--most", type=int, default=90, help="runs of the objective per peer")
-    given = parser.parse_args()
-    tune_peers(given.out, given.peers, given.most)
+    tune_peers(parser.parse_args().out)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Pictures in which no road can be judged: no road at all, a covered or blurred lens, noise, night.
 
-``python -m benchmarks.vision.odd_pictures [--models DIR] [--count N] [--seed N] [--page]`` shows them to
+``python -m benchmarks.vision.odd_pictures [--models DIR] [--page]`` shows them to
 the image estimator and prints how many end in flag 0, kind by kind: all ought to. --page writes the table into
 docs/camera_scores.md.
 """
@@ -161,11 +161,11 @@ def verdicts(ife: Ife, kind: str, count: int, seed: int = 0) -> list[FrameResult
     return [ife.process(IfeState(), picture(kind, number, seed), Motion(10.0))[1] for number in range(count)]
 
 
-def table(ife: Ife, count: int, seed: int) -> str:
+def table(ife: Ife, count: int = 16) -> str:
     """How many of each kind end in flag 0, as Markdown."""
     rows, held, shown = [], 0, 0
     for kind in KINDS:
-        found = verdicts(ife, kind, count, seed)
+        found = verdicts(ife, kind, count)
         p_util, P_fusion = np.median([[result.p_util, result.P_fusion] for result in found], axis=0)
         down = sum(not result.flag for result in found)
         held, shown = held + down, shown + len(found)
@@ -177,13 +177,11 @@ def table(ife: Ife, count: int, seed: int) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", type=Path, default=ROOT / "models")
-    parser.add_argument("--count", type=int, default=16)
-    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--page", action="store_true", help="write the table into docs/camera_scores.md")
     options = parser.parse_args()
     files = options.models / "segmenter.onnx", options.models / "surface.onnx"
     ife = Ife(IfeConfig(groups_looked_at=1), Segmenter(files[0]), SurfaceClassifier(files[1]))
-    found = table(ife, options.count, options.seed)
+    found = table(ife)
     print(found)
     if options.page:
         write_between(PAGE, found, "odd")

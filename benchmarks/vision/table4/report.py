@@ -42,7 +42,6 @@ class Measured:
 
     table: pd.DataFrame
     missing: tuple[str, ...]
-    not_left_out: bool
     time: dict[str, Any] | None
     render_cpu_min: float
     judge_cpu_min: float
@@ -86,12 +85,7 @@ def _warning(measured: Measured) -> list[str]:
     """What the reader must know before the first figure."""
     if not measured.missing:
         return []
-    mark = (
-        "NOT LEFT OUT: the networks that judge these sources were trained on them: their rows say nothing of new roads"
-        if measured.not_left_out
-        else "No rows, for want of networks that never saw the source"
-    )
-    return [f"**{mark}**: {'; '.join(measured.missing)}."]
+    return [f"**No rows, for want of networks that never saw the source**: {'; '.join(measured.missing)}."]
 
 
 def _in(table: pd.DataFrame, scenario: str, method: str) -> pd.DataFrame:
@@ -264,6 +258,4 @@ def draw(measured: Measured, path: Path) -> None:
     figure.legend(
         *figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8
     )
-    if measured.missing and measured.not_left_out:
-        figure.suptitle("Provisional: the networks were trained on the sources of (a)", fontsize=10)
     figure.savefig(path, dpi=110, metadata={"Software": None})
