@@ -33,7 +33,18 @@ PICTURES = 12
 EVERY_M = 5.0
 CORES = 2
 RATE_HZ, BARE_S = 1000.0, 60.0
-SHOWN = ["cycles", "overruns", "bare_loop", "timing", "held_cycles", "camera", "events", "system", "log", "machine"]
+SHOWN = [
+    "cycles",
+    "overruns",
+    "bare_loop",
+    "timing",
+    "held_cycles",
+    "camera",
+    "events",
+    "system",
+    "log",
+    "machine",
+]
 BUSY_NS = 250_000
 """What a cycle of the rig takes [ns]."""
 
