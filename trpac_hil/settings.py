@@ -40,7 +40,7 @@ class HilSettings:
         Pictures per second.
     parameters : mapping
         Parameters of the unit by variable name.
-    plant : PartnerJob or None
+    plant : PlantJob or None
         The plant on the same bus; None without it.
     log, counters, live, realtime : bool
         Whether to log; to check message counters; to draw on the terminal; to ask for real-time priority.

@@ -27,6 +27,8 @@ MODELS = Path(__file__).resolve().parents[2] / "models"
 STOPS = (-4.0, -3.0, -2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 BLUR_M = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 SUB_FRAMES = 12
+SCALE = 0.5
+"""Of the paper's 1920 x 1200 pixels."""
 LEAST_CONFIDENCE = 0.01
 """Confidence below it counts as this much: its logarithm would run away [-]."""
 
@@ -55,10 +57,9 @@ def developed(light: np.ndarray) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--worlds", type=int, default=20, help="random worlds per surface")
-    parser.add_argument("--scale", type=float, default=0.5, help="of the paper's 1920 x 1200 pixels")
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
-    camera = Camera().scaled(arguments.scale)
+    camera = Camera().scaled(SCALE)
     segmenter = Segmenter(MODELS / "segmenter.onnx", 1)
     ife = Ife(IfeConfig(camera=camera), segmenter, SurfaceClassifier(MODELS / "surface.onnx", 1))
     found: dict[tuple[str, float], list[tuple[float, bool, Surface]]] = {}

@@ -19,8 +19,8 @@ from gap_drives import (
     road_of,
     trace,
 )
+from random_gap_drives import SEVERITY
 
-from benchmarks.gap.development_drives import SEVERITY
 from scenarios.effects import EFFECTS
 from scenarios.effects.aero_drag import AeroDrag
 from scenarios.effects.mass_offset import MassOffset

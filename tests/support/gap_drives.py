@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from random_gap_drives import BARE, Case, drives
 
-from benchmarks.gap.development_drives import BARE, Case, drives
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant.pipeline import simulate
 from sim2real.observing.drive import CHANNELS, make_drive

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import shutil
 import sys
@@ -21,7 +20,6 @@ from fmu_src.doctor import State, UnusableError, examine_file
 from fmu_src.units import ROOT
 from scenarios.library import networks_folder
 
-from .forked import forked
 from .mutations import BINARY, TEXT, Rng, damaged
 
 LONGEST_ERROR = 20_000
@@ -196,16 +194,6 @@ def _read_log(path: Path) -> Any:
     return read_log(path).to_frame().to_numpy(dtype=float)
 
 
-def _read_mdf(path: Path) -> Any:
-    from sim2real.logs.mdf_file import EXTRACTOR
-
-    sys.path.insert(0, str(EXTRACTOR.parent))
-    importlib.import_module(EXTRACTOR.stem)  # before the first fork: that is what takes the time
-    sys.path.remove(str(EXTRACTOR.parent))
-    with forked(EXTRACTOR):
-        return _read_log(path)
-
-
 # Networks, units, buses
 
 
@@ -307,7 +295,7 @@ KINDS = {
     ),
     "log_csv": Kind(_log(".csv"), _read_log, _scenario_errors, text=True),
     "log_parquet": Kind(_log(".parquet"), _read_log, _scenario_errors, exact=True),
-    "log_mf4": Kind(_log(".mf4"), _read_mdf, _scenario_errors),
+    "log_mf4": Kind(_log(".mf4"), _read_log, _scenario_errors),
     "bus_dbc": Kind(
         _shipped("trpac_hil", "trpac.dbc"),
         _load("load_codec", "trpac_hil.codec"),

@@ -1,7 +1,7 @@
-"""Drives of the product's own plant with known effects: what the tests of the diagnosis are held on, and a first look.
+"""Random drives of the product's own plant with known effects, on the diagnosis' grid.
 
-No command: `tests/support/gap_drives.py` uses them. They flatter it, since plant and library share their forms:
-its gates were set on opened cases of `benchmarks/gap/withheld`.
+They flatter the diagnosis, since plant and library share their forms: its gates were set on opened cases of
+`benchmarks/gap/withheld`.
 """
 
 from __future__ import annotations
