@@ -6,8 +6,10 @@ r"""Eqs. (12) to (19) of Tian et al. 2022 [1]_ as they are printed, for one whee
     \hat F_x &= F_z \mu(\hat\theta, \lambda) \sigma - (I / R)(s + K \omega)  \quad (14) \\
     \dot s &= -(K / I)(T - R \hat F_x) + (R / I) F_z \mu_\theta \sigma \dot{\hat\theta}  \quad (15) \\
     \dot{\hat\theta} &= \gamma [\theta(\lambda, \hat F_x) - \hat\theta]  \quad (16), (19) \\
-    \dot{\hat\theta} &= \gamma [\theta(\lambda, \hat F_x) - \hat\theta + \varepsilon K_v (\hat\theta_{img} - \hat\theta)]  \quad (17) \\
-    \dot{\hat\theta} &= \gamma [\theta(\lambda, \hat F_x) - \hat\theta] + \varepsilon K_v (\hat\theta_{img} - \hat\theta)  \quad (18)
+    \dot{\hat\theta} &= \gamma [\theta(\lambda, \hat F_x) - \hat\theta
+        + \varepsilon K_v (\hat\theta_{img} - \hat\theta)]  \quad (17) \\
+    \dot{\hat\theta} &= \gamma [\theta(\lambda, \hat F_x) - \hat\theta]
+        + \varepsilon K_v (\hat\theta_{img} - \hat\theta)  \quad (18)
 
 Errata. Printed, (14) and (15) hold for the opposite sign of the force, and the last term of (15) lacks F_z; here both
 are as Eq. (12) needs them. The equations are solved over a step with held inputs, not by Euler's rule.

@@ -226,7 +226,7 @@ def test_a_camera_that_falls_silent_is_lost_and_one_that_sees_nothing_is_believe
     bench = Bench()
     bench.bus.messages = lambda cycle: driving(1.0) | (road(0.0, cycle) if cycle == 100 else {})
     bench.run(1500)
-    assert bench.sight.losses == 1
+    assert bench.camera_input.losses == 1
     assert bench.table["age_picture_ms"][-1] != bench.table["age_picture_ms"][-1]
     blind = Bench()
     blind.bus.messages = lambda cycle: (

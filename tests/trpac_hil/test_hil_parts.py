@@ -19,22 +19,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.errors import ScenarioError
+from trpac_core.estimator import RoadClass
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.bus import BusSettings, Link, bus_options
+from trpac_hil.bus_relay import BusRelay, RelayedBus, relay_ring
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, OUTPUT_MESSAGES, load_codec
 from trpac_hil.dbc_table import TARGET, document
 from trpac_hil.deadlines import Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
-from trpac_hil.ferry import Ferry, Wire, ferry_ring
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
-from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
-from trpac_hil.plant_node import PLAIN_SCENARIO, Partner, PartnerJob
-from trpac_hil.quantile_sketch import Spread
+from trpac_hil.plant_node import PLAIN_SCENARIO, PlantJob, PlantNode
+from trpac_hil.preview_stamps import CameraResult, Odometer, PreviewStamps
+from trpac_hil.quantile_sketch import QuantileSketch
 from trpac_hil.realtime import as_before, loop_core, pin
 from trpac_hil.records import columns
 from trpac_hil.rig import Rig, _vision
@@ -212,17 +213,17 @@ def driven(speed_m_s: float, seconds: float, odometer: Odometer, from_ns: int = 
 
 
 def result(number: int, captured_ns: int, arrived_ns: int, surface: Surface | None) -> CameraResult:
-    verdict = None if surface is None else Verdict(surface, 0.9)
-    return CameraResult(number, captured_ns, arrived_ns, (verdict,))
+    road_class = None if surface is None else RoadClass(surface, 0.9)
+    return CameraResult(number, captured_ns, arrived_ns, (road_class,))
 
 
-def placing() -> Placing:
-    return Placing(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, sides=1)
+def preview_stamps() -> PreviewStamps:
+    return PreviewStamps(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, sides=1)
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.06, 0.12])
 def test_a_result_is_placed_where_its_picture_was_taken_however_late_it_comes(late_s: float) -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     captured_ns = driven(20.0, 1.0, odometer)
     captured_m = odometer.position_m
     now_ns = driven(20.0, late_s, odometer, captured_ns)
@@ -237,7 +238,7 @@ def test_a_result_is_placed_where_its_picture_was_taken_however_late_it_comes(la
 
 
 def test_a_result_that_comes_on_its_stretch_acts_from_then_on_and_one_beyond_it_never() -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     captured_ns = driven(20.0, 1.0, odometer)
     now_ns = driven(20.0, 0.2, odometer, captured_ns)
     places.take(result(1, captured_ns, now_ns, Surface.WET), odometer, 1000 * MS)
@@ -251,7 +252,7 @@ def test_a_result_that_comes_on_its_stretch_acts_from_then_on_and_one_beyond_it_
 
 
 def test_a_result_that_was_overtaken_or_is_older_than_the_memory_is_not_placed() -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     now_ns = driven(10.0, 1.0, odometer)
     places.take(result(1, now_ns - 50 * MS, now_ns, Surface.DRY), odometer, 1000 * MS)
     places.take(result(0, now_ns - 90 * MS, now_ns, Surface.WET), odometer, 1000 * MS)
@@ -260,7 +261,7 @@ def test_a_result_that_was_overtaken_or_is_older_than_the_memory_is_not_placed()
 
 
 def test_while_pictures_fail_nothing_is_known_and_after_a_good_one_it_is_again() -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     now_ns = driven(10.0, 1.0, odometer)
     places.take(result(1, now_ns, now_ns, Surface.DRY), odometer, 1000 * MS)
     now_ns = driven(10.0, 0.3, odometer, now_ns)
@@ -312,10 +313,10 @@ def test_a_lost_bus_is_tried_again_whatever_opening_it_raises(why: Exception) ->
 
 @pytest.mark.parametrize(("key", "value"), [("scenario", "nowhere.yaml"), ("dbc", "nowhere.dbc")])
 def test_what_a_plant_on_the_bus_refuses_leaves_no_open_bus(key: str, value: str, tmp_path: Path) -> None:
-    job = PartnerJob(PLAIN_SCENARIO, BusSettings("virtual", "none"), DBC_FILE, 1000.0)
+    job = PlantJob(PLAIN_SCENARIO, BusSettings("virtual", "none"), DBC_FILE, 1000.0)
     opened: list[int] = []
     with pytest.raises((ScenarioError, HilError), match="nowhere"):
-        Partner(replace(job, **{key: tmp_path / value}), lambda: opened.append(1), SystemClock())
+        PlantNode(replace(job, **{key: tmp_path / value}), lambda: opened.append(1), SystemClock())
     assert not opened
 
 
@@ -389,12 +390,12 @@ def test_what_goes_into_the_wire_comes_out_of_the_bus_in_order(
     sent = [
         (frame_id if extended else frame_id % 2**11, extended, data) for frame_id, extended, data in messages
     ]
-    settings, ring = BusSettings("virtual", "test-ferry"), ferry_ring()
-    wire, link, listener = Wire(ring), Link(settings.open, unsaid), settings.open()
+    settings, ring = BusSettings("virtual", "test-ferry"), relay_ring()
+    wire, link, listener = RelayedBus(ring), Link(settings.open, unsaid), settings.open()
     for message in sent:
         assert wire.send(*message)
     assert wire.receive() == []
-    Ferry(ring, link, FakeClock()).take_over()
+    BusRelay(ring, link, FakeClock()).take_over()
     heard = []
     while (message := listener.recv(0.0)) is not None:
         heard.append((message.arbitration_id, message.is_extended_id, bytes(message.data)))
@@ -433,21 +434,21 @@ def test_a_reader_that_is_too_slow_loses_the_oldest_rows_and_knows_how_many() ->
 
 def test_quantiles_are_right_to_half_a_per_cent_and_the_greatest_is_exact() -> None:
     values = np.random.default_rng(1).lognormal(3.0, 1.0, 20_000)
-    spread = Spread()
+    sketch = QuantileSketch()
     for part in np.array_split(values, 7):
-        spread.add([*part, math.nan])
-    assert spread.count == len(values)
-    assert spread.greatest == values.max()
+        sketch.add([*part, math.nan])
+    assert sketch.count == len(values)
+    assert sketch.greatest == values.max()
     for share in (0.5, 0.99):
-        assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=0.006)
-    assert Spread().summary() is None
+        assert sketch.quantile(share) == pytest.approx(np.quantile(values, share), rel=0.006)
+    assert QuantileSketch().summary() is None
 
 
 def test_events_are_said_once_and_counted_always() -> None:
     told: list[tuple[float, str]] = []
     events = Events(lambda time_s, text: told.append((time_s, text)), lambda: 1.5)
     for _ in range(3):
-        events.say("a", "first")
+        events.report("a", "first")
     assert told == [(1.5, "first")]
     assert events.summary() == [{"kind": "a", "first_s": 1.5, "count": 3, "said": "first"}]
 

@@ -1,4 +1,4 @@
-r"""The filter: how likely each friction is under each tyre, and what each pair makes of the tyre's slip offset and stiffness.
+r"""The filter: the probability of each friction under each tyre, and the tyre's slip offset and softness in each.
 
 In cell theta_j and tyre l the wheel's slip offset r and softness c are two Gaussian states of an extended Kalman filter
 that predicts the used friction

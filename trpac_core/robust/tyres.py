@@ -58,8 +58,8 @@ TYRES = (
     Tyre(0.30, slip_offset=0.005, softness=0.20, mean_softness=-0.1, peak=2.15, fall=0.8),
     Tyre(0.20, slip_offset=0.005, softness=0.20, mean_softness=-0.1, peak=3.0, fall=0.4),
 )
-"""The hypotheses. A magic formula of shape factor 1.65 has its peak at 2.15, a brush or TMeasy curve at 3 (Pacejka 2012,
-ch. 3 and 4); beyond it steep magic formulas lose to 0.6 at three times the peak's slip, which is `fall` 1."""
+"""The hypotheses. A magic formula of shape factor 1.65 has its peak at 2.15, a brush or TMeasy curve at 3 (Pacejka
+2012, ch. 3 and 4); beyond it steep magic formulas lose to 0.6 at three times the peak's slip, which is `fall` 1."""
 FORMULAS = 2
 """How many of the tyres, the first ones, have the told formula."""
 
@@ -86,7 +86,7 @@ def sliding(normalised_slip: Array) -> Array:
 
 
 def dugoff(theta: Array, slip: Array, load_n: float, stiffness_n: Array) -> Curve:
-    """Curve of the modified Dugoff tyre at unsigned slips, shapes that broadcast [-], [N]; source in `trpac_core.tyre`."""
+    """Curve of the modified Dugoff tyre, see `trpac_core.tyre`, at unsigned slips; shapes that broadcast [-], [N]."""
     rolls = 1.0 - slip
     elastic = stiffness_n * slip / rolls / load_n
     shape = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * rolls * theta
