@@ -1,4 +1,4 @@
-"""The equations as printed against the paper's text: solved by another integrator, with another tyre and another root."""
+"""The equations as printed against the paper's text, solved by another integrator with another tyre and root finder."""
 
 import math
 from dataclasses import replace
@@ -203,7 +203,9 @@ def test_a_force_against_the_slip_shows_no_theta():
     assert step(begun(0.2), 0.025, -200.0).state.theta_hat == 0.2
 
 
-@pytest.mark.parametrize(("theta_hat", "friction", "bound"), [(0.05, 0.001, 0.02), (1.0, used(1.6, 0.6), 1.2)])
+@pytest.mark.parametrize(
+    ("theta_hat", "friction", "bound"), [(0.05, 0.001, 0.02), (1.0, used(1.6, 0.6), 1.2)]
+)
 def test_the_estimate_stays_within_the_domains_of_table_2(theta_hat, friction, bound):
     slip = 0.6
     state = Printed(theta_hat, state_of_force(friction * LOAD, theta_hat, slip, 1.0, at(slip)))

@@ -25,7 +25,8 @@ def of(road, tyre):
 
 
 BELIEFS = st.tuples(
-    arrays(float, (4, len(THETA)), elements=st.floats(1e-6, 1.0)), arrays(float, 4, elements=st.floats(0.01, 1.0))
+    arrays(float, (4, len(THETA)), elements=st.floats(1e-6, 1.0)),
+    arrays(float, 4, elements=st.floats(0.01, 1.0)),
 )
 
 
@@ -89,7 +90,11 @@ def test_a_normal_belief_has_a_normal_distributions_bounds():
     road = norm.pdf(THETA, 0.5, 0.1) * np.gradient(THETA)
     said, _ = of(np.tile(road, (4, 1)), np.ones(4))
     low, clip, high = norm.ppf([0.005, 0.025, 0.975], 0.5, 0.1)
-    for beyond, at in ((low - said.low / 0.9, low), (clip - said.clip, clip), (said.unmoved_high - high, high)):
+    for beyond, at in (
+        (low - said.low / 0.9, low),
+        (clip - said.clip, clip),
+        (said.unmoved_high - high, high),
+    ):
         assert 0.0 < beyond < 1.5 * max(0.006, 0.025 * at) * 1.03
 
 
