@@ -81,6 +81,11 @@ def test_rolling_resistance_takes_torque_of_a_wheel_that_rolls(rim_m_s, rolls):
     assert taken == pytest.approx(0.0065 if rolls else 0.0, abs=1e-12)
 
 
+def test_a_slow_wheel_has_a_slip_too():
+    found = read(block(0.4 / R, 0.3), block(0.4 / R, 0.2))
+    assert (found.slip, found.slip_change) == (pytest.approx(0.375), pytest.approx(0.25))
+
+
 def test_at_standstill_there_is_no_slip():
     still = block(0.0, 0.0)
     found = read(still, still)
@@ -128,7 +133,9 @@ def test_a_second_difference_counts_as_six_variances():
 
 def test_the_first_value_may_be_nought():
     """A first value of 0 is a value, not one that is held."""
-    assert heard(Noise(1.0), 0.0, 1e-3, 0.1).values == 1
+    first = heard(Noise(1.0), 0.0, 1e-3, 0.1)
+    assert first.values == 1
+    assert heard(first, 0.0, 1e-3, 0.1) == first
 
 
 def test_the_noise_is_at_least_the_told():
