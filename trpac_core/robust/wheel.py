@@ -215,11 +215,9 @@ def stepped(
     unread_m, stale = (0.0, False) if observed else (state.unread_m + way_m, state.stale)
     way_m += state.way_m
     if sample is None:
-        filled = Filling(duration_s=state.filling.duration_s + step_s)
-        state = replace(state, filling=filled, before=None, way_m=way_m, unread_m=unread_m, stale=stale)
-        if filled.duration_s < BLOCK_S:
-            return state
-        return _on_road(state, known, None, given, filled.duration_s)
+        # What the block had is dropped: its means would count the lost time as standstill.
+        state = replace(state, way_m=way_m, unread_m=unread_m, stale=stale)
+        return _on_road(state, known, None, given, state.filling.duration_s + step_s)
     wheel_noise, speed_noise = state.wheel_noise, state.speed_noise
     new = wheel_noise.values == 0 or sample.wheel_speed_rad_s != wheel_noise.before
     wheel_noise = heard(wheel_noise, sample.wheel_speed_rad_s, step_s, known.wheel_noise)
