@@ -57,6 +57,11 @@ class Method(Enum):
         """Its name in files and on the command line."""
         return self.name.lower()
 
+    @property
+    def title(self) -> str:
+        """Its name in reports."""
+        return "DIFE" if self is Method.DIFE else self.label.replace("_", " ")
+
     @classmethod
     def of(cls, label: str) -> Method:
         """The method of a name; TrpacError with the names there are."""

@@ -288,13 +288,23 @@ class FourWheels:
     def restore(self, data: Mapping[str, Any]) -> None:
         """Go back to what `state` gave."""
         camera = SidesState.from_json(data["camera"])
-        *numbers, source = data["car"]
+        theta, deviation, low, high, expected, expected_deviation, source = data["car"]
         for wheel, saved in zip(self._wheels, data["wheels"], strict=True):
             wheel.restore(saved)
         self._camera = camera
         fl, fr, rl, rr = (wheel.last for wheel in self._wheels)
         problems = tuple((who, text) for who, text in data["problems"])
-        self._last = CarEstimate((fl, fr, rl, rr), *numbers, Source(source), problems)
+        self._last = CarEstimate(
+            (fl, fr, rl, rr),
+            theta,
+            deviation,
+            low,
+            high,
+            expected,
+            expected_deviation,
+            Source(source),
+            problems,
+        )
 
 
 def _pairs(values: Four, deviations: Four) -> tuple[Known, Known, Known, Known]:
