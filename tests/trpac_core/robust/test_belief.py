@@ -276,6 +276,11 @@ def test_a_slow_car_or_a_locked_wheel_says_nothing(speed, rim, said):
     assert shows(reading(speed_m_s=speed, rim_m_s=rim)) is said
 
 
+@pytest.mark.parametrize(("slip", "said"), [(0.39, True), (0.4, False), (0.9, False), (-0.9, True)])
+def test_a_spinning_wheel_says_nothing_and_a_braked_one_does_until_it_locks(slip, said):
+    assert shows(reading(slip)) is said
+
+
 def test_the_first_belief_is_the_priors():
     found = unread(KNOWN, PRIOR)
     assert found.tyre == pytest.approx([t.weight for t in TYRES])

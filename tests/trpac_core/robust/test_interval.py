@@ -41,7 +41,7 @@ def test_mean_and_deviation_are_numpys(belief):
 @given(BELIEFS)
 def test_the_bounds_hold_their_quantiles_and_no_more_than_a_cell_beyond(belief):
     said, likely = of(*belief)
-    low, high = said.low / 0.9, said.high / 1.06
+    low, high = said.low / 0.86, said.high / 1.06
     assert high == pytest.approx(said.unmoved_high)
     for bound, quantile in ((low, 0.005), (said.clip, 0.025)):
         at = int(np.argmin(np.abs(THETA - bound)))
@@ -51,8 +51,8 @@ def test_the_bounds_hold_their_quantiles_and_no_more_than_a_cell_beyond(belief):
     at = int(np.argmin(np.abs(THETA - high)))
     assert THETA[at] == pytest.approx(high)
     last = len(THETA) - 1
-    assert likely[:at].sum() >= 0.975 - 1e-12 or at == last
-    assert likely[: at - 1].sum() < 0.975 + 1e-12 or at == last
+    assert likely[:at].sum() >= 0.965 - 1e-12 or at == last
+    assert likely[: at - 1].sum() < 0.965 + 1e-12 or at == last
 
 
 @given(BELIEFS)
@@ -80,7 +80,7 @@ def test_a_sure_belief_has_the_next_cells_as_bounds(at):
     road[:, at] = 1.0
     said, _ = of(road, np.ones(4))
     assert (said.mean, said.std) == (pytest.approx(THETA[at]), pytest.approx(0.0, abs=1e-7))
-    assert said.low == pytest.approx(0.9 * THETA[max(at - 1, 0)])
+    assert said.low == pytest.approx(0.86 * THETA[max(at - 1, 0)])
     assert said.clip == THETA[max(at - 1, 0)]
     assert said.unmoved_high == THETA[min(at + 1, len(THETA) - 1)]
 
@@ -89,9 +89,9 @@ def test_a_normal_belief_has_a_normal_distributions_bounds():
     """0.5 % lies 2.58 deviations below, 97.5 % lies 1.96 above; a bound is up to one and a half cells beyond."""
     road = norm.pdf(THETA, 0.5, 0.1) * np.gradient(THETA)
     said, _ = of(np.tile(road, (4, 1)), np.ones(4))
-    low, clip, high = norm.ppf([0.005, 0.025, 0.975], 0.5, 0.1)
+    low, clip, high = norm.ppf([0.005, 0.025, 0.965], 0.5, 0.1)
     for beyond, at in (
-        (low - said.low / 0.9, low),
+        (low - said.low / 0.86, low),
         (clip - said.clip, clip),
         (said.unmoved_high - high, high),
     ):
