@@ -103,3 +103,13 @@ def test_a_tyre_that_is_not_believed_has_no_say():
     road[0, 20], road[1:, 90] = 1.0, 1.0
     assert of(road, [1.0, 0.0, 0.0, 0.0])[0].mean == pytest.approx(THETA[20], abs=1e-4)
     assert of(road, [0.5, 0.5, 0.0, 0.0])[0].mean == pytest.approx(0.5 * (THETA[20] + THETA[90]), abs=1e-4)
+
+
+def test_the_bounds_are_the_quantiles_where_the_belief_rises_slowly():
+    """A share of (i / 103)^4 lies up to cell i: 0.5 % at 27.4, 2.5 % at 41, 97.5 % at 102.4."""
+    edges = (np.arange(len(THETA) + 1) / len(THETA)) ** 4
+    said, _ = of(np.tile(np.diff(edges), (4, 1)), np.ones(4))
+    at = [int(np.searchsorted(edges[1:], q)) for q in (0.005, 0.025, 0.975)]
+    assert said.low == pytest.approx(0.9 * THETA[at[0] - 1])
+    assert said.clip == THETA[at[1] - 1]
+    assert said.unmoved_high == THETA[min(at[2] + 1, len(THETA) - 1)]
