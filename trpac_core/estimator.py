@@ -15,6 +15,8 @@ from .camera_side import RoadUnderWheel, take_frame
 from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
 from .dife import (
     GREATEST_THETA,
+    NEVER_SEEN_M,
+    SEEN_HOLD_M,
     FusionState,
     Outcome,
     VisualTerm,
@@ -25,7 +27,7 @@ from .dife import (
     unread,
 )
 from .elastic import ElasticLine, learned
-from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Method, Rates, RoadClass
+from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Method, Rates, RoadClass, Source
 from .mismatch import followed
 from .paper import PrintedStep, PrintedWheel, printed_step
 from .readings import (
@@ -39,6 +41,7 @@ from .readings import (
 )
 from .robust import roads
 from .robust.belief import WheelModel
+from .robust.messages import radius_message, tyre_message
 from .robust.wheel import INNOVATION, Sample, begun, point, setup, stepped
 from .sight import Look, WheelInputs, look_at
 from .steady import quickened, unsettled
@@ -63,6 +66,7 @@ _LEAST_FRICTION = 1e-6
 """Used friction below which a reading says nothing of the tyre's curve, whatever the noise is said to be [-]."""
 BOUNDS = 2.0
 """Standard deviations from TRPAC to the ends of the interval where it is symmetric [-]."""
+_SOURCES = tuple(Source)
 _new = tuple.__new__
 
 
@@ -301,7 +305,15 @@ class TrpacEstimator:
         if outcome is not None:
             age_s = state.time_s - outcome.captured_s
         theta_alone, slip, force_n = alone[0][0], inputs[3][0], unaided[3]
-        deviation = math.sqrt(with_camera(config.confidence, state.variance, theta, theta_img))
+        if config.method is Method.AS_PRINTED:
+            step, theta_alone = self._as_printed(sensors, load_n, theta_img, step_s)
+            _, slip, force_n, threshold, excited, K_v = step
+            theta = step.state.theta_hat
+            # The paper's estimate has no deviation: that of a road of which nothing is known.
+            state.variance = variance = unknown_variance(config.confidence, theta)
+        else:
+            variance = with_camera(config.confidence, state.variance, theta, theta_img)
+        deviation = math.sqrt(variance)
         low, high = max(theta - BOUNDS * deviation, 0.0), min(theta + BOUNDS * deviation, GREATEST_THETA)
         expected, expected_deviation = theta, deviation
         if state.robust is not None and self._robust is not None:
@@ -315,10 +327,6 @@ class TrpacEstimator:
             theta, deviation = point(state.robust, theta_alone)
             low, high, expected, expected_deviation = said.low, said.high, said.mean, said.std
             K_v = scheduler.K_v(abs(theta_img - theta)) if excited and theta_img is not None else 0.0
-        elif config.method is Method.AS_PRINTED:
-            step, theta_alone = self._as_printed(sensors, load_n, theta_img, step_s)
-            _, slip, force_n, threshold, excited, K_v = step
-            theta = expected = step.state.theta_hat
         self._last = _new(
             Estimate,
             (
@@ -340,10 +348,23 @@ class TrpacEstimator:
                 high,
                 expected,
                 expected_deviation,
+                self._source(flag, excited),
                 None,
             ),
         )
         return self._last
+
+    def _source(self, flag: bool, excited: bool) -> Source:
+        """What the estimate rests on; the estimator as printed remembers no road that the tyre has shown."""
+        state, fusion = self._state, self._state.fusion
+        if state.robust is not None:
+            tyre = not state.robust.stale
+        elif self.config.method is Method.AS_PRINTED:
+            tyre = excited
+        else:
+            classes = fusion.theta_img is not None
+            tyre = fusion.rests or fusion.unseen_m < (SEEN_HOLD_M if classes else NEVER_SEEN_M)
+        return _SOURCES[tyre + 2 * flag]
 
     def _as_printed(
         self, sensors: Sensors, load_n: float, theta_img: float | None, step_s: float
@@ -509,6 +530,7 @@ class TrpacEstimator:
             image_confidence=Q_v,
             frame_age_s=age_s,
             **self._held_bounds(),
+            source=self._source(False, False),
             problem=problem,
         )
         return self._last
@@ -527,11 +549,23 @@ class TrpacEstimator:
         said = state.robust.said
         return {
             "TRPAC_std": math.hypot(said.std, said.mean - theta),
-            "TRPAC_low": said.low,
-            "TRPAC_high": said.high,
+            "TRPAC_low": min(said.low, theta),
+            "TRPAC_high": max(said.high, theta),
             "TRPAC_expected": said.mean,
             "TRPAC_expected_std": said.std,
         }
+
+    def messages(self) -> dict[str, str]:
+        """Sentences on what the drive shows of a car that is not as told, by what they concern; robust method only."""
+        state, known = self._state.robust, self._robust
+        if state is None or known is None:
+            return {}
+        axle = "Front" if self.config.front_axle else "Rear"
+        texts = {
+            f"{axle} tyres": tyre_message(state, known, axle, self._static_load_n),
+            f"{axle} wheels": radius_message(state, known, axle),
+        }
+        return {about: text for about, text in texts.items() if text is not None}
 
     def state(self) -> dict[str, Any]:
         """All that is remembered as JSON-able values; floats survive the round trip bit by bit."""
@@ -540,4 +574,4 @@ class TrpacEstimator:
     def restore(self, data: Mapping[str, Any]) -> None:
         """Go back to what `state` gave."""
         self._state = EstimatorState.from_json(data["state"])
-        self._last = Estimate(**data["last"])
+        self._last = Estimate(**{**data["last"], "source": Source(data["last"]["source"])})

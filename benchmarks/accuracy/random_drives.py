@@ -58,6 +58,44 @@ class CarError:
 
 
 @dataclass(frozen=True)
+class Tyre:
+    """How the tyre is built, where it is not the modified Dugoff tyre of constant stiffness.
+
+    A magic formula of shape factor C and curvature E, whose stiffness grows with the load by a share, and whose force
+    follows the slip over the relaxation length [m].
+    """
+
+    shape: float
+    curvature: float
+    by_load: float = 0.0
+    relaxation_m: float = 0.0
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, foreign: bool) -> "Tyre":
+        """A formula as car tyres have it; a foreign one with stiffness by load and relaxation as they have it too."""
+        shape, curvature = float(rng.uniform(1.25, 1.9)), float(rng.uniform(-1.0, 0.6))
+        if not foreign:
+            return cls(shape, curvature)
+        return cls(shape, curvature, float(rng.uniform(0.7, 1.0)), float(rng.uniform(0.05, 0.5)))
+
+    def put_on(self, car: VehicleFile) -> VehicleFile:
+        """The car with this tyre."""
+        effects: dict[str, dict[str, float]] = {
+            "tyre_formula": {"share": 1.0, "shape": self.shape, "curvature": self.curvature}
+        }
+        if self.relaxation_m > 0.0:
+            effects["tyre_relaxation"] = {"length_m": self.relaxation_m}
+        stiffness = {
+            "stiffness_n": car.tyre.longitudinal_stiffness_n,
+            "by_load": self.by_load,
+        }
+        effects["tyre_stiffness_offset"] = stiffness
+        values = car.model_dump(by_alias=True)
+        values |= {"effects": effects, "forms": {"tyre_stiffness_offset": "with load"}}
+        return VehicleFile.model_validate(values)
+
+
+@dataclass(frozen=True)
 class Drive:
     """What the estimator is given and what is true, one row per millisecond."""
 
@@ -124,7 +162,9 @@ def _frames(rng: np.random.Generator, road: RoadFile, front_m: NDArray[np.float6
     return frames
 
 
-def make_drive(seed: int, error: CarError | None = None, noise: float | None = None) -> Drive:
+def make_drive(
+    seed: int, error: CarError | None = None, noise: float | None = None, tyre: Tyre | None = None
+) -> Drive:
     """A drive; without a car error one is drawn, and so is the noise, between half and twice the scenario's."""
     rng = np.random.default_rng(seed)
     road = _road(rng)
@@ -132,6 +172,8 @@ def make_drive(seed: int, error: CarError | None = None, noise: float | None = N
     error, scale = error or drawn, noise or scale
     car = load_vehicle(CAR_FILE)
     actual = _actual(car, error)
+    if tyre is not None:
+        actual = tyre.put_on(actual)
     run = _driven(actual, road, 1.0 + error.torque)
     louder = NOISE.model_copy(update={name: scale * value for name, value in NOISE.model_dump().items()})
     rows = make_log(run, actual, louder, seed)[COLUMNS].to_numpy(copy=True)

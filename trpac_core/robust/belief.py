@@ -24,7 +24,8 @@ from .blocks import Reading
 from .tyres import FORMULAS, Tyre, curves
 
 POWER_PER_S = 20.0
-"""Power with which the likelihood of a second of readings counts, as of independent readings [1/s]."""
+"""Power with which the likelihood of a second of readings counts, as of independent readings; a reading
+counts as one at most [1/s]."""
 INDEPENDENT_1_S = 1.0
 """How often a second the normalisation of the likelihood counts: operating points are new about once a second [1/s]."""
 MODEL_SHARE = 0.02
@@ -43,6 +44,9 @@ LEAST_SLOPE = 0.5
 """Slope of the curve by slip below which it does not count in the normalisation [-]."""
 LEAST_SPEED_M_S, LEAST_RIM_M_S = 1.5, 0.5
 """Speed below which slip says nothing, and rim speed below which the brake's torque is not the road's [m/s]."""
+MOST_SLIP = 0.4
+"""Slip of a driven wheel above which it spins, and what its tyre loses is not known: to a fifth of the peak by magic
+formulas, hardly any by others [-]."""
 NEVER = 1e-30
 """Weight that each cell keeps [-]."""
 
@@ -181,8 +185,10 @@ class WheelModel:
 
 
 def shows(reading: Reading) -> bool:
-    """Whether the tyre says anything: the car drives and the wheel turns."""
-    return reading.speed_m_s > LEAST_SPEED_M_S and reading.rim_m_s > LEAST_RIM_M_S
+    """Whether the tyre says anything: the car drives, and the wheel neither stands nor spins."""
+    return (
+        reading.speed_m_s > LEAST_SPEED_M_S and reading.rim_m_s > LEAST_RIM_M_S and reading.slip < MOST_SLIP
+    )
 
 
 def read(
@@ -239,7 +245,7 @@ def read(
         - by_slip * to_offset
         + by_softness * to_softness
     )
-    power = POWER_PER_S * duration_s
+    power = min(POWER_PER_S * duration_s, 1.0)
     normalisation = np.maximum(np.abs(by_slip), LEAST_SLOPE) / np.sqrt(variance)
     likelihood = -0.5 * power * error * error / variance + INDEPENDENT_1_S * duration_s * log(normalisation)
     gain_offset, gain_softness = power * to_offset / variance, power * to_softness / variance
@@ -261,3 +267,8 @@ def read(
 def told_formula(belief: Belief) -> float:
     """Probability that the tyre has the told formula [-]."""
     return float(math.fsum(belief.tyre[:FORMULAS].tolist()))
+
+
+def mean_offset(belief: Belief) -> float:
+    """Mean of the slip offset over all tyres and cells [-]."""
+    return float((belief.tyre * (belief.road * belief.offset).sum(axis=1)).sum())

@@ -9,12 +9,12 @@ import numpy as np
 from .arrays import Array
 from .belief import Belief
 
-LOW, HIGH = 0.005, 0.975
+LOW, HIGH = 0.005, 0.965
 """Quantiles that the interval lies between. The lower bound is the more careful one: to claim grip that is not there
 costs more than to miss some [-]."""
 CLIP = 0.025
 """Quantile below which the point value does not go [-]."""
-LOW_SHARE, HIGH_SHARE = 0.1, 0.06
+LOW_SHARE, HIGH_SHARE = 0.14, 0.06
 """Shares by which the bounds move out: mass, torque and load are not better known, and no driving tells. Below, what
 the tyre carries is the edge of what is possible, and the truth may lie on it [-]."""
 

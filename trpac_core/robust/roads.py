@@ -18,7 +18,7 @@ SLIPPERY, SLIPPERY_SHARE = 0.05, 0.2
 """Roads below this friction are rarer without a camera: wet ice near 0 degrees alone; by this share [-]."""
 CLASS_SCATTER, NEW_SCATTER = 0.13, 0.15
 """Standard deviation of a road from its class's value: of a class that has stood, and of a new one [-]."""
-WRONG_CLASS, NEW_WRONG = 0.04, 0.2
+WRONG_CLASS, NEW_WRONG = 0.1, 0.2
 """Probability that the class is wrong and says nothing: of one that has stood, and of a new one [-]."""
 STOOD_M = 4.0
 """Way for which the camera gives a class until it has stood: two near groups of the picture [m]."""
