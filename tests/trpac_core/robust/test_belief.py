@@ -14,6 +14,7 @@ from trpac_core.robust.belief import (
     WheelModel,
     driven,
     hypotheses,
+    mean_offset,
     read,
     shows,
     told_formula,
@@ -133,7 +134,7 @@ def innovation(belief, tyre_at, cell, now):
 
 def plainly_read(belief, now):
     after, mass = blank(), np.zeros(len(TYRES))
-    power, independent = 20.0 * now.duration_s, 1.0 * now.duration_s
+    power, independent = min(20.0 * now.duration_s, 1.0), 1.0 * now.duration_s
     weight = np.zeros_like(belief.road)
     for i in range(len(TYRES)):
         for j in range(len(THETA)):
@@ -169,13 +170,13 @@ def after(belief, now):
     return read(belief, KNOWN, THETA, now, WHEEL, **NOISE)
 
 
-@pytest.mark.parametrize("duration_s", [0.01, 0.05])
+@pytest.mark.parametrize("duration_s", [0.01, 0.05, 0.2])
 @pytest.mark.parametrize(
     ("slip", "friction"),
     [(0.004, 0.07), (0.015, 0.28), (-0.015, -0.28), (0.2, 0.4), (-0.3, -0.4), (0.01, -0.1)],
 )
 def test_a_reading_counts_as_in_a_plain_filter(slip, friction, duration_s):
-    """At 0.05 s the power is 1: a textbook extended Kalman filter with the likelihood of its innovation."""
+    """From 0.05 s on the power is 1: a textbook extended Kalman filter with the likelihood of its innovation."""
     for seed in range(3):
         belief = drawn(seed)
         now = reading(slip, friction, duration_s, load_n=2800.0, samples=7)
@@ -270,10 +271,25 @@ def test_a_sliding_wheel_shows_the_road_and_a_gentle_one_a_lower_bound():
 
 
 @pytest.mark.parametrize(
-    ("speed", "rim", "said"), [(1.6, 0.6, True), (1.5, 9.0, False), (20.0, 0.5, False), (20.0, 0.51, True)]
+    ("speed", "rim", "slip", "said"),
+    [
+        (1.6, 0.6, 0.0, True),
+        (1.5, 9.0, 0.0, False),
+        (20.0, 0.5, 0.0, False),
+        (20.0, 0.51, 0.0, True),
+        (20.0, 20.0, 0.39, True),
+        (20.0, 20.0, 0.4, False),
+        (20.0, 9.0, -0.6, True),
+    ],
 )
-def test_a_slow_car_or_a_locked_wheel_says_nothing(speed, rim, said):
-    assert shows(reading(speed_m_s=speed, rim_m_s=rim)) is said
+def test_a_slow_car_and_a_wheel_that_stands_or_spins_say_nothing(speed, rim, slip, said):
+    assert shows(reading(slip, speed_m_s=speed, rim_m_s=rim)) is said
+
+
+def test_the_mean_offset_is_that_over_tyres_and_cells():
+    belief = drawn(1)
+    weights = belief.tyre[:, None] * belief.road
+    assert mean_offset(belief) == pytest.approx(np.average(belief.offset, weights=weights), rel=1e-12)
 
 
 @pytest.mark.parametrize(("slip", "said"), [(0.39, True), (0.4, False), (0.9, False), (-0.9, True)])

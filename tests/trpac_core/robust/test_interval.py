@@ -13,6 +13,9 @@ from trpac_core.robust.roads import cells
 from trpac_core.robust.tyres import TYRES
 
 THETA = cells()
+LOW, CLIP, HIGH = 0.005, 0.025, 0.965
+"""Quantiles, and the shares by which the bounds move out: as the module has them."""
+LOW_SHARE, HIGH_SHARE = 0.14, 0.06
 EMPTY = unread(hypotheses(TYRES), np.full(len(THETA), 1.0 / len(THETA)))
 
 
@@ -41,9 +44,9 @@ def test_mean_and_deviation_are_numpys(belief):
 @given(BELIEFS)
 def test_the_bounds_hold_their_quantiles_and_no_more_than_a_cell_beyond(belief):
     said, likely = of(*belief)
-    low, high = said.low / 0.86, said.high / 1.06
+    low, high = said.low / (1.0 - LOW_SHARE), said.high / (1.0 + HIGH_SHARE)
     assert high == pytest.approx(said.unmoved_high)
-    for bound, quantile in ((low, 0.005), (said.clip, 0.025)):
+    for bound, quantile in ((low, LOW), (said.clip, CLIP)):
         at = int(np.argmin(np.abs(THETA - bound)))
         assert THETA[at] == pytest.approx(bound)
         assert likely[: at + 1].sum() <= quantile + 1e-12 or at == 0
@@ -51,8 +54,8 @@ def test_the_bounds_hold_their_quantiles_and_no_more_than_a_cell_beyond(belief):
     at = int(np.argmin(np.abs(THETA - high)))
     assert THETA[at] == pytest.approx(high)
     last = len(THETA) - 1
-    assert likely[:at].sum() >= 0.965 - 1e-12 or at == last
-    assert likely[: at - 1].sum() < 0.965 + 1e-12 or at == last
+    assert likely[:at].sum() >= HIGH - 1e-12 or at == last
+    assert likely[: at - 1].sum() < HIGH + 1e-12 or at == last
 
 
 @given(BELIEFS)
@@ -80,18 +83,18 @@ def test_a_sure_belief_has_the_next_cells_as_bounds(at):
     road[:, at] = 1.0
     said, _ = of(road, np.ones(4))
     assert (said.mean, said.std) == (pytest.approx(THETA[at]), pytest.approx(0.0, abs=1e-7))
-    assert said.low == pytest.approx(0.86 * THETA[max(at - 1, 0)])
+    assert said.low == pytest.approx((1.0 - LOW_SHARE) * THETA[max(at - 1, 0)])
     assert said.clip == THETA[max(at - 1, 0)]
     assert said.unmoved_high == THETA[min(at + 1, len(THETA) - 1)]
 
 
 def test_a_normal_belief_has_a_normal_distributions_bounds():
-    """0.5 % lies 2.58 deviations below, 97.5 % lies 1.96 above; a bound is up to one and a half cells beyond."""
+    """A bound is up to one and a half cells beyond its quantile."""
     road = norm.pdf(THETA, 0.5, 0.1) * np.gradient(THETA)
     said, _ = of(np.tile(road, (4, 1)), np.ones(4))
-    low, clip, high = norm.ppf([0.005, 0.025, 0.965], 0.5, 0.1)
+    low, clip, high = norm.ppf([LOW, CLIP, HIGH], 0.5, 0.1)
     for beyond, at in (
-        (low - said.low / 0.86, low),
+        (low - said.low / (1.0 - LOW_SHARE), low),
         (clip - said.clip, clip),
         (said.unmoved_high - high, high),
     ):
@@ -103,3 +106,13 @@ def test_a_tyre_that_is_not_believed_has_no_say():
     road[0, 20], road[1:, 90] = 1.0, 1.0
     assert of(road, [1.0, 0.0, 0.0, 0.0])[0].mean == pytest.approx(THETA[20], abs=1e-4)
     assert of(road, [0.5, 0.5, 0.0, 0.0])[0].mean == pytest.approx(0.5 * (THETA[20] + THETA[90]), abs=1e-4)
+
+
+def test_the_bounds_are_the_quantiles_where_the_belief_rises_slowly():
+    """A share of (i / 103)^4 lies up to cell i: 0.5 % at 27.4, 2.5 % at 41."""
+    edges = (np.arange(len(THETA) + 1) / len(THETA)) ** 4
+    said, _ = of(np.tile(np.diff(edges), (4, 1)), np.ones(4))
+    at = [int(np.searchsorted(edges[1:], q)) for q in (LOW, CLIP, HIGH)]
+    assert said.low == pytest.approx((1.0 - LOW_SHARE) * THETA[at[0] - 1])
+    assert said.clip == THETA[at[1] - 1]
+    assert said.unmoved_high == THETA[min(at[2] + 1, len(THETA) - 1)]

@@ -14,6 +14,8 @@ DRY, WET, SNOW = range(3)
 VALUES = (0.8, 0.6, 0.2)
 THETA = cells()
 KNOWN = priors(THETA, VALUES)
+CLASSES = [(KNOWN.new, 0.15, 0.2), (KNOWN.stood, 0.13, 0.1)]
+"""Priors of each class, their scatter and the probability that the class says nothing."""
 
 
 def test_the_cells_reach_from_wet_ice_to_a_racing_tyre_and_are_narrow_enough():
@@ -36,7 +38,7 @@ def test_every_prior_is_a_probability(prior):
     assert (prior > 0.0).all()
 
 
-@pytest.mark.parametrize(("rows", "scatter", "wrong"), [(KNOWN.new, 0.15, 0.2), (KNOWN.stood, 0.13, 0.04)])
+@pytest.mark.parametrize(("rows", "scatter", "wrong"), CLASSES)
 def test_a_class_is_a_normal_distribution_and_a_share_that_says_nothing(rows, scatter, wrong):
     for value, prior in list(zip(VALUES, rows, strict=True))[1:]:
         edges = np.concatenate([[0.017], 0.5 * (THETA[1:] + THETA[:-1]), [1.5 * THETA[-1] - 0.5 * THETA[-2]]])
@@ -46,7 +48,7 @@ def test_a_class_is_a_normal_distribution_and_a_share_that_says_nothing(rows, sc
         assert inside > 0.55
 
 
-@pytest.mark.parametrize(("rows", "scatter", "wrong"), [(KNOWN.new, 0.15, 0.2), (KNOWN.stood, 0.13, 0.04)])
+@pytest.mark.parametrize(("rows", "scatter", "wrong"), CLASSES)
 def test_above_the_greatest_class_all_frictions_are_alike(rows, scatter, wrong):
     likely = (rows[DRY] - wrong * unseen(THETA)) / np.gradient(THETA)
     above = likely[THETA >= 0.8]

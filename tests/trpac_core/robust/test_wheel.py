@@ -74,7 +74,7 @@ def test_a_tyre_that_slides_makes_the_interval_narrow(curve, theta, torque_nm):
     said = min((s.said for s in states), key=lambda said: said.high - said.low)
     assert said.high - said.low < 0.15
     assert said.low < theta < said.high
-    assert said.mean == pytest.approx(theta, rel=0.1)
+    assert abs(said.mean - theta) < 2.0 * said.std
 
 
 def test_a_gentle_wheel_leaves_the_interval_open_upwards():
@@ -125,7 +125,7 @@ def test_another_class_makes_the_observers_estimate_stale_until_it_reads_the_roa
 def test_what_the_observer_reads_on_the_classs_own_road_is_not_stale():
     """The class stands 4 m after the road began; the observer last read it 3 m ago."""
     coasting = driven(lambda t: 0.0, lambda t: 0.2, 1.0)
-    state = replace(begun(KNOWN), stale=False)
+    state = begun(KNOWN)._replace(stale=False)
     for k, (omega, torque, speed) in enumerate(zip(*(s.tolist() for s in coasting[:3]), strict=True)):
         state = stepped(state, KNOWN, Sample(omega, torque, speed, LOAD), SNOW, 1e-3, speed * 1e-3, k == 150)
     assert state.memory.stood == SNOW
@@ -136,19 +136,20 @@ def test_what_the_observer_reads_on_the_classs_own_road_is_not_stale():
 
 
 def said_of(mean, std=0.05, clip=0.1, high=1.0):
-    return Interval(mean, std, 0.9 * clip, 1.06 * high, clip, high)
+    return Interval(mean, std, 0.86 * clip, 1.06 * high, clip, high)
 
 
 def state_of(tyre, said, stale=False):
     start = begun(KNOWN)
-    return replace(start, belief=replace(start.belief, tyre=np.array(tyre)), said=said, stale=stale)
+    belief = replace(start.belief, tyre=np.array(tyre))
+    return start._replace(belief=belief, said=said, stale=stale)
 
 
 @pytest.mark.parametrize(("told", "share"), [(1.0, 1.0), (0.2, 1.0), (0.125, 0.5), (0.05, 0.0), (0.0, 0.0)])
 def test_the_point_follows_the_observer_as_far_as_the_told_formula_is_believed(told, share):
     state = state_of([0.5 * told, 0.5 * told, 1.0 - told, 0.0], said_of(0.5))
     assert point(state, 0.4)[0] == pytest.approx(0.5 - 0.1 * share)
-    assert point(replace(state, stale=True), 0.4)[0] == pytest.approx(0.5)
+    assert point(state._replace(stale=True), 0.4)[0] == pytest.approx(0.5)
 
 
 def test_the_point_stays_within_the_bounds():
@@ -166,7 +167,7 @@ def test_the_points_deviation_has_the_distance_from_the_mean_and_four_per_cent()
 
 def test_on_the_told_tyre_the_point_is_the_observers():
     states = on("told", 0.3, 0.3, 230.0)[1]
-    assert point(replace(states[-1], stale=False), 0.301)[0] == 0.301
+    assert point(states[-1]._replace(stale=False), 0.301)[0] == 0.301
 
 
 # Steps and blocks
@@ -183,9 +184,7 @@ def test_a_state_that_was_written_goes_on_as_if_it_had_not_been():
         written = json.loads(json.dumps(states[at].to_json()))
         restored = RobustState.from_json(written)
         assert same(restored, states[at])
-        assert all(
-            isinstance(getattr(restored, f.name), type(getattr(states[at], f.name))) for f in fields(restored)
-        )
+        assert [type(value) for value in restored] == [type(value) for value in states[at]]
         onward = course([s[at + 1 : at + 40] for s in drive], state=restored)
         assert same(onward[-1], states[at + 39])
 
@@ -316,3 +315,30 @@ def test_before_anything_was_read_nothing_is_known_but_how_rare_wet_ice_is():
     assert (state.memory.last, state.before) == (NONE, None)
     assert (state.friction, state.slowness_s_m, state.way_m, state.unread_m) == (0.0, 0.0, 0.0, 0.0)
     assert (state.wheel_noise.variance, state.speed_noise.variance) == (KNOWN.wheel_noise, KNOWN.speed_noise)
+
+
+# What contradicts the told car
+
+
+def test_the_time_of_doubt_grows_while_another_curve_is_used_and_ends_where_the_told_is_believed():
+    _, states = on("magic formula", 0.3, 0.3, 230.0)
+    told = np.array([beliefs.told_formula(s.belief) for s in states])
+    doubt = np.array([s.doubted_s for s in states])
+    assert doubt[-1] > 0.5
+    assert (doubt[told >= 0.2] == 0.0).all()
+    gained = np.diff(doubt)
+    assert gained[gained > 0.0] == pytest.approx(0.01, rel=1e-6)
+    used = np.array([abs(s.friction) / s.said.mean for s in states])[1:]
+    assert (used[gained > 0.0] > 0.1).all()
+    full = np.array([s.filling.duration_s == 0.0 for s in states])[1:]
+    assert (gained[full & (told[1:] < 0.2) & (used > 0.1)] > 0.0).all()
+    assert not any(s.doubted_s for s in on("told", 0.3, 0.3, 330.0)[1])
+
+
+@pytest.mark.parametrize(("radius_share", "strange"), [(1.0, False), (1.02, True), (0.98, True)])
+def test_a_wheel_of_another_radius_reads_a_strange_offset(radius_share, strange):
+    """Coasting; 2 % is more than twice the told tolerance of 0.3 % and the speed's bias at 20 m/s."""
+    drive = driven(lambda t: 0.0, lambda t: 0.9, 1.0, speed_m_s=20.0)
+    state = course(drive._replace(wheel_speed_rad_s=drive.wheel_speed_rad_s * radius_share))[-1]
+    assert (state.offset_s > 0.5) is strange
+    assert beliefs.mean_offset(state.belief) == pytest.approx(radius_share - 1.0, abs=0.004)
