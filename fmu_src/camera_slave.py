@@ -87,6 +87,8 @@ class CameraSlave(GuardedSlave):
             # Each problem begins with the name of a reading, such as "wheel_speed_rad_s is ...".
             about = [part.partition(" is ")[0] for part in text.split("; ")]
             self.report(f"sensors {kind} {about}", Fmi2Status.warning, f"{self.modelName}: {text}")
+        for about_car, text in self._estimator.messages().items():
+            self.report(f"car {about_car}", Fmi2Status.warning, f"{self.modelName}: {text}")
 
     def _report_buffers_off(self) -> None:
         text = (

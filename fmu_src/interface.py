@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .settings import PARAMETERS
-from .signals import INPUTS, OUTPUTS
+from .signals import INPUTS, INTERVAL_OUTPUTS, OUTPUTS
 
-TRPAC_ESTIMATOR = INPUTS + OUTPUTS + PARAMETERS
+TRPAC_ESTIMATOR = INPUTS + OUTPUTS + PARAMETERS + INTERVAL_OUTPUTS
 """Variables of the unit `TrpacEstimator`."""

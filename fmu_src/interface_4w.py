@@ -14,7 +14,7 @@ from trpac_core.parameters.variables import Kind, Variable
 from trpac_core.vehicle import WHEELS
 
 from .settings import PARAMETERS
-from .signals import INPUTS, OUTPUTS
+from .signals import INPUTS, INTERVAL_OUTPUTS, OUTPUTS
 
 PER_WHEEL = ("wheel_speed", "wheel_torque", "vertical_load")
 PER_SIDE = ("road_class", "road_class_confidence")
@@ -107,5 +107,7 @@ TRPAC_ESTIMATOR_4W = (
         for v in PARAMETERS
         if v.name not in WHICH_WHEEL
     ),
+    *(made for variable in INTERVAL_OUTPUTS for made in _at_each_wheel(variable)),
+    *(replace(v, name=f"{v.name}.vehicle", description=f"Car: {v.description}") for v in INTERVAL_OUTPUTS),
 )
 """Variables of the unit `TrpacEstimator4W`."""

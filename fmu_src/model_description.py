@@ -44,7 +44,7 @@ IMAGE_TYPE = "application/octet-stream"
 """JPEG, PNG or raw pixels; the convention asks for a valid MIME type, which image/* with its wildcard is not."""
 
 LOG_CATEGORIES = {
-    "logStatusWarning": "An input that could not be used; the last good estimate is held.",
+    "logStatusWarning": "An unusable input: the last good estimate is held; or a car that is not as told.",
     "logStatusError": "A parameter, a call or a state that could not be used.",
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from trpac_core.dife import GREATEST_THETA
+from trpac_core.estimator_data import Source
 from trpac_core.parameters.variables import Kind, Variable
 from trpac_core.vision.classes import Surface
 
@@ -157,3 +158,20 @@ OUTPUTS = (
     ),
     _output("TRPAC_std", "1", "Standard deviation of TRPAC", 0.0),
 )
+
+INTERVAL_OUTPUTS = (
+    _output("TRPAC_low", "1", "Lower bound of the interval that holds the road's TRPAC with 95 %", 0.0),
+    _output("TRPAC_high", "1", "Upper bound of that interval", 0.0),
+    _output("TRPAC_expected", "1", "Mean of what the road's TRPAC may be", 0.0),
+    _output("TRPAC_expected_std", "1", "Standard deviation of what it may be", 0.0),
+    Variable(
+        "TRPAC_source",
+        Kind.INTEGER,
+        "output",
+        "discrete",
+        "What TRPAC rests on: 0 nothing read on this road, 1 the tyre, 2 a flagged class of the camera, 3 both",
+        minimum=min(Source),
+        maximum=max(Source),
+    ),
+)
+"""Further outputs; they follow the parameters, so that value references stay as they were."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from operator import attrgetter
 from typing import Any, ClassVar
 
 from trpac_core.four_wheels import CarEstimate, CarSensors, FourWheels, FourWheelsConfig
@@ -18,13 +17,17 @@ from .estimate_outputs import OF_ESTIMATE
 from .frames import CLASS_PER_SIDE, BusClass
 from .guarded_slave import Value
 from .interface_4w import TRPAC_ESTIMATOR_4W
+from .signals import INTERVAL_OUTPUTS
 
 _OF_WHEEL = {
     f"{name}.{wheel}": (index, of_estimate)
     for index, wheel in enumerate(WHEELS)
     for name, of_estimate in OF_ESTIMATE.items()
 }
-_OF_CAR = {"TRPAC.vehicle": attrgetter("TRPAC"), "TRPAC_std.vehicle": attrgetter("TRPAC_std")}
+_OF_CAR = {
+    f"{name}.vehicle": OF_ESTIMATE[name]
+    for name in ("TRPAC", "TRPAC_std", *(v.name for v in INTERVAL_OUTPUTS))
+}
 _LOADS = tuple(f"vertical_load.{wheel}" for wheel in WHEELS)
 
 

@@ -9,20 +9,21 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from scenarios.metrics import ESTIMATORS
+from scenarios.metrics import estimators
 from scenarios.runner import Run
+from trpac_core.estimator_data import Method
 from trpac_core.vehicle import WHEELS
 
-COLOURS = {"IFE": "#d08a00", "DE": "#7fb2e5", "DIFE": "#c0272d"}
-WIDTHS = {"IFE": 1.1, "DE": 3.0, "DIFE": 1.3}
-"""Line widths; DE is a band under DIFE, so that both are visible where they agree."""
+IMAGE, DYNAMICS, FUSED = "#d08a00", "#7fb2e5", "#c0272d"
+LINES = {"TRPAC_image": (IMAGE, 1.1), "TRPAC_dynamics": (DYNAMICS, 3.0), "TRPAC": (FUSED, 1.3)}
+"""Colour and width of a line; DE is a band under DIFE, so that both are visible where they agree."""
 TRUTH = "#222222"
 ROAD = {"dry": "#eeeeea", "wet": "#d3e0ec", "snow_ice": "#f2f6fb"}
 
 
 def draw_figure17(run: Run, path: Path) -> None:
     """Write the figure: speed, slip, start/stop flag, visual flag, gain, estimates, errors."""
-    table = run.table
+    table, method = run.table, Method.of(run.summary["method"])
     time = table["time_s"].to_numpy()
     with plt.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}):
         figure, axes = plt.subplots(
@@ -32,8 +33,8 @@ def draw_figure17(run: Run, path: Path) -> None:
             _shade_road(axis, run, time)
         _motion(axes[0], axes[1], run, table, time)
         _flags(axes[2], axes[3], axes[4], table, time)
-        _estimates(axes[5], table, time)
-        _errors(axes[6], table, time)
+        _estimates(axes[5], table, time, method)
+        _errors(axes[6], table, time, method)
         axes[6].set_xlabel("time [s]")
         axes[0].set_xlim(time[0], time[-1])
         noise = run.scenario.sensors
@@ -79,31 +80,29 @@ def _motion(speed: Axes, slip: Axes, run: Run, table: pd.DataFrame, time: np.nda
 def _flags(start_stop: Axes, visual: Axes, gain: Axes, table: pd.DataFrame, time: np.ndarray) -> None:
     start_stop.fill_between(time, table["excitation_flag"].astype(float), step="post", color="#2c9c5a", lw=0)
     start_stop.set_ylabel("(c) start/\nstop")
-    visual.fill_between(time, table["flag"].astype(float), step="post", color=COLOURS["IFE"], lw=0)
+    visual.fill_between(time, table["flag"].astype(float), step="post", color=IMAGE, lw=0)
     visual.plot(time, table["image_confidence"], color=TRUTH, lw=0.7)
     visual.set_ylabel("(d) visual\nflag, Q_v")
     for axis in (start_stop, visual):
         axis.set_ylim(-0.05, 1.1)
         axis.set_yticks([0, 1])
-    gain.plot(time, table["K_v"], color=COLOURS["DIFE"], lw=1.2)
+    gain.plot(time, table["K_v"], color=FUSED, lw=1.2)
     gain.set_ylim(bottom=-0.05)
     gain.set_ylabel("(e) gain\n$K_v$")
 
 
-def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray) -> None:
+def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray, method: Method) -> None:
     axis.plot(time, table["theta_true"], color=TRUTH, lw=2.2, label="true TRPAC")
-    for name, column in ESTIMATORS.items():
-        axis.plot(time, table[column], color=COLOURS[name], lw=WIDTHS[name], label=name)
-    two_std = 2.0 * table["TRPAC_std"]
-    axis.fill_between(
-        time,
-        table["TRPAC"] - two_std,
-        table["TRPAC"] + two_std,
-        color=COLOURS["DIFE"],
-        alpha=0.10,
-        lw=0,
-        label="DIFE ± 2 TRPAC_std",
-    )
+    for name, column in estimators(method).items():
+        colour, width = LINES[column]
+        axis.plot(time, table[column], color=colour, lw=width, label=name)
+    if method is Method.ROBUST:
+        low, high, band = table["TRPAC_low"], table["TRPAC_high"], "95 % interval"
+    else:
+        two_std = 2.0 * table["TRPAC_std"]
+        low, high = table["TRPAC"] - two_std, table["TRPAC"] + two_std
+        band = f"{method.title} ± 2 TRPAC_std"
+    axis.fill_between(time, low, high, color=FUSED, alpha=0.10, lw=0, label=band)
     axis.set_ylim(0.0, 1.1)
     axis.set_ylabel("(f) TRPAC [-]")
     axis.legend(loc="lower left", ncols=5, fontsize=8)
@@ -120,10 +119,10 @@ def _stretches(table: pd.DataFrame, time: np.ndarray) -> list[tuple[float, float
     return stretches
 
 
-def _errors(axis: Axes, table: pd.DataFrame, time: np.ndarray) -> None:
-    for name, column in ESTIMATORS.items():
-        error = table[column] - table["theta_true"]
-        axis.plot(time, error, color=COLOURS[name], lw=WIDTHS[name], label=name)
+def _errors(axis: Axes, table: pd.DataFrame, time: np.ndarray, method: Method) -> None:
+    for name, column in estimators(method).items():
+        colour, width = LINES[column]
+        axis.plot(time, table[column] - table["theta_true"], color=colour, lw=width, label=name)
     axis.axhspan(-0.02, 0.02, color=TRUTH, alpha=0.12, lw=0, label="± 0.02")
     axis.set_ylim(-0.45, 0.6)
     axis.set_ylabel("(g) error [-]")

@@ -8,8 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
-"""The estimators of this project, and the unit's output of each."""
+from trpac_core.estimator_data import Method
+
+
+def estimators(method: Method) -> dict[str, str]:
+    """Names of this project's estimators, and the unit's output of each, in their order in reports."""
+    return {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", method.title: "TRPAC"}
+
+
+ESTIMATORS = estimators(Method.DIFE)
+"""Those of the unit as it is delivered."""
 CONVERGED_SHARE = 0.05
 """Error within which an estimator has converged, as a share of the step of friction [-]."""
 STEADY_SHARE = 0.3

@@ -7,6 +7,7 @@ from typing import Any
 
 from scenarios.html_page import data_address, page
 from scenarios.runner import Run
+from trpac_core.estimator_data import Method
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 DASH = "–"
@@ -19,12 +20,18 @@ def write_report(run: Run, figure: Path, overlay: Path | None, path: Path) -> No
         {"number": number},
         run=run,
         summary=run.summary,
+        ours=title(run.summary),
         rows=score_rows(run.summary),
         conclusion=conclusion(run.summary),
         figure=data_address(figure.read_bytes()),
         overlay=data_address(overlay.read_bytes(), "image/jpeg") if overlay is not None else None,
     )
     path.write_text(text, encoding="utf-8")
+
+
+def title(summary: dict[str, Any]) -> str:
+    """Name of the estimator that made the unit's TRPAC."""
+    return Method.of(summary["method"]).title
 
 
 def score_rows(summary: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
@@ -36,22 +43,22 @@ def score_rows(summary: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
 
 def conclusion(summary: dict[str, Any]) -> str:
     """Results of the run in sentences."""
-    sentences = []
+    sentences, name = [], title(summary)
     for before, (dife, alone) in _steps(summary):
         where = f"From {before:g} to {dife['theta']:g}"
         if dife["steady_state_error"] is None:
             sentences.append(f"{where} the tyre was not excited: the estimates hold what they had.")
             continue
         sentences.append(
-            f"{where} DIFE {_convergence(dife)} and stays {dife['steady_state_error']:.3f} off; "
+            f"{where} {name} {_convergence(dife)} and stays {dife['steady_state_error']:.3f} off; "
             f"DE alone {_convergence(alone)} and stays {number(alone['steady_state_error'])} off."
         )
     return " ".join(sentences)
 
 
 def _steps(summary: dict[str, Any]) -> list[tuple[float, tuple[dict[str, Any], dict[str, Any]]]]:
-    """Adhesion before each change of road, with DIFE's and DE's scores after it."""
-    dife, alone = summary["estimators"]["DIFE"], summary["estimators"]["DE"]
+    """Adhesion before each change of road, with the scores of the unit's TRPAC and of DE after it."""
+    dife, alone = summary["estimators"][title(summary)], summary["estimators"]["DE"]
     return [(dife[i - 1]["theta"], (dife[i], alone[i])) for i in range(1, len(dife))]
 
 

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from scenarios.files import Scenario
 from scenarios.fmu_client.estimator import parameters, run_unit
-from scenarios.metrics import ESTIMATORS, score_run
+from scenarios.metrics import estimators, score_run
 from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.progress import StageProgress, silent
+from trpac_core.estimator_data import Method
 from trpac_core.files import file_sha256
 from trpac_core.vehicle import WHEELS
 
@@ -67,6 +68,7 @@ def run_scenario(
     frames_folder: Path,
     progress: StageProgress = silent,
     overrides: Mapping[str, float] | None = None,
+    method: Method = Method.DIFE,
 ) -> Run:
     """Results of a scenario: plant, pictures, unit and scores.
 
@@ -82,6 +84,8 @@ def run_scenario(
         Called with the stage, and how many of how many of its items are done.
     overrides : mapping, optional
         Parameters of the unit by variable name, in place of the scenario's and the default ones.
+    method : Method
+        Estimator of the unit.
 
     Raises
     ------
@@ -91,7 +95,8 @@ def run_scenario(
     trajectory = drive(scenario)
     log = make_scenario_log(scenario, trajectory)
     frames = record(scenario, trajectory, frames_folder, lambda d, n: progress("drawing pictures", d, n))
-    settings = parameters(scenario) | dict(overrides or {})
+    chosen = {} if method is Method.DIFE else {"estimator.method": method.value}
+    settings = parameters(scenario) | chosen | dict(overrides or {})
     outputs = run_unit(
         fmu,
         settings,
@@ -101,7 +106,7 @@ def run_scenario(
         lambda done, total: progress("stepping the unit", done, total),
     )
     table = pd.concat([log, outputs, under_the_wheel(scenario, trajectory)], axis=1)
-    return Run(scenario, trajectory, frames, table, summarise(scenario, table, fmu))
+    return Run(scenario, trajectory, frames, table, summarise(scenario, table, fmu, method))
 
 
 def unit_signals(log: pd.DataFrame, wheel: str) -> pd.DataFrame:
@@ -131,14 +136,14 @@ def segment_starts(scenario: Scenario) -> NDArray[np.float64]:
     return np.array([s.start_m for s in scenario.road.segments])
 
 
-def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path) -> dict[str, Any]:
+def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path, method: Method) -> dict[str, Any]:
     """The content of summary.json: scores of a run, and what is needed to repeat it."""
     scores = score_run(
         segment_starts(scenario),
         table["segment"].to_numpy(),
         table["theta_true"].to_numpy(),
         float(table["TRPAC_dynamics"].iloc[0]),
-        {name: table[column].to_numpy() for name, column in ESTIMATORS.items()},
+        {name: table[column].to_numpy() for name, column in estimators(method).items()},
         table["excitation_flag"].to_numpy(),
         scenario.step_s,
     )
@@ -146,8 +151,9 @@ def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path) -> dict[str, A
         "scenario": scenario.name,
         "seed": scenario.seed,
         "wheel": scenario.wheel,
+        "method": method.label,
         "longitudinal_stiffness_n": scenario.vehicle.tyre.longitudinal_stiffness_n,
-        "excited_time_of": "DIFE's start/stop flag, one clock for all estimators",
+        "excited_time_of": f"{method.title}'s start/stop flag, one clock for all estimators",
         "fmu_sha256": file_sha256(fmu),
         "versions": {package: version(package) for package in PACKAGES},
         "estimators": scores,

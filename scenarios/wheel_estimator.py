@@ -14,10 +14,19 @@ from scenarios.files import VehicleFile
 from scenarios.library import PAPER_VEHICLE, networks_folder
 from trpac_core.errors import TrpacError
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.estimator_data import Method
 from trpac_core.readings import Sensors
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife
+
+_HELD = "The tyre does not slip enough: the estimate holds what it had."
+_UNSEEN = {
+    Method.AS_PRINTED: _HELD,
+    Method.DIFE: _HELD,
+    Method.ROBUST: "The tyre does not slip enough: the interval widens with the way driven.",
+}
+"""Reason where neither tyre nor camera shows the road."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +37,12 @@ class Estimate:
     ----------
     theta, std : float
         TRPAC and its standard deviation [-].
+    low, high : float
+        Bounds of the interval that holds the road's TRPAC with 95 % [-].
+    expected, expected_std : float
+        Mean and standard deviation of what the road's TRPAC may be [-].
+    source : str
+        What TRPAC rests on: none, tyre, camera or both.
     peak : float
         Maximum of the tyre's curve at theta, which a brake test measures [-].
     flag : bool
@@ -44,6 +59,11 @@ class Estimate:
 
     theta: float
     std: float
+    low: float
+    high: float
+    expected: float
+    expected_std: float
+    source: str
     peak: float
     flag: bool
     K_v: float
@@ -64,11 +84,13 @@ class Estimator:
         fl, fr, rl or rr.
     camera : path or name, optional
         The camera of the pictures for `step`.
+    method : str
+        as_printed, dife or robust (docs/dynamics.md).
 
     Raises
     ------
     TrpacError
-        A car, wheel or camera that is wrong.
+        A car, wheel, camera or method that is wrong.
     """
 
     def __init__(
@@ -77,17 +99,28 @@ class Estimator:
         *,
         wheel: str = "fl",
         camera: str | Path | None = None,
+        method: str = "dife",
     ) -> None:
         if wheel not in WHEELS:
             raise TrpacError(f"wheel is {wheel!r}; expected one of {', '.join(WHEELS)}.")
         car = as_vehicle(PAPER_VEHICLE if vehicle is None else vehicle).to_core()
-        config = EstimatorConfig(vehicle=car, front_axle=wheel.startswith("f"), left_side=wheel.endswith("l"))
+        config = EstimatorConfig(
+            vehicle=car,
+            front_axle=wheel.startswith("f"),
+            left_side=wheel.endswith("l"),
+            method=Method.of(method),
+        )
         ife = None
         if camera is not None:
             settings = replace(config.image_settings, camera=load_camera(camera))
             ife = Ife.load(settings, networks_folder())
         self._estimator = TrpacEstimator(config, ife)
         self._time_s: float | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what the drive shows of a car that is not as told, with the method robust."""
+        return tuple(self._estimator.messages().values())
 
     def step(
         self,
@@ -156,10 +189,15 @@ class Estimator:
         elif estimate.flag:
             why = "The tyre does not slip enough; the camera's class of the road is used."
         else:
-            why = "The tyre does not slip enough: the estimate holds what it had."
+            why = _UNSEEN[self._estimator.config.method]
         return Estimate(
             theta=estimate.TRPAC,
             std=estimate.TRPAC_std,
+            low=estimate.TRPAC_low,
+            high=estimate.TRPAC_high,
+            expected=estimate.TRPAC_expected,
+            expected_std=estimate.TRPAC_expected_std,
+            source=estimate.source.label,
             peak=estimate.TRPAC_peak,
             flag=bool(estimate.flag),
             K_v=estimate.K_v,

@@ -21,6 +21,7 @@ from sim2real.replay.run import Replay
 from trpac.extras import extras
 from trpac.files import read_log
 from trpac.picture import Picture
+from trpac_core.estimator_data import Method
 
 
 @dataclass(frozen=True, repr=False)
@@ -30,7 +31,9 @@ class Estimates:
     Attributes
     ----------
     frame : DataFrame
-        time_s [s]; TRPAC, TRPAC_std and TRPAC_peak of the car and of each wheel [-]; flag, K_v, excitation_flag.
+        time_s [s]; TRPAC, TRPAC_std and TRPAC_peak of the car [-], TRPAC and TRPAC_std of each wheel [-]; flag, K_v,
+        excitation_flag; TRPAC_low, TRPAC_high, TRPAC_source of the car and of each wheel; TRPAC_expected and its
+        deviation of the car [-].
     summary : dict
         Content of summary.json of `trpac estimate`.
     """
@@ -58,7 +61,7 @@ class Estimates:
         return list(self.summary["warnings"])
 
     def plot(self) -> Picture:
-        """A figure of the car's estimate with its deviation, the flags and the drive."""
+        """A figure of the car's estimate with its deviation or interval, the flags and the drive."""
         from sim2real.replay.figures import estimate
 
         return Picture(estimate(self._replay))
@@ -84,6 +87,7 @@ def estimate(
     mapping: Mapping | str | Path | None = None,
     camera: str | Path | None = None,
     peers: bool = False,
+    method: str = "dife",
     progress: StageProgress = silent,
 ) -> Estimates:
     """Estimates of the road's adhesion along a recorded drive.
@@ -98,6 +102,8 @@ def estimate(
         Columns of the log in the log format; the camera of the pictures in column image_path.
     peers : bool
         Whether to run estimators of the literature as well.
+    method : str
+        Estimator: as_printed, dife or robust (docs/dynamics.md).
     progress : callable
         Called with the stage, and how many of how many of its items are done.
 
@@ -110,6 +116,7 @@ def estimate(
     """
     from sim2real.replay.report import estimates_table
 
+    chosen = Method.of(method)
     progress("reading", 0, 1)
     origin = TABLE_3 if vehicle is None else vehicle
     car, lens = as_vehicle(origin), None if camera is None else load_camera(camera)
@@ -124,6 +131,7 @@ def estimate(
             progress,
             guessed=vehicle is None,
             vehicle_path=None if isinstance(origin, VehicleFile) else located("vehicle", origin),
+            method=chosen,
         )
     for text in summary["warnings"]:
         logging.getLogger("trpac").warning("%s: %s", read.name, text)

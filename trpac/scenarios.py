@@ -21,6 +21,7 @@ from scenarios.progress import StageProgress, silent
 from trpac.extras import extras
 from trpac.picture import Picture
 from trpac_core.errors import TrpacError
+from trpac_core.estimator_data import Method
 from trpac_core.vehicle import WHEELS
 
 
@@ -141,6 +142,7 @@ def run(
     seed: int | None = None,
     stiffness_n: float | None = None,
     fmu: str | Path | None = None,
+    method: str = "dife",
     progress: StageProgress = silent,
 ) -> ScenarioRun:
     """Results of a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
@@ -153,6 +155,8 @@ def run(
         Replace the scenario's seed, and the vehicle's C_x [N].
     fmu : path, optional
         The unit; by default one is built.
+    method : str
+        Estimator of the unit: as_printed, dife or robust (docs/dynamics.md).
     progress : callable
         Called with the stage, and how many of how many of its items are done.
 
@@ -163,6 +167,7 @@ def run(
     MissingExtraError
         Without the extra 'fmu'.
     """
+    which = Method.of(method)
     chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     if seed is not None:
         chosen = replace(chosen, seed=seed)
@@ -176,5 +181,5 @@ def run(
         from trpac.units import build_fmu, require_unit
 
         unit = build_fmu(scratch.name) if fmu is None else require_unit(fmu)
-        finished = run_scenario(chosen, unit, Path(scratch.name) / "frames", progress)
+        finished = run_scenario(chosen, unit, Path(scratch.name) / "frames", progress, method=which)
     return ScenarioRun(finished.table, finished.summary, finished, scratch)

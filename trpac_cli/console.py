@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
@@ -31,6 +31,14 @@ LONGEST_LINE = 900
 """Characters of that line: problems that fit are named, further ones are counted."""
 LONGEST_SHOWN = 10_000
 """Greatest number of characters of a line on the terminal."""
+MethodOption = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="Estimator:\n\nas_printed: the paper's equations, and nothing else.\n\ndife: they, guarded against noise and "
+        "wrong classes.\n\nrobust: an interval, where the tyre's curve is not known.",
+    ),
+]
 
 
 class Terminal(Console):

@@ -9,7 +9,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from trpac_cli.console import Terminal, bars, refuse, require_folder
+from trpac_cli.console import MethodOption, Terminal, bars, refuse, require_folder
 
 COMMAND = "trpac estimate"
 
@@ -35,6 +35,7 @@ def estimate(
         bool,
         typer.Option("--peers", help="Also slip-slope and two Kalman filters; takes a few times as long."),
     ] = False,
+    method: MethodOption = "dife",
 ) -> None:
     """Estimate the road's adhesion along a recorded drive.
 
@@ -63,7 +64,7 @@ def estimate(
     try:
         with bars() as progress:
             done = trpac.estimate(
-                log, vehicle, mapping=mapping, camera=camera, peers=peers, progress=progress
+                log, vehicle, mapping=mapping, camera=camera, peers=peers, method=method, progress=progress
             )
             progress("report", 0, 1)
             written = done.write(out)

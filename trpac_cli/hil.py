@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from trpac_cli.console import Terminal, complain, refuse, require_folder
+from trpac_cli.console import MethodOption, Terminal, complain, refuse, require_folder
 
 if TYPE_CHECKING:
     from trpac_hil.bus import BusSettings
@@ -66,6 +66,7 @@ def hil(
     parameter: Annotated[
         list[str] | None, typer.Option(help="NAME=VALUE of the unit, such as estimator.gamma=10; repeatable.")
     ] = None,
+    method: MethodOption = "dife",
     frames: Annotated[
         Path | None, typer.Option(help="Folder of pictures to play; without it classes come by bus.")
     ] = None,
@@ -101,7 +102,7 @@ def hil(
 
     Exit codes: 0 done or ended by Ctrl-C, 2 unusable input or no bus, 4 ran, but the log could not be written.
     """
-    from scenarios.errors import ScenarioError
+    from trpac_core.errors import TrpacError
     from trpac_hil.codec import DBC_FILE
     from trpac_hil.deadlines import SPIN_NS
     from trpac_hil.rig import run_hil
@@ -125,7 +126,7 @@ def hil(
             camera=camera,
             frames=frames,
             fps=fps,
-            parameters=_parameters(parameter),
+            parameters=_method(method) | _parameters(parameter),
             plant=_plant_job(bus, dbc, scenario, rate_hz, frames is None) if with_plant else None,
             log=not no_log,
             counters=not no_counters,
@@ -136,7 +137,7 @@ def hil(
             spin_ns=SPIN_NS,
         )
         summary = run_hil(settings)
-    except (ScenarioError, OSError) as error:
+    except (TrpacError, OSError) as error:
         refuse(COMMAND, error)
     _show(summary, out)
     if summary["log"]["problem"]:
@@ -197,6 +198,14 @@ def _bus(interface: str, channel: str | None, options: list[str] | None) -> BusS
     if chosen is None:
         raise HilError(f"--channel: missing; interface {interface} has no default here.")
     return BusSettings(interface, chosen, bus_options(options or ()))
+
+
+def _method(label: str) -> dict[str, float]:
+    """Parameters of the unit for a method; none for that which units have by default."""
+    from trpac_core.estimator_data import Method
+
+    method = Method.of(label)
+    return {} if method is Method.DIFE else {"estimator.method": method.value}
 
 
 def _parameters(pairs: list[str] | None) -> dict[str, float]:

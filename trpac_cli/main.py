@@ -11,7 +11,7 @@ from rich.table import Table
 
 from trpac_cli import fmu as fmu_commands
 from trpac_cli import gap, vision
-from trpac_cli.console import Terminal, bars, refuse, require_folder
+from trpac_cli.console import MethodOption, Terminal, bars, refuse, require_folder
 from trpac_cli.estimate import estimate
 from trpac_cli.hil import hil, hil_plant
 from trpac_cli.sweep import sweep
@@ -65,6 +65,7 @@ def run(
         float | None,
         typer.Option(min=10_000.0, max=1e6, help="C_x in place of the vehicle's, in plant and unit [N]."),
     ] = None,
+    method: MethodOption = "dife",
 ) -> None:
     """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy; write report and scores.
 
@@ -77,7 +78,9 @@ def run(
     require_folder("trpac run", out)
     try:
         with bars() as progress:
-            finished = trpac.run(scenario, seed=seed, stiffness_n=stiffness_n, fmu=fmu, progress=progress)
+            finished = trpac.run(
+                scenario, seed=seed, stiffness_n=stiffness_n, fmu=fmu, method=method, progress=progress
+            )
             finished.write(out, progress)
     except (TrpacError, OSError) as error:
         refuse("trpac run", error)
@@ -88,7 +91,7 @@ def run(
 
 def _score_table(summary: dict) -> Table:
     """The table of scores for the terminal."""
-    from scenarios.report import number, score_rows
+    from scenarios.report import number, score_rows, title
 
     table = Table(title=f"{summary['scenario']}, seed {summary['seed']}")
     headings = (
@@ -109,7 +112,7 @@ def _score_table(summary: dict) -> Table:
             number(score["convergence_time_s"], 2),
             number(score["wall_convergence_time_s"], 2),
             number(score["excited_time_s"], 2),
-            style="bold" if name == "DIFE" else None,
+            style="bold" if name == title(summary) else None,
         )
     return table
 

@@ -15,6 +15,7 @@ from .camera_side import RoadUnderWheel, take_frame
 from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
 from .dife import (
     GREATEST_THETA,
+    NEVER_SEEN_M,
     FusionState,
     Outcome,
     VisualTerm,
@@ -25,7 +26,7 @@ from .dife import (
     unread,
 )
 from .elastic import ElasticLine, learned
-from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Method, Rates, RoadClass
+from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Method, Rates, RoadClass, Source
 from .mismatch import followed
 from .paper import PrintedStep, PrintedWheel, printed_step
 from .readings import (
@@ -39,6 +40,7 @@ from .readings import (
 )
 from .robust import roads
 from .robust.belief import WheelModel
+from .robust.messages import radius_message, tyre_message
 from .robust.wheel import INNOVATION, Sample, begun, point, setup, stepped
 from .sight import Look, WheelInputs, look_at
 from .steady import quickened, unsettled
@@ -63,6 +65,7 @@ _LEAST_FRICTION = 1e-6
 """Used friction below which a reading says nothing of the tyre's curve, whatever the noise is said to be [-]."""
 BOUNDS = 2.0
 """Standard deviations from TRPAC to the ends of the interval where it is symmetric [-]."""
+_SOURCES = tuple(Source)
 _new = tuple.__new__
 
 
@@ -340,10 +343,22 @@ class TrpacEstimator:
                 high,
                 expected,
                 expected_deviation,
+                self._source(flag, excited),
                 None,
             ),
         )
         return self._last
+
+    def _source(self, flag: bool, excited: bool) -> Source:
+        """What the estimate rests on; the estimator as printed remembers no road that the tyre has shown."""
+        state, fusion = self._state, self._state.fusion
+        if state.robust is not None:
+            tyre = not state.robust.stale
+        elif self.config.method is Method.AS_PRINTED:
+            tyre = excited
+        else:
+            tyre = fusion.unseen_m < NEVER_SEEN_M and (fusion.rests or fusion.road_img is None)
+        return _SOURCES[tyre + 2 * flag]
 
     def _as_printed(
         self, sensors: Sensors, load_n: float, theta_img: float | None, step_s: float
@@ -509,6 +524,7 @@ class TrpacEstimator:
             image_confidence=Q_v,
             frame_age_s=age_s,
             **self._held_bounds(),
+            source=self._source(False, False),
             problem=problem,
         )
         return self._last
@@ -527,11 +543,23 @@ class TrpacEstimator:
         said = state.robust.said
         return {
             "TRPAC_std": math.hypot(said.std, said.mean - theta),
-            "TRPAC_low": said.low,
-            "TRPAC_high": said.high,
+            "TRPAC_low": min(said.low, theta),
+            "TRPAC_high": max(said.high, theta),
             "TRPAC_expected": said.mean,
             "TRPAC_expected_std": said.std,
         }
+
+    def messages(self) -> dict[str, str]:
+        """Sentences on what the drive shows of a car that is not as told, by what they concern; robust method only."""
+        state, known = self._state.robust, self._robust
+        if state is None or known is None:
+            return {}
+        axle = "Front" if self.config.front_axle else "Rear"
+        texts = {
+            f"{axle} tyres": tyre_message(state, known, axle, self._static_load_n),
+            f"{axle} wheels": radius_message(state, known, axle),
+        }
+        return {about: text for about, text in texts.items() if text is not None}
 
     def state(self) -> dict[str, Any]:
         """All that is remembered as JSON-able values; floats survive the round trip bit by bit."""
@@ -540,4 +568,4 @@ class TrpacEstimator:
     def restore(self, data: Mapping[str, Any]) -> None:
         """Go back to what `state` gave."""
         self._state = EstimatorState.from_json(data["state"])
-        self._last = Estimate(**data["last"])
+        self._last = Estimate(**{**data["last"], "source": Source(data["last"]["source"])})

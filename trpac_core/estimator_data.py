@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from enum import Enum
+from enum import Enum, IntEnum
 from typing import Any, NamedTuple
 
 from .confidence import ConfidenceModel
 from .dife import GREATEST_THETA, FusionState, Gains
 from .elastic import ElasticLine, ElasticModel
+from .errors import TrpacError
 from .excitation import FuzzyScheduler
 from .mismatch import Following
 from .observer import seen_at
@@ -56,13 +57,34 @@ class Method(Enum):
         """Its name in files and on the command line."""
         return self.name.lower()
 
+    @property
+    def title(self) -> str:
+        """Its name in reports."""
+        return "DIFE" if self is Method.DIFE else self.label.replace("_", " ")
+
     @classmethod
     def of(cls, label: str) -> Method:
-        """The method of a name; ValueError with the names there are."""
+        """The method of a name; TrpacError with the names there are."""
         known = {method.label: method for method in cls}
         if label not in known:
-            raise ValueError(f"estimator method is {label!r}; expected one of {', '.join(known)}.")
+            raise TrpacError(f"estimator method is {label!r}; expected one of {', '.join(known)}.")
         return known[label]
+
+
+class Source(IntEnum):
+    """What an estimate rests on; a bit for the tyre, a bit for the camera."""
+
+    NONE = 0
+    TYRE = 1
+    """The tyre has shown this road."""
+    CAMERA = 2
+    """A flagged class of the road under the wheel counts."""
+    BOTH = 3
+
+    @property
+    def label(self) -> str:
+        """Its name in files."""
+        return self.name.lower()
 
 
 @dataclass(frozen=True)
@@ -174,6 +196,7 @@ class Estimate(NamedTuple):
     """Expected friction, whatever the tyre shows now [-]."""
     TRPAC_expected_std: float = math.nan
     """Its standard deviation [-]."""
+    source: Source = Source.NONE
     problem: str | None = None
     """One sentence where the input was unusable and the last good estimate is held."""
 

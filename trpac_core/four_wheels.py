@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .car_friction import car_friction
+from .car_friction import Known, car_friction
 from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
+from .estimator_data import Source
 from .local_speed import local_speeds, motion_known
 from .readings import LONGEST_STEP_S, PLAUSIBLE, Sensors
 from .vehicle import WHEELS
@@ -86,6 +87,16 @@ class CarEstimate(NamedTuple):
     """The car's adhesion, see `car_friction` [-]."""
     TRPAC_std: float
     """Its standard deviation [-]."""
+    TRPAC_low: float
+    """The same rule applied to the wheels' lower bounds [-]."""
+    TRPAC_high: float
+    """The same rule applied to the wheels' upper bounds [-]."""
+    TRPAC_expected: float
+    """The same rule applied to the wheels' expected frictions [-]."""
+    TRPAC_expected_std: float
+    """Its standard deviation [-]."""
+    source: Source
+    """What any of the wheels' estimates rests on."""
     problems: tuple[tuple[str, str], ...] = ()
     """Who could not be estimated (a wheel's name, or `CAR` where all could not), and why."""
 
@@ -177,17 +188,22 @@ class FourWheels:
     ) -> CarEstimate:
         """The wheels' estimates and the car's."""
         fl, fr, rl, rr = estimates
-        theta, deviation = car_friction(
-            (
-                (fl.TRPAC, fl.TRPAC_std),
-                (fr.TRPAC, fr.TRPAC_std),
-                (rl.TRPAC, rl.TRPAC_std),
-                (rr.TRPAC, rr.TRPAC_std),
-            ),
-            loads_n,
-            self.config.axle_deviation,
+        axle = self.config.axle_deviation
+        deviations = fl.TRPAC_std, fr.TRPAC_std, rl.TRPAC_std, rr.TRPAC_std
+        low, high, (theta, deviation) = (
+            car_friction(_pairs(values, deviations), loads_n, axle)
+            for values in (
+                (fl.TRPAC_low, fr.TRPAC_low, rl.TRPAC_low, rr.TRPAC_low),
+                (fl.TRPAC_high, fr.TRPAC_high, rl.TRPAC_high, rr.TRPAC_high),
+                (fl.TRPAC, fr.TRPAC, rl.TRPAC, rr.TRPAC),
+            )
         )
-        return _new(CarEstimate, ((fl, fr, rl, rr), theta, deviation, problems))
+        means = fl.TRPAC_expected, fr.TRPAC_expected, rl.TRPAC_expected, rr.TRPAC_expected
+        their = fl.TRPAC_expected_std, fr.TRPAC_expected_std, rl.TRPAC_expected_std, rr.TRPAC_expected_std
+        expected = car_friction(_pairs(means, their), loads_n, axle)
+        source = Source(fl.source | fr.source | rl.source | rr.source)
+        wheels = fl, fr, rl, rr
+        return _new(CarEstimate, (wheels, theta, deviation, low[0], high[0], *expected, source, problems))
 
     def _told(self, sensors: CarSensors, problems: list[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
         """Problems by whom they concern; one that all wheels share is the car's."""
@@ -255,25 +271,46 @@ class FourWheels:
             max(rear_n + rear, LIFTED_N),
         )
 
+    def messages(self) -> dict[str, str]:
+        """Sentences on what the drive shows of a car that is not as told, once per axle and matter."""
+        fl, fr, rl, rr = (wheel.messages() for wheel in self._wheels)
+        return fr | fl | rr | rl
+
     def state(self) -> dict[str, Any]:
         """All that is remembered as JSON-able values; floats survive the round trip bit by bit."""
         return {
             "wheels": [wheel.state() for wheel in self._wheels],
             "camera": self._camera.to_json(),
-            "car": [self._last.TRPAC, self._last.TRPAC_std],
+            "car": list(self._last[1:-1]),
             "problems": [list(problem) for problem in self._last.problems],
         }
 
     def restore(self, data: Mapping[str, Any]) -> None:
         """Go back to what `state` gave."""
         camera = SidesState.from_json(data["camera"])
-        theta, deviation = data["car"]
+        theta, deviation, low, high, expected, expected_deviation, source = data["car"]
         for wheel, saved in zip(self._wheels, data["wheels"], strict=True):
             wheel.restore(saved)
         self._camera = camera
         fl, fr, rl, rr = (wheel.last for wheel in self._wheels)
         problems = tuple((who, text) for who, text in data["problems"])
-        self._last = CarEstimate((fl, fr, rl, rr), theta, deviation, problems)
+        self._last = CarEstimate(
+            (fl, fr, rl, rr),
+            theta,
+            deviation,
+            low,
+            high,
+            expected,
+            expected_deviation,
+            Source(source),
+            problems,
+        )
+
+
+def _pairs(values: Four, deviations: Four) -> tuple[Known, Known, Known, Known]:
+    """Values of the wheels with their deviations."""
+    fl, fr, rl, rr = zip(values, deviations, strict=True)
+    return fl, fr, rl, rr
 
 
 def _first_known(measured: OptionalFour, other: Four) -> Four:

@@ -101,7 +101,7 @@ def run_unit(
     Returns
     -------
     DataFrame
-        One row per step: the unit's Real and Boolean outputs at the step's end.
+        One row per step: the unit's outputs at the step's end.
 
     Raises
     ------
@@ -126,26 +126,25 @@ def run_unit(
 def _step_all(
     unit: Instance, signals: pd.DataFrame, frames: pd.DataFrame, step_s: float, progress: Progress
 ) -> pd.DataFrame:
-    real_names, flag_names = (
+    real_names, whole_names, flag_names = (
         [v.name for v in unit.variables if v.causality == "output" and v.type == kind]
-        for kind in ("Real", "Boolean")
+        for kind in ("Real", "Integer", "Boolean")
     )
-    inputs, reals, flags = map(unit.references, (INPUTS, real_names, flag_names))
+    inputs, reals, whole, flags = map(unit.references, (INPUTS, real_names, whole_names, flag_names))
     slave, picture, number = unit.slave, unit.references(["image_path"]), unit.references(["frame_id"])
     pictures = {
         int(row): (str(file), int(frame)) for row, file, frame in frames[["row", "path", "frame"]].values
     }
     values = signals[list(INPUTS)].to_numpy(dtype=float)
-    results = np.empty((len(values), len(reals) + len(flags)))
+    results = np.empty((len(values), len(reals) + len(whole) + len(flags)))
     for row, readings in enumerate(values):
         if row in pictures:
             slave.setString(picture, [pictures[row][0]])
             slave.setInteger(number, [pictures[row][1]])
         slave.setReal(inputs, readings)
         slave.doStep(currentCommunicationPoint=row * step_s, communicationStepSize=step_s)
-        results[row, : len(reals)] = slave.getReal(reals)
-        results[row, len(reals) :] = slave.getBoolean(flags)
+        results[row] = [*slave.getReal(reals), *slave.getInteger(whole), *slave.getBoolean(flags)]
         if row % 500 == 0 or row == len(values) - 1:
             progress(row + 1, len(values))
-    table = pd.DataFrame(results, columns=[*real_names, *flag_names])
-    return table.astype(dict.fromkeys(flag_names, bool))
+    table = pd.DataFrame(results, columns=[*real_names, *whole_names, *flag_names])
+    return table.astype(dict.fromkeys(whole_names, int) | dict.fromkeys(flag_names, bool))

@@ -123,8 +123,8 @@ def step_all(
             its = other.step(step_s, sensors, frame)
             theta[row, column], std[row, column] = its.TRPAC, its.TRPAC_std
         for column, peer in enumerate(peers.values(), start=len(ESTIMATORS) + len(methods)):
-            said = peer.step(step_s, sensors)
-            theta[row, column], std[row, column] = said.TRPAC, said.TRPAC_std
+            of_peer = peer.step(step_s, sensors)
+            theta[row, column], std[row, column] = of_peer.TRPAC, of_peer.TRPAC_std
     strange = [name for i, name in enumerate(names) if not np.isfinite(theta[:, i]).all()]
     if strange:
         raise ValueError(f"{strange[0]} gives an estimate that is no finite number.")

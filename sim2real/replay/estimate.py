@@ -11,8 +11,9 @@ from scenarios.library import PAPER_VEHICLE, networks_folder, shipped
 from sim2real.logs import Log
 from sim2real.replay.camera import camera_side
 from sim2real.replay.inputs import make_inputs
-from sim2real.replay.run import OURS, Replay, Told, replay, silent
+from sim2real.replay.run import Replay, Told, replay, silent
 from sim2real.replay.score import errors, excitation
+from trpac_core.estimator_data import Method
 from trpac_core.files import file_sha256
 from trpac_core.vision.camera import Camera
 
@@ -30,6 +31,7 @@ def estimate_log(
     *,
     guessed: bool = False,
     vehicle_path: Path | None = None,
+    method: Method = Method.DIFE,
 ) -> tuple[Replay, dict[str, Any]]:
     """Run the estimators along a log.
 
@@ -45,6 +47,8 @@ def estimate_log(
         Whether the car is an assumption.
     vehicle_path : Path, optional
         File of the car.
+    method : Method
+        Of our estimator.
 
     Returns
     -------
@@ -60,7 +64,7 @@ def estimate_log(
     seen = camera_side(
         read, inputs, car, lens, networks_folder(), lambda done, total: told("pictures", done, total)
     )
-    done = replay(inputs, seen, peers, told)
+    done = replay(inputs, seen, peers, told, method)
     assumed = (f"no vehicle file was given: the car is taken to be {car.name} of {TABLE_3.name}.",)
     summary = {
         "schema": 1,
@@ -76,6 +80,7 @@ def estimate_log(
             "path": None if vehicle_path is None else str(vehicle_path),
             "sha256": None if vehicle_path is None else file_sha256(vehicle_path),
         },
+        "method": method.label,
         "camera": seen.source,
         "noise": {
             "wheel_speed_rad_s": inputs.noise.wheel_speed_rad_s,
@@ -84,7 +89,7 @@ def estimate_log(
         "excitation": excitation(done),
         "estimate": _outcome(done),
         "errors": errors(done),
-        "warnings": [*(assumed if guessed else ()), *inputs.warnings, *seen.warnings],
+        "warnings": [*(assumed if guessed else ()), *inputs.warnings, *seen.warnings, *done.messages],
         "versions": {name: version(name) for name in PACKAGES},
     }
     return done, summary
@@ -92,12 +97,13 @@ def estimate_log(
 
 def _outcome(done: Replay) -> dict[str, float | None]:
     """The car's estimate at the end, and how sure it was where the tyre was seen."""
-    theta, std, peak = done.traces[OURS].of_the_car
+    theta, std, peak = done.ours.of_the_car
     seen = done.seen.any(axis=1) & done.inputs.moving
     return {
         "TRPAC_end": float(theta[-1]),
         "TRPAC_std_end": float(std[-1]),
         "TRPAC_peak_end": float(peak[-1]),
+        **{f"{name}_end": float(values[-1]) for name, values in done.of_the_car.items()},
         "mean_std_seen": float(std[seen].mean()) if seen.any() else None,
         "mean_std": float(std[done.inputs.moving].mean()),
     }

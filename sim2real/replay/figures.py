@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from sim2real.replay.run import DYNAMICS, OURS, Replay
+from sim2real.replay.run import DYNAMICS, Replay
 from sim2real.telling.figures import AFTER, BEFORE, DPI, FLOOR, MEASURED, STYLE, WIDTH_IN
+from trpac_core.estimator_data import Method
 from trpac_core.tyre import INITIAL_SLOPE
 from trpac_core.vehicle import WHEELS
 
@@ -50,19 +51,23 @@ def _sheet(rows: int, height_in: float, ratios: tuple[float, ...]) -> Iterator[t
 def estimate(done: Replay) -> bytes:
     """The car's estimate with its band and reference, the flags, and what the drive was like."""
     time_s = done.inputs.time_s
-    theta, std, peak = done.traces[OURS].of_the_car
+    theta, std, peak = done.ours.of_the_car
     share = peak / theta
+    if done.method is Method.ROBUST:
+        low, high, band = done.of_the_car["TRPAC_low"], done.of_the_car["TRPAC_high"], "95 % interval"
+    else:
+        low, high, band = theta - 2 * std, theta + 2 * std, "within 2 TRPAC_std"
     with _sheet(4, 6.6, (2.6, 0.5, 1.0, 1.0)) as (axes, buffer):
         top, flags, speed, torque = axes
         top.fill_between(
             time_s,
-            share * (theta - 2 * std),
-            share * (theta + 2 * std),
+            share * low,
+            share * high,
             color=BAND,
             lw=0,
-            label="within 2 TRPAC_std",
+            label=band,
         )
-        top.plot(time_s, peak, color=AFTER, lw=1.6, label="TRPAC_peak (DIFE)")
+        top.plot(time_s, peak, color=AFTER, lw=1.6, label=f"TRPAC_peak ({done.method.title})")
         if done.camera.left or done.camera.right:
             top.plot(
                 time_s,
@@ -96,7 +101,7 @@ def _flags(axis: Axes, done: Replay) -> None:
     strips = (
         ("camera used", done.flag.any(axis=1), BEFORE),
         ("tyre seen", done.seen.any(axis=1), AFTER),
-        ("excited", done.traces[OURS].excited.any(axis=1), FLOOR),
+        ("excited", done.ours.excited.any(axis=1), FLOOR),
     )
     for height, (_, rows, colour) in enumerate(strips):
         axis.fill_between(
@@ -119,7 +124,7 @@ def wheels(done: Replay) -> bytes:
     time_s = done.inputs.time_s
     with _sheet(3, 5.6, (1.4, 1.0, 1.0)) as (axes, buffer):
         panels = (
-            (axes[0], done.traces[OURS].peak, "TRPAC_peak [-]", (0.0, TOP_THETA)),
+            (axes[0], done.ours.peak, "TRPAC_peak [-]", (0.0, TOP_THETA)),
             (axes[1], done.slip, "slip [-]", (0.0, _largest(done.slip))),
             (axes[2], done.used_friction, "used friction [-]", (0.0, min(_largest(done.used_friction), 1.5))),
         )
@@ -156,7 +161,7 @@ def curve(done: Replay) -> bytes:
             )
         most_slip, most_friction = _largest(done.slip[rows]), min(_largest(done.used_friction[rows]), 1.5)
         # The load is the wheels' mean: the line is to be held beside the points, not through them.
-        load_n = float(np.nanmean(done.traces[OURS].load_n[rows]))
+        load_n = float(np.nanmean(done.ours.load_n[rows]))
         told = INITIAL_SLOPE * done.inputs.vehicle.longitudinal_stiffness_n / load_n
         end = min(most_slip, most_friction / told)
         axis.plot(
@@ -175,13 +180,13 @@ def curve(done: Replay) -> bytes:
 def compared(done: Replay) -> bytes:
     """The car's estimate beside those of the peers."""
     time_s = done.inputs.time_s
-    others = [name for name in done.traces if name not in (OURS, DYNAMICS)]
+    others = [name for name in done.traces if name not in (done.method.title, DYNAMICS)]
     with _sheet(1, 3.2, (1.0,)) as (axes, buffer):
         axis = axes[0]
         for name, colour in zip(others, PEER_COLOURS, strict=True):
             axis.plot(time_s, done.traces[name].of_the_car[2], color=colour, lw=0.9, label=name)
         axis.plot(time_s, done.traces[DYNAMICS].of_the_car[2], color=FLOOR, lw=1.0, label=DYNAMICS)
-        axis.plot(time_s, done.traces[OURS].of_the_car[2], color=AFTER, lw=1.6, label=OURS)
+        axis.plot(time_s, done.ours.of_the_car[2], color=AFTER, lw=1.6, label=done.method.title)
         if done.inputs.mu_reference is not None:
             axis.plot(
                 time_s, done.inputs.mu_reference, color=MEASURED, lw=1.2, ls=(0, (4, 3)), label="mu_reference"

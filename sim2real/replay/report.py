@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from scenarios.html_page import data_address, page
 from scenarios.whole_files import written_whole
 from sim2real.replay import figures
-from sim2real.replay.run import DYNAMICS, OURS, Replay
+from sim2real.replay.run import DYNAMICS, Replay
 from sim2real.telling.report import DASH, jsonable
+from trpac_core.estimator_data import Method, Source
 from trpac_core.vehicle import WHEELS
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
@@ -25,8 +27,8 @@ WIDE_STD = 0.15
 
 
 def estimates_table(done: Replay) -> pd.DataFrame:
-    """estimates.csv: the car's estimate, then TRPAC per wheel, then TRPAC_peak and the deviation per wheel."""
-    ours = done.traces[OURS]
+    """estimates.csv: the car's estimate, TRPAC per wheel, TRPAC_peak, the deviation per wheel, interval and source."""
+    ours = done.ours
     theta, std, peak = ours.of_the_car
     flags = done.flag.any(axis=1), ours.excited.any(axis=1)
     columns: dict[str, Any] = {
@@ -39,11 +41,21 @@ def estimates_table(done: Replay) -> pd.DataFrame:
         **{f"TRPAC_{w}": ours.theta[:, i] for i, w in enumerate(WHEELS)},
         "TRPAC_peak": peak,
         **{f"TRPAC_std_{w}": ours.std[:, i] for i, w in enumerate(WHEELS)},
+        **done.of_the_car,
+        "TRPAC_source": _labels(np.bitwise_or.reduce(done.source, axis=1)),
+        **{f"TRPAC_low_{w}": done.low[:, i] for i, w in enumerate(WHEELS)},
+        **{f"TRPAC_high_{w}": done.high[:, i] for i, w in enumerate(WHEELS)},
+        **{f"TRPAC_source_{w}": _labels(done.source[:, i]) for i, w in enumerate(WHEELS)},
     }
     for name, trace in done.traces.items():
-        if name not in (OURS, DYNAMICS):
+        if name not in (done.method.title, DYNAMICS):
             columns[f"TRPAC_{name.replace('-', '_')}"] = trace.of_the_car[0]
     return pd.DataFrame(columns)
+
+
+def _labels(source: NDArray[np.int_]) -> list[str]:
+    """Words for what estimates rest on."""
+    return [Source(value).label for value in source.tolist()]
 
 
 def write_replay(done: Replay, summary: dict[str, Any], folder: Path) -> tuple[Path, ...]:
@@ -77,7 +89,8 @@ def render(done: Replay, summary: dict[str, Any]) -> str:
         s=summary,
         pictures=pictures,
         verdict=verdict(summary),
-        ours=OURS,
+        ours=done.method.title,
+        interval=done.method is Method.ROBUST,
         dynamics=DYNAMICS,
     )
 
@@ -98,7 +111,8 @@ def verdict(summary: dict[str, Any]) -> str:
     )
     if driven["mean_std_seen"] is not None and driven["mean_std_seen"] > WIDE_STD:
         sentences.append("Its deviation is wide even where the tyre is seen: take it as a hint.")
-    error = (summary["errors"] or {}).get(OURS, {}).get("seen", {})
+    ours = Method.of(summary["method"]).title
+    error = (summary["errors"] or {}).get(ours, {}).get("seen", {})
     if error.get("mean_abs") is not None:
         sentences.append(
             f"Where the tyre is seen, TRPAC_peak is {error['mean_abs']:.3f} off the reference in the mean, and "

@@ -14,6 +14,7 @@ from sim2real.replay.camera import NO_CAMERA, CameraSide
 from sim2real.replay.inputs import Inputs
 from sim2real.replay.vehicle_level import vehicle_level
 from trpac_core.estimator import Estimate, EstimatorConfig, TrpacEstimator
+from trpac_core.estimator_data import Method
 from trpac_core.readings import Sensors
 from trpac_core.tyre import peak_friction
 from trpac_core.vehicle import WHEELS
@@ -21,7 +22,7 @@ from trpac_core.vehicle import WHEELS
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-OURS, DYNAMICS = "DIFE", "DE"
+OURS, DYNAMICS = Method.DIFE.title, "DE"
 TOLD_EVERY = 2000
 """Rows between two reports of progress."""
 
@@ -76,11 +77,19 @@ class Replay:
     inputs, camera : Inputs, CameraSide
         What they were told.
     traces : dict
-        By name: DIFE, DE, and the peers that were asked for.
+        By name: ours by its method's title, DE, and the peers that were asked for.
     flag, seen, usable : array of bool, shape (n, 4)
         The camera's verdict is used; the tyre moved the estimate; the readings were usable.
     K_v, slip, used_friction : array, shape (n, 4)
-        Of DIFE.
+        Of ours.
+    low, high, expected, expected_std : array, shape (n, 4)
+        Bounds of the interval, mean and deviation of what the road's TRPAC may be, of ours [-].
+    source : array of int, shape (n, 4)
+        `Source` of ours.
+    method : Method
+        Of ours.
+    messages : tuple of str
+        What the drive shows of a car that is not as told.
     """
 
     inputs: Inputs
@@ -92,6 +101,30 @@ class Replay:
     K_v: Array
     slip: Array
     used_friction: Array
+    low: Array
+    high: Array
+    expected: Array
+    expected_std: Array
+    source: NDArray[np.int_]
+    method: Method
+    messages: tuple[str, ...]
+
+    @property
+    def ours(self) -> Trace:
+        """Our estimator."""
+        return self.traces[self.method.title]
+
+    @cached_property
+    def of_the_car(self) -> dict[str, Array]:
+        """Interval, mean and deviation for the car by column of estimates.csv, shape (n,) each [-]."""
+        std, load_n = self.ours.std, self.ours.load_n
+        expected, expected_std = vehicle_level(self.expected, self.expected_std, load_n)
+        return {
+            "TRPAC_low": vehicle_level(self.low, std, load_n)[0],
+            "TRPAC_high": vehicle_level(self.high, std, load_n)[0],
+            "TRPAC_expected": expected,
+            "TRPAC_expected_std": expected_std,
+        }
 
 
 def replay(
@@ -99,8 +132,9 @@ def replay(
     camera: CameraSide = NO_CAMERA,
     peers: bool = False,
     told: Told = silent,
+    method: Method = Method.DIFE,
 ) -> Replay:
-    """Run DIFE and DE, and the peers where asked for, on all four wheels.
+    """Run our estimator and DE, and the peers where asked for, on all four wheels.
 
     Parameters
     ----------
@@ -110,8 +144,14 @@ def replay(
         Whether the estimators of the literature run as well.
     told : callable
         Told the stage, and how many of how many rows are done.
+    method : Method
+        Of our estimator.
     """
-    columns = [_our_wheel(inputs, camera, i, told) for i in range(len(WHEELS))]
+    wheels = [_our_wheel(inputs, camera, i, told, method) for i in range(len(WHEELS))]
+    columns = [said for said, _ in wheels]
+    messages: dict[str, str] = {}
+    for _, of_wheel in reversed(wheels):
+        messages |= of_wheel
 
     def of(name: str) -> Array:
         return np.array([[getattr(e, name) for e in column] for column in columns], dtype=np.float64).T
@@ -120,10 +160,10 @@ def replay(
     theta, alone, excited = of("TRPAC"), of("TRPAC_dynamics"), of("excitation_flag") > 0.0
     ours = Trace(theta, of("TRPAC_std"), of("TRPAC_peak"), excited, load_n)
     dynamics = ours
-    if camera.left or camera.right:
+    if camera.left or camera.right or method is Method.ROBUST:
         peak = _peaks(alone, load_n, inputs.vehicle.longitudinal_stiffness_n)
         dynamics = Trace(alone, np.full_like(alone, np.nan), peak, excited, load_n)
-    traces = {OURS: ours, DYNAMICS: dynamics}
+    traces = {method.title: ours, DYNAMICS: dynamics}
     if peers:
         traces |= _peer_traces(inputs, load_n, told)
     moved = np.diff(alone, axis=0, prepend=EstimatorConfig.theta_initial) != 0.0
@@ -137,11 +177,20 @@ def replay(
         K_v=of("K_v"),
         slip=of("slip"),
         used_friction=np.abs(of("tyre_force_n")) / load_n,
+        low=of("TRPAC_low"),
+        high=of("TRPAC_high"),
+        expected=of("TRPAC_expected"),
+        expected_std=of("TRPAC_expected_std"),
+        source=of("source").astype(int),
+        method=method,
+        messages=tuple(messages.values()),
     )
 
 
-def _our_wheel(inputs: Inputs, camera: CameraSide, wheel: int, told: Told) -> list[Estimate]:
-    """Our estimator on one wheel."""
+def _our_wheel(
+    inputs: Inputs, camera: CameraSide, wheel: int, told: Told, method: Method
+) -> tuple[list[Estimate], dict[str, str]]:
+    """Our estimator on one wheel, and the last of its messages by what they concern."""
     name = WHEELS[wheel]
     config = EstimatorConfig(
         vehicle=inputs.vehicle,
@@ -149,14 +198,17 @@ def _our_wheel(inputs: Inputs, camera: CameraSide, wheel: int, told: Told) -> li
         left_side=name.endswith("l"),
         preview=camera.preview,
         sliding_speed_noise_m_s=float(inputs.noise.sliding_speed_m_s[wheel]),
+        method=method,
     )
     estimator, frames, said = TrpacEstimator(config), camera.of(name.endswith("l")), []
+    messages: dict[str, str] = {}
     step_s = inputs.step_s
     for row, sensors in enumerate(readings(inputs, wheel)):
         frame = frames.get(row)
         said.append(estimator.step(step_s, sensors, frame, frame_failed=row in frames and frame is None))
+        messages |= estimator.messages()
         _tell(told, f"estimator {name}", row + 1, len(inputs))
-    return said
+    return said, messages
 
 
 def _peer_traces(inputs: Inputs, load_n: Array, told: Told) -> dict[str, Trace]:

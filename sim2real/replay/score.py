@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.replay.run import OURS, Replay
+from sim2real.replay.run import Replay
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -92,7 +92,7 @@ def excitation(done: Replay) -> dict[str, float]:
 
     return {
         "driven_s": float(np.count_nonzero(moving) * done.inputs.step_s),
-        "excited_share": share(done.traces[OURS].excited),
+        "excited_share": share(done.ours.excited),
         "seen_share": share(done.seen),
         "camera_share": share(done.flag),
         "unusable_share": share(~done.usable),

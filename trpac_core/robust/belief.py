@@ -261,3 +261,8 @@ def read(
 def told_formula(belief: Belief) -> float:
     """Probability that the tyre has the told formula [-]."""
     return float(math.fsum(belief.tyre[:FORMULAS].tolist()))
+
+
+def mean_offset(belief: Belief) -> float:
+    """Mean of the slip offset over all tyres and cells [-]."""
+    return float((belief.tyre * (belief.road * belief.offset).sum(axis=1)).sum())

@@ -14,7 +14,18 @@ import numpy as np
 
 from ..elastic import ElasticModel
 from .arrays import Array
-from .belief import Belief, Hypotheses, WheelModel, driven, hypotheses, read, shows, told_formula, unread
+from .belief import (
+    Belief,
+    Hypotheses,
+    WheelModel,
+    driven,
+    hypotheses,
+    mean_offset,
+    read,
+    shows,
+    told_formula,
+    unread,
+)
 from .blocks import BLOCK_S, Filling, Means, Noise, heard, means_of, reading
 from .interval import Interval, interval
 from .roads import STOOD_M, ClassUnderWheel, Priors, advanced, cells, prior_of, priors
@@ -26,6 +37,10 @@ DOUBTED, BELIEVED = 0.05, 0.2
 """Probability of the told formula up to which the observer does not count, and from which it counts fully [-]."""
 LEAST_TOLERANCE = 1e-4
 """Tolerance of radius and stiffness below which they are not taken: a filter divides by what it does not know [-]."""
+LEAST_USED_SHARE = 0.1
+"""Share of TRPAC below which the used friction does not tell one tyre from another [-]."""
+OFFSET_DEVIATIONS = 2.0
+"""Told standard deviations beyond which the slip offset contradicts what is told [-]."""
 SCALE_DEVIATION = 0.04
 """Standard deviation of TRPAC by mass, torque and load, as a share of it [-]."""
 
@@ -119,6 +134,8 @@ class RobustState:
         Way since the observer last read the road [m].
     stale : bool
         Whether the camera has since found another road.
+    doubted_s, offset_s : float
+        Time of readings since which the told formula, and the told tolerance of the radius, are not believed [s].
     """
 
     belief: Belief
@@ -133,6 +150,8 @@ class RobustState:
     speed_noise: Noise
     unread_m: float
     stale: bool
+    doubted_s: float = 0.0
+    offset_s: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
@@ -157,6 +176,8 @@ class RobustState:
             Noise(*data["speed_noise"]),
             data["unread_m"],
             data["stale"],
+            data["doubted_s"],
+            data["offset_s"],
         )
 
 
@@ -292,10 +313,18 @@ def _on_road(
             state.speed_noise.variance,
             known.torque_noise_nm,
         )
+    said = interval(belief, known.theta)
+    doubted_s, offset_s = state.doubted_s, state.offset_s
+    if now is not None:
+        if told_formula(belief) >= BELIEVED:
+            doubted_s = 0.0
+        elif abs(friction) > LEAST_USED_SHARE * said.mean:
+            doubted_s += duration_s
+        offset_s = offset_s + duration_s if _offset_is_strange(belief, known, slowness) else 0.0
     return replace(
         state,
         belief=belief,
-        said=interval(belief, known.theta),
+        said=said,
         memory=memory,
         filling=Filling(),
         before=means,
@@ -304,7 +333,15 @@ def _on_road(
         way_m=0.0,
         # What the observer reads on the class's own road is not undone by it.
         stale=state.stale or (stood and state.unread_m > STOOD_M),
+        doubted_s=doubted_s,
+        offset_s=offset_s,
     )
+
+
+def _offset_is_strange(belief: Belief, known: RobustSetup, slowness_s_m: float) -> bool:
+    """Whether the slip offset lies beyond what radius and speed bias are told to make of it."""
+    told = known.tyres.offset_variance[TOLD, 0] + (known.speed_bias_m_s * slowness_s_m) ** 2
+    return bool(mean_offset(belief) ** 2 > OFFSET_DEVIATIONS**2 * told)
 
 
 def point(state: RobustState, observer: float) -> tuple[float, float]:
