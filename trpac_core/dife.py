@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple
 
-from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
-from .observer import advanced_state, observed_force, settled_state
-from .sight import (
+from .identifiability import (
     GREATEST_THETA,
     LEAST_SENSITIVITY,
     Look,
@@ -24,7 +22,9 @@ from .sight import (
     place_of_mean,
     shown,
 )
-from .steady import NOTHING, Steady, faded, held, quickened, same_slip
+from .observer import advanced_state, observed_force, settled_state
+from .stationary_mean import NOTHING, Steady, faded, held, quickened, same_slip
+from .theta_variance import ConfidenceModel, camera_share
 from .tyre import elastic_friction, force, sensitivity_of
 
 __all__ = [

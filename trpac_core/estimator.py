@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import paper as printed
-from .camera_side import RoadUnderWheel, take_frame
-from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
 from .dife import (
     GREATEST_THETA,
     NEVER_SEEN_M,
@@ -25,11 +23,16 @@ from .dife import (
     settled,
     unread,
 )
-from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Method, Rates, RoadClass, Source
-from .mismatch import followed
+from .identifiability import Look, WheelInputs, look_at
 from .paper import PrintedStep, PrintedWheel, printed_step
-from .readings import (
+from .preprocessing import LOCKED_M_S, jumped, wheel_inputs
+from .road_buffer import RoadUnderWheel, take_frame
+from .robust import roads
+from .robust.belief import WheelModel
+from .robust.messages import radius_message, tyre_message
+from .robust.wheel import INNOVATION, Sample, begun, point, setup, stepped
+from .sensors import (
     GREATEST_ACCELERATION_M_S2,
     LONGEST_STEP_S,
     MOTION,
@@ -38,16 +41,20 @@ from .readings import (
     plain,
     unusable,
 )
-from .robust import roads
-from .robust.belief import WheelModel
-from .robust.messages import radius_message, tyre_message
-from .robust.wheel import INNOVATION, Sample, begun, point, setup, stepped
-from .sight import Look, WheelInputs, look_at
-from .steady import quickened, unsettled
+from .slip_calibration import ElasticLine, learned
+from .stationary_mean import quickened, unsettled
+from .stiffness_mismatch import followed
+from .theta_variance import (
+    Evidence,
+    advanced_variance,
+    reading_noise,
+    unknown_variance,
+    wandered,
+    with_camera,
+)
 from .tyre import TyreAtSlip, cubic_at_slip
 from .vision.ife import Ife
 from .vision.preview import PreviewState
-from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
 
 __all__ = [
     "LOCKED_M_S",

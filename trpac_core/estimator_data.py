@@ -8,15 +8,13 @@ from dataclasses import dataclass, field, fields, replace
 from enum import Enum, IntEnum
 from typing import Any, NamedTuple
 
-from .confidence import ConfidenceModel
 from .dife import GREATEST_THETA, FusionState, Gains
-from .elastic import ElasticLine, ElasticModel
 from .errors import TrpacError
 from .excitation import FuzzyScheduler
-from .mismatch import Following
 from .observer import seen_at
 from .paper import Printed
-from .readings import (
+from .robust.wheel import RobustState
+from .sensors import (
     GREATEST_ACCELERATION_M_S2,
     JUMP_M_S,
     RIM_ACCELERATION_M_S2,
@@ -24,8 +22,10 @@ from .readings import (
     Readings,
     filter_share,
 )
-from .robust.wheel import RobustState
-from .steady import Steady
+from .slip_calibration import ElasticLine, ElasticModel
+from .stationary_mean import Steady
+from .stiffness_mismatch import Following
+from .theta_variance import ConfidenceModel
 from .tyre import peak_friction
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface

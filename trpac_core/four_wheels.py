@@ -14,7 +14,7 @@ from .car_friction import Known, car_friction
 from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
 from .estimator_data import Source
 from .local_speed import local_speeds, motion_known
-from .readings import LONGEST_STEP_S, PLAUSIBLE, Sensors
+from .sensors import LONGEST_STEP_S, PLAUSIBLE, Sensors
 from .vehicle import WHEELS
 from .vision.results import FrameResult
 from .vision.sides import SidesIfe, SidesState

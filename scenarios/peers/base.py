@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from trpac_core.confidence import ConfidenceModel
-from trpac_core.readings import GREATEST_ACCELERATION_M_S2, Sensors, filter_share, unusable
+from trpac_core.sensors import GREATEST_ACCELERATION_M_S2, Sensors, filter_share, unusable
+from trpac_core.theta_variance import ConfidenceModel
 from trpac_core.vehicle import Vehicle
 
 UNKNOWN = ConfidenceModel.unknown

@@ -26,7 +26,7 @@ from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.parameters.configuration import configuration
 from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.tyre import friction_by_theta
 from trpac_core.vehicle import WHEELS, Vehicle
 from trpac_core.vision.classes import Surface

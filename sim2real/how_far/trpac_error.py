@@ -26,11 +26,11 @@ from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
 from sim2real.observing.noise import read_noise
 from sim2real.observing.observer import Prediction, Simulation
 from sim2real.result import RmsError
-from trpac_core.elastic import AS_TOLD
 from trpac_core.estimator import LOCKED_M_S, EstimatorConfig, TrpacEstimator
-from trpac_core.readings import Sensors, filter_share
-from trpac_core.sight import WheelInputs, visible_theta
+from trpac_core.identifiability import WheelInputs, visible_theta
+from trpac_core.sensors import Sensors, filter_share
 from trpac_core.slip import GREATEST_SLIP, Slip
+from trpac_core.slip_calibration import AS_TOLD
 from trpac_core.tyre import used_friction
 from trpac_core.vehicle import Vehicle
 

@@ -8,7 +8,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from trpac_core import tyre
-from trpac_core.confidence import ConfidenceModel
 from trpac_core.dife import (
     GREATEST_THETA,
     LEAST_THETA,
@@ -25,8 +24,9 @@ from trpac_core.dife import (
     settled,
 )
 from trpac_core.excitation import FuzzyScheduler
-from trpac_core.sight import WheelInputs, least_theta, look_at, visible_theta
+from trpac_core.identifiability import WheelInputs, least_theta, look_at, visible_theta
 from trpac_core.slip import Slip
+from trpac_core.theta_variance import ConfidenceModel
 
 WHEEL = Wheel(1.2, 0.29, 50_000.0)
 SCHEDULER = FuzzyScheduler()

@@ -10,13 +10,13 @@ import pytest
 from scipy.integrate import quad
 
 from trpac_core import tyre
-from trpac_core.confidence import unknown_variance, wandered
 from trpac_core.dife import NEVER_SEEN_M
-from trpac_core.elastic import AS_TOLD, ElasticModel
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.observer import seen_at
-from trpac_core.readings import Sensors
-from trpac_core.steady import NOTHING, Steady, faded, mean_deviation
+from trpac_core.sensors import Sensors
+from trpac_core.slip_calibration import AS_TOLD, ElasticModel
+from trpac_core.stationary_mean import NOTHING, Steady, faded, mean_deviation
+from trpac_core.theta_variance import unknown_variance, wandered
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
 

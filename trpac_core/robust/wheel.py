@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..elastic import ElasticModel
+from ..slip_calibration import ElasticModel
 from .arrays import Array
 from .belief import (
     Belief,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from .excitation import FuzzyScheduler
 from .slip import GREATEST_SLIP
-from .steady import Steady, mean_deviation
+from .stationary_mean import Steady, mean_deviation
 from .tyre import Cubic, cubic_at_slip, elastic_friction, theta_of
 
 GREATEST_THETA = 1.2

@@ -9,8 +9,8 @@ import pytest
 
 from trpac_core import tyre
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
-from trpac_core.mismatch import Following, followed
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
+from trpac_core.stiffness_mismatch import Following, followed
 from trpac_core.vehicle import Vehicle
 
 CAR = Vehicle()

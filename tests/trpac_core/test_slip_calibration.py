@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trpac_core.elastic import AS_TOLD, CORRELATED, SETTLING, ElasticModel, learned
+from trpac_core.slip_calibration import AS_TOLD, CORRELATED, SETTLING, ElasticModel, learned
 from trpac_core.tyre import INITIAL_SLOPE, used_friction
 
 LOAD_N, C_X = 3400.0, 50_000.0

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 from .estimator_data import EstimatorConfig, EstimatorState, Rates
-from .readings import Readings, Sensors
-from .sight import WheelInputs
+from .identifiability import WheelInputs
+from .sensors import Readings, Sensors
 from .slip import GREATEST_SLIP, signed_slip
 
 MOST_AHEAD = 2.0

@@ -7,9 +7,9 @@ import pytest
 
 from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
 from trpac_core.excitation import FuzzyScheduler
-from trpac_core.sight import YOUNG_S, WheelInputs, backed_theta, look_at, place_of_mean, shown
+from trpac_core.identifiability import YOUNG_S, WheelInputs, backed_theta, look_at, place_of_mean, shown
 from trpac_core.slip import Slip
-from trpac_core.steady import (
+from trpac_core.stationary_mean import (
     ELSEWHERE,
     MEMORY_S,
     NOTHING,

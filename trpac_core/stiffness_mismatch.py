@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from .elastic import CONTRADICTED, CORRELATED, REJECTED
+from .slip_calibration import CONTRADICTED, CORRELATED, REJECTED
 
 MEAN_S = 0.5
 """Time constant of the running means: a stroke of the pedal [s]."""

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from trpac_core.confidence import (
+from trpac_core.theta_variance import (
     GREATEST_ROAD,
     LEAST_ROAD,
     ConfidenceModel,

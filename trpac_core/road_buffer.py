@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .estimator_data import EstimatorConfig, EstimatorState, RoadClass
-from .readings import Sensors
+from .sensors import Sensors
 from .vision.ife import Ife
 from .vision.preview import Outcome, PreviewConfig, PreviewState, add_frame, covering, prune
 from .vision.trajectory import Motion
