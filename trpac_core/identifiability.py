@@ -5,25 +5,24 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from .excitation import FuzzyScheduler
-from .slip import GREATEST_SLIP
-from .stationary_mean import Steady, mean_deviation
-from .tyre import Cubic, cubic_at_slip, elastic_friction, theta_of
+from .slip import GREATEST_SLIP, Slip
+from .stationary_mean import StationaryMean, mean_slip_deviation
+from .tyre import TyreAtSlip, sliding_onset_friction, tyre_at_slip
 
 GREATEST_THETA = 1.2
 """Upper end of what the estimate may be: the domain of the difference in section 4.2 [-]."""
 SIGNIFICANCE = 1.5
-"""How many standard deviations of slip must lie between the tyre and one that does not slide at all, for a mean that
-has long been held [-]."""
-YOUNG = 1.0
-"""How many more for a single reading [-]: a young mean is another one at each step, and one of many is soon far off."""
-YOUNG_S = 0.08
-"""Time with which a mean that is held outgrows that [s]."""
-AT_ONCE = SIGNIFICANCE + YOUNG
-BACKED_SIGNIFICANCE = 0.25
-"""The same where the camera's class is that of such a road: two witnesses need less of each [-]."""
-BACKED_AFTER_S = 0.02
-"""How long a mean must have been held for that: as long as its noise takes to forget itself [s]."""
+"""How many standard deviations of slip must lie between the tyre and one that does not slide at all, for a mean over
+a long time [-]."""
+SHORT_MEAN_SIGNIFICANCE = 1.0
+"""How many more for a single reading [-]: a short mean is another one at each step, and one of many is soon far off."""
+SHORT_MEAN_S = 0.08
+"""Time constant with which a longer mean needs less of that [s]."""
+READING_SIGNIFICANCE = SIGNIFICANCE + SHORT_MEAN_SIGNIFICANCE
+CONFIRMED_SIGNIFICANCE = 0.25
+"""The same where the camera's class is that of such a road: two independent sources need less of each [-]."""
+CONFIRMED_AFTER_S = 0.02
+"""Least duration of a mean for that: as long as its noise takes to forget itself [s]."""
 NEAR_CLASS = 0.15
 """How far roads lie about the value of their class [-]."""
 LEAST_SENSITIVITY = 0.1
@@ -39,13 +38,12 @@ class WheelInputs(NamedTuple):
     """Mean over the step to come: a wheel that gains speed would else seem to bear too much force."""
     wheel_torque_nm: float
     """Mean over the step to come."""
-    slip: tuple[float, float]
-    """Size and direction, as in `Slip`."""
+    slip: Slip
     load_n: float
     slip_deviation: float
     """Standard deviation of the slip through sensor noise and a bias that is not known better [-]."""
     slip_change: float
-    """Distance of the slip from its own, once more filtered, course [-]: force and slip of a tyre that is being
+    """Distance of the slip from its lagged value (filtered once more) [-]: force and slip of a tyre that is being
     loaded or unloaded pass the filter along the chord of its bent curve, and lie that far beside it."""
     way_m: float = 0.0
     """Way driven over the step to come [m]."""
@@ -53,107 +51,92 @@ class WheelInputs(NamedTuple):
     """False at a locked wheel: its brake holds what the road gives, whatever was commanded."""
     slip_noise: float = 0.0
     """Standard deviation of the filtered slip through noise alone, which a mean over time lessens [-]."""
-    slip_doubt: float = 0.0
-    """That of slip's steady offset and of the tyre's curve, which no mean lessens, as far as it counts [-]."""
+    slip_bias_deviation: float = 0.0
+    """That of slip's constant offset and of the tyre's curve, which no mean lessens, as far as it counts [-]."""
     slip_rise: float = 0.0
     """`slip_change` with its sign: positive while the tyre is being loaded [-]."""
     noise_s: float = 1.0
     """Time in which the filtered noise forgets itself: twice the filter's constant [s]."""
 
-
-Look = tuple[Cubic, float, float]
-"""What slip and load say before any force is known, the same for DE and DIFE: the tyre, the slip that stands beyond
-noise, 0 or less where noise hides it [-], and the excitation threshold without a picture [-]."""
-
-Place = tuple[Steady, Cubic, float, float]
-"""Where on the curve the mean of slip stands, the same for DE and DIFE: the means of which it is taken (used friction
-does not count), the tyre there, the used friction below which it surely slides, 0 where noise hides it [-], and the
-deviation of the mean [-]."""
+    def friction(self, force_n: float) -> float:
+        """Used friction of a force in the direction of the slip [-]."""
+        return force_n * self.slip.direction / self.load_n
 
 
-def look_at(inputs: WheelInputs, longitudinal_stiffness_n: float, scheduler: FuzzyScheduler) -> Look:
-    """What slip and load say of the tyre.
+class OperatingPoint(NamedTuple):
+    """Where on the tyre's curve the wheel is, by slip and load."""
+
+    tyre: TyreAtSlip
+    slides_below: float
+    """Used friction below which the tyre slides with significance; 0 where noise hides it [-]."""
+
+    def theta(self, friction: float) -> float | None:
+        """theta(lambda, F) of a used friction; None where it is not identifiable [-]."""
+        if friction > self.slides_below or self.slides_below == 0.0:
+            return None
+        theta = self.tyre.theta(friction)
+        if theta is None or self.tyre.friction_by_theta(theta) < LEAST_SENSITIVITY:
+            return None
+        return min(theta, GREATEST_THETA)
+
+
+def point_of_reading(inputs: WheelInputs, longitudinal_stiffness_n: float) -> OperatingPoint:
+    """The operating point of the newest reading.
 
     On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
     end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
-    So the force must also be below the elastic one of a slip that is `AT_ONCE` deviations smaller.
+    So the force must also be below the elastic one of a slip that is `READING_SIGNIFICANCE` deviations smaller.
     """
-    size, load_n, deviation, change = inputs[3][0], inputs[4], inputs[5], inputs[6]
-    surely = size - AT_ONCE * (deviation + change)
-    threshold = scheduler.threshold(None, load_n, longitudinal_stiffness_n, deviation)
-    return cubic_at_slip(size, load_n, longitudinal_stiffness_n), surely, threshold
+    slip, load_n = inputs.slip.size, inputs.load_n
+    least_slip = slip - READING_SIGNIFICANCE * (inputs.slip_deviation + inputs.slip_change)
+    return OperatingPoint(
+        tyre_at_slip(slip, load_n, longitudinal_stiffness_n),
+        sliding_onset_friction(least_slip, load_n, longitudinal_stiffness_n),
+    )
 
 
-def shown(friction: float, tyre: Cubic, slides_below: float) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it.
-
-    Below `slides_below` the tyre surely slides; 0 where noise hides it [-].
-    """
-    if friction > slides_below or slides_below == 0.0:
-        return None, 0.0
-    theta = theta_of(friction, tyre)
-    if theta is None:
-        return None, 0.0
-    _, g_0, g_1, kappa = tyre
-    sensitivity = (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
-    if sensitivity < LEAST_SENSITIVITY:
-        return None, 0.0
-    return (theta if theta < GREATEST_THETA else GREATEST_THETA), sensitivity
+def point_of_mean(
+    mean: StationaryMean, inputs: WheelInputs, longitudinal_stiffness_n: float, significance: float
+) -> OperatingPoint:
+    """The operating point of the mean slip, which slides with a significance in standard deviations [-]."""
+    deviation = mean_slip_deviation(mean, inputs.slip_noise, inputs.noise_s, inputs.slip_bias_deviation)
+    least_slip = mean.slip - significance * (deviation + abs(mean.rise))
+    return OperatingPoint(
+        tyre_at_slip(mean.slip, inputs.load_n, longitudinal_stiffness_n),
+        sliding_onset_friction(least_slip, inputs.load_n, longitudinal_stiffness_n),
+    )
 
 
-def place_of_mean(steady: Steady, inputs: WheelInputs, longitudinal_stiffness_n: float) -> Place:
-    """Where the mean slip stands on the curve, and what of it noise leaves beyond doubt."""
-    load_n = inputs[4]
-    deviation = mean_deviation(steady, inputs[9], inputs[12], inputs[10]) + abs(steady[2])
-    tyre = cubic_at_slip(steady[0], load_n, longitudinal_stiffness_n)
-    significance = SIGNIFICANCE + YOUNG * math.exp(-steady[3] / YOUNG_S)
-    surely = steady[0] - significance * deviation
-    return steady, tyre, elastic_friction(surely, load_n, longitudinal_stiffness_n), deviation
+def significance_of_mean(mean: StationaryMean) -> float:
+    """Standard deviations that a mean needs by its duration [-]."""
+    return SIGNIFICANCE + SHORT_MEAN_SIGNIFICANCE * math.exp(-mean.duration_s / SHORT_MEAN_S)
 
 
-def backed_theta(
-    theta_img: float,
-    steady: Steady,
-    place: Place | None,
-    inputs: WheelInputs,
-    longitudinal_stiffness_n: float,
+def confirmed_theta(
+    theta_img: float, mean: StationaryMean, inputs: WheelInputs, longitudinal_stiffness_n: float
 ) -> float | None:
-    """theta(lambda, F_hat) by the means where tyre and camera agree on it, though the tyre alone is not sure [-].
-
-    `place` is where their slip stands, if that has been worked out.
-    """
-    if steady[3] < BACKED_AFTER_S:
+    """theta(lambda, F_hat) of the means where the camera's class confirms it; None where it does not [-]."""
+    if mean.duration_s < CONFIRMED_AFTER_S:
         return None
-    if place is None:
-        place = place_of_mean(steady, inputs, longitudinal_stiffness_n)
-    surely = steady[0] - BACKED_SIGNIFICANCE * place[3]
-    below = elastic_friction(surely, inputs[4], longitudinal_stiffness_n)
-    theta, _ = shown(steady[1], place[1], below)
+    point = point_of_mean(mean, inputs, longitudinal_stiffness_n, CONFIRMED_SIGNIFICANCE)
+    theta = point.theta(mean.friction)
     return theta if theta is not None and abs(theta - theta_img) < NEAR_CLASS else None
 
 
-def visible_theta(
-    force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float
-) -> tuple[float | None, float]:
-    """theta(lambda, F) and the sensitivity there; (None, 0) where the tyre does not show it, see `look_at`."""
-    tyre, surely, _ = look_at(inputs, longitudinal_stiffness_n, FuzzyScheduler())
-    _, direction = inputs.slip
-    below = elastic_friction(surely, inputs.load_n, longitudinal_stiffness_n)
-    return shown(force_n * direction / inputs.load_n, tyre, below)
+def visible_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float | None:
+    """theta(lambda, F) of the newest reading; None where it is not identifiable, see `point_of_reading` [-]."""
+    return point_of_reading(inputs, longitudinal_stiffness_n).theta(inputs.friction(force_n))
 
 
 def least_theta(force_n: float, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float:
-    """The smallest theta that force and slip allow: the inverse at a slip `AT_ONCE` deviations larger.
+    """The smallest theta that force and slip allow: the inverse at a slip `READING_SIGNIFICANCE` deviations larger.
 
     Below the curve's maximum, that is: beyond it a larger slip asks for more theta, but there the tyre is seen.
     """
-    (size, direction), load_n, deviation, change = inputs[3:7]
-    surely = size + AT_ONCE * (deviation + change)
-    friction = force_n * direction / load_n
-    tyre = cubic_at_slip(
-        surely if surely < GREATEST_SLIP else GREATEST_SLIP, load_n, longitudinal_stiffness_n
-    )
-    theta = theta_of(friction, tyre)
+    slip = inputs.slip.size + READING_SIGNIFICANCE * (inputs.slip_deviation + inputs.slip_change)
+    friction = inputs.friction(force_n)
+    tyre = tyre_at_slip(min(slip, GREATEST_SLIP), inputs.load_n, longitudinal_stiffness_n)
+    theta = tyre.theta(friction)
     if theta is None:
-        theta = 2.0 * tyre[0] if friction > 0.0 else 0.0
-    return theta if theta < GREATEST_THETA else GREATEST_THETA
+        theta = 2.0 * tyre.adhering if friction > 0.0 else 0.0
+    return min(theta, GREATEST_THETA)
