@@ -35,8 +35,8 @@ MethodOption = Annotated[
     str,
     typer.Option(
         "--method",
-        help="Estimator:\n\nas_printed: the paper's equations, and nothing else.\n\ndife: they, guarded against noise and "
-        "wrong classes.\n\nrobust: an interval, where the tyre's curve is not known.",
+        help="Estimator:\n\nas_printed: the paper's equations, and nothing else.\n\ndife: they, guarded against noise "
+        "and wrong classes.\n\nrobust: an interval, where the tyre's curve is not known.",
     ),
 ]
 

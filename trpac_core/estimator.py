@@ -14,6 +14,7 @@ from . import paper as printed
 from .dife import (
     GREATEST_THETA,
     NEVER_SEEN_M,
+    SEEN_HOLD_M,
     FusionState,
     Outcome,
     VisualTerm,
@@ -311,7 +312,15 @@ class TrpacEstimator:
         if outcome is not None:
             age_s = state.time_s - outcome.captured_s
         theta_alone, slip, force_n = alone[0][0], inputs[3][0], unaided[3]
-        deviation = math.sqrt(with_camera(config.confidence, state.variance, theta, theta_img))
+        if config.method is Method.AS_PRINTED:
+            step, theta_alone = self._as_printed(sensors, load_n, theta_img, step_s)
+            _, slip, force_n, threshold, excited, K_v = step
+            theta = step.state.theta_hat
+            # The paper's estimate has no deviation: that of a road of which nothing is known.
+            state.variance = variance = unknown_variance(config.confidence, theta)
+        else:
+            variance = with_camera(config.confidence, state.variance, theta, theta_img)
+        deviation = math.sqrt(variance)
         low, high = max(theta - BOUNDS * deviation, 0.0), min(theta + BOUNDS * deviation, GREATEST_THETA)
         expected, expected_deviation = theta, deviation
         if state.robust is not None and self._robust is not None:
@@ -325,10 +334,6 @@ class TrpacEstimator:
             theta, deviation = point(state.robust, theta_alone)
             low, high, expected, expected_deviation = said.low, said.high, said.mean, said.std
             K_v = scheduler.K_v(abs(theta_img - theta)) if excited and theta_img is not None else 0.0
-        elif config.method is Method.AS_PRINTED:
-            step, theta_alone = self._as_printed(sensors, load_n, theta_img, step_s)
-            _, slip, force_n, threshold, excited, K_v = step
-            theta = expected = step.state.theta_hat
         self._last = _new(
             Estimate,
             (
@@ -364,7 +369,8 @@ class TrpacEstimator:
         elif self.config.method is Method.AS_PRINTED:
             tyre = excited
         else:
-            tyre = fusion.unseen_m < NEVER_SEEN_M and (fusion.rests or fusion.road_img is None)
+            classes = fusion.theta_img is not None
+            tyre = fusion.rests or fusion.unseen_m < (SEEN_HOLD_M if classes else NEVER_SEEN_M)
         return _SOURCES[tyre + 2 * flag]
 
     def _as_printed(

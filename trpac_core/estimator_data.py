@@ -221,6 +221,11 @@ OUTPUTS = (
     "image_confidence",
     "frame_age_s",
     "TRPAC_std",
+    "TRPAC_low",
+    "TRPAC_high",
+    "TRPAC_expected",
+    "TRPAC_expected_std",
+    "source",
 )
 """What of an estimate a table or a bus shows."""
 

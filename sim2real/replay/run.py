@@ -150,8 +150,9 @@ def replay(
     wheels = [_our_wheel(inputs, camera, i, told, method) for i in range(len(WHEELS))]
     columns = [said for said, _ in wheels]
     messages: dict[str, str] = {}
-    for _, of_wheel in reversed(wheels):
-        messages |= of_wheel
+    for _, of_wheel in wheels:
+        for about, text in of_wheel.items():
+            messages.setdefault(about, text)
 
     def of(name: str) -> Array:
         return np.array([[getattr(e, name) for e in column] for column in columns], dtype=np.float64).T

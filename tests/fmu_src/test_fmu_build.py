@@ -72,6 +72,11 @@ INTERFACE = {
         "image_confidence",
         "frame_age",
         "TRPAC_std",
+        "TRPAC_low",
+        "TRPAC_high",
+        "TRPAC_expected",
+        "TRPAC_expected_std",
+        "TRPAC_source",
     },
 }
 
@@ -142,7 +147,8 @@ def test_start_lies_within_the_range(v: Variable) -> None:
 
 
 def test_outputs_are_the_fields_of_the_estimate() -> None:
-    assert {name.removesuffix("_n").removesuffix("_s") for name in OUTPUTS} == INTERFACE["output"]
+    named = {name.removesuffix("_n").removesuffix("_s") for name in OUTPUTS} - {"source"}
+    assert named | {"TRPAC_source"} == INTERFACE["output"]
     shown = {*Estimate._fields, "TRPAC_peak"} - {"problem", "load_n", "longitudinal_stiffness_n"}
     assert set(OUTPUTS) == shown
 
@@ -181,11 +187,13 @@ NOT_OFFERED = {
     "vision.use_foresight",
     "vision.use_lines",
     "vision.use_scene",
+    "gains.innovation",
     "elastic.coasting",
     "elastic.gentle",
     "elastic.force_doubt_n",
 }
-"""What the estimator of one wheel does not use, switches for ablation studies, and what learning the car rests on."""
+"""What the estimator of one wheel does not use, what the method sets, switches for ablation studies, and what
+learning the car rests on."""
 
 
 def leaves(owner: object, path: str = "") -> list[str]:

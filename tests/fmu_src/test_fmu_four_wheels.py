@@ -70,6 +70,11 @@ def test_variables_are_those_of_one_wheel_at_each_wheel_and_side() -> None:
         "lateral_acceleration",
         "TRPAC.vehicle",
         "TRPAC_std.vehicle",
+        "TRPAC_low.vehicle",
+        "TRPAC_high.vehicle",
+        "TRPAC_expected.vehicle",
+        "TRPAC_expected_std.vehicle",
+        "TRPAC_source.vehicle",
         "estimator.axle_deviation",
     }
 

@@ -373,5 +373,5 @@ def test_a_real_cars_log_runs_through(trpac_data, tmp_path):
     )
     assert result.exit_code == 0, result.output
     table = pd.read_csv(tmp_path / "out" / "estimates.csv")
-    assert np.isfinite(table.to_numpy()).all()
+    assert np.isfinite(table.select_dtypes("number").to_numpy()).all()
     assert table["TRPAC"].between(0.0, 1.2).all()

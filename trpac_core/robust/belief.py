@@ -24,7 +24,8 @@ from .blocks import Reading
 from .tyres import FORMULAS, Tyre, curves
 
 POWER_PER_S = 20.0
-"""Power with which the likelihood of a second of readings counts, as of independent readings [1/s]."""
+"""Power with which the likelihood of a second of readings counts, as of independent readings; a reading
+counts as one at most [1/s]."""
 INDEPENDENT_1_S = 1.0
 """How often a second the normalisation of the likelihood counts: operating points are new about once a second [1/s]."""
 MODEL_SHARE = 0.02
@@ -239,7 +240,7 @@ def read(
         - by_slip * to_offset
         + by_softness * to_softness
     )
-    power = POWER_PER_S * duration_s
+    power = min(POWER_PER_S * duration_s, 1.0)
     normalisation = np.maximum(np.abs(by_slip), LEAST_SLOPE) / np.sqrt(variance)
     likelihood = -0.5 * power * error * error / variance + INDEPENDENT_1_S * duration_s * log(normalisation)
     gain_offset, gain_softness = power * to_offset / variance, power * to_softness / variance

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ..tyre import INITIAL_SLOPE
 from .belief import mean_offset
 from .tyres import TYRES
 from .wheel import RobustSetup, RobustState
@@ -22,10 +23,11 @@ def tyre_message(state: RobustState, known: RobustSetup, axle: str, load_n: floa
         return None
     softness = float((state.belief.road[tyre] * state.belief.softness[tyre]).sum())
     learnt_n = known.wheel.stiffness_n * math.exp(-softness) * load_n / known.wheel.mean_load_n
+    told_n = INITIAL_SLOPE * known.wheel.stiffness_n
     return (
         f"{axle} tyres do not follow the told curve: slip stiffness learnt {1e-3 * learnt_n:.0f} kN per unit slip at "
-        f"{1e-3 * load_n:.1f} kN load, told {1e-3 * known.wheel.stiffness_n:.0f} kN. TRPAC is an interval here; adjust "
-        "tyre.longitudinal_stiffness_n in vehicle.yaml."
+        f"{1e-3 * load_n:.1f} kN load, told {1e-3 * told_n:.0f} kN ({INITIAL_SLOPE:g} C_x). TRPAC is an interval here; "
+        "adjust tyre.longitudinal_stiffness_n in vehicle.yaml."
     )
 
 
