@@ -325,7 +325,8 @@ def fusion_step(
     unseen_m = min(state.unseen_m + inputs.way_m, NEVER_SEEN_M)
     excited = theta_tyre is not None or (slip > threshold and inputs.torque_known)
     if excited and theta_img is not None:
-        by_tyre, by_camera = theta_tyre, theta_img
+        by_tyre: float | None = theta_tyre
+        by_camera: float | None = theta_img
         if gains.tyre_first:
             rests = state.rests or unseen_m < SEEN_HOLD_M or state.other_m > 0.0
             if theta_tyre is None and not rests:

@@ -217,7 +217,9 @@ class FourWheels:
             problems=problems,
         )
 
-    def _by_subject(self, sensors: CarSensors, problems: list[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
+    def _by_subject(
+        self, sensors: CarSensors, problems: list[tuple[str, str]]
+    ) -> tuple[tuple[str, str], ...]:
         """Problems by whom they concern; one that all wheels share is the car's."""
         lateral = sensors.lateral_acceleration_m_s2
         if lateral is not None and not abs(lateral) <= _STEEPEST:
@@ -309,7 +311,9 @@ class FourWheels:
         car = data["car"]
         source = Source(car["source"])
         problems = tuple((subject, text) for subject, text in car["problems"])
-        self._last = CarEstimate(**{**car, "wheels": (fl, fr, rl, rr), "source": source, "problems": problems})
+        self._last = CarEstimate(
+            **{**car, "wheels": (fl, fr, rl, rr), "source": source, "problems": problems}
+        )
 
 
 def _of_each(

@@ -71,7 +71,7 @@ class OperatingPoint(NamedTuple):
     """Used friction below which the tyre slides with significance; 0 where noise hides it [-]."""
 
     def theta(self, friction: float) -> float | None:
-        """theta(lambda, F) of a used friction; None where it is not identifiable [-]."""
+        """The inverse of a used friction; None where theta is not identifiable [-]."""
         if friction > self.slides_below or self.slides_below == 0.0:
             return None
         theta = self.tyre.theta(friction)

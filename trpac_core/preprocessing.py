@@ -57,9 +57,7 @@ def preprocess(
     """What a step makes of the sensors; at the start, and after a gap, they are not filtered."""
     floor_m_s, settled = config.floor_m_s, state.settled
     share = rates.sensor_share if settled else 1.0
-    sample = FilteredReadings(
-        sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s
-    )
+    sample = FilteredReadings(sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s)
     readings = state.readings.with_sample(sensors, share) if settled else sample
     omega_ahead, torque_ahead_nm = readings.wheel_speed_rad_s, readings.wheel_torque_nm
     if settled:

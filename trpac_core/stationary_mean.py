@@ -55,9 +55,7 @@ def with_reading(
     step_s : float
         Step [s].
     """
-    stationary = (
-        abs(rise) < RISING_DEVIATIONS * noise and abs(slip - mean.slip) < MOVED_DEVIATIONS * noise
-    )
+    stationary = abs(rise) < RISING_DEVIATIONS * noise and abs(slip - mean.slip) < MOVED_DEVIATIONS * noise
     if mean.duration_s == 0.0 or not stationary:
         return StationaryMean(slip, friction, rise, step_s)
     duration_s = mean.duration_s + step_s

@@ -192,7 +192,9 @@ def advanced_variance(
         settled += share_elsewhere * bounded_variance(theta_tyre, 2.0 * adhering)
     # A theta that follows the slip is no road's: then any road above would do.
     if evidence.mismatch > 0.0:
-        settled += evidence.mismatch * evidence.mismatch * (bounded_variance(theta_tyre, theta_tyre) - settled)
+        settled += (
+            evidence.mismatch * evidence.mismatch * (bounded_variance(theta_tyre, theta_tyre) - settled)
+        )
     variance += (1.0 - math.exp(-2.0 * gamma * step_s)) * (settled - variance)
     variance = min(variance, unknown_variance(model, theta_hat))
     # Where the tyre goes on showing something else than the estimate, the estimate is off by that.
@@ -201,7 +203,9 @@ def advanced_variance(
     return (max(variance, off * off) if off > 0.0 else variance), lag
 
 
-def variance_with_camera(model: VarianceModel, variance: float, theta_hat: float, theta_img: float | None) -> float:
+def variance_with_camera(
+    model: VarianceModel, variance: float, theta_hat: float, theta_img: float | None
+) -> float:
     """Mean square error of the estimate with what the camera says of the road beside what is known [-]."""
     if theta_img is None:
         return variance

@@ -33,7 +33,6 @@ GREATEST_PEAK_SLIP = 0.95
 """Where the search for the curve's maximum ends [-]."""
 
 
-
 def slip_ratio_force(slip: float, longitudinal_stiffness_n: float) -> float:
     """X = C_x lambda / (1 - lambda), the force of a tyre that never slides. [N]."""
     return longitudinal_stiffness_n * slip / (1.0 - slip)
