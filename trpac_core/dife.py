@@ -328,12 +328,12 @@ def fusion_step(
         by_tyre: float | None = theta_tyre
         by_camera: float | None = theta_img
         if gains.tyre_first:
-            rests = state.rests or unseen_m < SEEN_HOLD_M or state.other_m > 0.0
-            if theta_tyre is None and not rests:
+            silent = state.rests or unseen_m < SEEN_HOLD_M or state.other_m > 0.0
+            if theta_tyre is None and not silent:
                 by_tyre = confirmed_theta(theta_img, dynamics.mean, inputs, C_x)
             if by_tyre is not None:
                 by_camera = _agreeing(theta_img, theta_hat, by_tyre)
-            elif rests:
+            elif silent:
                 by_camera = None
             else:
                 # Not less than it already carries.
@@ -347,10 +347,14 @@ def fusion_step(
             theta_next, s = _with_camera(
                 state, dynamics, by_tyre, by_camera, K_v, inputs, wheel, gains, step_s
             )
-    after = state._replace(theta_hat=theta_next, s=s, unseen_m=unseen_m, mean=dynamics.mean)
+    road_img, rests = state.road_img, state.rests
     if theta_tyre is not None:
+        unseen_m = 0.0
         road_img = state.theta_img if state.road_img is None else state.road_img
-        after = after._replace(unseen_m=0.0, road_img=road_img, rests=road_img is not None)
+        rests = road_img is not None
+    after = FusionState(
+        theta_next, s, unseen_m, state.theta_img, road_img, state.other_m, rests, dynamics.mean
+    )
     return FusionStep(after, dynamics, threshold, excited, K_v)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,7 +207,8 @@ class TrpacEstimator:
             frame, frame_failed = None, True
         if problem is not None:
             return self._hold(step_s, sensors, frame, frame_failed, problem)
-        self._rates = Rates.at(config, step_s, state.step_s)
+        if step_s != self._rates.step_s or step_s == 0.0:
+            self._rates = Rates.at(config, step_s, state.step_s)
         if state.settled and jumped(state.readings, sensors, self._wheel.radius_m, self._rates):
             state.settled = False
         acceleration, lagged, load_n = self._moved(sensors)
@@ -257,7 +258,7 @@ class TrpacEstimator:
         theta_img = config.class_theta[outcome.surface] if outcome is not None and flag else None
         alone = fusion_step(dynamics, inputs, wheel, gains, config.scheduler, None, step_s)
         fused = alone
-        if config.method is Method.DIFE:
+        if config.method is Method.DIFE and (theta_img is not None or fusion != dynamics):
             fused = fusion_step(
                 fusion,
                 inputs,
@@ -285,7 +286,8 @@ class TrpacEstimator:
         state.step_s, state.settled = step_s or state.step_s, True
         theta = fused.state.theta_hat
         variance = variance_with_camera(config.confidence, state.variance, theta, theta_img)
-        estimate = self._last._replace(
+        image, bounds = self._image(outcome), _symmetric(theta, math.sqrt(variance))
+        estimate = Estimate(
             TRPAC=theta,
             flag=flag,
             K_v=fused.K_v,
@@ -293,12 +295,18 @@ class TrpacEstimator:
             excitation_threshold=fused.threshold,
             slip=inputs.slip.size,
             tyre_force_n=fused.tyre_force_n,
+            TRPAC_image=image.theta,
             TRPAC_dynamics=alone.state.theta_hat,
+            image_confidence=image.Q_v,
+            frame_age_s=image.age_s,
+            TRPAC_std=bounds.deviation,
             load_n=load_n,
             longitudinal_stiffness_n=wheel.longitudinal_stiffness_n,
-            problem=None,
+            TRPAC_low=bounds.low,
+            TRPAC_high=bounds.high,
+            TRPAC_expected=theta,
+            TRPAC_expected_std=bounds.deviation,
         )
-        estimate = _with_interval(self._with_image(estimate, outcome), math.sqrt(variance))
         if config.method is Method.AS_PRINTED:
             estimate = self._printed(estimate, sensors, theta_img, step_s)
         elif state.robust is not None and self._robust is not None:
@@ -319,22 +327,20 @@ class TrpacEstimator:
 
     def _calibrated_wheel(self, calibration: SlipCalibration) -> Wheel:
         """The wheel with the stiffness that was learnt."""
-        stiffness_n = self._wheel.longitudinal_stiffness_n / (1.0 + calibration.compliance())
-        return replace(self._wheel, longitudinal_stiffness_n=stiffness_n)
+        wheel = self._wheel
+        stiffness_n = wheel.longitudinal_stiffness_n / (1.0 + calibration.compliance())
+        return Wheel(wheel.inertia_kg_m2, wheel.radius_m, stiffness_n)
 
     def _under_wheel(self) -> Outcome | None:
         """What the camera gave for the road under the wheel."""
         return covering(self._state.preview, self._preview, self._state.position_m - self._setback_m)
 
-    def _with_image(self, estimate: Estimate, outcome: Outcome | None) -> Estimate:
-        """The estimate with what it shows of the camera; where there is no class the last adhesion stays."""
+    def _image(self, outcome: Outcome | None) -> _Image:
+        """What an estimate shows of the camera; where there is no class the last adhesion stays."""
         if outcome is None:
-            return estimate._replace(image_confidence=0.0, frame_age_s=-1.0)
-        return estimate._replace(
-            TRPAC_image=self.config.class_theta[outcome.surface],
-            image_confidence=outcome.Q_v,
-            frame_age_s=self._state.time_s - outcome.captured_s,
-        )
+            return _Image(self._last.TRPAC_image, Q_v=0.0, age_s=-1.0)
+        theta = self.config.class_theta[outcome.surface]
+        return _Image(theta, outcome.Q_v, self._state.time_s - outcome.captured_s)
 
     def _source(self, flag: bool, excited: bool) -> Source:
         """What the estimate rests on; the estimator as printed remembers no road that the tyre has shown."""
@@ -369,7 +375,8 @@ class TrpacEstimator:
         theta = fused.state.theta_hat
         # The paper's estimate has no deviation: that of a road of which nothing is known.
         state.variance = unknown_variance(self.config.confidence, theta)
-        estimate = estimate._replace(
+        bounds = _symmetric(theta, math.sqrt(state.variance))
+        return estimate._replace(
             TRPAC=theta,
             TRPAC_dynamics=alone.state.theta_hat,
             slip=fused.slip,
@@ -377,8 +384,12 @@ class TrpacEstimator:
             excitation_threshold=fused.threshold,
             excitation_flag=fused.excited,
             K_v=fused.K_v,
+            TRPAC_std=bounds.deviation,
+            TRPAC_low=bounds.low,
+            TRPAC_high=bounds.high,
+            TRPAC_expected=theta,
+            TRPAC_expected_std=bounds.deviation,
         )
-        return _with_interval(estimate, math.sqrt(state.variance))
 
     def _update_variance(self, fused: FusionStep, inputs: WheelInputs, wheel: Wheel, passed_s: float) -> None:
         """Bring the variance of the fused estimate up to date after a time."""
@@ -485,24 +496,33 @@ class TrpacEstimator:
                 if step_s > LONGEST_STEP_S
                 else stepped(state.robust, self._robust, None, roads.NONE, passed_s, way_m, False)
             )
-        held = self._with_image(self._last, self._under_wheel())._replace(
+        image, theta = self._image(self._under_wheel()), self._last.TRPAC
+        bounds = _symmetric(theta, math.sqrt(state.variance))
+        held = self._last._replace(
             flag=False,
             K_v=0.0,
             excitation_flag=False,
+            TRPAC_image=image.theta,
+            image_confidence=image.Q_v,
+            frame_age_s=image.age_s,
+            TRPAC_std=bounds.deviation,
+            TRPAC_low=bounds.low,
+            TRPAC_high=bounds.high,
+            TRPAC_expected_std=bounds.deviation,
             source=self._source(False, False),
             problem=problem,
         )
-        if state.robust is None:
-            self._last = _with_interval(held, math.sqrt(state.variance))
-        else:
-            robust = _with_robust(held, state.robust, held.TRPAC)
-            self._last = robust._replace(
-                TRPAC=held.TRPAC,
-                TRPAC_std=math.hypot(robust.TRPAC_expected_std, robust.TRPAC_expected - held.TRPAC),
-                TRPAC_low=min(robust.TRPAC_low, held.TRPAC),
-                TRPAC_high=max(robust.TRPAC_high, held.TRPAC),
+        if state.robust is not None:
+            interval = state.robust.said
+            held = held._replace(
+                TRPAC_std=math.hypot(interval.std, interval.mean - theta),
+                TRPAC_low=min(interval.low, theta),
+                TRPAC_high=max(interval.high, theta),
+                TRPAC_expected=interval.mean,
+                TRPAC_expected_std=interval.std,
             )
-        return self._last
+        self._last = held
+        return held
 
     def messages(self) -> dict[str, str]:
         """Sentences on what the drive shows of a car that is not as told, by what they concern; robust method only."""
@@ -526,16 +546,26 @@ class TrpacEstimator:
         self._last = Estimate(**{**data["last"], "source": Source(data["last"]["source"])})
 
 
-def _with_interval(estimate: Estimate, deviation: float) -> Estimate:
-    """The estimate with an interval that is symmetric, within the bounds of theta."""
-    theta = estimate.TRPAC
-    return estimate._replace(
-        TRPAC_std=deviation,
-        TRPAC_low=max(theta - BOUNDS * deviation, 0.0),
-        TRPAC_high=min(theta + BOUNDS * deviation, GREATEST_THETA),
-        TRPAC_expected=theta,
-        TRPAC_expected_std=deviation,
-    )
+class _Image(NamedTuple):
+    """What an estimate shows of the camera."""
+
+    theta: float
+    Q_v: float
+    age_s: float
+
+
+class _Bounds(NamedTuple):
+    """Standard deviation of an estimate, and its interval."""
+
+    deviation: float
+    low: float
+    high: float
+
+
+def _symmetric(theta: float, deviation: float) -> _Bounds:
+    """The interval about an estimate that is symmetric but for the bounds of theta [-]."""
+    low, high = theta - BOUNDS * deviation, theta + BOUNDS * deviation
+    return _Bounds(deviation, max(low, 0.0), min(high, GREATEST_THETA))
 
 
 def _with_robust(estimate: Estimate, state: RobustState, observer: float) -> Estimate:
