@@ -146,12 +146,12 @@ _FUSION_PARAMETERS = (
         parameter(
             f"scheduler.K_v_{size}",
             "1/s",
-            f"scheduler.K_v_values.{place}",
+            f"scheduler.K_v_values.{index}",
             f"K_v of the set '{size}', in 1/s as the visual term is in form (18)",
             0.0,
             K_V_LIMIT,
         )
-        for place, size in enumerate(("small", "medium", "big"))
+        for index, size in enumerate(("small", "medium", "big"))
     ),
     parameter(
         "scheduler.class_scatter",
