@@ -103,7 +103,7 @@ def estimate(
     peers : bool
         Whether to run estimators of the literature as well.
     method : str
-        Estimator: as_printed, dife or robust (docs/dynamics.md).
+        Estimator: as_printed, dife or robust (docs/methods.md).
     progress : callable
         Called with the stage, and how many of how many of its items are done.
 

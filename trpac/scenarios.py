@@ -156,7 +156,7 @@ def run(
     fmu : path, optional
         The unit; by default one is built.
     method : str
-        Estimator of the unit: as_printed, dife or robust (docs/dynamics.md).
+        Estimator of the unit: as_printed, dife or robust (docs/methods.md).
     progress : callable
         Called with the stage, and how many of how many of its items are done.
 

@@ -11,6 +11,7 @@ import pytest
 from log_maker import make_frame, save
 from typer.testing import CliRunner
 
+import trpac
 from scenarios.camera.files import load_camera
 from scenarios.files import load_scenario, load_vehicle
 from scenarios.library import networks_folder
@@ -26,6 +27,7 @@ from sim2real.replay.vehicle_level import vehicle_level
 from trpac_cli.main import app
 from trpac_core.car_friction import Friction, car_friction
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
+from trpac_core.estimator_data import Method
 from trpac_core.four_wheels import FourWheelsConfig
 from trpac_core.vision.classes import Surface
 
@@ -135,6 +137,22 @@ class TestCommand:
         said = " ".join(estimated[1].stdout.split())
         assert "the tyres showed the road for" in said
         assert "TRPAC_peak against mu_reference" in said
+
+    @pytest.mark.parametrize("method", ["as_printed", "robust"])
+    def test_another_method_is_named_in_all_three_files(self, driven, tmp_path, method):
+        log, title = save(driven, tmp_path / "drive.csv"), Method.of(method).title
+        result = run(log, "--vehicle", TABLE_3, "--method", method, "--out", tmp_path / "out")
+        assert result.exit_code == 0, result.output
+        summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+        assert summary["method"] == method
+        assert title in summary["errors"]
+        assert "DIFE" not in summary["errors"]
+        assert f"<td>{title}</td>" in (tmp_path / "out" / "report.html").read_text()
+        table = pd.read_csv(tmp_path / "out" / "estimates.csv")
+        python = trpac.estimate(driven, TABLE_3, method=method).frame
+        for name in ("TRPAC", "TRPAC_low", "TRPAC_high", "TRPAC_expected", "TRPAC_high_rr"):
+            assert table[name].to_numpy() == pytest.approx(python[name].to_numpy(), rel=1e-4, abs=1e-6)
+        assert list(table["TRPAC_source"]) == list(python["TRPAC_source"])
 
     def test_the_help_tells_what_is_needed(self):
         text = " ".join(run("--help").output.split())

@@ -1,6 +1,7 @@
 """A scenario through the command line, from files to report, on the real unit."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,10 @@ from scenarios.pictures import frame_name, record
 from scenarios.plant.pipeline import drive
 from scenarios.runner import run_scenario
 from trpac_cli.main import app
+from trpac_core.confidence import ConfidenceModel
+from trpac_core.estimator import EstimatorConfig, TrpacEstimator
+from trpac_core.estimator_data import Method
+from trpac_core.readings import Sensors
 
 ROOT = Path(__file__).parents[2]
 
@@ -103,6 +108,51 @@ def test_run_writes_report_figure_log_and_scores(scenario_file, unit_file, tmp_p
     assert "<i>" not in report
     assert 'src="http' not in report
     assert report.count("data:image/") == 2
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize("method", ["as_printed", "robust"])
+def test_another_method_is_that_of_the_unit_and_of_the_report(scenario_file, unit_file, tmp_path, method):
+    """Without pictures: the unit's outputs are those of the core over the log's own signals."""
+    content = yaml.safe_load(scenario_file.read_text())
+    del content["camera"], content["pictures"]
+    scenario_file.write_text(yaml.safe_dump(content))
+    out = tmp_path / "out"
+    command = ["run", str(scenario_file), "--fmu", str(unit_file), "--method", method, "--out", str(out)]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    summary, log = json.loads((out / "summary.json").read_text()), pd.read_csv(out / "log.csv")
+    title = Method.of(method).title
+    assert (summary["method"], list(summary["estimators"])) == (method, ["IFE", "DE", title])
+    assert title in result.output
+    assert "DIFE" not in result.output
+    scenario = load_scenario(scenario_file)
+    noise = scenario.sensors
+    config = EstimatorConfig(
+        scenario.vehicle.to_core(),
+        method=Method.of(method),
+        confidence=replace(ConfidenceModel(), torque_noise_nm=noise.wheel_torque_noise_nm),
+        sliding_speed_noise_m_s=float(
+            np.hypot(
+                noise.vehicle_speed_noise_m_s, scenario.vehicle.wheel_radius_m * noise.wheel_speed_noise_rad_s
+            )
+        ),
+    )
+    core = TrpacEstimator(config)
+    for row in log.itertuples():
+        estimate = core.step(
+            0.001,
+            Sensors(
+                row.wheel_speed_fl_rad_s,
+                row.wheel_torque_fl_nm,
+                row.vehicle_speed_m_s,
+                longitudinal_acceleration_m_s2=row.accel_x_m_s2 or None,
+            ),
+        )
+    last = log.iloc[-1]
+    for name in ("TRPAC", "TRPAC_low", "TRPAC_high", "TRPAC_expected", "TRPAC_expected_std"):
+        assert last[name] == pytest.approx(getattr(estimate, name), rel=1e-9)
+    assert last["TRPAC_source"] == estimate.source
 
 
 @pytest.mark.long

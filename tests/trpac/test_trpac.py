@@ -14,6 +14,9 @@ import trpac
 from scenarios.files import load_vehicle
 from scenarios.library import FOLDERS, located, shipped
 from trpac.extras import EXTRA_OF, MissingExtraError, extras
+from trpac_core.estimator import EstimatorConfig, TrpacEstimator
+from trpac_core.estimator_data import Method
+from trpac_core.readings import Sensors
 
 CAR = trpac.Vehicle.builtin("four_in_wheel_motor_ev")
 TIME_S = np.arange(0.0, 4.0, 0.01)
@@ -116,6 +119,90 @@ def test_lists_are_tables(make):
     table = make()
     assert len(table)
     assert not table.columns.duplicated().any()
+
+
+# Methods
+
+METHODS = ("as_printed", "dife", "robust")
+
+
+def stepped(estimator, log):
+    """The estimates of a wheel over the rows of a log."""
+    return [
+        estimator.step(
+            t=row.time_s,
+            wheel_speed=row.wheel_speed_fl_rad_s,
+            wheel_torque=row.wheel_torque_fl_nm,
+            vehicle_speed=row.vehicle_speed_m_s,
+            longitudinal_acceleration=row.accel_x_m_s2,
+        )
+        for row in log.itertuples()
+    ]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_wheels_estimate_is_the_cores_by_each_method(log, method):
+    config = EstimatorConfig(CAR.to_core(), method=Method.of(method))
+    core, before_s = TrpacEstimator(config), 0.0
+    for row, shown in zip(log.itertuples(), stepped(trpac.Estimator(CAR, method=method), log), strict=True):
+        sensors = Sensors(
+            row.wheel_speed_fl_rad_s,
+            row.wheel_torque_fl_nm,
+            row.vehicle_speed_m_s,
+            longitudinal_acceleration_m_s2=row.accel_x_m_s2,
+        )
+        estimate, before_s = core.step(row.time_s - before_s, sensors), row.time_s
+        assert (shown.theta, shown.std, shown.low, shown.high, shown.expected, shown.expected_std) == (
+            estimate.TRPAC,
+            estimate.TRPAC_std,
+            estimate.TRPAC_low,
+            estimate.TRPAC_high,
+            estimate.TRPAC_expected,
+            estimate.TRPAC_expected_std,
+        )
+        assert shown.source == estimate.source.label
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_estimates_of_each_method_have_the_interval_of_the_car_and_its_wheels(log, method):
+    done = trpac.estimate(log, CAR, method=method)
+    frame = done.frame
+    assert done.summary["method"] == method
+    for end in ("", "_fl", "_fr", "_rl", "_rr"):
+        assert (frame[f"TRPAC_low{end}"] <= frame[f"TRPAC{end}"]).all()
+        assert (frame[f"TRPAC{end}"] <= frame[f"TRPAC_high{end}"]).all()
+        assert set(frame[f"TRPAC_source{end}"]) <= {"none", "tyre"}
+    assert (frame["TRPAC_expected"] == frame["TRPAC"]).all() == (method != "robust")
+    assert np.isfinite(frame[["TRPAC_expected", "TRPAC_expected_std"]]).all(axis=None)
+    assert done.plot().png[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda log, method: trpac.Estimator(CAR, method=method),
+        lambda log, method: trpac.estimate(log, CAR, method=method),
+        lambda log, method: trpac.run("paper_simulation", method=method),
+    ],
+)
+def test_a_wrong_method_is_named_with_those_there_are(log, use):
+    with pytest.raises(trpac.TrpacError, match=r"'DIFE'; expected one of as_printed, dife, robust\.$"):
+        use(log, "DIFE")
+
+
+def test_a_wrong_radius_is_a_warning_of_the_drive():
+    wrong = CAR.model_copy(update={"wheel_radius_m": 1.02 * CAR.wheel_radius_m})
+    pedal = 250.0 * np.sin(3.0 * np.arange(0.0, 6.0, 0.01))
+    drive = trpac.simulate(
+        CAR, trpac.Road.uniform(0.4, "wet"), torque=np.column_stack([pedal] * 4), speed=15.0
+    )
+    warnings = [text for text in trpac.estimate(drive, wrong, method="robust").warnings if "radius" in text]
+    assert [text.split()[0] for text in warnings] == ["Front", "Rear"]
+    assert all("Adjust wheel_radius_m in vehicle.yaml." in text for text in warnings)
+    wheel = trpac.Estimator(wrong, method="robust")
+    stepped(wheel, drive)
+    assert [text for text in wheel.warnings if "radius" in text]
+    assert trpac.estimate(drive, CAR, method="robust").warnings == []
 
 
 # Simulate

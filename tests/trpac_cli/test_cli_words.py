@@ -13,6 +13,7 @@ from rich.text import Text
 from typer.testing import CliRunner
 
 from trpac_cli.main import app
+from trpac_core.estimator_data import Method
 
 
 def commands(command: click.Command, path: str = "trpac"):
@@ -42,6 +43,21 @@ def test_units_in_tables_are_no_markup():
     shown = CliRunner().invoke(app, ["gains"]).output
     assert "C_x [kN]" in shown
     assert "K [1/s]" in shown
+
+
+@pytest.mark.parametrize("command", ["run", "estimate", "hil"])
+def test_each_command_explains_the_methods_and_refuses_another(command, tmp_path):
+    runner = CliRunner(env={"COLUMNS": "200", "TERM": "dumb"})
+    text = " ".join(runner.invoke(app, [command, "--help"]).output.split())
+    for method in Method:
+        assert f"{method.label}: " in text
+    given = {"run": ["paper_simulation"], "estimate": ["drive.csv"], "hil": []}[command]
+    done = runner.invoke(app, [command, *given, "--method", "printed", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert done.stderr.strip() == (
+        f"trpac {command}: estimator method is 'printed'; expected one of as_printed, dife, robust."
+    )
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_version_is_told():

@@ -23,6 +23,7 @@ from typer.testing import CliRunner
 
 from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_cli.main import app
+from trpac_core.estimator import EstimatorConfig
 from trpac_hil.bus import BusSettings
 from trpac_hil.codec import load_codec
 from trpac_hil.errors import HilError
@@ -150,6 +151,14 @@ def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(unit_file: Pa
         assert np.abs(sent - log[column]).max() <= half[signal_name], signal_name
     assert [e["Flag"] for e in estimates[:-1]] == log["flag"].tolist()
     assert estimates[-1]["Status"] == 7.0
+
+
+def test_a_method_is_that_of_the_unit(unit_file: Path, tmp_path: Path) -> None:
+    """At the start the robust estimate is the mean of all roads, that of the others `estimator.theta_initial`."""
+    command = ["hil", "--with-plant", "--fmu", str(unit_file), "--rate-hz", "100", "--duration-s", "0.2"]
+    done = CliRunner().invoke(app, [*command, "--method", "robust", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    assert 0.5 < columns(tmp_path / "out" / "log.mf4")["TRPAC"][0] < 0.7 < EstimatorConfig.theta_initial
 
 
 def test_ctrl_c_ends_cleanly_with_the_log_written(unit_file: Path, tmp_path: Path) -> None:
