@@ -325,19 +325,11 @@ def fusion_step(
     unseen_m = min(state.unseen_m + inputs.way_m, NEVER_SEEN_M)
     excited = theta_tyre is not None or (slip > threshold and inputs.torque_known)
     if excited and theta_img is not None:
-        by_tyre: float | None = theta_tyre
-        by_camera: float | None = theta_img
-        if gains.tyre_first:
-            silent = state.rests or unseen_m < SEEN_HOLD_M or state.other_m > 0.0
-            if theta_tyre is None and not silent:
-                by_tyre = confirmed_theta(theta_img, dynamics.mean, inputs, C_x)
-            if by_tyre is not None:
-                by_camera = _agreeing(theta_img, theta_hat, by_tyre)
-            elif silent:
-                by_camera = None
-            else:
-                # Not less than it already carries.
-                by_camera = max(theta_img, least_theta(dynamics.force_n, inputs, C_x))
+        by_tyre, by_camera = (
+            _guarded(theta_img, state, unseen_m, dynamics, inputs, C_x)
+            if gains.tyre_first
+            else (theta_tyre, theta_img)
+        )
         if by_camera is not None:
             difference = abs(by_camera - theta_hat)
             if by_tyre is None and confidence is not None and gains.tyre_first:
@@ -356,6 +348,27 @@ def fusion_step(
         theta_next, s, unseen_m, state.theta_img, road_img, state.other_m, rests, dynamics.mean
     )
     return FusionStep(after, dynamics, threshold, excited, K_v)
+
+
+def _guarded(
+    theta_img: float,
+    state: FusionState,
+    unseen_m: float,
+    dynamics: DynamicsUpdate,
+    inputs: WheelInputs,
+    longitudinal_stiffness_n: float,
+) -> tuple[float | None, float | None]:
+    """What tyre and camera pull theta_hat to under the guards of `Gains.tyre_first`; None where one does not [-]."""
+    theta_tyre = dynamics.theta_tyre
+    silent = state.rests or unseen_m < SEEN_HOLD_M or state.other_m > 0.0
+    if theta_tyre is None and not silent:
+        theta_tyre = confirmed_theta(theta_img, dynamics.mean, inputs, longitudinal_stiffness_n)
+    if theta_tyre is not None:
+        return theta_tyre, _agreeing(theta_img, state.theta_hat, theta_tyre)
+    if silent:
+        return None, None
+    # Not less than it already carries.
+    return None, max(theta_img, least_theta(dynamics.force_n, inputs, longitudinal_stiffness_n))
 
 
 def _agreeing(theta_img: float, theta_hat: float, theta_tyre: float) -> float | None:
