@@ -10,7 +10,7 @@ from trpac_core.estimator import TrpacEstimator as Estimator
 from trpac_core.local_speed import local_speeds
 from trpac_core.parameters.configuration import configuration
 from trpac_core.parameters.variables import Variable
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.vision.ife import Ife
 from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 

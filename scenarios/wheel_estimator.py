@@ -15,7 +15,7 @@ from scenarios.library import PAPER_VEHICLE, networks_folder
 from trpac_core.errors import TrpacError
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.estimator_data import Method
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife

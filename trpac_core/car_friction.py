@@ -31,9 +31,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-_new = tuple.__new__
-_ROOT_2, _ROOT_2_PI = math.sqrt(2.0), math.sqrt(2.0 * math.pi)
-
 
 class Friction(NamedTuple):
     """An adhesion and its standard deviation [-]."""
@@ -42,24 +39,19 @@ class Friction(NamedTuple):
     deviation: float
 
 
-Known = tuple[float, float]
-"""An adhesion and its standard deviation, as in `Friction` [-]."""
-
-
-def surer(front: Known, rear: Known, axle_deviation: float) -> tuple[Known, Known]:
-    """The friction of a side's two wheels: each its own estimate, or that of the other where that one says more.
+def surer(front: Friction, rear: Friction, axle_deviation: float) -> tuple[Friction, Friction]:
+    """The friction of a side's two wheels: each its own estimate, or that of the other where its deviation is smaller.
 
     `axle_deviation` is the standard deviation of the road's change over a wheelbase [-].
     """
-    front_deviation, rear_deviation = front[1], rear[1]
-    if front_deviation <= rear_deviation:
-        lent = math.hypot(front_deviation, axle_deviation)
-        return front, rear if rear_deviation <= lent else (front[0], lent)
-    lent = math.hypot(rear_deviation, axle_deviation)
-    return front if front_deviation <= lent else (rear[0], lent), rear
+    if front.deviation <= rear.deviation:
+        from_front = Friction(front.theta, math.hypot(front.deviation, axle_deviation))
+        return front, rear if rear.deviation <= from_front.deviation else from_front
+    from_rear = Friction(rear.theta, math.hypot(rear.deviation, axle_deviation))
+    return front if front.deviation <= from_rear.deviation else from_rear, rear
 
 
-def lower(first: Known, second: Known) -> Friction:
+def lower(first: Friction, second: Friction) -> Friction:
     """The smaller of two adhesions, and the root mean square error of taking it for the true minimum.
 
     Examples
@@ -67,25 +59,24 @@ def lower(first: Known, second: Known) -> Friction:
     >>> lower(Friction(0.3, 0.02), Friction(0.8, 0.1)).deviation
     0.02
     """
-    low, high = (first, second) if first[0] <= second[0] else (second, first)
-    (low_theta, low_deviation), (high_theta, high_deviation) = low, high
-    spread = math.hypot(low_deviation, high_deviation)
-    if spread == 0.0:
-        return Friction(low_theta, low_deviation)
-    gap = high_theta - low_theta
-    ratio = gap / spread
-    right_order = 0.5 * (1.0 + math.erf(ratio / _ROOT_2))
-    density = math.exp(-0.5 * ratio * ratio) / _ROOT_2_PI
+    low, high = (first, second) if first.theta <= second.theta else (second, first)
+    deviation = math.hypot(low.deviation, high.deviation)
+    if deviation == 0.0:
+        return low
+    gap = high.theta - low.theta
+    ratio = gap / deviation
+    right_order = 0.5 * (1.0 + math.erf(ratio / math.sqrt(2.0)))
+    density = math.exp(-0.5 * ratio * ratio) / math.sqrt(2.0 * math.pi)
     square = (
-        low_deviation * low_deviation * right_order
-        + (gap * gap + high_deviation * high_deviation) * (1.0 - right_order)
-        - gap * spread * density
+        low.deviation * low.deviation * right_order
+        + (gap * gap + high.deviation * high.deviation) * (1.0 - right_order)
+        - gap * deviation * density
     )
-    return _new(Friction, (low_theta, math.sqrt(square) if square > 0.0 else 0.0))
+    return Friction(low.theta, math.sqrt(max(square, 0.0)))
 
 
 def car_friction(
-    wheels: tuple[Known, Known, Known, Known],
+    wheels: tuple[Friction, Friction, Friction, Friction],
     load_n: tuple[float, float, float, float],
     axle_deviation: float,
 ) -> Friction:
@@ -107,12 +98,11 @@ def car_friction(
     0.362
     """
     fl, fr, rl, rr = wheels
-    (left_theta, left_deviation), rear_left = surer(fl, rl, axle_deviation)
-    (right_theta, right_deviation), rear_right = surer(fr, rr, axle_deviation)
-    rear_theta, rear_deviation = lower(rear_left, rear_right)
-    left_n, right_n, rear_n, rear_right_n = load_n
-    rear_n += rear_right_n
-    total_n = left_n + right_n + rear_n
-    theta = left_n * left_theta + right_n * right_theta + rear_n * rear_theta
-    deviation = left_n * left_deviation + right_n * right_deviation + rear_n * rear_deviation
-    return _new(Friction, (theta / total_n, deviation / total_n))
+    fl_n, fr_n, rl_n, rr_n = load_n
+    left, rear_left = surer(fl, rl, axle_deviation)
+    right, rear_right = surer(fr, rr, axle_deviation)
+    rear, rear_n = lower(rear_left, rear_right), rl_n + rr_n
+    total_n = fl_n + fr_n + rear_n
+    theta = fl_n * left.theta + fr_n * right.theta + rear_n * rear.theta
+    deviation = fl_n * left.deviation + fr_n * right.deviation + rear_n * rear.deviation
+    return Friction(theta / total_n, deviation / total_n)

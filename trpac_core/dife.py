@@ -8,40 +8,35 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from .confidence import ConfidenceModel, camera_share
 from .excitation import FuzzyScheduler
-from .observer import advanced_state, observed_force, settled_state
-from .sight import (
+from .identifiability import (
     GREATEST_THETA,
-    LEAST_SENSITIVITY,
-    Look,
-    Place,
     WheelInputs,
-    backed_theta,
+    confirmed_theta,
     least_theta,
-    place_of_mean,
-    shown,
+    point_of_mean,
+    point_of_reading,
+    significance_of_mean,
 )
-from .steady import NOTHING, Steady, faded, held, quickened, same_slip
-from .tyre import elastic_friction, force, sensitivity_of
+from .observer import advanced_state, observed_force, settled_state
+from .stationary_mean import NO_MEAN, StationaryMean, aged, gamma_factor, with_reading
+from .theta_variance import VarianceModel, camera_share
+from .tyre import force, tyre_at_slip
 
 __all__ = [
     "GREATEST_THETA",
-    "LEAST_SENSITIVITY",
     "LEAST_THETA",
     "NEVER_SEEN_M",
     "OTHER_CLASS_M",
     "SEEN_HOLD_M",
+    "DynamicsUpdate",
     "FusionState",
     "FusionStep",
     "Gains",
-    "Unaided",
     "VisualTerm",
     "Wheel",
-    "dynamics_step",
-    "fused_step",
     "fusion_step",
     "settled",
 ]
@@ -54,7 +49,6 @@ OTHER_CLASS_M = 4.0
 """Way for which another class must stand to be another road: twice what one picture's verdict reaches [m]."""
 NEVER_SEEN_M = 1e6
 """Way since the tyre showed theta where it never did [m]."""
-_new = tuple.__new__
 
 
 class VisualTerm(Enum):
@@ -117,11 +111,11 @@ class FusionState(NamedTuple):
     """Way for which one other class than that has been given [m]."""
     rests: bool = False
     """Whether the tyre has shown theta since that class stands: the camera then has nothing to add."""
-    steady: Steady = NOTHING
-    """Means of slip and used friction since the wheel stands where it stands on the curve."""
+    mean: StationaryMean = NO_MEAN
+    """Means of slip and used friction since the wheel is at one point of the curve."""
 
 
-class Unaided(NamedTuple):
+class DynamicsUpdate(NamedTuple):
     """What one step makes of slip, torque and load alone."""
 
     theta_hat: float
@@ -134,18 +128,16 @@ class Unaided(NamedTuple):
     """Observed force F_hat [N]."""
     theta_tyre: float | None
     """theta(lambda, F_hat); None where the tyre does not show it or the estimate holds [-]."""
-    sensitivity: float
-    """d mu / d theta there [-]; 0 where it is None."""
-    steady: Steady
-    place: Place | None
-    """None where the newest reading stands for itself."""
+    mean: StationaryMean
+    """Means of slip and used friction with this step's reading."""
 
 
 class FusionStep(NamedTuple):
     """Outcome of one step."""
 
     state: FusionState
-    unaided: Unaided
+    dynamics: DynamicsUpdate
+    """The same step without the camera."""
     threshold: float
     """Excitation threshold [-]."""
     excited: bool
@@ -155,27 +147,17 @@ class FusionStep(NamedTuple):
     @property
     def tyre_force_n(self) -> float:
         """Observed force F_hat [N]."""
-        return self.unaided.force_n
+        return self.dynamics.force_n
 
     @property
     def theta_tyre(self) -> float | None:
-        """theta(lambda, F_hat), see `Unaided` [-]."""
-        return self.unaided.theta_tyre
-
-    @property
-    def sensitivity(self) -> float:
-        """Sensitivity d mu / d theta there, see `Unaided` [-]."""
-        return self.unaided.sensitivity
-
-
-Outcome = tuple[FusionState, Unaided, float, bool, float]
-"""What makes up a `FusionStep`."""
+        """theta(lambda, F_hat), see `DynamicsUpdate` [-]."""
+        return self.dynamics.theta_tyre
 
 
 def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains) -> FusionState:
     """The state with its observed force balancing the wheel torque, to start from."""
-    (size, direction), load_n = inputs.slip, inputs.load_n
-    model = force(state.theta_hat, size, load_n, wheel.longitudinal_stiffness_n, direction)
+    model = _model_force(state.theta_hat, inputs, wheel)
     balanced = inputs.wheel_torque_nm / wheel.radius_m
     s = settled_state(model, balanced, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m)
     return state._replace(s=s)
@@ -184,136 +166,134 @@ def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains)
 def unread(state: FusionState, passed_s: float, way_m: float) -> FusionState:
     """The state after a time and a way in which nothing could be read."""
     unseen_m = min(state.unseen_m + way_m, NEVER_SEEN_M)
-    return state._replace(unseen_m=unseen_m, steady=faded(state.steady, passed_s))
+    return state._replace(unseen_m=unseen_m, mean=aged(state.mean, passed_s))
 
 
-def _unaided(
-    state: FusionState,
-    inputs: WheelInputs,
-    look: Look,
-    wheel: Wheel,
-    gains: Gains,
-    step_s: float,
-    asked: bool,
-    beside: Place | None,
-) -> Unaided:
-    """Observer and estimator over a step without a camera; the tyre is asked for theta where slip is high enough.
+def _model_force(theta_hat: float, inputs: WheelInputs, wheel: Wheel) -> float:
+    """Force of the tyre model [N]."""
+    slip = inputs.slip
+    return force(theta_hat, slip.size, inputs.load_n, wheel.longitudinal_stiffness_n, slip.direction)
 
-    `beside` is the place that the other estimator found in this step. A locked wheel tells nothing of its force: the
-    observer is then led by the tyre model and the estimate holds.
+
+def _dynamics_update(
+    state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains, step_s: float, above: bool
+) -> DynamicsUpdate:
+    """Observer and estimator over a step without the camera.
+
+    theta(lambda, F_hat) is asked for where slip is above a threshold. The torque of a locked wheel is not known: the
+    observer then is led by the tyre model and the estimate holds.
     """
-    theta_hat, s = state[0], state[1]
-    omega, (size, direction), load_n = inputs[0], inputs[3], inputs[4]
-    elastic, g_0, g_1, kappa = look[0]
-    inertia, radius_m, C_x = wheel.inertia_kg_m2, wheel.radius_m, wheel.longitudinal_stiffness_n
-    K, base, driven_n = gains.K, g_0 + g_1 * theta_hat, direction * load_n
-    free = theta_hat >= 2.0 * elastic
-    share = elastic if free else theta_hat * (1.0 - kappa * theta_hat)
-    model_n = driven_n * (share * base)
-    if not inputs[8]:
-        s = settled_state(model_n, model_n, omega, K, inertia, radius_m)
-        return _new(Unaided, (theta_hat, s, model_n, model_n, None, 0.0, NOTHING, None))
-    force_n = observed_force(model_n, s, omega, K, inertia, radius_m)
-    theta_tyre, sensitivity, place = None, 0.0, None
-    theta_next, by_theta_n, theta_rate = theta_hat, 0.0, 0.0
-    if asked:
-        friction = force_n * direction / load_n
-        steady = held(state[7], size, friction, inputs[11], inputs[9], step_s)
-        if steady[3] > step_s:
-            place = beside
-            if place is None or not same_slip(place[0], steady):
-                place = place_of_mean(steady, inputs, C_x)
-            theta_tyre, sensitivity = shown(steady[1], place[1], place[2])
-        else:
-            theta_tyre, sensitivity = shown(friction, look[0], elastic_friction(look[1], load_n, C_x))
-        if theta_tyre is not None:
-            rate = gains.gamma * quickened(steady, inputs[12])
-            rate *= 1.0 + gains.innovation * abs(theta_tyre - theta_hat)
-            theta_next = _driven(theta_hat, rate, rate * theta_tyre, step_s)
-            if theta_next != theta_hat and step_s > 0.0:
-                theta_rate = (theta_next - theta_hat) / step_s
-                slope = share * g_1 if free else (1.0 - 2.0 * kappa * theta_hat) * base + share * g_1
-                by_theta_n = driven_n * slope
+    theta_hat, inertia, radius_m = state.theta_hat, wheel.inertia_kg_m2, wheel.radius_m
+    model_n = _model_force(theta_hat, inputs, wheel)
+    if not inputs.torque_known:
+        s = settled_state(model_n, model_n, inputs.wheel_speed_rad_s, gains.K, inertia, radius_m)
+        return DynamicsUpdate(theta_hat, s, model_n, model_n, theta_tyre=None, mean=NO_MEAN)
+    force_n = observed_force(model_n, state.s, inputs.wheel_speed_rad_s, gains.K, inertia, radius_m)
+    theta_tyre, theta_next, mean = None, theta_hat, NO_MEAN
+    if above:
+        mean = with_reading(
+            state.mean,
+            inputs.slip.size,
+            inputs.friction(force_n),
+            inputs.slip_rise,
+            inputs.slip_noise,
+            step_s,
+        )
+        theta_tyre = _theta_tyre(mean, inputs, wheel, step_s)
+    if theta_tyre is not None:
+        rate = gains.gamma * gamma_factor(mean, inputs.noise_s)
+        rate *= 1.0 + gains.innovation * abs(theta_tyre - theta_hat)
+        theta_next = _relaxed(theta_hat, rate, rate * theta_tyre, step_s)
+    s = _advanced_observer(state, model_n, theta_next, inputs, wheel, gains, step_s)
+    return DynamicsUpdate(theta_next, s, model_n, force_n, theta_tyre, mean)
+
+
+def _theta_tyre(mean: StationaryMean, inputs: WheelInputs, wheel: Wheel, step_s: float) -> float | None:
+    """theta(lambda, F_hat) of the means, or of the newest reading where they have just begun anew [-]."""
+    C_x = wheel.longitudinal_stiffness_n
+    if mean.duration_s > step_s:
+        point = point_of_mean(mean, inputs, C_x, significance_of_mean(mean))
     else:
-        steady = NOTHING
-    s = advanced_state(s, model_n, by_theta_n, theta_rate, inputs[2], inputs[1], K, inertia, radius_m, step_s)
-    return _new(Unaided, (theta_next, s, model_n, force_n, theta_tyre, sensitivity, steady, place))
+        point = point_of_reading(inputs, C_x)
+    return point.theta(mean.friction)
 
 
-def _led(
+def _advanced_observer(
     state: FusionState,
-    unaided: Unaided,
+    model_n: float,
+    theta_next: float,
     inputs: WheelInputs,
-    look: Look,
     wheel: Wheel,
     gains: Gains,
-    theta_img: float | None,
-    K_v: float,
     step_s: float,
-) -> tuple[float, float]:
-    """theta_hat and s after a step of Eq. (17) or (18) in which the camera pulls, or what tyre and camera agree on."""
-    theta_hat, s = state[:2]
-    _, omega_ahead, torque_nm, (_, direction), load_n = inputs[:5]
-    inertia, radius_m = wheel.inertia_kg_m2, wheel.radius_m
-    rate = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)
-    pull = 0.0 if theta_img is None else rate * theta_img
-    if unaided.theta_tyre is not None:
-        by_tyre = gains.gamma * quickened(unaided.steady, inputs.noise_s)
-        rate, pull = by_tyre + rate, by_tyre * unaided.theta_tyre + pull
-    theta_next = _driven(theta_hat, rate, pull, step_s)
-    by_theta_n = direction * load_n * sensitivity_of(theta_hat, look[0]) if theta_next != theta_hat else 0.0
-    theta_rate = (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0
-    return theta_next, advanced_state(
-        s,
-        unaided.model_n,
+) -> float:
+    """The observer's s after a step over which theta_hat goes to `theta_next` [rad/s^2]."""
+    by_theta_n = theta_rate = 0.0
+    if theta_next != state.theta_hat and step_s > 0.0:
+        theta_rate = (theta_next - state.theta_hat) / step_s
+        tyre = tyre_at_slip(inputs.slip.size, inputs.load_n, wheel.longitudinal_stiffness_n)
+        by_theta_n = inputs.slip.direction * inputs.load_n * tyre.friction_by_theta(state.theta_hat)
+    return advanced_state(
+        state.s,
+        model_n,
         by_theta_n,
         theta_rate,
-        torque_nm,
-        omega_ahead,
+        inputs.wheel_torque_nm,
+        inputs.wheel_speed_ahead_rad_s,
         gains.K,
-        inertia,
-        radius_m,
+        wheel.inertia_kg_m2,
+        wheel.radius_m,
         step_s,
     )
 
 
-def dynamics_step(
-    state: FusionState, inputs: WheelInputs, look: Look, wheel: Wheel, gains: Gains, step_s: float
-) -> Outcome:
-    """One step of DE: what `fused_step` makes without a camera of a state that none has ever touched."""
-    threshold = look[2]
-    above = inputs[3][0] > threshold
-    unaided = _unaided(state, inputs, look, wheel, gains, step_s, above, None)
-    theta_next, s, _, _, theta_tyre, _, steady, _ = unaided
-    shows = theta_tyre is not None
-    unseen_m = 0.0
-    if not shows:
-        unseen_m = state[2] + inputs[7]
-        if unseen_m > NEVER_SEEN_M:
-            unseen_m = NEVER_SEEN_M
-    after = _new(FusionState, (theta_next, s, unseen_m, None, None, 0.0, False, steady))
-    return after, unaided, threshold, shows or (above and inputs[8]), 0.0
+def _with_camera(
+    state: FusionState,
+    dynamics: DynamicsUpdate,
+    theta_tyre: float | None,
+    theta_img: float | None,
+    K_v: float,
+    inputs: WheelInputs,
+    wheel: Wheel,
+    gains: Gains,
+    step_s: float,
+) -> tuple[float, float]:
+    """theta_hat and s after a step of Eq. (17) or (18)."""
+    rate = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)
+    pull = 0.0 if theta_img is None else rate * theta_img
+    if theta_tyre is not None:
+        by_tyre = gains.gamma * gamma_factor(dynamics.mean, inputs.noise_s)
+        rate, pull = by_tyre + rate, by_tyre * theta_tyre + pull
+    theta_next = _relaxed(state.theta_hat, rate, pull, step_s)
+    return theta_next, _advanced_observer(state, dynamics.model_n, theta_next, inputs, wheel, gains, step_s)
 
 
-def fusion_step(*given: Any, **more: Any) -> FusionStep:
-    """`fused_step` with its outcome by names; parameters as there."""
-    return FusionStep(*fused_step(*given, **more))
+def _with_class(state: FusionState, theta_img: float | None, way_m: float) -> FusionState:
+    """The state with the class that the camera gives now."""
+    if theta_img is None:
+        return state
+    if state.road_img is None:
+        return state._replace(theta_img=theta_img)
+    if theta_img == state.road_img:
+        return state._replace(theta_img=theta_img, other_m=0.0)
+    other_m = state.other_m + way_m if theta_img == state.theta_img else way_m
+    if other_m < OTHER_CLASS_M:
+        return state._replace(theta_img=theta_img, other_m=other_m)
+    # Another class that stands: what the tyre showed was another road.
+    return state._replace(theta_img=theta_img, road_img=theta_img, other_m=0.0, rests=False)
 
 
-def fused_step(
+def fusion_step(
     state: FusionState,
     inputs: WheelInputs,
-    look: Look,
     wheel: Wheel,
     gains: Gains,
     scheduler: FuzzyScheduler,
     theta_img: float | None,
     step_s: float,
-    confidence: ConfidenceModel | None = None,
+    confidence: VarianceModel | None = None,
     variance: float = 0.0,
-    before: FusionState | None = None,
-    beside: Unaided | None = None,
-) -> Outcome:
+) -> FusionStep:
     """One step of observer and estimator.
 
     The tyre is excited where slip is above the fuzzy threshold. It also is where it visibly slides at a slip above
@@ -325,73 +305,70 @@ def fused_step(
 
     Parameters
     ----------
-    state, inputs, look, wheel, gains, scheduler
-        State now, inputs at the start of the step, what slip and load say, and constants.
+    state, inputs, wheel, gains, scheduler
+        State now, inputs at the start of the step, and constants.
     theta_img : float or None
         Adhesion of the class that the camera gives the road under the wheel; None where epsilon = 0 [-].
     step_s : float
         Step [s].
-    confidence, variance : ConfidenceModel, float
-        That of the estimate: where the tyre is not seen, a class may claim `confidence.camera_share` of its distance
-        from the estimate; without a model all of it.
-    before, beside : FusionState and Unaided, optional
-        DE's state and what it made of it on the same inputs. Where that is the same here it is taken from there; the
-        outcome does not depend on it.
+    confidence, variance : VarianceModel, float
+        That of the estimate: where the tyre is not seen, a class may claim `theta_variance.camera_share` of its
+        distance from the estimate; without a model all of it.
     """
-    theta_hat, s, unseen_m, before_img, road_img, other_m, rests, steady = state
-    size, way_m, threshold = inputs[3][0], inputs[7], look[2]
-    above = may_show = size > threshold
-    if theta_img is not None:
-        if theta_img == road_img:
-            other_m = 0.0
-        elif road_img is not None:
-            other_m = other_m + way_m if theta_img == before_img else way_m
-            if other_m >= OTHER_CLASS_M:
-                # Another class that stands: what the tyre showed was another road.
-                road_img, other_m, rests = theta_img, 0.0, False
-        before_img = theta_img
-        threshold = scheduler.threshold(theta_img, inputs[4], wheel.longitudinal_stiffness_n, inputs[5])
-        above = size > threshold
-    unseen_m += way_m
-    if unseen_m > NEVER_SEEN_M:
-        unseen_m = NEVER_SEEN_M
-    if before is None or beside is None:
-        unaided = _unaided(state, inputs, look, wheel, gains, step_s, above or may_show, None)
-    elif theta_hat != before[0] or s != before[1] or steady != before[7] or (above and not may_show):
-        unaided = _unaided(state, inputs, look, wheel, gains, step_s, above or may_show, beside[7])
-    else:
-        unaided = beside
-    theta_next, s, _, force_n, theta_tyre, _, steady, place = unaided
-    K_v = 0.0
-    excited = theta_tyre is not None or (above and inputs[8])
+    slip, load_n, C_x = inputs.slip.size, inputs.load_n, wheel.longitudinal_stiffness_n
+    threshold = scheduler.threshold(theta_img, load_n, C_x, inputs.slip_deviation)
+    threshold_alone = scheduler.threshold(None, load_n, C_x, inputs.slip_deviation)
+    dynamics = _dynamics_update(state, inputs, wheel, gains, step_s, slip > min(threshold, threshold_alone))
+    theta_tyre, theta_hat = dynamics.theta_tyre, state.theta_hat
+    theta_next, s, K_v = dynamics.theta_hat, dynamics.s, 0.0
+    state = _with_class(state, theta_img, inputs.way_m)
+    unseen_m = min(state.unseen_m + inputs.way_m, NEVER_SEEN_M)
+    excited = theta_tyre is not None or (slip > threshold and inputs.torque_known)
     if excited and theta_img is not None:
-        by_tyre = theta_tyre
-        if gains.tyre_first:
-            if theta_tyre is not None:
-                theta_img = _agreeing(theta_img, theta_hat, theta_tyre)
-            elif rests or unseen_m < SEEN_HOLD_M or other_m > 0.0:
-                theta_img = None
-            else:
-                by_tyre = backed_theta(theta_img, steady, place, inputs, wheel.longitudinal_stiffness_n)
-                if by_tyre is not None:
-                    theta_img = _agreeing(theta_img, theta_hat, by_tyre)
-                else:
-                    # Not less than it already carries.
-                    theta_img = max(theta_img, least_theta(force_n, inputs, wheel.longitudinal_stiffness_n))
-        if theta_img is not None:
-            difference = abs(theta_img - theta_hat)
+        by_tyre, by_camera = (
+            _guarded(theta_img, state, unseen_m, dynamics, inputs, C_x)
+            if gains.tyre_first
+            else (theta_tyre, theta_img)
+        )
+        if by_camera is not None:
+            difference = abs(by_camera - theta_hat)
             if by_tyre is None and confidence is not None and gains.tyre_first:
                 difference *= camera_share(confidence, variance, theta_hat)
             K_v = scheduler.K_v(difference)
         if K_v != 0.0 or by_tyre is not theta_tyre:
-            led_by = unaided if by_tyre is theta_tyre else unaided._replace(theta_tyre=by_tyre)
-            theta_next, s = _led(state, led_by, inputs, look, wheel, gains, theta_img, K_v, step_s)
+            theta_next, s = _with_camera(
+                state, dynamics, by_tyre, by_camera, K_v, inputs, wheel, gains, step_s
+            )
+    road_img, rests = state.road_img, state.rests
     if theta_tyre is not None:
         unseen_m = 0.0
-        road_img = before_img if road_img is None else road_img
+        road_img = state.theta_img if state.road_img is None else state.road_img
         rests = road_img is not None
-    after = _new(FusionState, (theta_next, s, unseen_m, before_img, road_img, other_m, rests, steady))
-    return after, unaided, threshold, excited, K_v
+    after = FusionState(
+        theta_next, s, unseen_m, state.theta_img, road_img, state.other_m, rests, dynamics.mean
+    )
+    return FusionStep(after, dynamics, threshold, excited, K_v)
+
+
+def _guarded(
+    theta_img: float,
+    state: FusionState,
+    unseen_m: float,
+    dynamics: DynamicsUpdate,
+    inputs: WheelInputs,
+    longitudinal_stiffness_n: float,
+) -> tuple[float | None, float | None]:
+    """What tyre and camera pull theta_hat to under the guards of `Gains.tyre_first`; None where one does not [-]."""
+    theta_tyre = dynamics.theta_tyre
+    silent = state.rests or unseen_m < SEEN_HOLD_M or state.other_m > 0.0
+    if theta_tyre is None and not silent:
+        theta_tyre = confirmed_theta(theta_img, dynamics.mean, inputs, longitudinal_stiffness_n)
+    if theta_tyre is not None:
+        return theta_tyre, _agreeing(theta_img, state.theta_hat, theta_tyre)
+    if silent:
+        return None, None
+    # Not less than it already carries.
+    return None, max(theta_img, least_theta(dynamics.force_n, inputs, longitudinal_stiffness_n))
 
 
 def _agreeing(theta_img: float, theta_hat: float, theta_tyre: float) -> float | None:
@@ -406,12 +383,10 @@ def _agreeing(theta_img: float, theta_hat: float, theta_tyre: float) -> float | 
     return theta_img if abs(by_camera) < abs(by_tyre) else theta_tyre
 
 
-def _driven(theta_hat: float, rate: float, pull: float, step_s: float) -> float:
+def _relaxed(theta_hat: float, rate: float, pull: float, step_s: float) -> float:
     """theta_hat one step later under theta_hat' = pull - rate theta_hat, both held over the step."""
     if rate == 0.0:
         return theta_hat
     target = pull / rate
     moved = target + (theta_hat - target) * math.exp(-rate * step_s)
-    if moved < LEAST_THETA:
-        return LEAST_THETA
-    return moved if moved < GREATEST_THETA else GREATEST_THETA
+    return min(max(moved, LEAST_THETA), GREATEST_THETA)

@@ -5,50 +5,56 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import paper as printed
-from .camera_side import RoadUnderWheel, take_frame
-from .confidence import Evidence, advanced_variance, reading_noise, unknown_variance, wandered, with_camera
 from .dife import (
     GREATEST_THETA,
     NEVER_SEEN_M,
     SEEN_HOLD_M,
     FusionState,
-    Outcome,
+    FusionStep,
     VisualTerm,
     Wheel,
-    dynamics_step,
-    fused_step,
+    fusion_step,
     settled,
     unread,
 )
-from .elastic import ElasticLine, learned
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Method, Rates, RoadClass, Source
-from .mismatch import followed
-from .paper import PrintedStep, PrintedWheel, printed_step
-from .readings import (
-    GREATEST_ACCELERATION_M_S2,
-    LONGEST_STEP_S,
-    MOTION,
-    Sensors,
-    implausible,
-    plain,
-    unusable,
-)
+from .identifiability import WheelInputs
+from .paper import PrintedWheel, printed_step
+from .preprocessing import LOCKED_M_S, jumped, preprocess
+from .road_buffer import take_frame
 from .robust import roads
 from .robust.belief import WheelModel
 from .robust.messages import radius_message, tyre_message
-from .robust.wheel import INNOVATION, Sample, begun, point, setup, stepped
-from .sight import Look, WheelInputs, look_at
-from .steady import quickened, unsettled
-from .tyre import TyreAtSlip, cubic_at_slip
+from .robust.wheel import INNOVATION, RobustState, Sample, begun, point, setup, stepped
+from .sensors import (
+    GREATEST_ACCELERATION_M_S2,
+    LONGEST_STEP_S,
+    MOTION,
+    FilteredReadings,
+    Sensors,
+    implausible,
+    unusable,
+)
+from .slip_calibration import SlipCalibration, calibrated
+from .stationary_mean import gamma_factor, unsettled_slip
+from .stiffness_mismatch import updated_mismatch
+from .theta_variance import (
+    Evidence,
+    advanced_variance,
+    drifted_variance,
+    reading_noise,
+    unknown_variance,
+    variance_with_camera,
+)
+from .tyre import tyre_at_slip
 from .vision.ife import Ife
-from .vision.preview import PreviewState
-from .wheel_inputs import LOCKED_M_S, jumped, wheel_inputs
+from .vision.preview import Outcome, PreviewState, covering
 
 __all__ = [
     "LOCKED_M_S",
@@ -62,12 +68,10 @@ __all__ = [
 
 LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
-_LEAST_FRICTION = 1e-6
+LEAST_FRICTION = 1e-6
 """Used friction below which a reading says nothing of the tyre's curve, whatever the noise is said to be [-]."""
 BOUNDS = 2.0
 """Standard deviations from TRPAC to the ends of the interval where it is symmetric [-]."""
-_SOURCES = tuple(Source)
-_new = tuple.__new__
 
 
 class TrpacEstimator:
@@ -98,9 +102,7 @@ class TrpacEstimator:
         smoothing = config.gains.gamma * config.sensor_filter_s
         self._averaged = smoothing / (1.0 + smoothing)
         self._rates = Rates.at(config, 0.0, 0.0)
-        self._radius_m, self._least_load_n = car.wheel_radius_m, LEAST_LOAD * self._static_load_n
-        self._road = RoadUnderWheel(self._preview)
-        self._softened_by: tuple[ElasticLine | None, Wheel] = (None, self._wheel)
+        self._least_load_n = LEAST_LOAD * self._static_load_n
         self._robust = None
         self._gains = config.gains
         if config.method is Method.ROBUST:
@@ -113,7 +115,7 @@ class TrpacEstimator:
                 car.rolling_resistance,
                 config.sliding_speed_noise_m_s,
                 config.confidence.torque_noise_nm,
-                config.elastic,
+                config.tolerance,
                 config.class_theta,
             )
         self.reset()
@@ -123,15 +125,10 @@ class TrpacEstimator:
         config, theta = self.config, self.config.theta_initial
         stiffness_n, start = self._wheel.longitudinal_stiffness_n, FusionState(theta, 0.0)
         variance = unknown_variance(config.confidence, theta)
-        self._state = EstimatorState(start, start, (0.0, 0.0, 0.0), config.elastic.start, variance)
+        readings = FilteredReadings(0.0, 0.0, 0.0)
+        self._state = EstimatorState(start, start, readings, config.tolerance.prior, variance)
         self._state.printed = self._state.printed_alone = printed.begun(theta)
-        low, high, expected, expected_deviation = 0.0, GREATEST_THETA, theta, math.sqrt(variance)
-        if self._robust is not None:
-            self._state.robust = robust = begun(self._robust)
-            said = robust.said
-            low, high, expected, expected_deviation = said.low, said.high, said.mean, said.std
-            theta, deviation = point(robust, theta)
-            variance = deviation * deviation
+        deviation = math.sqrt(variance)
         self._last = Estimate(
             TRPAC=theta,
             flag=False,
@@ -144,14 +141,18 @@ class TrpacEstimator:
             TRPAC_dynamics=theta,
             image_confidence=0.0,
             frame_age_s=-1.0,
-            TRPAC_std=math.sqrt(variance),
+            TRPAC_std=deviation,
             load_n=self._static_load_n,
             longitudinal_stiffness_n=stiffness_n,
-            TRPAC_low=low,
-            TRPAC_high=high,
-            TRPAC_expected=expected,
-            TRPAC_expected_std=expected_deviation,
+            TRPAC_low=0.0,
+            TRPAC_high=GREATEST_THETA,
+            TRPAC_expected=theta,
+            TRPAC_expected_std=deviation,
         )
+        if self._robust is not None:
+            self._state.robust = robust = begun(self._robust)
+            last = _with_robust(self._last, robust, theta)
+            self._last = last._replace(TRPAC_image=last.TRPAC, TRPAC_dynamics=last.TRPAC)
 
     @property
     def last(self) -> Estimate:
@@ -199,18 +200,16 @@ class TrpacEstimator:
         ImageError
             If the picture does not fit the camera; nothing has changed then.
         """
-        config, rates, problem = self.config, self._rates, None
-        if not plain(step_s, sensors, config.floor_m_s):
-            problem = unusable(step_s, sensors, self._wheel.radius_m, config.floor_m_s)
+        config, state = self.config, self._state
+        problem = unusable(step_s, sensors, self._wheel.radius_m, config.floor_m_s)
         if frame is not None and isinstance(frame, RoadClass) and not 0.0 <= frame.confidence <= 1.0:
             problem = problem or f"Class confidence is {frame.confidence}; expected a number between 0 and 1."
             frame, frame_failed = None, True
         if problem is not None:
             return self._hold(step_s, sensors, frame, frame_failed, problem)
-        state = self._state
-        if step_s != rates.step_s or step_s == 0.0:
-            self._rates = rates = Rates.at(config, step_s, state.step_s)
-        if state.settled and jumped(state.readings, sensors, self._radius_m, rates):
+        if step_s != self._rates.step_s or step_s == 0.0:
+            self._rates = Rates.at(config, step_s, state.step_s)
+        if state.settled and jumped(state.readings, sensors, self._wheel.radius_m, self._rates):
             state.settled = False
         acceleration, lagged, load_n = self._moved(sensors)
         if frame is not None or frame_failed:
@@ -236,8 +235,7 @@ class TrpacEstimator:
             load_n = self._static_load_n + self._load_by_acceleration * acceleration
         elif state.settled:
             load_n = state.load_n + rates.sensor_share * (load_n - state.load_n)
-        least_n = self._least_load_n
-        return acceleration, lagged, load_n if load_n > least_n else least_n
+        return acceleration, lagged, max(load_n, self._least_load_n)
 
     def _advance(
         self,
@@ -248,111 +246,101 @@ class TrpacEstimator:
         load_n: float,
     ) -> Estimate:
         """Run both estimators over the step with the road that lies under the wheel at its start."""
-        config, state = self.config, self._state
-        scheduler, gains = config.scheduler, self._gains
-        softened_by, wheel = self._softened_by
-        if softened_by is not state.line:
-            wheel = self._softened(state.line)
-        C_x = wheel.longitudinal_stiffness_n
-        readings, inputs, read_slip, smoothed_slip, locked_s = wheel_inputs(
-            config, self._rates, state, sensors, self._radius_m, step_s, load_n
-        )
-        fusion, dynamics = state.fusion, state.dynamics
+        config, state, gains = self.config, self._state, self._gains
+        wheel = self._calibrated_wheel(state.calibration)
+        prepared = preprocess(config, self._rates, state, sensors, wheel.radius_m, step_s, load_n)
+        inputs, fusion, dynamics = prepared.inputs, state.fusion, state.dynamics
         if not state.settled:
             fusion = settled(fusion, inputs, wheel, gains)
             dynamics = settled(dynamics, inputs, wheel, gains)
-        outcome = self._road.at(state.preview, state.position_m - self._setback_m)
-        flag, theta_img, theta_seen = False, None, self._last.TRPAC_image
-        Q_v, age_s = 0.0, -1.0
-        if outcome is not None:
-            flag = outcome.flag and not state.frame_failed
-            theta_seen, Q_v = config.class_theta[outcome.surface], outcome.Q_v
-            theta_img = theta_seen if flag else None
-        look = look_at(inputs, C_x, scheduler)
-        alone = dynamics_step(dynamics, inputs, look, wheel, gains, step_s)
+        outcome = self._under_wheel()
+        flag = outcome is not None and outcome.flag and not state.frame_failed
+        theta_img = config.class_theta[outcome.surface] if outcome is not None and flag else None
+        alone = fusion_step(dynamics, inputs, wheel, gains, config.scheduler, None, step_s)
         fused = alone
         if config.method is Method.DIFE and (theta_img is not None or fusion != dynamics):
-            model, known = config.confidence, state.variance
-            fused = fused_step(
+            fused = fusion_step(
                 fusion,
                 inputs,
-                look,
                 wheel,
                 gains,
-                scheduler,
+                config.scheduler,
                 theta_img,
                 step_s,
-                model,
-                known,
-                dynamics,
-                alone[1],
+                config.confidence,
+                state.variance,
             )
-        after, unaided, threshold, excited, K_v = fused
-        theta, class_after, class_before = after[0], after[3], fusion[3]
-        unasked_s = state.unasked_s + step_s
-        if unasked_s >= config.sensor_filter_s or class_after != class_before:
+        state.since_update_s += step_s
+        class_changed = fused.state.theta_img != fusion.theta_img
+        if state.since_update_s >= config.sensor_filter_s or class_changed:
             if config.method is Method.DIFE:
-                state.variance, state.lag = self._variance(state, fused, inputs, look, wheel, unasked_s)
-            state.line = self._learned(state, alone, inputs, read_slip, unasked_s)
-            unasked_s = 0.0
-        state.fusion, state.dynamics, state.readings = after, alone[0], readings
-        state.unasked_s, state.locked_s, state.smoothed_slip = unasked_s, locked_s, smoothed_slip
+                self._update_variance(fused, inputs, wheel, state.since_update_s)
+            self._update_calibration(alone, inputs, prepared.read_slip, state.since_update_s)
+            state.since_update_s = 0.0
+        state.fusion, state.dynamics, state.readings = fused.state, alone.state, prepared.readings
+        state.locked_s, state.lagged_slip = prepared.locked_s, prepared.lagged_slip
         state.time_s += step_s
-        state.position_m += inputs[7]
+        state.position_m += inputs.way_m
         state.speed_m_s, state.lagged_speed_m_s = sensors.vehicle_speed_m_s, lagged_speed_m_s
         state.acceleration_m_s2, state.load_n = acceleration_m_s2, load_n
         state.step_s, state.settled = step_s or state.step_s, True
-        if outcome is not None:
-            age_s = state.time_s - outcome.captured_s
-        theta_alone, slip, force_n = alone[0][0], inputs[3][0], unaided[3]
+        theta = fused.state.theta_hat
+        variance = variance_with_camera(config.confidence, state.variance, theta, theta_img)
+        image, bounds = self._image(outcome), _symmetric(theta, math.sqrt(variance))
+        estimate = Estimate(
+            TRPAC=theta,
+            flag=flag,
+            K_v=fused.K_v,
+            excitation_flag=fused.excited,
+            excitation_threshold=fused.threshold,
+            slip=inputs.slip.size,
+            tyre_force_n=fused.tyre_force_n,
+            TRPAC_image=image.theta,
+            TRPAC_dynamics=alone.state.theta_hat,
+            image_confidence=image.Q_v,
+            frame_age_s=image.age_s,
+            TRPAC_std=bounds.deviation,
+            load_n=load_n,
+            longitudinal_stiffness_n=wheel.longitudinal_stiffness_n,
+            TRPAC_low=bounds.low,
+            TRPAC_high=bounds.high,
+            TRPAC_expected=theta,
+            TRPAC_expected_std=bounds.deviation,
+        )
         if config.method is Method.AS_PRINTED:
-            step, theta_alone = self._as_printed(sensors, load_n, theta_img, step_s)
-            _, slip, force_n, threshold, excited, K_v = step
-            theta = step.state.theta_hat
-            # The paper's estimate has no deviation: that of a road of which nothing is known.
-            state.variance = variance = unknown_variance(config.confidence, theta)
-        else:
-            variance = with_camera(config.confidence, state.variance, theta, theta_img)
-        deviation = math.sqrt(variance)
-        low, high = max(theta - BOUNDS * deviation, 0.0), min(theta + BOUNDS * deviation, GREATEST_THETA)
-        expected, expected_deviation = theta, deviation
-        if state.robust is not None and self._robust is not None:
-            given = roads.NONE if outcome is None or not flag else int(outcome.surface)
+            estimate = self._printed(estimate, sensors, theta_img, step_s)
+        elif state.robust is not None and self._robust is not None:
             sample = Sample(
                 sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s, load_n
             )
-            seen = unaided[4] is not None
-            state.robust = stepped(state.robust, self._robust, sample, given, step_s, inputs[7], seen)
-            said = state.robust.said
-            theta, deviation = point(state.robust, theta_alone)
-            low, high, expected, expected_deviation = said.low, said.high, said.mean, said.std
-            K_v = scheduler.K_v(abs(theta_img - theta)) if excited and theta_img is not None else 0.0
-        self._last = _new(
-            Estimate,
-            (
-                theta,
-                flag,
-                K_v,
-                excited,
-                threshold,
-                slip,
-                force_n,
-                theta_seen,
-                theta_alone,
-                Q_v,
-                age_s,
-                deviation,
-                load_n,
-                C_x,
-                low,
-                high,
-                expected,
-                expected_deviation,
-                self._source(flag, excited),
-                None,
-            ),
-        )
+            road_class = int(outcome.surface) if outcome is not None and flag else roads.NONE
+            observed = alone.theta_tyre is not None
+            state.robust = stepped(
+                state.robust, self._robust, sample, road_class, step_s, inputs.way_m, observed
+            )
+            estimate = _with_robust(estimate, state.robust, estimate.TRPAC_dynamics)
+            if estimate.excitation_flag and theta_img is not None:
+                K_v = config.scheduler.K_v(abs(theta_img - estimate.TRPAC))
+                estimate = estimate._replace(K_v=K_v)
+        self._last = estimate._replace(source=self._source(flag, estimate.excitation_flag))
         return self._last
+
+    def _calibrated_wheel(self, calibration: SlipCalibration) -> Wheel:
+        """The wheel with the stiffness that was learnt."""
+        wheel = self._wheel
+        stiffness_n = wheel.longitudinal_stiffness_n / (1.0 + calibration.compliance())
+        return Wheel(wheel.inertia_kg_m2, wheel.radius_m, stiffness_n)
+
+    def _under_wheel(self) -> Outcome | None:
+        """What the camera gave for the road under the wheel."""
+        return covering(self._state.preview, self._preview, self._state.position_m - self._setback_m)
+
+    def _image(self, outcome: Outcome | None) -> _Image:
+        """What an estimate shows of the camera; where there is no class the last adhesion stays."""
+        if outcome is None:
+            return _Image(self._last.TRPAC_image, Q_v=0.0, age_s=-1.0)
+        theta = self.config.class_theta[outcome.surface]
+        return _Image(theta, outcome.Q_v, self._state.time_s - outcome.captured_s)
 
     def _source(self, flag: bool, excited: bool) -> Source:
         """What the estimate rests on; the estimator as printed remembers no road that the tyre has shown."""
@@ -364,14 +352,14 @@ class TrpacEstimator:
         else:
             classes = fusion.theta_img is not None
             tyre = fusion.rests or fusion.unseen_m < (SEEN_HOLD_M if classes else NEVER_SEEN_M)
-        return _SOURCES[tyre + 2 * flag]
+        return Source(tyre + 2 * flag)
 
-    def _as_printed(
-        self, sensors: Sensors, load_n: float, theta_img: float | None, step_s: float
-    ) -> tuple[PrintedStep, float]:
-        """A step of Eqs. (12) to (19) with the camera, and the estimate of the same without it [-]."""
+    def _printed(
+        self, estimate: Estimate, sensors: Sensors, theta_img: float | None, step_s: float
+    ) -> Estimate:
+        """The estimate after a step of Eqs. (12) to (19) with the camera, and beside it of the same without it."""
         state, gains, wheel = self._state, self.config.gains, self._wheel
-        told = PrintedWheel(
+        constants = PrintedWheel(
             wheel.inertia_kg_m2,
             wheel.radius_m,
             wheel.longitudinal_stiffness_n,
@@ -380,35 +368,35 @@ class TrpacEstimator:
             gains.visual_term is VisualTerm.INSIDE,
             self.config.floor_m_s,
         )
-        read = sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s, load_n
-        with_picture = printed_step(state.printed, told, *read, theta_img, step_s)
-        alone = printed_step(state.printed_alone, told, *read, None, step_s)
-        state.printed, state.printed_alone = with_picture.state, alone.state
-        return with_picture, alone.state.theta_hat
+        read = sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s, estimate.load_n
+        fused = printed_step(state.printed, constants, *read, theta_img, step_s)
+        alone = printed_step(state.printed_alone, constants, *read, None, step_s)
+        state.printed, state.printed_alone = fused.state, alone.state
+        theta = fused.state.theta_hat
+        # The paper's estimate has no deviation: that of a road of which nothing is known.
+        state.variance = unknown_variance(self.config.confidence, theta)
+        bounds = _symmetric(theta, math.sqrt(state.variance))
+        return estimate._replace(
+            TRPAC=theta,
+            TRPAC_dynamics=alone.state.theta_hat,
+            slip=fused.slip,
+            tyre_force_n=fused.force_n,
+            excitation_threshold=fused.threshold,
+            excitation_flag=fused.excited,
+            K_v=fused.K_v,
+            TRPAC_std=bounds.deviation,
+            TRPAC_low=bounds.low,
+            TRPAC_high=bounds.high,
+            TRPAC_expected=theta,
+            TRPAC_expected_std=bounds.deviation,
+        )
 
-    def _softened(self, line: ElasticLine) -> Wheel:
-        """The wheel with the stiffness that was learnt, kept until the line changes."""
-        told = self._wheel
-        softened_n = told.longitudinal_stiffness_n / (1.0 + line.compliance())
-        wheel = Wheel(told.inertia_kg_m2, told.radius_m, softened_n)
-        self._softened_by = line, wheel
-        return wheel
-
-    def _variance(
-        self,
-        state: EstimatorState,
-        fused: Outcome,
-        inputs: WheelInputs,
-        look: Look,
-        wheel: Wheel,
-        passed_s: float,
-    ) -> tuple[float, float]:
-        """Variance and lag of the fused estimate after a time."""
-        config, theta_hat, before_s = self.config, fused[0].theta_hat, state.step_s
-        _, _, _, force_n, theta_tyre, _, steady, place = fused[1]
-        size, direction = inputs.slip
+    def _update_variance(self, fused: FusionStep, inputs: WheelInputs, wheel: Wheel, passed_s: float) -> None:
+        """Bring the variance of the fused estimate up to date after a time."""
+        config, state, theta_hat = self.config, self._state, fused.state.theta_hat
+        theta_tyre, mean = fused.theta_tyre, fused.dynamics.mean
         way_m = state.speed_m_s * passed_s
-        before, after = state.fusion.theta_img, fused[0].theta_img
+        before, after = state.fusion.theta_img, fused.state.theta_img
         if (
             theta_tyre is None
             and before is not None
@@ -417,64 +405,55 @@ class TrpacEstimator:
         ):
             # A class that is farther from the estimate than the one before: the road may be another.
             way_m += config.confidence.class_change_m
-        if size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
-            return wandered(config.confidence, state.variance, theta_hat, way_m), 0.0
+        if inputs.slip.size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
+            state.variance = drifted_variance(config.confidence, state.variance, theta_hat, way_m)
+            state.lag = 0.0
+            return
         speed_m_s = max(state.speed_m_s, config.floor_m_s)
-        cubic, friction = look[0], force_n * direction / inputs.load_n
-        if steady.held_s > before_s:
-            size, friction = steady.slip, steady.friction
-            cubic = (
-                place[1]
-                if place is not None
-                else cubic_at_slip(size, inputs.load_n, wheel.longitudinal_stiffness_n)
-            )
-        tyre = TyreAtSlip(*cubic)
-        noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / size
+        slip, friction = inputs.slip.size, inputs.friction(fused.tyre_force_n)
+        if mean.duration_s > state.step_s:
+            slip, friction = mean.slip, mean.friction
+        tyre = tyre_at_slip(slip, inputs.load_n, wheel.longitudinal_stiffness_n)
+        noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / slip
         torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
-        torque_friction, following = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0
-        if theta_tyre is not None and friction > max(torque_friction, _LEAST_FRICTION):
+        torque_friction, mismatch = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0
+        if theta_tyre is not None and friction > max(torque_friction, LEAST_FRICTION):
             noise = reading_noise(friction, tyre, noise_share, torque_friction)
-            state.following = followed(state.following, tyre.elastic, theta_tyre, noise, passed_s)
-            following = state.following.share()
-        line_share = math.sqrt(state.line.slip_variance(size, speed_m_s)) / size
-        evidence = Evidence(theta_tyre, friction, tyre, line_share, noise_share, torque_friction, following)
-        return advanced_variance(
+            state.mismatch = updated_mismatch(state.mismatch, tyre.adhering, theta_tyre, noise, passed_s)
+            mismatch = state.mismatch.share()
+        line_share = math.sqrt(state.calibration.slip_variance(slip, speed_m_s)) / slip
+        state.variance, state.lag = advanced_variance(
             config.confidence,
             state.variance,
             state.lag,
             theta_hat,
-            evidence,
+            Evidence(theta_tyre, friction, tyre, line_share, noise_share, torque_friction, mismatch),
             self._averaged,
-            config.gains.gamma * quickened(steady, inputs.noise_s),
+            config.gains.gamma * gamma_factor(mean, inputs.noise_s),
             way_m,
             passed_s,
         )
 
-    def _learned(
-        self,
-        state: EstimatorState,
-        alone: Outcome,
-        inputs: WheelInputs,
-        read_slip: float,
-        passed_s: float,
-    ) -> Any:
-        """The elastic line with the slip that is read now."""
-        config, speed_m_s = self.config, state.speed_m_s
-        line = state.line.drifted(config.elastic, passed_s)
+    def _update_calibration(
+        self, alone: FusionStep, inputs: WheelInputs, read_slip: float, passed_s: float
+    ) -> None:
+        """Bring the calibration up to date with the slip that is read now."""
+        config, state, speed_m_s = self.config, self._state, self._state.speed_m_s
+        state.calibration = state.calibration.drifted(config.tolerance, passed_s)
         if not (state.settled and inputs.torque_known and speed_m_s > config.floor_m_s):
-            return line
+            return
         noise = self._rates.noise_m_s / speed_m_s
-        state.unsettled = unsettled(state.unsettled, inputs.slip_change, noise, passed_s)
-        return learned(
-            line,
-            config.elastic,
+        state.unsettled_slip = unsettled_slip(state.unsettled_slip, inputs.slip_change, noise, passed_s)
+        state.calibration = calibrated(
+            state.calibration,
+            config.tolerance,
             read_slip,
             speed_m_s,
-            alone[1].force_n,
+            alone.tyre_force_n,
             inputs.load_n,
             self._wheel.longitudinal_stiffness_n,
             noise,
-            state.unsettled,
+            state.unsettled_slip,
         )
 
     def _hold(
@@ -503,7 +482,7 @@ class TrpacEstimator:
         state.time_s += passed_s
         state.position_m += way_m
         theta, model = state.fusion.theta_hat, self.config.confidence
-        state.variance = wandered(model, state.variance, theta, way_m)
+        state.variance = drifted_variance(model, state.variance, theta, way_m)
         state.fusion = unread(state.fusion, passed_s, way_m)
         state.dynamics = unread(state.dynamics, passed_s, way_m)
         if step_s > LONGEST_STEP_S:
@@ -517,43 +496,33 @@ class TrpacEstimator:
                 if step_s > LONGEST_STEP_S
                 else stepped(state.robust, self._robust, None, roads.NONE, passed_s, way_m, False)
             )
-        outcome = self._road.at(state.preview, state.position_m - self._setback_m)
-        theta_seen, Q_v, age_s = self._last.TRPAC_image, 0.0, -1.0
-        if outcome is not None:
-            theta_seen, Q_v = self.config.class_theta[outcome.surface], outcome.Q_v
-            age_s = state.time_s - outcome.captured_s
-        self._last = self._last._replace(
+        image, theta = self._image(self._under_wheel()), self._last.TRPAC
+        bounds = _symmetric(theta, math.sqrt(state.variance))
+        held = self._last._replace(
             flag=False,
             K_v=0.0,
             excitation_flag=False,
-            TRPAC_image=theta_seen,
-            image_confidence=Q_v,
-            frame_age_s=age_s,
-            **self._held_bounds(),
+            TRPAC_image=image.theta,
+            image_confidence=image.Q_v,
+            frame_age_s=image.age_s,
+            TRPAC_std=bounds.deviation,
+            TRPAC_low=bounds.low,
+            TRPAC_high=bounds.high,
+            TRPAC_expected_std=bounds.deviation,
             source=self._source(False, False),
             problem=problem,
         )
-        return self._last
-
-    def _held_bounds(self) -> dict[str, float]:
-        """Deviation and interval of the estimate that is held; of the robust one with its expectation too."""
-        state, theta = self._state, self._last.TRPAC
-        deviation = math.sqrt(state.variance)
-        if state.robust is None:
-            return {
-                "TRPAC_std": deviation,
-                "TRPAC_low": max(theta - BOUNDS * deviation, 0.0),
-                "TRPAC_high": min(theta + BOUNDS * deviation, GREATEST_THETA),
-                "TRPAC_expected_std": deviation,
-            }
-        said = state.robust.said
-        return {
-            "TRPAC_std": math.hypot(said.std, said.mean - theta),
-            "TRPAC_low": min(said.low, theta),
-            "TRPAC_high": max(said.high, theta),
-            "TRPAC_expected": said.mean,
-            "TRPAC_expected_std": said.std,
-        }
+        if state.robust is not None:
+            interval = state.robust.said
+            held = held._replace(
+                TRPAC_std=math.hypot(interval.std, interval.mean - theta),
+                TRPAC_low=min(interval.low, theta),
+                TRPAC_high=max(interval.high, theta),
+                TRPAC_expected=interval.mean,
+                TRPAC_expected_std=interval.std,
+            )
+        self._last = held
+        return held
 
     def messages(self) -> dict[str, str]:
         """Sentences on what the drive shows of a car that is not as told, by what they concern; robust method only."""
@@ -575,3 +544,39 @@ class TrpacEstimator:
         """Go back to what `state` gave."""
         self._state = EstimatorState.from_json(data["state"])
         self._last = Estimate(**{**data["last"], "source": Source(data["last"]["source"])})
+
+
+class _Image(NamedTuple):
+    """What an estimate shows of the camera."""
+
+    theta: float
+    Q_v: float
+    age_s: float
+
+
+class _Bounds(NamedTuple):
+    """Standard deviation of an estimate, and its interval."""
+
+    deviation: float
+    low: float
+    high: float
+
+
+def _symmetric(theta: float, deviation: float) -> _Bounds:
+    """The interval about an estimate that is symmetric but for the bounds of theta [-]."""
+    low, high = theta - BOUNDS * deviation, theta + BOUNDS * deviation
+    return _Bounds(deviation, max(low, 0.0), min(high, GREATEST_THETA))
+
+
+def _with_robust(estimate: Estimate, state: RobustState, observer: float) -> Estimate:
+    """The estimate of the robust method, by the observer's theta_hat [-]."""
+    theta, deviation = point(state, observer)
+    interval = state.said
+    return estimate._replace(
+        TRPAC=theta,
+        TRPAC_std=deviation,
+        TRPAC_low=interval.low,
+        TRPAC_high=interval.high,
+        TRPAC_expected=interval.mean,
+        TRPAC_expected_std=interval.std,
+    )

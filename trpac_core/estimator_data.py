@@ -8,24 +8,24 @@ from dataclasses import dataclass, field, fields, replace
 from enum import Enum, IntEnum
 from typing import Any, NamedTuple
 
-from .confidence import ConfidenceModel
 from .dife import GREATEST_THETA, FusionState, Gains
-from .elastic import ElasticLine, ElasticModel
 from .errors import TrpacError
 from .excitation import FuzzyScheduler
-from .mismatch import Following
 from .observer import seen_at
 from .paper import Printed
-from .readings import (
+from .robust.wheel import RobustState
+from .sensors import (
     GREATEST_ACCELERATION_M_S2,
     JUMP_M_S,
     RIM_ACCELERATION_M_S2,
     RIM_JUMP_M_S,
-    Readings,
+    FilteredReadings,
     filter_share,
 )
-from .robust.wheel import RobustState
-from .steady import Steady
+from .slip_calibration import CarTolerance, SlipCalibration
+from .stationary_mean import StationaryMean
+from .stiffness_mismatch import StiffnessMismatch
+from .theta_variance import VarianceModel
 from .tyre import peak_friction
 from .vehicle import Vehicle
 from .vision.classes import CLASS_THETA, Surface
@@ -103,8 +103,9 @@ class EstimatorConfig:
         Settings of the image estimator but for what the vehicle and the wheel already say, see `image_settings`.
     gains, scheduler, preview, confidence
         Settings of the parts.
-    elastic : ElasticModel
-        How well slip and stiffness are known before the car drives; `elastic.AS_TOLD` to learn nothing of them.
+    tolerance : CarTolerance
+        How well slip and stiffness are known before the car drives; `slip_calibration.EXACT_CAR` to learn nothing of
+        them.
     class_theta : tuple of 3 floats
         Adhesion of dry, wet, snow and ice [-].
     theta_initial : float
@@ -131,8 +132,8 @@ class EstimatorConfig:
     gains: Gains = field(default_factory=Gains)
     scheduler: FuzzyScheduler = field(default_factory=FuzzyScheduler)
     preview: PreviewConfig = field(default_factory=PreviewConfig)
-    confidence: ConfidenceModel = field(default_factory=ConfidenceModel)
-    elastic: ElasticModel = field(default_factory=ElasticModel)
+    confidence: VarianceModel = field(default_factory=VarianceModel)
+    tolerance: CarTolerance = field(default_factory=CarTolerance)
     class_theta: tuple[float, float, float] = (
         CLASS_THETA[Surface.DRY],
         CLASS_THETA[Surface.WET],
@@ -240,25 +241,25 @@ class EstimatorState:
 
     fusion: FusionState
     dynamics: FusionState
-    readings: Readings
-    line: ElasticLine
+    readings: FilteredReadings
+    calibration: SlipCalibration
     variance: float
-    following: Following = field(default_factory=Following)
+    mismatch: StiffnessMismatch = field(default_factory=StiffnessMismatch)
     """How the tyre's theta follows its slip."""
-    unsettled: float = 0.0
-    """How far slip has lately been from its own course [-]."""
+    unsettled_slip: float = 0.0
+    """Recent distance of slip from its lagged value [-]."""
     lag: float = 0.0
     """Smoothed distance of the tyre's theta from the estimate [-]."""
-    unasked_s: float = 0.0
-    """Time since elastic line and variance were last brought up to date: once per time constant of the filter [s]."""
+    since_update_s: float = 0.0
+    """Time since calibration and variance were last brought up to date: once per time constant of the filter [s]."""
     locked_s: float = math.inf
     """Time since the wheel was last locked [s]."""
     time_s: float = 0.0
     position_m: float = 0.0
     speed_m_s: float = 0.0
     acceleration_m_s2: float = 0.0
-    smoothed_slip: float = 0.0
-    """Signed slip through the sensor filter once more."""
+    lagged_slip: float = 0.0
+    """Signed slip through the sensor filter once more [-]."""
     lagged_speed_m_s: float = 0.0
     """Speed behind the filter that differentiates it."""
     load_n: float = 0.0
@@ -279,8 +280,9 @@ class EstimatorState:
         """The state as JSON-able values, exact."""
         values = {item.name: getattr(self, item.name) for item in fields(self)}
         for name in _PARTS:
-            values[name] = list(values[name])
-        values["fusion"][-1], values["dynamics"][-1] = list(self.fusion.steady), list(self.dynamics.steady)
+            values[name] = values[name]._asdict()
+        for name in ("fusion", "dynamics"):
+            values[name]["mean"] = values[name]["mean"]._asdict()
         values["locked_s"] = None if math.isinf(self.locked_s) else self.locked_s
         for name in ("printed", "printed_alone"):
             values[name] = [None if math.isnan(value) else value for value in values[name]]
@@ -293,7 +295,7 @@ class EstimatorState:
         """The state that `to_json` wrote."""
         values = dict(data)
         for name, kind in _PARTS.items():
-            values[name] = kind(*values[name])
+            values[name] = kind(**values[name])
         values["locked_s"] = math.inf if values["locked_s"] is None else values["locked_s"]
         for name in ("printed", "printed_alone"):
             theta, s = values[name]
@@ -304,24 +306,17 @@ class EstimatorState:
         return cls(**values)
 
 
-def _fusion_state(*values: Any) -> FusionState:
+def _fusion_state(**values: Any) -> FusionState:
     """A state of its JSON-able values."""
-    *plain, steady = values
-    return FusionState._make((*plain, Steady(*steady)))
-
-
-def _readings(*values: float) -> Readings:
-    """Readings of their JSON-able values."""
-    omega, torque_nm, speed_m_s = values
-    return omega, torque_nm, speed_m_s
+    return FusionState(**{**values, "mean": StationaryMean(**values["mean"])})
 
 
 _PARTS: Mapping[str, Any] = {
     "fusion": _fusion_state,
     "dynamics": _fusion_state,
-    "readings": _readings,
-    "line": ElasticLine,
-    "following": Following,
+    "readings": FilteredReadings,
+    "calibration": SlipCalibration,
+    "mismatch": StiffnessMismatch,
 }
 
 

@@ -7,16 +7,14 @@ per output set, the table therefore falls apart into two interpolations, which i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from .tyre import onset_elastic
+from .tyre import onset_adhering
 
 THRESHOLD_LIMIT = 0.06
 """Upper end of the threshold's domain [-] (section 4.2)."""
 K_V_LIMIT = 3.0
 """Upper end of K_v's domain [-] (section 4.2)."""
-MOST_CLASSES = 8
-"""Classes whose onset is kept, and none: a bound on memory, not a setting [-]."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +49,9 @@ class Partition:
 
     def blend(self, value: float, outputs: tuple[float, float, float]) -> float:
         """Centre of gravity of three output values under the memberships."""
-        degrees = self.memberships(value)
-        return degrees[0] * outputs[0] + degrees[1] * outputs[1] + degrees[2] * outputs[2]
+        small, medium, big = self.memberships(value)
+        of_small, of_medium, of_big = outputs
+        return small * of_small + medium * of_medium + big * of_big
 
 
 @dataclass(frozen=True)
@@ -72,8 +71,6 @@ class FuzzyScheduler:
     class_scatter: float = 0.1
     onset_sensitivity: float = 0.1
     noise_factor: float = 3.0
-    _onsets: dict[float | None, float] = field(default_factory=dict, init=False, repr=False, compare=False)
-    """Onsets that are worked out already, by class."""
 
     def threshold(
         self, theta_img: float | None, load_n: float, longitudinal_stiffness_n: float, slip_deviation: float
@@ -89,31 +86,22 @@ class FuzzyScheduler:
         slip_deviation : float
             Standard deviation of the slip through sensor noise [-].
         """
-        elastic = self._onsets.get(theta_img)
-        if elastic is None:
-            elastic = self._onset(theta_img)
-        ratio = elastic * load_n / longitudinal_stiffness_n
+        ratio = self._onset(theta_img) * load_n / longitudinal_stiffness_n
         slip, noise = ratio / (1.0 + ratio), self.noise_factor * slip_deviation
-        if slip < noise:
-            slip = noise
-        return slip if slip < THRESHOLD_LIMIT else THRESHOLD_LIMIT
+        return min(max(slip, noise), THRESHOLD_LIMIT)
 
     def _onset(self, theta_img: float | None) -> float:
-        """Elastic friction at which a road of that class begins to show [-]; classes are few, so it is kept."""
+        """X / F_z from which a road of that class is identifiable [-]."""
         sets = self.theta_sets
         visible = (
             sets.small - self.class_scatter,
             sets.medium - self.class_scatter,
             sets.big - self.class_scatter,
         )
-        theta = visible[0] if theta_img is None else sets.blend(theta_img, visible)
-        elastic = onset_elastic(theta, self.onset_sensitivity)
-        if len(self._onsets) < MOST_CLASSES:
-            self._onsets[theta_img] = elastic
-        return elastic
+        most_slippery, _, _ = visible
+        theta = most_slippery if theta_img is None else sets.blend(theta_img, visible)
+        return onset_adhering(theta, self.onset_sensitivity)
 
     def K_v(self, difference: float) -> float:
         """Visual gain for a difference abs(theta_img - theta_hat) [-]."""
-        if difference <= self.difference_sets.small:
-            return self.K_v_values[0]
         return self.difference_sets.blend(difference, self.K_v_values)

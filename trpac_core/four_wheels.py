@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .car_friction import Known, car_friction
+from .car_friction import Friction, car_friction
 from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
 from .estimator_data import Source
 from .local_speed import local_speeds, motion_known
-from .readings import LONGEST_STEP_S, PLAUSIBLE, Sensors
+from .sensors import LONGEST_STEP_S, PLAUSIBLE, Sensors
 from .vehicle import WHEELS
 from .vision.results import FrameResult
 from .vision.sides import SidesIfe, SidesState
@@ -31,7 +31,6 @@ Four = tuple[float, float, float, float]
 OptionalFour = tuple[float | None, float | None, float | None, float | None]
 
 
-_new = tuple.__new__
 _UNKNOWN: OptionalFour = (None, None, None, None)
 _NO_LOADS: Four = (math.nan, math.nan, math.nan, math.nan)
 
@@ -128,7 +127,8 @@ class FourWheels:
         front_n, rear_n = car.wheel_load(True), car.wheel_load(False)
         self._static_n = (front_n, front_n, rear_n, rear_n)
         per_m_s2 = car.mass_kg * car.cog_height_m / (car.track_m * car.wheelbase_m)
-        self._roll_kg = (per_m_s2 * car.cog_to_rear_axle_m, per_m_s2 * car.cog_to_front_axle_m)
+        self._front_roll_kg = per_m_s2 * car.cog_to_rear_axle_m
+        self._rear_roll_kg = per_m_s2 * car.cog_to_front_axle_m
         self.reset()
 
     def reset(self) -> None:
@@ -165,57 +165,72 @@ class FourWheels:
         """
         if step_s > LONGEST_STEP_S:
             self._camera = self._camera.elsewhere()
-        left, right = (None, None) if frame is None else self._verdicts(sensors, frame)
-        omega, torque, speed, _, steering, accel, _, yaw = sensors
+        left, right = (None, None) if frame is None else self._classes(sensors, frame)
+        speed, steering, yaw = sensors.vehicle_speed_m_s, sensors.steering_angle_rad, sensors.yaw_rate_rad_s
         speeds_m_s = (speed, speed, speed, speed)
         if steering or yaw:
             speeds_m_s = local_speeds(self._car, speed, steering, yaw)
         loads_n, given_n = self._loads(sensors)
         estimates, problems = [], []
-        for name, wheel, side, wheel_omega, wheel_torque, wheel_m_s, wheel_n in zip(
-            WHEELS, self._wheels, (left, right, left, right), omega, torque, speeds_m_s, given_n, strict=True
+        for name, wheel, side, omega, torque_nm, wheel_m_s, load_n in zip(
+            WHEELS,
+            self._wheels,
+            (left, right, left, right),
+            sensors.wheel_speed_rad_s,
+            sensors.wheel_torque_nm,
+            speeds_m_s,
+            given_n,
+            strict=True,
         ):
-            one = Sensors(wheel_omega, wheel_torque, wheel_m_s, wheel_n, steering, accel, yaw)
-            estimate = wheel.step(step_s, one, side, frame_failed)
+            accel = sensors.longitudinal_acceleration_m_s2
+            of_wheel = Sensors(omega, torque_nm, wheel_m_s, load_n, steering, accel, yaw)
+            estimate = wheel.step(step_s, of_wheel, side, frame_failed)
             estimates.append(estimate)
             if estimate.problem is not None:
                 problems.append((name, estimate.problem))
-        self._last = self._together(estimates, loads_n, self._told(sensors, problems) if problems else ())
+        by_subject = self._by_subject(sensors, problems) if problems else ()
+        self._last = self._together(estimates, loads_n, by_subject)
         return self._last
 
     def _together(
         self, estimates: list[Estimate], loads_n: Four, problems: tuple[tuple[str, str], ...]
     ) -> CarEstimate:
         """The wheels' estimates and the car's."""
-        fl, fr, rl, rr = estimates
-        axle = self.config.axle_deviation
-        deviations = fl.TRPAC_std, fr.TRPAC_std, rl.TRPAC_std, rr.TRPAC_std
-        low, high, (theta, deviation) = (
-            car_friction(_pairs(values, deviations), loads_n, axle)
-            for values in (
-                (fl.TRPAC_low, fr.TRPAC_low, rl.TRPAC_low, rr.TRPAC_low),
-                (fl.TRPAC_high, fr.TRPAC_high, rl.TRPAC_high, rr.TRPAC_high),
-                (fl.TRPAC, fr.TRPAC, rl.TRPAC, rr.TRPAC),
-            )
+        axle_deviation = self.config.axle_deviation
+        low, high, fused = (
+            car_friction(_of_each(estimates, value, "TRPAC_std"), loads_n, axle_deviation)
+            for value in ("TRPAC_low", "TRPAC_high", "TRPAC")
         )
-        means = fl.TRPAC_expected, fr.TRPAC_expected, rl.TRPAC_expected, rr.TRPAC_expected
-        their = fl.TRPAC_expected_std, fr.TRPAC_expected_std, rl.TRPAC_expected_std, rr.TRPAC_expected_std
-        expected = car_friction(_pairs(means, their), loads_n, axle)
-        source = Source(fl.source | fr.source | rl.source | rr.source)
-        wheels = fl, fr, rl, rr
-        return _new(CarEstimate, (wheels, theta, deviation, low[0], high[0], *expected, source, problems))
+        expected = car_friction(
+            _of_each(estimates, "TRPAC_expected", "TRPAC_expected_std"), loads_n, axle_deviation
+        )
+        fl, fr, rl, rr = estimates
+        return CarEstimate(
+            wheels=(fl, fr, rl, rr),
+            TRPAC=fused.theta,
+            TRPAC_std=fused.deviation,
+            TRPAC_low=low.theta,
+            TRPAC_high=high.theta,
+            TRPAC_expected=expected.theta,
+            TRPAC_expected_std=expected.deviation,
+            source=Source(fl.source | fr.source | rl.source | rr.source),
+            problems=problems,
+        )
 
-    def _told(self, sensors: CarSensors, problems: list[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
+    def _by_subject(
+        self, sensors: CarSensors, problems: list[tuple[str, str]]
+    ) -> tuple[tuple[str, str], ...]:
         """Problems by whom they concern; one that all wheels share is the car's."""
         lateral = sensors.lateral_acceleration_m_s2
         if lateral is not None and not abs(lateral) <= _STEEPEST:
             expected = f"expected a number within +-{_STEEPEST:g}. Check the signal's source and unit."
             return ((CAR, f"lateral_acceleration_m_s2 is {lateral:g}, {expected}"),)
-        if len(problems) == len(WHEELS) and len({text for _, text in problems}) == 1:
-            return ((CAR, problems[0][1]),)
+        texts = {text for _, text in problems}
+        if len(problems) == len(WHEELS) and len(texts) == 1:
+            return ((CAR, texts.pop()),)
         return tuple(problems)
 
-    def _verdicts(
+    def _classes(
         self, sensors: CarSensors, frame: NDArray[np.uint8] | SideClasses | None
     ) -> tuple[RoadClass | None, RoadClass | None]:
         """What a new frame says of the left and of the right track; nothing where the car's motion is not known."""
@@ -226,12 +241,13 @@ class FourWheels:
         if not motion_known(sensors.vehicle_speed_m_s, sensors.steering_angle_rad, sensors.yaw_rate_rad_s):
             return None, None
         accel = sensors.longitudinal_acceleration_m_s2
+        front_left, front_right, *_ = self._wheels
         motion = Motion(
             sensors.vehicle_speed_m_s,
             accel if accel is not None and abs(accel) <= _STEEPEST else 0.0,
             sensors.steering_angle_rad,
             sensors.yaw_rate_rad_s,
-            0.5 * (self._wheels[0].way_m + self._wheels[1].way_m),
+            0.5 * (front_left.way_m + front_right.way_m),
         )
         self._camera, left, right = self._ife.process(self._camera, frame, motion)
         return self._as_class(left), self._as_class(right)
@@ -247,7 +263,8 @@ class FourWheels:
         Where the lateral acceleration is no good reading all are NaN, which no wheel takes, used or not.
         """
         loads = self._static_n
-        _, _, _, given, _, accel, lateral, _ = sensors
+        given, accel = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
+        lateral = sensors.lateral_acceleration_m_s2
         if lateral is not None and not abs(lateral) <= _STEEPEST:
             return loads, _NO_LOADS
         if accel is not None and abs(accel) <= _STEEPEST:
@@ -256,14 +273,14 @@ class FourWheels:
             if lateral is not None:
                 loads = self._leaning(front_n, rear_n, lateral)
                 given = _first_known(given, loads)
-        if given is _UNKNOWN or given == _UNKNOWN:
+        if given == _UNKNOWN:
             return loads, given
         total = _first_known(given, loads)
         return (total if all(load > 0.0 and math.isfinite(load) for load in total) else self._static_n), given
 
     def _leaning(self, front_n: float, rear_n: float, lateral_m_s2: float) -> Four:
         """Loads under lateral acceleration [N]."""
-        front, rear = self._roll_kg[0] * lateral_m_s2, self._roll_kg[1] * lateral_m_s2
+        front, rear = self._front_roll_kg * lateral_m_s2, self._rear_roll_kg * lateral_m_s2
         return (
             max(front_n - front, LIFTED_N),
             max(front_n + front, LIFTED_N),
@@ -281,35 +298,29 @@ class FourWheels:
         return {
             "wheels": [wheel.state() for wheel in self._wheels],
             "camera": self._camera.to_json(),
-            "car": list(self._last[1:-1]),
-            "problems": [list(problem) for problem in self._last.problems],
+            "car": {name: value for name, value in self._last._asdict().items() if name != "wheels"},
         }
 
     def restore(self, data: Mapping[str, Any]) -> None:
         """Go back to what `state` gave."""
         camera = SidesState.from_json(data["camera"])
-        theta, deviation, low, high, expected, expected_deviation, source = data["car"]
         for wheel, saved in zip(self._wheels, data["wheels"], strict=True):
             wheel.restore(saved)
         self._camera = camera
         fl, fr, rl, rr = (wheel.last for wheel in self._wheels)
-        problems = tuple((who, text) for who, text in data["problems"])
+        car = data["car"]
+        source = Source(car["source"])
+        problems = tuple((subject, text) for subject, text in car["problems"])
         self._last = CarEstimate(
-            (fl, fr, rl, rr),
-            theta,
-            deviation,
-            low,
-            high,
-            expected,
-            expected_deviation,
-            Source(source),
-            problems,
+            **{**car, "wheels": (fl, fr, rl, rr), "source": source, "problems": problems}
         )
 
 
-def _pairs(values: Four, deviations: Four) -> tuple[Known, Known, Known, Known]:
-    """Values of the wheels with their deviations."""
-    fl, fr, rl, rr = zip(values, deviations, strict=True)
+def _of_each(
+    estimates: list[Estimate], value: str, deviation: str
+) -> tuple[Friction, Friction, Friction, Friction]:
+    """One of the wheels' outputs, each with its standard deviation."""
+    fl, fr, rl, rr = (Friction(getattr(one, value), getattr(one, deviation)) for one in estimates)
     return fl, fr, rl, rr
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .readings import PLAUSIBLE
+from .sensors import PLAUSIBLE
 from .vehicle import Vehicle
 
 _FASTEST, _TURNING, _STEERED = (

@@ -33,9 +33,6 @@ GREATEST_PEAK_SLIP = 0.95
 """Where the search for the curve's maximum ends [-]."""
 
 
-_NEWTON = range(NEWTON_STEPS)
-
-
 def slip_ratio_force(slip: float, longitudinal_stiffness_n: float) -> float:
     """X = C_x lambda / (1 - lambda), the force of a tyre that never slides. [N]."""
     return longitudinal_stiffness_n * slip / (1.0 - slip)
@@ -46,103 +43,80 @@ def correction(theta: float, slip: float) -> float:
     return (1.15 - 0.75 * theta) * slip * slip - (1.63 - 0.75 * theta) * slip + 1.27
 
 
-Cubic = tuple[float, float, float, float]
-"""The numbers of a `TyreAtSlip`, bare: where it is made at each step of each wheel."""
-
-
 class TyreAtSlip(NamedTuple):
-    """The tyre at one slip and load, a function of theta alone: the cubic of the module's text.
+    """The tyre at one slip and load, a function of theta alone: the cubic of the module's text."""
 
-    elastic is X / F_z, g_0 and g_1 make up G, and kappa is F_z / (4 X) [-].
-    """
-
-    elastic: float
+    adhering: float
+    """Used friction of a tyre that never slides, over G: X / F_z [-]."""
     g_0: float
+    """Part of G that does not depend on theta [-]."""
     g_1: float
+    """Part of G by theta [-]."""
     kappa: float
+    """F_z / (4 X) [-]."""
+
+    @property
+    def sliding_onset_friction(self) -> float:
+        """Used friction at L = 1, the most at this slip that theta can be read from [-]."""
+        return self.adhering * (self.g_0 + self.g_1 * (2.0 * self.adhering))
 
     def friction(self, theta: float) -> float:
         """Used friction mu [-]."""
-        elastic, g_0, g_1, kappa = self
-        share = elastic if theta >= 2.0 * elastic else theta * (1.0 - kappa * theta)
-        return share * (g_0 + g_1 * theta)
+        slides = theta < 2.0 * self.adhering
+        share = theta * (1.0 - self.kappa * theta) if slides else self.adhering
+        return share * (self.g_0 + self.g_1 * theta)
 
     def friction_by_theta(self, theta: float) -> float:
         """Sensitivity d mu / d theta [-]: how clearly the tyre shows the road's friction."""
-        return sensitivity_of(theta, self)
+        if theta >= 2.0 * self.adhering:
+            return self.adhering * self.g_1
+        return self._friction_by_theta_sliding(theta)
+
+    def _friction_by_theta_sliding(self, theta: float) -> float:
+        G, share = self.g_0 + self.g_1 * theta, theta * (1.0 - self.kappa * theta)
+        return (1.0 - 2.0 * self.kappa * theta) * G + share * self.g_1
 
     def theta(self, friction: float) -> float | None:
         """The one theta below L = 1 that gives this used friction; None where none does."""
-        return theta_of(friction, self)
-
-
-def sensitivity_of(theta: float, cubic: Cubic) -> float:
-    """`TyreAtSlip.friction_by_theta` of its numbers [-]."""
-    elastic, g_0, g_1, kappa = cubic
-    if theta >= 2.0 * elastic:
-        return elastic * g_1
-    return (1.0 - 2.0 * kappa * theta) * (g_0 + g_1 * theta) + theta * (1.0 - kappa * theta) * g_1
-
-
-def theta_of(friction: float, cubic: Cubic) -> float | None:
-    """`TyreAtSlip.theta` of its numbers [-]."""
-    if friction <= 0.0:
-        return 0.0 if friction == 0.0 else None
-    elastic, g_0, g_1, kappa = cubic
-    upper = 2.0 * elastic
-    if friction >= elastic * (g_0 + g_1 * upper):
-        return None
-    # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
-    left = 1.0 - friction / (elastic * g_0)
-    theta = upper * (1.0 - math.sqrt(left)) if left > 0.0 else upper
-    lower, twice_kappa = 0.0, 2.0 * kappa
-    for _ in _NEWTON:
-        base = g_0 + g_1 * theta
-        share = theta * (1.0 - kappa * theta)
-        excess = share * base - friction
-        proposal = theta - excess / ((1.0 - twice_kappa * theta) * base + share * g_1)
-        # The cubic rises: where it is above the friction theta has to fall, else to rise.
-        if excess > 0.0:
-            upper = theta
-            if not proposal >= lower:
+        if friction <= 0.0:
+            return 0.0 if friction == 0.0 else None
+        if friction >= self.sliding_onset_friction:
+            return None
+        lower, upper = 0.0, 2.0 * self.adhering
+        # Without g_1 the cubic is a quadratic, whose root is within a few per cent: Newton does the rest.
+        left = 1.0 - friction / (self.adhering * self.g_0)
+        theta = upper * (1.0 - math.sqrt(left)) if left > 0.0 else upper
+        for _ in range(NEWTON_STEPS):
+            share = theta * (1.0 - self.kappa * theta)
+            excess = share * (self.g_0 + self.g_1 * theta) - friction
+            proposal = theta - excess / self._friction_by_theta_sliding(theta)
+            # The cubic rises: where it is above the friction theta has to fall, else to rise.
+            if excess > 0.0:
+                upper = theta
+            else:
+                lower = theta
+            if not lower <= proposal <= upper:
                 proposal = 0.5 * (lower + upper)
-            if proposal - theta > -LEAST_STEP:
+            if abs(proposal - theta) < LEAST_STEP:
                 return proposal
-        else:
-            lower = theta
-            if not proposal <= upper:
-                proposal = 0.5 * (lower + upper)
-            if proposal - theta < LEAST_STEP:
-                return proposal
-        theta = proposal
-    return theta
+            theta = proposal
+        return theta
 
 
 def tyre_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> TyreAtSlip:
     """The tyre at this unsigned slip [-], vertical load F_z [N] and longitudinal stiffness C_x [N]."""
-    return TyreAtSlip(*cubic_at_slip(slip, load_n, longitudinal_stiffness_n))
-
-
-def cubic_at_slip(slip: float, load_n: float, longitudinal_stiffness_n: float) -> Cubic:
-    """The numbers of `tyre_at_slip`."""
-    rolls = 1.0 - slip
-    elastic = longitudinal_stiffness_n * slip / rolls / load_n
-    return (
-        elastic,
-        1.27 + slip * (1.15 * slip - 1.63),
-        0.75 * slip * rolls,
-        0.25 / elastic if elastic > 0.0 else math.inf,
+    adhering = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
+    return TyreAtSlip(
+        adhering,
+        g_0=1.27 + slip * (1.15 * slip - 1.63),
+        g_1=0.75 * slip * (1.0 - slip),
+        kappa=0.25 / adhering if adhering > 0.0 else math.inf,
     )
 
 
-def elastic_friction(slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
+def sliding_onset_friction(slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
     """Used friction at L = 1, the most at this slip that theta can be read from; 0 at a slip below 0 [-]."""
-    if slip <= 0.0:
-        return 0.0
-    rolls = 1.0 - slip
-    elastic = longitudinal_stiffness_n * slip / rolls / load_n
-    g_0 = 1.27 + slip * (1.15 * slip - 1.63)
-    return elastic * (g_0 + 2.0 * (0.75 * slip * rolls) * elastic)
+    return tyre_at_slip(slip, load_n, longitudinal_stiffness_n).sliding_onset_friction if slip > 0.0 else 0.0
 
 
 def used_friction(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
@@ -177,18 +151,18 @@ def friction_by_theta(theta: float, slip: float, load_n: float, longitudinal_sti
 
 def friction_by_slip(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
     """Slope d mu / d lambda at constant theta [-]."""
-    elastic = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
-    elastic_by_slip = longitudinal_stiffness_n / (load_n * (1.0 - slip) ** 2)
+    adhering = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
+    adhering_by_slip = longitudinal_stiffness_n / (load_n * (1.0 - slip) ** 2)
     correction_by_slip = 2.0 * (1.15 - 0.75 * theta) * slip - (1.63 - 0.75 * theta)
-    if theta >= 2.0 * elastic:
-        return elastic_by_slip * correction(theta, slip) + elastic * correction_by_slip
-    share_by_slip = -theta * elastic_by_slip / (4.0 * elastic * elastic)
+    if theta >= 2.0 * adhering:
+        return adhering_by_slip * correction(theta, slip) + adhering * correction_by_slip
+    share_by_slip = -theta * adhering_by_slip / (4.0 * adhering * adhering)
     return theta * (
-        -share_by_slip * correction(theta, slip) + (1.0 - theta / (4.0 * elastic)) * correction_by_slip
+        -share_by_slip * correction(theta, slip) + (1.0 - theta / (4.0 * adhering)) * correction_by_slip
     )
 
 
-def onset_elastic(theta: float, sensitivity: float) -> float:
+def onset_adhering(theta: float, sensitivity: float) -> float:
     """X / F_z at which d mu / d theta reaches a sensitivity: from here on the tyre shows theta [-].
 
     G's dependence on theta (0.75 theta lambda, about 1 %) is left out, and G is taken at small slip, 1.27.
@@ -197,8 +171,8 @@ def onset_elastic(theta: float, sensitivity: float) -> float:
 
 
 def onset_slip(theta: float, load_n: float, longitudinal_stiffness_n: float, sensitivity: float) -> float:
-    """Slip at which d mu / d theta reaches a sensitivity, see `onset_elastic` [-]."""
-    ratio = onset_elastic(theta, sensitivity) * load_n / longitudinal_stiffness_n
+    """Slip at which d mu / d theta reaches a sensitivity, see `onset_adhering` [-]."""
+    ratio = onset_adhering(theta, sensitivity) * load_n / longitudinal_stiffness_n
     return ratio / (1.0 + ratio)
 
 
@@ -210,24 +184,21 @@ def peak_slip(theta: float, load_n: float, longitudinal_stiffness_n: float) -> f
     quarter = theta * load_n / (4.0 * longitudinal_stiffness_n)
     square, linear = 1.15 - 0.75 * theta, 1.63 - 0.75 * theta
     lower, upper = 1e-6, GREATEST_PEAK_SLIP
-    slip = math.sqrt(1.27 * quarter / linear)
-    if slip > 0.5:
-        slip = 0.5
+    slip = min(math.sqrt(1.27 * quarter / linear), 0.5)
     # lambda^2 times the slope of (1 - quarter (1 - lambda) / lambda) G(lambda): a cubic without a linear term
-    cubic, bend = 2.0 * square * (1.0 + quarter), linear * (1.0 + quarter) + square * quarter
-    level, thrice_cubic, twice_bend = 1.27 * quarter, 3.0 * cubic, 2.0 * bend
-    least, most = -LEAST_SLIP_STEP, LEAST_SLIP_STEP
-    for _ in _NEWTON:
-        value = (cubic * slip - bend) * slip * slip + level
+    cubic, quadratic = 2.0 * square * (1.0 + quarter), linear * (1.0 + quarter) + square * quarter
+    constant, thrice_cubic, twice_quadratic = 1.27 * quarter, 3.0 * cubic, 2.0 * quadratic
+    for _ in range(NEWTON_STEPS):
+        value = (cubic * slip - quadratic) * slip * slip + constant
         if value > 0.0:
             lower = slip
         else:
             upper = slip
-        value_by_slip = (thrice_cubic * slip - twice_bend) * slip
+        value_by_slip = (thrice_cubic * slip - twice_quadratic) * slip
         proposal = slip - value / value_by_slip if value_by_slip != 0.0 else upper
         if not lower < proposal < upper:
             proposal = 0.5 * (lower + upper)
-        if least < proposal - slip < most:
+        if abs(proposal - slip) < LEAST_SLIP_STEP:
             return proposal
         slip = proposal
     return slip
@@ -244,7 +215,4 @@ def peak_friction(theta: float, load_n: float, longitudinal_stiffness_n: float) 
     if theta <= 0.0:
         return 0.0
     slip = peak_slip(theta, load_n, longitudinal_stiffness_n)
-    rolls = 1.0 - slip
-    elastic = longitudinal_stiffness_n * slip / rolls / load_n
-    base = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * rolls * theta
-    return (elastic if theta >= 2.0 * elastic else theta * (1.0 - 0.25 / elastic * theta)) * base
+    return used_friction(theta, slip, load_n, longitudinal_stiffness_n)

@@ -14,7 +14,7 @@ from scenarios.runner import Run, segment_starts, under_the_wheel
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.run import believed_config, camera_of, signals_of
 from trpac_core.estimator import TrpacEstimator
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 
 
 def full_run(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:

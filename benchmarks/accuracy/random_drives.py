@@ -50,10 +50,10 @@ class CarError:
         known = EstimatorConfig()
         return cls(
             mass=0.025 * rng.standard_normal(),
-            radius=known.elastic.ratio * rng.standard_normal(),
-            stiffness=known.elastic.compliance * rng.standard_normal(),
+            radius=known.tolerance.ratio * rng.standard_normal(),
+            stiffness=known.tolerance.compliance * rng.standard_normal(),
             torque=0.015 * rng.standard_normal(),
-            speed_bias_m_s=known.elastic.speed_bias_m_s * rng.standard_normal(),
+            speed_bias_m_s=known.tolerance.speed_bias_m_s * rng.standard_normal(),
         )
 
 

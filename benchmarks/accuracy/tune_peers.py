@@ -39,7 +39,7 @@ from scenarios.plant.pipeline import drive
 from scenarios.plant.sensors import make_scenario_log
 from trpac_core.dife import LEAST_SENSITIVITY
 from trpac_core.estimator import EstimatorConfig
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.slip import GREATEST_SLIP
 from trpac_core.tyre import friction_by_theta
 

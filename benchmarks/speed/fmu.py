@@ -26,7 +26,7 @@ from fmu_src.units import UNITS
 from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.files import file_sha256
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 
 STEP_S = 0.001
 STEPS = 2000

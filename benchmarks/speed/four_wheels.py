@@ -13,7 +13,7 @@ from typing import Any
 
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig, SideClasses
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
 

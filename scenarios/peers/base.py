@@ -10,13 +10,13 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from trpac_core.confidence import ConfidenceModel
-from trpac_core.readings import GREATEST_ACCELERATION_M_S2, Sensors, filter_share, unusable
+from trpac_core.sensors import GREATEST_ACCELERATION_M_S2, Sensors, filter_share, unusable
+from trpac_core.theta_variance import VarianceModel
 from trpac_core.vehicle import Vehicle
 
-UNKNOWN = ConfidenceModel.unknown
+UNKNOWN = VarianceModel.unknown
 """Standard deviation of an unknown theta, that of our estimator [-]."""
-ROAD_CHANGE = ConfidenceModel.road_change
+ROAD_CHANGE = VarianceModel.road_change
 """Random walk of theta per root of distance without excitation, that of our estimator [1/sqrt(m)]."""
 
 

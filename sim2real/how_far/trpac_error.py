@@ -26,11 +26,11 @@ from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
 from sim2real.observing.noise import read_noise
 from sim2real.observing.observer import Prediction, Simulation
 from sim2real.result import RmsError
-from trpac_core.elastic import AS_TOLD
 from trpac_core.estimator import LOCKED_M_S, EstimatorConfig, TrpacEstimator
-from trpac_core.readings import Sensors, filter_share
-from trpac_core.sight import WheelInputs, visible_theta
+from trpac_core.identifiability import WheelInputs, visible_theta
+from trpac_core.sensors import Sensors, filter_share
 from trpac_core.slip import GREATEST_SLIP, Slip
+from trpac_core.slip_calibration import EXACT_CAR
 from trpac_core.tyre import used_friction
 from trpac_core.vehicle import Vehicle
 
@@ -236,7 +236,7 @@ def _sliding_speed_noise(model: Simulation, drive: Drive, prediction: Prediction
 def _run(inputs: Inputs, drive: Drive, sliding_speed_noise_m_s: float) -> Run:
     # What a model is worth shows where the estimator does not mend it by itself.
     config = EstimatorConfig(
-        vehicle=inputs.vehicle, elastic=AS_TOLD, sliding_speed_noise_m_s=sliding_speed_noise_m_s
+        vehicle=inputs.vehicle, tolerance=EXACT_CAR, sliding_speed_noise_m_s=sliding_speed_noise_m_s
     )
     estimator, step_s, said = TrpacEstimator(config), drive.step_s, []
     for wheel_rad_s, torque_nm, speed_m_s, *accel in zip(
@@ -272,7 +272,7 @@ def _shown(truth: Array, model: Prediction, inputs: Inputs, step_s: float, noise
         force_n = load_n * used_friction(float(truth[k]), slip, load_n, stiffness_n)
         deviation = float(filtered_m_s / inputs.vehicle_speed_m_s[k])
         wheel = WheelInputs(0.0, 0.0, 0.0, Slip(slip, 1.0), load_n, deviation, 0.0)
-        shown[k] = visible_theta(force_n, wheel, stiffness_n)[0] is not None
+        shown[k] = visible_theta(force_n, wheel, stiffness_n) is not None
     return shown
 
 

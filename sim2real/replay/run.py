@@ -15,7 +15,7 @@ from sim2real.replay.inputs import Inputs
 from sim2real.replay.vehicle_level import vehicle_level
 from trpac_core.estimator import Estimate, EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.tyre import peak_friction
 from trpac_core.vehicle import WHEELS
 

@@ -17,7 +17,7 @@ from road_picture import road_picture
 
 from trpac_core.estimator import EstimatorConfig, RoadClass
 from trpac_core.estimator import TrpacEstimator as Estimator
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.vision.classes import CLASS_THETA, Surface
 
 pytestmark = pytest.mark.e2e

@@ -188,9 +188,9 @@ NOT_OFFERED = {
     "vision.use_lines",
     "vision.use_scene",
     "gains.innovation",
-    "elastic.coasting",
-    "elastic.gentle",
-    "elastic.force_doubt_n",
+    "tolerance.coasting",
+    "tolerance.gentle",
+    "tolerance.force_doubt_n",
 }
 """What the estimator of one wheel does not use, what the method sets, switches for ablation studies, and what
 learning the car rests on."""

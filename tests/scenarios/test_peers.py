@@ -25,7 +25,7 @@ from scenarios.peers import (
 from scenarios.peers.base import UNKNOWN, SensorFront
 from scenarios.peers.tuning import write_tuning
 from scenarios.peers.wheel_model import WheelState, advanced
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.vehicle import Vehicle
 
 CAR = Vehicle(cog_height_m=0.0, rolling_resistance=0.0)

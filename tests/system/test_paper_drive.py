@@ -11,7 +11,7 @@ from scenarios.files import SensorNoise, load_scenario
 from scenarios.plant.pipeline import drive
 from scenarios.plant.sensors import make_scenario_log
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 
 SCENARIO = load_scenario(Path(__file__).parents[2] / "scenarios" / "paper_simulation.yaml")
 NEAR_M = 3.5

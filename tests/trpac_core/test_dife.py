@@ -8,7 +8,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from trpac_core import tyre
-from trpac_core.confidence import ConfidenceModel
 from trpac_core.dife import (
     GREATEST_THETA,
     LEAST_THETA,
@@ -19,14 +18,13 @@ from trpac_core.dife import (
     Gains,
     VisualTerm,
     Wheel,
-    dynamics_step,
-    fused_step,
     fusion_step,
     settled,
 )
 from trpac_core.excitation import FuzzyScheduler
-from trpac_core.sight import WheelInputs, least_theta, look_at, visible_theta
+from trpac_core.identifiability import WheelInputs, least_theta, visible_theta
 from trpac_core.slip import Slip
+from trpac_core.theta_variance import VarianceModel
 
 WHEEL = Wheel(1.2, 0.29, 50_000.0)
 SCHEDULER = FuzzyScheduler()
@@ -43,8 +41,7 @@ def on_road(theta, slip=0.03, deviation=0.0, change=0.0):
 
 
 def stepped(state, inputs, gains=GAINS, theta_img=None, step_s=STEP_S):
-    look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
-    return fusion_step(state, inputs, look, WHEEL, gains, SCHEDULER, theta_img, step_s)
+    return fusion_step(state, inputs, WHEEL, gains, SCHEDULER, theta_img, step_s)
 
 
 def run(inputs, theta_hat, seconds, gains=GAINS, theta_img=None):
@@ -135,7 +132,7 @@ def test_the_right_class_leaves_no_bias_of_its_own():
 def test_an_elastic_tyre_shows_nothing_and_the_estimate_holds():
     trace, step = run(on_road(0.9, slip=0.008), 0.7, 1.0)
     assert np.all(trace == 0.7)
-    assert step.sensitivity == 0.0
+    assert step.theta_tyre is None
 
 
 def at_sliding_limit(share, slip):
@@ -151,7 +148,7 @@ def test_nothing_is_shown_where_theta_would_be_off_by_ten_times_what_the_used_fr
     )
     slope = (upper - lower) / 2e-5
     inputs = on_road(theta, slip)
-    shown, _ = visible_theta(inputs.wheel_torque_nm / WHEEL.radius_m, inputs, WHEEL.longitudinal_stiffness_n)
+    shown = visible_theta(inputs.wheel_torque_nm / WHEEL.radius_m, inputs, WHEEL.longitudinal_stiffness_n)
     if slope < 0.099:
         assert shown is None
     elif slope > 0.101:
@@ -169,7 +166,7 @@ def test_a_tyre_that_hardly_slides_does_not_move_the_estimate(theta_img):
 def test_a_wheel_that_rolls_freely_shows_no_ice(slip):
     """Without force and with no slip beyond noise any road would do."""
     inputs = WheelInputs(34.0, 34.0, 0.0, Slip(slip, 1.0), LOAD_N, 1e-4, 0.0)
-    assert visible_theta(0.0, inputs, WHEEL.longitudinal_stiffness_n) == (None, 0.0)
+    assert visible_theta(0.0, inputs, WHEEL.longitudinal_stiffness_n) is None
 
 
 @pytest.mark.parametrize("known_as", ["slip_deviation", "slip_change"])
@@ -178,11 +175,11 @@ def test_noise_at_the_elastic_end_is_not_taken_for_a_slippery_road(known_as):
     truth = on_road(0.9, slip=0.016)
     misread = truth._replace(slip=Slip(0.016 * 1.05, 1.0))
     force_n = truth.wheel_torque_nm / WHEEL.radius_m
-    fooled, _ = visible_theta(force_n, misread, WHEEL.longitudinal_stiffness_n)
+    fooled = visible_theta(force_n, misread, WHEEL.longitudinal_stiffness_n)
     assert fooled is not None
     assert fooled < 0.7
     aware = misread._replace(**{known_as: 0.0008})
-    assert visible_theta(force_n, aware, WHEEL.longitudinal_stiffness_n) == (None, 0.0)
+    assert visible_theta(force_n, aware, WHEEL.longitudinal_stiffness_n) is None
 
 
 def test_a_wrong_class_dry_does_not_keep_the_estimator_off_a_sliding_tyre():
@@ -227,7 +224,7 @@ def test_a_wrong_class_snow_does_not_pull_below_what_the_tyre_carries():
     inputs = on_road(0.9, slip=0.016, deviation=2e-4)
     trace, step = run(inputs, 0.8, 2.0, theta_img=0.2)
     assert step.excited
-    assert step.sensitivity == 0.0
+    assert step.theta_tyre is None
     least = least_theta(inputs.wheel_torque_nm / WHEEL.radius_m, inputs, WHEEL.longitudinal_stiffness_n)
     assert 0.33 < least < 0.6
     assert trace.min() > least
@@ -253,7 +250,7 @@ def test_no_road_beyond_the_greatest_is_shown_or_asked_for():
     for slip in (0.03, 0.08):
         inputs = on_road(1.6, slip)
         force_n = inputs.wheel_torque_nm / WHEEL.radius_m
-        assert visible_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n)[0] in (None, GREATEST_THETA)
+        assert visible_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n) in (None, GREATEST_THETA)
         assert least_theta(force_n, inputs, WHEEL.longitudinal_stiffness_n) <= GREATEST_THETA
 
 
@@ -277,7 +274,7 @@ def test_the_camera_rests_for_a_way_after_the_tyre_was_seen():
         step = stepped(state, elastic, theta_img=0.8)
         state = step.state
         trace.append(state.theta_hat)
-    assert step.sensitivity == 0.0
+    assert step.theta_tyre is None
     resting = round(SEEN_HOLD_M / elastic.way_m)
     assert trace[: resting - 1] == [0.5] * (resting - 1)
     assert trace[-1] > 0.5
@@ -331,9 +328,8 @@ def test_a_sure_estimate_leaves_less_of_the_difference_to_the_class():
     """Not seen, and 0.3 from the class: half of that or less is within K_v's dead zone."""
     elastic = on_road(0.9, slip=0.0235, deviation=1e-4)
     state = settled(FusionState(0.5, 0.0), elastic, WHEEL, GAINS)
-    look = look_at(elastic, WHEEL.longitudinal_stiffness_n, SCHEDULER)
-    given = (state, elastic, look, WHEEL, GAINS, SCHEDULER, 0.8, STEP_S)
-    K_v = [fusion_step(*given, ConfidenceModel(), std * std).K_v for std in (0.05, 0.2, 0.5)]
+    given = (state, elastic, WHEEL, GAINS, SCHEDULER, 0.8, STEP_S)
+    K_v = [fusion_step(*given, VarianceModel(), std * std).K_v for std in (0.05, 0.2, 0.5)]
     assert K_v[0] == 0.0
     assert 0.0 < K_v[1] < K_v[2] == pytest.approx(fusion_step(*given).K_v)
 
@@ -341,9 +337,8 @@ def test_a_sure_estimate_leaves_less_of_the_difference_to_the_class():
 def test_beside_a_tyre_that_is_seen_a_class_hurries_a_sure_estimate_as_any():
     """How sure the estimate is weighs a class that speaks alone."""
     sliding = on_road(0.3)
-    look = look_at(sliding, WHEEL.longitudinal_stiffness_n, SCHEDULER)
-    given = (settled(FusionState(0.8, 0.0), sliding, WHEEL, GAINS), sliding, look, WHEEL, GAINS, SCHEDULER)
-    sure = fusion_step(*given, 0.2, STEP_S, ConfidenceModel(), 1e-4)
+    given = (settled(FusionState(0.8, 0.0), sliding, WHEEL, GAINS), sliding, WHEEL, GAINS, SCHEDULER)
+    sure = fusion_step(*given, 0.2, STEP_S, VarianceModel(), 1e-4)
     assert sure.K_v == fusion_step(*given, 0.2, STEP_S).K_v == pytest.approx(SCHEDULER.K_v(0.5), rel=1e-3)
 
 
@@ -371,41 +366,28 @@ def noisy_course(rng, steps=400):
             slip, theta_img = rng.choice([0.0, 0.004, 0.02, 0.03, 0.08]), rng.choice([None, 0.2, 0.6, 0.8])
         noisy = on_road(0.4, abs(slip + 1e-4 * rng.standard_normal()), deviation=1e-4, change=1e-5)
         yield (
-            noisy._replace(way_m=0.01, torque_known=k % 150 < 140, slip_noise=1e-4, slip_doubt=1e-4),
+            noisy._replace(way_m=0.01, torque_known=k % 150 < 140, slip_noise=1e-4, slip_bias_deviation=1e-4),
             theta_img,
         )
 
 
-def test_without_a_camera_the_fusion_is_the_dynamics_estimator():
-    fused, unseen_m = FusionState(0.8, 0.0), []
-    alone = fused
+def test_the_way_since_the_tyre_was_seen_begins_anew_at_each_sight_of_it():
+    state, unseen_m = FusionState(0.8, 0.0), []
     for inputs, _ in noisy_course(np.random.default_rng(5)):
-        look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
-        fused, *said = fused_step(fused, inputs, look, WHEEL, GAINS, SCHEDULER, None, STEP_S)
-        alone, *expected = dynamics_step(alone, inputs, look, WHEEL, GAINS, STEP_S)
-        assert (fused, said) == (alone, expected)
-        unseen_m.append(alone.unseen_m)
+        state = fusion_step(state, inputs, WHEEL, GAINS, SCHEDULER, None, STEP_S).state
+        unseen_m.append(state.unseen_m)
     assert min(unseen_m) == 0.0
     assert 0.3 < max(unseen_m[100:]) < 4.0
 
 
-@pytest.mark.parametrize("tyre_first", [True, False])
-def test_what_is_taken_from_the_estimator_beside_changes_nothing(tyre_first):
-    gains, rng = Gains(tyre_first=tyre_first), np.random.default_rng(3)
-    alone, fused = FusionState(0.8, 0.0), FusionState(0.8, 0.0)
-    shared = apart = 0
-    for inputs, theta_img in noisy_course(rng):
-        look = look_at(inputs, WHEEL.longitudinal_stiffness_n, SCHEDULER)
-        given = (inputs, look, WHEEL, gains, SCHEDULER)
-        by_itself = fusion_step(alone, *given, None, STEP_S)
-        expected = fusion_step(fused, *given, theta_img, STEP_S, ConfidenceModel(), 0.04)
-        outcome = fusion_step(
-            fused, *given, theta_img, STEP_S, ConfidenceModel(), 0.04, alone, by_itself.unaided
+def test_a_step_without_a_picture_is_the_same_whatever_class_came_before():
+    before = FusionState(0.6, 0.0)
+    with_class = before._replace(theta_img=0.8, road_img=0.8, rests=True)
+    for inputs, _ in noisy_course(np.random.default_rng(3)):
+        alone, after = (
+            fusion_step(state, inputs, WHEEL, GAINS, SCHEDULER, None, STEP_S)
+            for state in (before, with_class)
         )
-        # All but the last, the place, which names the mean force of the estimator that found it.
-        assert outcome.unaided[:-1] == expected.unaided[:-1]
-        assert outcome._replace(unaided=expected.unaided) == expected
-        shared += outcome.unaided is by_itself.unaided
-        apart += outcome.unaided is not by_itself.unaided
-        alone, fused = by_itself.state, outcome.state
-    assert min(shared, apart) > 20
+        assert after.dynamics == alone.dynamics
+        assert (after.threshold, after.excited, after.K_v) == (alone.threshold, alone.excited, 0.0)
+        before, with_class = alone.state, after.state

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from trpac_core import tyre
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
 

@@ -10,13 +10,13 @@ import pytest
 from scipy.integrate import quad
 
 from trpac_core import tyre
-from trpac_core.confidence import unknown_variance, wandered
 from trpac_core.dife import NEVER_SEEN_M
-from trpac_core.elastic import AS_TOLD, ElasticModel
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.observer import seen_at
-from trpac_core.readings import Sensors
-from trpac_core.steady import NOTHING, Steady, faded, mean_deviation
+from trpac_core.sensors import Sensors
+from trpac_core.slip_calibration import EXACT_CAR, CarTolerance
+from trpac_core.stationary_mean import NO_MEAN, StationaryMean, aged, mean_slip_deviation
+from trpac_core.theta_variance import drifted_variance, unknown_variance
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
 
@@ -24,7 +24,7 @@ NAN = math.nan
 SMOOTH = Vehicle(rolling_resistance=0.0)
 LOAD_N = SMOOTH.wheel_load(True)
 C_X, RADIUS_M, INERTIA = SMOOTH.longitudinal_stiffness_n, SMOOTH.wheel_radius_m, SMOOTH.wheel_inertia_kg_m2
-UNFILTERED = EstimatorConfig(vehicle=SMOOTH, sensor_filter_s=1e-6, elastic=AS_TOLD)
+UNFILTERED = EstimatorConfig(vehicle=SMOOTH, sensor_filter_s=1e-6, tolerance=EXACT_CAR)
 STEPS_S = [0.001, 0.01, 0.02, 0.05, 0.1]
 
 
@@ -104,7 +104,7 @@ def test_what_was_read_before_a_gap_does_not_speak_for_the_road_behind_it():
     after_gap, fresh = (TrpacEstimator(EstimatorConfig(vehicle=SMOOTH)) for _ in range(2))
     driven(after_gap, sliding(0.5), 1.5)
     driven(after_gap, replace(sliding(0.5), wheel_torque_nm=NAN), 3.0)
-    start = after_gap.state()["state"]["fusion"][0]
+    start = after_gap.state()["state"]["fusion"]["theta_hat"]
     fresh = TrpacEstimator(EstimatorConfig(vehicle=SMOOTH, theta_initial=start))
     for part_s in (0.05, 0.05, 0.1):
         found, expected = (driven(one, sliding(0.3), part_s).TRPAC for one in (after_gap, fresh))
@@ -116,17 +116,17 @@ def test_way_without_readings_is_way_unseen():
     driven(estimator, sliding(0.3), 1.0)
     driven(estimator, replace(sliding(0.3), wheel_speed_rad_s=NAN), 5.0)
     state = estimator.state()["state"]
-    assert state["fusion"][2] == pytest.approx(50.0, rel=1e-6)
-    assert state["dynamics"][2] == pytest.approx(50.0, rel=1e-6)
+    assert state["fusion"]["unseen_m"] == pytest.approx(50.0, rel=1e-6)
+    assert state["dynamics"]["unseen_m"] == pytest.approx(50.0, rel=1e-6)
 
 
 def test_a_single_lost_sample_leaves_the_means_nearly_as_good():
-    long = Steady(0.03, 0.4, 0.0, 5.0)
-    after = faded(long, 0.001)
+    long = StationaryMean(0.03, 0.4, 0.0, 5.0)
+    after = aged(long, 0.001)
     assert after[:3] == long[:3]
-    assert mean_deviation(after, 1e-3, 0.02, 0.0) < 1.01 * mean_deviation(long, 1e-3, 0.02, 0.0)
-    assert faded(long, 0.0) == long
-    assert faded(long, 0.2) == faded(NOTHING, 0.001) == NOTHING
+    assert mean_slip_deviation(after, 1e-3, 0.02, 0.0) < 1.01 * mean_slip_deviation(long, 1e-3, 0.02, 0.0)
+    assert aged(long, 0.0) == long
+    assert aged(long, 0.2) == aged(NO_MEAN, 0.001) == NO_MEAN
 
 
 def test_a_step_over_which_nobody_knows_the_way_leaves_nothing_known():
@@ -137,7 +137,7 @@ def test_a_step_over_which_nobody_knows_the_way_leaves_nothing_known():
     unknown = math.sqrt(unknown_variance(EstimatorConfig().confidence, sure.TRPAC))
     assert sure.TRPAC_std < 0.5 * unknown
     assert lost.TRPAC_std == pytest.approx(unknown)
-    assert estimator.state()["state"]["fusion"][2] == NEVER_SEEN_M
+    assert estimator.state()["state"]["fusion"]["unseen_m"] == NEVER_SEEN_M
     assert driven(estimator, Sensors(10.0 / RADIUS_M, 0.0, 10.0), 0.01).TRPAC_std > 0.9 * unknown
 
 
@@ -153,7 +153,7 @@ def test_a_class_counts_above_the_threshold_only(confidence, flag):
 
 def test_a_camera_that_pulls_the_estimate_leaves_the_observed_force_alone():
     """Last term of Eq. (15): the tyre model's force goes with theta_hat, the road's does not."""
-    estimator = TrpacEstimator(replace(UNFILTERED, elastic=ElasticModel(), theta_initial=0.8))
+    estimator = TrpacEstimator(replace(UNFILTERED, tolerance=CarTolerance(), theta_initial=0.8))
     force_n = tyre.force(0.9, 0.0235, LOAD_N, C_X, 1.0)
     steady = Sensors(10.0 / RADIUS_M / (1.0 - 0.0235), force_n * RADIUS_M, 10.0, LOAD_N)
     told = [estimator.step(0.001, steady, RoadClass(Surface.SNOW_ICE, 0.95)) for _ in range(2000)]
@@ -170,11 +170,11 @@ def test_a_class_farther_off_than_the_one_before_makes_the_estimate_less_sure():
     before = estimator.state()["state"]
     driven(estimator, cruise, 0.25, RoadClass(Surface.SNOW_ICE, 0.9))
     at_border = estimator.state()["state"]
-    assert at_border["fusion"][3] == 0.8, "the wheel is not there yet"
+    assert at_border["fusion"]["theta_img"] == 0.8, "the wheel is not there yet"
     after = driven(estimator, cruise, 0.002)
     model = config.confidence
     way_m = 10.0 * 0.002 + model.class_change_m
-    expected = wandered(model, at_border["variance"], at_border["fusion"][0], way_m)
+    expected = drifted_variance(model, at_border["variance"], at_border["fusion"]["theta_hat"], way_m)
     assert after.TRPAC_image == 0.2
     assert estimator.state()["state"]["variance"] == pytest.approx(expected, rel=1e-2)
     assert at_border["variance"] < 0.5 * expected

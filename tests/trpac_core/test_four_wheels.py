@@ -13,7 +13,7 @@ from ife_scene import CAMERA, DRY, SNOW, Masks, Middle, split_road
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.four_wheels import CAR, CarSensors, FourWheels, FourWheelsConfig, SideClasses
 from trpac_core.local_speed import local_speeds
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.tyre import force
 from trpac_core.vehicle import WHEELS, Vehicle
 from trpac_core.vision.ife_config import IfeConfig

@@ -31,6 +31,6 @@ def with_fields(owner: Any, settings: Mapping[str, Any]) -> Any:
         known = (f.name for f in fields(owner) if f.name in below)
         return replace(owner, **{name: with_fields(getattr(owner, name), below[name]) for name in known})
     return tuple(
-        with_fields(item, below[str(place)]) if str(place) in below else item
-        for place, item in enumerate(owner)
+        with_fields(item, below[str(index)]) if str(index) in below else item
+        for index, item in enumerate(owner)
     )

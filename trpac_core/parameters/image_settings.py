@@ -23,8 +23,8 @@ CAMERA_PARAMETERS = (
     parameter("camera.cx", "px", "vision.camera.cx_px", "Principal point, column"),
     parameter("camera.cy", "px", "vision.camera.cy_px", "Principal point, row"),
     *(
-        parameter(f"camera.{term}", "1", f"vision.camera.distortion.{place}", f"Lens distortion {term}")
-        for place, term in enumerate(("k1", "k2", "p1", "p2", "k3"))
+        parameter(f"camera.{term}", "1", f"vision.camera.distortion.{index}", f"Lens distortion {term}")
+        for index, term in enumerate(("k1", "k2", "p1", "p2", "k3"))
     ),
     parameter("camera.height_above_road", "m", "vision.camera.height_m", "Height above the road", 0.01),
     parameter(
@@ -55,24 +55,24 @@ IMAGE_PARAMETERS = (
         parameter(
             f"image.{group}_{end}",
             "m",
-            f"vision.ranges_m.{place}.{index}",
+            f"vision.ranges_m.{number}.{index}",
             f"The {group} group looks {end} this way ahead",
             0.0,
             MOST_WAY_M,
         )
-        for place, group in enumerate(_GROUPS)
+        for number, group in enumerate(_GROUPS)
         for index, end in enumerate(("from", "to"))
     ),
     *(
         parameter(
             f"image.patches_{group}",
             "",
-            f"vision.b.{place}",
+            f"vision.b.{number}",
             f"Patches of the {group} group",
             2,
             MOST_PATCHES,
         )
-        for place, group in enumerate(_GROUPS)
+        for number, group in enumerate(_GROUPS)
     ),
     parameter("image.grid", "m", "vision.a_m", "Grid size a", LEAST_GRID_M),
     parameter(

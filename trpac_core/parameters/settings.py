@@ -146,12 +146,12 @@ _FUSION_PARAMETERS = (
         parameter(
             f"scheduler.K_v_{size}",
             "1/s",
-            f"scheduler.K_v_values.{place}",
+            f"scheduler.K_v_values.{index}",
             f"K_v of the set '{size}', in 1/s as the visual term is in form (18)",
             0.0,
             K_V_LIMIT,
         )
-        for place, size in enumerate(("small", "medium", "big"))
+        for index, size in enumerate(("small", "medium", "big"))
     ),
     parameter(
         "scheduler.class_scatter",
@@ -236,7 +236,7 @@ _FUSION_PARAMETERS = (
     parameter(
         "tolerance.speed_bias",
         "m/s",
-        "elastic.speed_bias_m_s",
+        "tolerance.speed_bias_m_s",
         "Standard deviation of a constant error of the sliding speed, learnt while the tyre adheres",
         0.0,
         100.0,
@@ -244,7 +244,7 @@ _FUSION_PARAMETERS = (
     parameter(
         "tolerance.speed_drift",
         "m/s1.5",
-        "elastic.speed_drift_m_s",
+        "tolerance.speed_drift_m_s",
         "How far that error wanders per root of a second",
         0.0,
         100.0,
@@ -252,7 +252,7 @@ _FUSION_PARAMETERS = (
     parameter(
         "tolerance.rolling_radius",
         "1",
-        "elastic.ratio",
+        "tolerance.ratio",
         "Standard deviation of the rolling radius as a share of it, learnt while the tyre adheres",
         0.0,
         1.0,
@@ -260,7 +260,7 @@ _FUSION_PARAMETERS = (
     parameter(
         "tolerance.longitudinal_stiffness",
         "1",
-        "elastic.compliance",
+        "tolerance.compliance",
         "Standard deviation of the tyre's compliance as a share of it, learnt while the tyre adheres",
         0.0,
         10.0,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..elastic import ElasticModel
+from ..slip_calibration import CarTolerance
 from .arrays import Array
 from .belief import (
     Belief,
@@ -85,7 +85,7 @@ def setup(
     rolling_resistance: float,
     sliding_speed_noise_m_s: float,
     torque_noise_nm: float,
-    tolerance: ElasticModel,
+    tolerance: CarTolerance,
     class_theta: tuple[float, ...],
 ) -> RobustSetup:
     """The set-up of a wheel; the told noise of the sliding speed [m/s] is shared evenly by its two sensors."""

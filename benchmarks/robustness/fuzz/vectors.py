@@ -19,7 +19,7 @@ from benchmarks.robustness.conformance.cases import CASES
 from benchmarks.robustness.conformance.operations import OK, Unit
 from benchmarks.robustness.conformance.outcome import NotAsExpectedError
 from benchmarks.robustness.conformance.transports import Fmpy
-from trpac_core.readings import PLAUSIBLE
+from trpac_core.sensors import PLAUSIBLE
 
 from .mutations import Rng
 

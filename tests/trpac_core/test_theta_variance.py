@@ -5,22 +5,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from trpac_core.confidence import (
+from trpac_core.theta_variance import (
     GREATEST_ROAD,
     LEAST_ROAD,
-    ConfidenceModel,
     Evidence,
+    VarianceModel,
     advanced_variance,
     bounded_variance,
     camera_share,
+    drifted_variance,
     reading_noise,
     unknown_variance,
-    wandered,
-    with_camera,
+    variance_with_camera,
 )
 from trpac_core.tyre import tyre_at_slip
 
-MODEL = ConfidenceModel()
+MODEL = VarianceModel()
 LOAD_N, C_X = 3000.0, 50_000.0
 
 
@@ -91,7 +91,7 @@ def test_noise_of_one_reading_is_that_of_drawn_ones(noise_share, torque_friction
 
 
 def test_what_no_driving_can_tell_of_load_and_torque_stays():
-    sure = ConfidenceModel(tyre_share=0.0, car_share=0.04)
+    sure = VarianceModel(tyre_share=0.0, car_share=0.04)
     assert settled_std(0.3, 0.05, model=sure) == pytest.approx(0.04 * 0.3)
 
 
@@ -140,12 +140,12 @@ def test_the_smoothed_distance_never_overshoots(step_s):
 
 def test_no_way_makes_surer_and_no_class_claims_more_than_its_distance():
     unknown = unknown_variance(MODEL, 0.3)
-    assert wandered(MODEL, 2.0 * unknown, 0.3, 100.0) == 2.0 * unknown
+    assert drifted_variance(MODEL, 2.0 * unknown, 0.3, 100.0) == 2.0 * unknown
     assert camera_share(MODEL, 2.0 * unknown, 0.3) == 1.0
 
 
 def test_knowledge_fades_with_the_way_up_to_nothing():
-    variances = [wandered(MODEL, 1e-4, 0.3, way) for way in (0.0, 1.0, 10.0, 1e4)]
+    variances = [drifted_variance(MODEL, 1e-4, 0.3, way) for way in (0.0, 1.0, 10.0, 1e4)]
     assert variances == sorted(variances)
     assert variances[1] - variances[0] == pytest.approx(MODEL.road_change**2, rel=0.05)
     assert variances[-1] == pytest.approx(unknown_variance(MODEL, 0.3))
@@ -164,7 +164,7 @@ def test_a_tyre_that_goes_on_showing_something_else_widens_at_once():
 def test_any_force_leaves_a_variance_between_none_and_that_of_the_unknown(fraction, slip, line, noise):
     """Also one far beyond the elastic line, which no tyre of the model has but a car with another tyre."""
     at = tyre_at_slip(slip, LOAD_N, C_X)
-    evidence = Evidence(0.5, fraction * at.elastic * at.g_0, at, line, noise, 0.0)
+    evidence = Evidence(0.5, fraction * at.adhering * at.g_0, at, line, noise, 0.0)
     variance, lag = advanced_variance(MODEL, 1e-4, 0.0, 0.5, evidence, 0.11, 12.5, 0.0, 0.01)
     assert 0.0 <= variance <= unknown_variance(MODEL, 0.5)
     assert lag == 0.0
@@ -172,18 +172,18 @@ def test_any_force_leaves_a_variance_between_none_and_that_of_the_unknown(fracti
 
 def test_a_force_surely_beyond_the_elastic_one_says_only_that_the_road_has_more():
     at = tyre_at_slip(0.005, LOAD_N, C_X)
-    evidence = Evidence(0.5, 1.5 * at.elastic * at.g_0, at, 0.01, 0.01, 0.0)
+    evidence = Evidence(0.5, 1.5 * at.adhering * at.g_0, at, 0.01, 0.01, 0.0)
     variance, lag = 1e-4, 0.0
     for _ in range(400):
         variance, lag = advanced_variance(MODEL, variance, lag, 0.5, evidence, 0.11, 12.5, 0.0, 0.01)
-    assert variance == pytest.approx(bounded_variance(0.5, 2.0 * at.elastic), rel=0.05)
+    assert variance == pytest.approx(bounded_variance(0.5, 2.0 * at.adhering), rel=0.05)
 
 
 @pytest.mark.parametrize("fraction", [0.5, 1.0, 1.5])
 def test_a_car_that_is_configured_without_any_error_is_no_error(fraction):
     at = tyre_at_slip(0.01, LOAD_N, C_X)
-    evidence = Evidence(0.5, fraction * at.elastic * at.g_0, at, 0.0, 0.0, 0.0)
-    sure = ConfidenceModel(tyre_share=0.0, car_share=0.0)
+    evidence = Evidence(0.5, fraction * at.adhering * at.g_0, at, 0.0, 0.0, 0.0)
+    sure = VarianceModel(tyre_share=0.0, car_share=0.0)
     variance, _ = advanced_variance(sure, 1e-4, 0.0, 0.5, evidence, 0.11, 12.5, 0.0, 0.01)
     assert 0.0 <= variance <= unknown_variance(sure, 0.5)
 
@@ -214,13 +214,13 @@ def test_camera_and_estimate_are_as_by_bayes_rule_but_no_surer_than_the_surer_of
     weights = np.exp(-0.5 * ((roads - theta_hat) / std) ** 2 - 0.5 * ((roads - theta_img) / scatter) ** 2)
     by_bayes = np.average((roads - theta_hat) ** 2, weights=weights)
     surer = min(std**2, scatter**2 + (theta_img - theta_hat) ** 2)
-    found = with_camera(MODEL, std**2, theta_hat, theta_img)
+    found = variance_with_camera(MODEL, std**2, theta_hat, theta_img)
     assert found == pytest.approx(max(by_bayes, surer), rel=1e-6)
 
 
 def test_the_camera_narrows_where_it_agrees_and_widens_where_it_does_not():
     unknown, sure = unknown_variance(MODEL, 0.8), 1e-4
-    assert with_camera(MODEL, unknown, 0.8, 0.8) < unknown
-    assert with_camera(MODEL, unknown, 0.8, 0.2) > unknown
-    assert with_camera(MODEL, sure, 0.3, 0.8) == pytest.approx(sure, rel=0.1)
-    assert with_camera(MODEL, unknown, 0.8, None) == unknown
+    assert variance_with_camera(MODEL, unknown, 0.8, 0.8) < unknown
+    assert variance_with_camera(MODEL, unknown, 0.8, 0.2) > unknown
+    assert variance_with_camera(MODEL, sure, 0.3, 0.8) == pytest.approx(sure, rel=0.1)
+    assert variance_with_camera(MODEL, unknown, 0.8, None) == unknown

@@ -1,4 +1,4 @@
-"""How sure the estimate is: what the tyre, the force it carries, the camera and the way driven unseen say of its error.
+"""Variance of the estimate: by the tyre, the force it carries, the camera and the distance driven unseen.
 
 The variance P is that of the error of theta_hat, not of a best guess: where the estimate holds, what is known of the
 road may lie elsewhere, and the distance counts.
@@ -31,7 +31,7 @@ LAG_RATE_1_S = 50.0
 
 
 @dataclass(frozen=True)
-class ConfidenceModel:
+class VarianceModel:
     """Noise that the estimate is held to.
 
     Parameters
@@ -65,24 +65,24 @@ MIDDLE_ROAD = 0.5 * (LEAST_ROAD + GREATEST_ROAD)
 """Middle of the roads that may be where nothing is known [-]."""
 
 
-def spread_variance(theta_hat: float, least: float, greatest: float) -> float:
+def uniform_variance(theta_hat: float, least: float, greatest: float) -> float:
     """Square of half the distance from the estimate that holds 95 % of the roads between two ends, alike likely [-].
 
     Not their mean square: no road lies beyond the ends, so two of its roots would hold every one.
     """
     above, below, held = greatest - theta_hat, theta_hat - least, HELD_SHARE * (greatest - least)
-    nearer = above if above < below else below
+    nearer = min(above, below)
     half = 0.25 * held if 2.0 * nearer > held else 0.5 * (held - nearer)
     return half * half
 
 
-def unknown_variance(model: ConfidenceModel, theta_hat: float) -> float:
+def unknown_variance(model: VarianceModel, theta_hat: float) -> float:
     """That of an estimate that says nothing of the road [-]."""
     reach = math.sqrt(3.0) * model.unknown
-    return spread_variance(theta_hat, MIDDLE_ROAD - reach, MIDDLE_ROAD + reach)
+    return uniform_variance(theta_hat, MIDDLE_ROAD - reach, MIDDLE_ROAD + reach)
 
 
-def camera_share(model: ConfidenceModel, variance: float, theta_hat: float) -> float:
+def camera_share(model: VarianceModel, variance: float, theta_hat: float) -> float:
     """Share of its distance from the estimate that a class may claim [-].
 
     The Kalman gain P / (P + R), with the variance P of the estimate and R of a road about its class's value; as a
@@ -90,10 +90,10 @@ def camera_share(model: ConfidenceModel, variance: float, theta_hat: float) -> f
     """
     unknown, scatter = unknown_variance(model, theta_hat), model.class_scatter * model.class_scatter
     share = variance * (unknown + scatter) / (unknown * (variance + scatter))
-    return share if share < 1.0 else 1.0
+    return min(share, 1.0)
 
 
-def wandered(model: ConfidenceModel, variance: float, theta_hat: float, way_m: float) -> float:
+def drifted_variance(model: VarianceModel, variance: float, theta_hat: float, way_m: float) -> float:
     """Variance after a way driven unseen: the road may have changed to any other [-]."""
     unknown = unknown_variance(model, theta_hat)
     if variance >= unknown:
@@ -101,17 +101,15 @@ def wandered(model: ConfidenceModel, variance: float, theta_hat: float, way_m: f
     return unknown - (unknown - variance) * math.exp(-(model.road_change**2) * abs(way_m) / unknown)
 
 
-def theta_at(fraction: float, elastic: float) -> float:
+def theta_at(fraction: float, adhering: float) -> float:
     """Theta from the force as a fraction of the elastic one, below 1; 2 X / F_z is the road that just slides."""
     # 1 - sqrt(1 - f) in the form that keeps its digits where hardly any force is used.
-    return 2.0 * elastic * (fraction / (1.0 + math.sqrt(1.0 - fraction)) if fraction < 1.0 else 1.0)
+    return 2.0 * adhering * (fraction / (1.0 + math.sqrt(1.0 - fraction)) if fraction < 1.0 else 1.0)
 
 
 def bounded_variance(theta_hat: float, least: float) -> float:
-    """`spread_variance` where the road is known to be anywhere above `least` [-]."""
-    return spread_variance(
-        theta_hat, least if least < GREATEST_ROAD - 0.1 else GREATEST_ROAD - 0.1, GREATEST_ROAD
-    )
+    """`uniform_variance` where the road is known to be anywhere above `least` [-]."""
+    return uniform_variance(theta_hat, min(least, GREATEST_ROAD - 0.1), GREATEST_ROAD)
 
 
 class Evidence(NamedTuple):
@@ -128,21 +126,21 @@ class Evidence(NamedTuple):
     """That of the slip through noise and through its change, in one step [-]."""
     torque_friction: float
     """That of the used friction through the filtered torque's noise [-]."""
-    following: float = 0.0
-    """How surely the tyre's theta follows its slip, from 0 to 1, see `mismatch` [-]."""
+    mismatch: float = 0.0
+    """Share of `StiffnessMismatch`, from 0 to 1 [-]."""
 
 
 def reading_noise(friction: float, tyre: TyreAtSlip, noise_share: float, torque_friction: float) -> float:
     """Relative standard deviation of the tyre's theta through noise in one step; parameters as in `Evidence` [-]."""
-    elastic, g_0, _, _ = tyre
-    fraction = friction / (elastic * g_0)
+    adhering = tyre.adhering
+    fraction = friction / (adhering * tyre.g_0)
     share = math.hypot(noise_share, torque_friction / friction)
-    low, high = theta_at(fraction * (1.0 - share), elastic), theta_at(fraction * (1.0 + share), elastic)
-    return 0.5 * (high - low) / theta_at(fraction, elastic)
+    low, high = theta_at(fraction * (1.0 - share), adhering), theta_at(fraction * (1.0 + share), adhering)
+    return 0.5 * (high - low) / theta_at(fraction, adhering)
 
 
 def advanced_variance(
-    model: ConfidenceModel,
+    model: VarianceModel,
     variance: float,
     lag: float,
     theta_hat: float,
@@ -165,36 +163,38 @@ def advanced_variance(
     gamma, way_m, step_s : float
         Rate of the estimator [1/s], way [m] and step [s].
     """
-    variance = wandered(model, variance, theta_hat, way_m)
-    theta_tyre, friction, tyre, line_share, noise_share, torque_friction, following = evidence
+    variance = drifted_variance(model, variance, theta_hat, way_m)
+    theta_tyre, friction, noise_share = evidence.theta_tyre, evidence.friction, evidence.noise_share
     if friction <= 0.0:
         return variance, 0.0
-    elastic = tyre.elastic
-    fraction = friction / (elastic * tyre.g_0)
-    sure = line_share * line_share + model.tyre_share * model.tyre_share
+    adhering = evidence.tyre.adhering
+    fraction = friction / (adhering * evidence.tyre.g_0)
+    sure = evidence.line_share * evidence.line_share + model.tyre_share * model.tyre_share
     if theta_tyre is None:
         share = SURELY * math.sqrt(sure + noise_share * noise_share)
-        least = theta_at(fraction * (1.0 - share), elastic) if share < 1.0 else 0.0
+        least = theta_at(fraction * (1.0 - share), adhering) if share < 1.0 else 0.0
         if least > LEAST_ROAD:
             bound = bounded_variance(theta_hat, least)
             variance = bound if least > theta_hat else min(variance, bound)
         return variance, 0.0
-    from_torque = torque_friction * torque_friction * averaged / (friction * friction)
+    from_torque = evidence.torque_friction * evidence.torque_friction * averaged / (friction * friction)
     share = max(math.sqrt(sure + noise_share * noise_share * averaged + from_torque), LEAST_SHARE)
-    low, high = theta_at(fraction * (1.0 - share), elastic), theta_at(fraction * (1.0 + share), elastic)
+    low, high = theta_at(fraction * (1.0 - share), adhering), theta_at(fraction * (1.0 + share), adhering)
     half, scale = 0.5 * (high - low), model.car_share * theta_tyre
     settled = half * half + scale * scale
     # The same error may make a tyre that does not slide look like one that does: then any road above would do. By
     # Bayes' rule with all roads alike likely; exp(-x^2 / 2) integrates to sqrt(2 pi) half over those that slide.
-    apart, above = (1.0 - fraction) / (fraction * share), GREATEST_ROAD - 2.0 * elastic
+    apart, above = (1.0 - fraction) / (fraction * share), GREATEST_ROAD - 2.0 * adhering
     if above > 0.0 and apart < FARTHEST:
         elsewhere, here = math.exp(-0.5 * apart * apart) * above, math.sqrt(2.0 * math.pi) * half
         # `here` is 0 where the force is surely more than the elastic one: no road that slides is known by it.
         share_elsewhere = elsewhere / (elsewhere + here) if here > 0.0 else 1.0
-        settled += share_elsewhere * bounded_variance(theta_tyre, 2.0 * elastic)
+        settled += share_elsewhere * bounded_variance(theta_tyre, 2.0 * adhering)
     # A theta that follows the slip is no road's: then any road above would do.
-    if following > 0.0:
-        settled += following * following * (bounded_variance(theta_tyre, theta_tyre) - settled)
+    if evidence.mismatch > 0.0:
+        settled += (
+            evidence.mismatch * evidence.mismatch * (bounded_variance(theta_tyre, theta_tyre) - settled)
+        )
     variance += (1.0 - math.exp(-2.0 * gamma * step_s)) * (settled - variance)
     variance = min(variance, unknown_variance(model, theta_hat))
     # Where the tyre goes on showing something else than the estimate, the estimate is off by that.
@@ -203,16 +203,15 @@ def advanced_variance(
     return (max(variance, off * off) if off > 0.0 else variance), lag
 
 
-def with_camera(model: ConfidenceModel, variance: float, theta_hat: float, theta_img: float | None) -> float:
+def variance_with_camera(
+    model: VarianceModel, variance: float, theta_hat: float, theta_img: float | None
+) -> float:
     """Mean square error of the estimate with what the camera says of the road beside what is known [-]."""
     if theta_img is None:
         return variance
     scatter, distance = model.class_scatter * model.class_scatter, theta_img - theta_hat
     share = variance / (variance + scatter)
-    together, by_camera = (
-        share * scatter + share * distance * (share * distance),
-        scatter + distance * distance,
-    )
+    together = share * scatter + share * distance * (share * distance)
+    by_camera = scatter + distance * distance
     # Both may rest on the same: what is known of all roads. So together they are no surer than the better one.
-    alone = variance if variance < by_camera else by_camera
-    return together if together > alone else alone
+    return max(together, min(variance, by_camera))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 PLAUSIBLE = {
     "wheel_speed_rad_s": 1000.0,
@@ -47,8 +48,21 @@ class Sensors:
     yaw_rate_rad_s: float | None = None
 
 
-Readings = tuple[float, float, float]
-"""Filtered wheel speed [rad/s], wheel torque [N m] and vehicle speed [m/s]."""
+class FilteredReadings(NamedTuple):
+    """The sensors behind their filter."""
+
+    wheel_speed_rad_s: float
+    wheel_torque_nm: float
+    vehicle_speed_m_s: float
+
+    def with_sample(self, sensors: Sensors, share: float) -> FilteredReadings:
+        """The readings a step later; `share` is that of the filter, see `filter_share` [-]."""
+        omega, torque_nm, speed_m_s = self
+        return FilteredReadings(
+            omega + share * (sensors.wheel_speed_rad_s - omega),
+            torque_nm + share * (sensors.wheel_torque_nm - torque_nm),
+            speed_m_s + share * (sensors.vehicle_speed_m_s - speed_m_s),
+        )
 
 
 def filter_share(step_s: float, time_constant_s: float) -> float:
@@ -63,25 +77,6 @@ def implausible(sensors: Sensors, names: tuple[str, ...]) -> list[str]:
         for name in names
         if (value := getattr(sensors, name)) is not None and not abs(value) <= PLAUSIBLE[name]
     ]
-
-
-_OMEGA, _TORQUE, _SPEED, _LOAD, _STEERING, _ACCELERATION, _YAW = PLAUSIBLE.values()
-
-
-def plain(step_s: float, sensors: Sensors, floor_m_s: float) -> bool:
-    """Whether a step's input is beyond doubt, at little cost; where it is not, `unusable` decides."""
-    load_n, acceleration = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
-    steering, yaw_rate = sensors.steering_angle_rad, sensors.yaw_rate_rad_s
-    return (
-        0.0 <= step_s <= LONGEST_STEP_S
-        and -floor_m_s <= sensors.vehicle_speed_m_s <= _SPEED
-        and 0.0 <= sensors.wheel_speed_rad_s <= _OMEGA
-        and -_TORQUE <= sensors.wheel_torque_nm <= _TORQUE
-        and (not steering or -_STEERING <= steering <= _STEERING)
-        and (load_n is None or 0.0 < load_n <= _LOAD)
-        and (acceleration is None or -_ACCELERATION <= acceleration <= _ACCELERATION)
-        and (yaw_rate is None or -_YAW <= yaw_rate <= _YAW)
-    )
 
 
 def unusable(step_s: float, sensors: Sensors, wheel_radius_m: float, floor_m_s: float) -> str | None:

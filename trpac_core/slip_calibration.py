@@ -1,4 +1,4 @@
-"""The elastic line of the tyre at hand: what gentle driving teaches of slip and stiffness.
+"""Calibration of slip offset and stiffness from gentle driving, in which the tyre does not slide.
 
 A rolling radius or a speed signal that is off by half a per cent moves slip by as much as the difference between two
 roads, and a stiffness that is off moves all that is read from it. Both show where a tyre surely does not slide:
@@ -30,11 +30,10 @@ CONTRADICTED = 2.0
 """Deviations up to which the car is taken to be as told: what noise teaches does not spoil a car that is [-]."""
 SOFTEST, STIFFEST = 1.0, -0.5
 """Bounds of c [-]: half and double the stiffness that is known."""
-_new = tuple.__new__
 
 
 @dataclass(frozen=True)
-class ElasticModel:
+class CarTolerance:
     """How well the car is known before it drives; three deviations of 0 leave it as it is told.
 
     Parameters
@@ -64,23 +63,23 @@ class ElasticModel:
     force_doubt_n: float = 15.0
 
     @property
-    def start(self) -> ElasticLine:
+    def prior(self) -> SlipCalibration:
         """Before anything was driven."""
         b, r, c = self.speed_bias_m_s, self.ratio, self.compliance
-        return ElasticLine(0.0, 0.0, 0.0, b * b, 0.0, 0.0, r * r, 0.0, c * c)
+        return SlipCalibration(0.0, 0.0, 0.0, b * b, 0.0, 0.0, r * r, 0.0, c * c)
 
 
-AS_TOLD = ElasticModel(0.0, 0.0, 0.0, 0.0)
+EXACT_CAR = CarTolerance(0.0, 0.0, 0.0, 0.0)
 """The car is as it is told: nothing is learned of it."""
 
 
-def beyond(value: float, variance: float) -> float:
-    """What of a value lies beyond `CONTRADICTED` deviations [-]."""
+def significant(value: float, variance: float) -> float:
+    """The part of a value that lies beyond `CONTRADICTED` deviations of 0 [-]."""
     least = CONTRADICTED * math.sqrt(variance)
     return value - least if value > least else value + least if value < -least else 0.0
 
 
-class ElasticLine(NamedTuple):
+class SlipCalibration(NamedTuple):
     """b [m/s], r [-], c [-] and the upper triangle of their covariance."""
 
     b: float
@@ -93,47 +92,35 @@ class ElasticLine(NamedTuple):
     rc: float
     cc: float
 
-    def offset(self, speed_m_s: float) -> tuple[float, float]:
-        """What is taken off the slip that is read, and the standard deviation of what it reads too much [-]."""
-        b, r, _, bb, br, _, rr, _, _ = self
-        variance = (bb / speed_m_s + 2.0 * br) / speed_m_s + rr
-        deviation = math.sqrt(variance) if variance > 0.0 else 0.0
-        value, least = b / speed_m_s + r, CONTRADICTED * deviation
-        return (value - least if value > least else value + least if value < -least else 0.0), deviation
-
-    def compliance(self) -> float:
-        """What the tyre is taken to be softer by [-]."""
-        return beyond(self.c, self.cc)
+    def offset(self, speed_m_s: float) -> float:
+        """What is taken off the slip that is read [-]."""
+        return significant(self.b / speed_m_s + self.r, self.offset_variance(speed_m_s))
 
     def offset_variance(self, speed_m_s: float) -> float:
         """Variance of what the slip reads too much [-]."""
-        _, _, _, bb, br, _, rr, _, _ = self
-        variance = (bb / speed_m_s + 2.0 * br) / speed_m_s + rr
-        return variance if variance > 0.0 else 0.0
+        return max((self.bb / speed_m_s + 2.0 * self.br) / speed_m_s + self.rr, 0.0)
+
+    def compliance(self) -> float:
+        """Share by which the tyre is taken to be softer [-]."""
+        return significant(self.c, self.cc)
 
     def slip_variance(self, slip: float, speed_m_s: float) -> float:
-        """Mean square error of where the elastic line has a slip, with what was learned and not used in it [-]."""
-        b, r, c, _, _, bc, _, rc, cc = self
-        cross = 2.0 * slip * (bc / speed_m_s + rc)
-        offset_variance = self.offset_variance(speed_m_s)
-        offset = b / speed_m_s + r
-        unused = offset + slip * c - (beyond(offset, offset_variance) + slip * beyond(c, cc))
-        total = offset_variance + cross + slip * slip * cc
-        return (total if total > 0.0 else 0.0) + unused * unused
+        """Mean square error of a slip on the elastic line, with what was learned and not used in it [-]."""
+        covariance = 2.0 * slip * (self.bc / speed_m_s + self.rc)
+        learned = self.b / speed_m_s + self.r + slip * self.c
+        unused = learned - (self.offset(speed_m_s) + slip * self.compliance())
+        total = self.offset_variance(speed_m_s) + covariance + slip * slip * self.cc
+        return max(total, 0.0) + unused * unused
 
-    def drifted(self, model: ElasticModel, passed_s: float) -> ElasticLine:
-        """The line after a time in which the speed signals may have drifted."""
-        if model.speed_drift_m_s == 0.0:
-            return self
-        b, r, c, bb, br, bc, rr, rc, cc = self
-        grown = bb + model.speed_drift_m_s**2 * passed_s
-        most = max(bb, model.speed_bias_m_s**2)
-        return _new(ElasticLine, (b, r, c, grown if grown < most else most, br, bc, rr, rc, cc))
+    def drifted(self, model: CarTolerance, passed_s: float) -> SlipCalibration:
+        """The calibration after a time in which the speed signals may have drifted."""
+        most = max(self.bb, model.speed_bias_m_s**2)
+        return self._replace(bb=min(self.bb + model.speed_drift_m_s**2 * passed_s, most))
 
 
-def learned(
-    line: ElasticLine,
-    model: ElasticModel,
+def calibrated(
+    known: SlipCalibration,
+    model: CarTolerance,
     slip: float,
     speed_m_s: float,
     force_n: float,
@@ -141,56 +128,53 @@ def learned(
     longitudinal_stiffness_n: float,
     deviation: float,
     slip_change: float,
-) -> ElasticLine:
-    """The line after one reading, unchanged where the tyre might slide.
+) -> SlipCalibration:
+    """The calibration after one reading, unchanged where the tyre might slide.
 
     Parameters
     ----------
-    line, model : ElasticLine, ElasticModel
+    known, model : SlipCalibration, CarTolerance
         What is known.
     slip : float
         Signed slip as it is read [-].
     speed_m_s, force_n, load_n, longitudinal_stiffness_n : float
         Speed [m/s], signed F_hat [N], F_z [N], C_x as it is told [N].
     deviation, slip_change : float
-        Standard deviation of the slip through noise, and how far it is from its own course: force and slip of a
+        Standard deviation of the slip through noise, and how far it is from its lagged value: force and slip of a
         tyre that is being loaded do not belong together [-].
     """
     used = abs(force_n) / load_n
     if used > model.gentle:
-        return line
-    b, r, c, bb, br, bc, rr, rc, cc = line
-    elastic = force_n / (INITIAL_SLOPE * longitudinal_stiffness_n)
+        return known
+    b, r, c, bb, br, bc, rr, rc, cc = known
+    adhering_slip = force_n / (INITIAL_SLOPE * longitudinal_stiffness_n)
     inverse_v = 1.0 / speed_m_s
-    by_b = bb * inverse_v + br + bc * elastic
-    by_r = br * inverse_v + rr + rc * elastic
-    by_c = bc * inverse_v + rc + cc * elastic
-    known = by_b * inverse_v + by_r + by_c * elastic
-    if known <= 0.0:
-        return line
-    doubt = model.force_doubt_n / (INITIAL_SLOPE * longitudinal_stiffness_n)
+    by_b = bb * inverse_v + br + bc * adhering_slip
+    by_r = br * inverse_v + rr + rc * adhering_slip
+    by_c = bc * inverse_v + rc + cc * adhering_slip
+    predicted = by_b * inverse_v + by_r + by_c * adhering_slip
+    if predicted <= 0.0:
+        return known
+    force_doubt = model.force_doubt_n / (INITIAL_SLOPE * longitudinal_stiffness_n)
     settling = SETTLING * slip_change
-    total = known + CORRELATED * deviation * deviation + doubt * doubt + settling * settling
-    off = slip - (b * inverse_v + r + (1.0 + c) * elastic)
-    if off * off > REJECTED * REJECTED * total:
+    total = predicted + CORRELATED * deviation * deviation + force_doubt * force_doubt + settling * settling
+    innovation = slip - (b * inverse_v + r + (1.0 + c) * adhering_slip)
+    if innovation * innovation > REJECTED * REJECTED * total:
         if used > model.coasting:
-            return line
+            return known
         # No force and yet slip, more than was thought possible: the radius or the speed is off by about that much.
-        rr += off * off
-        by_r += off * off
-        total += off * off
-    gain = off / total
-    return _new(
-        ElasticLine,
-        (
-            b + by_b * gain,
-            r + by_r * gain,
-            min(max(c + by_c * gain, STIFFEST), SOFTEST),
-            bb - by_b * by_b / total,
-            br - by_b * by_r / total,
-            bc - by_b * by_c / total,
-            rr - by_r * by_r / total,
-            rc - by_r * by_c / total,
-            cc - by_c * by_c / total,
-        ),
+        rr += innovation * innovation
+        by_r += innovation * innovation
+        total += innovation * innovation
+    gain = innovation / total
+    return SlipCalibration(
+        b + by_b * gain,
+        r + by_r * gain,
+        min(max(c + by_c * gain, STIFFEST), SOFTEST),
+        bb - by_b * by_b / total,
+        br - by_b * by_r / total,
+        bc - by_b * by_c / total,
+        rr - by_r * by_r / total,
+        rc - by_r * by_c / total,
+        cc - by_c * by_c / total,
     )

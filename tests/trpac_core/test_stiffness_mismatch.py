@@ -9,8 +9,8 @@ import pytest
 
 from trpac_core import tyre
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
-from trpac_core.mismatch import Following, followed
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
+from trpac_core.stiffness_mismatch import StiffnessMismatch, updated_mismatch
 from trpac_core.vehicle import Vehicle
 
 CAR = Vehicle()
@@ -20,11 +20,11 @@ SLIPS = 0.02 + 0.01 * np.sin(0.05 * np.arange(800))
 
 def slope_of(exponent, noise, seed=1):
     """The slope after 400 readings of theta ~ X^exponent, with relative noise that the filter is told."""
-    rng, state = np.random.default_rng(seed), Following()
+    rng, state = np.random.default_rng(seed), StiffnessMismatch()
     for slip in SLIPS[:400]:
-        elastic = slip / (1.0 - slip) * CAR.longitudinal_stiffness_n / LOAD_N
-        theta = 0.3 * (elastic / 0.3) ** exponent * math.exp(noise * rng.standard_normal())
-        state = followed(state, elastic, theta, noise, 0.01)
+        adhering = slip / (1.0 - slip) * CAR.longitudinal_stiffness_n / LOAD_N
+        theta = 0.3 * (adhering / 0.3) ** exponent * math.exp(noise * rng.standard_normal())
+        state = updated_mismatch(state, adhering, theta, noise, 0.01)
     return state
 
 
@@ -42,23 +42,25 @@ def test_what_noise_alone_may_make_of_it_is_no_mismatch():
 
 
 def test_an_even_pedal_tells_nothing_of_the_slope():
-    state = Following()
+    state = StiffnessMismatch()
     for _ in range(500):
-        state = followed(state, 0.3, 0.3, 0.02, 0.01)
+        state = updated_mismatch(state, 0.3, 0.3, 0.02, 0.01)
     assert state.share() == 0.0
     assert state.variance == 1.0
 
 
 def test_what_was_learned_of_the_slope_is_forgotten_with_time():
     known = slope_of(0.0, noise=0.05)
-    here = (math.exp(known.log_elastic), math.exp(known.log_theta))
-    assert followed(known, *here, 0.05, 10.0).variance == pytest.approx(known.variance + 0.1)
-    assert followed(known, *here, 0.05, 1e4).variance == 1.0
+    here = (math.exp(known.log_adhering), math.exp(known.log_theta))
+    assert updated_mismatch(known, *here, 0.05, 10.0).variance == pytest.approx(known.variance + 0.1)
+    assert updated_mismatch(known, *here, 0.05, 1e4).variance == 1.0
 
 
 def test_a_reading_far_beyond_noise_teaches_nothing_of_the_slope():
     known = slope_of(0.0, noise=0.02)
-    after = followed(known, 1.5 * math.exp(known.log_elastic), 3.0 * math.exp(known.log_theta), 0.02, 0.01)
+    after = updated_mismatch(
+        known, 1.5 * math.exp(known.log_adhering), 3.0 * math.exp(known.log_theta), 0.02, 0.01
+    )
     assert after.slope == known.slope
 
 
@@ -69,7 +71,7 @@ def pulsed(believed_n, theta, slips=SLIPS):
         force = tyre.force(theta, slip, LOAD_N, CAR.longitudinal_stiffness_n, 1.0)
         omega = 10.0 / CAR.wheel_radius_m / (1.0 - slip)
         said = estimator.step(0.001, Sensors(omega, force * CAR.wheel_radius_m, 10.0, LOAD_N))
-    return estimator, said, Following(*estimator.state()["state"]["following"]).share()
+    return estimator, said, StiffnessMismatch(**estimator.state()["state"]["mismatch"]).share()
 
 
 def test_an_elastic_tyre_taken_for_a_stiffer_one_is_not_taken_for_ice():
@@ -92,4 +94,4 @@ def test_the_slope_survives_json():
     other = TrpacEstimator(estimator.config)
     other.restore(json.loads(json.dumps(estimator.state())))
     assert other.state() == estimator.state()
-    assert other.state()["state"]["following"] != list(Following())
+    assert other.state()["state"]["mismatch"] != StiffnessMismatch()._asdict()

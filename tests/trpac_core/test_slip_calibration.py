@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from trpac_core.elastic import AS_TOLD, CORRELATED, SETTLING, ElasticModel, learned
+from trpac_core.slip_calibration import CORRELATED, EXACT_CAR, SETTLING, CarTolerance, calibrated
 from trpac_core.tyre import INITIAL_SLOPE, used_friction
 
 LOAD_N, C_X = 3400.0, 50_000.0
-MODEL = ElasticModel()
+MODEL = CarTolerance()
 RNG_SEED = 5
 
 
 def taught(model=MODEL, bias=0.0, ratio=0.0, compliance=0.0, gentle=0.05, seconds=4.0, noise=2e-4, speed=8.0):
     """Coasting and gentle pulses in turn, read every 10 ms, at a speed that rises."""
-    rng, line = np.random.default_rng(RNG_SEED), model.start
+    rng, line = np.random.default_rng(RNG_SEED), model.prior
     rows = round(seconds / 0.01)
     for row in range(rows):
         force_n = gentle * LOAD_N if row // 30 % 2 else 0.0
@@ -24,13 +24,13 @@ def taught(model=MODEL, bias=0.0, ratio=0.0, compliance=0.0, gentle=0.05, second
             + (1.0 + compliance) * force_n / (INITIAL_SLOPE * C_X)
             + noise * rng.standard_normal()
         )
-        line = learned(line.drifted(model, 0.01), model, slip, v, force_n, LOAD_N, C_X, noise, 0.0)
+        line = calibrated(line.drifted(model, 0.01), model, slip, v, force_n, LOAD_N, C_X, noise, 0.0)
     return line, v
 
 
 def test_a_car_that_is_as_told_is_left_as_it_is():
     line, v = taught()
-    assert line.offset(v)[0] == 0.0
+    assert line.offset(v) == 0.0
     assert line.compliance() == 0.0
     assert line.offset_variance(v) < 1e-8
 
@@ -38,7 +38,7 @@ def test_a_car_that_is_as_told_is_left_as_it_is():
 @pytest.mark.parametrize(("bias", "ratio"), [(0.03, 0.0), (0.0, 0.01), (0.0, -0.05), (0.0, 0.1)])
 def test_slip_that_a_coasting_wheel_reads_is_taken_off(bias, ratio):
     line, v = taught(bias=bias, ratio=ratio)
-    assert line.offset(v)[0] == pytest.approx(bias / v + ratio, abs=3e-4)
+    assert line.offset(v) == pytest.approx(bias / v + ratio, abs=3e-4)
 
 
 @pytest.mark.parametrize("compliance", [-0.1, 0.1, 0.2])
@@ -50,28 +50,28 @@ def test_a_tyre_of_another_stiffness_is_told_within_its_deviation(compliance):
 
 
 def test_a_tyre_that_may_slide_teaches_nothing():
-    line = MODEL.start
+    line = MODEL.prior
     for used in (0.061, 0.3):
-        assert learned(line, MODEL, 0.03, 8.0, used * LOAD_N, LOAD_N, C_X, 1e-4, 0.0) is line
+        assert calibrated(line, MODEL, 0.03, 8.0, used * LOAD_N, LOAD_N, C_X, 1e-4, 0.0) is line
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize("used", [0.0601, 0.065, 0.1, 0.5])
 def test_above_gentle_driving_not_even_slip_on_the_elastic_line_is_learned_from(used, direction):
     """A tyre that slides a little on a slippery road would pass for one that is softer than told."""
-    line, force_n = MODEL.start, direction * used * LOAD_N
+    line, force_n = MODEL.prior, direction * used * LOAD_N
     for more in (0.0, 1.0, 1.2):
         slip = more * force_n / (INITIAL_SLOPE * C_X)
-        assert learned(line, MODEL, slip, 8.0, force_n, LOAD_N, C_X, 1e-4, 0.0) is line
+        assert calibrated(line, MODEL, slip, 8.0, force_n, LOAD_N, C_X, 1e-4, 0.0) is line
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_gentle_driving_teaches_on_a_car_that_drives_or_brakes(direction):
     force_n = direction * 0.0599 * LOAD_N
-    taught_by = learned(
-        MODEL.start, MODEL, force_n / (INITIAL_SLOPE * C_X), 8.0, force_n, LOAD_N, C_X, 1e-4, 0.0
+    taught_by = calibrated(
+        MODEL.prior, MODEL, force_n / (INITIAL_SLOPE * C_X), 8.0, force_n, LOAD_N, C_X, 1e-4, 0.0
     )
-    assert taught_by.cc < MODEL.start.cc
+    assert taught_by.cc < MODEL.prior.cc
 
 
 def test_what_counts_as_gentle_lets_no_tyre_slide_on_a_tenth():
@@ -83,16 +83,16 @@ def test_what_counts_as_gentle_lets_no_tyre_slide_on_a_tenth():
 
 def test_what_contradicts_all_that_is_known_counts_only_on_a_coasting_wheel():
     line, _ = taught()
-    assert learned(line, MODEL, 0.02, 8.0, 0.05 * LOAD_N, LOAD_N, C_X, 1e-4, 0.0) is line
-    assert learned(line, MODEL, 0.02, 8.0, 0.0, LOAD_N, C_X, 1e-4, 0.0).offset_variance(
+    assert calibrated(line, MODEL, 0.02, 8.0, 0.05 * LOAD_N, LOAD_N, C_X, 1e-4, 0.0) is line
+    assert calibrated(line, MODEL, 0.02, 8.0, 0.0, LOAD_N, C_X, 1e-4, 0.0).offset_variance(
         8.0
     ) > line.offset_variance(8.0)
 
 
 def test_told_to_learn_nothing_it_learns_nothing():
-    line, v = taught(AS_TOLD, ratio=0.02, compliance=0.1)
-    assert line == AS_TOLD.start
-    assert line.offset(v)[0] == line.compliance() == 0.0
+    line, v = taught(EXACT_CAR, ratio=0.02, compliance=0.1)
+    assert line == EXACT_CAR.prior
+    assert line.offset(v) == line.compliance() == 0.0
 
 
 def test_a_reading_is_taken_as_by_kalmans_formula():
@@ -105,7 +105,7 @@ def test_a_reading_is_taken_as_by_kalmans_formula():
     total = H @ P @ H + noise
     gain = P @ H / total
     off = slip - (line.b / v + line.r + (1.0 + line.c) * elastic)
-    after = learned(line, MODEL, slip, v, force_n, LOAD_N, C_X, deviation, change)
+    after = calibrated(line, MODEL, slip, v, force_n, LOAD_N, C_X, deviation, change)
     assert abs(off) < 3.0 * np.sqrt(total)
     assert after[:3] == pytest.approx(np.array(line[:3]) + gain * off)
     expected = P - np.outer(gain, H @ P)
@@ -118,14 +118,14 @@ def test_error_of_the_line_is_its_covariance_and_what_was_learned_and_not_used(s
     line, v = taught(**off)
     P = np.array([[line.bb, line.br, line.bc], [line.br, line.rr, line.rc], [line.bc, line.rc, line.cc]])
     H = np.array([1.0 / v, 1.0, slip])
-    unused = H @ line[:3] - (line.offset(v)[0] + slip * line.compliance())
+    unused = H @ line[:3] - (line.offset(v) + slip * line.compliance())
     assert unused != 0.0
     assert line.slip_variance(slip, v) == pytest.approx(H @ P @ H + unused**2, rel=1e-9)
 
 
 @pytest.mark.parametrize(("compliance", "bound"), [(4.0, 1.0), (-0.8, -0.5)])
 def test_no_tyre_is_taken_for_more_than_twice_as_soft_or_as_stiff(compliance, bound):
-    line, _ = taught(ElasticModel(compliance=3.0), compliance=compliance)
+    line, _ = taught(CarTolerance(compliance=3.0), compliance=compliance)
     assert line.c == pytest.approx(bound, abs=0.02)
 
 
