@@ -107,8 +107,6 @@ def holes(items: list[Any]) -> list[int]:
 
     A list object holds, after three words, the address of its items (CPython 3.11, Include/cpython/listobject.h).
     """
-    if not items:
-        return []
     word = ctypes.sizeof(ctypes.c_void_p)
     address = ctypes.c_void_p.from_address(id(items) + 3 * word).value
     if address is None:
@@ -145,7 +143,6 @@ class GuardedSlave(Fmi2Slave):
     """Inputs that hold for one step only, such as addresses: `clear_volatile` forgets them, no state holds them."""
     views: ClassVar[frozenset[str]] = frozenset()
     """Outputs that `shown` gives; `values` does not hold them."""
-    _prepared: ClassVar[bool] = False
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -171,15 +168,11 @@ class GuardedSlave(Fmi2Slave):
         try:
             self.prepare()
         except Exception as error:
+            # Before there is an instance the wrapper survives an exception, and only so does the host learn of it.
+            # Many hosts show no log of a unit that they could not instantiate.
             text = quoted(f"{self.modelName} cannot be instantiated: {error}", LONGEST_LOG)
-            if not type(self)._prepared:
-                # Before there is an instance the wrapper survives an exception, and only so does the host
-                # learn of it. Many hosts show no log of a unit that they could not instantiate.
-                print(text, file=sys.stderr)
-                raise InstantiationError(log_text(text)) from error
-            self.report("prepare", Fmi2Status.error, text)
-        else:
-            type(self)._prepared = True
+            print(text, file=sys.stderr)
+            raise InstantiationError(log_text(text)) from error
         finally:
             # After all libraries are loaded, so that in a host without Python the interpreter ends before they do.
             end_in_order(str(self.resources))
@@ -187,7 +180,7 @@ class GuardedSlave(Fmi2Slave):
     # What a slave adds
 
     def prepare(self) -> None:
-        """Load what all instances need; may raise, and the unit is then not instantiated."""
+        """Load what all instances need, once; may raise in the first one, and the unit is then not instantiated."""
 
     def initialise(self) -> None:
         """Apply the parameters; ValueError where they cannot be applied."""

@@ -138,10 +138,10 @@ class Link:
             if not self.receive() and self.backlogs == backlogs:
                 return
 
-    def send(self, frame_id: int, extended: bool, data: bytes) -> bool:
-        """Hand a message over; False where that failed."""
+    def send(self, frame_id: int, extended: bool, data: bytes) -> None:
+        """Hand a message over; one that cannot be sent is counted in `unsent`, without a bus it is dropped."""
         if self._bus is None:
-            return False
+            return
         message = can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data)
         try:
             self._bus.send(message)
@@ -149,12 +149,9 @@ class Link:
             # A full transmit buffer is no lost bus: nobody acknowledges, or too much is sent.
             self.unsent += 1
             self._say("unsent", f"A message could not be sent: {quoted(error)}")
-            return False
         except BUS_ERRORS as error:
             self.unsent += 1
             self._lose(f"{type(error).__name__}: {quoted(error)}")
-            return False
-        return True
 
     def check(self) -> None:
         """Ask the controller for its state, where the interface can tell; a bus that is off is lost."""

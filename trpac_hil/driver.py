@@ -95,10 +95,9 @@ class EndlessDrive:
         self._instants = self._drive()
         self.now = next(self._instants)
 
-    def advance(self, steps: int = 1) -> Instant:
-        """The plant some steps later."""
+    def advance(self, steps: int = 1) -> None:
+        """Go on by some steps."""
         self.now = next(islice(self._instants, steps - 1, None))
-        return self.now
 
     def _drive(self) -> Iterator[Instant]:
         """One instant after the other, without end."""

@@ -32,10 +32,9 @@ class Wire:
     def __init__(self, ring: Ring) -> None:
         self._ring = ring
 
-    def send(self, frame_id: int, extended: bool, data: bytes) -> bool:
+    def send(self, frame_id: int, extended: bool, data: bytes) -> None:
         """Hand a message of at most 8 bytes over."""
         self._ring.write([frame_id, extended, len(data), *_BYTES.unpack(data.ljust(_BYTES.size, b"\0"))])
-        return True
 
     def receive(self) -> list[can.Message]:
         """Nothing: the far end listens to nobody."""

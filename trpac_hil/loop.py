@@ -41,7 +41,7 @@ class Bus(Protocol):
 
     def receive(self) -> list[can.Message]: ...  # noqa: D102
 
-    def send(self, frame_id: int, extended: bool, data: bytes) -> bool: ...  # noqa: D102
+    def send(self, frame_id: int, extended: bool, data: bytes) -> None: ...  # noqa: D102
 
     def check(self) -> None: ...  # noqa: D102
 

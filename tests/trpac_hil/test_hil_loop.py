@@ -139,6 +139,7 @@ def test_before_the_first_messages_it_is_starting_and_holds() -> None:
     counts = bench.run(20)
     assert bench.sent("Status")[:20] == [STARTING] * 10 + [RUNNING] * 10
     assert counts.lost == {}
+    assert bench.told == [], "what comes for the first time is not back"
 
 
 def test_a_lost_bus_holds_and_a_recovered_one_goes_on() -> None:
@@ -161,6 +162,7 @@ def test_a_step_that_the_unit_discards_is_held_said_once_and_made_up_for() -> No
     assert bench.sent("Status")[:10] == [RUNNING] * 4 + [HELD_UNIT] * 2 + [RUNNING] * 4
     assert bench.sent("Flag")[4:6] == [0.0, 0.0]
     assert bench.unit.steps[4][1] == pytest.approx(3e-3)
+    assert bench.table["step_s"] == pytest.approx([1e-3] * 4 + [0.0] * 2 + [3e-3] + [1e-3] * 3)
     assert sum(step for _, step, _ in bench.unit.steps) == pytest.approx(0.010)
     assert counts.discarded == 2
     assert len([text for text in bench.told if "discarded" in text]) == 1

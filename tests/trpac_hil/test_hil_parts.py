@@ -8,6 +8,7 @@ import re
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import can
 import hil_bodies
@@ -23,6 +24,7 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
+from trpac_hil import helper
 from trpac_hil.bus import BusSettings, Link, bus_options
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, OUTPUT_MESSAGES, load_codec
 from trpac_hil.dbc_table import TARGET, document
@@ -30,6 +32,7 @@ from trpac_hil.deadlines import Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
 from trpac_hil.ferry import Ferry, Wire, ferry_ring
+from trpac_hil.figures import SPREADS, Figures
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
 from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
@@ -116,6 +119,22 @@ def test_a_dbc_file_without_ranges_leaves_what_the_bits_can_hold(tmp_path: Path)
         for signal, (low, high) in coded.bounds.items():
             stated = CODEC[name].bounds[signal]
             assert low <= stated[0] <= stated[1] <= high
+
+
+def test_a_message_without_a_counter_is_new_each_time(tmp_path: Path) -> None:
+    uncounted = tmp_path / "uncounted.dbc"
+    text = DBC_FILE.read_text(encoding="utf-8")
+    uncounted.write_text(
+        re.sub(r"^ SG_ WheelSpeeds_?Counter .*\n", "", text, flags=re.MULTILINE), encoding="utf-8"
+    )
+    codec = load_codec(uncounted)
+    coded = codec["WheelSpeeds"]
+    assert not coded.counter
+    data = coded.encode(dict.fromkeys(coded.signals, 50.0), 3)
+    assert coded.decode(data)[1] == -1
+    inputs = Inputs(codec, INPUT_MESSAGES, unsaid)
+    assert [inputs.take(256, False, data, at) for at in (0, 20 * MS, 40 * MS)] == ["WheelSpeeds"] * 3
+    assert inputs.heard["WheelSpeeds"].lost == 0
 
 
 # Time
@@ -274,12 +293,27 @@ def test_while_pictures_fail_nothing_is_known_and_after_a_good_one_it_is_again()
 
 def test_the_place_between_two_looks_is_interpolated() -> None:
     odometer = Odometer()
-    odometer.drive(0, 0.0, 0.0)
-    odometer.drive(10 * MS, 10.0, 0.01)
-    assert odometer.at(5 * MS) == pytest.approx(0.05)
-    odometer.drive(20 * MS, math.nan, 0.01)
+    odometer.drive(70 * MS, 0.0, 0.0)
+    odometer.drive(80 * MS, 10.0, 0.01)
+    assert odometer.at(74 * MS) == pytest.approx(0.04)
+    odometer.drive(90 * MS, math.nan, 0.01)
     assert odometer.position_m == pytest.approx(0.2), "without a speed the last one counts"
-    assert odometer.at(-1) is None
+    assert [odometer.at(at * MS) for at in (70, 80, 85, 90, 99)] == pytest.approx([0.0, 0.1, 0.15, 0.2, 0.2])
+    assert odometer.at(70 * MS - 1) is None
+
+
+@pytest.mark.parametrize(("silent_s", "believed"), [(0.9, True), (1.1, False)])
+def test_after_a_camera_was_lost_what_it_said_before_no_longer_counts(silent_s: float, believed: bool) -> None:
+    odometer, places = Odometer(), placing()
+    first_ns = driven(1.0, 1.0, odometer)
+    first_m = odometer.position_m
+    places.take(result(1, first_ns, first_ns, Surface.WET), odometer, 1000 * MS)
+    now_ns = driven(1.0, silent_s, odometer, first_ns)
+    places.take(result(2, now_ns, now_ns, Surface.DRY), odometer, 1000 * MS)
+    assert (places.known(0, first_m + 3.0) is not None) == believed
+    ahead = places.known(0, odometer.position_m + 3.0)
+    assert ahead is not None
+    assert ahead.surface is Surface.DRY
 
 
 # Bus
@@ -329,7 +363,7 @@ def test_a_bus_that_raises_is_lost_said_once_and_opened_again(error: Exception) 
     assert link.receive() == []
     assert not link.up
     assert link.losses == 1
-    assert link.send(1, False, b"") is False
+    link.send(1, False, b"")
     until_back(link)
     assert link.up
     assert buses[0].shut
@@ -347,7 +381,7 @@ def test_a_full_transmit_buffer_is_no_lost_bus() -> None:
     bus = RaisingBus()
     link = Link(lambda: bus, unsaid)
     bus.failing = can.CanOperationError("Transmit buffer full")
-    assert link.send(1, False, b"") is False
+    link.send(1, False, b"")
     assert link.up
     assert link.unsent == 1
 
@@ -392,7 +426,7 @@ def test_what_goes_into_the_wire_comes_out_of_the_bus_in_order(
     settings, ring = BusSettings("virtual", "test-ferry"), ferry_ring()
     wire, link, listener = Wire(ring), Link(settings.open, unsaid), settings.open()
     for message in sent:
-        assert wire.send(*message)
+        wire.send(*message)
     assert wire.receive() == []
     Ferry(ring, link, FakeClock()).take_over()
     heard = []
@@ -443,6 +477,24 @@ def test_quantiles_are_right_to_half_a_per_cent_and_the_greatest_is_exact() -> N
     assert Spread().summary() is None
 
 
+def test_figures_are_those_of_all_rows_and_the_newest_one_counts() -> None:
+    kinds = columns(Wiring.of_one("fl"))
+    places = {column.name: place for place, column in enumerate(kinds)}
+    rows = np.random.default_rng(2).uniform(1.0, 9.0, (900, len(kinds)))
+    figures = Figures(kinds)
+    assert math.isnan(figures.now("TRPAC"))
+    for part in (rows[:0], rows[:400], rows[400:]):
+        figures.add(part)
+    for name, column in SPREADS.items():
+        assert figures.summary()[name]["max"] == pytest.approx(rows[:, places[column]].max(), rel=1e-3)
+        assert figures.summary()[name]["median"] == pytest.approx(
+            np.median(rows[:, places[column]]), rel=0.01
+        )
+    assert figures.rows == 900
+    assert figures.now("TRPAC") == rows[-1, places["TRPAC"]]
+    assert math.isnan(figures.now("no such column"))
+
+
 def test_events_are_said_once_and_counted_always() -> None:
     told: list[tuple[float, str]] = []
     events = Events(lambda time_s, text: told.append((time_s, text)), lambda: 1.5)
@@ -460,6 +512,7 @@ def test_the_log_appears_whole_and_nothing_else_is_left(tmp_path: Path) -> None:
     log.add(rows[:2])
     log.add(rows[2:])
     assert not (tmp_path / "log.mf4").exists()
+    assert log.rows == 6
     log.finish()
     assert [p.name for p in tmp_path.iterdir()] == ["log.mf4"]
     with MDF(tmp_path / "log.mf4") as mdf:
@@ -478,6 +531,25 @@ def test_priority_and_cores_are_given_back():
         assert os.sched_getaffinity(0) == {min(cores)}
     assert os.sched_getaffinity(0) == cores
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
+
+
+def test_a_process_beside_the_loop_is_over_when_it_is_told_so_or_its_parent_is_gone(monkeypatch):
+    now_s, alive, looks = [100.0], [True], []
+    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
+    parent = SimpleNamespace(is_alive=lambda: looks.append(now_s[0]) or alive[0])
+    monkeypatch.setattr(helper, "parent_process", lambda: parent)
+    control = helper.Control("camera")
+    assert [control.stopped for _ in range(5)] == [False] * 5
+    assert len(looks) == 1, "a look at the parent each second is enough"
+    alive[0] = False
+    now_s[0] += 1.5 * helper.PARENT_EVERY_S
+    assert control.stopped
+    monkeypatch.setattr(helper, "parent_process", lambda: None)
+    now_s[0] += 1.5 * helper.PARENT_EVERY_S
+    assert not control.stopped, "the loop's own process has no parent to lose"
+    control.stop()
+    assert control.stopped
+    assert not control.wait_for_start()
 
 
 def test_a_helper_that_does_not_stop_is_ended():
