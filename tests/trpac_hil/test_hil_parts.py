@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import math
 import os
 import re
+import signal as signals
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -38,9 +42,9 @@ from trpac_hil.mdf import MdfLog
 from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
 from trpac_hil.plant_node import PLAIN_SCENARIO, Partner, PartnerJob
 from trpac_hil.quantile_sketch import Spread
-from trpac_hil.realtime import as_before, loop_core, pin
+from trpac_hil.realtime import as_before, loop_core, pin, undisturbed
 from trpac_hil.records import columns
-from trpac_hil.rig import Rig, _vision
+from trpac_hil.rig import Rig, Stopper, _vision
 from trpac_hil.settings import HilSettings
 from trpac_hil.shared import Ring
 from trpac_hil.unit import Wiring
@@ -303,7 +307,9 @@ def test_the_place_between_two_looks_is_interpolated() -> None:
 
 
 @pytest.mark.parametrize(("silent_s", "believed"), [(0.9, True), (1.1, False)])
-def test_after_a_camera_was_lost_what_it_said_before_no_longer_counts(silent_s: float, believed: bool) -> None:
+def test_after_a_camera_was_lost_what_it_said_before_no_longer_counts(
+    silent_s: float, believed: bool
+) -> None:
     odometer, places = Odometer(), placing()
     first_ns = driven(1.0, 1.0, odometer)
     first_m = odometer.position_m
@@ -550,6 +556,34 @@ def test_a_process_beside_the_loop_is_over_when_it_is_told_so_or_its_parent_is_g
     control.stop()
     assert control.stopped
     assert not control.wait_for_start()
+
+
+@pytest.mark.parametrize("number", [signals.SIGINT, signals.SIGTERM])
+def test_a_signal_stops_the_loop_not_the_program_and_means_what_it_meant_afterwards(number):
+    before, stopper = signals.getsignal(number), Stopper()
+    with stopper.by_signal():
+        assert stopper() is False
+        signals.raise_signal(number)
+        assert stopper() is True
+    assert signals.getsignal(number) is before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="timer slack is Linux's")
+def test_undisturbed_the_garbage_collector_rests_and_sleeps_end_on_time_and_then_all_is_as_before():
+    timer_slack = ctypes.CDLL(None).prctl
+    gc.enable()
+    interval_s = sys.getswitchinterval()
+    with undisturbed():
+        assert not gc.isenabled()
+        assert sys.getswitchinterval() == pytest.approx(2e-4)
+        assert timer_slack(30, 0, 0, 0, 0) == 1000, "PR_GET_TIMERSLACK [ns]"
+    assert gc.isenabled()
+    assert sys.getswitchinterval() == interval_s
+    gc.disable()
+    with undisturbed():
+        pass
+    assert not gc.isenabled(), "what was off stays off"
+    gc.enable()
 
 
 def test_a_helper_that_does_not_stop_is_ended():

@@ -80,6 +80,7 @@ class Bench:
         for line in record.read_text(encoding="utf-8").splitlines():
             test, file, number = line.split("\t")
             ran[test].add((file, int(number)))
+        self._at_load = ran.pop("", set())
         self._by_line: defaultdict[str, defaultdict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
         for test in self.took:
             for one in (test, *found["fixtures"][test]):
@@ -89,11 +90,11 @@ class Bench:
     def tests_of(self, mutant: Mutant) -> list[str]:
         """The tests that run a mutant's place, those first that found others near it, then the quick ones."""
         place = mutant.place
-        if place.compiled or place.loaded:
-            tests = self._beside(place.file)
-        else:
-            ran = self._by_line[place.file]
-            tests = set().union(*(ran[n] for n in range(place.lines[0], place.lines[1] + 1)))
+        lines = range(place.lines[0], place.lines[1] + 1)
+        tests = set().union(*(self._by_line[place.file][n] for n in lines))
+        if place.compiled or place.loaded or any((place.file, n) in self._at_load for n in lines):
+            tests |= self._beside(place.file)
+        tests = tests or self._naming(place.file)  # as where an isolated interpreter runs it
         killers = self._killers[f"{place.file} {place.function}"][::-1] + self._killers[place.file][::-1]
         likely = list(dict.fromkeys(t for t in killers if t in tests))
         ordered = likely + sorted(tests - set(likely), key=lambda t: (self.took[t], t))
@@ -106,16 +107,16 @@ class Bench:
         return enough
 
     def _beside(self, file: str) -> set[str]:
-        """The tests that may depend on what is compiled in a file or done as it is loaded, where no test is seen.
-
-        They run other code of its folder, or are in a test file that names the module.
-        """
-        folder, _, name = file.removesuffix(".py").rpartition("/")
-        files = {test: test.partition("::")[0] for test in self.took}
-        naming = {f for f in set(files.values()) if name in (self.copy / f).read_text(encoding="utf-8")}
-        beside = [f for f in self._by_line if f.startswith(folder)]
+        """The tests that may depend on what is compiled in a file or done as it is loaded, where no test is seen."""
+        beside = [f for f in self._by_line if f.startswith(file.rpartition("/")[0])]
         found = {test for f in beside for tests in self._by_line[f].values() for test in tests}
-        return found | {test for test, f in files.items() if f in naming}
+        return found | self._naming(file)
+
+    def _naming(self, file: str) -> set[str]:
+        """The tests in files that name this one."""
+        files = {test: self.copy / test.partition("::")[0] for test in self.took}
+        naming = {f for f in set(files.values()) if Path(file).stem in f.read_text(encoding="utf-8")}
+        return {test for test, f in files.items() if f in naming}
 
     # Mutants
 
