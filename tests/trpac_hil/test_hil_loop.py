@@ -229,6 +229,7 @@ def test_a_camera_that_falls_silent_is_lost_and_one_that_sees_nothing_is_believe
     bench.bus.messages = lambda cycle: driving(1.0) | (road(0.0, cycle) if cycle == 100 else {})
     bench.run(1500)
     assert bench.sight.losses == 1
+    assert [text for text in bench.told if text.startswith("No result of a picture for ")]
     assert bench.table["age_picture_ms"][-1] != bench.table["age_picture_ms"][-1]
     blind = Bench()
     blind.bus.messages = lambda cycle: (
@@ -238,6 +239,16 @@ def test_a_camera_that_falls_silent_is_lost_and_one_that_sees_nothing_is_believe
     called, classes, _ = blind.unit.classes[-1]
     assert called == 400
     assert classes == [(int(Surface.WET), 0.0)]
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1.0])
+def test_a_confidence_at_either_end_is_no_failed_picture(confidence: float) -> None:
+    bench = Bench()
+    said = road(0.0, 7)
+    said["RoadClass"]["RoadClassConfidence_Left"] = confidence
+    bench.bus.messages = lambda cycle: driving() | (said if cycle == 50 else {})
+    bench.run(60)
+    assert (bench.placing.counts.results, bench.placing.counts.failed) == (1, 0)
 
 
 def test_of_four_wheels_one_without_its_signals_holds_alone_and_each_has_its_own_estimate_on_the_bus() -> (

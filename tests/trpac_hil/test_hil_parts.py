@@ -30,6 +30,7 @@ from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil import helper
 from trpac_hil.bus import BusSettings, Link, bus_options
+from trpac_hil.camera import FAILED, MOTION, result_columns
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, OUTPUT_MESSAGES, load_codec
 from trpac_hil.dbc_table import TARGET, document
 from trpac_hil.deadlines import Deadlines, SystemClock, WallWatch, wait_until
@@ -46,8 +47,9 @@ from trpac_hil.realtime import as_before, loop_core, pin, undisturbed
 from trpac_hil.records import columns
 from trpac_hil.rig import Rig, Stopper, _vision
 from trpac_hil.settings import HilSettings
-from trpac_hil.shared import Ring
-from trpac_hil.unit import Wiring
+from trpac_hil.shared import Numbers, Ring
+from trpac_hil.sight import Sight
+from trpac_hil.unit import NO_CLASS, Wiring
 
 CODEC = load_codec()
 
@@ -293,6 +295,28 @@ def test_while_pictures_fail_nothing_is_known_and_after_a_good_one_it_is_again()
     places.take(result(3, now_ns + 1, now_ns + 1, Surface.DRY), odometer, 1000 * MS)
     assert places.known(0, odometer.position_m) is not None
     assert places.counts.failed == 1
+
+
+def test_results_of_the_cameras_process_come_with_its_work_and_what_it_left_out() -> None:
+    results, motion = Ring(result_columns(2), 8), Numbers(len(MOTION))
+    sight = Sight(
+        Placing(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, 2), 1000 * MS, ("left", "right"), results, motion
+    )
+    odometer, heard = Odometer(), Inputs(CODEC, INPUT_MESSAGES, unsaid).heard["RoadClass"]
+    captured_ns = driven(20.0, 1.0, odometer)
+    sight.share_motion(odometer, {"AccelX": math.nan, "SteeringAngle": 1.6, "YawRate": 0.2})
+    assert motion.get() == pytest.approx([20.0, 0.0, 0.0, 0.2, 20.0])
+    sight.share_motion(odometer, {"AccelX": 1.5, "SteeringAngle": -0.1, "YawRate": 0.2})
+    assert motion.get()[1:3] == pytest.approx([1.5, -0.1])
+    assert not sight.news(heard, False, False, odometer, captured_ns, unsaid)
+    results.write([4, captured_ns, captured_ns, 2, 17.5, FAILED, 0.0, 1.0, 0.8])
+    results.write([5, captured_ns + 1, captured_ns, 3, 18.5, FAILED, 0.0, 1.0, 0.9])
+    now_ns = driven(20.0, 0.14, odometer, captured_ns)
+    assert sight.news(heard, False, False, odometer, now_ns, unsaid)
+    assert sight.classes == [(NO_CLASS, 0.0), (int(Surface.WET), 0.9)]
+    assert (sight.left_out, sight.work_ms, sight.number) == (3, [17.5, 18.5], 1)
+    assert sight.picture_age_ms(now_ns) == pytest.approx(140.0)
+    assert sight.age_under_wheel_ms(now_ns) == pytest.approx(140.0, abs=1e-3)
 
 
 def test_the_place_between_two_looks_is_interpolated() -> None:

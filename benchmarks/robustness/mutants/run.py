@@ -188,7 +188,7 @@ class Bench:
         process = os.fork()
         if process == 0:
             self._become(tests, told, caches, stop, compiled)
-        code = _wait(process, 4.0 * self._hangs_s if stop else math.inf)
+        code = _wait(process, 2.0 * self._hangs_s if stop else math.inf)
         with suppress(ProcessLookupError):
             os.killpg(process, signal.SIGKILL)
         return code, told.read_text(encoding="utf-8").splitlines(), round(time.monotonic() - started, 1)
