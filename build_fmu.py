@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 import sys
 import time
 from pathlib import Path
 
 from fmu_src.build_command import EPILOG, Product, run_build
 
-SMOKE_STEPS = 100
-SMOKE_STEP_S = 0.001
+SMOKE_STEPS, SMOKE_STEP_S = 100, 0.001
+"""Steps of the smoke run, and their length [s]."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -52,37 +51,19 @@ def validate(path: Path) -> list[str]:
 
 def smoke_run(path: Path) -> str:
     """Instantiate the unit and step it with rolling wheels; returns how many steps, and the mean time of one."""
-    from fmpy import read_model_description
-    from fmpy.fmi2 import FMU2Slave
-
     from fmu_src.trial import rolling
-    from scenarios.fmu_client.unpacking import unpack_unit
+    from scenarios.fmu_client.opening import opened
 
-    description = read_model_description(str(path))
-    folder = unpack_unit(path)
-    try:
-        unit = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="smoke",
-        )
-        unit.instantiate(loggingOn=True)
-        unit.setupExperiment(startTime=0.0)
-        unit.enterInitializationMode()
-        unit.exitInitializationMode()
-        for variable in description.modelVariables:
+    with opened(path, path.stem.removesuffix("_flat"), {}) as unit:
+        for variable in unit.variables:
             value = rolling(variable.name) if variable.causality == "input" else None
             if value is not None:
-                unit.setReal([variable.valueReference], [value])
+                unit.set({variable.name: value})
         started = time.perf_counter()
         for step in range(SMOKE_STEPS):
-            unit.doStep(step * SMOKE_STEP_S, SMOKE_STEP_S)
+            unit.slave.doStep(step * SMOKE_STEP_S, SMOKE_STEP_S)
         elapsed = time.perf_counter() - started
-        unit.terminate()
-        unit.freeInstance()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        unit.slave.terminate()
     return f"{SMOKE_STEPS} steps, {elapsed / SMOKE_STEPS * 1e6:.0f} us each"
 
 

@@ -1,4 +1,4 @@
-"""What `build_fmu.py` and `build_ssp.py` do alike: build a file, validate it, run it, print its path and SHA-256."""
+"""The common part of `build_fmu.py` and `build_ssp.py`: build a file, validate it, run it, print path and SHA-256."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ EPILOG = "Exit codes: 0 done, 2 usage, 3 build, 4 validation, 5 run."
 
 @dataclass(frozen=True)
 class Product:
-    """What a build program makes.
+    """A kind of file that a build program makes.
 
     Parameters
     ----------
     noun : str
-        What it is called: unit, package.
+        Its noun in messages: unit, package.
     kind, known : str, collection of str
-        What its names are called, and the names that there are.
+        The noun of its names, and the known names.
     build : callable
-        Builds the one of a name; returns its path; raises BuildError or OSError.
+        Builds the file of a name; returns its path; raises BuildError or OSError.
     validate : callable
-        Problems of a built file.
+        Returns the problems of a built file.
     valid : str
-        What to say where there are none.
+        Message where there are none.
     run : callable
-        Runs a built file a little; returns how much, as a phrase.
+        Takes some steps with a built file; returns their number and time as a phrase.
     """
 
     noun: str
@@ -43,19 +43,9 @@ class Product:
 
 
 def run_build(program: str, load: Callable[[], Product], name: str) -> int:
-    """Build the one of this name and say what was done; returns the exit code.
+    """Build the file of this name and print the outcome; returns the exit code."""
 
-    Parameters
-    ----------
-    program : str
-        The file that the user runs, for messages.
-    load : callable
-        Imports what the build needs; raises ImportError under another interpreter than the project's.
-    name : str
-        What to build.
-    """
-
-    def say(text: str) -> None:
+    def complain(text: str) -> None:
         print(f"{program}: {text}", file=sys.stderr)
 
     try:
@@ -64,27 +54,27 @@ def run_build(program: str, load: Callable[[], Product], name: str) -> int:
 
         from .packaging import BuildError
     except ImportError as error:
-        say(f"{error}. Run it with the project's interpreter: .venv/bin/python {program}")
+        complain(f"{error}. Run it with the project's interpreter: .venv/bin/python {program}")
         return EXIT_BUILD
     if name not in product.known:
-        say(f"'{name}' is not a {product.kind}. Known: {', '.join(sorted(product.known))}.")
+        complain(f"'{name}' is not a {product.kind}. Known: {', '.join(sorted(product.known))}.")
         return EXIT_USAGE
     started = time.perf_counter()
     try:
         path = product.build(name)
     except (BuildError, OSError) as error:
-        say(str(error))
+        complain(str(error))
         return EXIT_BUILD
     print(f"built      {path.stat().st_size / 1e6:.2f} MB in {time.perf_counter() - started:.1f} s")
     problems = product.validate(path)
     if problems:
-        say("\n".join([f"the {product.noun} does not validate:", *problems]))
+        complain("\n".join([f"the {product.noun} does not validate:", *problems]))
         return EXIT_INVALID
     print(f"validated  {product.valid}")
     try:
         done = product.run(path)
     except Exception as error:  # noqa: BLE001 - fmpy raises bare Exceptions; the exit code tells that the run failed
-        say(f"the {product.noun} does not run: {error}")
+        complain(f"the {product.noun} does not run: {error}")
         return EXIT_RUN
     print(f"ran        {done}")
     print(f"{product.noun:<10} {path}")

@@ -1,4 +1,4 @@
-"""What the estimators' units have in common: networks, frames, optional inputs, the estimator's state."""
+"""The common part of the estimators' units: networks, frames, optional inputs, the estimator's state."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
 
@@ -23,38 +23,19 @@ SEGMENTER_FILE = "segmenter.onnx"
 CLASSIFIER_FILE = "surface.onnx"
 
 
-class Estimator(Protocol):
-    """What a unit's step needs of the estimator that it wraps."""
-
-    @property
-    def last(self) -> Any:
-        """The estimate of the step before."""
-
-    def step(self, step_s: float, sensors: Any, frame: Any = None, *, frame_failed: bool = False) -> Any:
-        """One step."""
-
-    def state(self) -> Mapping[str, Any]:
-        """All that is remembered."""
-
-    def restore(self, data: Mapping[str, Any]) -> None:
-        """Go back to what `state` gave."""
-
-
 class CameraSlave(GuardedSlave):
-    """Sensors and camera frames into an estimator, its estimate out.
+    """A unit with sensors and camera frames as inputs and an estimate as output.
 
     A unit gives `bus` and `views` and overrides `build`, `sensors`, `shown` and `problems`.
     """
 
     bus: ClassVar[tuple[BusClass, ...]]
-    """Inputs in which a surface class may come by bus."""
+    """Inputs for surface classes by bus."""
     _networks: ClassVar[tuple[Segmenter, SurfaceClassifier] | None] = None
 
     @abstractmethod
-    def build(
-        self, values: Mapping[str, Any], networks: tuple[Segmenter, SurfaceClassifier] | None
-    ) -> Estimator:
-        """The estimator under these parameters; ValueError where they cannot be applied."""
+    def build(self, values: Mapping[str, Any], networks: tuple[Segmenter, SurfaceClassifier] | None) -> Any:
+        """The estimator, TrpacEstimator or FourWheels; ValueError where the parameters cannot be applied."""
 
     @abstractmethod
     def sensors(self) -> Any:
@@ -62,13 +43,13 @@ class CameraSlave(GuardedSlave):
 
     @abstractmethod
     def problems(self, estimate: Any) -> Iterable[tuple[str, str]]:
-        """Unusable readings: what distinguishes one from another in the log, and a sentence."""
+        """Unusable readings: a key that separates them in the log, and a sentence."""
 
     def prepare(self) -> None:
-        """Load the networks, once per process; raises ContentError where they are not those of the build, ModelError.
+        """Load the networks, once per process; raises ModelError, and ContentError for networks of another build.
 
-        In the unit this module's name holds the hash of all that the unit carries, networks included:
-        those of another unit cannot be meant.
+        In the unit the name of this module holds the hash of its whole content, so that units of other builds have
+        networks of their own.
         """
         if CameraSlave._networks is None:
             folder = Path(str(self.resources))
@@ -85,10 +66,10 @@ class CameraSlave(GuardedSlave):
         self._frame = FrameState()
 
     def step(self, step_s: float) -> None:
-        """Hand sensors and a new frame to the estimator, whose last estimate the outputs show."""
+        """Step the estimator with the sensors and a new frame; the outputs show its last estimate."""
         sensors = self.sensors()
         if not self.values[BUFFERS_ENABLED] and in_memory(self.values):
-            self._tell_buffers_off()
+            self._report_buffers_off()
         try:
             self._frame, frame, problem = next_frame(self._frame, self.values, self.bus)
         finally:
@@ -103,11 +84,11 @@ class CameraSlave(GuardedSlave):
             sort = "class" if self._frame.source == BUS else "picture"
             self.report(f"frame {sort}", Fmi2Status.warning, f"{self.modelName}: {problem}")
         for kind, text in self.problems(estimate):
-            # A problem begins with what it is about, "wheel_speed_rad_s is ...", and so does each of several.
+            # Each problem begins with the name of a reading, such as "wheel_speed_rad_s is ...".
             about = [part.partition(" is ")[0] for part in text.split("; ")]
             self.report(f"sensors {kind} {about}", Fmi2Status.warning, f"{self.modelName}: {text}")
 
-    def _tell_buffers_off(self) -> None:
+    def _report_buffers_off(self) -> None:
         text = (
             f"the inputs image.* point to a picture in memory, which is not read: the parameter {BUFFERS_ENABLED} is "
             "false. Set it to true before the initialisation ends, or give pictures by image_path."
@@ -115,7 +96,7 @@ class CameraSlave(GuardedSlave):
         self.report("buffers off", Fmi2Status.warning, f"{self.modelName}: {text}")
 
     def optional(self, name: str) -> float | None:
-        """An input that counts as connected from its first value that is a number other than 0; None before."""
+        """An input that is connected from its first finite value other than 0; None before."""
         value: float = self.values[name]
         if not math.isfinite(value):
             return value
@@ -132,7 +113,7 @@ class CameraSlave(GuardedSlave):
         }
 
     def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
-        """Take back what `inner_state` gave under these variable values."""
+        """Restore what `inner_state` returned under these variable values."""
         frame = FrameState(**state["frame"])
         estimator = self.build(values, self._networks)
         estimator.restore(state["estimator"])

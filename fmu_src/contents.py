@@ -1,4 +1,4 @@
-"""What a unit's archive held when it was built, and what differs from it now."""
+"""The record of a unit's files at its build, and the differences from it."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from pathlib import Path
 from trpac_core.files import FileError, file_sha256, parse_json, quoted, read_bytes
 
 CONTENTS_FILE = "contents.json"
-"""The record, among the unit's resources; it lists every file of the archive but itself."""
+"""File of the record, among the unit's resources; it lists every other file of the archive."""
 SCHEMA = 1
 SHOWN_DIGITS = 12
+"""Digits of a hash in messages."""
 MOST_RECORD_BYTES = 4_000_000
-"""Size of the record of a build; those of this project's units have 10 kB [bytes]."""
+"""Largest record that is read; those of this project's units have 10 kB [bytes]."""
 
 
 class ContentError(ValueError):
-    """A file of the unit is not the one that was built; the text names it and what to do."""
+    """A file of the unit differs from the build; the text names it and what to do."""
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What was built.
+    """The record of a build.
 
     Parameters
     ----------
@@ -71,17 +72,7 @@ def sha256_of(data: bytes) -> str:
 
 
 def deviations(contents: Contents, names: Iterable[str], sha256: Callable[[str], str]) -> list[str]:
-    """One sentence for each of the named files that is missing or is not the one that was built.
-
-    Parameters
-    ----------
-    contents : Contents
-        The record.
-    names : iterable of str
-        Paths in the archive.
-    sha256 : callable
-        Gives the hash of what lies at such a path now; FileError or KeyError where nothing can be read.
-    """
+    """One sentence for each named file that differs from the build, or where `sha256` raises FileError or KeyError."""
     problems = []
     for name in names:
         try:
@@ -101,7 +92,7 @@ def deviations(contents: Contents, names: Iterable[str], sha256: Callable[[str],
 
 
 def require_as_built(resources: Path, names: Iterable[str]) -> None:
-    """Raise one ContentError that names all of these resources that are not what was built into the unit."""
+    """Raise one ContentError that names all of these resources that differ from the build."""
     try:
         data = read_bytes(resources / CONTENTS_FILE, MOST_RECORD_BYTES, "the unit's record of its build")
     except FileError as error:

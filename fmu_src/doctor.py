@@ -1,4 +1,4 @@
-"""What is wrong with a unit's file, or with the Python that shall run it, found out without risk to the caller."""
+"""Examination of a unit's file and of the Python that runs it; the unit's code runs in a child process."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from inspect import getsource
 from pathlib import Path
 from typing import Any
 
@@ -19,41 +20,43 @@ from trpac_core.files import parse_json, quoted
 
 from .contents import CONTENTS_FILE, ContentError, Contents, deviations, read_contents
 from .host import LEAST_PYTHON
+from .trial import end_with_parent
 from .units import UNITS
 
 RECORD = f"resources/{CONTENTS_FILE}"
 DESCRIPTION = "modelDescription.xml"
 KNOWN_PACKAGES = {module: package for slave in UNITS.values() for module, package in slave.packages.items()}
-"""What units of this project may need, and what brings it: nothing else that a file names is imported."""
+"""Modules that units of this project need, and their packages; no other module that a file names is imported."""
 PROBE_LIMIT_S, TRIAL_LIMIT_S = 60.0, 300.0
-"""How long the interpreter may take to import the packages, and the unit to start: the plant compiles first [s]."""
+"""Longest time to import the packages, and to start the unit, where the plant compiles first [s]."""
 MOST_NAMED, LONGEST_PROBLEM = 5, 400
-"""Problems of one kind that a finding names; the rest are counted. Characters of one: two hashes and a quoted name."""
+"""Problems of one kind that a finding names, and characters of one; further problems are counted."""
 TESTED_PYTHON = (3, 11)
 ISOLATED = ("-I",)
-"""No folder of the caller's, no PYTHONPATH and no packages of the user's own are imported from: it includes -P, which
-Pythons before 3.11 do not know."""
-MISSAID = (ValueError, IndexError, KeyError, TypeError, AttributeError)
-"""What an answer of a side process may end in that is none."""
+"""Python's isolated mode: without the current folder, PYTHONPATH and the user's own packages. It includes -P, which
+Pythons before 3.11 do not have."""
+UNREADABLE_ANSWER = (ValueError, IndexError, KeyError, TypeError, AttributeError)
+"""Exceptions where the answer of a child process cannot be read."""
 
-PROBE = """
+PROBE = f"""
 import ctypes, importlib, json, sys, sysconfig
-if sys.platform.startswith("linux"):
-    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG, SIGKILL
-packages = {}
+{getsource(end_with_parent)}
+end_with_parent()
+packages = {{}}
 for module in sys.argv[1:]:
     try:
         packages[module] = [True, str(getattr(importlib.import_module(module), "__version__", ""))]
     except Exception as error:
         packages[module] = [False, str(error)]
 library = "%s/%s" % (sysconfig.get_config_var("LIBDIR"), sysconfig.get_config_var("INSTSONAME"))
-print(json.dumps({"executable": sys.executable, "version": list(sys.version_info[:3]), "prefix": sys.prefix,
-                  "libpython": library, "packages": packages}))
+print(json.dumps({{"executable": sys.executable, "version": list(sys.version_info[:3]), "prefix": sys.prefix,
+                  "libpython": library, "packages": packages}}))
 """
+"""Program of the child process: prints the interpreter, and which of the modules in its arguments it can import."""
 
 
 class State(Enum):
-    """What a finding means."""
+    """Severity of a finding."""
 
     OK = "ok"
     NOTE = "note"
@@ -62,7 +65,7 @@ class State(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: what it is, how it is, and what to do about it."""
+    """A result of the examination: subject, state, text and remedy."""
 
     what: str
     state: State
@@ -72,7 +75,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Python:
-    """The interpreter that shall run the unit."""
+    """The interpreter that runs the unit."""
 
     command: str
     version: tuple[int, ...] = ()
@@ -83,7 +86,7 @@ class Python:
 
 @dataclass(frozen=True)
 class Examination:
-    """All findings on a unit, in the order in which they were made."""
+    """All findings on a unit, in their order."""
 
     unit: str
     findings: tuple[Finding, ...]
@@ -98,34 +101,34 @@ class Examination:
 
 
 class UnusableError(ValueError):
-    """What was given is no unit, or no Python; the text says what was expected."""
+    """The file is no unit, or the command no Python; the text says what was expected."""
 
 
 def examine(
     path: Path,
     python: str = sys.executable,
     run: bool = True,
-    tell: Callable[[str], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> Examination:
-    """Look at a unit's file and try it out in a child process, which runs the unit's own code.
+    """Findings on a unit's file, and on a trial in a child process, which runs the unit's own code.
 
     Parameters
     ----------
     path : Path
         The unit's archive.
     python : str
-        The interpreter that shall run it.
+        The interpreter that runs it.
     run : bool
-        Whether it is tried out; its code is not run otherwise.
-    tell : callable
-        Is given a sentence before the unit's code is run.
+        Whether to make the trial; without it the unit's code is not run.
+    notify : callable
+        Called with a sentence before the unit's code is run.
 
     Raises
     ------
     UnusableError
         If the file is not an FMU, or the interpreter cannot be started.
     """
-    contents, (*of_file, described) = look_at_file(path)
+    contents, (*of_file, described) = examine_file(path)
     findings = [*of_file, described]
     named = set(contents.packages) if contents else set()
     if unknown := sorted(named - set(KNOWN_PACKAGES)):
@@ -139,7 +142,7 @@ def examine(
     findings += _python(probed, modules if contents else None)
     intact = all(finding.state is not State.PROBLEM for finding in of_file)
     if intact and run:
-        tell(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
+        notify(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
         findings.append(_trial(path, python))
     else:
         why = "the file is not what was built" if run else "as it was asked for"
@@ -148,8 +151,8 @@ def examine(
     return Examination(quoted(name), tuple(findings), probed, intact and run)
 
 
-def look_at_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
-    """The record of the build, if it can be read, and findings on archive, contents and description.
+def examine_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
+    """The record of the build, None where it cannot be read, and findings on archive, contents and description.
 
     Raises
     ------
@@ -180,7 +183,7 @@ def _archive(archive: Archive) -> Finding:
 
 
 def _contents(archive: Archive) -> tuple[Contents | None, Finding]:
-    """The record of the build, and whether the files are those of the record: networks first."""
+    """The record of the build, and the finding on whether the files are those of the record, networks first."""
     names = archive.names
     if RECORD not in names:
         text = f"no {RECORD}: another tool's unit, or one of an older version; nothing to compare with"
@@ -229,15 +232,19 @@ def _run(command: list[str], limit_s: float) -> subprocess.CompletedProcess[str]
 
 
 def _probe(python: str, modules: list[str]) -> Python:
-    """What the interpreter is and can import; raises UnusableError if it cannot be started."""
+    """Version, paths and importable modules of the interpreter; raises UnusableError if it cannot be started."""
     try:
         done = _run([python, *ISOLATED, "-c", PROBE, *modules], PROBE_LIMIT_S)
-        said = parse_json(done.stdout.splitlines()[-1], "its answer")
-        packages = {module: (bool(good), quoted(text)) for module, (good, text) in said["packages"].items()}
+        answer = parse_json(done.stdout.splitlines()[-1], "its answer")
+        packages = {module: (bool(good), quoted(text)) for module, (good, text) in answer["packages"].items()}
         return Python(
-            said["executable"] or python, tuple(said["version"]), said["prefix"], said["libpython"], packages
+            answer["executable"] or python,
+            tuple(answer["version"]),
+            answer["prefix"],
+            answer["libpython"],
+            packages,
         )
-    except (OSError, *MISSAID, subprocess.TimeoutExpired) as error:
+    except (OSError, *UNREADABLE_ANSWER, subprocess.TimeoutExpired) as error:
         raise UnusableError(
             f"{quoted(python)}: cannot be run as a Python interpreter ({quoted(error)})."
         ) from error
@@ -270,7 +277,7 @@ def _python(python: Python, modules: list[str] | None) -> list[Finding]:
 
 
 def _trial(path: Path, python: str) -> Finding:
-    """Instantiate the unit and take steps, in a child process that may die."""
+    """The finding on instantiating and stepping the unit in a child process."""
     temporary = tempfile.gettempdir()
     if not SAFE_PATH.fullmatch(str(Path(temporary).resolve())):
         text = f"hosts unpack to {temporary}, a path that crashes the unit's wrapper"
@@ -300,16 +307,16 @@ def _judged(done: subprocess.CompletedProcess[str]) -> Finding:
         text = f"the process died of {next(names, f'signal {-done.returncode}')}; {last_words}".strip("; ")
         return Finding("trial", State.PROBLEM, text)
     try:
-        said: dict[str, Any] = parse_json(done.stdout.splitlines()[-1], "its answer")
-        log = _some(said["log"])
-        if not said["ran"]:
-            text = "; ".join(filter(None, [quoted(said["error"], LONGEST_PROBLEM), log, last_words]))
+        answer: dict[str, Any] = parse_json(done.stdout.splitlines()[-1], "its answer")
+        log = _some(answer["log"])
+        if not answer["ran"]:
+            text = "; ".join(filter(None, [quoted(answer["error"], LONGEST_PROBLEM), log, last_words]))
             return Finding("trial", State.PROBLEM, text)
-        if said["not_finite"] or done.returncode:
-            text = f"outputs not finite: {quoted(said['not_finite'])}; exit {done.returncode}"
+        if answer["not_finite"] or done.returncode:
+            text = f"outputs not finite: {quoted(answer['not_finite'])}; exit {done.returncode}"
             return Finding("trial", State.PROBLEM, text)
-        text = f"instantiates and steps, {said['step_us']:.0f} us a step; ends in order"
-    except MISSAID:
+        text = f"instantiates and steps, {answer['step_us']:.0f} us a step; ends in order"
+    except UNREADABLE_ANSWER:
         text = f"the process ended with {done.returncode}: {last_words or 'nothing said'}"
         return Finding("trial", State.PROBLEM, text)
     if log:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from operator import attrgetter
 from typing import Any
 
-from trpac_core import estimator_data
+from .signals import OUTPUTS
 
-OUTPUT_NAMES = {"tyre_force_n": "tyre_force", "frame_age_s": "frame_age"}
+FIELDS = {"tyre_force": "tyre_force_n", "frame_age": "frame_age_s"}
 """Fields of the estimate whose unit is in the name; the FMI variable states it as an attribute."""
 
 OF_ESTIMATE: dict[str, Callable[[Any], Any]] = {
-    OUTPUT_NAMES.get(name, name): attrgetter(name) for name in estimator_data.OUTPUTS
+    v.name: attrgetter(FIELDS.get(v.name, v.name)) for v in OUTPUTS
 }
-"""What reads an output, by its name, from a wheel's estimate."""
+"""Reads each output, by its name, from a wheel's estimate."""

@@ -1,4 +1,4 @@
-"""Which camera frame is new, and what it holds."""
+"""New camera frames from the inputs of a unit."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Frame = NDArray[np.uint8] | RoadClass | SideClasses
 
 
 class BusClass(NamedTuple):
-    """The inputs in which one surface class comes by bus."""
+    """Names of the inputs for one surface class by bus."""
 
     surface: str
     confidence: str
@@ -39,15 +39,15 @@ BUS = "<road_class>"
 BUFFER = "<buffer>"
 """Source of a frame that came as a picture in memory."""
 IN_MEMORY = "picture in memory"
-"""What messages call it."""
+"""Name of such a picture in messages."""
 SURFACES = {surface.value: surface for surface in Surface}
 
 
 @dataclass(frozen=True)
 class FrameState:
-    """The newest frame that was taken: the path it came from, BUS or BUFFER, and whether it could not be used.
+    """The newest frame: its source, which is a path, BUS or BUFFER, its number, and whether it could not be used.
 
-    `path` is the last one that was taken, whatever came after it: a host may leave it set.
+    `path` is the last path that was read, because a host may leave it set after other sources.
     """
 
     source: str = ""
@@ -59,20 +59,20 @@ class FrameState:
 def next_frame(
     seen: FrameState, values: Mapping[str, Any], bus: tuple[BusClass, ...]
 ) -> tuple[FrameState, Frame | None, str | None]:
-    """The frame of this step, if it is a new one; `bus` names where classes come, for the road or for each side.
+    """The frame of this step where it is a new one; `bus` has the inputs for classes, of the road or of each side.
 
-    A changed path or a changed frame number is a new frame. Without numbers (0) each picture in memory is one, and
-    so is each step in which a class comes by bus, since a bus signal holds its value. After a frame that cannot
-    be used `failed` stays set until one can.
+    A changed path or a changed frame number is a new frame. Without numbers (0) each picture in memory is a new frame,
+    and so is each step with a class by bus, because a bus signal holds its value. `failed` stays set from a frame that
+    cannot be used until one that can.
 
     Returns
     -------
     FrameState, frame or None, problem or None
-        The problem is one sentence that says why a new frame could not be used.
+        The problem is a sentence: why a new frame could not be used.
     """
     frame_id, source = values["frame_id"], _source(values, bus)
     if not source:
-        # A picture in memory is set for one step: that none is set now ends nothing.
+        # A picture in memory is set for one step only, so its absence now does not end the frame.
         if seen.source == BUFFER or (not seen.source and seen.frame_id == frame_id):
             return replace(seen, path="") if seen.path else seen, None, None
         return FrameState("", frame_id, seen.failed), None, None
@@ -88,8 +88,8 @@ def next_frame(
 
 
 def _source(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> str:
-    for place in bus:
-        if values[place.surface] != NO_ROAD_CLASS:
+    for bus_class in bus:
+        if values[bus_class.surface] != NO_ROAD_CLASS:
             return BUS
     if values[BUFFERS_ENABLED] and in_memory(values):
         return BUFFER
@@ -110,9 +110,9 @@ def _read(source: str, values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> 
 
 
 def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
-    """The picture at an address, copied; the address is two signed halves of 32 bits.
+    """A copy of the picture at an address, which is two signed halves of 32 bits.
 
-    All that the numbers alone can tell is checked before the first byte is read.
+    Size, width and height are checked before the first byte is read.
     """
     address = (values["image.base.lo"] & 0xFFFFFFFF) | (values["image.base.hi"] & 0xFFFFFFFF) << 32
     size, width, height = values["image.size"], values["image_width"], values["image_height"]
@@ -131,26 +131,26 @@ def _picture_in_memory(values: Mapping[str, Any]) -> NDArray[np.uint8]:
 
 
 def _by_bus(values: Mapping[str, Any], bus: tuple[BusClass, ...]) -> RoadClass | SideClasses | None:
-    """The class of the road, or those of its sides, of which one may be none; all problems in one ValueError."""
-    problems = [text for place in bus for text in _problems(place, values)]
+    """The class of the road, or those of its two sides, None where there is none; all problems in one ValueError."""
+    problems = [text for bus_class in bus for text in _problems(bus_class, values)]
     if problems:
         raise ValueError("; ".join(problems) + ".")
-    classes = [_road_class(place, values) for place in bus]
+    classes = [_road_class(bus_class, values) for bus_class in bus]
     return SideClasses(*classes) if bus == CLASS_PER_SIDE else classes[0]
 
 
-def _road_class(place: BusClass, values: Mapping[str, Any]) -> RoadClass | None:
-    surface = SURFACES.get(values[place.surface])
-    return None if surface is None else RoadClass(surface, values[place.confidence])
+def _road_class(bus_class: BusClass, values: Mapping[str, Any]) -> RoadClass | None:
+    surface = SURFACES.get(values[bus_class.surface])
+    return None if surface is None else RoadClass(surface, values[bus_class.confidence])
 
 
-def _problems(place: BusClass, values: Mapping[str, Any]) -> list[str]:
-    number, confidence = values[place.surface], values[place.confidence]
+def _problems(bus_class: BusClass, values: Mapping[str, Any]) -> list[str]:
+    number, confidence = values[bus_class.surface], values[bus_class.confidence]
     problems = []
     if number not in SURFACES and number != NO_ROAD_CLASS:
         problems.append(
-            f"{place.surface} is {number}, expected -1 (none), 0 (dry), 1 (wet) or 2 (snow or ice)"
+            f"{bus_class.surface} is {number}, expected -1 (none), 0 (dry), 1 (wet) or 2 (snow or ice)"
         )
     if number != NO_ROAD_CLASS and not 0.0 <= confidence <= 1.0:
-        problems.append(f"{place.confidence} is {confidence}, expected 0 to 1")
+        problems.append(f"{bus_class.confidence} is {confidence}, expected 0 to 1")
     return problems

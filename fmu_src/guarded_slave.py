@@ -1,8 +1,8 @@
-"""A co-simulation slave that never lets an exception reach the wrapper.
+"""A co-simulation slave whose callbacks raise no exceptions.
 
 The wrapper of pythonfmu frees the slave when an exception leaves a callback, while the host keeps its handle:
-the next call would use freed memory. It also passes log texts on as printf formats. Both are dealt with here,
-once, for every slave; see docs/fmu.md.
+the next call would use freed memory. It also passes log texts on as printf formats. This module handles both for all
+slaves; see docs/fmu.md.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from .host import end_in_order
 Value = float | int | bool | str
 STATE_SCHEMA = 1
 INTERRUPT_DELAY_S = 0.1
-"""A Ctrl-C that arrives within a callback is raised again this much later, in the host's own code: long enough for
-the callback to return on a busy machine [s]."""
+"""Delay after which a Ctrl-C within a callback is raised again, then in the host's code: callbacks return sooner, also
+on a busy machine [s]."""
 LONGEST_LOG = 1000
-"""Characters of a log line, whatever a file or the host has put into it."""
+"""Greatest number of characters of a log line."""
 MOST_STATE_BYTES = 16_000_000
-"""A serialised state of more is none of the unit's, which has 0.1 MB and the path of a picture [bytes]."""
+"""Largest serialised state that is read; those of the unit have 0.1 MB and the path of a picture [bytes]."""
 MOST_INTEGER = 1 << 31
 """Integers of FMI 2.0 have 32 bits."""
 PYTHON: dict[Kind, Callable[[Any], Value]] = {
@@ -43,29 +43,27 @@ PYTHON: dict[Kind, Callable[[Any], Value]] = {
     Kind.BOOLEAN: bool,
     Kind.STRING: str,
 }
-"""What the wrapper takes for a value; of others it makes an error that nobody catches."""
+"""Python types that the wrapper accepts; on others it raises an error that is not caught."""
 NEUTRAL: dict[Kind, Value] = {Kind.REAL: 0.0, Kind.INTEGER: 0, Kind.BOOLEAN: False, Kind.STRING: ""}
-"""Start of outputs, and what a read of an unknown value reference gives."""
+"""Start values of outputs, and values of unknown value references."""
 
 
 def log_text(message: str) -> str:
-    """The message as the wrapper can log it: short, on one line, no printf directive, no lone surrogate."""
+    """The message as one short line without printf directives and lone surrogates, as the wrapper can log it."""
     return quoted(message, LONGEST_LOG).replace("%", "%%")
 
 
 def guarded(fallback: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Keep every exception of a callback inside it: log it once and return `fallback(*arguments)`."""
+    """Decorate a callback to log its exceptions and then return `fallback(*arguments)`."""
 
     def decorate(callback: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(callback)
         def run(self: GuardedSlave, *arguments: Any) -> Any:
             try:
                 return callback(self, *arguments)
-            except BaseException as error:  # noqa: BLE001 - whatever it is, C++ must not see it
-                with suppress(
-                    BaseException
-                ):  # nor what goes wrong as it is told: there is nobody left to tell
-                    self.tell_fault(callback.__name__, error)
+            except BaseException as error:  # noqa: BLE001 - no exception may reach C++
+                with suppress(BaseException):  # nor one of the logging
+                    self.report_fault(callback.__name__, error)
             return fallback(*arguments)
 
         return run
@@ -74,7 +72,7 @@ def guarded(fallback: Callable[..., Any]) -> Callable[[Callable[..., Any]], Call
 
 
 def settled(callback: Callable[..., Any]) -> Callable[..., Any]:
-    """Drop an error that C code has left pending: raising another one replaces it, and catching that ends it."""
+    """Decorate a callback to clear an error that C code left pending, by raising and catching another one."""
 
     @wraps(callback)
     def run(self: GuardedSlave, *arguments: Any) -> Any:
@@ -92,7 +90,7 @@ def _nothing(*_: Any) -> None:
 
 
 def _fits(kind: Kind, value: Any) -> bool:
-    """Whether the wrapper can hand on such a value of a variable of this kind."""
+    """Whether the wrapper accepts such a value for a variable of this kind."""
     if kind is Kind.STRING:
         return (
             isinstance(value, str) and value.encode("utf-8", "ignore").decode() == value
@@ -103,21 +101,21 @@ def _fits(kind: Kind, value: Any) -> bool:
 
 
 def holes(items: list[Any]) -> list[int]:
-    """Places of a list that hold no object at all, as only C code can leave them; Python would crash on reading one.
+    """Indices of a list at which C code has left null pointers; reading one would crash Python.
 
-    A list object holds, after three words, the address of its items (CPython 3.11, Include/cpython/listobject.h).
+    The address of its items is the fourth word of a list object (CPython 3.11, Include/cpython/listobject.h).
     """
     word = ctypes.sizeof(ctypes.c_void_p)
     address = ctypes.c_void_p.from_address(id(items) + 3 * word).value
     if address is None:
         return []
     return [
-        place for place, item in enumerate((ctypes.c_void_p * len(items)).from_address(address)) if not item
+        index for index, item in enumerate((ctypes.c_void_p * len(items)).from_address(address)) if not item
     ]
 
 
 class Held(dict[str, Any]):
-    """Values by name; what is not held here is shown from where it lives, when it is asked for."""
+    """Values by name; a name that is missing here is computed by `show` when it is read."""
 
     def __init__(self, values: Mapping[str, Any], show: Callable[[str], Value]) -> None:
         super().__init__(values)
@@ -128,26 +126,26 @@ class Held(dict[str, Any]):
 
 
 class InstantiationError(RuntimeError):
-    """The unit cannot be instantiated; the text says why, ready for a printf-like logger."""
+    """The unit cannot be instantiated; the text is escaped for a printf-like logger."""
 
 
 class GuardedSlave(Fmi2Slave):
-    """Variables by name, guarded callbacks, log lines once per kind, and the whole state as bytes.
+    """Base of all slaves: variables by name, callbacks without exceptions, one log line per kind, the state as bytes.
 
-    A slave gives `variables` and overrides `prepare`, `initialise`, `step`, `inner_state` and
-    `restore_inner_state`, and `shown` where outputs need not be worked out unless they are read; all may raise.
+    A slave sets `variables` and overrides `prepare`, `initialise`, `step`, `inner_state` and
+    `restore_inner_state`, and `shown` for outputs that are computed when they are read; all may raise.
     """
 
     variables: ClassVar[tuple[Variable, ...]] = ()
     volatile: ClassVar[frozenset[str]] = frozenset()
-    """Inputs that hold for one step only, such as addresses: `clear_volatile` forgets them, no state holds them."""
+    """Inputs of one step only, such as addresses: `clear_volatile` resets them, the state does not contain them."""
     views: ClassVar[frozenset[str]] = frozenset()
-    """Outputs that `shown` gives; `values` does not hold them."""
+    """Outputs that `shown` returns; `values` does not contain them."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        # The wrapper prepends the resources to sys.path at every instantiation, for good. All modules of the
-        # unit are imported by now, and packages find their parts without it.
+        # The wrapper prepends the resources to sys.path at every instantiation and leaves them there. All modules of
+        # the unit are imported by now, and packages find their parts without it.
         sys.path[:] = [entry for entry in sys.path if entry != self.resources]
         self._starts: dict[str, Value] = {
             v.name: NEUTRAL[v.kind] if v.start is None else v.start for v in self.variables
@@ -163,24 +161,24 @@ class GuardedSlave(Fmi2Slave):
         }
         self._settable = self._inputs_and_parameters
         self._reported: set[str] = set()
-        self._ready = self._looked_at = False
+        self._ready = self._computed = False
         self._initialising = self._stale = False
         try:
             self.prepare()
         except Exception as error:
-            # Before there is an instance the wrapper survives an exception, and only so does the host learn of it.
-            # Many hosts show no log of a unit that they could not instantiate.
+            # During instantiation the wrapper handles an exception, which is how the host learns of it. Many hosts show
+            # no log of a unit that they could not instantiate.
             text = quoted(f"{self.modelName} cannot be instantiated: {error}", LONGEST_LOG)
             print(text, file=sys.stderr)
             raise InstantiationError(log_text(text)) from error
         finally:
-            # After all libraries are loaded, so that in a host without Python the interpreter ends before they do.
+            # Called after all libraries are loaded, so that in a host without Python the interpreter ends before them.
             end_in_order(str(self.resources))
 
-    # What a slave adds
+    # Overridden by slaves
 
     def prepare(self) -> None:
-        """Load what all instances need, once; may raise in the first one, and the unit is then not instantiated."""
+        """Load what all instances need; where it raises, the unit is not instantiated."""
 
     def initialise(self) -> None:
         """Apply the parameters; ValueError where they cannot be applied."""
@@ -194,28 +192,28 @@ class GuardedSlave(Fmi2Slave):
         raise NotImplementedError
 
     def inner_state(self) -> Any:
-        """What `step` keeps between calls, JSON-able and exact."""
+        """The state of `step` between calls, JSON-able and exact."""
         return None
 
     def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
-        """Take back what `inner_state` gave under these variable values, or raise and change nothing."""
+        """Restore what `inner_state` returned under these variable values, or raise and change nothing."""
 
     def _view(self, name: str) -> Value:
         if name not in self.views:
             raise KeyError(name)
-        return self.shown(name) if self._ready or self._looked_at else self._starts[name]
+        return self.shown(name) if self._ready or self._computed else self._starts[name]
 
-    def _look_ahead(self) -> None:
-        """Work the outputs out by what is set so far, for a host that reads them while it initialises."""
-        self._stale = self._looked_at = False
+    def _compute_outputs(self) -> None:
+        """Compute the outputs from the values set so far, for a host that reads them during initialisation."""
+        self._stale = self._computed = False
         try:
             self.initialise()
-        except ValueError:  # told when the initialisation ends, if it is so still
+        except ValueError:  # reported at the end of the initialisation where it persists
             return
-        self._looked_at = True
+        self._computed = True
 
     def clear_volatile(self) -> None:
-        """Forget the inputs that hold for one step only."""
+        """Reset the inputs of one step only."""
         self.values.update(self._forgotten)
 
     def report(self, kind: str, status: Fmi2Status, message: str) -> None:
@@ -228,8 +226,8 @@ class GuardedSlave(Fmi2Slave):
             with suppress(OSError, ValueError):  # standard error may be closed, and the log has it
                 print(quoted(message, LONGEST_LOG), file=sys.stderr)
 
-    def tell_fault(self, name: str, error: BaseException) -> None:
-        """Log what went wrong in the callback of this name; an interrupt is handed to the host."""
+    def report_fault(self, name: str, error: BaseException) -> None:
+        """Log an exception of the callback of this name; an interrupt is raised again in the host."""
         if isinstance(error, KeyboardInterrupt):
             threading.Timer(INTERRUPT_DELAY_S, interrupt_main).start()
             return
@@ -250,7 +248,7 @@ class GuardedSlave(Fmi2Slave):
 
     @guarded(_nothing)
     def exit_initialization_mode(self) -> None:
-        """Apply the parameters; what is wrong with them is logged, and each step is then discarded."""
+        """Apply the parameters; where they are wrong this is logged, and each step is then discarded."""
         self._initialising = self._stale = False
         self._settable = self._inputs
         try:
@@ -258,15 +256,15 @@ class GuardedSlave(Fmi2Slave):
         except ValueError as error:
             message = f"{self.modelName} cannot be initialised, and every step will be discarded: {error}"
             self.report("initialise", Fmi2Status.error, message)
-            self._looked_at = False
+            self._computed = False
         else:
             self._ready = True
 
     @guarded(lambda *_: False)
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """One communication step; False (fmi2Discard) only where nothing could be computed."""
+        """Take one communication step; returns False (fmi2Discard) where nothing could be computed."""
         if not self._ready:
-            if self._settable is not self._inputs:  # else it has been told what is wrong
+            if self._settable is not self._inputs:  # else the reason is logged already
                 text = f"{self.modelName}: a step was asked for before the initialisation has ended; it is discarded."
                 self.report("not ready", Fmi2Status.error, text)
             return False
@@ -275,7 +273,7 @@ class GuardedSlave(Fmi2Slave):
 
     @guarded(_nothing)
     def terminate(self) -> None:
-        """Nothing to do: the unit holds no files and no threads."""
+        """Do nothing: the unit has no open files and no threads."""
 
     def _set(self, kind: Kind, references: list[int], values: list[Any]) -> None:
         names, settable = self._names[kind], self._settable
@@ -295,7 +293,7 @@ class GuardedSlave(Fmi2Slave):
 
     def _get(self, kind: Kind, references: list[int]) -> list[Any]:
         if self._stale:
-            self._look_ahead()
+            self._compute_outputs()
         names, values, python = self._names[kind], self.values, PYTHON[kind]
         try:
             return [python(values[names[reference]]) for reference in references]
@@ -328,8 +326,8 @@ class GuardedSlave(Fmi2Slave):
         self._set(Kind.BOOLEAN, vrs, values)
 
     def __init_subclass__(cls) -> None:
-        # A text that is not UTF-8 leaves Python's error pending while the wrapper looks this callback up: only what
-        # lies in the instance's own class is then found.
+        # A text that is not UTF-8 leaves a Python error pending while the wrapper looks up this callback, and only
+        # attributes of the instance's own class are then found.
         cls.set_string = cls.set_string  # type: ignore[method-assign]
 
     @settled
@@ -342,10 +340,10 @@ class GuardedSlave(Fmi2Slave):
             self.report(
                 "set String encoding",
                 Fmi2Status.error,
-                f"{self.modelName}: the texts for value references {[vrs[place] for place in unreadable]} are "
+                f"{self.modelName}: the texts for value references {[vrs[index] for index in unreadable]} are "
                 "not UTF-8, as FMI 2.0 has them, and were taken as empty.",
             )
-        texts = ["" if place in unreadable else values[place] or "" for place in range(len(values))]
+        texts = ["" if index in unreadable else values[index] or "" for index in range(len(values))]
         self._set(Kind.STRING, vrs, texts)
 
     @guarded(lambda vrs: [0.0] * len(vrs))
@@ -368,8 +366,8 @@ class GuardedSlave(Fmi2Slave):
         """Read String variables by value reference."""
         return self._get(Kind.STRING, vrs)
 
-    # The state is the bytes of a JSON text from the start: immutable, so that it can be restored many times,
-    # and its serialisation cannot fail.
+    # The state is the bytes of a JSON text: immutable, so that it can be restored many times, and serialised
+    # without failure.
 
     @guarded(lambda: b"")
     def _get_fmu_state(self) -> bytes:
@@ -403,11 +401,11 @@ class GuardedSlave(Fmi2Slave):
             return
         self._settable = self._inputs if content["initialised"] else self._inputs_and_parameters
         self.values = Held(content["values"], self._view)
-        self._ready, self._looked_at = content["ready"], False
+        self._ready, self._computed = content["ready"], False
         self._initialising = self._stale = not content["initialised"]
 
     def _read_state(self, state: bytes) -> tuple[dict[str, Any], tuple[str, str] | None]:
-        """What a serialised state says; and what is wrong with it, by kind and in words."""
+        """The content of a serialised state, and its problem as key and sentence or None."""
         if len(state) > MOST_STATE_BYTES:
             return {}, ("size", f"it has {len(state) / 1e6:.0f} MB, expected a state of this unit")
         try:
@@ -426,7 +424,7 @@ class GuardedSlave(Fmi2Slave):
         return content, None
 
     def _states(self, content: dict[str, Any]) -> bool:
-        """Whether a state gives each variable a value of its kind."""
+        """Whether a state has exactly the expected keys, and a value of its kind for each variable."""
         values, kinds = content.get("values"), {v.name: v.kind for v in self.variables}
         return (
             content.keys() == {"schema", "unit", "ready", "initialised", "values", "inner"}

@@ -1,4 +1,4 @@
-"""What each kind of host needs to run a unit, with the paths of a given interpreter filled in."""
+"""Requirements of each kind of host to run a unit, with the paths of a given interpreter."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from .doctor import Python
 
 @dataclass(frozen=True)
 class HostNeeds:
-    """One kind of host, and what it needs, one sentence each."""
+    """A kind of host, and its requirements, one sentence each."""
 
     host: str
     needs: tuple[str, ...]
 
 
 def host_needs(python: Python) -> tuple[HostNeeds, ...]:
-    """The kinds of host; what is said of Windows and of vendors' tools follows from documents, not from a test."""
+    """Requirements by kind of host; those of Windows and of vendors' tools are from documents, not tested."""
     programs = Path(python.command).parent
     return (
         HostNeeds(

@@ -1,6 +1,6 @@
 """The variables of the unit `TrpacEstimator4W`, in the order of their value references.
 
-They are those of one wheel: what each wheel has is there four times, what each side of the road has is there twice.
+They are those of one wheel, four times for signals of a wheel, twice for signals of a side of the road.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ PER_WHEEL = ("wheel_speed", "wheel_torque", "vertical_load")
 PER_SIDE = ("road_class", "road_class_confidence")
 SIDES = ("left", "right")
 WHICH_WHEEL = ("wheel.front", "wheel.left")
-"""Parameters of the one-wheel unit that say which wheel it is."""
-PLACES = dict(zip(WHEELS, ("front left", "front right", "rear left", "rear right"), strict=True))
+"""Parameters of the one-wheel unit that select its wheel."""
+WHEEL_NAMES = dict(zip(WHEELS, ("front left", "front right", "rear left", "rear right"), strict=True))
 
 
 def _at_each_wheel(variable: Variable) -> Iterator[Variable]:
-    for wheel, place in PLACES.items():
+    for wheel, wheel_name in WHEEL_NAMES.items():
         yield replace(
             variable,
             name=f"{variable.name}.{wheel}",
-            description=f"{_capital(place)} wheel: {variable.description}",
+            description=f"{_capital(wheel_name)} wheel: {variable.description}",
         )
 
 

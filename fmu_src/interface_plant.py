@@ -7,10 +7,10 @@ from trpac_core.parameters.variables import Kind, Variable
 WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 SIDES = ("left", "right")
 ROAD = ((0.0, 0.9, 0), (20.0, 0.3, 2), (40.0, 0.5, 1), (60.0, 0.9, 0), (80.0, 0.3, 2))
-"""Start [m], theta and surface of each segment that the parameters can describe; by default the first three count, the
+"""Start [m], theta [-] and surface class of each segment of the parameters; the first three, used by default, are the
 road of Figure 16 of Tian et al. 2022."""
 MOST_TORQUE_NM = 20_000.0
-"""No road car's wheel is given more; beyond it the input is a fault or in another unit [N m]."""
+"""Greatest torque that is accepted: no wheel of a road car has more, so that the input is in another unit [N m]."""
 
 
 def _at_each_wheel(
@@ -28,14 +28,14 @@ def _at_each_wheel(
             Kind.REAL,
             causality,
             "continuous",
-            f"{place[0].upper()}{place[1:]} wheel: {description}",
+            f"{wheel_name[0].upper()}{wheel_name[1:]} wheel: {description}",
             unit,
             0.0 if causality == "input" else None,
             minimum,
             maximum,
             nominal,
         )
-        for wheel, place in WHEELS.items()
+        for wheel, wheel_name in WHEELS.items()
     )
 
 

@@ -6,7 +6,7 @@ from trpac_core.parameters.variables import Kind, Variable
 
 WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 MOST_TORQUE_NM = 20_000.0
-"""As the plant takes [N m]."""
+"""Greatest torque, that of the plant [N m]."""
 
 
 def _parameter(
@@ -22,14 +22,14 @@ TORQUE_PULSES = (
             Kind.REAL,
             "output",
             "continuous",
-            f"{place[0].upper()}{place[1:]} wheel: torque for the step to come, positive drives",
+            f"{wheel_name[0].upper()}{wheel_name[1:]} wheel: torque for the step to come, positive drives",
             "N.m",
             None,
             -MOST_TORQUE_NM,
             MOST_TORQUE_NM,
             300.0,
         )
-        for wheel, place in WHEELS.items()
+        for wheel, wheel_name in WHEELS.items()
     ),
     _parameter(
         "drive.torque", "N.m", "Torque of a driving pulse at each driven wheel", 240.0, 0.0, MOST_TORQUE_NM

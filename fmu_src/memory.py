@@ -1,4 +1,4 @@
-"""Memory of this process by its address, read by the operating system: a wrong address is an error and no crash."""
+"""Memory of this process, read through the operating system, so that a wrong address is an error and no crash."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from trpac_core.vision.images import ImageError
 
 
 def read_memory(address: int, size: int) -> bytearray:
-    """A copy of so many bytes at an address.
+    """A copy of `size` bytes at an address.
 
     Raises
     ------
     ImageError
-        If not all of them can be read, or the system lets no process read memory so.
+        If not all of them can be read, or the system has no such call.
     """
     data = bytearray(size)
     copied, reason = _copy(address, size, (ctypes.c_char * size).from_buffer(data))
@@ -59,5 +59,5 @@ elif sys.platform == "linux":
 else:
 
     def _copy(address: int, size: int, buffer: ctypes.Array[ctypes.c_char]) -> tuple[int, str]:
-        """Nothing copied: a wrong address could not be caught here."""
+        """Number of bytes copied, 0, and the reason: a wrong address could not be caught here."""
         return 0, f"pictures in memory cannot be read safely on {sys.platform}: give them by image_path"

@@ -1,4 +1,4 @@
-"""modelDescription.xml of a unit, complete enough that a validator finds nothing to remark."""
+"""modelDescription.xml of a unit."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ LOG_CATEGORIES = {
 
 @dataclass(frozen=True)
 class UnitInfo:
-    """What the description says of a unit as a whole."""
+    """General attributes of a unit."""
 
     name: str
     description: str
@@ -65,8 +65,8 @@ def model_description(
 ) -> bytes:
     """The XML text of a unit's description; the same arguments give the same bytes.
 
-    With `flat` names are made of letters, digits and underscores alone: some tools make structures of dotted ones. The
-    annotations of binary data, which are for the tools that read dots, are then left out.
+    With `flat` names consist of letters, digits and underscores, for tools that make structures of dotted names; the
+    annotations of binary data are then left out.
     """
     root = Element(
         "fmiModelDescription",
@@ -99,14 +99,14 @@ def model_description(
     for reference, variable in enumerate(variables):
         _variable(listed, reference, variable, flat)
     structure = SubElement(root, "ModelStructure")
-    outputs = [place for place, v in enumerate(variables, start=1) if v.causality == "output"]
+    outputs = [index for index, v in enumerate(variables, start=1) if v.causality == "output"]
     for group in ("Outputs", "InitialUnknowns"):
         entries = SubElement(structure, group)
-        # Within a step outputs stay what the step before has made of the inputs: no input reaches them at once. At the
-        # start they depend on the parameters, which is what leaving the attribute out means.
+        # Outputs depend on inputs of earlier steps only. At the start they depend on the parameters, which is the
+        # meaning of the missing attribute.
         known = {"dependencies": ""} if group == "Outputs" else {}
-        for place in outputs:
-            SubElement(entries, "Unknown", {"index": str(place), **known})
+        for index in outputs:
+            SubElement(entries, "Unknown", {"index": str(index), **known})
     indent(root)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
 
@@ -155,7 +155,7 @@ def _variable(parent: Element, reference: int, variable: Variable, flat: bool) -
 
 
 def _osmp(parent: Element, element: str, attributes: dict[str, str]) -> None:
-    """Annotation of the OSI Sensor Model Packaging, which has the convention for binary data over FMI 2.0."""
+    """Add an annotation of the OSI Sensor Model Packaging, the convention for binary data over FMI 2.0."""
     tool = SubElement(parent, "Tool", {"name": "net.pmsf.osmp", "xmlns:osmp": OSMP_NAMESPACE})
     SubElement(tool, f"osmp:{element}", attributes)
 

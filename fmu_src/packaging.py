@@ -20,7 +20,7 @@ from .contents import CONTENTS_FILE, Contents, sha256_of
 from .model_description import UnitInfo, model_description
 
 SLAVE_FILES = ("__init__.py", "contents.py", "guarded_slave.py", "host.py")
-"""Files of this package that every unit carries; what a unit needs besides comes on top."""
+"""Files of this package in every unit."""
 
 PYTHONFMU_FILES = (
     "__init__.py",
@@ -31,10 +31,12 @@ PYTHONFMU_FILES = (
     "logmsg.py",
     "variables.py",
 )
-"""What a slave needs of pythonfmu; its builder and command line stay behind."""
+"""Files of pythonfmu in every unit, without its builder and command line."""
 
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
+"""Time of all entries, so that the same content gives the same bytes; the earliest of the zip format."""
 HASH_DIGITS = 12
+"""Digits of the content's hash in module names."""
 
 
 @dataclass(frozen=True)
@@ -44,19 +46,19 @@ class Slave:
     Parameters
     ----------
     info : UnitInfo
-        What its description says of it as a whole; its name is its slave class's.
+        General attributes; the name is that of the slave class.
     files : tuple of str
-        Files of this package that it carries besides `SLAVE_FILES`; the slave's own comes last.
+        Files of this package in the unit besides `SLAVE_FILES`; that of the slave class is the last.
     variables : sequence of Variable
         In the order of their value references.
     modules : mapping
-        Folder or file by its place among the unit's modules: the code of other packages that it carries.
+        Folder or file by its path among the unit's modules: code of other packages in the unit.
     packages : mapping
-        Modules that the host must have, and the PyPI packages that bring them.
+        Modules that the host must have, and their PyPI packages.
     resources : sequence of Path
         Files beside the code.
     compiled : str
-        Package among `modules` whose compiled code is kept from one unpacking to the next; empty if none.
+        Package among `modules` whose compiled code is kept in the user's cache; empty if none.
     """
 
     info: UnitInfo
@@ -74,20 +76,11 @@ class Slave:
 
 
 class BuildError(TrpacError):
-    """The unit cannot be built; the text lists everything that is wrong."""
+    """The unit cannot be built; the text lists all problems."""
 
 
 def build_unit(slave: Slave, target: Path, *, flat: bool = False) -> Path:
     """Write the unit's archive; the same sources give the same bytes.
-
-    Parameters
-    ----------
-    slave : Slave
-        The unit.
-    target : Path
-        The archive, which is there whole or as it was before.
-    flat : bool
-        Whether its variables have names without dots.
 
     Returns
     -------
@@ -118,7 +111,7 @@ def build_unit(slave: Slave, target: Path, *, flat: bool = False) -> Path:
 
 def write_archive(target: Path, content: Mapping[str, bytes]) -> Path:
     """Write a zip archive, whole or not at all; the same content by path gives the same bytes. Returns its path."""
-    # Stored, not compressed: compressed bytes differ between versions of zlib.
+    # Stored without compression, whose bytes differ between versions of zlib.
     with (
         written_whole(target.parent) as made,
         zipfile.ZipFile(made / target.name, "w", zipfile.ZIP_STORED) as archive,
@@ -130,11 +123,11 @@ def write_archive(target: Path, content: Mapping[str, bytes]) -> Path:
     return target
 
 
-def _module_files(place: str, path: Path) -> dict[str, bytes]:
+def _module_files(target: str, path: Path) -> dict[str, bytes]:
     if path.is_file():
-        return {place: path.read_bytes()}
+        return {target: path.read_bytes()}
     return {
-        f"{place}/{file.relative_to(path).as_posix()}": file.read_bytes()
+        f"{target}/{file.relative_to(path).as_posix()}": file.read_bytes()
         for file in path.rglob("*.py")
         if "__pycache__" not in file.parts
     }
@@ -143,8 +136,8 @@ def _module_files(place: str, path: Path) -> dict[str, bytes]:
 def _resources(slave: Slave) -> dict[str, bytes]:
     here, wrapper = Path(__file__).parent, _folder(pythonfmu)
     files: dict[str, bytes] = {}
-    for place, path in slave.modules.items():
-        files |= {f"resources/{name}": data for name, data in _module_files(place, path).items()}
+    for target, path in slave.modules.items():
+        files |= {f"resources/{name}": data for name, data in _module_files(target, path).items()}
     for name in (*SLAVE_FILES, *slave.files):
         files[f"resources/fmu_src/{name}"] = (here / name).read_bytes()
     for name in PYTHONFMU_FILES:
@@ -181,7 +174,7 @@ def _licences() -> dict[str, bytes]:
 
 
 def _digest(description: bytes, content: dict[str, bytes]) -> str:
-    """Hash of all that the unit is made of, its description without a hash included."""
+    """Hash of the unit's content and of its description without a hash."""
     total = hashlib.sha256(description)
     for path in sorted(content):
         total.update(f"{path}\0{len(content[path])}\0".encode() + content[path])
@@ -200,7 +193,7 @@ def _renamed_imports(path: str, data: bytes, digest: str) -> bytes:
 
 
 def _entry(slave: Slave, digest: str) -> bytes:
-    """The script that the wrapper runs at each instantiation: so it holds little but imports."""
+    """The script that the wrapper runs at each instantiation."""
     lines = [
         f'"""Entry of the unit {slave.info.name}."""',
         f"from fmu_src_{digest}.host import import_kept, keep, require_packages",

@@ -24,7 +24,7 @@ from .interface_plant import MOST_TORQUE_NM, REFERENCE_PLANT, SIDES, WHEELS
 File = TypeVar("File", bound=BaseModel)
 
 LONGEST_STEP_S = 10.0
-"""Longer steps are refused: the plant's own sub-steps would keep the host waiting for minutes [s]."""
+"""Longest step that is taken: the plant's sub-steps would delay the host for minutes [s]."""
 
 _TORQUES = tuple(f"wheel_torque.{wheel}" for wheel in WHEELS)
 _PER_WHEEL = {
@@ -35,7 +35,7 @@ _PER_WHEEL = {
 
 @dataclass(frozen=True)
 class Setting:
-    """What the parameters say."""
+    """Car, road and distances of the parameters."""
 
     vehicle: VehicleFile
     road: RoadFile
@@ -53,14 +53,14 @@ class ReferencePlant(GuardedSlave):
         setting = self._setting(self.values)
         start_m = self.values["initial.position"] - setting.to_front_m
         state = initial_state(setting.vehicle, setting.road, self.values["initial.vehicle_speed"], start_m)
-        moved = advance(state, (0.0,) * 4, 1e-3)  # compiles, so that no step of the host's has to wait for it
+        moved = advance(state, (0.0,) * 4, 1e-3)  # compiles now rather than in the first step
         if not (_finite(state) and _finite(moved)):
             raise ValueError("The parameters describe a car whose loads or motion are no finite numbers.")
         self._set_up, self._state, self._torque = setting, state, (0.0,) * 4
         self._publish()
 
     def step(self, step_s: float) -> None:
-        """Move the car on under the torques that are set now."""
+        """Move the car under the torques that are set now."""
         given = tuple(self.values[name] for name in _TORQUES)
         if all(abs(torque) <= MOST_TORQUE_NM for torque in given):
             self._torque = given
@@ -127,7 +127,7 @@ class ReferencePlant(GuardedSlave):
         }
 
     def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
-        """Take back what `inner_state` gave under these variable values; ScenarioError where a file has changed."""
+        """Restore what `inner_state` returned under these variable values; ScenarioError where a file has changed."""
         setting = self._setting(values)
         setup = initial_state(setting.vehicle, setting.road).setup
         self._state = PlantState(
@@ -142,7 +142,7 @@ class ReferencePlant(GuardedSlave):
 
 
 def _finite(state: PlantState) -> bool:
-    """Whether motion, loads and forces are numbers."""
+    """Whether motion, loads and forces are finite."""
     parts = (state.y, *state.wheels)
     return math.isfinite(state.accel_x_m_s2) and all(bool(np.isfinite(part).all()) for part in parts)
 

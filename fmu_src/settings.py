@@ -1,4 +1,4 @@
-"""Parameters of the estimator's unit: those of the estimator, and its own."""
+"""Parameters of the estimator's unit: those of the estimator and one of the unit."""
 
 from __future__ import annotations
 

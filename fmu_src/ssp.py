@@ -1,4 +1,4 @@
-"""Systems of units as SSP 1.0 packages: which unit is wired to which, and the parameter sets that go with them."""
+"""Systems of units as SSP 1.0 packages: connections and parameter sets."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OSP_ANNOTATION = "com.opensimulationplatform"
-"""Annotation in which Open Simulation Platform's tools look for the step size."""
+"""Annotation from which Open Simulation Platform's tools read the step size."""
 SSP_VERSION = "1.0"
 STOP_S = 10.0
-"""The car has then crossed both borders of the paper's road [s]."""
+"""End of the simulation, when the car has crossed both borders of the paper's road [s]."""
 
 PLANT, ESTIMATOR, DRIVER = "plant", "estimator", "driver"
 
 SHOWN = ("TRPAC", "TRPAC_std", "flag", "K_v", "tyre_force")
-"""Outputs of the estimator that a tool is to record."""
+"""Outputs of the estimator that a tool records."""
 
 Value = float | int | bool | str
 
@@ -44,11 +44,11 @@ class Wiring:
     description : str
         One sentence.
     elements : mapping
-        Units by the name that they have in the system, in the order in which they are stepped.
+        Units by their names in the system, in the order of their steps.
     connections : tuple
         (element, output, element, input).
     shown : tuple
-        (element, output) that are no one's input: what a tool is to record.
+        (element, output) that are not connected and that a tool records.
     sets : mapping
         Parameter sets by name, each with the elements that it is bound to and its values.
     """
@@ -71,10 +71,10 @@ def _parameter_names(variables: tuple[Variable, ...]) -> list[str]:
 
 
 def _sets() -> dict[str, tuple[tuple[str, ...], Mapping[str, Value]]]:
-    """The car as plant and estimator know it, where the plant starts, the road, and the drive.
+    """Parameter sets: the car of plant and estimator, the start of the plant, the road, and the driver.
 
-    All values are the plant's own starts, and but for the rolling resistance the estimator's: tools that read no
-    parameter sets drive the same car over the same road.
+    All values are start values of the plant, and except for the rolling resistance those of the estimator, so that
+    tools that read no parameter sets simulate the same car on the same road.
     """
     plant, known = _parameter_names(REFERENCE_PLANT), set(_parameter_names(TRPAC_ESTIMATOR_4W))
     car = [name for name in plant if name in known and name.split(".")[0] in ("vehicle", "tyre")]
@@ -145,15 +145,6 @@ SYSTEMS = {"four_wheels": _four_wheels(), "one_wheel": _one_wheel()}
 
 def build_package(wiring: Wiring, units: Mapping[str, Path], target: Path) -> Path:
     """Write a system's package; the same units give the same bytes.
-
-    Parameters
-    ----------
-    wiring : Wiring
-        The system.
-    units : mapping
-        The built archive of each of its units, by the unit's name.
-    target : Path
-        The package's file.
 
     Raises
     ------

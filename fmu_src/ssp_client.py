@@ -1,4 +1,4 @@
-"""SSP packages in fmpy: validated against the standard's schemas, and run with the sets that they are bound to."""
+"""SSP packages in fmpy: validated against the standard's schemas, and simulated with their bound parameter sets."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SCHEMA_OF = {".ssd": "SystemStructureDescription.xsd", ".ssv": "SystemStructureP
 
 
 def problems(package: Path) -> list[str]:
-    """What the schemas of SSP 1.0 find in the package, and sources that are not in it; raises UnitFileError."""
+    """Problems of the package by the schemas of SSP 1.0, and sources that are missing in it; raises UnitFileError."""
     found = []
     with opened_archive(package, EXPECTED) as archive:
         names = archive.names
@@ -52,7 +52,7 @@ def problems(package: Path) -> list[str]:
 
 
 def require_package(package: Path) -> None:
-    """Read a package and the units in it to their ends; raises UnitFileError where one is not to be unpacked."""
+    """Check a package and the units in it; raises UnitFileError where one must not be unpacked."""
     with (
         opened_archive(package, EXPECTED) as archive,
         tempfile.TemporaryDirectory(prefix="trpac_ssp_") as made,
@@ -65,9 +65,9 @@ def require_package(package: Path) -> None:
 
 
 def bound_parameters(package: Path) -> ParameterSet:
-    """All bound parameters under their names in the system: fmpy takes them so, and does not follow the bindings.
+    """All bound parameters under their names in the system, as fmpy expects them, which does not follow the bindings.
 
-    Raises UnitFileError where the package or a unit in it is not to be unpacked.
+    Raises UnitFileError where the package or a unit in it must not be unpacked.
     """
     require_package(package)
     merged = ParameterSet(name="bound")
@@ -81,7 +81,7 @@ def bound_parameters(package: Path) -> ParameterSet:
 
 
 def simulate(package: Path, stop_s: float, step_s: float = STEP_S) -> NDArray[Any]:
-    """Run the package in fmpy, whose master steps all units at once and then hands their outputs on.
+    """Results of the package in fmpy, whose master steps all units in parallel and then transfers their outputs.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def simulate(package: Path, stop_s: float, step_s: float = STEP_S) -> NDArray[An
     Raises
     ------
     UnitFileError
-        If the package or a unit in it is not to be unpacked.
+        If the package or a unit in it must not be unpacked.
     """
     result = simulate_ssp(
         str(package), stop_time=stop_s, step_size=step_s, parameter_set=bound_parameters(package)

@@ -1,4 +1,4 @@
-"""The unit `TorquePulses`: a driver that pushes and brakes by the clock."""
+"""The unit `TorquePulses`: a driver of periodic driving and braking pulses."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .guarded_slave import GuardedSlave
 from .interface_pulses import TORQUE_PULSES, WHEELS
 
 LONGEST_STEP_S = 10.0
-"""As of the other units: beyond it the host has lost its clock [s]."""
+"""Longest step that is taken, as in the other units [s]."""
 
 
 class TorquePulses(GuardedSlave):
-    """Pause, driving pulse, pause, braking pulse, and again; each pulse is a trapezium."""
+    """Pause, driving pulse, pause, braking pulse, repeated; each pulse is a trapezium."""
 
     variables: ClassVar[tuple[Variable, ...]] = TORQUE_PULSES
 
@@ -27,7 +27,7 @@ class TorquePulses(GuardedSlave):
         self._time_s = 0.0
 
     def step(self, step_s: float) -> None:
-        """Let time pass; a step below 0, above 10 s or not finite moves nothing."""
+        """Advance the time; a step below 0, above 10 s or not finite is ignored."""
         if 0.0 <= step_s <= LONGEST_STEP_S:
             self._time_s += step_s
             self._publish()
@@ -49,7 +49,7 @@ class TorquePulses(GuardedSlave):
             values[f"wheel_torque.{wheel}"] = share * driving - braking
 
     def _height(self, since_s: float, duration_s: float) -> float:
-        """Height of a pulse of 1 so long after its start [-]."""
+        """Value of a pulse of height 1 at a time after its start [-]."""
         ramp_s = self.values["pulse.ramp"]
         return max(0.0, min(1.0, since_s / ramp_s, (duration_s - since_s) / ramp_s))
 
@@ -58,5 +58,5 @@ class TorquePulses(GuardedSlave):
         return self._time_s
 
     def restore_inner_state(self, values: dict[str, Any], state: Any) -> None:
-        """Take back what `inner_state` gave; the outputs are among the values."""
+        """Restore what `inner_state` returned; the outputs are among the values."""
         self._time_s = float(state)

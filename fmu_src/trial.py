@@ -1,7 +1,7 @@
-"""A unit tried out in a process of its own: `python trial.py FOLDER [STEPS]`; needs the standard library alone.
+"""A trial of a unit in a process of its own: `python trial.py FOLDER [STEPS]`; imports the standard library alone.
 
-It loads the wrapper as a host does, instantiates, steps with rolling wheels and prints one line of JSON. Whatever kills
-it kills no one else.
+It loads the wrapper as a host does, instantiates, steps with rolling wheels and prints one line of JSON. A crash ends
+this process only.
 """
 
 from __future__ import annotations
@@ -17,12 +17,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 ROLLING = {"wheel_speed": 34.5, "vehicle_speed": 10.0, "wheel_torque": 20.0}
-"""Signals of a rolling car, for the inputs of these names and of each wheel."""
+"""Inputs of a rolling car by name, for one wheel and for each of four [rad/s], [m/s], [N m]."""
 STEPS, STEP_S = 20, 0.001
 PLATFORMS = {"linux": ("linux64", ".so"), "win32": ("win64", ".dll")}
 CO_SIMULATION = 1
-PR_SET_PDEATHSIG, SIGKILL = 1, 9
-"""What asks Linux to end this process with its parent (prctl(2))."""
 OK = 0
 
 _POINTER, _TEXT = ctypes.c_void_p, ctypes.c_char_p
@@ -42,7 +40,7 @@ class _Callbacks(ctypes.Structure):
 
 
 def rolling(name: str) -> float | None:
-    """What a rolling car gives to an input of this name, with its wheel behind a dot or, in flat units, a line."""
+    """Value of an input of a rolling car; the name may end in a wheel after a dot or, in flat units, an underscore."""
     return next(
         (value for root, value in ROLLING.items() if re.fullmatch(rf"{root}([._](fl|fr|rl|rr))?", name)), None
     )
@@ -50,15 +48,15 @@ def rolling(name: str) -> float | None:
 
 def library(folder: Path, name: str) -> Path:
     """The wrapper of a unit for this platform; raises FileNotFoundError."""
-    place, suffix = PLATFORMS.get(sys.platform, (sys.platform, ".so"))
-    path = folder / "binaries" / place / f"{name}{suffix}"
+    platform, suffix = PLATFORMS.get(sys.platform, (sys.platform, ".so"))
+    path = folder / "binaries" / platform / f"{name}{suffix}"
     if not path.is_file():
-        raise FileNotFoundError(f"the unit holds no library for this platform ({place})")
+        raise FileNotFoundError(f"the unit holds no library for this platform ({platform})")
     return path
 
 
 class Instance:
-    """One instance of the unit, driven as the FMI 2.0 standard has it; `log` holds what it said."""
+    """One instance of the unit, called as FMI 2.0 requires; `log` has its messages."""
 
     def __init__(self, folder: Path) -> None:
         root = ElementTree.parse(folder / "modelDescription.xml").getroot()
@@ -68,7 +66,7 @@ class Instance:
         self.scalars = [(s.attrib, s[0].tag) for s in root.iter("ScalarVariable")]
         self.log: list[str] = []
         self._dll = ctypes.CDLL(str(library(folder, simulation.attrib["modelIdentifier"])))
-        self._callbacks = _Callbacks(_LOGGER(self._told), _ALLOCATE(0), _FREE(0), None, None)
+        self._callbacks = _Callbacks(_LOGGER(self._log_message), _ALLOCATE(0), _FREE(0), None, None)
         instantiate = self._dll.fmi2Instantiate
         instantiate.restype = _POINTER
         resources = (folder.resolve() / "resources").as_uri().encode()
@@ -86,11 +84,11 @@ class Instance:
         if not self._component:
             raise RuntimeError("fmi2Instantiate gave no instance")
 
-    def _told(self, _: int, __: bytes, ___: int, ____: bytes, message: bytes) -> None:
+    def _log_message(self, _: int, __: bytes, ___: int, ____: bytes, message: bytes) -> None:
         self.log.append(message.decode("utf-8", "replace").replace("%%", "%"))
 
     def call(self, name: str, *arguments: Any) -> None:
-        """An FMI function on this instance; raises RuntimeError where its status is not fmi2OK."""
+        """Call an FMI function on this instance; raises RuntimeError where its status is not fmi2OK."""
         status = getattr(self._dll, name)(self._component, *arguments)
         if status != OK:
             raise RuntimeError(f"{name} returned status {status}")
@@ -116,14 +114,14 @@ class Instance:
         return value.value
 
     def initialise(self) -> None:
-        """From instantiation to the first step."""
+        """Initialise the instance."""
         no, zero = ctypes.c_int(0), ctypes.c_double(0.0)
         self.call("fmi2SetupExperiment", no, zero, zero, no, zero)
         self.call("fmi2EnterInitializationMode")
         self.call("fmi2ExitInitializationMode")
 
     def step(self, index: int) -> None:
-        """One communication step."""
+        """Take one communication step."""
         self.call("fmi2DoStep", ctypes.c_double(index * STEP_S), ctypes.c_double(STEP_S), ctypes.c_int(1))
 
     def free(self) -> None:
@@ -133,7 +131,7 @@ class Instance:
 
 
 def run(folder: Path, steps: int) -> dict[str, Any]:
-    """Instantiate, step and free; what happened, JSON-able."""
+    """Instantiate, step and free the unit; returns the outcome, JSON-able."""
     instance = None
     try:
         instance = Instance(folder)
@@ -162,9 +160,9 @@ def run(folder: Path, steps: int) -> dict[str, Any]:
 
 
 def end_with_parent() -> None:
-    """Let this process be killed as soon as the one that started it ends, on Linux."""
+    """Have Linux kill this process when its parent ends; its source is also run in another program."""
     if sys.platform.startswith("linux"):
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, SIGKILL)
+        ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG, SIGKILL: prctl(2)
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from .interface import TRPAC_ESTIMATOR
 
 
 class TrpacEstimator(CameraSlave):
-    """Sensors and camera frames of one wheel in, TRPAC, flag and K_v out."""
+    """The unit with sensors and frames of one wheel as inputs, and TRPAC, flag and K_v as outputs."""
 
     variables: ClassVar[tuple[Variable, ...]] = TRPAC_ESTIMATOR
     volatile: ClassVar[frozenset[str]] = frozenset(v.name for v in TRPAC_ESTIMATOR if v.binary)
@@ -37,7 +37,7 @@ class TrpacEstimator(CameraSlave):
         return Estimator(config, Ife(config.image_settings, *networks) if networks else None)
 
     def sensors(self) -> Sensors:
-        """The inputs as the estimator's sensors; in a curve the wheel has a speed of its own over the road."""
+        """The inputs as the estimator's sensors; in a curve the speed is that of the wheel's contact."""
         values, config = self.values, self._config
         speed, steering, yaw = values["vehicle_speed"], values["steering_angle"], self.optional("yaw_rate")
         if steering or yaw:
@@ -55,7 +55,7 @@ class TrpacEstimator(CameraSlave):
         )
 
     def shown(self, name: str) -> Value:
-        """An output, from the last estimate."""
+        """Value of an output, from the last estimate."""
         value: Value = OF_ESTIMATE[name](self._estimator.last)
         return value
 

@@ -20,8 +20,8 @@ from .guarded_slave import Value
 from .interface_4w import TRPAC_ESTIMATOR_4W
 
 _OF_WHEEL = {
-    f"{name}.{wheel}": (place, of_estimate)
-    for place, wheel in enumerate(WHEELS)
+    f"{name}.{wheel}": (index, of_estimate)
+    for index, wheel in enumerate(WHEELS)
     for name, of_estimate in OF_ESTIMATE.items()
 }
 _OF_CAR = {"TRPAC.vehicle": attrgetter("TRPAC"), "TRPAC_std.vehicle": attrgetter("TRPAC_std")}
@@ -29,7 +29,7 @@ _LOADS = tuple(f"vertical_load.{wheel}" for wheel in WHEELS)
 
 
 class TrpacEstimator4W(CameraSlave):
-    """Sensors of the car and camera frames in, TRPAC, flag and K_v of each wheel and the car's TRPAC out."""
+    """The unit with sensors and frames of the car as inputs, and TRPAC of each wheel and of the car as outputs."""
 
     variables: ClassVar[tuple[Variable, ...]] = TRPAC_ESTIMATOR_4W
     volatile: ClassVar[frozenset[str]] = frozenset(v.name for v in TRPAC_ESTIMATOR_4W if v.binary)
@@ -69,15 +69,15 @@ class TrpacEstimator4W(CameraSlave):
         )
 
     def shown(self, name: str) -> Value:
-        """An output, from the last estimate of its wheel or of the car."""
+        """Value of an output, from the last estimate of its wheel or of the car."""
         estimate = self._estimator.last
         if name in _OF_CAR:
             of_car: Value = _OF_CAR[name](estimate)
             return of_car
-        place, of_estimate = _OF_WHEEL[name]
-        of_wheel: Value = of_estimate(estimate.wheels[place])
+        index, of_estimate = _OF_WHEEL[name]
+        of_wheel: Value = of_estimate(estimate.wheels[index])
         return of_wheel
 
     def problems(self, estimate: CarEstimate) -> Iterable[tuple[str, str]]:
-        """Unusable readings, by the wheel that holds."""
+        """Unusable readings by wheel."""
         return ((who, f"{who}: {text}") for who, text in estimate.problems)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -16,8 +17,8 @@ from .packaging import Slave
 
 ROOT = Path(__file__).parent.parent
 CORE_FILES = {
-    place: ROOT / place
-    for place in (
+    path: ROOT / path
+    for path in (
         "trpac_core/__init__.py",
         "trpac_core/errors.py",
         "trpac_core/files.py",
@@ -27,9 +28,10 @@ CORE_FILES = {
         "trpac_core/parameters/variables.py",
     )
 }
-"""What every unit carries of the core."""
+"""Files of the core in every unit."""
 NETWORKS = (networks_folder() / "segmenter.onnx", networks_folder() / "surface.onnx")
 STEP_S, STOP_S = 0.001, 10.0
+"""Step and end of the default experiment [s]."""
 
 ESTIMATOR_PACKAGES = {"numpy": "numpy", "cv2": "opencv-python-headless", "onnxruntime": "onnxruntime"}
 ESTIMATOR_FILES = (
@@ -53,11 +55,12 @@ PLANT_MODULES = (
     "scenarios/strict.py",
     "scenarios/yaml_text.py",
     "scenarios/effects",
+    "scenarios/plant/__init__.py",
     "scenarios/plant/dynamics.py",
     "scenarios/plant/parameters.py",
     "scenarios/plant/pipeline.py",
 )
-"""What the plant is made of, without its sensors and what they need."""
+"""Files of the plant in its unit, without its sensors and their imports."""
 
 
 def _info(name: str, description: str) -> UnitInfo:
@@ -70,28 +73,26 @@ def _info(name: str, description: str) -> UnitInfo:
     )
 
 
+_estimator = partial(
+    Slave, modules={"trpac_core": ROOT / "trpac_core"}, packages=ESTIMATOR_PACKAGES, resources=NETWORKS
+)
+
 UNITS = {
-    "TrpacEstimator": Slave(
+    "TrpacEstimator": _estimator(
         _info(
             "TrpacEstimator",
             "Peak adhesion coefficient of tyre and road at one wheel, from dynamics and camera",
         ),
         files=(*ESTIMATOR_FILES, "interface.py", "trpac_estimator.py"),
         variables=TRPAC_ESTIMATOR,
-        modules={"trpac_core": ROOT / "trpac_core"},
-        packages=ESTIMATOR_PACKAGES,
-        resources=NETWORKS,
     ),
-    "TrpacEstimator4W": Slave(
+    "TrpacEstimator4W": _estimator(
         _info(
             "TrpacEstimator4W",
             "Peak adhesion coefficient of tyre and road at four wheels and of the car, from dynamics and camera",
         ),
         files=(*ESTIMATOR_FILES, "interface_4w.py", "trpac_estimator_4w.py"),
         variables=TRPAC_ESTIMATOR_4W,
-        modules={"trpac_core": ROOT / "trpac_core"},
-        packages=ESTIMATOR_PACKAGES,
-        resources=NETWORKS,
     ),
     "ReferencePlant": Slave(
         _info(
@@ -99,11 +100,7 @@ UNITS = {
         ),
         files=("interface_plant.py", "reference_plant.py"),
         variables=REFERENCE_PLANT,
-        modules={
-            "scenarios/plant/__init__.py": Path(__file__).parent / "carried_plant.py",
-            **CORE_FILES,
-            **{place: ROOT / place for place in PLANT_MODULES},
-        },
+        modules=CORE_FILES | {path: ROOT / path for path in PLANT_MODULES},
         packages=PLANT_PACKAGES,
         resources=(),
         compiled="scenarios",
@@ -117,4 +114,4 @@ UNITS = {
         resources=(),
     ),
 }
-"""Units by the name that `build_fmu.py --slave` takes."""
+"""Units by the name for `build_fmu.py --slave`."""

@@ -1,4 +1,4 @@
-"""Errors of scenario files, and what an error says of an unknown word."""
+"""Errors of scenario files, and hints on unknown words."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from trpac_core.errors import TrpacError
 
 
 class ScenarioError(TrpacError):
-    """A scenario, camera, road or manoeuvre file is wrong: what, where, what was expected, how to mend."""
+    """A scenario, camera, road or manoeuvre file is wrong; the text says what, where, and what was expected."""
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """A closing sentence for an error about an unknown word: what it may have meant, or what is known."""
+    """Last sentences of an error about an unknown word: the closest known word, and all known words."""
     words = list(known)
     close = get_close_matches(word, words, n=1)
     hint = f"did you mean {close[0]!r}? " if close else ""

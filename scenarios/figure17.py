@@ -9,12 +9,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from scenarios.runner import ESTIMATORS, Run
+from scenarios.metrics import ESTIMATORS
+from scenarios.runner import Run
 from trpac_core.vehicle import WHEELS
 
 COLOURS = {"IFE": "#d08a00", "DE": "#7fb2e5", "DIFE": "#c0272d"}
 WIDTHS = {"IFE": 1.1, "DE": 3.0, "DIFE": 1.3}
-"""DE lies as a band under DIFE, so that both are seen where they agree."""
+"""Line widths; DE is a band under DIFE, so that both are visible where they agree."""
 TRUTH = "#222222"
 ROAD = {"dry": "#eeeeea", "wet": "#d3e0ec", "snow_ice": "#f2f6fb"}
 
@@ -51,7 +52,7 @@ def draw_figure17(run: Run, path: Path) -> None:
 
 
 def _shade_road(axis: Axes, run: Run, time: np.ndarray) -> None:
-    """Colour the background by the surface that lies under the wheel."""
+    """Colour the background by the surface under the wheel."""
     segment = run.table["segment"].to_numpy()
     for index in np.unique(segment):
         here = time[segment == index]
@@ -93,11 +94,11 @@ def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray) -> None:
     axis.plot(time, table["theta_true"], color=TRUTH, lw=2.2, label="true TRPAC")
     for name, column in ESTIMATORS.items():
         axis.plot(time, table[column], color=COLOURS[name], lw=WIDTHS[name], label=name)
-    spread = 2.0 * table["TRPAC_std"]
+    two_std = 2.0 * table["TRPAC_std"]
     axis.fill_between(
         time,
-        table["TRPAC"] - spread,
-        table["TRPAC"] + spread,
+        table["TRPAC"] - two_std,
+        table["TRPAC"] + two_std,
         color=COLOURS["DIFE"],
         alpha=0.10,
         lw=0,

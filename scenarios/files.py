@@ -1,6 +1,6 @@
 """The YAML files that describe a scenario: vehicle, road, manoeuvre, and the scenario that names them.
 
-Every loader reads strictly and raises one ScenarioError that lists all problems of its file.
+Every loader raises one ScenarioError with all problems of its file.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Friction = Annotated[float, Field(ge=0.001, le=1.5)]
 Name = Annotated[str, Field(max_length=200)]
 Description = Annotated[str, Field(max_length=5_000)]
 
-# From a model car to a mining truck [kg, m, kg m^2, N m, N]; from a pulse of a millisecond to a day's drive.
+# Bounds from a model car to a mining truck [kg, m, kg m^2, N m, N], and from a pulse of 1 ms to a day's drive [s].
 Mass = Annotated[float, Field(ge=1.0, le=1e6)]
 Length = Annotated[float, Field(ge=0.01, le=100.0)]
 Height = Annotated[float, Field(ge=0.0, le=100.0)]
@@ -36,12 +36,12 @@ Inertia = Annotated[float, Field(ge=1e-4, le=1e6)]
 PeakTorque = Annotated[float, Field(ge=0.01, le=1e6)]
 Torque = Annotated[float, Field(ge=-1e6, le=1e6)]
 Stiffness = Annotated[float, Field(ge=100.0, le=1e9)]
-Place = Annotated[float, Field(ge=-1e7, le=1e7)]
+Position = Annotated[float, Field(ge=-1e7, le=1e7)]
 Time = Annotated[float, Field(ge=0.0, le=1e5)]
 Duration = Annotated[float, Field(ge=1e-3, le=1e5)]
 Noise = Annotated[float, Field(ge=0.0, le=1e5)]
 LONGEST_RUN_S = 3600.0
-"""A simulated drive ends by then: an hour [s]."""
+"""Longest simulated drive [s]."""
 
 
 class _FileModel(BaseModel):
@@ -56,7 +56,7 @@ class TyreSection(_FileModel):
 
 
 class VehicleFile(_FileModel):
-    """vehicle.yaml: the vehicle, and which effects the simulation models of it."""
+    """vehicle.yaml: the vehicle, and its effects in the simulation."""
 
     schema_: Literal[1] = Field(alias="schema")
     name: Name
@@ -71,14 +71,14 @@ class VehicleFile(_FileModel):
     tyre: TyreSection
     effects: dict[str, dict[str, float]] = Field(default_factory=dict)
     forms: dict[str, str] = Field(default_factory=dict)
-    """Which form of an effect is meant, where there are several; else the plant's own."""
+    """Form of an effect by its id, where there are several; by default the plant's own."""
 
     @model_validator(mode="after")
     def _check(self) -> VehicleFile:
         problems = [text for key, form in self.forms.items() for text in self._problems_of_form(key, form)]
         try:
             core = self.to_core()
-        except ValueError as error:  # what its effects may be depends on the car
+        except ValueError as error:  # bounds of effects depend on the car
             problems.append(str(error))
         else:
             problems += [
@@ -91,7 +91,7 @@ class VehicleFile(_FileModel):
         return self
 
     def to_core(self) -> Vehicle:
-        """The vehicle as the estimator knows it."""
+        """The vehicle of the estimator."""
         return Vehicle(
             mass_kg=self.mass_kg,
             wheelbase_m=self.wheelbase_m,
@@ -106,7 +106,7 @@ class VehicleFile(_FileModel):
         )
 
     def _rolling_moment(self) -> float:
-        """The rolling resistance that acts in a wheel's own balance of torque [-]."""
+        """Coefficient of the rolling resistance that acts as a moment on the wheels [-]."""
         key = "rolling_resistance"
         at_the_wheels = self.forms.get(key, "") in ("", EFFECTS[key].form)
         return self.effects.get(key, {}).get("coefficient", 0.0) if at_the_wheels else 0.0
@@ -122,7 +122,7 @@ class VehicleFile(_FileModel):
         return [f"forms.{effect_id} is {form!r}; expected one of {', '.join(map(repr, known))}."]
 
     def make_effects(self) -> tuple[Effect, ...]:
-        """The effects that the file switches on, in the order in which they act."""
+        """The effects of the file, in the order in which they act."""
         core, order = self.to_core(), list(EFFECTS)
         made = [
             make_effect(key, values, core, self.forms.get(key, "")) for key, values in self.effects.items()
@@ -131,9 +131,9 @@ class VehicleFile(_FileModel):
 
 
 class RoadSegment(_FileModel):
-    """One stretch of road; it holds to the next one's start. Its sides may have other surfaces than `surface`."""
+    """A stretch of road up to the next one's start; its sides may have other surfaces than `surface`."""
 
-    start_m: Place
+    start_m: Position
     mu_left: Friction
     mu_right: Friction
     surface: SurfaceName
@@ -171,12 +171,12 @@ class RoadFile(_FileModel):
         return self
 
     def segment_at(self, position_m: float) -> RoadSegment:
-        """The segment under a place on the road [m]."""
+        """The segment at a position on the road [m]."""
         return next((s for s in reversed(self.segments) if s.start_m <= position_m), self.segments[0])
 
 
 class Pulse(_FileModel):
-    """A trapezoidal torque pulse: rises from start_s and falls to 0 at end_s, over ramp_s each [N m, s]."""
+    """A trapezoidal torque pulse that rises from start_s and falls to 0 at end_s, over ramp_s each [N m, s]."""
 
     start_s: Time
     end_s: Duration
@@ -223,7 +223,7 @@ class Manoeuvre(_FileModel):
 
 
 class End(_FileModel):
-    """When a drive ends: at a place (of the front axle) or a time, whichever comes first."""
+    """The end of a drive: a position of the front axle or a time, whichever is first."""
 
     position_m: Annotated[float, Field(gt=0.0, le=1e6)]
     time_s: Annotated[float, Field(gt=0.0, le=LONGEST_RUN_S)]
@@ -239,7 +239,7 @@ class SensorNoise(_FileModel):
 
 
 class Pictures(_FileModel):
-    """How the camera's pictures are disturbed and stored."""
+    """Disturbance and storage of the camera's pictures."""
 
     disturbance: Literal["paper", "none"] = "none"
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 90
@@ -247,7 +247,7 @@ class Pictures(_FileModel):
 
 
 class ScenarioFile(_FileModel):
-    """scenario.yaml as written; paths are relative to it."""
+    """The content of scenario.yaml; paths are relative to it."""
 
     schema_: Literal[1] = Field(alias="schema")
     name: Name
@@ -266,7 +266,7 @@ class ScenarioFile(_FileModel):
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scenario with all its files read; camera_path is None without camera."""
+    """A scenario with the content of its files; camera_path is None without camera."""
 
     path: Path
     name: str
@@ -284,22 +284,22 @@ class Scenario:
 
 
 def load_vehicle(path: str | Path) -> VehicleFile:
-    """Read vehicle.yaml, or the shipped vehicle of a name; raises ScenarioError."""
+    """The vehicle of a vehicle.yaml, or the shipped one of a name; raises ScenarioError."""
     return load_strict(located("vehicle", path), VehicleFile)
 
 
 def load_road(path: str | Path) -> RoadFile:
-    """Read road.yaml, or the shipped road of a name; raises ScenarioError."""
+    """The road of a road.yaml, or the shipped one of a name; raises ScenarioError."""
     return load_strict(located("road", path), RoadFile)
 
 
 def load_manoeuvre(path: str | Path) -> Manoeuvre:
-    """Read manoeuvre.yaml, or the shipped manoeuvre of a name; raises ScenarioError."""
+    """The manoeuvre of a manoeuvre.yaml, or the shipped one of a name; raises ScenarioError."""
     return load_strict(located("manoeuvre", path), Manoeuvre)
 
 
 def load_scenario(path: str | Path) -> Scenario:
-    """Read scenario.yaml, or the shipped one of a name, and the files that it names; raises ScenarioError."""
+    """The scenario of a scenario.yaml, or the shipped one of a name, with its files; raises ScenarioError."""
     path = located("scenario", path)
     file = load_strict(path, ScenarioFile)
     problems: list[str] = []

@@ -1,10 +1,10 @@
-"""How the gains K and gamma come about: from a stated bandwidth, a stated noise level and a stated accuracy.
+"""Design of the gains K and gamma from a bandwidth, a noise level and an accuracy.
 
-The force observer and the estimator are a cascade. K is bounded from above by what the wheel's equation leaves out
-(motor torque lag and driveline torsion, from about 10 Hz on), so K is put at that corner. gamma is bounded by the
-cascade (its loop must stay slower than the observer that feeds it, by `SEPARATION`) and by noise: at the tyre's least
-useful excitation two standard deviations of the estimate must stay within the paper's steady-state error of 0.02.
-The largest gamma that keeps both is taken.
+The force observer and the estimator are a cascade. K is bounded by the dynamics that the wheel's equation neglects
+(motor torque lag and driveline torsion, from about 10 Hz on), and is set to that corner. gamma is bounded by the
+cascade, whose outer loop must be slower than the observer by `SEPARATION`, and by noise: at the least useful excitation
+two standard deviations of the estimate must be within the paper's steady-state error of 0.02. gamma is the largest
+value that satisfies both.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from trpac_core.tyre import friction_by_slip, friction_by_theta, onset_slip
 from trpac_core.vehicle import Vehicle
 
 SEPARATION = 5.0
-"""Ratio of the observer's to the estimator's bandwidth that keeps the two loops of the cascade apart [-]."""
+"""Ratio of the observer's to the estimator's bandwidth [-]."""
 
 
 @dataclass(frozen=True)
 class DesignPoint:
-    """What the design rests on; the noise is that of the sensors in the delivered scenarios.
+    """Requirements and operating point of the design; the noise is that of the sensors in the shipped scenarios.
 
-    The operating point is the hardest of the paper's simulation: the middle-friction road at full motor torque.
+    The operating point is that of least excitation in the paper's simulation: the road of middle friction at full motor
+    torque.
     """
 
     force_bandwidth_hz: float = 10.0
@@ -45,7 +46,7 @@ class DesignPoint:
 
 @dataclass(frozen=True)
 class Design:
-    """Gains [1/s] and the standard deviation of theta_hat that sensor noise leaves [-]."""
+    """Gains [1/s], and the standard deviation of theta_hat under sensor noise [-]."""
 
     K: float
     gamma: float
@@ -53,7 +54,7 @@ class Design:
 
 
 def linearised(point: DesignPoint, vehicle: Vehicle, K: float, gamma: float) -> control.StateSpace:
-    """Observer and estimator around an excited operating point.
+    """Linear system of observer and estimator at an excited operating point.
 
     States: s and theta_hat; inputs: errors of wheel torque, wheel speed and vehicle speed; output: theta_hat.
     """
@@ -85,7 +86,7 @@ def theta_deviation(point: DesignPoint, vehicle: Vehicle, K: float, gamma: float
 
 
 def design_gains(point: DesignPoint, vehicle: Vehicle) -> Design:
-    """K from the bandwidth, gamma as large as separation and noise allow."""
+    """The gains: K from the bandwidth, the largest gamma that separation and noise allow."""
     K = 2.0 * math.pi * point.force_bandwidth_hz
     gamma = K / SEPARATION
     if theta_deviation(point, vehicle, K, gamma) > point.theta_deviation:

@@ -1,4 +1,4 @@
-"""Reports as one HTML page that needs nothing beside it; what is not ours in it is text, whatever it holds."""
+"""Reports as one HTML page without further files; inserted values are escaped."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import jinja2
 
 
 def page(template: Path, filters: Mapping[str, Callable[..., Any]], **content: Any) -> str:
-    """The page of a template; each value is escaped, and one that the template wants and is not there is an error."""
+    """The page of a template; values are escaped, and a missing one is an error."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(template.parent),
         autoescape=True,
@@ -24,5 +24,5 @@ def page(template: Path, filters: Mapping[str, Callable[..., Any]], **content: A
 
 
 def data_address(data: bytes, media_type: str = "image/png") -> str:
-    """A picture as the address that holds it."""
+    """A picture as a data URL."""
     return f"data:{media_type};base64,{b64encode(data).decode('ascii')}"

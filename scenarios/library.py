@@ -1,4 +1,4 @@
-"""What comes with the package, by name: scenarios, vehicles, roads, manoeuvres, cameras and sweeps."""
+"""Files that are shipped with the package, by name: scenarios, vehicles, roads, manoeuvres, cameras and sweeps."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ FOLDERS = {
     "sweep": "sweeps",
 }
 """Folder of each kind of file."""
+PAPER_VEHICLE = "four_in_wheel_motor_ev"
+"""Shipped vehicle with the values of Table 3 in Tian et al. 2022."""
 
 
 def networks_folder() -> Path:
@@ -25,18 +27,18 @@ def networks_folder() -> Path:
 
 
 def shipped(kind: str) -> dict[str, Path]:
-    """The shipped files of a kind by their names, in alphabetical order."""
+    """Paths of the shipped files of a kind by name, in alphabetical order."""
     folder = Path(str(files(__package__))) / FOLDERS[kind]
     return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
 
 
 def located(kind: str, given: str | Path) -> Path:
-    """The file that is meant: a path as it is, and a word without ending and folder as the shipped file of that name.
+    """The path of a file: a path as given, or the shipped file of a name without ending and folder.
 
     Raises
     ------
     ScenarioError
-        A word that is neither a file nor a shipped name.
+        A name that is neither a file nor shipped.
     """
     path = Path(given)
     if path.suffix or len(path.parts) != 1 or path.exists():

@@ -1,4 +1,4 @@
-"""How well each estimator did, per stretch of road: error, convergence, excitation."""
+"""Scores of estimators per stretch of road: error, convergence, excitation."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
+"""The estimators of this project, and the unit's output of each."""
 CONVERGED_SHARE = 0.05
-"""An estimator has converged when its error stays within this share of the friction step [-]."""
+"""Error within which an estimator has converged, as a share of the step of friction [-]."""
 STEADY_SHARE = 0.3
-"""The last share of a segment's excited time, over which the steady-state error is taken [-]."""
+"""Last share of a stretch's excited time, over which the steady-state error is averaged [-]."""
 
 
 @dataclass(frozen=True)
 class SegmentScore:
-    """One estimator on one stretch of road; None where there is nothing to measure.
+    """The scores of an estimator on a stretch of road; None where there is nothing to measure.
 
     Attributes
     ----------
@@ -49,7 +51,7 @@ def score_segment(
     excited: NDArray[np.bool_],
     step_s: float,
 ) -> SegmentScore:
-    """Score an estimate over the steps that the wheel spends on one stretch.
+    """The scores of an estimate over the steps of the wheel on one stretch.
 
     Parameters
     ----------
@@ -87,7 +89,7 @@ def score_run(
     excited: NDArray[np.bool_],
     step_s: float,
 ) -> dict[str, list[dict[str, Any]]]:
-    """Score every estimator on every stretch that the wheel reached.
+    """The scores of every estimator on every stretch that the wheel reached.
 
     Parameters
     ----------
@@ -100,7 +102,7 @@ def score_run(
     estimates : dict of arrays, shape (n,)
         By estimator [-].
     excited : array, shape (n,)
-        DIFE's start/stop flag: one clock for all estimators, so that their times can be compared.
+        DIFE's start/stop flag, by which the excited time of all estimators is counted.
     step_s : float
         Step [s].
 

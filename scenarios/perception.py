@@ -1,9 +1,9 @@
 """The camera chain of a simulated drive: perception columns for a plant log.
 
-One picture per frame interval. From each the chain judges a stretch of road ahead, as long as the way driven since
-the picture before, and stamps the result with it, Eq. (11) of Tian et al. 2022 (doi:10.3390/rs14215583). Without
-effects the stamp is where the camera looked, the class is the road's but for rare mistakes and a blend at borders,
-and the confidence wanders about its normal level from picture to picture.
+Each picture gives the class of a stretch of road ahead, as long as the distance driven since the picture before, and is
+stamped with it, Eq. (11) of Tian et al. 2022 (doi:10.3390/rs14215583). Without effects the stamp is exact, the class is
+the road's except for rare errors and a blend at borders, and the logit of the confidence is a first-order
+autoregression around its normal level.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ Columns = dict[str, NDArray]
 
 NORMAL_CONFIDENCE = 0.95
 """Median Q_v of undisturbed pictures: 0.97 of our networks on rendered roads, a little less for a real one [-]."""
-CONFIDENCE_SPREAD = 0.8
+CONFIDENCE_DEVIATION = 0.8
 """Standard deviation of the confidence's logit; with the median above 90 % of the pictures lie above 0.86 [-]."""
 CONFIDENCE_MEMORY_S = 0.15
-"""Time over which the confidence forgets itself: neighbouring pictures show much the same road [s]."""
+"""Correlation time of the confidence: successive pictures show nearly the same road [s]."""
 WRONG_SHARE = 0.02
-"""Share of pictures whose class is wrong though nothing disturbs them: the paper's 1.5 of 100, rounded up; our
+"""Share of undisturbed pictures with a wrong class: the paper's 1.5 of 100, rounded up; our
 networks are wrong in 12 on rendered roads (docs/camera_scores.md), in runs, as in
 benchmarks/accuracy/random_drives.py [-]."""
 BORDER_BLEND_M = 0.1
-"""Way about a border over which either class may be given: borders are no sharp lines, and the position wanders [m]."""
+"""Standard deviation of the position of a border between classes, which is not sharp [m]."""
 REFERENCE_NOISE = 0.01
 """Standard deviation of the friction reference [-]."""
 
@@ -52,15 +52,15 @@ def perceive(
     Parameters
     ----------
     trajectory : PlantTrajectory
-        The true motion.
+        The motion.
     road, vehicle : RoadFile, VehicleFile
-        Its surfaces, and the car with the effects that are switched on.
+        Its surfaces, and the car with its effects.
     fps : float
         Pictures per second [Hz].
     camera : Camera
-        Height and place of the lens; the default is that of scenarios/cameras/paper.yaml.
+        Height and position of the lens; the default is that of scenarios/cameras/paper.yaml.
     seed : int
-        The same seed gives the same mistakes and noise.
+        Seed of errors and noise.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def perceive(
 def plain_frames(
     trajectory: PlantTrajectory, vehicle: VehicleFile, fps: float, camera: Camera, random: np.random.Generator
 ) -> Frames:
-    """The chain without any effect."""
+    """The frames of the chain without effects."""
     to_camera_m = vehicle.to_core().cog_to_front_axle_m + camera.x_from_front_axle_m
     drive_camera_m = trajectory.position_m + to_camera_m
     begin, end = trajectory.time_s[0], trajectory.time_s[-1]
@@ -109,7 +109,9 @@ def plain_frames(
         stamp_camera_m=camera_m,
         stamped_m=ahead,
         seen_m=ahead,
-        confidence=expit(logit(NORMAL_CONFIDENCE) + CONFIDENCE_SPREAD * _wandering(len(time_s), fps, random)),
+        confidence=expit(
+            logit(NORMAL_CONFIDENCE) + CONFIDENCE_DEVIATION * _autoregression(len(time_s), fps, random)
+        ),
         wrong_share=np.full(len(time_s), WRONG_SHARE),
         camera_height_m=camera.height_m,
         class_friction=np.array([CLASS_THETA[s] for s in Surface]),
@@ -119,14 +121,14 @@ def plain_frames(
 
 
 def surfaces_at(road: RoadFile, position_m: Array) -> NDArray[np.intp]:
-    """Class index of road.yaml's surface at places, same shape; the first segment also holds before it."""
+    """Class index of the road's surface at positions, same shape; the first segment also holds before its start."""
     starts = np.array([s.start_m for s in road.segments[1:]])
     classes = np.array([int(s.surface_class) for s in road.segments])
     return classes[np.searchsorted(starts, position_m, side="right")]
 
 
-def _wandering(count: int, fps: float, random: np.random.Generator) -> Array:
-    """A first-order autoregression of unit variance."""
+def _autoregression(count: int, fps: float, random: np.random.Generator) -> Array:
+    """A first-order autoregression of unit variance, shape (count,)."""
     from scipy.signal import lfilter  # here, since its import is slow
 
     keep = np.exp(-1.0 / (fps * CONFIDENCE_MEMORY_S))
@@ -138,7 +140,7 @@ def _wandering(count: int, fps: float, random: np.random.Generator) -> Array:
 def _judged(
     road: RoadFile, seen_m: Array, wrong_share: Array, random: np.random.Generator
 ) -> NDArray[np.intp]:
-    """The class that each picture is given: that of the middle of what it shows, blended and sometimes wrong."""
+    """Class index of each picture: that of the middle of its stretch, with blended borders and random errors."""
     count = len(seen_m)
     middle = seen_m.mean(axis=1) + BORDER_BLEND_M * random.standard_normal(count)
     classes = surfaces_at(road, middle)
@@ -148,7 +150,7 @@ def _judged(
 
 
 def _held(time_s: Array, frames: Frames, classes: NDArray[np.intp]) -> Columns:
-    """Results in the log's rows: each from its arrival until the next one's."""
+    """Perception columns: each result holds from its arrival until the next one's."""
     stamps = frames.stamp_camera_m[:, None] + frames.stamped_m
     newest = np.searchsorted(frames.arrival_s, time_s, side="right") - 1
     none = newest < 0

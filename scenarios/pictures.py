@@ -1,8 +1,7 @@
-"""The camera's pictures of a scenario, rendered, disturbed and written as a camera's recorder would."""
+"""The camera's pictures of a scenario: rendered, disturbed and written as JPEG."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,21 +13,22 @@ from joblib import Parallel, delayed
 from scenarios.camera.disturbances import NONE, PAPER, disturb
 from scenarios.camera.files import load_camera
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.errors import ScenarioError
 from scenarios.files import Scenario
 from scenarios.plant.pipeline import PlantTrajectory
+from scenarios.progress import Progress, silent
 
 WORKERS = 2
-"""Processes that render: each holds one world of some 100 MB."""
+"""Rendering processes, of about 100 MB each."""
 DISTURBANCES = {"none": NONE, "paper": PAPER}
-LOOK_STREAM = 101
-"""Keeps the scenario's world apart from the streams of its sensors and disturbances."""
+SCENE_STREAM = 101
+"""Random stream of the scenario's world, apart from those of sensors and disturbances."""
 
 
 @dataclass(frozen=True)
 class PictureJob:
-    """All that it takes to draw some frames in a process of its own."""
+    """Frames to render in one process."""
 
     scenario: Scenario
     frames: tuple[tuple[int, float], ...]
@@ -36,20 +36,20 @@ class PictureJob:
     folder: Path
 
 
-def scene(scenario: Scenario) -> Renderer:
-    """The scenario's world; the same seed gives the same one. Raises ScenarioError where there is no camera."""
+def scene_renderer(scenario: Scenario) -> Renderer:
+    """The renderer of the scenario's world, by its seed; raises ScenarioError where there is no camera."""
     if scenario.camera_path is None:
         raise ScenarioError(
             f"{scenario.path}: camera: missing; expected a camera file, to draw pictures through."
         )
     segments = [SurfaceSegment(s.start_m, s.surface_class) for s in scenario.road.segments]
-    look = SceneLook.random(np.random.default_rng([scenario.seed, LOOK_STREAM]))
-    return Renderer(load_camera(scenario.camera_path), segments, look)
+    scene = Scene.random(np.random.default_rng([scenario.seed, SCENE_STREAM]))
+    return Renderer(load_camera(scenario.camera_path), segments, scene)
 
 
 def draw(job: PictureJob) -> int:
-    """Draw one job's frames; returns how many."""
-    renderer, pictures = scene(job.scenario), job.scenario.pictures
+    """Render and write the frames of a job; returns their number."""
+    renderer, pictures = scene_renderer(job.scenario), job.scenario.pictures
     quality = [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality]
     for number, position_m in job.frames:
         image = renderer.frame(position_m).image
@@ -75,23 +75,14 @@ def record(
     scenario: Scenario,
     trajectory: PlantTrajectory,
     folder: Path,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = silent,
 ) -> pd.DataFrame:
-    """Draw all pictures of a drive.
-
-    Parameters
-    ----------
-    scenario, trajectory : Scenario, PlantTrajectory
-        World and camera, and the drive through it.
-    folder : Path
-        Where the pictures go.
-    progress : callable
-        Told how many of how many pictures are done.
+    """Render and write all pictures of a drive; returns a table of them.
 
     Returns
     -------
     DataFrame
-        frame, row (of the trajectory), time_s, front_axle_m, path. Without a camera it is empty.
+        frame, row (of the trajectory), time_s, front_axle_m, path; empty without a camera.
     """
     columns = ["frame", "row", "time_s", "front_axle_m", "path"]
     if scenario.camera_path is None:
@@ -99,7 +90,7 @@ def record(
     rows = np.arange(0, len(trajectory), frame_steps(scenario))
     front_axle_m = trajectory.position_m[rows] + scenario.vehicle.to_core().cog_to_front_axle_m
     folder.mkdir(parents=True, exist_ok=True)
-    frames = [(number, float(place)) for number, place in enumerate(front_axle_m, start=1)]
+    frames = [(number, float(axle_m)) for number, axle_m in enumerate(front_axle_m, start=1)]
     batch = max(1, -(-len(frames) // (4 * WORKERS)))
     jobs = [PictureJob(scenario, tuple(frames[i : i + batch]), folder) for i in range(0, len(frames), batch)]
     done = 0

@@ -1,4 +1,4 @@
-"""report.html of a run: one file that needs nothing beside it."""
+"""report.html of a run, in one file."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ TEMPLATE = Path(__file__).with_name("report.html.jinja")
 DASH = "–"
 
 
-def write_report(run: Run, figure: Path, looks: Path | None, path: Path) -> None:
-    """Write the report of a run around its figure and, where there was a camera, its sheet of pictures."""
+def write_report(run: Run, figure: Path, overlay: Path | None, path: Path) -> None:
+    """Write the report of a run with its figure and, where there was a camera, its sheet of pictures."""
     text = page(
         TEMPLATE,
         {"number": number},
         run=run,
         summary=run.summary,
         rows=score_rows(run.summary),
-        verdict=verdict(run.summary),
+        conclusion=conclusion(run.summary),
         figure=data_address(figure.read_bytes()),
-        looks=data_address(looks.read_bytes(), "image/jpeg") if looks is not None else None,
+        overlay=data_address(overlay.read_bytes(), "image/jpeg") if overlay is not None else None,
     )
     path.write_text(text, encoding="utf-8")
 
 
 def score_rows(summary: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """Estimator and score, stretch by stretch, as a table shows them."""
+    """Rows of a table: estimator and score, stretch by stretch."""
     estimators = summary["estimators"]
     stretches = len(next(iter(estimators.values())))
     return [(name, estimators[name][i]) for i in range(stretches) for name in estimators]
 
 
-def verdict(summary: dict[str, Any]) -> str:
-    """What the run showed, in sentences that follow from its numbers."""
+def conclusion(summary: dict[str, Any]) -> str:
+    """Results of the run in sentences."""
     sentences = []
     for before, (dife, alone) in _steps(summary):
         where = f"From {before:g} to {dife['theta']:g}"
@@ -62,5 +62,5 @@ def _convergence(score: dict[str, Any]) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number as the tables show it; a dash where there is none."""
+    """A number as text; a dash for None."""
     return DASH if value is None else f"{value:.{digits}f}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 
 from scenarios.files import Scenario
 from scenarios.fmu_client.estimator import parameters, run_unit
-from scenarios.metrics import score_run
+from scenarios.metrics import ESTIMATORS, score_run
 from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
+from scenarios.progress import StageProgress, silent
 from trpac_core.files import file_sha256
 from trpac_core.vehicle import WHEELS
 
-ESTIMATORS = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
-"""The estimators that are compared, and the unit's output that holds each."""
 PACKAGES = (
     "trpac-fmu",
     "fmpy",
@@ -36,9 +35,6 @@ PACKAGES = (
     "albumentations",
 )
 
-Progress = Callable[[str, int, int], None]
-"""Told the stage, and how much of how much is done."""
-
 
 @dataclass(frozen=True)
 class Run:
@@ -47,15 +43,15 @@ class Run:
     Attributes
     ----------
     scenario : Scenario
-        What was run.
+        The scenario.
     trajectory : PlantTrajectory
-        The truth.
+        The plant's motion.
     frames : DataFrame
-        The pictures given, see `pictures.record`.
+        The pictures, see `pictures.record`.
     table : DataFrame
         One row per step: the sensors' log, the unit's outputs, theta and segment under the wheel.
     summary : dict
-        What summary.json holds.
+        Content of summary.json.
     """
 
     scenario: Scenario
@@ -69,23 +65,23 @@ def run_scenario(
     scenario: Scenario,
     fmu: Path,
     frames_folder: Path,
-    progress: Progress = lambda stage, done, total: None,
+    progress: StageProgress = silent,
     overrides: Mapping[str, float] | None = None,
 ) -> Run:
-    """Drive the plant, draw the pictures, step the unit over both, score.
+    """Results of a scenario: plant, pictures, unit and scores.
 
     Parameters
     ----------
     scenario : Scenario
-        What to run.
+        The scenario.
     fmu : Path
         The estimator unit.
     frames_folder : Path
-        Where the pictures go.
+        Folder of the pictures.
     progress : callable
-        Told the stage and how much of it is done.
+        Called with the stage, and how many of how many of its items are done.
     overrides : mapping, optional
-        Parameters of the unit, by variable name, in place of the scenario's or the delivered ones.
+        Parameters of the unit by variable name, in place of the scenario's and the default ones.
 
     Raises
     ------
@@ -109,7 +105,7 @@ def run_scenario(
 
 
 def unit_signals(log: pd.DataFrame, wheel: str) -> pd.DataFrame:
-    """The columns of a log that the unit of one wheel takes, under the unit's names."""
+    """Inputs of the unit of one wheel from a log, by the unit's names."""
     return pd.DataFrame(
         {
             "wheel_speed": log[f"wheel_speed_{wheel}_rad_s"],
@@ -121,7 +117,7 @@ def unit_signals(log: pd.DataFrame, wheel: str) -> pd.DataFrame:
 
 
 def under_the_wheel(scenario: Scenario, trajectory: PlantTrajectory) -> pd.DataFrame:
-    """True adhesion and index of the road's stretch at the wheel's contact, columns theta_true and segment."""
+    """Columns theta_true and segment: adhesion and index of the road's stretch at the wheel's contact."""
     car, column = scenario.vehicle.to_core(), WHEELS.index(scenario.wheel)
     offset_m = car.cog_to_front_axle_m if scenario.wheel.startswith("f") else -car.cog_to_rear_axle_m
     starts = segment_starts(scenario)
@@ -136,7 +132,7 @@ def segment_starts(scenario: Scenario) -> NDArray[np.float64]:
 
 
 def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path) -> dict[str, Any]:
-    """The scores of a run and what is needed to repeat it."""
+    """The content of summary.json: scores of a run, and what is needed to repeat it."""
     scores = score_run(
         segment_starts(scenario),
         table["segment"].to_numpy(),

@@ -1,4 +1,4 @@
-"""The figure of a drive on split friction: each wheel on its own side's road, and the car."""
+"""The figure of a drive on split friction: estimates of each wheel and of the car."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PANELS = (("fl", "front left"), ("fr", "front right"), ("rl", "rear left"), ("rr
 
 
 def draw_split(table: pd.DataFrame, path: Path) -> None:
-    """Write the figure: four panels placed as the wheels are, the car below, the speed last."""
+    """Write the figure: a panel per wheel, then the car, then the speed."""
     time = table["time_s"].to_numpy()
     with plt.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}):
         figure, axes = plt.subplot_mosaic(
@@ -40,14 +40,14 @@ def draw_split(table: pd.DataFrame, path: Path) -> None:
         plt.close(figure)
 
 
-def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray, place: str) -> None:
-    theta, deviation = table[f"TRPAC.{place}"].to_numpy(), table[f"TRPAC_std.{place}"].to_numpy()
-    if f"excitation_flag.{place}" in table:
-        excited = table[f"excitation_flag.{place}"].to_numpy() > 0.5
+def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray, suffix: str) -> None:
+    theta, deviation = table[f"TRPAC.{suffix}"].to_numpy(), table[f"TRPAC_std.{suffix}"].to_numpy()
+    if f"excitation_flag.{suffix}" in table:
+        excited = table[f"excitation_flag.{suffix}"].to_numpy() > 0.5
         axis.fill_between(
             time, 0.0, 1.2, where=excited, color=EXCITED, linewidth=0.0, label="tyre excited", step="mid"
         )
-        seen = np.where(table[f"flag.{place}"] > 0.5, table[f"TRPAC_image.{place}"], np.nan)
+        seen = np.where(table[f"flag.{suffix}"] > 0.5, table[f"TRPAC_image.{suffix}"], np.nan)
         axis.plot(time, seen, color=CAMERA, linewidth=1.0, label="camera's class")
     axis.fill_between(
         time,
@@ -58,7 +58,7 @@ def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray, place: str) ->
         linewidth=0.0,
         label="+-2 TRPAC_std",
     )
-    axis.plot(time, table[f"theta.{place}"], color=TRUTH, linewidth=1.2, linestyle="--", label="true")
+    axis.plot(time, table[f"theta.{suffix}"], color=TRUTH, linewidth=1.2, linestyle="--", label="true")
     axis.plot(time, theta, color=ESTIMATE, linewidth=1.4, label="TRPAC")
     axis.set_ylim(0.0, 1.2)
     axis.set_ylabel("theta [-]")

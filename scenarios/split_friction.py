@@ -2,33 +2,26 @@
 
 ``python -m scenarios.split_friction --plant P.fmu --estimator E.fmu --out DIR [--pictures] [--figure FILE.png]``
 
-The car comes at 22 m/s onto a road whose left side is ice, later its right side, and brakes in pulses. In a pulse each
-wheel is braked to a share of what its own road carries, as anti-lock control does. The camera side is either the
-plant's class by bus or rendered pictures that show each side's surface.
+The car enters at 22 m/s a road whose left side, and later right side, is ice, and brakes in pulses to a share of each
+wheel's theta F_z, as anti-lock control does. The camera side is the plant's class by bus, or rendered pictures.
 """
 
 from __future__ import annotations
 
 import argparse
-import shutil
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pandas as pd
-from fmpy.fmi2 import FMU2Slave
 
 from scenarios.camera.files import load_camera
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.camera.split import SplitRenderer
 from scenarios.files import load_road, load_vehicle
 from scenarios.fmu_client.archives import UnitFileError
-from scenarios.fmu_client.opening import opened_unit
-from scenarios.fmu_client.unpacking import unpack_unit
+from scenarios.fmu_client.opening import Instance, opened
 from trpac_core.car_friction import Friction, car_friction
 from trpac_core.vehicle import WHEELS
 
@@ -40,60 +33,22 @@ CAMERA = HERE / "cameras" / "paper.yaml"
 PLANT, ESTIMATOR = "ReferencePlant", "TrpacEstimator4W"
 
 STEP_S, FRAME_STEPS = 0.001, 50
+"""Communication step [s], and steps per frame."""
 START_M_S, END_M = 22.0, 95.0
+"""Speed at the start [m/s], and position of the front axle at the end [m]."""
 PULSE_S, PERIOD_S, RAMP_S = 0.4, 0.6, 0.05
+"""Length, period and ramps of a braking pulse [s]."""
 FIRST_PULSE_S = 0.3
 USED_SHARE = 0.9
 """Share of theta F_z that each wheel is braked with in a pulse [-]."""
 NOISE = {"wheel_speed": 0.01, "wheel_torque": 3.2, "vehicle_speed": 0.003, "longitudinal_acceleration": 0.05}
-"""Standard deviations as in the paper's scenario, in the units of the signals."""
+"""Standard deviations of the sensors as in the paper's scenario, in the units of the signals."""
 NAMES = ("TRPAC", "TRPAC_std", "TRPAC_image", "excitation_flag", "flag")
 
 
-class Unit:
-    """A unit in a host's hands, variables by name."""
-
-    def __init__(self, unit: FMU2Slave, description: Any, parameters: Mapping[str, float | str]) -> None:
-        self._variables = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
-        self._unit = unit
-        self._unit.setupExperiment(startTime=0.0)
-        self.set(parameters)
-        self._unit.enterInitializationMode()
-        self._unit.exitInitializationMode()
-
-    def set(self, values: Mapping[str, float | str]) -> None:
-        """Set variables of any type."""
-        for name, value in values.items():
-            reference, kind = self._variables[name]
-            getattr(self._unit, f"set{kind}")([reference], [value])
-
-    def get(self, name: str) -> float:
-        """A numeric variable's value."""
-        reference, kind = self._variables[name]
-        return float(getattr(self._unit, f"get{kind}")([reference])[0])
-
-    def at_wheels(self, name: str) -> list[float]:
-        """Values of a variable that each wheel has."""
-        references, kinds = zip(*(self._variables[f"{name}.{wheel}"] for wheel in WHEELS), strict=True)
-        return [float(value) for value in getattr(self._unit, f"get{kinds[0]}")(list(references))]
-
-    def step(self, time_s: float) -> None:
-        """One communication step."""
-        self._unit.doStep(time_s, STEP_S)
-
-
-@contextmanager
-def opened(name: str, archive: Path, parameters: Mapping[str, float | str]) -> Iterator[Unit]:
-    """A unit of this name from its file, unpacked and freed for this run alone; raises UnitFileError."""
-    folder = unpack_unit(archive)
-    try:
-        unit, description = opened_unit(archive, folder, [name], name)
-        try:
-            yield Unit(unit, description, parameters)
-        finally:
-            unit.freeInstance()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+def _at_wheels(unit: Instance, name: str) -> list[float]:
+    """Values of a variable at the wheels fl, fr, rl, rr."""
+    return [unit.get(f"{name}.{wheel}") for wheel in WHEELS]
 
 
 def pulse(time_s: float) -> float:
@@ -113,20 +68,7 @@ def run(
     seed: int = 1,
     road: Path = ROAD,
 ) -> pd.DataFrame:
-    """Drive both units over a road; returns one row per step, in the order of time.
-
-    Parameters
-    ----------
-    plant_file, estimator_file : Path
-        The units `ReferencePlant` and `TrpacEstimator4W`.
-    out : Path
-        Where pictures go.
-    pictures : bool
-        Whether the estimator sees rendered pictures, or is given the plant's class.
-    seed : int
-        Of the sensors' noise and of the pictures' world.
-    road : Path
-        The road file.
+    """Simulate both units on a road; returns one row per step.
 
     Raises
     ------
@@ -144,30 +86,30 @@ def run(
     world = _world(road, seed) if pictures else None
     rows = []
     with (
-        opened(PLANT, plant_file, start) as plant,
-        opened(ESTIMATOR, estimator_file, settings) as estimator,
+        opened(plant_file, PLANT, start) as plant,
+        opened(estimator_file, ESTIMATOR, settings) as estimator,
     ):
         step = 0
         while plant.get("position") < END_M and plant.get("vehicle_speed") > 2.0:
             share = USED_SHARE * pulse(step * STEP_S)
-            loads, thetas = plant.at_wheels("vertical_load"), plant.at_wheels("theta")
+            loads, thetas = _at_wheels(plant, "vertical_load"), _at_wheels(plant, "theta")
             torques = [-share * theta * load * radius_m for theta, load in zip(thetas, loads, strict=True)]
             estimator.set(_measured(plant, torques, rng))
             if step % FRAME_STEPS == 0:
                 estimator.set(_frame(plant, world, out / "frames", step // FRAME_STEPS + 1))
-            # Both start at the same time: what the car measures now, and what it is told to do from now on.
-            estimator.step(step * STEP_S)
+            # Both at the same time: the current measurements, and the torque from now on.
+            estimator.slave.doStep(step * STEP_S, STEP_S)
             rows.append(_row(step * STEP_S, plant, estimator, loads, thetas))
             plant.set({f"wheel_torque.{w}": torque for w, torque in zip(WHEELS, torques, strict=True)})
-            plant.step(step * STEP_S)
+            plant.slave.doStep(step * STEP_S, STEP_S)
             step += 1
     return pd.DataFrame(rows)
 
 
-def _measured(plant: Unit, torques: list[float], rng: np.random.Generator) -> dict[str, float | str]:
-    """The car's sensors: the plant's truth with noise; torque as commanded for the step to come."""
+def _measured(plant: Instance, torques: list[float], rng: np.random.Generator) -> dict[str, float | str]:
+    """Inputs of the estimator: the plant's outputs with noise, and the torque commanded for the next step."""
     values: dict[str, float | str] = {}
-    for wheel, torque, speed in zip(WHEELS, torques, plant.at_wheels("wheel_speed"), strict=True):
+    for wheel, torque, speed in zip(WHEELS, torques, _at_wheels(plant, "wheel_speed"), strict=True):
         values[f"wheel_torque.{wheel}"] = torque + NOISE["wheel_torque"] * rng.standard_normal()
         values[f"wheel_speed.{wheel}"] = speed + NOISE["wheel_speed"] * rng.standard_normal()
     for name in ("vehicle_speed", "longitudinal_acceleration"):
@@ -178,17 +120,17 @@ def _measured(plant: Unit, torques: list[float], rng: np.random.Generator) -> di
 def _world(road: Path, seed: int) -> SplitRenderer:
     segments = load_road(road).segments
     left, right = ([SurfaceSegment(s.start_m, s.surface_classes[side]) for s in segments] for side in (0, 1))
-    look = SceneLook(seed=seed, sky="overcast", sun_share=0.0, trees_per_100_m=0.0, bridges_per_100_m=0.0)
-    return SplitRenderer(load_camera(CAMERA), _joined(left), _joined(right), look)
+    scene = Scene(seed=seed, sky="overcast", sun_share=0.0, trees_per_100_m=0.0, bridges_per_100_m=0.0)
+    return SplitRenderer(load_camera(CAMERA), _joined(left), _joined(right), scene)
 
 
 def _joined(segments: list[SurfaceSegment]) -> list[SurfaceSegment]:
-    """Neighbours of one surface as one segment."""
+    """The segments with consecutive ones of the same surface joined."""
     return [s for i, s in enumerate(segments) if i == 0 or s.surface != segments[i - 1].surface]
 
 
-def _frame(plant: Unit, world: SplitRenderer | None, folder: Path, number: int) -> dict[str, float | str]:
-    """The inputs that hand a new frame over: a picture's path, or the plant's class of each side."""
+def _frame(plant: Instance, world: SplitRenderer | None, folder: Path, number: int) -> dict[str, float | str]:
+    """Inputs of a new frame: a picture's path, or the plant's class of each side."""
     if world is None:
         sides = ("left", "right")
         classes = {f"road_class.{side}": int(plant.get(f"road_class.{side}")) for side in sides}
@@ -201,12 +143,12 @@ def _frame(plant: Unit, world: SplitRenderer | None, folder: Path, number: int) 
 
 
 def _row(
-    time_s: float, plant: Unit, estimator: Unit, loads: list[float], thetas: list[float]
+    time_s: float, plant: Instance, estimator: Instance, loads: list[float], thetas: list[float]
 ) -> dict[str, float]:
     row = {"time_s": time_s, "position_m": plant.get("position"), "speed_m_s": plant.get("vehicle_speed")}
     for name in NAMES:
         row |= {
-            f"{name}.{wheel}": value for wheel, value in zip(WHEELS, estimator.at_wheels(name), strict=True)
+            f"{name}.{wheel}": value for wheel, value in zip(WHEELS, _at_wheels(estimator, name), strict=True)
         }
     row |= {f"theta.{wheel}": theta for wheel, theta in zip(WHEELS, thetas, strict=True)}
     row |= {f"vertical_load.{wheel}": load for wheel, load in zip(WHEELS, loads, strict=True)}
@@ -228,8 +170,8 @@ def main() -> int:
     )
     for option, name in (("--plant", PLANT), ("--estimator", ESTIMATOR)):
         file = Path("dist") / f"{name}.fmu"
-        told = f"unit that build_fmu.py --slave {name} makes (default: %(default)s)"
-        parser.add_argument(option, type=Path, default=file, help=told)
+        text = f"unit that build_fmu.py --slave {name} makes (default: %(default)s)"
+        parser.add_argument(option, type=Path, default=file, help=text)
     parser.add_argument(
         "--out", type=Path, default=Path("out/split_friction"), help="folder (default: %(default)s)"
     )

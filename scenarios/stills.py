@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from scenarios.library import networks_folder
+from scenarios.progress import Progress, silent
 from scenarios.whole_files import written_whole
 from trpac_core.files import quoted
 from trpac_core.vision.classes import Surface
@@ -32,32 +33,25 @@ from trpac_core.vision.scene import scene_of
 
 CLASSIFY_COLUMNS = ("file", "class", "confidence", "p_dry", "p_wet", "p_snow_ice")
 PICTURE_ENDINGS = frozenset((".jpg", ".jpeg", ".png", ".bmp", ".gif", ".heic", ".tif", ".tiff", ".webp"))
-"""Files of a folder that count as pictures: those of unsupported formats are reported, not passed over."""
+"""Endings of picture files in a folder; those of unsupported formats are reported."""
 
 LOWER_CENTRE = (0.20, 0.60, 0.80, 0.95)
-"""Where road is in the picture of a camera of which nothing is known: left, top, right, bottom [of its size]."""
+"""Region of the road in pictures of an unknown camera: left, top, right, bottom [of the size]."""
 WIDE = (0.08, 0.55, 0.92, 0.96)
-"""The same with the road's sides: water shows in what a wide field reflects."""
+"""A wider region with the sides of the road, whose reflections show water."""
 PART = 0.6
-"""Size of the overlapping parts of the lower centre that are looked at besides, of its width and height [-]."""
+"""Size of the four overlapping parts of the lower centre, of its width and height [-]."""
 LEAST_USABLE = 0.7
-"""Share of a look that must be road out of the shadow [-]."""
+"""Least share of road out of the shadow in a crop [-]."""
 LEAST_ROAD = 0.05
-"""Probability of readable road that at least one look must have: the lowest of validation stills was 0.08 [-]."""
-LEAST_LOOKS = 2
-"""With fewer looks at usable road, all are taken."""
+"""Least probability of readable road of the best crop: the lowest of validation stills was 0.08 [-]."""
+LEAST_CROPS = 2
+"""Least number of crops on usable road; with fewer, all readable crops are used."""
 _LEAST_PROBABILITY = 1e-12
-
-Progress = Callable[[int, int], None]
-"""Told how much of how much is done."""
-
-
-def silent(done: int, total: int) -> None:
-    """Progress that nobody follows."""
 
 
 def find_pictures(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:
-    """Picture files named or lying in named folders, numbers in names in their order, each once; and problems."""
+    """Picture files among the paths and in folders among them, in counting order, each once; and problems."""
     found: dict[Path, None] = {}
     problems = []
     for path in paths:
@@ -75,14 +69,14 @@ def pictures_in(folder: Path) -> list[Path]:
     files = (
         p for p in folder.iterdir() if p.suffix.lower() in PICTURE_ENDINGS and not p.name.startswith(".")
     )
-    # What is no file, as a link that leads nowhere, is to be told of, not passed over.
+    # A broken link is reported when it is read, not ignored.
     return sorted((p for p in files if not p.is_dir()), key=counting_order)
 
 
 def cell_of(name: str | Path) -> str:
-    """A file's name as a table holds it: text, though a name need not be, and no formula where people open the table.
+    """A file's name as a table cell: valid text, and no formula.
 
-    A spreadsheet runs what begins with one of = + - @; behind ./ it is the same file's name.
+    A spreadsheet runs cells that begin with one of = + - @; with ./ before it the name is of the same file.
     """
     text = os.fsencode(name).decode("utf-8", "replace")
     return f"./{text}" if text.lstrip().startswith(("=", "+", "-", "@")) else text
@@ -95,19 +89,12 @@ def counting_order(path: Path) -> tuple[list[tuple[int, int, str]], str]:
 
 
 def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tuple[pd.DataFrame, list[str]]:
-    """Surface of each picture, of any camera.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        JPEG or PNG.
-    progress : callable
-        Told how many pictures are done.
+    """Table of the surface in each picture, and problems.
 
     Returns
     -------
     DataFrame, list of str
-        Columns `CLASSIFY_COLUMNS`, one row per picture that could be judged; one sentence per other picture.
+        Columns `CLASSIFY_COLUMNS`, one row per classified picture; one sentence per other picture.
 
     Raises
     ------
@@ -132,39 +119,40 @@ def patch_logs(
 ) -> NDArray[np.float64]:
     """Mean log probability of dry, wet, snow and ice over the patches of one picture, shape (3,).
 
-    Patches of one picture share light, camera and road, so they are not the independent bodies of evidence that
-    Dempster's rule would multiply to near-certainty.
+    Patches of one picture share light, camera and road, so that they are not the independent evidence that Dempster's
+    rule requires.
 
-    Raises ImageError where the lower centre shows nothing at all, or nothing that could be read: a covered, blinded or
-    dark camera, a picture without road.
+    Raises ImageError where the lower centre has no contrast or no readable road: a covered, blinded or dark camera, a
+    picture without road.
     """
-    boxes = _looks(image.shape[1], image.shape[0])
+    boxes = _crops(image.shape[1], image.shape[0])
     patches = np.stack([cut_box(image, box) for box in boxes])
     contrast = patches.std(axis=(1, 2)).max(axis=1) >= LEAST_CONTRAST
     if not contrast.any():
         raise ImageError(
             f"{name}: one even colour where the road should be. Is the lens covered, or the picture dark?"
         )
-    verdicts = classifier.verdicts(patches, scene_of(image))
-    if verdicts.readable[contrast].max() < LEAST_ROAD:
+    judged = classifier.verdicts(patches, scene_of(image))
+    if judged.readable[contrast].max() < LEAST_ROAD:
         raise ImageError(
             f"{name}: no road that could be read where it should be, the lower centre. Is it a picture of a road, in "
             "focus and lit?"
         )
     usable = usable_road(masks, remove_shadow=True)
     share = road_shares(np.array(boxes), usable, image.shape[1], image.shape[0])
-    readable = contrast & (verdicts.readable >= LEAST_READABLE)
+    readable = contrast & (judged.readable >= LEAST_READABLE)
     on_road = readable & (share >= LEAST_USABLE)
     best = next(
-        (looks for looks, least in ((on_road, LEAST_LOOKS), (readable, 1)) if looks.sum() >= least), contrast
+        (chosen for chosen, least in ((on_road, LEAST_CROPS), (readable, 1)) if chosen.sum() >= least),
+        contrast,
     )
-    probabilities = calibrated_probabilities(verdicts.logits[best], classifier.temperature)
+    probabilities = calibrated_probabilities(judged.logits[best], classifier.temperature)
     return np.asarray(np.log(np.maximum(probabilities, _LEAST_PROBABILITY)).mean(axis=0))
 
 
 @dataclass(frozen=True)
 class StillNetworks:
-    """The networks that judge single pictures."""
+    """The networks that classify single pictures."""
 
     segmenter: Segmenter
     classifier: SurfaceClassifier
@@ -182,18 +170,18 @@ class StillNetworks:
     def probabilities(self, image: NDArray[np.uint8], name: str = "image") -> NDArray[np.float64]:
         """Probabilities of dry, wet, snow and ice of one BGR picture, shape (3,) [-].
 
-        What its patches say and what it says as a whole, multiplied; the second weighs as much as its T allows, which
-        was learned beside the first.
+        The product of the probabilities of its patches and of the whole picture; the temperature of the second was
+        learned together with the first.
 
-        Raises ImageError where there is no road to be judged, see `patch_logs`.
+        Raises ImageError as `patch_logs` does.
         """
         logs = patch_logs(image, self.segmenter.segment(image), self.classifier, name)
         both = logs + self.picture.logits(image) / self.picture.temperature
         return calibrated_probabilities(both[None], 1.0)[0]
 
 
-def _looks(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:
-    """The wide look, the lower centre and its four parts: left, top, right, bottom of each [px]."""
+def _crops(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:
+    """The wide region, the lower centre and its four parts: left, top, right, bottom of each [px]."""
     left, top, right, bottom = LOWER_CENTRE
     columns, rows = PART * (right - left), PART * (bottom - top)
     parts = [(x, y, x + columns, y + rows) for x in (left, right - columns) for y in (top, bottom - rows)]
@@ -202,6 +190,6 @@ def _looks(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:
 
 
 def write_classes(table: pd.DataFrame, out: Path) -> None:
-    """Write the table of `classify_pictures`, whole or not at all; raises OSError."""
+    """Write the table of `classify_pictures`, complete or not at all; raises OSError."""
     with written_whole(out.parent) as made:
         table.to_csv(made / out.name, index=False, float_format="%.6f")

@@ -1,4 +1,4 @@
-"""YAML files read strictly: every problem of a file in one message, with its place and what was expected."""
+"""YAML files read strictly: all problems of a file in one message, with position and expectation."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Model = TypeVar("Model", bound=BaseModel)
 Made = TypeVar("Made")
 
 MOST_BYTES = 1_000_000
-"""Larger files are refused unread; a road of 10,000 segments has 900,000 [bytes]."""
+"""Largest file that is read; a road of 10,000 segments has 900,000 [bytes]."""
 MOST_PROBLEMS = 20
-"""Problems of a file that are told; the rest is counted."""
+"""Problems of a file that are named; further ones are counted."""
 LONGEST_PROBLEM = 600
-"""Characters of one problem."""
+"""Greatest number of characters of a problem."""
 
 
 def load_strict(path: str | Path, model: type[Model]) -> Model:
-    """Read a YAML file into its model; all of its problems in one ScenarioError."""
+    """The model of a YAML file; raises one ScenarioError with all problems."""
     name = quoted(path)
     try:
         data = parse_yaml(read_text(path, MOST_BYTES, "a YAML file"))
@@ -35,23 +35,13 @@ def load_strict(path: str | Path, model: type[Model]) -> Model:
     except YamlError as error:
         raise ScenarioError(f"{name}: not valid YAML: {error}") from error
     if not isinstance(data, dict):
-        # Not a word of it: whoever named the wrong file need not see it in a log.
+        # The content is not repeated: the file may be a wrong one, and must not appear in logs.
         raise ScenarioError(f"{name}: holds no keys at its top; expected lines of `key: value`.")
     return made(partial(model.model_validate, data), model, name)
 
 
 def made(make: Callable[[], Made], model: type[BaseModel], name: str) -> Made:
-    """What `make` gives, which makes a model of values; all that is wrong with these in one ScenarioError.
-
-    Parameters
-    ----------
-    make : callable
-        The making, with the values.
-    model : type
-        The model, whose keys are known.
-    name : str
-        What messages call the values.
-    """
+    """The result of `make`, which makes a model of values; raises one ScenarioError with all problems of these."""
     try:
         return make()
     except ValidationError as error:
@@ -59,54 +49,54 @@ def made(make: Callable[[], Made], model: type[BaseModel], name: str) -> Made:
 
 
 def _problems(error: ValidationError, model: type[BaseModel]) -> list[str]:
-    """One sentence per problem: key, what is wrong, what was expected."""
+    """Problems as sentences: key, problem, expectation."""
     texts: list[str] = []
     every = error.errors(include_url=False)
     for item in every[:MOST_PROBLEMS]:
-        place, known = _place(model, item["loc"])
+        path, known = _location(model, item["loc"])
         if item["type"] == "extra_forbidden":
-            texts.append(f"{place}: unknown key; {suggestion(quoted(item['loc'][-1]), known)}")
+            texts.append(f"{path}: unknown key; {suggestion(quoted(item['loc'][-1]), known)}")
         elif item["type"] == "missing":
-            texts.append(f"{place}: missing; expected this key.")
+            texts.append(f"{path}: missing; expected this key.")
         elif item["type"] == "value_error":
-            prefix = f"{place}: " if place else ""
+            prefix = f"{path}: " if path else ""
             texts.extend(prefix + line for line in str(item["ctx"]["error"]).splitlines())
         else:
             texts.append(
-                f"{place or 'file'}: is {_shown(item['input'])}; {item['msg'][0].lower()}{item['msg'][1:]}."
+                f"{path or 'file'}: is {_shown(item['input'])}; {item['msg'][0].lower()}{item['msg'][1:]}."
             )
-    told = [quoted(text, LONGEST_PROBLEM) for text in texts[:MOST_PROBLEMS]]
-    more = len(texts) + len(every[MOST_PROBLEMS:]) - len(told)
-    return [*told, f"and {more} more problems."] if more else told
+    named = [quoted(text, LONGEST_PROBLEM) for text in texts[:MOST_PROBLEMS]]
+    more = len(texts) + len(every[MOST_PROBLEMS:]) - len(named)
+    return [*named, f"and {more} more problems."] if more else named
 
 
 def _shown(value: Any) -> str:
-    """A value as a message repeats it; of lists and mappings the kind alone."""
+    """A value as text in messages; of lists and mappings only kind and length."""
     if value and isinstance(value, (list, dict)):
         return f"a {'list' if isinstance(value, list) else 'mapping'} of {len(value)}"
     return quoted(repr(value))
 
 
-def _place(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
-    """Where in the file a problem is, and the keys that are known there.
+def _location(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
+    """Path of a problem in the file, and the keys that are known there.
 
-    Among the keys pydantic names the type that it tried, where there are several: those are left out.
+    Where a value may have several types, pydantic's location contains the type that it tried, which is left out.
     """
-    place, known = "", list(_fields([model]))
+    path, known = "", list(_fields([model]))
     types: list[type] = [model]
     for key in location:
         if isinstance(key, int):
-            place += f"[{key}]"
+            path += f"[{key}]"
             continue
         fields = _fields(types)
         tried = [t for t in types if re.search(rf"\b{re.escape(t.__name__)}\b", key)]
         if key not in fields and len(types) > 1 and tried:
             types = tried
             continue
-        place += f".{key}"
+        path += f".{key}"
         known = list(fields)
         types = _types(fields[key]) if key in fields else types
-    return quoted(place.lstrip(".")), known
+    return quoted(path.lstrip(".")), known
 
 
 def _fields(types: Iterable[type]) -> dict[str, Any]:

@@ -1,8 +1,7 @@
-"""What the image estimator looks at, drawn onto the pictures of a run for a person to see."""
+"""The image estimator's regions and results, drawn onto the pictures of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario
 from scenarios.library import networks_folder
+from scenarios.progress import Progress, silent
 from scenarios.runner import Run
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
@@ -25,13 +25,15 @@ ROAD_BGR, SHADOW_BGR = (90, 200, 90), (200, 90, 90)
 LINE_BGR = (0, 230, 255)
 FLAG_DOWN_BGR = (60, 60, 230)
 NEAR_LINE_PX, FAR_LINE_PX = 5, 2
+"""Widths of the lines of the near group and of the others [px]."""
 TINT = 0.22
-TILE_PX = 640
-COLUMNS = 3
+"""Opacity of the tint of road and shadow [-]."""
+TILE_PX, COLUMNS = 640, 3
+"""Width of a tile of the sheet [px], and tiles in a row."""
 
 
 def image_estimator(scenario: Scenario) -> Ife:
-    """The image estimator with the shipped networks, set as the unit's is."""
+    """The image estimator with the shipped networks and the unit's settings."""
     if scenario.camera_path is None:
         raise ValueError(f"{scenario.path}: there is no camera, so there are no pictures to look at.")
     car = scenario.vehicle.to_core()
@@ -45,10 +47,10 @@ def image_estimator(scenario: Scenario) -> Ife:
 
 
 def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDArray[np.uint8]:
-    """The picture with usable road and shadow tinted, ellipses, lines across the road, patches by their class, verdict.
+    """The picture with tints of road and shadow, ellipses, lines across the road, patches by class, and the result.
 
-    The near group, whose verdict it is, is drawn in thick lines; a bar in the class's colour stands beside the
-    verdict, and a red line stands below it where the flag is down.
+    The near group, which gives the result, has thick lines; a bar beside the result has the colour of its class, and a
+    red line below it means that the flag is down.
 
     Raises ValueError where the result was made without its view.
     """
@@ -73,7 +75,7 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
         if np.isfinite(line).all():
             left, right = np.round(line).astype(np.int32).tolist()
             cv2.line(shown, left, right, LINE_BGR, NEAR_LINE_PX, cv2.LINE_AA)
-    verdict = (
+    found = (
         f"{result.surface.label}  Q_v {result.Q_v:.2f} (p_util {result.p_util:.2f}, P {result.P_fusion:.2f})"
         f"  flag {int(result.flag)}"
     )
@@ -81,33 +83,31 @@ def annotate(image: NDArray[np.uint8], result: FrameResult, caption: str) -> NDA
     cv2.rectangle(shown, (0, 0), (14, 150), CLASS_BGR[result.surface], cv2.FILLED)
     if not result.flag:
         cv2.rectangle(shown, (0, 138), (shown.shape[1], 150), FLAG_DOWN_BGR, cv2.FILLED)
-    for row, text in enumerate((caption, verdict)):
-        place = (24, 60 + 64 * row)
-        cv2.putText(shown, text, place, cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 4, cv2.LINE_AA)
+    for row, text in enumerate((caption, found)):
+        corner = (24, 60 + 64 * row)
+        cv2.putText(shown, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 4, cv2.LINE_AA)
     return shown
 
 
-def draw_looks(
-    run: Run, path: Path, progress: Callable[[int, int], None] = lambda done, total: None, count: int = 6
-) -> None:
-    """Write a sheet of the run's pictures, evenly spread, as the estimator saw them.
+def draw_overlay_sheet(run: Run, path: Path, progress: Progress = silent, count: int = 6) -> None:
+    """Write a sheet of annotated pictures at equal distances of the run.
 
-    The sheet replays every picture up to the last one shown with the checkout's networks, so that its verdicts rest on
-    the same history as the unit's; they are the unit's own where it was built from this checkout.
+    All pictures up to the last one shown are processed with the shipped networks, so that results have the same history
+    as those of the unit, and equal them where the unit was built from the same code.
     """
     ife, state = image_estimator(run.scenario), IfeState()
     chosen = {round(share * (len(run.frames) - 1)) for share in np.linspace(0.06, 0.94, count)}
     tiles = []
-    for place in range(max(chosen) + 1):
-        frame = run.frames.iloc[place]
-        progress(place + 1, max(chosen) + 1)
+    for index in range(max(chosen) + 1):
+        frame = run.frames.iloc[index]
+        progress(index + 1, max(chosen) + 1)
         image = decode_image(Path(frame["path"]))
         row = run.table.iloc[int(frame["row"])]
         motion = Motion(
             float(row["vehicle_speed_m_s"]), float(row["accel_x_m_s2"]), way_m=float(frame["front_axle_m"])
         )
-        state, result = ife.process(state, image, motion, with_view=place in chosen)
-        if place in chosen:
+        state, result = ife.process(state, image, motion, with_view=index in chosen)
+        if index in chosen:
             caption = f"t {frame['time_s']:.2f} s, front axle at {frame['front_axle_m']:.1f} m"
             tile = annotate(image, result, caption)
             height = round(TILE_PX * tile.shape[0] / tile.shape[1])

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from scenarios.camera.files import load_camera
 from scenarios.errors import ScenarioError
 from scenarios.library import networks_folder
-from scenarios.overlay_video import Film, Strip, dark, shown
-from scenarios.stills import PICTURE_ENDINGS, Progress, cell_of, pictures_in, silent
+from scenarios.overlay_video import OverlayVideo, Strip, dark, shown
+from scenarios.progress import Progress, silent
+from scenarios.stills import PICTURE_ENDINGS, cell_of, pictures_in
 from scenarios.whole_files import written_whole
 from trpac_core.files import FileError, file_sha256, quoted, require_file
 from trpac_core.vision.classes import Surface
@@ -46,13 +47,15 @@ CONTAINERS = (
     "asf",
     "ogg",
 )
-"""FFmpeg's names of the formats that are read: files that hold their pictures, no lists of other files or addresses."""
+"""FFmpeg's names of the formats that are read: those that contain pictures, not lists of other files or addresses."""
 MOST_VIDEO_BYTES = 100_000_000_000
 """Larger videos are refused [bytes]."""
 LOWEST_FPS, HIGHEST_FPS = 0.01, 1000.0
+"""Range of frame rates [1/s]."""
 FASTEST_M_S = 150.0
+"""Greatest speed [m/s]."""
 PACKAGES = ("numpy", "onnxruntime", "opencv-python-headless", "trpac-fmu")
-WRITTEN = FRAMES_CSV, SUMMARY, FILM, STRIP = "frames.csv", "summary.json", "annotated.mp4", "strip.jpg"
+WRITTEN = FRAMES_CSV, SUMMARY, VIDEO, STRIP = "frames.csv", "summary.json", "annotated.mp4", "strip.jpg"
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class Frames:
     files : tuple of Path
         Pictures in their order; empty for a video.
     count : int
-        Number of frames; of a video as announced, which may be wrong or 0.
+        Number of frames; of a video that in its header, which may be wrong or 0.
     """
 
     path: Path
@@ -75,7 +78,7 @@ class Frames:
 
     @classmethod
     def find(cls, path: Path) -> Frames:
-        """Look what is there; raises ScenarioError."""
+        """The frames at a path; raises ScenarioError."""
         if path.is_dir():
             files = tuple(pictures_in(path))
             if not files:
@@ -94,7 +97,7 @@ class Frames:
         return cls(path, (), max(announced, 0))
 
     def __iter__(self) -> Iterator[tuple[str, NDArray[np.uint8] | ImageError]]:
-        """Name of each frame (file name, or number in the video) with the picture or what is wrong with it."""
+        """Name of each frame (file name, or number in the video), with its picture or the error of reading it."""
         if self.files:
             for file in self.files:
                 try:
@@ -114,7 +117,7 @@ class Frames:
 
 
 def _open_video(path: Path) -> cv2.VideoCapture:
-    # The decoder and OpenCV would print their own complaints; one clear error is raised here instead.
+    # Messages of decoder and OpenCV are suppressed; an error is raised here instead.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = f"format_whitelist;{','.join(CONTAINERS)}"
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
@@ -128,14 +131,14 @@ def _open_video(path: Path) -> cv2.VideoCapture:
         raise ScenarioError(
             f"{path}: not a video that can be decoded. Convert it to MP4, or to a folder of pictures."
         )
-    # The camera file is of the pixels as stored, as with pictures.
+    # The camera file describes the pixels as stored, as for pictures.
     capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
     return capture
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A finished run over frames: the table, what summary.json holds, and the folder with all four files."""
+    """A finished run over frames: table, content of summary.json, and folder of the four files."""
 
     table: pd.DataFrame
     summary: dict[str, Any]
@@ -145,12 +148,12 @@ class Drive:
 def run_frames(
     frames: Frames, camera_file: Path, speed_m_s: float, fps: float, out: Path, progress: Progress = silent
 ) -> Drive:
-    """Image estimator, with its memory, and voting baseline over frames taken at a constant speed.
+    """Results of the image estimator and the voting baseline over frames at a constant speed.
 
     Parameters
     ----------
     frames : Frames
-        What the camera saw.
+        Pictures or video.
     camera_file : Path
         camera.yaml.
     speed_m_s, fps : float
@@ -158,12 +161,12 @@ def run_frames(
     out : Path
         Folder for frames.csv, annotated.mp4, strip.jpg and summary.json, which appear together at the end.
     progress : callable
-        Told how many frames are done.
+        Called with how many of how many frames are done.
 
     Raises
     ------
     ScenarioError
-        If the camera file is wrong, the numbers make no sense, or no frame at all could be used.
+        If the camera file is wrong, speed or rate are out of range, or no frame could be used.
     ModelError
         If a network file cannot be used.
     OSError
@@ -181,7 +184,7 @@ def run_frames(
         Segmenter(networks_folder() / "segmenter.onnx"),
         SurfaceClassifier(networks_folder() / "surface.onnx"),
     )
-    watcher = _Watcher(
+    estimators = _Estimators(
         segmenter,
         Ife(IfeConfig(camera=camera), segmenter, classifier),
         Voting(VotingConfig(camera=camera), segmenter, classifier),
@@ -189,28 +192,28 @@ def run_frames(
         Motion(speed_m_s),
     )
     with written_whole(out) as scratch:
-        film, strip = Film(scratch / FILM, camera, fps), Strip()
+        video, strip = OverlayVideo(scratch / VIDEO, camera, fps), Strip()
         rows, unreadable = [], []
         for number, (name, image) in enumerate(frames):
             caption = f"{name}  {number / fps:.2f} s"
             try:
-                row, shown = watcher.look(number, name, image, caption)
+                row, shown = estimators.process(number, name, image, caption)
             except ImageError as error:
                 unreadable.append({"frame": name, "reason": str(error)})
-                row, shown = (name, "", None, None, None, 0, "", None), dark(film.size, caption)
+                row, shown = (name, "", None, None, None, 0, "", None), dark(video.size, caption)
             rows.append(row)
-            film.add(shown)
+            video.add(shown)
             strip.add(shown)
             progress(number + 1, max(frames.count, number + 1))
         table = pd.DataFrame(rows, columns=list(FRAME_COLUMNS))
         if len(unreadable) == len(rows):
             raise ScenarioError(_nothing_usable(frames, unreadable))
-        summary = _summary(table, unreadable, frames, camera_file, speed_m_s, fps, film.finish())
+        summary = _summary(table, unreadable, frames, camera_file, speed_m_s, fps, video.finish())
         strip.write(scratch / STRIP)
         table.to_csv(scratch / FRAMES_CSV, index=False, float_format="%.6g")
         (scratch / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        if not (scratch / FILM).exists():
-            (out / FILM).unlink(missing_ok=True)  # of an earlier run
+        if not (scratch / VIDEO).exists():
+            (out / VIDEO).unlink(missing_ok=True)  # of an earlier run
     return Drive(table, summary, out)
 
 
@@ -234,22 +237,22 @@ def _nothing_usable(frames: Frames, unreadable: Sequence[dict[str, str]]) -> str
     )
 
 
-class _Watcher:
-    """Both estimators over successive frames; the memory of the image estimator lies here."""
+class _Estimators:
+    """Both estimators over successive frames, with the state of the image estimator."""
 
     def __init__(self, segmenter: Segmenter, ife: Ife, voting: Voting, step_m: float, motion: Motion) -> None:
         self._segmenter, self._ife, self._voting = segmenter, ife, voting
         self._step_m, self._motion = step_m, motion
         self._state = IfeState()
 
-    def look(
+    def process(
         self, number: int, name: str, image: NDArray[np.uint8] | ImageError, caption: str
     ) -> tuple[tuple[Any, ...], NDArray[np.uint8]]:
-        """Row of the table and annotated picture; raises ImageError, and then nothing is remembered."""
+        """Row of the table and annotated picture; where ImageError is raised the state is unchanged."""
         if isinstance(image, ImageError):
             raise image
         if not self._state.frame_count:
-            # The networks' first run sets up their memory: it says nothing of a frame's time.
+            # The networks' first run allocates memory, so its time is not representative.
             self._ife.process(self._state, image, self._motion)
         motion = replace(self._motion, way_m=number * self._step_m)
         start = time.perf_counter()
@@ -259,8 +262,8 @@ class _Watcher:
         vote = self._voting.process(self._state.frame_count, image, masks=masks)
         self._state = after
         voted = "" if vote.surface is None else vote.surface.label
-        verdict = (result.surface.label, result.P_fusion, result.p_util, result.Q_v, int(result.flag))
-        return (name, *verdict, voted, ms), shown(image, result, f"{caption}  voting: {voted or 'no road'}")
+        found = (result.surface.label, result.P_fusion, result.p_util, result.Q_v, int(result.flag))
+        return (name, *found, voted, ms), shown(image, result, f"{caption}  voting: {voted or 'no road'}")
 
 
 def _summary(
@@ -270,9 +273,9 @@ def _summary(
     camera_file: Path,
     speed_m_s: float,
     fps: float,
-    film: bool,
+    video: bool,
 ) -> dict[str, Any]:
-    """What a run found, and what is needed to repeat it; shares are of the frames that could be used."""
+    """The content of summary.json; shares are of the frames that could be used."""
     seen = table[table["class"] != ""]
     return {
         "frames": len(table),
@@ -287,7 +290,7 @@ def _summary(
         "fps": fps,
         "source": str(frames.path),
         "camera": str(camera_file),
-        "annotated": FILM if film else None,
+        "annotated": VIDEO if video else None,
         "strip": STRIP,
         "versions": {package: version(package) for package in PACKAGES},
         "model_sha256": {

@@ -1,4 +1,4 @@
-"""Files of a result that appear in their folder all together, or not at all."""
+"""Files that are moved into a folder all together, or not at all."""
 
 from __future__ import annotations
 
@@ -11,13 +11,24 @@ from pathlib import Path
 from trpac_core.files import quoted
 
 
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file completely or not at all."""
+    scratch = path.with_name(path.name + ".part")
+    scratch.unlink(missing_ok=True)
+    with scratch.open("xb") as file:  # fails on a link or pipe of that name
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(scratch, path)
+
+
 @contextmanager
 def written_whole(folder: Path) -> Iterator[Path]:
-    """A scratch folder; the files that lie in it when the block ends well are moved to `folder`, else none is.
+    """A scratch folder whose files are moved to `folder` when the block ends without exception.
 
-    It lies in `folder` if that is there, which may be a mounted disk, else in the nearest folder above it that is:
-    always on the same disk, so that a full one shows before anything is moved. Whatever ends the moves half-way, what
-    was in the way is put back; only a process that is killed meanwhile leaves it in the scratch folder.
+    It is made in `folder`, which may be a mounted disk, or in the nearest existing folder above, so that all files are
+    on the same disk and a full disk is detected before files are moved. Where a move fails, replaced files are
+    restored; a process that is killed meanwhile leaves them in the scratch folder.
 
     Raises
     ------
@@ -25,14 +36,14 @@ def written_whole(folder: Path) -> Iterator[Path]:
         The folder cannot be written to, the disk is full, or a folder has the name of a file.
     """
     whole = folder.absolute()
-    place = next(place for place in (whole, *whole.parents) if place.exists())
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=place) as made:
+    existing = next(above for above in (whole, *whole.parents) if above.exists())
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}_", dir=existing) as made:
         yield Path(made)
         _move_all(Path(made), whole)
 
 
 def _move_all(made: Path, folder: Path) -> None:
-    """Move what lies in `made` into a folder; on any exception all is as it was before."""
+    """Move the files of `made` into a folder; on any exception the folder is unchanged."""
     files = sorted(made.iterdir())
     aside = Path(tempfile.mkdtemp(dir=made))
     with ExitStack() as undo:  # last done, first undone

@@ -1,4 +1,4 @@
-"""YAML text to plain values and back: the core of YAML 1.2, of bounded size, and nothing that unfolds or is built."""
+"""YAML text to plain values and back: the core schema of YAML 1.2 without tags and merge keys, of bounded size."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from yaml.resolver import BaseResolver
 from trpac_core.files import quoted
 
 MOST_VALUES = 100_000
-"""Values and keys of a file, those of its aliases counted where they are used; a road of 10,000 segments has 90,000."""
+"""Greatest number of values and keys, with those of aliases at each use; a road of 10,000 segments has 90,000."""
 
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
-"""Control characters, and halves of surrogate pairs, which no file could be written with."""
+"""Control characters, and lone surrogates, which cannot be written to a file."""
 
 
 class YamlError(ValueError):
-    """Text that is no YAML of the kind that is read; says where."""
+    """Text that is not valid YAML of this kind; the text has the position."""
 
 
 class _Loader(Composer, CParser, SafeConstructor, BaseResolver):
-    """Reads null, booleans, decimal numbers, text, lists and mappings; no tags, no merge keys, no key twice."""
+    """Reads null, booleans, decimal numbers, text, lists and mappings, without tags, merge keys and repeated keys."""
 
     def __init__(self, text: str) -> None:
         CParser.__init__(self, text)
@@ -36,7 +36,7 @@ class _Loader(Composer, CParser, SafeConstructor, BaseResolver):
         self._sizes: dict[int, int] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        """A value; an alias counts as much as what it stands for."""
+        """A node; an alias counts with all values of its anchor."""
         event: Any = self.peek_event()
         if isinstance(event, yaml.AliasEvent):
             node = super().compose_node(parent, index)
@@ -83,7 +83,7 @@ class _Loader(Composer, CParser, SafeConstructor, BaseResolver):
 for _tag, _pattern, _first in (
     ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
     ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
-    # Longer ones are text, which no number may be: Python would take its time over thousands of digits.
+    # Longer ones are text: Python needs seconds to convert thousands of digits.
     ("int", r"[-+]?[0-9]{1,30}", list("-+0123456789")),
     (
         "float",
@@ -104,7 +104,7 @@ def _wrong(what: str, at: Any) -> yaml.MarkedYAMLError:
 
 
 def parse_yaml(text: str) -> Any:
-    """The values of a YAML text; raises YamlError, which says the row and never repeats the text around it."""
+    """The values of a YAML text; raises YamlError with row and column, without the text around them."""
     loader = None
     try:
         loader = _Loader(text)

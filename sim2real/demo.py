@@ -21,7 +21,7 @@ from scenarios.files import (
     load_vehicle,
 )
 from scenarios.library import shipped
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import make_log, write_log
 from scenarios.whole_files import written_whole
 from scenarios.yaml_text import to_yaml

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scenarios.effects import Effect
 from scenarios.files import RoadFile, VehicleFile
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from sim2real.observing.doubt import doubt
 from sim2real.observing.drive import CHANNELS, Drive, make_drive
 from sim2real.observing.evidence import Evidence

@@ -1,7 +1,7 @@
 """Tyre-road peak adhesion (TRPAC) from Python: estimate, simulate, run scenarios, diagnose a gap, judge pictures.
 
-Everything that the command line does is a function here. Results are small frozen objects; nothing is written and
-nothing is printed unless asked. What is heavy is imported when it is first used.
+Functions for the commands of the command line. Results are small frozen objects; files are written only by methods
+that say so, and nothing is printed. Modules are imported when they are first used.
 """
 
 from __future__ import annotations
@@ -14,46 +14,33 @@ from typing import TYPE_CHECKING, Any
 from trpac_core.errors import TrpacError
 
 if TYPE_CHECKING:
+    from scenarios.car_and_road import Road, Vehicle
+    from scenarios.files import SensorNoise
+    from scenarios.vision_estimator import PictureClass, VisionEstimator, classify
+    from scenarios.wheel_estimator import Estimate, Estimator
+    from sim2real.logs import Log
     from trpac import effects
-    from trpac.estimation import Estimate, Estimates, Estimator, estimate
+    from trpac.estimation import Estimates, estimate
     from trpac.extras import MissingExtraError
-    from trpac.files import (
-        Log,
-        Road,
-        SensorNoise,
-        Vehicle,
-        list_effects,
-        list_roads,
-        list_scenarios,
-        list_vehicles,
-        read_log,
-    )
+    from trpac.files import list_effects, list_roads, list_scenarios, list_vehicles, read_log
     from trpac.gap import Diagnosis, diagnose
     from trpac.scenarios import ScenarioRun, run, simulate
     from trpac.units import build_fmu
-    from trpac.vision import PictureClass, VisionEstimator, classify
 
-_HOMES = {
-    "effects": ("effects",),
-    "estimation": ("Estimate", "Estimates", "Estimator", "estimate"),
-    "extras": ("MissingExtraError",),
-    "files": (
-        "Log",
-        "Road",
-        "SensorNoise",
-        "Vehicle",
-        "list_effects",
-        "list_roads",
-        "list_scenarios",
-        "list_vehicles",
-        "read_log",
-    ),
-    "gap": ("Diagnosis", "diagnose"),
-    "scenarios": ("ScenarioRun", "run", "simulate"),
-    "units": ("build_fmu",),
-    "vision": ("PictureClass", "VisionEstimator", "classify"),
+_MODULES = {
+    "scenarios.car_and_road": ("Road", "Vehicle"),
+    "scenarios.files": ("SensorNoise",),
+    "scenarios.vision_estimator": ("PictureClass", "VisionEstimator", "classify"),
+    "scenarios.wheel_estimator": ("Estimate", "Estimator"),
+    "sim2real.logs": ("Log",),
+    "trpac.estimation": ("Estimates", "estimate"),
+    "trpac.extras": ("MissingExtraError",),
+    "trpac.files": ("list_effects", "list_roads", "list_scenarios", "list_vehicles", "read_log"),
+    "trpac.gap": ("Diagnosis", "diagnose"),
+    "trpac.scenarios": ("ScenarioRun", "run", "simulate"),
+    "trpac.units": ("build_fmu",),
 }
-_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "Diagnosis",
@@ -87,13 +74,14 @@ logging.getLogger("trpac").addHandler(logging.NullHandler())
 
 
 def __getattr__(name: str) -> Any:
-    """A function or class of this package, from its module, which is imported now."""
+    """A function or class of this package; its module is imported now."""
     if name == "__version__":
         return version("trpac-fmu")
-    if name not in _HOME:
+    if name == "effects":
+        return import_module("trpac.effects")
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'trpac' has no attribute {name!r}")
-    module = import_module(f"trpac.{_HOME[name]}")
-    return module if _HOME[name] == name else getattr(module, name)
+    return getattr(import_module(_MODULE_OF[name]), name)
 
 
 def __dir__() -> list[str]:

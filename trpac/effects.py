@@ -11,5 +11,5 @@ __all__ = sorted(_CLASSES)
 
 
 def __getattr__(name: str) -> type[Effect]:
-    """Never reached for an effect; says which there are."""
+    """Raise AttributeError with the names of all effects."""
     raise AttributeError(f"no effect {name!r}; there are {', '.join(__all__)}")

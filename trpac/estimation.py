@@ -1,45 +1,38 @@
-"""The estimator over a recorded drive, and step by step."""
+"""The estimator over a recorded drive."""
 
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from scenarios.camera.files import load_camera
+from scenarios.car_and_road import as_vehicle
 from scenarios.files import VehicleFile
-from scenarios.library import located, networks_folder
+from scenarios.library import located
+from scenarios.progress import StageProgress, silent
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
 from sim2real.replay.estimate import TABLE_3, estimate_log
 from sim2real.replay.run import Replay
 from trpac.extras import extras
-from trpac.files import read_log, the_vehicle
+from trpac.files import read_log
 from trpac.picture import Picture
-from trpac.progress import Told, silent
-from trpac_core.errors import TrpacError
-from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
-from trpac_core.readings import Sensors
-from trpac_core.vehicle import WHEELS
-from trpac_core.vision.classes import Surface
-from trpac_core.vision.ife import Ife
 
 
 @dataclass(frozen=True, repr=False)
 class Estimates:
-    """The estimators along a drive.
+    """Estimates along a drive.
 
     Attributes
     ----------
     frame : DataFrame
         time_s [s]; TRPAC, TRPAC_std and TRPAC_peak of the car and of each wheel [-]; flag, K_v, excitation_flag.
     summary : dict
-        What `trpac estimate` writes as summary.json.
+        Content of summary.json of `trpac estimate`.
     """
 
     frame: pd.DataFrame
@@ -54,18 +47,18 @@ class Estimates:
 
     @property
     def verdict(self) -> str:
-        """What the drive showed, in sentences."""
+        """Results of the drive in sentences."""
         from sim2real.replay.report import verdict
 
         return verdict(self.summary)
 
     @property
     def warnings(self) -> list[str]:
-        """What is odd about the log, in sentences."""
+        """Warnings about the log in sentences."""
         return list(self.summary["warnings"])
 
     def plot(self) -> Picture:
-        """The car's estimate with its band, the flags, and what the drive was like."""
+        """A figure of the car's estimate with its deviation, the flags and the drive."""
         from sim2real.replay.figures import estimate
 
         return Picture(estimate(self._replay))
@@ -78,7 +71,7 @@ class Estimates:
         return Path(path)
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write report.html, estimates.csv and summary.json, all or none; returns their paths."""
+        """Write report.html, estimates.csv and summary.json; returns their paths."""
         from sim2real.replay.report import write_replay
 
         return write_replay(self._replay, self.summary, Path(folder))
@@ -91,35 +84,35 @@ def estimate(
     mapping: Mapping | str | Path | None = None,
     camera: str | Path | None = None,
     peers: bool = False,
-    progress: Told = silent,
+    progress: StageProgress = silent,
 ) -> Estimates:
-    """Estimate the road's adhesion along a recorded drive.
+    """Estimates of the road's adhesion along a recorded drive.
 
     Parameters
     ----------
     log : DataFrame or path
         Columns of the log format (docs/logs.md), or those that the mapping names.
     vehicle : Vehicle, path or name, optional
-        The car; without it the paper's (Table 3), and said so.
+        The car; by default that of the paper (Table 3), with a warning.
     mapping, camera : path, optional
-        How the log's columns become those of the log format; the camera of the pictures that column image_path names.
+        Columns of the log in the log format; the camera of the pictures in column image_path.
     peers : bool
-        Whether estimators of the literature run as well.
+        Whether to run estimators of the literature as well.
     progress : callable
-        Told the stage, and how much of how much is done.
+        Called with the stage, and how many of how many of its items are done.
 
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     MissingExtraError
-        Where the log's format, or the peers, need an extra.
+        Without the extra of the log's format or of the peers.
     """
     from sim2real.replay.report import estimates_table
 
     progress("reading", 0, 1)
     origin = TABLE_3 if vehicle is None else vehicle
-    car, lens = the_vehicle(origin), None if camera is None else load_camera(camera)
+    car, lens = as_vehicle(origin), None if camera is None else load_camera(camera)
     read = read_log(log, mapping=mapping)
     progress("reading", 1, 1)
     with extras("estimate"):
@@ -135,153 +128,3 @@ def estimate(
     for text in summary["warnings"]:
         logging.getLogger("trpac").warning("%s: %s", read.name, text)
     return Estimates(estimates_table(replay), summary, replay)
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """What the estimator of one wheel says at a time.
-
-    Attributes
-    ----------
-    theta, std : float
-        TRPAC and its standard deviation [-].
-    peak : float
-        Maximum of the tyre's curve at theta: what a brake test measures [-].
-    flag : bool
-        Whether the camera's verdict on the road under the wheel is used.
-    K_v : float
-        Visual gain [1/s].
-    excited : bool
-        Whether the tyre slips enough to show the road.
-    slip, tyre_force_n : float
-        Longitudinal slip [-] and observed force [N].
-    why : str
-        What the estimate rests on, in a sentence.
-    """
-
-    theta: float
-    std: float
-    peak: float
-    flag: bool
-    K_v: float
-    excited: bool
-    slip: float
-    tyre_force_n: float
-    why: str
-
-
-class Estimator:
-    """The estimator of one wheel, step by step.
-
-    Parameters
-    ----------
-    vehicle : Vehicle, path or name, optional
-        The car; the paper's (Table 3) where none is given.
-    wheel : str
-        fl, fr, rl or rr.
-    camera : path or name, optional
-        The camera of the pictures that `step` is given.
-
-    Raises
-    ------
-    TrpacError
-        A car, wheel or camera that cannot be used.
-    """
-
-    def __init__(
-        self,
-        vehicle: VehicleFile | str | Path | None = None,
-        *,
-        wheel: str = "fl",
-        camera: str | Path | None = None,
-    ) -> None:
-        if wheel not in WHEELS:
-            raise TrpacError(f"wheel is {wheel!r}; expected one of {', '.join(WHEELS)}.")
-        car = the_vehicle(TABLE_3 if vehicle is None else vehicle).to_core()
-        config = EstimatorConfig(vehicle=car, front_axle=wheel.startswith("f"), left_side=wheel.endswith("l"))
-        ife = None
-        if camera is not None:
-            settings = replace(config.image_settings, camera=load_camera(camera))
-            ife = Ife.load(settings, networks_folder())
-        self._estimator = TrpacEstimator(config, ife)
-        self._time_s: float | None = None
-
-    def step(
-        self,
-        *,
-        t: float,
-        wheel_speed: float,
-        wheel_torque: float,
-        vehicle_speed: float,
-        longitudinal_acceleration: float | None = None,
-        yaw_rate: float | None = None,
-        steering_angle: float = 0.0,
-        vertical_load: float | None = None,
-        road_class: str | None = None,
-        road_class_confidence: float = 1.0,
-        image: NDArray[np.uint8] | None = None,
-    ) -> Estimate:
-        """The estimate at a time.
-
-        Parameters
-        ----------
-        t : float
-            Time, ascending [s].
-        wheel_speed, wheel_torque, vehicle_speed : float
-            [rad/s], [N m] with brakes included and positive where it drives, [m/s].
-        longitudinal_acceleration, yaw_rate, steering_angle, vertical_load : float, optional
-            [m/s^2], [rad/s] and [rad] positive to the left, [N]; None is not measured.
-        road_class, road_class_confidence : str and float, optional
-            A new result of a camera: dry, wet or snow_ice, and how sure it is [-].
-        image : array of uint8, shape (height, width, 3), optional
-            A new picture, BGR, in place of a result.
-
-        Raises
-        ------
-        TrpacError
-            Times that do not ascend, an unknown class, a picture without a camera.
-        """
-        before_s = t if self._time_s is None else self._time_s
-        if not t >= before_s:
-            raise TrpacError(f"t is {t} after {before_s}; expected ascending times.")
-        frame: NDArray[np.uint8] | RoadClass | None = image
-        if road_class is not None:
-            known = [surface.label for surface in Surface]
-            if road_class not in known:
-                raise TrpacError(f"road_class is {road_class!r}; expected one of {', '.join(known)}.")
-            frame = RoadClass(Surface(known.index(road_class)), road_class_confidence)
-        elif image is not None and not self._estimator.sees:
-            raise TrpacError("image is given and no camera: Estimator(vehicle, camera=...) has one.")
-        said = self._estimator.step(
-            t - before_s,
-            Sensors(
-                wheel_speed,
-                wheel_torque,
-                vehicle_speed,
-                vertical_load,
-                steering_angle,
-                longitudinal_acceleration,
-                yaw_rate,
-            ),
-            frame,
-        )
-        self._time_s = t
-        if said.problem:
-            why = said.problem
-        elif said.excitation_flag:
-            why = "The tyre slips enough to show the road."
-        elif said.flag:
-            why = "The tyre does not slip enough; the camera's class of the road is used."
-        else:
-            why = "The tyre does not slip enough: the estimate holds what it had."
-        return Estimate(
-            theta=said.TRPAC,
-            std=said.TRPAC_std,
-            peak=said.TRPAC_peak,
-            flag=bool(said.flag),
-            K_v=said.K_v,
-            excited=bool(said.excitation_flag),
-            slip=said.slip,
-            tyre_force_n=said.tyre_force_n,
-            why=why,
-        )

@@ -1,4 +1,4 @@
-"""Packages that are installed only where they are asked for, and what to say where one is missing."""
+"""Optional packages, and errors where one is missing."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ EXTRA_OF = {
     "pythonfmu": "fmu",
     "sympy": "design",
 }
-"""Module to the extra of this package that brings it."""
+"""Extra of this package by module."""
 
 
 class MissingExtraError(ImportError):
-    """A package is not installed that this function needs; the text says which extra brings it."""
+    """A required package is not installed; the text names its extra."""
 
 
 def missing(error: ModuleNotFoundError, extra: str = "") -> str | None:
-    """One sentence on the extra that brings a missing module, `extra` or any; None where no extra does."""
+    """The sentence on the extra of a missing module, or on `extra`; None where the module is of no extra."""
     module = (error.name or "").partition(".")[0]
     if module not in EXTRA_OF:
         return None
@@ -42,7 +42,7 @@ def missing(error: ModuleNotFoundError, extra: str = "") -> str | None:
 
 @contextmanager
 def extras(what: str, extra: str = "") -> Iterator[None]:
-    """Within it a missing package of an extra is a MissingExtraError that names `extra`, or one that brings it."""
+    """Context that raises MissingExtraError for a missing package of an extra."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -9,26 +9,27 @@ from typing import Any
 
 import pandas as pd
 
+from scenarios.car_and_road import Vehicle, as_road, as_vehicle
 from scenarios.files import RoadFile, VehicleFile
+from scenarios.progress import StageProgress, silent
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
 from sim2real.result import Cause, Gap, Place, Verdict, needed
-from sim2real.result import Diagnosis as Said
+from sim2real.result import Diagnosis as Result
 from trpac.extras import extras
-from trpac.files import Vehicle, read_log, the_road, the_vehicle
-from trpac.progress import Told, silent
+from trpac.files import read_log
 
 AnyLog = Log | pd.DataFrame | str | Path
 
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """What a diagnosis says; `said` has all of it."""
+    """The outcome of a diagnosis; `result` has all details."""
 
-    said: Said
+    result: Result
 
     def __repr__(self) -> str:
-        return f"Diagnosis {self.verdict}: {self.said.sentence}"
+        return f"Diagnosis {self.verdict}: {self.result.sentence}"
 
     def _repr_html_(self) -> str:
         rows = [(c.effect, c.probability, c.gap_after, c.shrink_percent.value) for c in self.causes]
@@ -38,54 +39,54 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """The outcome in a word: identified, ambiguous, compound, unknown or no_gap."""
-        return self.said.verdict
+        """The outcome: identified, ambiguous, compound, unknown or no_gap."""
+        return self.result.verdict
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """The candidates, likeliest first."""
-        return self.said.causes
+        """The candidate causes, most probable first."""
+        return self.result.causes
 
     @property
     def gap(self) -> Gap:
-        """The gap on the hold-out before and after, in noise floors."""
-        return self.said.gap
+        """The gap on the hold-out log before and after, in noise floors."""
+        return self.result.gap
 
     @property
     def where(self) -> tuple[Place, ...]:
-        """Where the gap lies: signal, subsystem, regime and time."""
-        return self.said.where
+        """Location of the gap: signal, subsystem, regime and time."""
+        return self.result.where
 
     def apply_to(self, vehicle: VehicleFile) -> Vehicle:
-        """The car with the effects that the verdict names, ready for `simulate`; as it was where it names none."""
+        """The car with the identified effects, for `simulate`; unchanged without any."""
         car = Vehicle(**vehicle.model_dump(by_alias=True))
         from scenarios.effects import form_of
 
         return car.with_effects(
             [
                 form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()})
-                for c in needed(self.said)
+                for c in needed(self.result)
             ]
         )
 
     def to_json(self) -> dict[str, Any]:
-        """What diagnosis.json holds."""
-        return self.said.to_json()
+        """The content of diagnosis.json."""
+        return self.result.to_json()
 
     def to_html(self, path: str | Path) -> Path:
         """Write the report; returns its path."""
         with extras("to_html", "gap"):
             from sim2real.telling.report import rated, render
 
-            Path(path).write_text(render(rated(self.said)), encoding="utf-8")
+            Path(path).write_text(render(rated(self.result)), encoding="utf-8")
         return Path(path)
 
     def write(self, folder: str | Path) -> tuple[Path, Path]:
-        """Write diagnosis.json and report.html, both or neither; returns their paths."""
+        """Write diagnosis.json and report.html; returns their paths."""
         with extras("write", "gap"):
             from sim2real.telling.report import rated, write_diagnosis
 
-            return write_diagnosis(rated(self.said), folder)
+            return write_diagnosis(rated(self.result), folder)
 
 
 def diagnose(
@@ -98,35 +99,35 @@ def diagnose(
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
-    progress: Told = silent,
+    progress: StageProgress = silent,
 ) -> Diagnosis:
-    """Diagnose recorded logs against the simulation of a car on one road.
+    """The diagnosis of recorded logs against the simulation of a car on one road.
 
     Parameters
     ----------
     vehicle, road : Vehicle and Road, or path or name of each
-        What the simulation knows.
+        Car and road of the simulation.
     fit, holdout : sequence of logs, log
-        DataFrames or paths: those that parameters are fitted to, and the one that the gap is measured on.
+        DataFrames or paths: logs for the fit of parameters, and the log on which the gap is measured.
     mapping : path, optional
-        How the logs' columns become those of the log format.
+        Columns of the logs in the log format.
     seed : int
-        Of the resampling behind the intervals.
+        Seed of the resampling for the intervals.
     exclude : collection of str
-        Effects that are left out.
+        Excluded effects.
     jobs : int
-        Threads.
+        Number of threads.
     progress : callable
-        Told the stage, and how much of how much is done.
+        Called with the stage, and how many of how many of its items are done.
 
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     MissingExtraError
         Without the extra 'gap'.
     """
-    car, course = the_vehicle(vehicle), the_road(road)
+    car, course = as_vehicle(vehicle), as_road(road)
     logs = [read_log(log, mapping=mapping) for log in (*fit, holdout)]
     with extras("diagnose", "gap"):
         from sim2real.diagnose import diagnose_sources

@@ -1,4 +1,4 @@
-"""A drawing as a notebook shows it."""
+"""A figure for notebooks and files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, repr=False)
 class Picture:
-    """A PNG: shown by a notebook, written by `save`."""
+    """A PNG picture, shown by notebooks."""
 
     png: bytes
 

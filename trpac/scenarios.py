@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from scenarios.car_and_road import Vehicle, as_road, as_vehicle
 from scenarios.effects import Effect
 from scenarios.files import RoadFile, Scenario, SensorNoise, VehicleFile, load_scenario
-from scenarios.plant import make_log
-from scenarios.plant import simulate as run_plant
+from scenarios.plant.pipeline import simulate as run_plant
+from scenarios.plant.sensors import make_log
+from scenarios.progress import StageProgress, silent
 from trpac.extras import extras
-from trpac.files import Vehicle, the_road, the_vehicle
 from trpac.picture import Picture
-from trpac.progress import Told, silent
 from trpac_core.errors import TrpacError
 from trpac_core.vehicle import WHEELS
 
@@ -35,27 +35,27 @@ def simulate(
     noise: SensorNoise | None = None,
     seed: int = 0,
 ) -> pd.DataFrame:
-    """The log of a car that is driven by these wheel torques, with the columns of the log format.
+    """The log of a simulated car under wheel torques, with the columns of the log format.
 
     Parameters
     ----------
     vehicle, road : Vehicle and Road, or path or name of each
-        What drives, and on what.
+        The car and the road.
     torque : DataFrame, or array of shape (n, 4)
         time_s at equal steps and wheel_torque_{fl,fr,rl,rr}_nm; or the torques alone, `step_s` apart [N m].
     step_s : float
-        Of an array [s].
+        Step of an array [s].
     speed : float
-        At the start [m/s].
+        Speed at the start [m/s].
     effects : sequence of Effect
-        On top of those of the vehicle: `trpac.effects.TorqueLag(time_constant_s=0.05)`.
+        Effects in addition to those of the vehicle, such as `trpac.effects.TorqueLag(time_constant_s=0.05)`.
     noise, seed : SensorNoise, int
-        Of the sensors, which are ideal without it.
+        Noise of the sensors, by default none, and its seed.
 
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     """
     if isinstance(torque, pd.DataFrame):
         names = ["time_s", *(f"wheel_torque_{wheel}_nm" for wheel in WHEELS)]
@@ -66,10 +66,10 @@ def simulate(
         if len(steps) == 0 or not np.allclose(steps, steps[0], rtol=1e-6, atol=1e-9) or steps[0] <= 0.0:
             raise TrpacError("torque has times that are not equally apart; expected a uniform time_s.")
         step_s = float(steps[0])
-    car = the_vehicle(vehicle)
+    car = as_vehicle(vehicle)
     if effects:
         car = Vehicle(**car.model_dump(by_alias=True)).with_effects(effects)
-    trajectory = run_plant(car, the_road(road), np.asarray(torque, dtype=float), step_s, speed)
+    trajectory = run_plant(car, as_road(road), np.asarray(torque, dtype=float), step_s, speed)
     return make_log(trajectory, car, noise or SensorNoise(), seed)
 
 
@@ -82,7 +82,7 @@ class ScenarioRun:
     log : DataFrame
         One row per step: the sensors, the unit's outputs, theta and segment under the wheel.
     summary : dict
-        Scores per stretch of road and estimator, as summary.json has them.
+        Content of summary.json: scores per stretch of road and estimator.
     """
 
     log: pd.DataFrame
@@ -92,7 +92,7 @@ class ScenarioRun:
 
     @property
     def frames(self) -> tuple[Path, ...]:
-        """The pictures that the camera took, as files that are there as long as this run is."""
+        """Files of the camera's pictures, which exist as long as this object does."""
         return tuple(Path(path) for path in self._run.frames["path"])
 
     def __repr__(self) -> str:
@@ -114,20 +114,22 @@ class ScenarioRun:
         draw_figure17(self._run, path)
         return Picture(path.read_bytes())
 
-    def write(self, folder: str | Path, progress: Told = silent) -> tuple[Path, ...]:
-        """Write report.html, figure17.png, log.csv and summary.json, all or none; returns their paths."""
+    def write(self, folder: str | Path, progress: StageProgress = silent) -> tuple[Path, ...]:
+        """Write report.html, figure17.png, log.csv and summary.json; returns their paths."""
         from scenarios.report import write_report
         from scenarios.runner import write_run
-        from scenarios.vision_overlay import draw_looks
+        from scenarios.vision_overlay import draw_overlay_sheet
         from scenarios.whole_files import written_whole
 
         with written_whole(Path(folder)) as made:
-            looks = None
+            overlay = None
             if len(self._run.frames):
-                looks = Path(self._scratch.name) / "looks.jpg"
-                draw_looks(self._run, looks, lambda done, total: progress("drawing the report", done, total))
+                overlay = Path(self._scratch.name) / "overlay.jpg"
+                draw_overlay_sheet(
+                    self._run, overlay, lambda done, total: progress("drawing the report", done, total)
+                )
             figure = self.figure17().save(made / "figure17.png")
-            write_report(self._run, figure, looks, made / "report.html")
+            write_report(self._run, figure, overlay, made / "report.html")
             write_run(self._run, made)
             names = sorted(path.name for path in made.iterdir())
         return tuple(Path(folder) / name for name in names)
@@ -139,25 +141,25 @@ def run(
     seed: int | None = None,
     stiffness_n: float | None = None,
     fmu: str | Path | None = None,
-    progress: Told = silent,
+    progress: StageProgress = silent,
 ) -> ScenarioRun:
-    """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
+    """Results of a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
 
     Parameters
     ----------
     scenario : path or name
         Scenario file, or a shipped one such as "paper_simulation".
     seed, stiffness_n : optional
-        In place of the scenario's seed, and of the vehicle's C_x [N].
+        Replace the scenario's seed, and the vehicle's C_x [N].
     fmu : path, optional
-        The unit; without it one is built.
+        The unit; by default one is built.
     progress : callable
-        Told the stage, and how much of how much is done.
+        Called with the stage, and how many of how many of its items are done.
 
     Raises
     ------
     TrpacError
-        With all that is wrong.
+        With all problems.
     MissingExtraError
         Without the extra 'fmu'.
     """

@@ -15,11 +15,11 @@ def build_fmu(folder: str | Path, *, unit: str = "TrpacEstimator", flat: bool = 
     Parameters
     ----------
     folder : path
-        Where the archive goes; it is made where it is missing.
+        Folder of the archive, which is made where it is missing.
     unit : str
         TrpacEstimator, TrpacEstimator4W, ReferencePlant or TorquePulses.
     flat : bool
-        Whether its variables have names without dots.
+        Whether the names of its variables are without dots.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def build_fmu(folder: str | Path, *, unit: str = "TrpacEstimator", flat: bool = 
 
 
 def require_unit(path: str | Path) -> Path:
-    """The path of a unit whose archive is whole; raises TrpacError."""
+    """The path of a unit after a check of its archive; raises TrpacError."""
     with extras("a unit", "fmu"):
         from scenarios.fmu_client.unpacking import require_whole
 

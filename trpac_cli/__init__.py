@@ -1,6 +1,6 @@
-"""The command line: arguments, progress and exit codes, nothing else."""
+"""The command line: arguments, progress and exit codes."""
 
 import os
 
-# Before NumPy is loaded. Matrices are small here: threads of their products wait for each other more than they work.
+# Set before NumPy is imported: matrices are small, and threads of their products mostly wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

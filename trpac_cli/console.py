@@ -1,63 +1,71 @@
-"""What commands share: a terminal that shows text as it is, progress bars, the check of the folder, refusals."""
+"""The common part of the commands: terminal, progress bars, check of the folder, error messages."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.text import Text
 
+from scenarios.progress import StageProgress
 from trpac_core.files import quoted
 
 EXIT_INPUT = 2
-"""Unusable input: one line on standard error, and nothing written."""
+"""Exit code of unusable input, with one line on standard error and no file written."""
 LONGEST_LINE = 900
-"""Characters of that line: the problems that fit are named, the rest are counted."""
+"""Characters of that line: problems that fit are named, further ones are counted."""
 LONGEST_SHOWN = 10_000
-"""Characters of a line on the terminal."""
-
-Told = Callable[[str, int, int], None]
+"""Greatest number of characters of a line on the terminal."""
 
 
 class Terminal(Console):
-    """A console for text that files may have a part in: brackets are brackets, control characters are shown as codes.
+    """A console for text from files: brackets are no markup, control characters are shown as codes.
 
-    Where a text of ours has markup, `print(..., markup=True)` says so, and what is not ours is escaped.
+    Text with markup is printed by `print(..., markup=True)`, with text from files escaped.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, highlight=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Text ready to be shown."""
+        """The text with control characters as codes."""
         plain = "\n".join(quoted(line, LONGEST_SHOWN) for line in text.split("\n"))
         return super().render_str(plain, **options)
 
 
 @contextmanager
-def bars() -> Iterator[Told]:
-    """A progress bar per stage, and what to tell them."""
+def bars() -> Iterator[StageProgress]:
+    """Show a progress bar per stage; the context's value is what the work calls."""
     named = TextColumn("{task.description:>20}", markup=False)
-    with Progress(named, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()) as shown:
+    times = (TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(named, BarColumn(), MofNCompleteColumn(), *times, console=Terminal()) as shown:
         tasks: dict[str, TaskID] = {}
 
-        def told(stage: str, done: int, total: int) -> None:
+        def progress(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
                 tasks[stage] = shown.add_task(stage, total=total)
             shown.update(tasks[stage], completed=done, total=total)
 
-        yield told
+        yield progress
 
 
 def require_folder(command: str, out: Path) -> None:
-    """Refuse before the work what would fail after it."""
+    """Refuse a folder that cannot be written to, before the work begins."""
     try:
         there = next(p for p in (out, *out.absolute().parents) if p.exists())
     except OSError as error:  # a name that is too long, a folder that may not be entered
@@ -69,13 +77,13 @@ def require_folder(command: str, out: Path) -> None:
 
 
 def refuse(command: str, problem: str | Exception) -> NoReturn:
-    """All problems in one line on standard error, as far as they fit."""
+    """Print all problems as one line on standard error and exit with `EXIT_INPUT`."""
     complain(command, problem)
     raise typer.Exit(EXIT_INPUT)
 
 
 def complain(command: str, problem: str | Exception) -> None:
-    """One line on standard error: the problems, one a line of the text, as far as they fit."""
+    """Print problems, one per line of the text, as one line on standard error, as far as they fit."""
     lines = [line.strip() for line in str(problem).splitlines() if line.strip()]
     shown: list[str] = []
     room = LONGEST_LINE

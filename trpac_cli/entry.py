@@ -1,4 +1,4 @@
-"""Where the command `trpac` begins: a package that is not installed is one sentence, not a traceback."""
+"""Entry of the command `trpac`: a missing package is reported as one sentence."""
 
 from __future__ import annotations
 
@@ -35,5 +35,5 @@ def main() -> None:
 
 
 def _leave(number: int, _: object) -> NoReturn:
-    """End as after any other error: passing folders are removed, files keep what they held."""
+    """Exit as after an exception, so that temporary folders are removed and files restored."""
     sys.exit(128 + number)

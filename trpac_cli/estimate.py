@@ -61,11 +61,13 @@ def estimate(
 
     require_folder(COMMAND, out)
     try:
-        with bars() as told:
-            done = trpac.estimate(log, vehicle, mapping=mapping, camera=camera, peers=peers, progress=told)
-            told("report", 0, 1)
+        with bars() as progress:
+            done = trpac.estimate(
+                log, vehicle, mapping=mapping, camera=camera, peers=peers, progress=progress
+            )
+            progress("report", 0, 1)
             written = done.write(out)
-            told("report", 1, 1)
+            progress("report", 1, 1)
     except (trpac.TrpacError, OSError) as error:
         refuse(COMMAND, error)
     console, summary = Terminal(), done.summary

@@ -28,7 +28,7 @@ app = typer.Typer(
 
 @app.callback()
 def _root() -> None:
-    """Makes `doctor` a subcommand, even while it is alone."""
+    """Group of the commands, so that `doctor` is a subcommand though it is the only one."""
 
 
 @app.command()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sim2real.result import Diagnosis
 
 MOST_CAUSES = 5
-"""Causes that the summary shows."""
+"""Greatest number of causes in the summary."""
 COLOURS = {
     "identified": "cyan",
     "compound": "cyan",
@@ -87,8 +87,8 @@ def diagnose(
     command = "trpac gap diagnose"
     require_folder(command, out)
     try:
-        with bars() as told:
-            said = diagnose_files(
+        with bars() as progress:
+            diagnosis = diagnose_files(
                 vehicle,
                 road,
                 fit,
@@ -96,15 +96,15 @@ def diagnose(
                 mapping=mapping,
                 seed=seed,
                 jobs=jobs or cpu_count(),
-                progress=told,
+                progress=progress,
             )
-            told("report", 0, 1)
-            written = write_diagnosis(rated(said), out)
-            told("report", 1, 1)
+            progress("report", 0, 1)
+            written = write_diagnosis(rated(diagnosis), out)
+            progress("report", 1, 1)
     except (ScenarioError, OSError) as error:
         refuse(command, error)
     console = Terminal()
-    _summarise(console, said)
+    _summarise(console, diagnosis)
     console.print("  ".join(str(path) for path in written), soft_wrap=True)
 
 
@@ -139,48 +139,48 @@ def demo(
     console = Terminal()
     try:
         case = make_case(out, seed)
-        _tell_case(console, case)
-        with bars() as told:
-            said = diagnose_files(
+        _print_case(console, case)
+        with bars() as progress:
+            diagnosis = diagnose_files(
                 case.vehicle,
                 case.road,
                 [str(path) for path in case.fit],
                 str(case.holdout),
                 seed=seed,
                 jobs=jobs or cpu_count(),
-                progress=told,
+                progress=progress,
             )
-            _, report = write_diagnosis(rated(said), out)
-        _tell(console, "\n4. What it says.", "A gap of 1 is what the sensors' noise alone leaves.")
-        _summarise(console, said)
-        _tell_truth(console, case, open_seal(case), said)
+            _, report = write_diagnosis(rated(diagnosis), out)
+        _print_step(console, "\n4. What it says.", "A gap of 1 is what the sensors' noise alone leaves.")
+        _summarise(console, diagnosis)
+        _print_truth(console, case, open_seal(case), diagnosis)
     except (ScenarioError, OSError) as error:
         refuse(command, error)
     console.print(f"The whole story, with pictures: {report}", soft_wrap=True)
 
 
-def _tell(console: Terminal, step: str, *sentences: str) -> None:
-    """One step of the demonstration, wrapped to the terminal."""
+def _print_step(console: Terminal, step: str, *sentences: str) -> None:
+    """Print a step of the demonstration."""
     console.print(f"[bold]{step}[/bold] {' '.join(sentences)}\n", markup=True)
 
 
-def _tell_case(console: Terminal, case: Case) -> None:
-    """What is hidden from whom."""
-    _tell(
+def _print_case(console: Terminal, case: Case) -> None:
+    """Print what is hidden and what the diagnosis gets."""
+    _print_step(
         console,
         "1. Hiding something.",
         "One effect is drawn, with a strength, and built into a car. The simulation of that car knows nothing of it.",
         "The car is driven three times over a road of dry, wet and icy stretches: accelerating, coasting, braking up",
         "to the grip limit. Its sensors are noisy.",
     )
-    _tell(
+    _print_step(
         console,
         "2. What the diagnosis gets:",
         f"the simulation's {case.vehicle.name} and {case.road.name}, two logs to fit to",
         f"({', '.join(path.name for path in case.fit)}), and {case.holdout.name}, to which no parameter is fitted.",
         f"Not {case.truth.name}: it is sealed with SHA-256 {case.seal}. All lie in {escape(str(case.truth.parent))}.",
     )
-    _tell(
+    _print_step(
         console,
         "3. The diagnosis",
         "lets the simulation run beside each log. What it mispredicts beyond the sensors' noise is the gap. Every",
@@ -188,18 +188,18 @@ def _tell_case(console: Terminal, case: Case) -> None:
     )
 
 
-def _tell_truth(console: Terminal, case: Case, truth: Truth, said: Diagnosis) -> None:
-    """The end of the demonstration: what was hidden against what was found."""
+def _print_truth(console: Terminal, case: Case, truth: Truth, diagnosis: Diagnosis) -> None:
+    """Print the hidden effect beside the diagnosis."""
     from sim2real.telling.report import estimate
 
     hidden = ", ".join(f"{name} {value:g}" for name, value in truth.parameters.items())
-    _tell(
+    _print_step(
         console,
         "\n5. Opening the seal.",
         f"{case.truth.name} is unchanged. Hidden was [bold]{truth.effect}[/bold] ({hidden}).",
-        judge(truth.effect, said),
+        judge(truth.effect, diagnosis),
     )
-    found = next((c for c in said.causes if c.effect == truth.effect), None)
+    found = next((c for c in diagnosis.causes if c.effect == truth.effect), None)
     for name, interval in found.parameters.items() if found else ():
         if name not in truth.parameters:  # a form of the effect with more to it than was hidden
             continue
@@ -210,46 +210,48 @@ def _tell_truth(console: Terminal, case: Case, truth: Truth, said: Diagnosis) ->
         )
 
 
-def judge(hidden: str, said: Diagnosis) -> str:
-    """Whether the diagnosis found the hidden effect, in a sentence with colours."""
+def judge(hidden: str, diagnosis: Diagnosis) -> str:
+    """The sentence, with markup, on whether the diagnosis found the hidden effect."""
     from sim2real.telling.report import percent
 
-    ranked = [c.effect for c in said.causes]
+    ranked = [c.effect for c in diagnosis.causes]
     if hidden not in ranked:
         return "The diagnosis did [red]not[/red] try it."
     rank = ranked.index(hidden) + 1
-    probability = said.causes[rank - 1].probability
-    if rank == 1 and said.verdict == "identified":
+    probability = diagnosis.causes[rank - 1].probability
+    if rank == 1 and diagnosis.verdict == "identified":
         return f"The diagnosis is [green]right[/green], with a probability of {percent(probability)}."
-    if any(hidden in group for group in said.ambiguous_with):
+    if any(hidden in group for group in diagnosis.ambiguous_with):
         return "The diagnosis has it among those that it [yellow]cannot tell apart[/yellow]."
     return (
-        f"The diagnosis is [red]not right[/red]: it says '{said.verdict}' and ranks the hidden effect {rank} of "
+        f"The diagnosis is [red]not right[/red]: it says '{diagnosis.verdict}' and ranks the hidden effect {rank} of "
         f"{len(ranked)}, with a probability of {percent(probability)}."
     )
 
 
-def _summarise(console: Terminal, said: Diagnosis) -> None:
-    """Verdict, sizes and the first causes on the terminal."""
+def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
+    """Print outcome, gap and first causes."""
     from sim2real.result import added
     from sim2real.telling.report import leading
 
-    gap = said.gap
+    gap = diagnosis.gap
     sizes = f"gap {gap.before.total:.2f}"
-    if added(said):
-        sizes += f", with {' and '.join(c.effect for c in added(said))} {gap.after.total:.2f}"
-    text = Text.assemble(said.sentence, "\n", (f"{sizes}; noise alone {gap.noise_floor:.2f}", "dim"))
-    colour = COLOURS[said.verdict]
-    console.print(Panel(text, title=said.verdict.replace("_", " "), title_align="left", border_style=colour))
-    if leading(said):
-        console.print(_cause_table(said))
-    if said.next_manoeuvre is not None:
-        console.print(f"To tell them apart: {said.next_manoeuvre.sentence}")
-    for warning in said.warnings:
+    if added(diagnosis):
+        sizes += f", with {' and '.join(c.effect for c in added(diagnosis))} {gap.after.total:.2f}"
+    text = Text.assemble(diagnosis.sentence, "\n", (f"{sizes}; noise alone {gap.noise_floor:.2f}", "dim"))
+    colour = COLOURS[diagnosis.verdict]
+    console.print(
+        Panel(text, title=diagnosis.verdict.replace("_", " "), title_align="left", border_style=colour)
+    )
+    if leading(diagnosis):
+        console.print(_cause_table(diagnosis))
+    if diagnosis.next_manoeuvre is not None:
+        console.print(f"To tell them apart: {diagnosis.next_manoeuvre.sentence}")
+    for warning in diagnosis.warnings:
         console.print(warning, style="yellow")
 
 
-def _cause_table(said: Diagnosis) -> Table:
+def _cause_table(diagnosis: Diagnosis) -> Table:
     from sim2real.telling.report import estimate, number, percent
 
     table = Table(title="Causes, likeliest first", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
@@ -258,7 +260,7 @@ def _cause_table(said: Diagnosis) -> Table:
     table.add_column("estimate (95 % interval)")
     table.add_column("gap", justify="right", no_wrap=True)
     table.add_column("shrink", justify="right", no_wrap=True)
-    for cause in said.causes[:MOST_CAUSES]:
+    for cause in diagnosis.causes[:MOST_CAUSES]:
         values = "\n".join(f"{name} {estimate(value)}" for name, value in cause.parameters.items())
         table.add_row(
             cause.effect,

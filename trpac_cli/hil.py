@@ -15,13 +15,13 @@ from trpac_cli.console import Terminal, complain, refuse, require_folder
 
 if TYPE_CHECKING:
     from trpac_hil.bus import BusSettings
-    from trpac_hil.plant_node import PartnerJob
+    from trpac_hil.plant_node import PlantJob
 
 COMMAND, PLANT_COMMAND = "trpac hil", "trpac hil-plant"
 EXIT_NO_LOG = 4
-"""The loop ran, but its log could not be written."""
+"""Exit code where the log could not be written."""
 MULTICAST = "239.74.163.2"
-"""Channel of udp_multicast where none is given: python-can's own group for IPv4."""
+"""Default channel of udp_multicast: python-can's group for IPv4."""
 CHANNELS = {"virtual": "trpac", "udp_multicast": MULTICAST, "socketcan": "can0"}
 
 Interface = Annotated[
@@ -85,7 +85,9 @@ def hil(
         typer.Option(min=0, help="Core for the loop alone; with --realtime the last one by default."),
     ] = None,
     camera_threads: Annotated[int, typer.Option(min=1, max=16, help="Threads of each network.")] = 1,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No table while it runs, events only.")] = False,
+    events_only: Annotated[
+        bool, typer.Option("--quiet", help="No table while it runs, events only.")
+    ] = False,
 ) -> None:
     """Step the unit in real time against a CAN bus; end with Ctrl-C.
 
@@ -127,7 +129,7 @@ def hil(
             plant=_plant_job(bus, dbc, scenario, rate_hz, frames is None) if with_plant else None,
             log=not no_log,
             counters=not no_counters,
-            live=sys.stderr.isatty() and not quiet,
+            live=sys.stderr.isatty() and not events_only,
             realtime=realtime,
             core=core,
             camera_threads=camera_threads,
@@ -169,22 +171,22 @@ def hil_plant(
     """
     from scenarios.errors import ScenarioError
     from trpac_hil.deadlines import SystemClock
-    from trpac_hil.plant_node import open_partner
+    from trpac_hil.plant_node import open_plant_node
     from trpac_hil.rig import RUN_UP_NS, Stopper
 
     try:
         job = _plant_job(_bus(interface, channel, bus_option), dbc, scenario, rate_hz, True)
         job = replace(job, camera_fps=camera_fps, camera_delay_s=camera_delay_s)
-        partner = open_partner(job, lambda kind, text: complain(PLANT_COMMAND, text))
+        node = open_plant_node(job, lambda kind, text: complain(PLANT_COMMAND, text))
     except (ScenarioError, OSError) as error:
         refuse(PLANT_COMMAND, error)
     stopper = Stopper()
     print(f"{PLANT_COMMAND}: driving on {job.bus.interface} {job.bus.channel}; Ctrl-C ends.", file=sys.stderr)
     with stopper.by_signal():
         slots = None if duration_s is None else round(duration_s * rate_hz)
-        partner.run(SystemClock().now_ns() + RUN_UP_NS, stopper, slots)
-    partner.close()
-    print(f"{PLANT_COMMAND}: {partner.left_out} cycles were left out for being late.", file=sys.stderr)
+        node.run(SystemClock().now_ns() + RUN_UP_NS, stopper, slots)
+    node.close()
+    print(f"{PLANT_COMMAND}: {node.left_out} cycles were left out for being late.", file=sys.stderr)
 
 
 def _bus(interface: str, channel: str | None, options: list[str] | None) -> BusSettings:
@@ -214,17 +216,17 @@ def _parameters(pairs: list[str] | None) -> dict[str, float]:
 
 def _plant_job(
     bus: BusSettings, dbc: Path | None, scenario: Path | None, rate_hz: float, sees: bool
-) -> PartnerJob:
+) -> PlantJob:
     from trpac_hil.codec import DBC_FILE
-    from trpac_hil.plant_node import PLAIN_SCENARIO, PartnerJob
+    from trpac_hil.plant_node import PLAIN_SCENARIO, PlantJob
 
-    return PartnerJob(
+    return PlantJob(
         scenario or PLAIN_SCENARIO, bus, dbc or DBC_FILE, rate_hz, camera_fps=20.0 if sees else 0.0
     )
 
 
 def _show(summary: dict[str, Any], out: Path) -> None:
-    """The outcome on the terminal."""
+    """Print the outcome."""
     console, overruns = Terminal(), summary["overruns"]
     worst = f", the worst by {overruns['worst_ms']:.2f} ms" if overruns["count"] else ""
     console.print(

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from trpac_cli import fmu as fmu_commands
 from trpac_cli import gap, vision
-from trpac_cli.console import Terminal, refuse, require_folder
+from trpac_cli.console import Terminal, bars, refuse, require_folder
 from trpac_cli.estimate import estimate
 from trpac_cli.hil import hil, hil_plant
 from trpac_cli.sweep import sweep
@@ -34,7 +33,7 @@ app.command()(hil)
 app.command("hil-plant")(hil_plant)
 
 
-def _tell_version(asked: bool) -> None:
+def _print_version(asked: bool) -> None:
     if asked:
         print(f"trpac {version('trpac-fmu')}")
         raise typer.Exit
@@ -42,12 +41,12 @@ def _tell_version(asked: bool) -> None:
 
 @app.callback()
 def _root(
-    told: Annotated[
+    version_asked: Annotated[
         bool,
-        typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and exit."),
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
     ] = False,
 ) -> None:
-    """What holds for all commands."""
+    """Options of all commands."""
 
 
 @app.command()
@@ -76,29 +75,19 @@ def run(
     import trpac
 
     require_folder("trpac run", out)
-    console = Terminal()
-    named = TextColumn("{task.description:>18}", markup=False)
     try:
-        with Progress(
-            named, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
-        ) as bars:
-            tasks: dict[str, TaskID] = {}
-
-            def show(stage: str, done: int, total: int) -> None:
-                if stage not in tasks:
-                    tasks[stage] = bars.add_task(stage, total=total)
-                bars.update(tasks[stage], completed=done)
-
-            finished = trpac.run(scenario, seed=seed, stiffness_n=stiffness_n, fmu=fmu, progress=show)
-            finished.write(out, show)
+        with bars() as progress:
+            finished = trpac.run(scenario, seed=seed, stiffness_n=stiffness_n, fmu=fmu, progress=progress)
+            finished.write(out, progress)
     except (TrpacError, OSError) as error:
         refuse("trpac run", error)
+    console = Terminal()
     console.print(_score_table(finished.summary))
     console.print(f"Report: {out / 'report.html'}   figure: {out / 'figure17.png'}")
 
 
 def _score_table(summary: dict) -> Table:
-    """Scores as a table for the terminal."""
+    """The table of scores for the terminal."""
     from scenarios.report import number, score_rows
 
     table = Table(title=f"{summary['scenario']}, seed {summary['seed']}")

@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 
 from scenarios.errors import ScenarioError
-from trpac_cli.console import Terminal, complain, refuse, require_folder
+from trpac_cli.console import Terminal, bars, complain, refuse, require_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,8 +21,9 @@ if TYPE_CHECKING:
     from scenarios.sweep.store import Parts
 
 EXIT_SOME_FAILED = 1
-"""Done, but some runs failed; they are named on standard error."""
+"""Exit code where some runs failed; they are named on standard error."""
 MOST_NAMED = 5
+"""Failed runs that are named."""
 
 
 def sweep(
@@ -56,27 +50,13 @@ def sweep(
     from scenarios.sweep.execute import execute
     from scenarios.sweep.files import load_sweep
 
-    columns = (
-        TextColumn("runs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
     console = Terminal()
     try:
         _require(scheduler, jobs)
         require_folder("trpac sweep", out)
         loaded = load_sweep(file, allow_code=allow_code)
-        with Progress(*columns, console=console) as bars:
-            task = bars.add_task("runs", total=None)
-            parts, failures = execute(
-                loaded,
-                out,
-                scheduler,
-                jobs,
-                lambda done, total: bars.update(task, completed=done, total=total),
-            )
+        with bars() as progress:
+            parts, failures = execute(loaded, out, scheduler, jobs, partial(progress, "runs"))
         if not parts.empty():
             _finish(loaded, parts, failures, out, console)
     except (ScenarioError, OSError) as error:
@@ -88,13 +68,13 @@ def sweep(
 
 
 def _require(scheduler: str | None, jobs: int | None) -> None:
-    """Refuse options that say two things."""
+    """Raise ScenarioError for contradicting options."""
     if scheduler is not None and jobs is not None:
         raise ScenarioError("--jobs goes with processes of this machine; leave it out with --scheduler.")
 
 
 def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, console: Terminal) -> None:
-    """Write what the runs make together: all of it, or nothing."""
+    """Write table, summary and report, all or none, and print the summary."""
     from scenarios.sweep.report import write_report
     from scenarios.sweep.store import write_table
     from scenarios.sweep.summary import summarise
@@ -117,7 +97,7 @@ def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, con
 
 
 def _shown(summary: dict[str, Any]) -> Table:
-    """Medians and 95th percentiles for the terminal."""
+    """The table of medians and 95th percentiles for the terminal."""
     from scenarios.report import number
 
     table = Table(

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from trpac_cli.console import Terminal, refuse, require_folder
+from trpac_cli.console import Terminal, bars, refuse, require_folder
 from trpac_core.files import quoted
 
 if TYPE_CHECKING:
-    from scenarios.stills import Progress as Told
     from scenarios.vision_runs import Drive
 
 EXIT_SOME_UNREADABLE = 1
-"""Done, but some of the pictures could not be used; they are named on standard error."""
+"""Exit code where some pictures could not be used; they are named on standard error."""
 LONGEST_PROBLEM = 400
-"""Characters of one problem."""
+"""Greatest number of characters of a problem."""
 MOST_NAMED = 20
-"""Unusable pictures that a message names; the rest are counted."""
+"""Unusable pictures that are named; further ones are counted."""
 
 app = typer.Typer(help="The camera side alone: road surface from pictures.", no_args_is_help=True)
 
@@ -54,8 +52,8 @@ def classify(
         files, problems = find_pictures(paths)
         if os.path.realpath(out) in {os.path.realpath(file) for file in files}:
             refuse(command, f"{out}: one of the pictures. Expected the name of a CSV file to write.")
-        with _bar("pictures") as told:
-            table, unusable = classify_pictures(files, told)
+        with bars() as progress:
+            table, unusable = classify_pictures(files, partial(progress, "pictures"))
         problems += unusable
         if table.empty:
             refuse(command, _listed("nothing to classify", problems))
@@ -92,8 +90,8 @@ def run(
     require_folder(command, out)
     try:
         found = Frames.find(frames)
-        with _bar("frames") as told:
-            drive = run_frames(found, camera, speed_m_s, fps, out, told)
+        with bars() as progress:
+            drive = run_frames(found, camera, speed_m_s, fps, out, partial(progress, "frames"))
     except (ScenarioError, ModelError, OSError) as error:
         refuse(command, error)
     _show(drive)
@@ -102,7 +100,7 @@ def run(
 
 
 def _show(drive: Drive) -> None:
-    """The run's outcome on the terminal."""
+    """Print the outcome."""
     summary, console = drive.summary, Terminal()
     table = Table(title=f"{summary['frames']} frames, {len(summary['unreadable'])} not usable")
     for heading in ("share of frames", "IFE", "voting"):
@@ -122,17 +120,8 @@ def _show(drive: Drive) -> None:
     console.print(f"Table: {drive.out / 'frames.csv'}", soft_wrap=True)
 
 
-@contextmanager
-def _bar(what: str) -> Iterator[Told]:
-    """A progress bar, and what to tell it."""
-    columns = (TextColumn("{task.description:>18}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns) as bars:
-        task = bars.add_task(what, total=None)
-        yield lambda done, total: bars.update(task, completed=done, total=total)
-
-
 def _counted(classes: Sequence[str]) -> str:
-    """How many of each class."""
+    """The number of pictures by class as text."""
     from trpac_core.vision.classes import Surface
 
     return ", ".join(f"{classes.count(surface.label)} {surface.label}" for surface in Surface)
@@ -145,7 +134,7 @@ def _listed(heading: str, problems: Sequence[str]) -> str:
 
 
 def _finish(command: str, heading: str, problems: Sequence[str]) -> None:
-    """Name what could not be used, if anything."""
+    """Exit with `EXIT_SOME_UNREADABLE` and a message where there are problems."""
     if problems:
         print(f"{command}: {_listed(heading, problems)}", file=sys.stderr)
         raise typer.Exit(EXIT_SOME_UNREADABLE)

@@ -2,18 +2,20 @@
 
 ======================  ==================================================================================
 trpac.dbc, codec.py     the messages, and their values by signal name
-bus.py                  a CAN bus of any python-can interface that may be lost and come back
-inputs.py               the newest value of each signal, and how old it is
-placing.py, sight.py    which result of the camera is for the road under the wheel now
+bus.py                  a CAN bus of any python-can interface, reopened after it is lost
+inputs.py               the newest value of each signal, and its age
+preview_stamps.py       results of the camera, stamped on the road
+camera_input.py         which of them is for the road under the wheel now
 unit.py                 the unit through fmpy
 deadlines.py            when each cycle is due
 loop.py                 the cycle: bus, unit, bus
 camera.py               pictures, in a process of their own
-recorder.py, mdf.py     log, figures and terminal, in a process of their own
-figures.py, screen.py   spreads of timing and ages, and how the terminal shows them
+recorder.py, mdf.py     log, quantiles and terminal, in a process of their own
+figures.py, screen.py   quantiles of timing and ages, and how the terminal shows them
 shared.py               memory that these processes share
+bus_relay.py            a bus of the loop's process, reached from another process
 driver.py, plant_node.py the reference plant as the car on the bus
-settings.py             what a run is told
-rig.py                  all of it put together
+settings.py             the settings of a run
+rig.py                  puts unit, bus and processes together
 ======================  ==================================================================================
 """

@@ -1,4 +1,4 @@
-"""A CAN bus of any python-can interface that may be lost, and is opened anew beside the loop."""
+"""A CAN bus of any python-can interface; a lost bus is reopened in a thread beside the loop."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from can.interfaces import BACKENDS
 
 from trpac_core.files import quoted
 from trpac_hil.errors import HilError
-from trpac_hil.inputs import Say
+from trpac_hil.inputs import ReportEvent
 
 RETRY_S = 0.5
-"""Pause between attempts to open a lost bus anew [s]."""
+"""Pause between attempts to reopen a lost bus [s]."""
 MOST_AT_ONCE = 512
-"""Frames, of whatever kind, that one cycle reads at most; what is left waits for the next one."""
+"""Frames of any kind that one cycle reads at most; the rest waits for the next cycle."""
 BUS_ERRORS = (can.CanError, OSError)
-"""What interfaces raise when a bus fails."""
+"""Exceptions that interfaces raise when a bus fails."""
 OPENING_ERRORS = (*BUS_ERRORS, ValueError, TypeError, ImportError, NotImplementedError)
-"""What they raise when one cannot be opened."""
+"""Exceptions that they raise when a bus cannot be opened."""
 GARBLED_BY = (
     ValueError,
     TypeError,
@@ -32,29 +32,29 @@ GARBLED_BY = (
     MemoryError,
     RecursionError,
 )
-"""Causes of python-can's error where what came cannot be read as a CAN message; a bus that fails has others."""
+"""Causes of python-can's error where received data are no CAN message; a failing bus has other causes."""
 BACKENDS["udp_multicast"] = ("trpac_hil.datagrams", "DatagramBus")
 
 
 @dataclass(frozen=True)
 class BusSettings:
-    """How to open the bus: python-can's interface and channel, and whatever else that interface takes."""
+    """How to open the bus: python-can's interface, channel and further options of that interface."""
 
     interface: str = "virtual"
     channel: str = "trpac"
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def open(self) -> can.BusABC:
-        """Open the bus; raises what the interface raises.
+        """The open bus; raises what the interface raises.
 
-        No filters are set: where python-can filters itself, a look without waiting ends at the first message that is
-        filtered out, and leaves those behind it for later.
+        No filters are set: where python-can filters in software, a read without waiting ends at the first message that
+        is filtered out.
         """
         return can.Bus(channel=self.channel, interface=self.interface, **self.options)
 
 
 def bus_options(pairs: Sequence[str]) -> dict[str, Any]:
-    """Options as on the command line, NAME=VALUE each; raises HilError."""
+    """Interface options from NAME=VALUE texts; raises HilError."""
     options: dict[str, Any] = {}
     for pair in pairs:
         name, sign, text = pair.partition("=")
@@ -66,19 +66,13 @@ def bus_options(pairs: Sequence[str]) -> dict[str, Any]:
 
 
 class Link:
-    """The loop's end of the bus. No call of it waits, and none raises.
+    """The bus as the loop uses it: no method waits, and none raises."""
 
-    Parameters
-    ----------
-    open_bus : callable
-        Opens the bus, or raises one of `BUS_ERRORS`.
-    say : callable
-        Told when the bus is lost and when it is back.
-    """
-
-    def __init__(self, open_bus: Callable[[], can.BusABC], say: Say, retry_s: float = RETRY_S) -> None:
+    def __init__(
+        self, open_bus: Callable[[], can.BusABC], report: ReportEvent, retry_s: float = RETRY_S
+    ) -> None:
         """Open the bus; raises HilError where it cannot be opened at the start."""
-        self._open, self._say, self._retry_s = open_bus, say, retry_s
+        self._open, self._report, self._retry_s = open_bus, report, retry_s
         self.losses = self.unsent = self.error_frames = self.garbled = self.backlogs = 0
         self._found: can.BusABC | None = None
         self._closing = threading.Event()
@@ -97,7 +91,7 @@ class Link:
         return self._bus is not None
 
     def receive(self) -> list[can.Message]:
-        """All messages that have come, of at most `MOST_AT_ONCE` frames; none while the bus is lost."""
+        """Messages received since the last call, from at most `MOST_AT_ONCE` frames; none while the bus is lost."""
         bus = self._bus or self._back()
         messages: list[can.Message] = []
         if bus is None:
@@ -124,14 +118,14 @@ class Link:
 
     def _leave_aside(self, why: object) -> None:
         self.garbled += 1
-        self._say(
+        self._report(
             "garbled",
             f"What came is no CAN message and was left aside ({quoted(why)}). "
             "Something else sends to the bus's address; give the bus one of its own.",
         )
 
     def drain(self, longest_s: float = 1.0) -> None:
-        """Throw away what has waited: nobody knows how old it is."""
+        """Discard waiting messages, whose age is unknown."""
         end_s = time.monotonic() + longest_s
         while time.monotonic() < end_s:
             backlogs = self.backlogs
@@ -139,22 +133,22 @@ class Link:
                 return
 
     def send(self, frame_id: int, extended: bool, data: bytes) -> None:
-        """Hand a message over; one that cannot be sent is counted in `unsent`, without a bus it is dropped."""
+        """Send a message; one that cannot be sent is counted in `unsent`."""
         if self._bus is None:
             return
         message = can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data)
         try:
             self._bus.send(message)
         except can.CanOperationError as error:
-            # A full transmit buffer is no lost bus: nobody acknowledges, or too much is sent.
+            # The transmit buffer is full: no node acknowledges, or too much is sent. The bus is not lost.
             self.unsent += 1
-            self._say("unsent", f"A message could not be sent: {quoted(error)}")
+            self._report("unsent", f"A message could not be sent: {quoted(error)}")
         except BUS_ERRORS as error:
             self.unsent += 1
             self._lose(f"{type(error).__name__}: {quoted(error)}")
 
     def check(self) -> None:
-        """Ask the controller for its state, where the interface can tell; a bus that is off is lost."""
+        """Treat the bus as lost where the interface reports the controller as bus-off."""
         if self._bus is None:
             return
         try:
@@ -167,11 +161,11 @@ class Link:
 
     def _lose(self, why: str) -> None:
         self.losses += 1
-        self._say(
+        self._report(
             "bus lost", f"The bus was lost ({why}). TRPAC is held with flag 0; trying to open it again."
         )
         lost, self._bus = self._bus, None
-        # Closing and opening may take long: neither is the loop's business.
+        # Closing and opening may take seconds, so both run outside the loop's thread.
         self._seeker = threading.Thread(target=self._seek, args=(lost,), name="bus", daemon=True)
         self._seeker.start()
 
@@ -188,11 +182,11 @@ class Link:
     def _back(self) -> can.BusABC | None:
         if self._found is not None:
             self._bus, self._found = self._found, None
-            self._say("bus back", "The bus is back.")
+            self._report("bus back", "The bus is back.")
         return self._bus
 
     def close(self) -> None:
-        """Shut the bus; the last messages get a moment to leave."""
+        """Shut the bus, 20 ms after the last message was handed over."""
         self._closing.set()
         if self._seeker is not None:
             self._seeker.join(2.0)
@@ -204,7 +198,7 @@ class Link:
 
 
 def _sound(message: can.Message) -> bool:
-    """Whether identifier and data are what they must be; python-can does not look at their types."""
+    """Whether identifier and data have valid types and ranges, which python-can does not check."""
     number = message.arbitration_id
     return (
         isinstance(number, int)

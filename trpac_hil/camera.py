@@ -1,4 +1,4 @@
-"""Pictures, worked on in a process of their own: a folder of frames played at a rate, class and confidence out."""
+"""The camera's process: plays a folder of pictures at a fixed rate and shares class and confidence of each."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,60 +25,52 @@ from trpac_hil.helper import Control, helper
 from trpac_hil.shared import Numbers, Ring
 
 FAILED = -1.0
-"""In the place of a class: the picture could not be used."""
+"""Value of the class where the picture could not be used."""
 MOTION = ("speed_m_s", "acceleration_m_s2", "steering_angle_rad", "yaw_rate_rad_s", "way_m")
-"""What the loop shares of the car's motion; the yaw rate is NaN where it is not measured."""
+"""Numbers of the car's motion that the loop shares; the yaw rate is NaN where it is not measured."""
 HEAD = 5
-"""Numbers of a result before the verdicts: picture, time taken, time ready [ns], pictures left out, work [ms]."""
+"""Numbers of a result before the classes: picture, time taken, time ready [ns], pictures left out, work [ms]."""
 RESULTS_KEPT = 64
 LONGEST_SLEEP_NS = 50_000_000
 
 
 def result_columns(sides: int) -> int:
-    """Numbers of a result: the head, and class and confidence of each side."""
+    """How many numbers a result has: the head, and class and confidence of each side."""
     return HEAD + 2 * sides
 
 
-class Source(Protocol):
-    """Where pictures come from."""
-
-    def picture(self, number: int) -> NDArray[np.uint8]:
-        """The picture of that number, counted from 0; raises ImageError."""
-        ...
-
-
 @dataclass(frozen=True)
-class Folder:
-    """Pictures of a folder, over and over again."""
+class PictureFolder:
+    """The pictures of a folder, repeated without end."""
 
     files: tuple[Path, ...]
 
     def picture(self, number: int) -> NDArray[np.uint8]:
-        """The picture of that number; raises ImageError."""
+        """The picture of a number, counted from 0; raises ImageError."""
         return decode_image(self.files[number % len(self.files)])
 
 
 @dataclass(frozen=True)
 class CameraJob:
-    """What the camera's process needs to know.
+    """Settings of the camera's process.
 
     Attributes
     ----------
-    source : Source
+    source : PictureFolder
         Pictures.
     vision : IfeConfig
-        Settings of the image estimator: camera, car, and what the unit's parameters `image.*` say.
+        Settings of the image estimator: camera, car, and the unit's parameters `image.*`.
     fps : float
         Pictures per second.
     sides : tuple of str
-        Tracks that are asked for: 'left', 'right', or both in this order.
+        Tracks to classify: 'left', 'right', or both in this order.
     threads : int
-        Of each network; 1 leaves the loop its core.
+        Threads of each network.
     core : int or None
-        The loop's core, to keep off.
+        The loop's core, which this process does not use.
     """
 
-    source: Source
+    source: PictureFolder
     vision: IfeConfig
     fps: float
     sides: tuple[str, ...] = ("left",)
@@ -87,7 +79,7 @@ class CameraJob:
 
 
 @dataclass
-class Eyes:
+class ImageEstimator:
     """The image estimator of one side or of both, with its memory."""
 
     job: CameraJob
@@ -108,36 +100,38 @@ class Eyes:
             side: Any = job.sides[0]
             self._ife, self.state = Ife(replace(config, side=side), *networks), IfeState()
 
-    def look(self, image: NDArray[np.uint8], motion: Motion) -> Sequence[FrameResult]:
-        """Verdicts of a picture; raises ImageError or ModelError, and then nothing is remembered."""
+    def process(self, image: NDArray[np.uint8], motion: Motion) -> Sequence[FrameResult]:
+        """Results of a picture, one per side; where ImageError or ModelError is raised the state is unchanged."""
         self.state, *results = self._ife.process(self.state, image, motion)
         return results
 
 
 def motion_of(numbers: Sequence[float]) -> Motion:
-    """Motion from the numbers `MOTION` that the loop shares."""
+    """The motion that the numbers `MOTION` describe."""
     speed, acceleration, steering, yaw, way = numbers
     return Motion(speed, acceleration, steering, None if math.isnan(yaw) else yaw, way)
 
 
-def watch(job: CameraJob, motion: Numbers, results: Ring, control: Control) -> None:
-    """Body of the process: take each picture when it is due, and share what it shows; ends with the loop."""
+def run_camera(job: CameraJob, motion: Numbers, results: Ring, control: Control) -> None:
+    """Body of the process: classify each picture when it is due and share the result, until the loop ends."""
     with helper(job.core):
         cv2.setNumThreads(1)
         try:
-            eyes = Eyes(job)
+            estimator = ImageEstimator(job)
             first = job.source.picture(0)
-            eyes.look(first, Motion(10.0))
+            estimator.process(first, Motion(10.0))
         except (ModelError, ImageError) as error:
             control.refuse(str(error))
             return
-        eyes.state = type(eyes.state)()
+        estimator.state = type(estimator.state)()
         control.ready()
         if control.wait_for_start():
-            _play(job, eyes, motion, results, control)
+            _play(job, estimator, motion, results, control)
 
 
-def _play(job: CameraJob, eyes: Eyes, motion: Numbers, results: Ring, control: Control) -> None:
+def _play(
+    job: CameraJob, estimator: ImageEstimator, motion: Numbers, results: Ring, control: Control
+) -> None:
     clock = SystemClock()
     deadlines = Deadlines(control.start_ns, round(1e9 / job.fps))
     done, left_out = -1, 0
@@ -147,22 +141,24 @@ def _play(job: CameraJob, eyes: Eyes, motion: Numbers, results: Ring, control: C
         if now_ns < due_ns:
             clock.sleep_ns(min(due_ns - now_ns, LONGEST_SLEEP_NS))
             continue
-        # Too slow for the rate: the newest picture counts, those in between are left out.
+        # Too slow for the rate: the newest picture is used, those in between are left out.
         number = deadlines.next_slot(done, now_ns)
         left_out += number - done - 1
         done = number
-        verdicts = _verdicts(job, eyes, number, motion, control)
+        classes = _classes(job, estimator, number, motion, control)
         ready_ns = clock.now_ns()
         work_ms = (ready_ns - now_ns) * 1e-6
-        results.write([number, deadlines.due_ns(number), ready_ns, left_out, work_ms, *verdicts])
+        results.write([number, deadlines.due_ns(number), ready_ns, left_out, work_ms, *classes])
 
 
-def _verdicts(job: CameraJob, eyes: Eyes, number: int, motion: Numbers, control: Control) -> list[float]:
+def _classes(
+    job: CameraJob, estimator: ImageEstimator, number: int, motion: Numbers, control: Control
+) -> list[float]:
     moving = motion_of(motion.get())
     try:
-        seen = eyes.look(job.source.picture(number), moving)
+        seen = estimator.process(job.source.picture(number), moving)
     except (ImageError, ModelError) as error:
-        control.tell("picture", f"A picture could not be used: {error}")
+        control.send("picture", f"A picture could not be used: {error}")
         return [FAILED, 0.0] * len(job.sides)
     return [
         number

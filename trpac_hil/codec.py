@@ -18,9 +18,9 @@ from trpac_hil.errors import HilError
 
 DBC_FILE = Path(__file__).with_name("trpac.dbc")
 NOT_AVAILABLE = "not_available"
-"""Name of the raw value by which a sender says that a signal has no value."""
+"""Name of the raw value that means: the signal has no value."""
 STALE_AFTER = "StaleAfterMs"
-"""Attribute of a signal in the DBC file: age beyond which it counts as lost [ms]."""
+"""Attribute of a signal in the DBC file: greatest age at which it is used [ms]."""
 
 INPUT_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion", "Chassis", "RoadClass", "PlantTruth")
 OUTPUT_MESSAGES = ("Estimate", "EstimateWheels", "Health")
@@ -28,15 +28,15 @@ COUNTER_OF = "_Counter"
 LIFE_COUNTER = "LifeCounter"
 
 MOST_BYTES = 16_000_000
-"""Size of a DBC file that is read [bytes]; those of a whole car have some megabytes."""
+"""Largest DBC file that is read [bytes]; files of a whole car have some megabytes."""
 LONGEST_MS = 60_000
 """Greatest cycle time and age limit [ms]; from the definitions in trpac.dbc."""
 CLASSIC_BYTES, FD_SIZES = 8, (8, 12, 16, 20, 24, 32, 48, 64)
 """Longest message of classic CAN, and lengths of a CAN FD message from there on [bytes]; ISO 11898-1."""
 LONGEST_PAYLOAD = 4095
-"""Longest message that a DBC file may describe [bytes]; ISO 15765-2. cantools writes each bit of it down."""
+"""Longest message that a DBC file may describe [bytes]; ISO 15765-2. cantools stores each of its bits."""
 MOST_BRANCHES = 1_000_000
-"""Numbers in all ranges of extended multiplexing that a DBC file may have; cantools writes each of them down."""
+"""Numbers in all ranges of extended multiplexing that a DBC file may have; cantools stores each of them."""
 GREATEST_FLOATS = {16: 65504.0, 32: 3.4028234e38, 64: 1.7976931348623157e308}
 """Greatest number that a float of so many bits holds; IEEE 754."""
 DAMAGE = (
@@ -52,16 +52,16 @@ DAMAGE = (
     NotImplementedError,
     RecursionError,
 )
-"""What cantools raises on damaged files, when it reads them or at the first message."""
+"""Exceptions that cantools raises on damaged files, on reading or at the first message."""
 _COMMENT_OR_TEXT = re.compile(r'//[^\n]*|"(?:\\"|[^"])*?"')
 _SIZES = re.compile(r":\s*([-+]?\d+)(?:\s*\|\s*([-+]?\d+))?")
-"""Bytes of a message, or first bit and bits of a signal, which are all that follows a colon as a number."""
+"""Numbers after a colon: bytes of a message, or first bit and bits of a signal."""
 _BRANCHES, _RANGE = re.compile(r"SG_MUL_VAL_[^;]*"), re.compile(r"(\d+)\s*[-+]\s*(\d+)")
 
 
 @dataclass(frozen=True)
 class Coded:
-    """One message of the bus.
+    """A message of the bus with its coding.
 
     Attributes
     ----------
@@ -76,9 +76,9 @@ class Coded:
     bounds : mapping
         Least and greatest value that can be sent, by signal.
     stale_ns : mapping
-        Age beyond which a signal counts as lost [ns].
+        Greatest age at which a signal is used [ns].
     cycle_ns : int
-        How often it comes; 0 where the file does not say [ns].
+        Its cycle time; 0 where the file has none [ns].
     """
 
     message: Message
@@ -92,7 +92,7 @@ class Coded:
 
     @classmethod
     def of(cls, message: Message) -> Coded:
-        """What the DBC file says of a message; raises one of `DAMAGE`."""
+        """The coding of a message of a DBC file; raises one of `DAMAGE`."""
         absent, stale_ns = {}, {}
         for signal in message.signals:
             for raw, name in (signal.choices or {}).items():
@@ -116,7 +116,7 @@ class Coded:
         )
 
     def encode(self, values: Mapping[str, float], count: int = 0) -> bytes:
-        """Bytes of a message; what is out of range is cut, what is missing or NaN is not available, else 0."""
+        """Bytes of a message; values are limited to their range, missing ones and NaN sent as not available or 0."""
         ready: dict[str, float] = {self.counter: count % self.counts} if self.counts else {}
         for name in self.signals:
             value = values.get(name, math.nan)
@@ -130,7 +130,7 @@ class Coded:
         return bytes(self.message.encode(ready, strict=False))
 
     def decode(self, data: bytes) -> tuple[dict[str, float], int]:
-        """Values by signal, NaN where not available, and the count, -1 without one; ValueError on a wrong length."""
+        """Values by signal, NaN where not available, and the counter, -1 without one; ValueError on a wrong length."""
         least = self.message.length
         if len(data) not in (least, _padded(least)):
             raise ValueError(
@@ -146,7 +146,7 @@ class Coded:
 
 
 def _padded(length: int) -> int:
-    """The shortest CAN FD message of 8 bytes or more that such a message fits into [bytes]."""
+    """Length of the shortest CAN FD message of 8 bytes or more that holds so many bytes [bytes]."""
     return next((size for size in FD_SIZES if size >= length), length)
 
 
@@ -162,7 +162,7 @@ def _whole_ms(value: object, what: str) -> int:
 
 
 def _bounds(signal: Signal, absent: float | None) -> tuple[float, float]:
-    """The range that a signal states, else what its bits can hold but for "not available"."""
+    """Least and greatest value of a signal: its stated range, else what its bits hold except "not available"."""
     if signal.is_float:
         greatest = GREATEST_FLOATS[signal.length]
         low, high = sorted(
@@ -199,7 +199,7 @@ class Codec:
 
 
 def load_codec(path: Path = DBC_FILE) -> Codec:
-    """Read a DBC file that has the messages and signals of the shipped one; ids, layout and scales may differ.
+    """The codec of a DBC file with the messages and signals of the shipped one; ids, layout and scales may differ.
 
     Raises
     ------
@@ -256,7 +256,7 @@ def _read(path: Path) -> Codec:
 
 
 def _require_sizes(text: str) -> None:
-    """ValueError where a message, a signal or a multiplexer is so large that cantools would fill the memory."""
+    """Raise ValueError where a message, signal or multiplexer is so large that cantools would fill the memory."""
     bare = _COMMENT_OR_TEXT.sub(lambda found: " " if found[0][0] == "/" else '""', text)
     for found in _SIZES.finditer(bare):
         if not all(0 <= int(size) <= 8 * LONGEST_PAYLOAD for size in found.groups("0")):
@@ -267,7 +267,7 @@ def _require_sizes(text: str) -> None:
 
 
 def _tried(message: Message) -> Coded:
-    """A message that was sent and received; raises one of `DAMAGE` where that cannot be."""
+    """The coding of a message after test values were encoded and decoded; raises one of `DAMAGE`."""
     longest = CLASSIC_BYTES if message.name in OUTPUT_MESSAGES else FD_SIZES[-1]
     if message.length > longest:
         raise ValueError(f"it has {message.length} bytes; expected at most {longest}")

@@ -1,4 +1,4 @@
-"""python-can's udp_multicast, safe from datagrams that are no CAN messages: anybody on the network can send one."""
+"""python-can's udp_multicast with checks on datagrams, which any host on the network can send."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from can.interfaces.udp_multicast import UdpMulticastBus
 def can_message(datagram: bytes, timestamp_s: float, fd: bool) -> can.Message:
     """The CAN message of a datagram; ValueError or TypeError where it is none, or one of CAN FD unasked for.
 
-    python-can takes a number in place of the data for a length, and makes room for so many bytes: that is refused.
+    python-can takes a number in place of the data for a length and allocates so many bytes: that is refused.
     """
     fields = msgpack.unpackb(datagram, raw=False)
     if not isinstance(fields, dict) or not isinstance(fields.get("data"), bytes | None):
@@ -22,7 +22,7 @@ def can_message(datagram: bytes, timestamp_s: float, fd: bool) -> can.Message:
 
 
 class DatagramBus(UdpMulticastBus):
-    """The bus; raises CanOperationError caused by ValueError or TypeError where a datagram is no message."""
+    """The bus; raises CanOperationError, caused by ValueError or TypeError, where a datagram is no message."""
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         received = self._multicast.recv(timeout)

@@ -22,7 +22,7 @@ the last sign of it.
 
 
 def document() -> str:
-    """All messages as a Markdown document."""
+    """The page of all messages as Markdown text."""
     messages = [coded.message for coded in load_codec().messages.values()]
     return _HEAD + "".join(_section(message) for message in messages)
 

@@ -1,4 +1,4 @@
-"""Who drives the plant on the bus: up and down between two speeds for ever, over a road that repeats itself."""
+"""Drives the plant on the bus between two speeds without end, over a road that repeats itself."""
 
 from __future__ import annotations
 
@@ -12,20 +12,23 @@ from numpy.typing import NDArray
 
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, Scenario
-from scenarios.plant import dynamics, initial_state
+from scenarios.plant import dynamics
 from scenarios.plant.parameters import FORCE, POSITION, SPEED, WHEEL
+from scenarios.plant.pipeline import initial_state
 from trpac_core.vision.classes import Surface
 
 SLOW_M_S, FAST_M_S = 4.0, 14.0
+"""Speeds at which the driver changes from brake to accelerator, and back [m/s]."""
 PULSE_S, PAUSE_S, RAMP_S = 0.45, 0.25, 0.05
+"""Length of a torque pulse, pause after it, rise and fall within it; as the paper's pedal pulses [s]."""
 GRIP_SHARE = 0.88
-"""Share of the grip that a pulse uses, as a driver who feels the road would: it shows theta and slides little [-]."""
+"""Share of theta F_z that a pulse uses: enough slip to estimate theta, and no sliding [-]."""
 BLOCK = 10
-"""Steps that are computed in one go: most of a step's cost is the call, and the loop wants the processor."""
+"""Steps that one call of the plant computes: the call itself costs more than a step."""
 
 
 class Instant(NamedTuple):
-    """The plant at one time: of the centre of gravity, and of the wheels fl, fr, rl, rr."""
+    """The plant's outputs at one time; lists are of the wheels fl, fr, rl, rr."""
 
     time_s: float
     position_m: float
@@ -38,14 +41,14 @@ class Instant(NamedTuple):
 
 @dataclass
 class Driver:
-    """Pedal pulses: the accelerator until fast, then the brake until slow.
+    """A driver of pedal pulses: accelerator up to `FAST_M_S`, then brake down to `SLOW_M_S`.
 
     Parameters
     ----------
     peak_nm : float
-        Most that a motor gives [N m].
+        Peak torque of a motor [N m].
     radius_m : float
-        Of the wheels [m].
+        Rolling radius of the wheels [m].
     """
 
     peak_nm: float
@@ -59,7 +62,7 @@ class Driver:
         theta: NDArray[np.float64],
         load_n: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Torque of the four wheels at these times, shape (n, 4), as speed, adhesion and load are now."""
+        """Torque of the four wheels at these times, shape (n, 4), for the current speed, theta and load [N m]."""
         if speed_m_s > FAST_M_S:
             self.braking = True
         elif speed_m_s < SLOW_M_S:
@@ -72,14 +75,14 @@ class Driver:
 
 
 class EndlessDrive:
-    """The reference plant on a scenario's road, which begins anew where it ends.
+    """The reference plant on a scenario's road, which is repeated without end.
 
     Parameters
     ----------
     scenario : Scenario
-        Car and road. Raises ScenarioError where either cannot be used so.
+        Car and road; raises ScenarioError where they cannot be used.
     step_s : float
-        Of the plant's output [s].
+        Output step of the plant [s].
     """
 
     def __init__(self, scenario: Scenario, step_s: float) -> None:
@@ -96,11 +99,11 @@ class EndlessDrive:
         self.now = next(self._instants)
 
     def advance(self, steps: int = 1) -> None:
-        """Go on by some steps."""
+        """Make `now` the plant's outputs some steps later."""
         self.now = next(islice(self._instants, steps - 1, None))
 
     def _drive(self) -> Iterator[Instant]:
-        """One instant after the other, without end."""
+        """The plant's outputs step by step, without end."""
         first = 0
         while True:
             time_s: NDArray[np.float64] = (first + np.arange(BLOCK + 1, dtype=np.float64)) * self._step_s
@@ -125,12 +128,12 @@ class EndlessDrive:
                 self._y[POSITION] -= self._length_m
 
     def surfaces_ahead(self, ahead_m: float) -> tuple[Surface, Surface]:
-        """Surface under the left and the right track this far ahead of the front axle."""
+        """Surfaces of the left and the right track at this distance ahead of the front axle."""
         return self.road.segment_at(self.now.position_m + self._to_front_m + ahead_m).surface_classes
 
 
 def repeated(road: RoadFile, length_m: float) -> RoadFile:
-    """The road twice in a row: a car that is put back by one length in the second does not notice."""
+    """The road twice in a row, so that a car in the second half can be put back by one length."""
     first = [s for s in road.segments if s.start_m < length_m]
     if not first or first[0].start_m > 0.0:
         raise ScenarioError("The road has no stretch at 0 m; expected one, to repeat the road from there.")

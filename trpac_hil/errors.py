@@ -6,4 +6,4 @@ from scenarios.errors import ScenarioError
 
 
 class HilError(ScenarioError):
-    """The rig cannot start: what, where, what was expected, how to mend."""
+    """The rig cannot start; the text says what is wrong, where, what was expected and what to do."""

@@ -1,4 +1,4 @@
-"""Events of the loop: each kind is said once and counted ever after."""
+"""Events of the loop: the first of each kind is shown, all are counted."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Event:
-    """One kind: when it first happened [s], what was said, and how often it happened."""
+    """A kind of event: time of its first occurrence [s], text, and number of occurrences."""
 
     time_s: float
     text: str
@@ -16,26 +16,26 @@ class Event:
 
 
 class Events:
-    """Said once, counted always.
+    """Events by kind.
 
     Parameters
     ----------
-    tell : callable
-        Given the time [s] and the sentence of a kind's first event.
+    show : callable
+        Called with time [s] and text of the first event of a kind.
     now_s : callable
-        Time since the start [s].
+        Returns the time since the start [s].
     """
 
-    def __init__(self, tell: Callable[[float, str], None], now_s: Callable[[], float]) -> None:
+    def __init__(self, show: Callable[[float, str], None], now_s: Callable[[], float]) -> None:
         self.kinds: dict[str, Event] = {}
-        self._tell, self._now_s = tell, now_s
+        self._show, self._now_s = show, now_s
 
-    def say(self, kind: str, text: str) -> None:
-        """An event happened."""
+    def report(self, kind: str, text: str) -> None:
+        """Count an event; show the first of its kind."""
         known = self.kinds.get(kind)
         if known is None:
             self.kinds[kind] = Event(self._now_s(), text)
-            self._tell(self.kinds[kind].time_s, text)
+            self._show(self.kinds[kind].time_s, text)
         else:
             known.count += 1
 

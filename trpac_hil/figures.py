@@ -1,4 +1,4 @@
-"""Figures of a run: spreads of timing and ages, as the terminal and summary.json have them."""
+"""Quantiles of timing and ages of a run, for the terminal and summary.json."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from trpac_hil.quantile_sketch import Spread
+from trpac_hil.quantile_sketch import QuantileSketch
 from trpac_hil.records import AGED, Column
 
-SPREADS = {
+SKETCHED_COLUMNS = {
     "jitter_us": "lateness_us",
     "cycle_us": "work_us",
     "cycle_cpu_us": "cpu_us",
@@ -19,24 +19,24 @@ SPREADS = {
     "age_picture_ms": "age_picture_ms",
     "age_under_wheel_ms": "age_under_wheel_ms",
 }
-"""Figures of summary.json, and the column of each."""
+"""Keys of summary.json, and the log column of each."""
 
 
 class Figures:
-    """Spreads of timing and ages over all rows, and the newest row."""
+    """Quantiles of timing and ages over all rows, and the newest row."""
 
     def __init__(self, columns: Sequence[Column]) -> None:
-        self._at = {column.name: place for place, column in enumerate(columns)}
-        self.spreads = {name: Spread() for name in SPREADS}
+        self._at = {column.name: index for index, column in enumerate(columns)}
+        self.sketches = {name: QuantileSketch() for name in SKETCHED_COLUMNS}
         self.newest: NDArray[np.float64] | None = None
         self.rows = 0
 
     def add(self, rows: NDArray[np.float64]) -> None:
-        """Count rows, shape (n, columns)."""
+        """Add rows, shape (n, columns)."""
         if not len(rows):
             return
-        for name, column in SPREADS.items():
-            self.spreads[name].add(rows[:, self._at[column]])
+        for name, column in SKETCHED_COLUMNS.items():
+            self.sketches[name].add(rows[:, self._at[column]])
         self.newest, self.rows = rows[-1].copy(), self.rows + len(rows)
 
     def now(self, column: str) -> float:
@@ -47,4 +47,4 @@ class Figures:
 
     def summary(self) -> dict[str, dict[str, float] | None]:
         """Median, p99 and maximum of each."""
-        return {name: spread.summary() for name, spread in self.spreads.items()}
+        return {name: sketch.summary() for name, sketch in self.sketches.items()}

@@ -1,4 +1,4 @@
-"""Processes beside the loop: how they start, hear that they are to stop, and say what is wrong."""
+"""Processes beside the loop: start, stop and messages."""
 
 from __future__ import annotations
 
@@ -21,30 +21,31 @@ from trpac_hil.realtime import leave, lower_priority
 from trpac_hil.shared import Numbers
 
 CONTEXT = multiprocessing.get_context("spawn")
-"""A forked child would inherit the unit's Python state and the loop's threads."""
+"""How processes are made: a forked child would inherit the unit's Python state and the loop's threads."""
 START_TIMEOUT_S = 120.0
-"""Loading takes seconds; numba may compile for half a minute [s]."""
+"""Longest time until a process is ready: loading takes seconds, numba compiles up to half a minute [s]."""
 PARENT_EVERY_S = 1.0
+"""Time between two checks that the parent is alive [s]."""
 _START, _STOP = 0, 1
 
 
 class Control:
-    """What the loop and one process beside it tell each other."""
+    """Messages between the loop and one process beside it."""
 
     def __init__(self, name: str) -> None:
         self.name = name
         self._numbers = Numbers(2)
-        self._said: SimpleQueue[tuple[str, Any]] = CONTEXT.SimpleQueue()
+        self._messages: SimpleQueue[tuple[str, Any]] = CONTEXT.SimpleQueue()
         self._parent_seen_s = 0.0
 
-    # The loop's side
+    # Called by the loop
 
     def wait_until_ready(self, process: Any) -> None:
-        """Wait until the process can begin; raises HilError where it cannot."""
+        """Wait until the process is ready; raises HilError where it refuses or dies."""
         end_s = time.monotonic() + START_TIMEOUT_S
         while time.monotonic() < end_s:
-            if not self._said.empty():
-                kind, text = self._said.get()
+            if not self._messages.empty():
+                kind, text = self._messages.get()
                 if kind == "ready":
                     return
                 raise HilError(str(text))
@@ -54,39 +55,39 @@ class Control:
         raise HilError(f"The process of the {self.name} did not start; its own words are above.")
 
     def start(self, start_ns: int) -> None:
-        """Say when slot 0 begins."""
+        """Set the time at which slot 0 begins."""
         self._numbers.set([float(start_ns), 0.0])
 
     def stop(self) -> None:
-        """Say that it is over."""
+        """Ask the process to stop."""
         self._numbers.set([self._numbers.get()[_START] or 1.0, 1.0])
 
     def heard(self) -> list[tuple[str, Any]]:
-        """What the process has said since: kind and text."""
-        said = []
+        """Messages of the process since the last call: kind and content."""
+        messages = []
         try:
-            while not self._said.empty():
-                said.append(self._said.get())
+            while not self._messages.empty():
+                messages.append(self._messages.get())
         except (EOFError, OSError, queue.Empty):
-            return said
-        return said
+            return messages
+        return messages
 
-    # The process's side
+    # Called by the process
 
     def ready(self) -> None:
-        """Say that the clock may start."""
-        self._said.put(("ready", ""))
+        """Report that the process is ready."""
+        self._messages.put(("ready", ""))
 
     def refuse(self, text: str) -> None:
-        """Say why the process cannot begin."""
-        self._said.put(("refused", text))
+        """Report why the process cannot begin."""
+        self._messages.put(("refused", text))
 
-    def tell(self, kind: str, content: Any) -> None:
-        """Say something to the loop's side."""
-        self._said.put((kind, content))
+    def send(self, kind: str, content: Any) -> None:
+        """Send a message to the loop."""
+        self._messages.put((kind, content))
 
     def wait_for_start(self) -> bool:
-        """Wait for the start; False if it was called off."""
+        """Wait for the start; returns False where the process is to stop instead."""
         while not self._numbers.get()[_START]:
             if self.stopped:
                 return False
@@ -100,7 +101,7 @@ class Control:
 
     @property
     def stopped(self) -> bool:
-        """Whether it is over, or the loop's process is gone."""
+        """Whether the process is to stop: it was asked to, or the loop's process has died."""
         if self._numbers.get()[_STOP]:
             return True
         now_s = time.monotonic()
@@ -112,7 +113,7 @@ class Control:
 
 
 class Body:
-    """What a process is to do; reaches it packed, so that what it needs is loaded when the process runs."""
+    """Function and arguments of a process; pickled, so that their modules are imported when the process runs."""
 
     def __init__(self, work: Callable[..., None], arguments: Sequence[Any]) -> None:
         self._work, self._arguments = work, tuple(arguments)
@@ -124,7 +125,7 @@ class Body:
 def begin(packed: bytes, with_parent: bool) -> None:
     """Target of each process beside the loop, given a `Body`.
 
-    `with_parent` ends it with the loop's process, even while it loads; one that has something to save looks at
+    With `with_parent` it ends as soon as the loop's process does; a process that has data to save checks
     `Control.stopped` instead.
     """
     if with_parent:
@@ -142,7 +143,7 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def helper(core: int | None) -> Iterator[None]:
-    """The rules of a process beside the loop: Ctrl-C is the loop's to hear, and the loop goes first."""
+    """Context of a process beside the loop: it ignores Ctrl-C, has low priority and keeps off the loop's core."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     lower_priority()
     leave(core)

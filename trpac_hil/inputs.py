@@ -1,4 +1,4 @@
-"""What the bus last said, and how old it is."""
+"""The newest values received from the bus, and their ages."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from trpac_core.files import quoted
 from trpac_hil.codec import Codec, Coded
 
 MOST_OFTEN = 1.2
-"""How much more often than its cycle time says a message may come for long [-]; the clocks of a bus differ by less."""
+"""Greatest lasting rate of a message over the rate of its cycle time [-]; clocks of nodes differ by less."""
 LONGEST_STALL_NS = 270_000_000
-"""For how long messages may be held up and then come at once [ns]; a sender that keeps no real time takes 200 ms."""
+"""Longest time for which messages may be held up and then come at once [ns]; senders without real time take 200 ms."""
 MOST_ODD, ODD_LEAK = 5.0, 0.25
-"""Odd counts that are too many, and how many each other message makes up for [-].
+"""Odd counts that mean a second sender, and by how much each other message lowers their number [-].
 
-Two senders of one rate make every second count odd, and are noticed by 14 messages. A sender that restarts makes one;
-one of which seven messages in ten are lost at random makes one in twenty.
+Two senders of one rate make every second count odd and are noticed after 14 messages. A sender that restarts makes
+one odd count; one of which seven in ten messages are lost at random makes one in twenty.
 """
 ORDERLY, ORDERLY_WEIGHT = 4, 0.125
-"""Messages counted on by one from which on such a message tells of one sender, and what it then weighs [-].
+"""Messages in sequence after which further ones in sequence count for one sender, and their weight then [-].
 
-So a sender that counts may be eight times too fast. One that fills the gap between two true messages with all counts
-that there are, to look like one, must be faster.
+A sender that counts may so be eight times too fast; an attacker that fills the gap between two true messages with all
+counts must be faster.
 """
 OVERFULL = 1.1
-"""How far beyond what is too much both are counted on [-]: so it ends soon after the second sender."""
+"""Limit of both counts over the number that means a second sender [-], so that they fall soon after it is gone."""
 HELD_NS = 1_000_000_000
-"""For how long after the last sign of a second sender its message is not believed [ns]."""
-Say = Callable[[str, str], None]
-"""Told a kind of event and a sentence; each kind is said once."""
+"""Time after the last sign of a second sender for which the message is not used [ns]."""
+ReportEvent = Callable[[str, str], None]
+"""Called with the kind of an event and a sentence."""
 
 
 @dataclass
 class Senders:
-    """Whether more than one device sends a message.
+    """Detector of a second device that sends the same message.
 
     Attributes
     ----------
     cycle_ns : int
-        How often it is due; 0 where that is not known [ns].
+        Cycle time of the message; 0 where it is not known [ns].
     until_ns : int
-        Up to when there are two senders [ns].
+        Time until which two senders are assumed [ns].
     noticed : int
-        How often there began to be.
+        How often a second sender was detected.
     """
 
     cycle_ns: int
@@ -55,10 +55,10 @@ class Senders:
     _orderly: int = 0
     _at_ns: int = 0
 
-    def look(self, at_ns: int, went_on: bool, odd: bool) -> str:
-        """Count a message; returns what gives a second sender away when there begins to be one, else "".
+    def count(self, at_ns: int, went_on: bool, odd: bool) -> str:
+        """Count a message; returns the sign of a second sender where one is newly detected, else "".
 
-        `went_on` is whether the counter went on by one, and `odd` whether it is where one sender's never is.
+        `went_on` is whether the counter rose by one, `odd` whether its value cannot be of a single sender.
         """
         self._orderly = self._orderly + 1 if went_on else 0
         often = self._often(at_ns, ORDERLY_WEIGHT if self._orderly > ORDERLY else 1.0)
@@ -76,7 +76,7 @@ class Senders:
         )
 
     def _often(self, at_ns: int, weight: float) -> bool:
-        """Whether more has come up to the look before than is due and could have been held up."""
+        """Whether more messages came than the cycle time and `LONGEST_STALL_NS` allow."""
         if not self.cycle_ns:
             return False
         most, often = LONGEST_STALL_NS / self.cycle_ns + 1.0, False
@@ -89,14 +89,14 @@ class Senders:
 
 @dataclass
 class Heard:
-    """The newest message of one kind.
+    """The newest message of one kind, with counts.
 
     Attributes
     ----------
     coded : Coded
         Its layout.
     at_ns : int
-        When it was there at the earliest; -1 before the first [ns].
+        Earliest time at which it can have come; -1 before the first [ns].
     count : int
         Its counter.
     data : bytes
@@ -106,9 +106,9 @@ class Heard:
     senders : Senders
         Whether more than one device sends it.
     new : bool
-        Whether the last message, old news or not, was no old news.
+        Whether the counter of the last message had changed.
     received, lost, frozen, broken : int
-        Messages that came; that the counter says are missing; whose counter stood still; of a wrong length.
+        Messages received; missing by the counter; with an unchanged counter; of a wrong length.
     """
 
     coded: Coded
@@ -132,23 +132,25 @@ class Inputs:
     codec : Codec
         Messages.
     names : tuple of str
-        Those that are listened to.
-    say : callable
-        Told what is wrong with messages.
+        Messages that are received.
+    report : callable
+        Called with what is wrong with messages.
     counters : bool
-        Whether a message whose counter stands still is old news; False for senders that do not count.
+        Whether a message with an unchanged counter is ignored; False for senders that do not count.
     """
 
-    def __init__(self, codec: Codec, names: tuple[str, ...], say: Say, counters: bool = True) -> None:
+    def __init__(
+        self, codec: Codec, names: tuple[str, ...], report: ReportEvent, counters: bool = True
+    ) -> None:
         self.heard: Mapping[str, Heard] = {
             name: Heard(codec[name], Senders(codec[name].cycle_ns)) for name in names
         }
         self._by_id = {key: self.heard[c.message.name] for key, c in codec.by_id(names).items()}
         self._message_of = {signal: h for h in self.heard.values() for signal in h.coded.signals}
-        self._say, self._counters = say, counters
+        self._report, self._counters = report, counters
 
     def take(self, frame_id: int, extended: bool, data: bytes, at_ns: int) -> str:
-        """Take a message in; returns its name if it brought something new, else "".
+        """Store a message; returns its name where it is new, else "".
 
         `at_ns` is the earliest time at which it can have come: ages are never understated.
         """
@@ -161,25 +163,25 @@ class Inputs:
             values, count = heard.coded.decode(data)
         except ValueError as error:
             heard.broken += 1
-            self._say(f"broken {name}", f"A message was left aside: {quoted(error)}")
+            self._report(f"broken {name}", f"A message was left aside: {quoted(error)}")
             return ""
         ahead, went_on, odd = 1, False, False
         if self._counters and count >= 0 and heard.count >= 0:
             ahead = (count - heard.count) % heard.coded.counts
             went_on = ahead == 1
-            # Of two senders one's counts run back behind the other's, or are the other's with another content.
+            # Counts of two senders run back, or are the same with other content.
             odd = 2 * ahead > heard.coded.counts or (ahead == 0 and heard.new and data != heard.data)
         heard.new = ahead > 0
-        seen = heard.senders.look(at_ns, went_on, odd)
+        seen = heard.senders.count(at_ns, went_on, odd)
         if seen:
-            self._say(
+            self._report(
                 f"two senders {name}",
                 f"{name}: {seen}, so two devices send it. TRPAC is held with flag 0 until "
                 f"{HELD_NS * 1e-9:g} s after the last sign of it. Take one off the bus, or correct its cycle time.",
             )
         if ahead == 0:
             heard.frozen += 1
-            self._say(
+            self._report(
                 f"frozen {name}",
                 f"{name}: its counter stood still at {count}, so the message is old news. "
                 "A sender that does not count needs --no-counters.",
@@ -190,7 +192,7 @@ class Inputs:
         return name
 
     def value(self, signal: str, now_ns: int) -> float:
-        """The newest value of a signal, NaN where there is none, it is too old, or two devices send it."""
+        """The newest value of a signal; NaN where there is none, it is too old, or two devices send it."""
         heard = self._message_of[signal]
         limit_ns = heard.coded.stale_ns.get(signal)
         if heard.at_ns < 0 or (limit_ns is not None and now_ns - heard.at_ns > limit_ns):
@@ -198,7 +200,7 @@ class Inputs:
         return math.nan if now_ns < heard.senders.until_ns else heard.values[signal]
 
     def doubted(self, now_ns: int) -> list[str]:
-        """Messages that two devices send."""
+        """Names of the messages that two devices send."""
         return [name for name, heard in self.heard.items() if now_ns < heard.senders.until_ns]
 
     def age_ns(self, message: str, now_ns: int) -> int:

@@ -1,71 +1,38 @@
-"""The cycle: read the bus, step the unit, send; each at its time, whatever happens."""
+"""The cycle in real time: read the bus, step the unit, send."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
-import can
-
+from trpac_hil.bus import Link
+from trpac_hil.camera_input import CameraInput
 from trpac_hil.codec import Codec
-from trpac_hil.deadlines import SPIN_NS, Clock, Deadlines, WallWatch, wait_until
+from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.delays import Delays
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
-from trpac_hil.placing import Odometer
+from trpac_hil.preview_stamps import Odometer
 from trpac_hil.records import AGED, LOGGED
 from trpac_hil.shared import Ring
-from trpac_hil.sight import Sight
-from trpac_hil.unit import Estimates, Wiring
+from trpac_hil.unit import Estimates, Unit
 
 HEALTH_EVERY_NS = 100_000_000
+"""Cycle time of the message Health [ns]."""
 CHECK_EVERY_NS = 100_000_000
-"""How often bus state, wall clock and helpers are looked at [ns]."""
+"""Time between checks of bus state, time of day and helper processes [ns]."""
 LONG_NS = 5_000_000
-"""Overruns beyond this are counted on their own [ns]."""
+"""Overruns beyond this are also counted as long ones [ns]."""
 REQUIRED_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion")
 STARTING, RUNNING, HELD_INPUT, HELD_BUS, HELD_UNIT, ENDED = 0, 1, 2, 3, 4, 7
 """Values of the signal Status."""
 NAN = math.nan
 
 
-class Bus(Protocol):
-    """What the loop needs of the bus; see `trpac_hil.bus.Link`."""
-
-    losses: int
-
-    @property
-    def up(self) -> bool: ...  # noqa: D102
-
-    def receive(self) -> list[can.Message]: ...  # noqa: D102
-
-    def send(self, frame_id: int, extended: bool, data: bytes) -> None: ...  # noqa: D102
-
-    def check(self) -> None: ...  # noqa: D102
-
-
-class SteppedUnit(Protocol):
-    """What the loop needs of the unit; see `trpac_hil.unit.Unit`."""
-
-    wiring: Wiring
-
-    @property
-    def last(self) -> Estimates: ...  # noqa: D102
-
-    def references(self, variables: Sequence[str]) -> list[int]: ...  # noqa: D102
-
-    def give_class(self, classes: Sequence[tuple[int, float]], number: int) -> None: ...  # noqa: D102
-
-    def step(  # noqa: D102
-        self, time_s: float, step_s: float, references: Sequence[int], values: Sequence[float]
-    ) -> Estimates | None: ...
-
-
 @dataclass
 class Counts:
-    """What the loop counts itself.
+    """Counts of the loop.
 
     `overruns` are cycles that ended after their deadline and cycles left out; `long_overruns` those of them by more
     than 5 ms, by `trpac_hil.delays.CAUSES` in `long_causes`; `worst_ns` is the greatest time by which a deadline was
@@ -86,40 +53,22 @@ class Counts:
 
     @property
     def overruns(self) -> int:
-        """Deadlines that were not met."""
+        """Number of deadlines that were missed."""
         return self.late_ends + self.left_out
 
 
 class Loop:
-    """One run.
-
-    Parameters
-    ----------
-    clock, deadlines : Clock, Deadlines
-        Time, and when each cycle is due.
-    bus, unit, codec, inputs : Bus, SteppedUnit, Codec, Inputs
-        What is read, stepped and sent.
-    sight : Sight
-        Results of pictures.
-    ring : Ring
-        Where each cycle's row goes.
-    events : Events
-        Told what happens.
-    delays : Delays
-        Told of each cycle, to know what long overruns came of.
-    check : callable
-        Looks after the helpers, ten times a second.
-    """
+    """One run of the loop."""
 
     def __init__(
         self,
-        clock: Clock,
+        clock: SystemClock,
         deadlines: Deadlines,
-        bus: Bus,
-        unit: SteppedUnit,
+        bus: Link,
+        unit: Unit,
         codec: Codec,
         inputs: Inputs,
-        sight: Sight,
+        camera_input: CameraInput,
         ring: Ring,
         events: Events,
         delays: Delays,
@@ -129,7 +78,7 @@ class Loop:
         self.counts, self.odometer = Counts(), Odometer()
         self._clock, self._deadlines, self._spin_ns = clock, deadlines, spin_ns
         self._bus, self._unit, self._codec, self._inputs = bus, unit, codec, inputs
-        self._sight, self._ring, self._events, self._check = sight, ring, events, check
+        self._camera_input, self._ring, self._events, self._check = camera_input, ring, events, check
         self._delays = delays
         self._wall = WallWatch(clock)
         self._polled_ns = clock.now_ns()
@@ -142,10 +91,10 @@ class Loop:
         self._next_check_ns = self._next_health_ns = 0
 
     def run(self, stop: Callable[[], bool], slots: int | None = None) -> Counts:
-        """Cycle until told to stop, or for a number of slots."""
+        """Run cycles until `stop` returns True, or for a number of slots; returns the counts."""
         deadlines, clock, done = self._deadlines, self._clock, -1
         self._polled_ns = wait_until(clock, deadlines.due_ns(-1), self._spin_ns)
-        self._bus.receive()  # what has come by now may be of any age
+        self._bus.receive()  # messages received so far may be of any age
         self._delays.start()
         while not stop() and (slots is None or done + 1 < slots):
             due_ns, longs = deadlines.due_ns(done + 1), self.counts.long_overruns
@@ -163,14 +112,14 @@ class Loop:
         return self.counts
 
     def _leave_out(self, first: int, number: int, now_ns: int) -> None:
-        """Count cycles that were left out: each missed its deadline."""
+        """Count cycles that were left out, each as a missed deadline."""
         if number <= 0:
             return
         counts, period_ns = self.counts, self._deadlines.period_ns
         counts.left_out += number
         missed_ns = self._deadlines.missed_by_ns(first, now_ns)
         counts.worst_ns = max(counts.worst_ns, missed_ns)
-        # Of the slots in a row that were left out each missed its own deadline by a period less than the one before.
+        # Each slot of a row that was left out missed its deadline by one period less than the slot before.
         counts.long_overruns += max(0, min(number, -(-(missed_ns - LONG_NS) // period_ns)))
 
     def _cycle(self, slot: int, left_out: int, began_ns: int) -> None:
@@ -179,13 +128,13 @@ class Loop:
         fresh = self._receive(began_ns)
         values = self._snapshot(began_ns)
         self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
-        sight = self._sight
-        sight.share_motion(self.odometer, values)
+        camera_input = self._camera_input
+        camera_input.share_motion(self.odometer, values)
         heard, doubted = self._inputs.heard["RoadClass"], self._inputs.doubted(began_ns)
-        if sight.news(
-            heard, "RoadClass" in fresh, "RoadClass" in doubted, self.odometer, began_ns, self._events.say
+        if camera_input.news(
+            heard, "RoadClass" in fresh, "RoadClass" in doubted, self.odometer, began_ns, self._events.report
         ):
-            self._unit.give_class(sight.classes, sight.number)
+            self._unit.give_class(camera_input.classes, camera_input.number)
         readings = self._readings(values)
         unit_began_ns = self._clock.now_ns()
         step_s = (slot - self._unit_slot) * self._deadlines.period_ns * 1e-9
@@ -199,7 +148,7 @@ class Loop:
         if status != RUNNING:
             estimates = estimates.held()
         self._send_estimate(estimates, status)
-        self._look_after(began_ns)
+        self._check_and_send_health(began_ns)
         ended_ns, cpu_ns = self._clock.now_ns(), self._clock.cpu_ns() - cpu_began_ns
         missed_ns = max(0, self._deadlines.missed_by_ns(slot, ended_ns))
         self._count(missed_ns, cpu_ns, status)
@@ -213,7 +162,7 @@ class Loop:
         self._record(slot, step_s, values, estimates, status, timing, left_out, began_ns)
 
     def _receive(self, now_ns: int) -> set[str]:
-        """Take in what came; it came after the last look at the earliest."""
+        """Store received messages, which came after the last poll at the earliest; returns names of new ones."""
         earliest_ns, self._polled_ns = self._polled_ns, now_ns
         take = self._inputs.take
         return {
@@ -223,7 +172,7 @@ class Loop:
         }
 
     def _snapshot(self, now_ns: int) -> dict[str, float]:
-        """All signals as they count now, NaN where lost; a message that stopped coming is said."""
+        """Current value of all signals, NaN where lost; reports required messages that are lost or back."""
         value = self._inputs.value
         values = {signal: value(signal, now_ns) for signal in LOGGED.values()}
         for name in REQUIRED_MESSAGES:
@@ -232,18 +181,18 @@ class Loop:
             here = 0 <= age_ns <= limit_ns
             if self._fresh.get(name, False) and not here:
                 self.counts.lost[name] = self.counts.lost.get(name, 0) + 1
-                self._events.say(
+                self._events.report(
                     f"lost {name}",
                     f"{name}: none for more than {limit_ns * 1e-6:g} ms. TRPAC is held with flag 0 until it is back.",
                 )
             elif here and not self._fresh.get(name, True):
-                self._events.say(f"back {name}", f"{name} is back.")
+                self._events.report(f"back {name}", f"{name} is back.")
             if here or name in self._fresh:
                 self._fresh[name] = here
         return values
 
     def _readings(self, values: dict[str, float]) -> list[float]:
-        """Inputs of the unit; an optional signal counts from the first time it comes, and is missed from then on."""
+        """Values of the unit's inputs; an optional signal is used, and can be lost, from its first value on."""
         for variable, signal in self._unit.wiring.optional.items():
             if variable not in self._wired and values[signal] == values[signal]:
                 self._wired[variable] = signal
@@ -251,12 +200,12 @@ class Loop:
         return [values[signal] for signal in self._wired.values()]
 
     def _judge(self, estimates: Estimates | None, readings: Sequence[float], doubted: bool) -> int:
-        """What the signal Status says of this cycle."""
+        """Value of the signal Status in this cycle."""
         if not self._bus.up:
             return HELD_BUS
         if estimates is None:
             self.counts.discarded += 1
-            self._events.say(
+            self._events.report(
                 "discarded",
                 "The unit discarded a step: the last estimate is held with flag 0, and the loop goes on.",
             )
@@ -267,7 +216,7 @@ class Loop:
         return HELD_INPUT if doubted else RUNNING
 
     def _missing(self, readings: Sequence[float]) -> bool:
-        """Whether signals are lost without which no wheel can be estimated; one wheel's own hold that wheel alone."""
+        """Whether lost signals prevent the estimate of all wheels; signals of one wheel hold that wheel alone."""
         lost = [name for name, reading in zip(self._wired, readings, strict=True) if reading != reading]
         if not lost:
             return False
@@ -299,8 +248,8 @@ class Loop:
         self._sent[name] += 1
         self._bus.send(coded.message.frame_id, coded.message.is_extended_frame, data)
 
-    def _look_after(self, now_ns: int) -> None:
-        """What needs no look in every cycle."""
+    def _check_and_send_health(self, now_ns: int) -> None:
+        """Check bus, helpers and time of day, and send the message Health, where these are due."""
         if now_ns >= self._next_check_ns:
             self._next_check_ns = now_ns + CHECK_EVERY_NS
             self._bus.check()
@@ -308,13 +257,13 @@ class Loop:
             jump_ns = self._wall.jump_ns()
             if jump_ns:
                 self.counts.clock_jumps += 1
-                self._events.say(
+                self._events.report(
                     "clock jump",
                     f"The wall clock was set by {jump_ns * 1e-9:+.3f} s. The loop runs by another clock and goes on.",
                 )
         if now_ns >= self._next_health_ns:
             self._next_health_ns = now_ns + HEALTH_EVERY_NS
-            picture_ms = self._sight.picture_age_ms(now_ns)
+            picture_ms = self._camera_input.picture_age_ms(now_ns)
             ages_ns = [self._inputs.age_ns(name, now_ns) for name in REQUIRED_MESSAGES]
             self._send(
                 "Health",
@@ -348,17 +297,17 @@ class Loop:
         left_out: int,
         now_ns: int,
     ) -> None:
-        """The cycle's row, in the order of `trpac_hil.records.columns`."""
-        age_ns, sight = self._inputs.age_ns, self._sight
+        """Write the cycle's row, in the order of `trpac_hil.records.columns`."""
+        age_ns, camera_input = self._inputs.age_ns, self._camera_input
         self._ring.write(
             [
                 slot * self._deadlines.period_ns * 1e-9,
                 step_s,
                 self.odometer.position_m,
                 *(values[signal] for signal in LOGGED.values()),
-                sight.number,
-                *(surface for surface, _ in sight.classes),
-                *(Q_v for _, Q_v in sight.classes),
+                camera_input.number,
+                *(surface for surface, _ in camera_input.classes),
+                *(Q_v for _, Q_v in camera_input.classes),
                 estimates.TRPAC,
                 estimates.TRPAC_std,
                 estimates.K_v,
@@ -372,7 +321,7 @@ class Loop:
                 left_out,
                 self.counts.overruns,
                 *(age * 1e-6 if (age := age_ns(name, now_ns)) >= 0 else NAN for name in AGED),
-                sight.picture_age_ms(now_ns),
-                sight.age_under_wheel_ms(now_ns),
+                camera_input.picture_age_ms(now_ns),
+                camera_input.age_under_wheel_ms(now_ns),
             ]
         )

@@ -1,4 +1,4 @@
-"""The log as MDF4, written while it grows and put in its place when it is whole."""
+"""The log as MDF4, written to a scratch file that becomes the log at the end."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ MASTER = ("time_s", 1)
 
 
 class MdfLog:
-    """Rows go to a scratch file on the log's own disk; `finish` makes it the log.
+    """A log whose rows go to a scratch file on the same disk; `finish` makes it the log.
 
-    Every method may raise OSError where the disk is full or the folder is gone.
+    Every method raises OSError where the disk is full or the folder is gone.
     """
 
     def __init__(self, path: Path, columns: Sequence[Column], comment: str) -> None:
@@ -51,7 +51,7 @@ class MdfLog:
         self.rows += len(rows)
 
     def finish(self) -> None:
-        """Write the file under another name, then give it its own."""
+        """Write the file under another name, then rename it."""
         try:
             whole = Path(self._mdf.save(self._scratch / self.path.name, overwrite=True))
             self._mdf.close()
@@ -60,7 +60,7 @@ class MdfLog:
             self.drop()
 
     def drop(self) -> None:
-        """Remove what is not the log."""
+        """Remove the scratch file."""
         shutil.rmtree(self._scratch, ignore_errors=True)
 
 

@@ -1,4 +1,4 @@
-"""The reference plant as the car on the bus: what a rig's simulator would send, in real time."""
+"""The reference plant as the car on the bus, in real time."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from scenarios.files import SensorNoise, load_scenario
 from scenarios.library import shipped
 from trpac_core.vehicle import WHEELS
 from trpac_hil.bus import BUS_ERRORS, BusSettings, Link
+from trpac_hil.bus_relay import RelayedBus
 from trpac_hil.codec import DBC_FILE, Codec, load_codec
-from trpac_hil.deadlines import Clock, Deadlines, SystemClock, wait_until
+from trpac_hil.deadlines import Deadlines, SystemClock, wait_until
 from trpac_hil.driver import EndlessDrive
-from trpac_hil.ferry import Wire
 from trpac_hil.helper import Control, helper
 from trpac_hil.realtime import raise_priority
 from trpac_hil.shared import Ring
@@ -27,30 +27,31 @@ PLAIN_SCENARIO = shipped("scenario")["paper_simulation"]
 SLOW_NS = 10_000_000
 """Cycle of the messages Chassis and PlantTruth [ns]."""
 P_0_M = 2.5
-"""How far ahead of the front axle the camera of the plant looks [m]."""
+"""Distance ahead of the front axle whose surface the plant's camera reports [m]."""
 CONFIDENCE = 0.9
+"""Q_v that the plant's camera reports [-]."""
 
 
 @dataclass(frozen=True)
-class PartnerJob:
-    """What the plant on the bus needs to know.
+class PlantJob:
+    """Settings of the plant on the bus.
 
     Attributes
     ----------
     scenario : Path
         Car, road and sensor noise.
     bus : BusSettings
-        The bus.
+        Its bus.
     dbc : Path
-        Its messages.
+        DBC file of its messages.
     rate_hz : float
-        Of the plant's steps and of the fast messages [Hz].
+        Rate of the plant's steps and of the fast messages [Hz].
     camera_fps, camera_delay_s : float
-        Results per second of a camera on the bus, 0 for none, and how late they are sent [1/s], [s].
+        Results per second of a camera on the bus, 0 for none [1/s], and their delay [s].
     core : int or None
-        The loop's core, to keep off.
+        The loop's core, which this process does not use.
     realtime : bool
-        Whether to ask for real-time priority, as a car on another machine would not give way to the camera either.
+        Whether to ask for real-time priority: a car on another machine would not be delayed by the camera either.
     """
 
     scenario: Path = PLAIN_SCENARIO
@@ -70,10 +71,10 @@ class _Picture:
     classes: tuple[int, int]
 
 
-class Partner:
-    """The plant with its sensors and its camera, and the messages that they send. Raises ScenarioError, HilError."""
+class PlantNode:
+    """The plant with its sensors and camera, and their messages; raises ScenarioError and HilError."""
 
-    def __init__(self, job: PartnerJob, open_link: Callable[[], Any], clock: Clock) -> None:
+    def __init__(self, job: PlantJob, open_link: Callable[[], Any], clock: SystemClock) -> None:
         scenario = load_scenario(job.scenario)
         self.drive = EndlessDrive(scenario, 1.0 / job.rate_hz)
         self.left_out = 0
@@ -86,7 +87,7 @@ class Partner:
         self._link = open_link()  # last: what is refused before leaves no open bus
 
     def run(self, start_ns: int, stop: Callable[[], bool], slots: int | None = None) -> None:
-        """Drive in real time until told to stop, or for a number of slots."""
+        """Drive in real time until `stop` returns True, or for a number of slots."""
         deadlines = Deadlines(start_ns, round(1e9 / self._job.rate_hz))
         done, picture = -1, -1
         cameras = Deadlines(start_ns, round(1e9 / self._job.camera_fps)) if self._job.camera_fps else None
@@ -108,7 +109,7 @@ class Partner:
             self._send_pictures(now_ns)
 
     def close(self) -> None:
-        """Leave the bus."""
+        """Close the bus."""
         self._link.close()
 
     def _send_fast(self) -> None:
@@ -166,16 +167,18 @@ class Partner:
         self._link.send(message.frame_id, message.is_extended_frame, coded.encode(values, count))
 
 
-def open_partner(job: PartnerJob, say: Callable[[str, str], None], wire: Ring | None = None) -> Partner:
-    """The plant with its end of the bus, or of a wire to it; raises ScenarioError and HilError."""
-    return Partner(job, lambda: Link(job.bus.open, say) if wire is None else Wire(wire), SystemClock())
+def open_plant_node(job: PlantJob, report: Callable[[str, str], None], wire: Ring | None = None) -> PlantNode:
+    """The plant on its own link to the bus, or relayed through `wire`; raises ScenarioError and HilError."""
+    return PlantNode(
+        job, lambda: Link(job.bus.open, report) if wire is None else RelayedBus(wire), SystemClock()
+    )
 
 
-def play(job: PartnerJob, wire: Ring | None, control: Control) -> None:
-    """Body of a process that drives beside the loop, and ends with it; without a wire it opens the bus itself."""
+def play(job: PlantJob, wire: Ring | None, control: Control) -> None:
+    """Body of a process that drives until the loop ends; without `wire` it opens the bus itself."""
     with helper(job.core):
         try:
-            partner = open_partner(job, control.tell, wire)
+            node = open_plant_node(job, control.send, wire)
         except (ScenarioError, *BUS_ERRORS) as error:
             control.refuse(str(error))
             return
@@ -183,5 +186,5 @@ def play(job: PartnerJob, wire: Ring | None, control: Control) -> None:
             raise_priority()
         control.ready()
         if control.wait_for_start():
-            partner.run(control.start_ns, lambda: control.stopped)
-        partner.close()
+            node.run(control.start_ns, lambda: control.stopped)
+        node.close()

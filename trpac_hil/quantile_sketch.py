@@ -1,4 +1,4 @@
-"""Median and upper end of a quantity over any number of values, in little memory."""
+"""Quantiles of any number of values in bounded memory."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 LEAST, GREATEST, RATIO = 1e-3, 1e9, 1.005
-"""Values are counted in bins that grow by this ratio: a quantile is right to half a per cent."""
+"""Range of the bins, and the ratio of their widths: a quantile is exact to half a per cent."""
 _BINS = math.ceil(math.log(GREATEST / LEAST) / math.log(RATIO)) + 2
 
 
-class Spread:
-    """Counts of values at or above 0; others count as 0. NaN is no value."""
+class QuantileSketch:
+    """Counts of values in bins; values below 0 count as 0, NaN is ignored."""
 
     def __init__(self) -> None:
         self._counts: NDArray[np.int64] = np.zeros(_BINS, dtype=np.int64)
@@ -31,11 +31,11 @@ class Spread:
 
     @property
     def count(self) -> int:
-        """How many values."""
+        """Number of values."""
         return int(self._counts.sum())
 
     def quantile(self, share: float) -> float:
-        """The value that this share of the values does not exceed; NaN without values."""
+        """Quantile of the values; NaN without values."""
         if not self.count:
             return math.nan
         reached = int(np.searchsorted(np.cumsum(self._counts), share * self.count))

@@ -1,4 +1,4 @@
-"""Keeping the loop undisturbed: garbage collector, thread switches, timer slack, priority, cores."""
+"""Settings of interpreter and system for the loop: garbage collector, thread switches, timer slack, priority, cores."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 SWITCH_INTERVAL_S = 2e-4
-"""How long another thread of this process may hold the interpreter while the loop waits for it [s]."""
+"""Longest time for which another thread holds the interpreter while the loop waits for it [s]."""
 PRIORITY = 50
-"""Of SCHED_FIFO: above all ordinary work, below the kernel's own threads."""
+"""Priority of SCHED_FIFO: above ordinary work, below the kernel's threads."""
 HELPER_NICENESS = 5
-_PR_SET_TIMERSLACK = 29
-_TIMER_SLACK_NS = 1000
+"""Niceness of the processes beside the loop."""
+_PR_SET_TIMERSLACK, _TIMER_SLACK_NS = 29, 1000
+"""Option of prctl(2), and by how much a sleep may be late [ns]; Linux's default is 50,000."""
 
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Collect garbage once, then no more; other threads give the interpreter back soon; sleeps end on time."""
+    """Context without garbage collection, with short thread switches and a small timer slack."""
     switch_s, collecting = sys.getswitchinterval(), gc.isenabled()
     gc.collect()
     gc.freeze()
@@ -38,13 +39,12 @@ def undisturbed() -> Iterator[None]:
 
 
 def _set_timer_slack() -> None:
-    # Linux may let a sleep of an ordinary thread overshoot by 50 us to save power.
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(_TIMER_SLACK_NS), 0, 0, 0)
 
 
 def memory_mb() -> float | None:
-    """Resident memory of this process; None where the system does not tell it as Linux does [MB]."""
+    """Resident memory of this process; None without /proc [MB]."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     except OSError:
@@ -53,11 +53,11 @@ def memory_mb() -> float | None:
 
 
 def raise_priority() -> str:
-    """Ask for real-time priority; returns what came of it."""
+    """Ask for real-time priority; returns the outcome as a sentence."""
     if not hasattr(os, "sched_setscheduler"):
         return "real-time priority: this system has none that can be asked for here"
     try:
-        # Threads that start later inherit it, as they must: one that is held up with the interpreter holds the loop up.
+        # Threads that start later inherit it: a preempted thread that holds the interpreter would delay the loop.
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except PermissionError:
         return (
@@ -70,14 +70,14 @@ def raise_priority() -> str:
 
 
 def lower_priority() -> None:
-    """Make a process beside the loop give way to it."""
+    """Lower the priority of a process beside the loop."""
     if hasattr(os, "nice"):
         os.nice(HELPER_NICENESS)
 
 
 @contextmanager
 def as_before() -> Iterator[None]:
-    """Give priority and cores back at the end: another run of this process is to choose anew."""
+    """Context that restores priority and cores at its end."""
     cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
     policy = (os.sched_getscheduler(0), os.sched_getparam(0)) if hasattr(os, "sched_getscheduler") else None
     try:
@@ -90,20 +90,20 @@ def as_before() -> Iterator[None]:
             os.sched_setaffinity(0, cores)
 
 
-def loop_core(told: int | None, realtime: bool) -> int | None:
-    """The loop's core: as told; with real-time priority else the last one, where the rest has another.
+def loop_core(asked: int | None, realtime: bool) -> int | None:
+    """The loop's core: `asked`; else, with real-time priority, the last one where there is more than one.
 
     Linux takes the processor from real-time threads for up to 50 ms in a second where ordinary work waits on their core
-    (sched_rt_runtime_us, since 6.12 the fair server), so the loop must not share its core with any.
+    (sched_rt_runtime_us, since 6.12 the fair server), so the loop does not share its core.
     """
-    if told is not None or not realtime or not hasattr(os, "sched_getaffinity"):
-        return told
+    if asked is not None or not realtime or not hasattr(os, "sched_getaffinity"):
+        return asked
     cores = os.sched_getaffinity(0)
     return max(cores) if len(cores) > 1 else None
 
 
 def pin(core: int) -> str:
-    """Run this process on one core alone; returns what came of it."""
+    """Run this process on one core alone; returns the outcome as a sentence."""
     if not hasattr(os, "sched_setaffinity"):
         return "core: this system cannot pin a process here"
     try:
@@ -114,7 +114,7 @@ def pin(core: int) -> str:
 
 
 def leave(core: int | None) -> None:
-    """Keep a process beside the loop off the loop's core, where there is another."""
+    """Keep a process off the loop's core, where there is another core."""
     if core is None or not hasattr(os, "sched_setaffinity"):
         return
     others = os.sched_getaffinity(0) - {core}

@@ -1,4 +1,4 @@
-"""The recorder: a process beside the loop that keeps the log, the figures and the terminal."""
+"""The recorder: a process beside the loop that writes log, quantiles and terminal."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from trpac_hil.records import Column
 from trpac_hil.shared import Ring
 
 EVERY_S = 0.25
-"""How often rows are fetched and the terminal is drawn [s]."""
+"""Time between two readings of the rows, and redraws of the terminal [s]."""
 ROWS_KEPT = 30_000
-"""Rows that wait for a recorder that is held up: 30 s at 1 kHz."""
+"""Rows that the shared memory holds: 30 s at 1 kHz."""
 LOG_FAILED = "log failed"
 
 
 @dataclass(frozen=True)
 class RecorderJob:
-    """What the recorder needs to know.
+    """Settings of the recorder.
 
     Attributes
     ----------
     columns : tuple of Column
-        Of the rows.
+        Columns of the rows.
     log : Path or None
-        The MDF4 file; None for none.
+        The MDF4 file; None without log.
     comment : str
-        What the log says of itself.
+        Comment of the log.
     live : bool
-        Whether to draw the figures on the terminal while the loop runs.
+        Whether to draw the table on the terminal while the loop runs.
     title : str
-        Of that table.
+        Title of that table.
     core : int or None
-        The loop's core, to keep off.
+        The loop's core, which this process does not use.
     """
 
     columns: tuple[Column, ...]
@@ -52,8 +52,8 @@ class RecorderJob:
     core: int | None = None
 
 
-def record(job: RecorderJob, ring: Ring, control: Control, words: Any) -> None:
-    """Body of the process: drain the ring until the loop ends, then finish the log and hand the figures back."""
+def record(job: RecorderJob, ring: Ring, control: Control, event_queue: Any) -> None:
+    """Body of the process: read rows until the loop ends, then finish the log and send the quantiles."""
     with helper(job.core):
         figures, log = Figures(job.columns), _open(job, control)
         control.ready()
@@ -65,19 +65,19 @@ def record(job: RecorderJob, ring: Ring, control: Control, words: Any) -> None:
                     rows = ring.read()
                     figures.add(rows)
                     log = _kept(log, rows, control)
-                    screen.show(figures, _words(words))
+                    screen.show(figures, _new_events(event_queue))
                     if not over:
                         time.sleep(EVERY_S)
-            screen.show(figures, _words(words))
+            screen.show(figures, _new_events(event_queue))
         written = _finished(log, control)
-        control.tell("done", {"figures": figures.summary(), "log_rows": written, "rows_lost": ring.lost})
+        control.send("done", {"figures": figures.summary(), "log_rows": written, "rows_lost": ring.lost})
 
 
-def _words(words: Any) -> list[tuple[float, str]]:
-    said = []
-    while not words.empty():
-        said.append(words.get())
-    return said
+def _new_events(event_queue: Any) -> list[tuple[float, str]]:
+    texts = []
+    while not event_queue.empty():
+        texts.append(event_queue.get())
+    return texts
 
 
 def _open(job: RecorderJob, control: Control) -> MdfLog | None:
@@ -91,21 +91,21 @@ def _open(job: RecorderJob, control: Control) -> MdfLog | None:
 
 
 def _kept(log: MdfLog | None, rows: NDArray[np.float64], control: Control) -> MdfLog | None:
-    """Rows into the log; a log that fails is given up, the loop goes on."""
+    """Add rows to the log; returns it, or None where it could not be written and is given up."""
     if log is None:
         return None
     try:
         log.add(rows)
     except OSError as error:
         log.drop()
-        control.tell(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
+        control.send(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
         print(f"trpac hil: {log.path}: the log cannot be written ({error}).", file=sys.stderr)
         return None
     return log
 
 
 def _finished(log: MdfLog | None, control: Control) -> int:
-    """Put the log in its place; returns its rows."""
+    """Finish the log; returns its number of rows."""
     if log is None:
         return 0
     if not log.rows:
@@ -114,12 +114,12 @@ def _finished(log: MdfLog | None, control: Control) -> int:
     try:
         log.finish()
     except OSError as error:
-        control.tell(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
+        control.send(LOG_FAILED, f"{log.path}: the log cannot be written ({error}).")
         return 0
     return log.rows
 
 
 def _screen(job: RecorderJob) -> Any:
-    from trpac_hil.screen import Lines, Screen  # rich takes a moment, and tests need it not
+    from trpac_hil.screen import EventLines, Screen  # rich takes a moment, and tests need it not
 
-    return Screen(job.title) if job.live else Lines()
+    return Screen(job.title) if job.live else EventLines()

@@ -1,4 +1,4 @@
-"""What is recorded of each cycle: the columns of the log, named as in the project's log format where it has a name."""
+"""The columns of the log, one row per cycle; names are those of the project's log format where it has one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TIME = "time_s"
 
 @dataclass(frozen=True)
 class Column:
-    """One column: its name, unit and meaning, and the type that it is stored in."""
+    """A column: name, unit, meaning and stored type."""
 
     name: str
     unit: str

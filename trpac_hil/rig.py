@@ -1,7 +1,8 @@
-"""The rig: unit, bus, camera, recorder and plant, put together for one run."""
+"""The rig: unit, bus, camera, recorder and plant of one run."""
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -20,6 +21,7 @@ from fmu_src.units import UNITS
 from scenarios.camera.files import load_camera
 from scenarios.files import load_scenario, load_vehicle
 from scenarios.fmu_client.estimator import car_parameters
+from scenarios.whole_files import write_whole
 from trpac_core.estimator import EstimatorConfig
 from trpac_core.parameters.configuration import configuration
 from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
@@ -29,53 +31,53 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.bus import Link
-from trpac_hil.camera import MOTION, RESULTS_KEPT, CameraJob, Folder, result_columns, watch
+from trpac_hil.bus_relay import BusRelay, relay_ring
+from trpac_hil.camera import MOTION, RESULTS_KEPT, CameraJob, PictureFolder, result_columns, run_camera
+from trpac_hil.camera_input import CameraInput
 from trpac_hil.codec import INPUT_MESSAGES, load_codec
 from trpac_hil.deadlines import Deadlines, SystemClock
 from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
-from trpac_hil.ferry import Ferry, ferry_ring
 from trpac_hil.helper import CONTEXT, Body, Control, begin
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Loop
 from trpac_hil.mdf import SCRATCH_PREFIX
-from trpac_hil.placing import UNIT_PREVIEW, Placing
 from trpac_hil.plant_node import play
+from trpac_hil.preview_stamps import UNIT_PREVIEW, PreviewStamps
 from trpac_hil.realtime import as_before, loop_core, memory_mb, pin, raise_priority, undisturbed
 from trpac_hil.recorder import LOG_FAILED, ROWS_KEPT, RecorderJob, record
 from trpac_hil.records import columns
 from trpac_hil.settings import HilSettings
 from trpac_hil.shared import Numbers, Ring
-from trpac_hil.sight import Sight
-from trpac_hil.summary import summarise, write_summary
+from trpac_hil.summary import summarise
 from trpac_hil.unit import Unit
 
 LOG, SUMMARY = "log.mf4", "summary.json"
 PATIENCE_S, RECORDERS_PATIENCE_S = 60.0, 3600.0
-"""How long a helper that has been told to stop may go on before it is ended [s]."""
+"""Longest time from the request to stop until a process is killed, and until the recorder, which has a log, is [s]."""
 RUN_UP_NS = 200_000_000
-"""From the word to start until slot 0, for all processes to hear it [ns]."""
+"""Time from the start message until slot 0, for all processes to receive it [ns]."""
 CLASS_MESSAGE, CLASS_SIGNAL = "RoadClass", "RoadClass_Number"
 
 
 class Stopper:
-    """Set by Ctrl-C, SIGTERM or whoever holds it."""
+    """A request to stop, by Ctrl-C, SIGTERM or `ask`."""
 
     def __init__(self) -> None:
         self.asked = False
 
     def __call__(self) -> bool:
-        """Whether to stop."""
+        """Whether a stop was requested."""
         return self.asked
 
     def ask(self, *_: object) -> None:
-        """Stop at the end of the cycle."""
+        """Request a stop at the end of the cycle."""
         self.asked = True
 
     @contextmanager
     def by_signal(self) -> Iterator[None]:
-        """Ctrl-C and SIGTERM end the loop, not the program; from another thread than the main one they cannot."""
+        """Context in which Ctrl-C and SIGTERM end the loop, not the program; without effect outside the main thread."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -88,75 +90,74 @@ class Stopper:
 
 
 class Rig:
-    """Helpers of a run: processes that start before the loop and end after it."""
+    """The processes of a run, which start before the loop and end after it."""
 
     def __init__(self) -> None:
         self._helpers: list[tuple[Control, Any]] = []
         self.dead: list[str] = []
 
     def add(self, name: str, body: Callable[..., None], *arguments: Any) -> Control:
-        """Start a process, its control in the place of `...`; the recorder alone, which saves a log, may outlive us."""
+        """Start a process, with its control for the argument `...`. Only the recorder may outlive this process."""
         control = Control(name)
-        places = [control if argument is ... else argument for argument in arguments]
+        passed = [control if argument is ... else argument for argument in arguments]
         process = CONTEXT.Process(
-            target=begin, args=(Body(body, places), name != "recorder"), name=f"trpac-hil-{name}"
+            target=begin, args=(Body(body, passed), name != "recorder"), name=f"trpac-hil-{name}"
         )
         process.start()
         self._helpers.append((control, process))
         return control
 
     def wait_until_ready(self) -> None:
-        """Wait for all of them; raises HilError."""
+        """Wait until all processes are ready; raises HilError."""
         for control, process in self._helpers:
             control.wait_until_ready(process)
 
     def start(self, start_ns: int) -> None:
-        """Tell all of them when slot 0 begins."""
+        """Send all processes the time at which slot 0 begins."""
         for control, _ in self._helpers:
             control.start(start_ns)
 
     def check(self, events: Events) -> None:
-        """Pass on what they say; a process that has died is said and left behind."""
+        """Report the messages of the processes, and those that have died."""
         for control, process in self._helpers:
             for kind, text in control.heard() if control.name != "recorder" else ():
-                events.say(kind, text)
+                events.report(kind, text)
             if control.name not in self.dead and not process.is_alive():
                 self.dead.append(control.name)
-                events.say(
+                events.report(
                     f"dead {control.name}", f"The process of the {control.name} has died. On without it."
                 )
 
     def end(self, control: Control | None = None, patience_s: float = PATIENCE_S) -> dict[str, Any]:
-        """Stop all, wait for them, and return what one of them said last, by kind.
+        """Stop all processes and wait for them; returns the last messages of the one of `control`, by kind.
 
-        One that is still at work after `patience_s` is ended; the recorder, which may have a long log to write, after
-        an hour.
+        A process that still runs after `patience_s` is killed; the recorder after `RECORDERS_PATIENCE_S`.
         """
         for each, _ in self._helpers:
             each.stop()
-        said: dict[str, Any] = {}
+        messages: dict[str, Any] = {}
         for each, process in self._helpers:
             patient_s = RECORDERS_PATIENCE_S if each.name == "recorder" else patience_s
             until_s = time.monotonic() + patient_s
             while process.is_alive():
                 heard = each.heard()
-                said |= dict(heard) if each is control else {}
+                messages |= dict(heard) if each is control else {}
                 process.join(0.1)
                 if time.monotonic() > until_s:
                     process.kill()
             if each is control:
-                said |= dict(each.heard())
+                messages |= dict(each.heard())
         self._helpers.clear()
-        return said
+        return messages
 
 
 def run_hil(settings: HilSettings, stopper: Stopper | None = None) -> dict[str, Any]:
-    """Run the loop to its end; writes log.mf4 and summary.json and returns what the latter holds.
+    """Run the loop to its end and write log.mf4 and summary.json; returns the content of summary.json.
 
     Raises
     ------
     HilError, ScenarioError
-        Before the loop begins, where something cannot be used; the folder then holds nothing new.
+        Before the loop begins, where a setting cannot be used; the folder is then unchanged.
     """
     stopper = stopper or Stopper()
     with ExitStack() as stack:
@@ -171,31 +172,31 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
     sides = len(unit.wiring.sides)
     clock, rig = SystemClock(), Rig()
     start_ns = clock.now_ns()
-    words = CONTEXT.SimpleQueue()
+    event_queue = CONTEXT.SimpleQueue()
     events = Events(
-        lambda time_s, text: words.put((time_s, text)), lambda: (clock.now_ns() - start_ns) * 1e-9
+        lambda time_s, text: event_queue.put((time_s, text)), lambda: (clock.now_ns() - start_ns) * 1e-9
     )
     seen = None if settings.frames is None else _camera_job(settings, unit)
-    link = Link(settings.bus.open, events.say)
+    link = Link(settings.bus.open, events.report)
     stack.callback(link.close)
-    # What can be refused has been refused: only now the processes, which take seconds.
+    # All settings are checked by now: the processes take seconds to start.
     stack.callback(rig.end)
     settings.out.mkdir(parents=True, exist_ok=True)
     ring = Ring(len(columns(unit.wiring)), ROWS_KEPT)
-    recorder = rig.add("recorder", record, _recorder_job(settings, unit), ring, ..., words)
+    recorder = rig.add("recorder", record, _recorder_job(settings, unit), ring, ..., event_queue)
     stale_ns = codec[CLASS_MESSAGE].stale_ns.get(CLASS_SIGNAL, 1_000_000_000)
-    placing = Placing(preview, 1.0 / settings.fps, sides)
-    sight = Sight(placing, stale_ns, unit.wiring.side_names)
+    stamps = PreviewStamps(preview, 1.0 / settings.fps, sides)
+    camera_input = CameraInput(stamps, stale_ns, unit.wiring.side_names)
     if seen is not None:
         results, motion = Ring(result_columns(sides), RESULTS_KEPT), Numbers(len(MOTION))
-        sight = Sight(placing, stale_ns, unit.wiring.side_names, results, motion)
-        rig.add("camera", watch, seen, motion, results, ...)
+        camera_input = CameraInput(stamps, stale_ns, unit.wiring.side_names, results, motion)
+        rig.add("camera", run_camera, seen, motion, results, ...)
     over = threading.Event()
     thread = _plant(settings, rig, events, over, stack)
     rig.wait_until_ready()
     stack.enter_context(as_before())
     system = _system(settings)
-    inputs = Inputs(codec, INPUT_MESSAGES, events.say, settings.counters)
+    inputs = Inputs(codec, INPUT_MESSAGES, events.report, settings.counters)
     period_ns = round(1e9 / settings.rate_hz)
     slots = None if settings.duration_s is None else max(1, round(settings.duration_s * settings.rate_hz))
     with undisturbed(), stopper.by_signal():
@@ -209,7 +210,7 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
             unit,
             codec,
             inputs,
-            sight,
+            camera_input,
             ring,
             events,
             Delays(stack.enter_context(ThreadAccounts())),
@@ -224,13 +225,13 @@ def _run(settings: HilSettings, stopper: Stopper, stack: ExitStack) -> dict[str,
         over.set()
         after_mb = memory_mb()
         ended = "asked to stop" if stopper.asked else "time was up"
-        said = rig.end(recorder)
-    summary = summarise(settings, unit, counts, events, inputs, link, sight, said, system, ended)
+        messages = rig.end(recorder)
+    summary = summarise(settings, unit, counts, events, inputs, link, camera_input, messages, system, ended)
     if before_mb is not None and after_mb is not None:
-        # The garbage collector is off: what grows here would grow for ever.
+        # The garbage collector is off, so that growth here would not end.
         summary["system"]["memory_mb"] = {"before": round(before_mb, 1), "after": round(after_mb, 1)}
-    summary["log"] = _log_outcome(settings, said)
-    write_summary(summary, settings.out / SUMMARY)
+    summary["log"] = _log_outcome(settings, messages)
+    write_whole(settings.out / SUMMARY, json.dumps(summary, indent=2).encode() + b"\n")
     return summary
 
 
@@ -250,12 +251,12 @@ def _vehicle(settings: HilSettings) -> Vehicle:
 
 
 def _parameters(settings: HilSettings) -> dict[str, Any]:
-    """The unit's parameters; results are placed by the rig, so the unit's own preview is switched off."""
+    """Parameters of the unit; its own preview is off, because the rig stamps the results."""
     return car_parameters(_vehicle(settings), settings.wheel) | dict(settings.parameters) | UNIT_PREVIEW
 
 
 def _preview(settings: HilSettings) -> PreviewConfig:
-    """What the rig places results by; raises HilError."""
+    """Settings of the rig's stamps; raises HilError."""
     names = {"preview.P_0": "P_0_m", "preview.hold": "hold_m", "preview.resolution": "resolution_m"}
     chosen = {names[key]: float(value) for key, value in settings.parameters.items() if key in names}
     try:
@@ -281,7 +282,7 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
     if not files:
         raise HilError(f"{settings.frames}: no pictures in this folder. Expected JPEG or PNG files.")
     return CameraJob(
-        Folder(files),
+        PictureFolder(files),
         _vision(settings, load_camera(settings.camera)),
         settings.fps,
         unit.wiring.side_names,
@@ -291,21 +292,21 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
 
 
 def _vision(settings: HilSettings, camera: Camera) -> IfeConfig:
-    """The image estimator's settings by the unit's parameters, which the unit itself has taken already."""
-    told = _parameters(settings)
+    """Settings of the image estimator by the unit's parameters, which the unit has accepted before."""
+    given = _parameters(settings)
     variables = [v for v in ESTIMATOR_PARAMETERS if v.name.startswith("image.")]
     kinds = {Kind.INTEGER: int, Kind.BOOLEAN: bool, Kind.REAL: float}
-    values = {v.name: kinds[v.kind](told.get(v.name, v.start)) for v in variables}
+    values = {v.name: kinds[v.kind](given.get(v.name, v.start)) for v in variables}
     vision = configuration(variables, values, EstimatorConfig()).vision
     return replace(
-        vision, camera=camera, track_m=told["vehicle.track"], wheelbase_m=told["vehicle.wheelbase"]
+        vision, camera=camera, track_m=given["vehicle.track"], wheelbase_m=given["vehicle.wheelbase"]
     )
 
 
 def _plant(
     settings: HilSettings, rig: Rig, events: Events, over: threading.Event, stack: ExitStack
 ) -> Callable[[int], None] | None:
-    """The plant, in a process of its own; to a bus within this process a thread here hands on what it sends."""
+    """Start the plant's process; for a bus of this process, returns what starts the relay of its messages."""
     job = settings.plant
     if job is None:
         return None
@@ -313,17 +314,17 @@ def _plant(
     if settings.bus.interface != "virtual":
         rig.add("plant", play, job, None, ...)
         return None
-    wire = ferry_ring()
+    wire = relay_ring()
     rig.add("plant", play, job, wire, ...)
-    link = Link(job.bus.open, lambda kind, text: events.say(f"plant: {kind}", f"Plant: {text}"))
+    link = Link(job.bus.open, lambda kind, text: events.report(f"plant: {kind}", f"Plant: {text}"))
     stack.callback(link.close)
-    ferry = Ferry(wire, link, SystemClock())
+    relay = BusRelay(wire, link, SystemClock())
 
     def start(start_ns: int) -> None:
-        # Half a period apart the two do not ask for the interpreter at the same time.
+        # Half a period apart, loop and relay do not need the interpreter at the same time.
         period_ns = round(1e9 / job.rate_hz)
         arguments = (start_ns + period_ns // 2, period_ns, over.is_set)
-        thread = threading.Thread(target=ferry.run, args=arguments, name="ferry", daemon=True)
+        thread = threading.Thread(target=relay.run, args=arguments, name="relay", daemon=True)
         thread.start()
         stack.callback(thread.join, 2.0)
         stack.callback(over.set)
@@ -332,7 +333,7 @@ def _plant(
 
 
 def _system(settings: HilSettings) -> dict[str, Any]:
-    """Priority and core of the loop, as far as the system grants them."""
+    """Ask for core and priority of the loop; returns the outcomes as in summary.json."""
     granted: dict[str, Any] = {"cpus": os.cpu_count(), "platform": sys.platform}
     if settings.core is not None:
         granted["core"] = pin(settings.core)
@@ -341,14 +342,14 @@ def _system(settings: HilSettings) -> dict[str, Any]:
     return granted
 
 
-def _log_outcome(settings: HilSettings, said: Mapping[str, Any]) -> dict[str, Any]:
+def _log_outcome(settings: HilSettings, messages: Mapping[str, Any]) -> dict[str, Any]:
     if not settings.log:
         return {"file": None, "rows": 0, "rows_lost": 0, "problem": None}
-    if "done" not in said:
+    if "done" not in messages:
         for left in settings.out.glob(f"{SCRATCH_PREFIX}*"):
             shutil.rmtree(left, ignore_errors=True)
-    done = said.get("done", {"log_rows": 0, "rows_lost": 0})
-    problem = said.get(LOG_FAILED) or (None if "done" in said else "the recorder's process died")
+    done = messages.get("done", {"log_rows": 0, "rows_lost": 0})
+    problem = messages.get(LOG_FAILED) or (None if "done" in messages else "the recorder's process died")
     return {
         "file": LOG if done["log_rows"] else None,
         "rows": done["log_rows"],

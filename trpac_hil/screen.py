@@ -1,4 +1,4 @@
-"""What the terminal shows while the loop runs."""
+"""The terminal while the loop runs."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from trpac_hil.records import AGED
 
 STATUS = {0: "starting", 1: "running", 2: "held: inputs", 3: "held: bus", 4: "held: unit"}
 MOST_WORDS = 8
-"""Newest events that the table shows; all are in summary.json."""
-Words = Sequence[tuple[float, str]]
+"""Newest events that are shown; all are in summary.json."""
+EventTexts = Sequence[tuple[float, str]]
 
 
-class Lines:
-    """Events alone, a line each: for logs and pipes."""
+class EventLines:
+    """Events alone, one line each, for logs and pipes."""
 
     def __init__(self) -> None:
         self._console = Console(stderr=True, soft_wrap=True, highlight=False)
 
-    def __enter__(self) -> Lines:
+    def __enter__(self) -> EventLines:
         return self
 
     def __exit__(self, *_: object) -> None:
         return None
 
-    def show(self, figures: Figures, words: Words) -> None:
-        """Print what was said since."""
-        for time_s, text in words:
+    def show(self, figures: Figures, texts: EventTexts) -> None:
+        """Print the new events."""
+        for time_s, text in texts:
             self._console.print(escape(f"{time_s:9.3f} s  {text}"))
 
 
 class Screen:
-    """A table that is drawn anew a few times a second, the newest events below."""
+    """A table, redrawn a few times a second, with the newest events below."""
 
     def __init__(self, title: str) -> None:
         self._title = title
-        self._words: list[tuple[float, str]] = []
+        self._texts: list[tuple[float, str]] = []
         self._live = Live(console=Console(stderr=True), auto_refresh=False, transient=False)
 
     def __enter__(self) -> Screen:
@@ -53,10 +53,10 @@ class Screen:
     def __exit__(self, *_: object) -> None:
         self._live.stop()
 
-    def show(self, figures: Figures, words: Words) -> None:
-        """Draw the figures as they are now."""
-        self._words = [*self._words, *words][-MOST_WORDS:]
-        events = [Text(f"{time_s:9.3f} s  {text}", style="yellow") for time_s, text in self._words]
+    def show(self, figures: Figures, texts: EventTexts) -> None:
+        """Redraw the table."""
+        self._texts = [*self._texts, *texts][-MOST_WORDS:]
+        events = [Text(f"{time_s:9.3f} s  {text}", style="yellow") for time_s, text in self._texts]
         self._live.update(Group(_estimate(figures, self._title), _timing(figures), *events), refresh=True)
 
 
@@ -91,8 +91,8 @@ def _timing(figures: Figures) -> Table:
         "age picture [ms]": ("age_picture_ms",) * 2,
     }
     for label, (name, column) in shown.items():
-        spread = figures.spreads[name].summary()
-        if spread is not None:
-            numbers = (figures.now(column), spread["median"], spread["p99"], spread["max"])
+        sketch = figures.sketches[name].summary()
+        if sketch is not None:
+            numbers = (figures.now(column), sketch["median"], sketch["p99"], sketch["max"])
             table.add_row(escape(label), *("-" if math.isnan(n) else f"{n:.4g}" for n in numbers))
     return table

@@ -1,4 +1,4 @@
-"""What a run of the rig is told."""
+"""Settings of a run of the rig."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 from trpac_hil.bus import BusSettings
 from trpac_hil.codec import DBC_FILE
 from trpac_hil.deadlines import SPIN_NS
-from trpac_hil.plant_node import PartnerJob
+from trpac_hil.plant_node import PlantJob
 
 
 @dataclass(frozen=True)
 class HilSettings:
-    """What a run is told.
+    """Settings of a run.
 
     Attributes
     ----------
@@ -23,15 +23,15 @@ class HilSettings:
     fmu : Path or None
         The unit; None builds TrpacEstimator from the sources.
     bus : BusSettings
-        The bus.
+        Interface and channel.
     dbc : Path
-        Its messages.
+        DBC file of the messages.
     rate_hz : float
         Cycles per second, 100 to 1000.
     duration_s : float or None
-        None runs until asked to stop [s].
+        Length of the run; None runs until a stop is requested [s].
     wheel : str
-        Which wheel a unit of one wheel is for.
+        Wheel of a unit of one wheel.
     vehicle, camera : Path or None
         vehicle.yaml; camera.yaml of the pictures.
     frames : Path or None
@@ -40,16 +40,16 @@ class HilSettings:
         Pictures per second.
     parameters : mapping
         Parameters of the unit by variable name.
-    plant : PartnerJob or None
-        The plant to play on the same bus.
+    plant : PlantJob or None
+        The plant on the same bus; None without it.
     log, counters, live, realtime : bool
-        Whether to log; to hold messages to their counters; to draw on the terminal; to ask for real-time priority.
+        Whether to log; to check message counters; to draw on the terminal; to ask for real-time priority.
     core : int or None
         Core of the loop; with real-time priority the last one by default.
     camera_threads : int
         Threads of each network.
     spin_ns : int
-        How long before a due time the sleep ends [ns].
+        Time before a due time at which the sleep ends [ns].
     """
 
     out: Path
@@ -64,7 +64,7 @@ class HilSettings:
     frames: Path | None = None
     fps: float = 20.0
     parameters: Mapping[str, float] = field(default_factory=dict)
-    plant: PartnerJob | None = None
+    plant: PlantJob | None = None
     log: bool = True
     counters: bool = True
     live: bool = False

@@ -1,7 +1,7 @@
-"""Memory that the loop shares with the processes beside it: no lock, no system call, no waiting.
+"""Memory that the loop shares with the processes beside it, without locks, system calls or waiting.
 
-One process writes and one reads. Numbers of 8 bytes are written whole on all machines that run Python 3.11; a row is
-announced after it is written, and carries its own number so that a reader can tell one that was overwritten.
+One process writes and one reads. Numbers of 8 bytes are written atomically on all machines that run Python 3.11; a row
+is announced after it is written and holds its own number, by which a reader detects that it was overwritten.
 """
 
 from __future__ import annotations
@@ -17,15 +17,7 @@ Array = NDArray[np.float64]
 
 
 class Ring:
-    """The newest rows of numbers; a reader that is too slow loses the oldest, and learns how many.
-
-    Parameters
-    ----------
-    columns : int
-        Numbers in a row.
-    rows : int
-        Rows that are kept.
-    """
+    """A ring of rows of numbers; a reader that is too slow loses the oldest rows, which `lost` counts."""
 
     def __init__(self, columns: int, rows: int) -> None:
         self.columns, self.rows = columns, rows
@@ -58,16 +50,16 @@ class Ring:
 
     @property
     def waiting(self) -> bool:
-        """Whether there are rows that were not read."""
+        """Whether there are unread rows."""
         return bool(self._head[0] > self._read)
 
     @property
     def written(self) -> int:
-        """Rows written since the start."""
+        """Number of rows written since the start."""
         return int(self._head[0])
 
     def read(self) -> Array:
-        """All rows since the last reading that are still there, shape (n, columns)."""
+        """Rows since the last call that were not overwritten, shape (n, columns)."""
         head = self._head[0]
         first = max(self._read, head - self.rows)
         numbers = np.arange(first, head)
@@ -79,15 +71,15 @@ class Ring:
 
 
 class Numbers:
-    """A few numbers that one process sets and others look at: how the car moves, whether to stop."""
+    """A few numbers that one process sets and others read."""
 
     def __init__(self, size: int) -> None:
         self._memory: Any = RawArray("d", size)
 
     def set(self, values: Sequence[float]) -> None:
-        """Set all of them, one after the other."""
+        """Set all numbers."""
         self._memory[:] = values
 
     def get(self) -> list[float]:
-        """All of them as they are now."""
+        """All numbers."""
         return list(self._memory)

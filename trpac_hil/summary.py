@@ -1,22 +1,20 @@
-"""summary.json: what a run counted and measured."""
+"""summary.json: counts and measurements of a run."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from trpac_core.files import file_sha256
 from trpac_hil.bus import Link
+from trpac_hil.camera_input import CameraInput
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Counts
 from trpac_hil.settings import HilSettings
-from trpac_hil.sight import Sight
 from trpac_hil.unit import Unit
 
 PACKAGES = ("trpac-fmu", "fmpy", "python-can", "cantools", "asammdf", "numpy", "onnxruntime")
@@ -29,13 +27,13 @@ def summarise(
     events: Events,
     inputs: Inputs,
     link: Link,
-    sight: Sight,
-    said: Mapping[str, Any],
+    camera_input: CameraInput,
+    messages: Mapping[str, Any],
     system: Mapping[str, Any],
     ended: str,
 ) -> dict[str, Any]:
-    """What summary.json holds; docs/hil.md has its fields."""
-    done = said.get("done")
+    """The content of summary.json; docs/hil.md has its fields."""
+    done = messages.get("done")
     return {
         "unit": unit.name,
         "unit_sha256": file_sha256(unit.archive),
@@ -56,9 +54,9 @@ def summarise(
         "held_cycles": counts.held,
         "discarded_steps": counts.discarded,
         "clock_jumps": counts.clock_jumps,
-        "signals_lost": counts.lost | ({"camera": sight.losses} if sight.losses else {}),
+        "signals_lost": counts.lost | ({"camera": camera_input.losses} if camera_input.losses else {}),
         "bus": _bus(settings, inputs, link),
-        "camera": _camera(settings, sight),
+        "camera": _camera(settings, camera_input),
         "events": events.summary(),
         "system": dict(system),
         "versions": {package: version(package) for package in PACKAGES},
@@ -88,8 +86,8 @@ def _bus(settings: HilSettings, inputs: Inputs, link: Link) -> dict[str, Any]:
     }
 
 
-def _camera(settings: HilSettings, sight: Sight) -> dict[str, Any]:
-    counts, work_ms = sight.placing.counts, sight.work_ms
+def _camera(settings: HilSettings, camera_input: CameraInput) -> dict[str, Any]:
+    counts, work_ms = camera_input.stamps.counts, camera_input.work_ms
     source = "bus" if settings.frames is None else f"pictures at {settings.fps:g} 1/s"
     return {
         "source": source,
@@ -98,7 +96,7 @@ def _camera(settings: HilSettings, sight: Sight) -> dict[str, Any]:
         "late": counts.late,
         "in_vain": counts.in_vain,
         "unplaced": counts.unplaced,
-        "left_out": sight.left_out,
+        "left_out": camera_input.left_out,
         "work_ms": {
             "median": round(float(np.median(work_ms)), 2),
             "p99": round(float(np.percentile(work_ms, 99.0)), 2),
@@ -107,10 +105,3 @@ def _camera(settings: HilSettings, sight: Sight) -> dict[str, Any]:
         if work_ms
         else None,
     }
-
-
-def write_summary(summary: Mapping[str, Any], path: Path) -> None:
-    """Write the summary under another name, then give it its own."""
-    scratch = path.with_name(f".{path.name}.part")
-    scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    scratch.replace(path)

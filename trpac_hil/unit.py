@@ -1,4 +1,4 @@
-"""The estimator's unit through fmpy, its variables wired to the bus's signals."""
+"""The estimator's unit through fmpy, with the bus's signals as its inputs."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from fmpy.fmi2 import FMU2Slave
 
 from fmu_src.interface_4w import WHICH_WHEEL
 from scenarios.fmu_client.archives import UnitFileError
-from scenarios.fmu_client.opening import opened_unit
+from scenarios.fmu_client.opening import Instance, opened_unit
 from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_core.vehicle import WHEELS
 from trpac_hil.errors import HilError
 
 NO_CLASS = -1
 WARM_UP_STEPS = 300
-"""Steps before the clock starts: the first ones load code and are slow."""
+"""Steps before the run: the first ones load code and are slow."""
 WARM_UP_INPUTS = {"wheel_speed": 52.0, "wheel_torque": 150.0, "vehicle_speed": 15.0}
 
 
 class Estimates(NamedTuple):
-    """What the loop sends: those of the car, or of the one wheel; then theta_hat and flag of each wheel, if any."""
+    """Estimates of the car or of the one wheel; then theta_hat and flag of each wheel of four."""
 
     TRPAC: float
     TRPAC_std: float
@@ -37,7 +37,7 @@ class Estimates(NamedTuple):
     wheel_flags: tuple[bool, ...]
 
     def held(self) -> Estimates:
-        """The same estimate, with nothing that says that it is live."""
+        """The same estimate with flags and K_v at 0: it is not updated."""
         return self._replace(
             flag=False, excitation=False, K_v=0.0, wheel_flags=(False,) * len(self.wheel_flags)
         )
@@ -45,16 +45,16 @@ class Estimates(NamedTuple):
 
 @dataclass(frozen=True)
 class Wiring:
-    """Which signals of the bus go to which variables.
+    """Signals of the bus by the unit's variables.
 
     Attributes
     ----------
     wheels : tuple of str
         Wheels that the unit estimates.
     required, optional : mapping
-        Signal by variable; optional ones are set from the first time they come.
+        Signal by variable; optional ones are set from their first value on.
     sides : tuple of pairs
-        Variables of class and confidence, for each side that the unit asks for.
+        Variables of class and confidence, for each side of the unit.
     side_names : tuple of str
         'left', 'right'.
     """
@@ -67,20 +67,20 @@ class Wiring:
 
     @classmethod
     def of_one(cls, wheel: str) -> Wiring:
-        """The unit of one wheel, wired to that wheel's signals."""
-        place = wheel.upper()
+        """The wiring of the unit of one wheel."""
+        suffix = wheel.upper()
         required = {
-            "wheel_speed": f"WheelSpeed_{place}",
-            "wheel_torque": f"WheelTorque_{place}",
+            "wheel_speed": f"WheelSpeed_{suffix}",
+            "wheel_torque": f"WheelTorque_{suffix}",
             "vehicle_speed": "VehicleSpeed",
         }
-        optional = {"vertical_load": f"VerticalLoad_{place}", **_OF_THE_CAR}
+        optional = {"vertical_load": f"VerticalLoad_{suffix}", **_OF_THE_CAR}
         side = "left" if wheel.endswith("l") else "right"
         return cls((wheel,), required, optional, (("road_class", "road_class_confidence"),), (side,))
 
     @classmethod
     def of_four(cls) -> Wiring:
-        """The unit of four wheels."""
+        """The wiring of the unit of four wheels."""
         required = {f"wheel_speed.{w}": f"WheelSpeed_{w.upper()}" for w in WHEELS}
         required |= {f"wheel_torque.{w}": f"WheelTorque_{w.upper()}" for w in WHEELS}
         optional = {f"vertical_load.{w}": f"VerticalLoad_{w.upper()}" for w in WHEELS}
@@ -130,32 +130,29 @@ class Unit:
         name = description.coSimulation.modelIdentifier
         self.name = name
         self.wiring = Wiring.of_four() if name.endswith("4W") else Wiring.of_one(wheel)
-        self._references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
-        self._parameters = {v.name for v in description.modelVariables if v.causality == "parameter"}
-        outputs = _outputs(self.wiring)
-        self._reals = [self._references[n][0] for n in outputs[0]]
-        self._flags = [self._references[n][0] for n in outputs[1]]
-        self._frame_id = self._references["frame_id"][0]
-        self._classes = [self._references[c][0] for c, _ in self.wiring.sides]
-        self._confidences = [self._references[c][0] for _, c in self.wiring.sides]
-        known = self._typed(settings)
-        self._initialise(known)
+        known = self._typed(
+            settings, {v.name: v.type for v in description.modelVariables if v.causality == "parameter"}
+        )
+        self.references = Instance(slave, description, known).references
+        self._reals, self._flags = map(self.references, _outputs(self.wiring))
+        self._classes, self._confidences = map(self.references, zip(*self.wiring.sides, strict=True))
+        self._frame_id = self.references(["frame_id"])
         self._warm_up()
         slave.reset()
-        self._initialise(known)
+        Instance(slave, description, known)
         self._last = self._read()
 
-    def _typed(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Settings as their variables' types; raises HilError for what is no parameter, or no number of its kind."""
+    def _typed(self, settings: Mapping[str, Any], types: Mapping[str, str]) -> dict[str, Any]:
+        """Settings converted to the types of their variables; raises HilError for unknown names and wrong values."""
         kinds = {"Integer": int, "Boolean": bool, "Real": float}
-        usable = {name for name in self._parameters if self._references[name][1] in kinds}
+        usable = {name for name, kind in types.items() if kind in kinds}
         unknown = sorted(set(settings) - usable - set(WHICH_WHEEL))
         if unknown:
             raise HilError(
                 f"{self.archive}: has no parameter {', '.join(unknown)}; see docs/fmu_variables.md."
             )
         known = {name: value for name, value in settings.items() if name in usable}
-        typed = {name: kinds[self._references[name][1]](value) for name, value in known.items()}
+        typed = {name: kinds[types[name]](value) for name, value in known.items()}
         changed = [name for name, value in known.items() if typed[name] != value]
         if changed:
             raise HilError(
@@ -164,17 +161,8 @@ class Unit:
             )
         return typed
 
-    def _initialise(self, settings: Mapping[str, Any]) -> None:
-        slave = self._instance
-        slave.setupExperiment(startTime=0.0)
-        for name, value in settings.items():
-            reference, kind = self._references[name]
-            getattr(slave, f"set{kind}")([reference], [value])
-        slave.enterInitializationMode()
-        slave.exitInitializationMode()
-
     def _warm_up(self) -> None:
-        """Steps whose results are thrown away; a unit that discards them cannot be used with these settings."""
+        """Take steps whose results are discarded; raises HilError where the unit refuses them with these settings."""
         values = [WARM_UP_INPUTS[name.partition(".")[0]] for name in self.wiring.required]
         references = self.references(tuple(self.wiring.required))
         for number in range(WARM_UP_STEPS):
@@ -188,20 +176,16 @@ class Unit:
             raise HilError(f"{self.archive}: is closed.")
         return self._slave
 
-    def references(self, variables: Sequence[str]) -> list[int]:
-        """Value references of variables."""
-        return [self._references[name][0] for name in variables]
-
     def give_class(self, classes: Sequence[tuple[int, float]], number: int) -> None:
         """Set class and confidence of each side, as the result of that number."""
         slave = self._instance
-        slave.setInteger([*self._classes, self._frame_id], [*(surface for surface, _ in classes), number])
+        slave.setInteger([*self._classes, *self._frame_id], [*(surface for surface, _ in classes), number])
         slave.setReal(self._confidences, [confidence for _, confidence in classes])
 
     def step(
         self, time_s: float, step_s: float, references: Sequence[int], values: Sequence[float]
     ) -> Estimates | None:
-        """Set inputs and step; None where the unit discards the step."""
+        """Set inputs and step; returns the estimates, or None where the unit discards the step."""
         slave = self._instance
         try:
             slave.setReal(references, values)

@@ -1,6 +1,6 @@
 """How far off are the estimator, DE and the peers on logs that others made, where the true peak friction is known?
 
-    python -m benchmarks.accuracy.estimate_logs DIR [--write docs/estimate.md] [--out FILE.json]
+    python -m benchmarks.accuracy.estimate_logs DIR [--write docs/estimate.md]
 
 DIR is the folder that holds vehicle_logs/. With --write the tables between the markers of that document are replaced.
 All wheels count row by row. One clock for all: the rows in which DE's excitation flag is up at the wheel.
@@ -9,7 +9,6 @@ All wheels count row by row. One clock for all: the rows in which DE's excitatio
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -20,6 +19,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from benchmarks.report import markdown, write_between
 from scenarios.files import VehicleFile, load_vehicle
 from scenarios.peers import PEER_NAMES
 from sim2real.cases.case import FOLDER as CASES
@@ -36,7 +36,6 @@ from trpac_core.vision.preview import PreviewConfig
 
 Array = NDArray[np.float64]
 
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 PLANTS = {
     "ocd_nominal_pulses_snow": "open_car_dynamics",
     "ocd_nominal_cruise": "open_car_dynamics",
@@ -210,27 +209,17 @@ def table(rows: list[dict]) -> str:
         "within 2 std",
         "std, not seen",
     )
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    before = ("", "")
+    lines, before = [], ("", "")
     for row in rows:
         head = (row["log"], row["car"])
-        excited, seen, rest = row["excited"], row["seen"], row["not_seen"]
-        cells = (
-            *(head if head != before else ("", "")),
-            row["estimator"],
-            _percent(row["excited_share"]),
-            _number(excited["mean_abs"]),
-            _percent(excited["within_2_std"]),
-            _number(seen["mean_abs"]),
-            _percent(seen["within_2_std"]),
-            _number(seen["mean_std"]),
-            _number(rest["mean_abs"]),
-            _percent(rest["within_2_std"]),
-            _number(rest["mean_std"]),
-        )
-        lines.append("| " + " | ".join(cells) + " |")
+        cells = [*(head if head != before else ("", "")), row["estimator"], _percent(row["excited_share"])]
+        for part in ("excited", "seen", "not_seen"):
+            of = row[part]
+            cells += [_number(of["mean_abs"]), _percent(of["within_2_std"])]
+            cells += [_number(of["mean_std"])] if part != "excited" else []
+        lines.append(cells)
         before = head
-    return "\n".join(lines)
+    return markdown(heads, lines)
 
 
 def _number(value: float | None) -> str:
@@ -241,25 +230,12 @@ def _percent(value: float | None) -> str:
     return "-" if value is None else f"{100.0 * value:.0f} %"
 
 
-def write_between(path: Path, text: str) -> None:
-    """Replace what stands between the markers of a document."""
-    old = path.read_text(encoding="utf-8")
-    head, _, rest = old.partition(BEGIN)
-    _, marker, tail = rest.partition(END)
-    if not marker:
-        raise SystemExit(
-            f"{path}: has no lines {BEGIN} and {END}; expected both, the tables go between them."
-        )
-    path.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{tail}", encoding="utf-8")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("data", type=Path, help="folder that holds vehicle_logs/")
     parser.add_argument("--write", type=Path, help="document whose tables are replaced")
-    parser.add_argument("--out", type=Path, help="JSON file for all rows")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         driven = list(measure(real(arguments.data, Path(scratch))))
@@ -268,8 +244,6 @@ def main() -> None:
     print(text)
     if arguments.write is not None:
         write_between(arguments.write, text)
-    if arguments.out is not None:
-        arguments.out.write_text(json.dumps([*simulated, *driven], indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,58 +1,35 @@
-"""All figures of docs/fusion.md, by one command.
+"""All figures of docs/fusion.md, of the shipped sweeps that `trpac sweep` has run into folders of one.
 
-``python -m benchmarks.accuracy.fusion_tables run --out out/fusion --jobs 2`` runs the shipped sweeps (what is there
-already is kept), ``... write --out out/fusion`` writes their tables between the markers of docs/fusion.md, the
-pictures beside it, and one line of JSON at the end of scores.jsonl in `--out`. ``write`` also takes sweeps that are
-not finished, and says how many runs each table rests on.
+``python -m benchmarks.accuracy.fusion_tables out/fusion`` writes their tables between the markers of the page, and the
+pictures beside it. It takes sweeps that are not finished too, and says how many runs each table rests on.
 """
 
 import argparse
 import json
 from collections.abc import Iterator
-from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.progress import Progress, TaskID
 
-from benchmarks.ledger import append
+from benchmarks.accuracy.full_run import full_run
+from benchmarks.report import markdown, write_between
 from scenarios.figure17 import draw_figure17
 from scenarios.sweep import figures
 from scenarios.sweep.draw import plan_run, run_keys
-from scenarios.sweep.execute import execute
 from scenarios.sweep.files import load_sweep
 from scenarios.sweep.store import Parts
 from scenarios.sweep.summary import distribution, shown_enough, slippery, summarise
-from scenarios.sweep.trace import trace
 
 ROOT = Path(__file__).resolve().parents[2]
 SWEEPS = ROOT / "scenarios" / "sweeps"
 PAGE, PICTURES = ROOT / "docs" / "fusion.md", ROOT / "docs" / "fusion"
 NAMES = ("paper_simulation", "peers", "road_test", "road_test_brakes", "degradation", "rendered")
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 DASH = "–"
 LEAST_RUNS = 5
 """Levels with fewer runs are left out of tables and pictures."""
 FRICTION_EDGES = (0.1, 0.15, 0.2, 0.25, 0.35, 0.4, 0.45, 0.5, 0.55, 0.7)
-
-
-def run(out: Path, names: list[str], runs: int | None, jobs: int | None, scheduler: str | None) -> None:
-    for name in names:
-        sweep = load_sweep(SWEEPS / f"{name}.yaml")
-        if runs is not None:
-            sweep = replace(sweep, file=sweep.file.model_copy(update={"runs": runs}))
-        with Progress() as bars:
-            told = partial(show, bars, bars.add_task(name))
-            _, failures = execute(sweep, out / name, scheduler, jobs, told)
-        if failures:
-            raise SystemExit(f"{name}: {len(failures)} runs failed, the first: {failures[0]}")
-
-
-def show(bars: Progress, task: TaskID, done: int, total: int) -> None:
-    bars.update(task, completed=done, total=total)
 
 
 def collected(folder: Path) -> dict[str, Any]:
@@ -71,9 +48,7 @@ def collected(folder: Path) -> dict[str, Any]:
         "runs": int(table["run"].nunique()),
         "asked": asked,
         "cpu_s_per_run": float(np.median(cpu_s)),
-        "cpu_s": float(np.sum(cpu_s)),
         "camera": file["camera"]["source"],
-        "source_sha256": described["source_sha256"],
     }
 
 
@@ -83,11 +58,6 @@ def cell(value: float | None, digits: int, missing: str = DASH) -> str:
 
 def pair(measure: dict[str, Any], digits: int, missing: str = DASH) -> str:
     return f"{cell(measure['median'], digits, missing)} / {cell(measure['percentile_95'], digits, missing)}"
-
-
-def markdown(heads: list[str], rows: list[list[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
 def accuracy(found: dict[str, Any]) -> str:
@@ -254,7 +224,7 @@ def blocks(found: dict[str, dict[str, Any]]) -> Iterator[str]:
     """The page's measured part."""
     state = ", ".join(f"{n} {f['runs']} of {f['asked']}" for n, f in found.items())
     cpu = ", ".join(f"{n} {f['cpu_s_per_run']:.2f} s ({f['camera']})" for n, f in found.items())
-    yield f"Runs: {state}. Processor time per run: {cpu}. Each pair is median / 95th percentile.\n"
+    yield f"Runs: {state}. Processor time per run: {cpu}. Each pair is median / 95th percentile."
     yield "### In the form of Table 5\n\n" + table_5(found)
     if "paper_simulation" in found:
         yield "### The simulation condition\n\n" + accuracy(found["paper_simulation"])
@@ -267,34 +237,13 @@ def blocks(found: dict[str, dict[str, Any]]) -> Iterator[str]:
         yield "### Degradation\n\n" + degradation(found["degradation"])
 
 
-def write(out: Path, pictures: bool) -> None:
+def write(out: Path) -> None:
+    """The page's measured part, and its pictures."""
     found = {n: collected(out / n) for n in NAMES if any((out / n / "parts").glob("*.json"))}
     if not found:
-        raise SystemExit(
-            f"{out}: no sweep there; run `python -m benchmarks.accuracy.fusion_tables run --out {out}` first"
-        )
-    text = PAGE.read_text(encoding="utf-8")
-    head, rest = text.split(BEGIN)
-    tail = rest.split(END)[1]
-    PAGE.write_text(head + BEGIN + "\n\n" + "\n".join(blocks(found)) + "\n" + END + tail, encoding="utf-8")
-    sweeps = {
-        name: {k: v for k, v in part.items() if k != "table"} | slim(summarise(part["table"]))
-        for name, part in found.items()
-    }
-    append(out / "scores.jsonl", {"sweeps": sweeps})
-    if pictures:
-        draw(found)
-
-
-def slim(value: Any) -> Any:
-    """A summary without what the tables do not show, in four digits."""
-    if isinstance(value, dict):
-        return {
-            k: slim(v) for k, v in value.items() if k not in ("by_surface", "coverage_by_surface", "slippery")
-        }
-    if isinstance(value, list):
-        return [slim(v) for v in value]
-    return float(f"{value:.4g}") if isinstance(value, float) else value
+        raise SystemExit(f"{out}: no sweep there; run `trpac sweep {NAMES[0]} --out {out / NAMES[0]}` first")
+    write_between(PAGE, "\n\n".join(blocks(found)))
+    draw(found)
 
 
 def draw(found: dict[str, dict[str, Any]]) -> None:
@@ -302,7 +251,7 @@ def draw(found: dict[str, dict[str, Any]]) -> None:
     PICTURES.mkdir(exist_ok=True)
     for name in ("road_test", "road_test_brakes"):
         sweep = load_sweep(SWEEPS / f"{name}.yaml")
-        draw_figure17(trace(plan_run(sweep, run_keys(sweep)[0])), PICTURES / f"{name}.png")
+        draw_figure17(full_run(plan_run(sweep, run_keys(sweep)[0])), PICTURES / f"{name}.png")
     if "paper_simulation" in found:
         table = found["paper_simulation"]["table"]
         (PICTURES / "distributions.png").write_bytes(figures.distributions(table))
@@ -312,24 +261,7 @@ def draw(found: dict[str, dict[str, Any]]) -> None:
             (PICTURES / "coverage.png").write_bytes(covered)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    commands = parser.add_subparsers(dest="command", required=True)
-    running = commands.add_parser("run", help="run the sweeps")
-    running.add_argument("--out", type=Path, default=Path("out/fusion"))
-    running.add_argument("--only", choices=NAMES, nargs="+", default=list(NAMES))
-    running.add_argument("--runs", type=int, help="in place of each sweep's own number")
-    running.add_argument("--jobs", type=int)
-    running.add_argument("--scheduler")
-    writing = commands.add_parser("write", help="write tables, figures and pictures")
-    writing.add_argument("--out", type=Path, default=Path("out/fusion"))
-    writing.add_argument("--no-pictures", action="store_true")
-    options = parser.parse_args()
-    if options.command == "run":
-        run(options.out, options.only, options.runs, options.jobs, options.scheduler)
-    else:
-        write(options.out, not options.no_pictures)
-
-
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="folder of the sweeps' folders")
+    write(parser.parse_args().out)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.accuracy.random_drives import CAR_FILE, COLUMNS, NOISE, STEP_S, Drive, estimated, told
 from scenarios.files import RoadFile, load_vehicle
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import make_log
 
 Array = NDArray[np.float64]

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import RoadFile, SensorNoise, VehicleFile, load_vehicle
-from scenarios.plant import simulate
-from scenarios.plant.pipeline import PlantTrajectory
+from scenarios.plant.pipeline import PlantTrajectory, simulate
 from scenarios.plant.sensors import make_log
 from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors, TrpacEstimator
 from trpac_core.vision.classes import Surface

@@ -1,7 +1,6 @@
-"""Tune the peers on drives of the paper's simulation, and judge them, and DE, on others.
+"""Tune the peers on drives of the paper's simulation: ``python -m benchmarks.accuracy.tune_peers``.
 
-    python -m benchmarks.accuracy.tune_peers tune     # writes scenarios/peers/tuning.yaml
-    python -m benchmarks.accuracy.tune_peers judge    # table on drives that nothing was tuned on
+It writes scenarios/peers/tuning.yaml; on other drives the peers are judged by the sweep `peers` of docs/fusion.md.
 
 A drive is the paper's (0.9 / 0.3 / 0.5, seed of the noise) or one with three frictions drawn by the seed. The objective
 is the mean absolute error of theta where the front left tyre truly shows it (d mu / d theta of at least 0.1 at its true
@@ -12,11 +11,10 @@ that sinks there because noise looks like sliding is worth as little as one that
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -26,9 +24,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from scenarios.files import RoadFile, RoadSegment, Scenario, load_scenario
-from scenarios.metrics import score_segment
 from scenarios.peers import (
-    PEER_NAMES,
     EkfPeer,
     PeerSetup,
     SlipSlopePeer,
@@ -36,14 +32,13 @@ from scenarios.peers import (
     Tuning,
     UkfPeer,
     load_tuning,
-    make_peers,
 )
 from scenarios.peers.base import Peer
 from scenarios.peers.tuning import TUNING_FILE, write_tuning
 from scenarios.plant.pipeline import drive
 from scenarios.plant.sensors import make_scenario_log
 from trpac_core.dife import LEAST_SENSITIVITY
-from trpac_core.estimator import EstimatorConfig, TrpacEstimator
+from trpac_core.estimator import EstimatorConfig
 from trpac_core.readings import Sensors
 from trpac_core.slip import GREATEST_SLIP
 from trpac_core.tyre import friction_by_theta
@@ -53,11 +48,12 @@ Array = NDArray[np.float64]
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "paper_simulation.yaml"
 COLUMNS = ["wheel_speed_fl_rad_s", "wheel_torque_fl_nm", "vehicle_speed_m_s", "accel_x_m_s2"]
 TUNING_SEEDS = (3000, 3001, 3002, 3003)
-JUDGING_SEEDS = tuple(range(4000, 4012))
 """Even seeds are the paper's road, odd ones draw their frictions."""
 EVERY = 4
-"""Of the 1 kHz log each so many samples while tuning (250 Hz); judged at 1 kHz."""
+"""Of the 1 kHz log each so many samples while tuning (250 Hz)."""
 GRIPPY_WEIGHT = 0.5
+MOST_RUNS = 90
+"""Of the objective, per peer."""
 NOISE = ("torque_share", "acceleration_noise_m_s2", "theta_walk", "measurement_share")
 BOUNDS = {
     "filter_s": (0.005, 0.05),
@@ -134,15 +130,13 @@ def driven(seed: int, every: int) -> Drive:
     return Drive(setup, every * scenario.step_s, log[COLUMNS].to_numpy(), theta, shown, moving, segment)
 
 
-def run_peer(peer: Peer, d: Drive) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Estimate, its deviation and the peer's own excitation over a drive."""
+def run_peer(peer: Peer, d: Drive) -> Array:
+    """Estimate over a drive [-]."""
     said = []
     for omega, torque, speed, acceleration in d.readings.tolist():
         sensors = Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
-        e = peer.step(d.step_s, sensors)
-        said.append((e.TRPAC, e.TRPAC_std, e.excited))
-    theta, std, excited = np.array(said, dtype=np.float64).T
-    return theta, std, excited > 0.0
+        said.append(peer.step(d.step_s, sensors).TRPAC)
+    return np.array(said)
 
 
 def objective(theta: Array, d: Drive) -> float:
@@ -185,7 +179,6 @@ def tune(
     finish: Callable,
     drives: Sequence[Drive],
     peer: type,
-    most: int,
 ):
     """Nelder-Mead on the logarithms of the free values; also the objective at the start, at the end, and the runs."""
     best: list = [np.inf, start]
@@ -194,7 +187,7 @@ def tune(
     def cost(logs: Array) -> float:
         tuning = finish(replace(start, **dict(zip(free, np.exp(logs).tolist(), strict=True))))
         try:
-            value = float(np.mean([objective(run_peer(peer(d.setup, tuning), d)[0], d) for d in drives]))
+            value = float(np.mean([objective(run_peer(peer(d.setup, tuning), d), d) for d in drives]))
         except np.linalg.LinAlgError:  # sigma points of a covariance that is none any more
             value = 10.0
         first.append(value)
@@ -206,14 +199,14 @@ def tune(
     logs = np.log([getattr(start, n) for n in free])
     simplex = np.vstack([logs, *(logs + 0.8 * row for row in np.eye(len(free)))])
     bounds = [tuple(np.log(BOUNDS[n])) for n in free]
-    options = {"maxfev": most, "initial_simplex": simplex, "fatol": 1e-4, "xatol": 0.02}
+    options = {"maxfev": MOST_RUNS, "initial_simplex": simplex, "fatol": 1e-4, "xatol": 0.02}
     minimize(cost, logs, method="Nelder-Mead", bounds=bounds, options=options)
     print(file=sys.stderr)
     return best[1], {"start": round(first[0], 4), "end": round(best[0], 4), "runs": len(first)}
 
 
-def tune_peers(path: Path, names: Sequence[str], most: int) -> None:
-    """Tune some peers from where the file stands, or from the defaults; the file is written after each."""
+def tune_peers(path: Path) -> None:
+    """Tune the peers from where the file stands, or from the defaults; the file is written after each."""
     drives = [driven(seed, EVERY) for seed in TUNING_SEEDS]
     known = load_tuning(path) if path.is_file() else Tuning()
     how = yaml.safe_load(path.read_text(encoding="utf-8"))["how"] if path.is_file() else {}
@@ -225,11 +218,10 @@ def tune_peers(path: Path, names: Sequence[str], most: int) -> None:
         "objective": "mean abs error where the tyre shows theta, mean of both slippery stretches, "
         f"plus {GRIPPY_WEIGHT} times that on the grippy one",
     }
-    for name in names:
-        attribute, free, peer = TUNED[name]
+    for name, (attribute, free, peer) in TUNED.items():
         finish = (lambda t: calibrated(t, drives)) if name == SlipSlopePeer.name else (lambda t: t)
         start = time.process_time()
-        tuned, found = tune(name, getattr(known, attribute), free, finish, drives, peer, most)
+        tuned, found = tune(name, getattr(known, attribute), free, finish, drives, peer)
         known = replace(known, **{attribute: tuned})
         found["cpu_s"] = round(time.process_time() - start)
         how.setdefault("runs_by_peer", {}).setdefault(attribute, []).append(found)
@@ -237,105 +229,10 @@ def tune_peers(path: Path, names: Sequence[str], most: int) -> None:
     print(path.read_text())
 
 
-def run_de(d: Drive) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Our estimator without a camera, and its start/stop flag."""
-    noise_m_s = float(
-        np.hypot(
-            d.setup.vehicle_speed_noise_m_s, d.setup.vehicle.wheel_radius_m * d.setup.wheel_speed_noise_rad_s
-        )
-    )
-    estimator = TrpacEstimator(EstimatorConfig(vehicle=d.setup.vehicle, sliding_speed_noise_m_s=noise_m_s))
-    said = []
-    for omega, torque, speed, acceleration in d.readings.tolist():
-        e = estimator.step(
-            d.step_s, Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
-        )
-        said.append((e.TRPAC, e.TRPAC_std, e.excitation_flag))
-    theta, std, excited = np.array(said, dtype=np.float64).T
-    return theta, std, excited > 0.0
-
-
-def judged(d: Drive, theta: Array, std: Array, clock: NDArray[np.bool_]) -> dict[str, float | None]:
-    """One estimator on one drive."""
-    error = np.abs(theta - d.theta)
-    inside = error <= 2.0 * std
-    row: dict[str, float | None] = {}
-    before = 0.8
-    for i, label in enumerate(("grippy", "second", "third")):
-        here = d.segment == i
-        value = float(d.theta[here][0])
-        score = asdict(score_segment(0.0, value, before, theta[here], clock[here], d.step_s))
-        before = value
-        shown = here & d.shown
-        row[f"{label} shown error"] = float(error[shown].mean()) if shown.any() else None
-        row[f"{label} steady"] = score["steady_state_error"]
-        row[f"{label} convergence"] = score["convergence_time_s"]
-    row["grippy error"] = float(error[d.moving & (d.segment == 0)].mean())
-    row["covered shown"] = float(inside[d.shown].mean())
-    row["covered all"] = float(inside[d.moving].mean())
-    return row
-
-
-def judge(out: Path | None, seeds: Sequence[int]) -> None:
-    """The table of docs/peers.md."""
-    rows: dict[str, dict[str, list[dict]]] = {"the paper's road": {}, "drawn frictions": {}}
-    for n, seed in enumerate(seeds):
-        d = driven(seed, 1)
-        kind = rows["the paper's road" if seed % 2 == 0 else "drawn frictions"]
-        theta, std, clock = run_de(d)
-        kind.setdefault("DE", []).append(judged(d, theta, std, clock))
-        for peer in make_peers(d.setup):
-            theta, std, _ = run_peer(peer, d)
-            kind.setdefault(peer.name, []).append(judged(d, theta, std, clock))
-        print(f"\r{n + 1} of {len(seeds)} drives", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    summary = {kind: {name: _summed(of) for name, of in names.items()} for kind, names in rows.items()}
-    for kind, names in summary.items():
-        print(f"\n{kind}\n")
-        heads = list(next(iter(names.values())))
-        print("| | " + " | ".join(heads) + " |\n|---|" + "---|" * len(heads))
-        for name, values in names.items():
-            print(f"| {name} | " + " | ".join(str(values[h]) for h in heads) + " |")
-    if out is not None:
-        out.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
-
-
-def _summed(rows: list[dict[str, float | None]]) -> dict[str, str]:
-    """Medians over drives and the worst; of the slippery stretches both together."""
-
-    def of(*keys: str) -> list[float | None]:
-        return [row[k] for row in rows for k in keys]
-
-    def text(values: list[float | None], digits: int) -> str:
-        known = [v for v in values if v is not None]
-        never = len(values) - len(known)
-        said = f"{np.median(known):.{digits}f} / {max(known):.{digits}f}" if known else "-"
-        return said + (f", {never} of {len(values)} never" if never else "")
-
-    return {
-        "steady-state error, median / worst": text(of("second steady", "third steady"), 4),
-        "excited convergence [s], median / worst": text(of("second convergence", "third convergence"), 2),
-        "mean error where shown, median / worst": text(of("second shown error", "third shown error"), 3),
-        "mean error on the grippy stretch, median / worst": text(of("grippy error"), 3),
-        "within 2 std where shown": f"{np.mean([r['covered shown'] for r in rows]):.0%}",
-        "within 2 std, all driving": f"{np.mean([r['covered all'] for r in rows]):.0%}",
-    }
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("what", choices=("tune", "judge"))
-    parser.add_argument("--out", type=Path, help="tuning.yaml to write, or a JSON file for the judgement")
-    parser.add_argument("--peers", nargs="+", choices=PEER_NAMES, default=PEER_NAMES, help="which to tune")
-    parser.add_argument("--drives", type=int, default=len(JUDGING_SEEDS), help="how many to judge on")
-    parser.add_argument("--most", type=int, default=90, help="runs of the objective per peer")
-    arguments = parser.parse_args()
-    if arguments.what == "tune":
-        tune_peers(arguments.out or TUNING_FILE, arguments.peers, arguments.most)
-    else:
-        judge(arguments.out, JUDGING_SEEDS[: arguments.drives])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=TUNING_FILE, help="file to write (default: %(default)s)")
+    tune_peers(parser.parse_args().out)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from typing import Any
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from benchmarks.ledger import append
+from benchmarks.report import append
 from benchmarks.robustness.conformance.cases import CASES, STEP_S, write_pictures
 from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS

@@ -1,13 +1,9 @@
 """Time of one estimator step in Python, one wheel, classes in place of pictures, over a recorded drive.
 
-.venv/bin/python -m benchmarks.speed.estimator
-
 Classes come at 20 Hz, some of them wrong, so that DE and DIFE are apart and both are computed. The reference loop is a
 fixed piece of Python: where a busy machine slows it, it slows the step alike.
 """
 
-import argparse
-import json
 import time
 
 import numpy as np
@@ -55,12 +51,3 @@ def measure() -> dict[str, float]:
         "step_us_median_of_all_repeats": round(float(np.median(times)), 2),
         "reference_loop_us": round(min(references), 2),
     }
-
-
-def main() -> None:
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    print(json.dumps(measure(), indent=2))
-
-
-if __name__ == "__main__":
-    main()

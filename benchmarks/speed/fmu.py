@@ -20,14 +20,13 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu import FmuBuilder
 
-from benchmarks.ledger import machine
+from benchmarks.report import machine
 from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios.fmu_client.unpacking import unpack_unit
-from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.files import file_sha256
 from trpac_core.readings import Sensors
-from trpac_core.vision.classes import Surface
 
 STEP_S = 0.001
 STEPS = 2000
@@ -101,24 +100,6 @@ def without_fmi() -> Callable[[], None]:
     return work
 
 
-def with_class(unit: FMU2Slave, references: dict[str, int]) -> Callable[[], None]:
-    """The same with a surface class that comes by bus at each step."""
-    unit.setInteger([references["road_class"]], [int(Surface.WET)])
-    unit.setReal([references["road_class_confidence"]], [0.9])
-    return through_fmi(unit, references)
-
-
-def with_class_without_fmi() -> Callable[[], None]:
-    """The estimator's own steps with a class at each."""
-    estimator, road = TrpacEstimator(EstimatorConfig()), RoadClass(Surface.WET, 0.9)
-
-    def work() -> None:
-        for _ in range(STEPS):
-            estimator.step(STEP_S, Sensors(*SIGNALS), road)
-
-    return work
-
-
 def medians_us(rounds: dict[str, Callable[[], None]]) -> dict[str, float]:
     """Median cost of a step of each [us]; they take turns."""
     times: dict[str, list[float]] = {name: [] for name in rounds}
@@ -138,18 +119,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="bench-fmu-") as name:
         folder = Path(name)
         archive = build_unit(UNITS["TrpacEstimator"], folder / "TrpacEstimator.fmu")
-        empty, unit, bus = (
-            opened(build_empty(folder)),
-            opened(unpack_unit(archive, folder / "unit")),
-            opened(unpack_unit(archive, folder / "bus")),
-        )
+        empty, unit = opened(build_empty(folder)), opened(unpack_unit(archive, folder / "unit"))
         cost = medians_us(
             {
                 "empty_slave": through_fmi(*empty),
                 "unit": through_fmi(*unit),
                 "estimator": without_fmi(),
-                "unit_with_class": with_class(*bus),
-                "estimator_with_class": with_class_without_fmi(),
             }
         )
         result = {
@@ -164,7 +139,7 @@ def main() -> None:
             "machine": machine(),
             "versions": {p: version(p) for p in ("fmpy", "pythonfmu")},
         }
-        for instance, _ in (empty, unit, bus):
+        for instance, _ in (empty, unit):
             instance.terminate()
             instance.freeInstance()
     text = json.dumps(result, indent=2)

@@ -15,7 +15,6 @@ import platform
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from scenarios.pictures import PictureJob, draw
 from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock, wait_until
 from trpac_hil.delays import Delays, ThreadAccounts
 from trpac_hil.loop import LONG_NS
-from trpac_hil.plant_node import PLAIN_SCENARIO, PartnerJob
+from trpac_hil.plant_node import PLAIN_SCENARIO, PlantJob
 from trpac_hil.realtime import loop_core, pin, raise_priority, undisturbed
 from trpac_hil.rig import run_hil
 from trpac_hil.settings import HilSettings
@@ -33,13 +32,26 @@ from trpac_hil.settings import HilSettings
 PICTURES = 12
 EVERY_M = 5.0
 CORES = 2
+RATE_HZ, BARE_S = 1000.0, 60.0
+SHOWN = [
+    "cycles",
+    "overruns",
+    "bare_loop",
+    "timing",
+    "held_cycles",
+    "camera",
+    "events",
+    "system",
+    "log",
+    "machine",
+]
 BUSY_NS = 250_000
 """What a cycle of the rig takes [ns]."""
 
 
-def bare_loop(duration_s: float, rate_hz: float, realtime: bool, core: int | None) -> dict[str, Any]:
+def bare_loop(duration_s: float, rate_hz: float, realtime: bool) -> dict[str, Any]:
     """Deadlines that a loop without any work of its own misses on this machine."""
-    chosen = loop_core(core, realtime)
+    chosen = loop_core(None, realtime)
     if chosen is not None:
         pin(chosen)
     if realtime:
@@ -87,13 +99,7 @@ def pictures(folder: Path) -> Path:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--duration-s", type=float, default=600.0)
-    parser.add_argument("--rate-hz", type=float, default=1000.0)
-    parser.add_argument("--fps", type=float, default=20.0)
     parser.add_argument("--realtime", action="store_true")
-    parser.add_argument("--core", type=int)
-    parser.add_argument("--frames", type=Path, help="folder of pictures in place of rendered ones")
-    parser.add_argument("--no-log", action="store_true")
-    parser.add_argument("--bare-s", type=float, default=60.0, help="of the bare loop, before and after each")
     parser.add_argument("--out", type=Path, help="JSON file for the whole summary")
     options = parser.parse_args()
     if hasattr(os, "sched_setaffinity"):
@@ -102,20 +108,17 @@ def main() -> None:
         folder = Path(name)
         settings = HilSettings(
             out=folder / "out",
-            rate_hz=options.rate_hz,
+            rate_hz=RATE_HZ,
             duration_s=options.duration_s,
-            frames=options.frames or pictures(folder / "frames"),
+            frames=pictures(folder / "frames"),
             camera=Path("scenarios/cameras/paper.yaml"),
-            fps=options.fps,
-            plant=PartnerJob(camera_fps=0.0),
+            fps=20.0,
+            plant=PlantJob(camera_fps=0.0, rate_hz=RATE_HZ),
             realtime=options.realtime,
-            core=options.core,
-            log=not options.no_log,
+            log=True,
         )
         load = os.getloadavg()[0]
-        plant = settings.plant
-        settings = replace(settings, plant=replace(plant, rate_hz=options.rate_hz) if plant else None)
-        bare = (options.bare_s, options.rate_hz, options.realtime, options.core)
+        bare = (BARE_S, RATE_HZ, options.realtime)
         before = alone(bare_loop, *bare)
         summary = alone(run_hil, settings)
         summary["bare_loop"] = {"before": before, "after": alone(bare_loop, *bare)}
@@ -129,19 +132,7 @@ def main() -> None:
     if options.out:
         options.out.parent.mkdir(parents=True, exist_ok=True)
         options.out.write_text(json.dumps(summary, indent=2) + "\n")
-    shown = (
-        "cycles",
-        "overruns",
-        "bare_loop",
-        "timing",
-        "held_cycles",
-        "camera",
-        "events",
-        "system",
-        "log",
-        "machine",
-    )
-    print(json.dumps({key: summary[key] for key in shown}, indent=2))
+    print(json.dumps({key: summary[key] for key in SHOWN}, indent=2))
 
 
 if __name__ == "__main__":

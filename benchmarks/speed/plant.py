@@ -1,9 +1,5 @@
-"""Speed of the plant on the paper's simulation, for several sets of effects; prints JSON.
+"""Speed of the plant on the paper's simulation, for several sets of effects."""
 
-python -m benchmarks.speed.plant
-"""
-
-import json
 import time
 from pathlib import Path
 from typing import Any
@@ -11,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.files import Scenario, VehicleFile, load_scenario
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "paper_simulation.yaml"
 DURATION_S = 9.8  # the manoeuvre, without the coasting after it
@@ -61,11 +57,3 @@ def measure_all() -> dict[str, Any]:
         name: measure(scenario, with_effects(scenario.vehicle, effects)) for name, effects in sets.items()
     }
     return {"scenario": scenario.name, "step_s": scenario.step_s, "effects": rows}
-
-
-def main() -> None:
-    print(json.dumps(measure_all(), indent=2))
-
-
-if __name__ == "__main__":
-    main()

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.vision.training_seeds import sets_of_pictures
-from models.training.data import Picture
+from benchmarks.report import markdown
+from models.training.data import MANIFEST, DataFolderError, Picture, of_split, read_manifest
 from models.training.scores import wilson_interval
 from scenarios.stills import classify_pictures
 from trpac_core.vision.classes import Surface
@@ -36,19 +36,42 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--data", type=Path, required=True, help="folder of road pictures with its manifest.csv"
     )
     folder = parser.parse_args(arguments).data
-    sets = sets_of_pictures(folder, SETS, "classify_stills")
-    judged = {name: _judged(pictures) for name, pictures in sets.items()}
-    print("| pictures | n | accuracy |" + "|".join(f" recall {s.label} (n) " for s in Surface) + "|")
-    print("|---" * (3 + len(Surface)) + "|")
-    for name, table in judged.items():
-        cells = [_share(table["right"])]
-        cells += [f"{_share(own)} ({len(own)})" for own in _by_class(table)]
-        print(" | ".join([f"| {name}", str(len(table)), *cells]) + " |")
-    print("\n| confidence | pictures | right |\n|---|---|---|")
-    every = pd.concat(judged.values())
+    judged = {name: _judged(pictures) for name, pictures in _sets(folder).items()}
+    rows = [
+        (
+            name,
+            len(table),
+            _share(table["right"]),
+            *(f"{_share(own)} ({len(own)})" for own in _by_class(table)),
+        )
+        for name, table in judged.items()
+    ]
+    print(markdown(("pictures", "n", "accuracy", *(f"recall {s.label} (n)" for s in Surface)), rows))
+    every, rows = pd.concat(judged.values()), []
     for low, high in pairwise(CONFIDENCES):
         right = every["right"][(every["confidence"] > low) & (every["confidence"] <= high)]
-        print(f"| above {low} to {high} | {len(right)} | {_share(right)} |")
+        rows.append((f"above {low} to {high}", len(right), _share(right)))
+    print("\n" + markdown(("confidence", "pictures", "right"), rows))
+
+
+def _sets(folder: Path) -> dict[str, list[Picture]]:
+    """The pictures of each set; raises SystemExit where the folder cannot be read or lacks a set."""
+    try:
+        every = read_manifest(folder)
+    except DataFolderError as error:
+        raise SystemExit(f"classify_stills: {error}") from error
+    found = {
+        name: [p for p in of_split(every, split) if p.source.startswith(source)]
+        for name, (source, split) in SETS.items()
+    }
+    for name, pictures in found.items():
+        if not pictures:
+            source, split = SETS[name]
+            raise SystemExit(
+                f"classify_stills: {folder / MANIFEST}: no {split} pictures for '{name}'; "
+                f"expected rows of split {split} whose files lie in {source}"
+            )
+    return found
 
 
 def _judged(pictures: Sequence[Picture]) -> pd.DataFrame:

@@ -9,19 +9,30 @@ than half of the wrong frames in every set and scenario.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from rich.progress import Progress
 
+from benchmarks.report import markdown
 from trpac_core.vision.ife_config import IfeConfig
 
-from .development_drives import add_options, verdicts
+from .table4.clips import real_sequences
+from .table4.drives import rendered_drives
+from .table4.judge import SCENARIOS, Networks, judged
 from .table4.scores import gate, method_of
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRST_SEED = 6_000_100
+EVERY = 2
+"""Of the frames of a rendered drive: neighbours are 0.5 m apart and much alike."""
 
 MASSES = tuple(np.round(np.arange(0.5, 0.96, 0.025), 3).tolist())
 ENOUGH_PERCENT = 50.0
@@ -30,11 +41,38 @@ HELD_BACK, COST, LEFT = "wrong frames with flag 0", "right frames with flag 0", 
 
 
 def main() -> None:
-    given = _options()
-    shares = shares_by_mass(method_of(verdicts(given, {"IFE": {}}), "IFE"))
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.vision.flag_gate", description=__doc__)
+    parser.add_argument("--data", type=Path, help="folder of real road pictures; none: rendered drives only")
+    parser.add_argument("--models", type=Path, default=ROOT / "models", help="folder of both networks")
+    parser.add_argument("--drives", type=int, default=96, help="rendered drives of 30 frames")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/development"), help="the drives, and the figure"
+    )
+    given = parser.parse_args()
+    shares = shares_by_mass(method_of(verdicts(given), "IFE"))
     print(as_markdown(shares))
     print(f"chosen: {chosen(shares)}")
     draw(shares, given.out / "flag_gate.png")
+
+
+def verdicts(given: argparse.Namespace) -> pd.DataFrame:
+    """Verdicts on drives that nothing is scored on, undisturbed and with interference: see `judged`.
+
+    Rendered drives, kept in the folder of `--out`, and the validation parts of the real clips.
+    """
+    cv2.setNumThreads(1)
+    networks, found = Networks.load(given.models), []
+    with Progress() as bars:
+        task = bars.add_task("rendered drives", total=given.drives)
+        drawn, _ = rendered_drives(
+            given.out, given.drives, lambda done, _: bars.update(task, completed=done), FIRST_SEED
+        )
+        sequences = [replace(drive, frames=drive.frames[::EVERY]) for drive in drawn]
+        real = [part.validation_part() for part in real_sequences(given.data)] if given.data else []
+        sequences += [part for part in real if part.frames]
+        for sequence in bars.track(sequences, description="judged"):
+            found += [judged(sequence, networks, scenario, {"IFE": {}}) for scenario in SCENARIOS]
+    return pd.concat(found, ignore_index=True)
 
 
 def shares_by_mass(judged: pd.DataFrame) -> pd.DataFrame:
@@ -76,11 +114,7 @@ def as_markdown(shares: pd.DataFrame) -> str:
         column=shares["set"] + ", " + shares["scenario"],
     )
     wide = cells.pivot_table("cell", "least_mass", "column", aggfunc="first", sort=False)
-    lines = [f"| least_mass | {' | '.join(wide.columns)} |", "|---" * (1 + len(wide.columns)) + "|"]
-    lines += [
-        f"| {mass:g} | {' | '.join(row)} |" for mass, row in zip(wide.index, wide.to_numpy(), strict=True)
-    ]
-    return "\n".join(lines)
+    return markdown(("least_mass", *wide.columns), ((f"{mass:g}", *row) for mass, *row in wide.itertuples()))
 
 
 def _cell(held_back: float, cost: float, left: float) -> str:
@@ -106,16 +140,6 @@ def draw(shares: pd.DataFrame, path: Path) -> None:
     axes.legend(loc="lower right")
     figure.savefig(path, dpi=120)
     plt.close(figure)
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.vision.flag_gate",
-        description=__doc__,
-        formatter_class=argparse.RawTextHelpFormatter,
-    )
-    add_options(parser, drives=96)
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.camera.disturbances import DISPLAY_GAMMA
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
@@ -27,6 +27,8 @@ MODELS = Path(__file__).resolve().parents[2] / "models"
 STOPS = (-4.0, -3.0, -2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 BLUR_M = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 SUB_FRAMES = 12
+SCALE = 0.5
+"""Of the paper's 1920 x 1200 pixels."""
 LEAST_CONFIDENCE = 0.01
 """Confidence below it counts as this much: its logarithm would run away [-]."""
 
@@ -55,16 +57,15 @@ def developed(light: np.ndarray) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--worlds", type=int, default=20, help="random worlds per surface")
-    parser.add_argument("--scale", type=float, default=0.5, help="of the paper's 1920 x 1200 pixels")
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
-    camera = Camera().scaled(arguments.scale)
+    camera = Camera().scaled(SCALE)
     segmenter = Segmenter(MODELS / "segmenter.onnx", 1)
     ife = Ife(IfeConfig(camera=camera), segmenter, SurfaceClassifier(MODELS / "surface.onnx", 1))
     found: dict[tuple[str, float], list[tuple[float, bool, Surface]]] = {}
     for world in range(arguments.worlds):
         for surface in Surface:
-            look = SceneLook.random(np.random.default_rng([world, int(surface), 77]), surface)
+            look = Scene.random(np.random.default_rng([world, int(surface), 77]), surface)
             renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], look)
             for key, image in disturbed(renderer, 30.0):
                 _, result = ife.process(IfeState(), image, Motion(15.0))

@@ -1,6 +1,6 @@
 """Pictures in which no road can be judged: no road at all, a covered or blurred lens, noise, night.
 
-``python -m benchmarks.vision.odd_pictures [--models DIR] [--count N] [--seed N] [--save DIR] [--page]`` shows them to
+``python -m benchmarks.vision.odd_pictures [--models DIR] [--page]`` shows them to
 the image estimator and prints how many end in flag 0, kind by kind: all ought to. --page writes the table into
 docs/camera_scores.md.
 """
@@ -16,9 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.report import markdown, write_between
 from models.training.rendered import random_camera
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
@@ -28,7 +29,6 @@ from trpac_core.vision.trajectory import Motion
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "camera_scores.md"
-BEGIN, END = "<!-- odd: begin -->", "<!-- odd: end -->"
 WIDTH_PX, HEIGHT_PX = 960, 600
 SCALE = 0.5
 DISPLAY_GAMMA = 2.2
@@ -62,7 +62,7 @@ def road(rng: np.random.Generator, pitch_rad: float | None = None, **look: float
     camera = random_camera(rng, SCALE)
     camera = camera if pitch_rad is None else replace(camera, pitch_rad=pitch_rad)
     surface = Surface(int(rng.integers(3)))
-    drawn = replace(SceneLook.random(rng, surface), **look)  # type: ignore[arg-type]
+    drawn = replace(Scene.random(rng, surface), **look)  # type: ignore[arg-type]
     return Renderer(camera, [SurfaceSegment(0.0, surface)], drawn).frame(0.0).image
 
 
@@ -161,46 +161,30 @@ def verdicts(ife: Ife, kind: str, count: int, seed: int = 0) -> list[FrameResult
     return [ife.process(IfeState(), picture(kind, number, seed), Motion(10.0))[1] for number in range(count)]
 
 
-def table(ife: Ife, count: int, seed: int) -> str:
+def table(ife: Ife, count: int = 16) -> str:
     """How many of each kind end in flag 0, as Markdown."""
-    lines = ["| kind | pictures | flag 0 | p_util, median | P_fusion, median |", "|---|---|---|---|---|"]
-    held, shown = 0, 0
+    rows, held, shown = [], 0, 0
     for kind in KINDS:
-        found = verdicts(ife, kind, count, seed)
+        found = verdicts(ife, kind, count)
         p_util, P_fusion = np.median([[result.p_util, result.P_fusion] for result in found], axis=0)
         down = sum(not result.flag for result in found)
         held, shown = held + down, shown + len(found)
-        lines.append(f"| {kind.replace('_', ' ')} | {len(found)} | {down} | {p_util:.2f} | {P_fusion:.2f} |")
-    return "\n".join([*lines, f"| all | {shown} | {held} | | |"])
-
-
-def save(folder: Path, count: int, seed: int) -> None:
-    """Write the pictures as PNG, a folder per kind."""
-    for kind in KINDS:
-        (folder / kind).mkdir(parents=True, exist_ok=True)
-        for number in range(count):
-            file = folder / kind / f"{number:02d}.png"
-            if not cv2.imwrite(str(file), picture(kind, number, seed)):
-                raise OSError(f"{file}: could not be written; is the disk full?")
+        rows.append((kind.replace("_", " "), len(found), down, f"{p_util:.2f}", f"{P_fusion:.2f}"))
+    heads = ("kind", "pictures", "flag 0", "p_util, median", "P_fusion, median")
+    return markdown(heads, [*rows, ("all", shown, held, "", "")])
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", type=Path, default=ROOT / "models")
-    parser.add_argument("--count", type=int, default=16)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--save", type=Path, help="folder for the pictures")
     parser.add_argument("--page", action="store_true", help="write the table into docs/camera_scores.md")
     options = parser.parse_args()
     files = options.models / "segmenter.onnx", options.models / "surface.onnx"
     ife = Ife(IfeConfig(groups_looked_at=1), Segmenter(files[0]), SurfaceClassifier(files[1]))
-    if options.save:
-        save(options.save, options.count, options.seed)
-    found = table(ife, options.count, options.seed)
+    found = table(ife)
     print(found)
     if options.page:
-        before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-        PAGE.write_text(f"{before}{BEGIN}\n\n{found}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+        write_between(PAGE, found, "odd")
 
 
 if __name__ == "__main__":

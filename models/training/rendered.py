@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import RenderedFrame, SceneLook, SurfaceSegment
+from scenarios.camera.scene import RenderedFrame, Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.roi_sampling import roi_box, roi_width_px
@@ -114,7 +114,7 @@ def world_views(
     if rng.random() < 0.25:
         other = Surface((int(surface) + int(rng.integers(1, 3))) % 3)
         segments.append(SurfaceSegment(rng.uniform(8.0, 60.0), other))
-    look = SceneLook.random(rng, likely)
+    look = Scene.random(rng, likely)
     street = rng.spawn(1)[0]
     if street.random() < streets:
         look = look.in_a_street(street)

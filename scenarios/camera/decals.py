@@ -1,7 +1,4 @@
-"""What lies on one road alone: shadows cast by trees, poles, walls and bridges, and repairs of the asphalt.
-
-All of it is drawn once on a map that repeats along the road.
-"""
+"""Shadows of trees, poles, walls and bridges, and repairs of the asphalt, as a map that repeats along the road."""
 
 from __future__ import annotations
 
@@ -11,30 +8,30 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .scene import SceneLook
+from .scene import Scene
 from .textures import RipMap, build_ripmap
 
-TEXEL_M = 0.06
+TEXEL_M = 0.06  # side of a texel
 SHAPE = (4096, 512)  # along, across: 245.76 m x 30.72 m
-LEVELS = (6, 6)
+LEVELS = (6, 6)  # levels of detail along and across
 LENGTH_M = SHAPE[0] * TEXEL_M
-LABEL_BLUR_M = 0.35
-LABEL_SHADE = 0.4  # shade from which, averaged over LABEL_BLUR_M, the ground counts as shadowed
-LONGEST_SHADOW = 7.0  # shadow length over height; a lower sun throws no sharper one
+LABEL_BLUR_M = 0.35  # length over which shade is averaged for the label
+LABEL_SHADE = 0.4  # averaged shade from which the ground is labelled as shadow [-]
+LONGEST_SHADOW = 7.0  # greatest shadow length over height [-]
 
 Points = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 
-def decal_map(look: SceneLook) -> RipMap:
-    """Channels: shade (255 is dark), shade for the label (128 is the threshold), tone and gloss of repairs."""
-    rng = np.random.default_rng([look.seed, 11])
-    if look.casts_shadows:
-        shade = _shade(look, rng)
+def decal_map(scene: Scene) -> RipMap:
+    """The map; channels are shade (255 is dark), shade for the label (128: threshold), tone and gloss of repairs."""
+    rng = np.random.default_rng([scene.seed, 11])
+    if scene.casts_shadows:
+        shade = _shade(scene, rng)
         label = _label(shade)
     else:
         shade = label = np.zeros(SHAPE, dtype=np.uint8)
-    tone, gloss = _repairs(look, rng)
+    tone, gloss = _repairs(scene, rng)
     return build_ripmap(np.dstack((shade, label, tone, gloss)), LEVELS)
 
 
@@ -56,7 +53,7 @@ def _blurred(image: Image, sigma: float) -> Image:
 
 
 def _fill(canvas: Image, points_m: Points, value: int) -> None:
-    """Fills a polygon given as (along, across from the map's right rim) [m], with its repeats along the road."""
+    """Fill a polygon given as (along, across from the map's right rim) [m], with its repeats along the road."""
     pixels = points_m[:, ::-1] / TEXEL_M
     for turn in (-1, 0, 1):
         shifted = pixels + np.array([0.0, turn * SHAPE[0]])
@@ -68,32 +65,32 @@ def _count(rng: np.random.Generator, per_100_m: float) -> int:
     return int(rng.poisson(per_100_m * LENGTH_M / 100.0))
 
 
-def _beside(look: SceneLook, rng: np.random.Generator, nearest_m: float, farthest_m: float) -> Points:
-    """A place beside the road, on either side, in map coordinates [m]."""
-    right, left = look.road_edges_m
+def _beside(scene: Scene, rng: np.random.Generator, nearest_m: float, farthest_m: float) -> Points:
+    """A random point beside the road, in map coordinates [m]."""
+    right, left = scene.road_edges_m
     away = rng.uniform(nearest_m, farthest_m)
     across = left + away if rng.random() < 0.5 else right - away
     return np.array([rng.uniform(0, LENGTH_M), across + SHAPE[1] * TEXEL_M / 2])
 
 
-def _shade(look: SceneLook, rng: np.random.Generator) -> Image:
-    reach = min(1.0 / np.tan(look.sun_elevation_rad), LONGEST_SHADOW)
-    per_metre = -reach * np.array([np.cos(look.sun_azimuth_rad), np.sin(look.sun_azimuth_rad)])
+def _shade(scene: Scene, rng: np.random.Generator) -> Image:
+    reach = min(1.0 / np.tan(scene.sun_elevation_rad), LONGEST_SHADOW)
+    per_metre = -reach * np.array([np.cos(scene.sun_azimuth_rad), np.sin(scene.sun_azimuth_rad)])
     soft = np.zeros(SHAPE, dtype=np.uint8)
-    for _ in range(_count(rng, look.trees_per_100_m)):
-        _tree(soft, _beside(look, rng, 1.5, 9.0), per_metre, rng)
+    for _ in range(_count(rng, scene.trees_per_100_m)):
+        _tree(soft, _beside(scene, rng, 1.5, 9.0), per_metre, rng)
     hard = np.zeros(SHAPE, dtype=np.uint8)
-    for _ in range(_count(rng, look.poles_per_100_m)):
-        _pole(hard, _beside(look, rng, 0.5, 3.0), per_metre, rng)
-    for _ in range(_count(rng, look.walls_per_100_m)):
-        _block(hard, _beside(look, rng, 3.0, 14.0), per_metre, rng)
-    for _ in range(_count(rng, look.bridges_per_100_m)):
+    for _ in range(_count(rng, scene.poles_per_100_m)):
+        _pole(hard, _beside(scene, rng, 0.5, 3.0), per_metre, rng)
+    for _ in range(_count(rng, scene.walls_per_100_m)):
+        _block(hard, _beside(scene, rng, 3.0, 14.0), per_metre, rng)
+    for _ in range(_count(rng, scene.bridges_per_100_m)):
         _bridge(hard, per_metre, rng)
     return np.maximum(_blurred(soft, 1.8), _blurred(hard, 0.9))
 
 
 def _tree(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
-    """A trunk and a crown of leaf clusters, which leave flecks of light between them."""
+    """Draw the shadow of a trunk and a crown of leaf clusters with light between them."""
     height = rng.uniform(4.0, 14.0)
     radius = height * rng.uniform(0.18, 0.35)
     _strip(canvas, foot, foot + per_metre * height * 0.6, height * 0.03, 255)
@@ -123,7 +120,7 @@ def _pole(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generat
 
 
 def _block(canvas: Image, foot: Points, per_metre: Points, rng: np.random.Generator) -> None:
-    """A house, a wall or a lorry: the hull of a box's base and its roof thrown on the ground."""
+    """Draw the shadow of a box, such as a house, a wall or a lorry: the hull of its base and its projected roof."""
     size = rng.uniform((2.0, 1.0), (18.0, 8.0))
     corners = foot + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size / 2
     outline = np.vstack((corners, corners + per_metre * rng.uniform(2.0, 9.0)))
@@ -142,12 +139,12 @@ def _bridge(canvas: Image, per_metre: Points, rng: np.random.Generator) -> None:
     )
 
 
-def _repairs(look: SceneLook, rng: np.random.Generator) -> tuple[Image, Image]:
+def _repairs(scene: Scene, rng: np.random.Generator) -> tuple[Image, Image]:
     """Tone (128 is the road's own) and gloss (bitumen) of patches, sealed seams, skid marks and covers."""
     tone = np.full(SHAPE, 128, dtype=np.uint8)
     gloss = np.zeros(SHAPE, dtype=np.uint8)
-    right, left = (edge + SHAPE[1] * TEXEL_M / 2 for edge in look.road_edges_m)
-    for _ in range(_count(rng, look.patches_per_100_m)):
+    right, left = (edge + SHAPE[1] * TEXEL_M / 2 for edge in scene.road_edges_m)
+    for _ in range(_count(rng, scene.patches_per_100_m)):
         corner = np.array([rng.uniform(0, LENGTH_M), rng.uniform(right, left)])
         size = np.exp(rng.uniform((-0.7, -1.0), (2.8, 1.3)))
         size[1] = min(size[1], left - corner[1])
@@ -159,7 +156,7 @@ def _repairs(look: SceneLook, rng: np.random.Generator) -> tuple[Image, Image]:
             for start, end in pairwise(np.vstack((corners, corners[:1]))):
                 _strip(tone, start, end, 0.08, 70)
                 _strip(gloss, start, end, 0.08, 160)
-    for _ in range(_count(rng, 6.0 * look.cracks**2)):
+    for _ in range(_count(rng, 6.0 * scene.cracks**2)):
         point = np.array([rng.uniform(0, LENGTH_M), rng.uniform(right, left)])
         heading = rng.choice([0.0, np.pi / 2]) + rng.normal(0.0, 0.2)
         for _ in range(int(rng.integers(4, 14))):

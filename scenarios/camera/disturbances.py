@@ -1,4 +1,4 @@
-"""Disturbances of the camera's pictures: the paper's set, by the library that the paper used [25].
+"""Disturbances of the camera's pictures: the paper's set, with the library that the paper used [25].
 
 Section 5.1 of Tian et al. 2022: motion blur on every frame, random brightness and random contrast on 70 % of them;
 abnormal exposure and road shadows are the other degradations that it names (Figure 3).
@@ -16,14 +16,16 @@ os.environ.setdefault("NO_ALBUMENTATIONS_UPDATE", "1")  # read on import: no loo
 import albumentations
 
 REFERENCE_WIDTH_PX = 1920
-"""Picture width for which blur lengths are given; they scale with the picture."""
+"""Picture width for which blur lengths are given; they scale with the picture [px]."""
 SHORTEST_BLUR_PX = 3
+"""Least kernel of albumentations [px]."""
 DISPLAY_GAMMA = 2.2
+"""Exponent from pixel values to light, of sRGB [-]."""
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """How often and how strongly pictures are disturbed; probabilities 0..1, all zero leaves them alone.
+    """Probabilities 0..1 and limits of disturbances; without any probability pictures are unchanged.
 
     ``motion_blur_limit_px`` is the longest smear in a picture 1920 px wide; the brightness and contrast limits are
     shares as albumentations counts them; exposures are drawn from ± ``exposure_limit_ev`` [EV] of light;
@@ -60,9 +62,9 @@ def disturb(image: NDArray[np.uint8], disturbance: Disturbance, rng_seed: int) -
     image : uint8 array, shape (H, W, 3)
         Any channel order.
     disturbance : Disturbance
-        What may happen to it.
+        Its probabilities and limits.
     rng_seed : int
-        Seed of this picture, for instance the scenario's seed plus the frame number.
+        Seed of this picture, such as the scenario's seed plus the frame number.
     """
     steps = _steps(disturbance, image.shape[1])
     if not steps:
@@ -71,7 +73,7 @@ def disturb(image: NDArray[np.uint8], disturbance: Disturbance, rng_seed: int) -
 
 
 def _steps(disturbance: Disturbance, width_px: int) -> list[albumentations.BasicTransform]:
-    """The library's transforms in the order of the light's way: road, exposure, motion, development."""
+    """The library's transforms in the order of a camera: road, exposure, motion, development."""
     steps: list[albumentations.BasicTransform] = []
     if disturbance.shadow_probability > 0.0:
         steps.append(

@@ -12,20 +12,20 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 
 from .renderer import Renderer
-from .scene import SceneLook, SurfaceSegment
+from .scene import Scene, SurfaceSegment
 
 SHADOW_TINT = np.array([0, 0, 128], dtype=np.uint8)
 
 
 def contact_sheet(seed: int, columns: int, rows_per_surface: int, labels: bool) -> NDArray[np.uint8]:
-    """Random looks at 480 x 300, rows of dry, wet and snow/ice; ``labels`` tints the labelled shadows red."""
+    """Random scenes at 480 x 300, rows of dry, wet and snow/ice; ``labels`` tints the labelled shadows red."""
     rng = np.random.default_rng(seed)
     camera = Camera().scaled(0.25)
     rows = []
     for surface in [surface for surface in Surface for _ in range(rows_per_surface)]:
         pictures = []
         for _ in range(columns):
-            renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], SceneLook.random(rng, surface))
+            renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], Scene.random(rng, surface))
             frame = renderer.frame(rng.uniform(0.0, 200.0), rng.normal(0.0, 0.3), rng.normal(0.0, 0.02))
             picture = frame.image
             if labels:

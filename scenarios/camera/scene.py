@@ -1,4 +1,4 @@
-"""What a rendered road looks like: surfaces along it and one look of road, verge, weather and camera."""
+"""The description of a rendered road: surfaces along it, and markings, verge, weather and camera."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trpac_core.vision.classes import Surface
 
 Sky = Literal["clear", "broken", "overcast", "low_sun"]
 Verge = Literal["grass", "dry_grass", "soil", "gravel"]
-Line = Literal["none", "dashed", "solid", "double"]
+CentreLine = Literal["none", "dashed", "solid", "double"]
 HOUSE_RISE = (0.4, 2.0)
 """Height of a row of houses over its distance from the road's middle [-]."""
 
@@ -40,8 +40,8 @@ class RenderedFrame:
 
 
 @dataclass(frozen=True)
-class SceneLook:
-    """Every choice that is not geometry of the camera or a surface class; the picture follows from it alone.
+class Scene:
+    """All parameters of a rendered world except camera geometry and surface classes.
 
     The road coordinate's lateral zero is the middle of the own lane, left positive. Shares and strengths lie in
     0..1 where no unit is given; ``white_balance`` is (blue, green, red) gains. The defaults are a plain two-lane
@@ -54,7 +54,7 @@ class SceneLook:
     own_lane: int = 0  # counted from the right
     lane_width_m: float = 3.5
     shoulder_m: float = 0.4
-    centre_line: Line = "dashed"
+    centre_line: CentreLine = "dashed"
     edge_lines: bool = True
     yellow_lines: bool = False
     marking_wear: float = 0.3
@@ -70,7 +70,7 @@ class SceneLook:
     patches_per_100_m: float = 2.0
     # water
     wet_darkening: float = 0.5
-    film: float = 0.6
+    water_film: float = 0.6
     puddles: float = 0.3
     # snow and ice
     snow_cover: float = 0.85
@@ -115,12 +115,12 @@ class SceneLook:
 
     @property
     def casts_shadows(self) -> bool:
-        """Whether the sun is strong enough for shadows that one can see (and that are labelled)."""
+        """Whether the sun is strong enough for visible, and so labelled, shadows."""
         return self.sun_on_road > 0.25
 
     @property
     def sun_on_road(self) -> float:
-        """What the sun itself brings to the road, of the light on open ground [-]."""
+        """Direct sunlight on the road, over the light on open ground [-]."""
         return 0.0 if self.open_shade else self.sun_share
 
     @property
@@ -128,14 +128,14 @@ class SceneLook:
         """Light on the road outside of cast shadows, over that on open ground [-]."""
         return 1.0 - self.sun_share if self.open_shade else 1.0
 
-    def in_a_street(self, rng: np.random.Generator) -> SceneLook:
-        """The same road in the open shade of houses that stand on one side or on both, drawn at random."""
+    def in_a_street(self, rng: np.random.Generator) -> Scene:
+        """The same scene in the open shade of random houses on one side or on both."""
         left, right = rng.uniform(*HOUSE_RISE, 2) * rng.permutation([1.0, rng.choice([0.0, 1.0])])
         return replace(self, open_shade=True, house_rise=(float(left), float(right)))
 
     @classmethod
-    def random(cls, rng: np.random.Generator, surface: Surface | None = None) -> SceneLook:
-        """One look drawn at random; ``surface`` makes its weather likely (any stays possible)."""
+    def random(cls, rng: np.random.Generator, surface: Surface | None = None) -> Scene:
+        """A random scene; weather is drawn as likely for ``surface``."""
         kind = Surface(int(rng.integers(3))) if surface is None else surface
         return cls(
             seed=int(rng.integers(2**31)),
@@ -172,7 +172,7 @@ def _random_surfaces(rng: np.random.Generator) -> dict:
         "oil_band": rng.uniform(0.0, 0.25),
         "cracks": rng.beta(0.7, 1.2),
         "wet_darkening": rng.uniform(0.38, 0.72),
-        "film": rng.uniform(0.25, 1.0),
+        "water_film": rng.uniform(0.25, 1.0),
         "puddles": float(rng.choice([0.0, rng.uniform(0, 0.5), rng.uniform(0, 1)])),
         "snow_cover": rng.uniform(0.6, 1.2),
         "snow_albedo": rng.uniform(0.42, 0.9),

@@ -1,8 +1,8 @@
 # mypy: disallow-untyped-defs=False
 # numba infers the types below from the first call.
-"""The compiled inner loop: light from every ground pixel to the lens.
+"""The compiled inner loop: light from every pixel's ground or sky to the lens.
 
-Light is linear and relative to what white open ground sends back; the encoding to bytes comes last.
+Light is linear and relative to that from white open ground; the encoding to bytes comes last.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-WET, SNOW = 1, 2
-TONE_STEPS_PER_UNIT = 4096
-TONE_RANGE = 4.0
+WET, SNOW = 1, 2  # as in Surface
+TONE_STEPS_PER_UNIT = 4096  # of the tone table, per unit of light
+TONE_RANGE = 4.0  # greatest light of the tone table
 F = np.float32
 HALF = F(0.5)
-GLAZE = F(0.25)  # ice and slush that stay where wheels have cleared the snow: a bare track is not this class
+GLAZE = F(0.25)  # least cover: ice and slush stay where wheels have cleared the snow
 ONE = F(1.0)
 
 
 class Maps(NamedTuple):
-    """What the loop looks up: ripmaps (texels as uint32 of four channels, level offsets), panoramas, tables."""
+    """Textures and tables: ripmaps (texels as uint32 of four channels, level offsets), panoramas, tone and markings."""
 
     macro: NDArray[np.uint32]
     macro_at: NDArray[np.int64]
@@ -40,7 +40,7 @@ class Maps(NamedTuple):
 
 
 class Pixels(NamedTuple):
-    """What does not change while one camera drives: shape (H, W) each."""
+    """Constants of the pixels of one camera, shape (H, W) each."""
 
     x: NDArray[np.float32]
     y: NDArray[np.float32]
@@ -53,8 +53,8 @@ class Pixels(NamedTuple):
     distance: NDArray[np.float32]  # on the ground [m], -1 above the horizon
 
 
-class Look(NamedTuple):
-    """The scalars of a look that the loop needs, float32 all."""
+class SceneScalars(NamedTuple):
+    """Scalars of a scene, all float32."""
 
     right: Any
     left: Any
@@ -67,7 +67,7 @@ class Look(NamedTuple):
     oil_band: Any
     cracks: Any
     wet_darkening: Any
-    film: Any
+    water_film: Any
     puddles: Any
     cover: Any
     snow_b: Any
@@ -104,8 +104,8 @@ class Look(NamedTuple):
     rough_px: Any
 
 
-class Place(NamedTuple):
-    """Where the car is: everything float32, textures' origins reduced to their first period."""
+class CarPose(NamedTuple):
+    """Pose of the car and exposure, all float32; texture coordinates are reduced to their first period."""
 
     cos_heading: Any
     sin_heading: Any
@@ -210,100 +210,100 @@ def _paint(lines, s, t, foot_s, foot_t):
 
 
 @njit(inline="always", fastmath=True)
-def _asphalt(look, m0, m1, m2, m3, track, oil, repair):
+def _asphalt(scene, m0, m1, m2, m3, track, oil, repair):
     """Tone of dry asphalt relative to its albedo: stains, wheel paths, cracks, repairs (grain comes later)."""
-    value = ONE + look.stains * (F(1.2) * m0 + F(1.3) * m1 + F(0.5) * m3)
-    value += look.wheel_band * track - look.oil_band * oil
-    threshold = F(0.75) - F(1.1) * look.cracks
+    value = ONE + scene.stains * (F(1.2) * m0 + F(1.3) * m1 + F(0.5) * m3)
+    value += scene.wheel_band * track - scene.oil_band * oil
+    threshold = F(0.75) - F(1.1) * scene.cracks
     crack = min(ONE, m2 * F(1.6)) * _step(m1 + F(0.7) * m3, threshold, threshold + F(0.2))
     return value * (ONE - F(0.75) * crack) * (F(0.35) + F(1.3) * repair)
 
 
 @njit(inline="always", fastmath=True)
-def _water(look, m0, m1, m3, f0, f2, track, oil):
-    """A water film: share of standing water, darkening, gloss of the film, and how much grain it drowns."""
-    threshold = F(0.62) - F(0.75) * look.puddles
+def _water(scene, m0, m1, m3, f0, f2, track, oil):
+    """A water film: share of standing water, darkening, gloss of the film, and share of the grain that is left."""
+    threshold = F(0.62) - F(0.75) * scene.puddles
     pool = m3 + F(0.25) * track + F(0.12) * m1 + F(0.05) * f2
-    still = _step(pool, threshold, threshold + F(0.08)) * min(ONE, look.puddles * F(5.0))
-    film = look.film + F(0.4) * m0 + F(0.4) * m3 + F(0.35) * m1 - F(0.3) * track + F(0.1) * oil
-    film = min(max(film, F(0.08)), F(1.1))
-    dark = ONE - (ONE - look.wet_darkening) * min(ONE, F(0.5) + film)
+    still = _step(pool, threshold, threshold + F(0.08)) * min(ONE, scene.puddles * F(5.0))
+    water_film = scene.water_film + F(0.4) * m0 + F(0.4) * m3 + F(0.35) * m1 - F(0.3) * track + F(0.1) * oil
+    water_film = min(max(water_film, F(0.08)), F(1.1))
+    dark = ONE - (ONE - scene.wet_darkening) * min(ONE, F(0.5) + water_film)
     dark *= ONE - F(0.35) * still
-    calm = ONE - F(0.65) * min(film, ONE)
-    gloss = (F(0.05) + F(0.6) * film) * (ONE + F(2.4) * calm * f0 + F(0.8) * m1)
+    calm = ONE - F(0.65) * min(water_film, ONE)
+    gloss = (F(0.05) + F(0.6) * water_film) * (ONE + F(2.4) * calm * f0 + F(0.8) * m1)
     gloss = min(max(gloss, F(0.0)), F(0.85))
     return still, dark, gloss, calm * (ONE - F(0.8) * still)
 
 
 @njit(inline="always", fastmath=True)
-def _snow(look, m0, m1, m3, f0, f1, track):
-    """Snow on the road: cover, its colour, and how far the wheels have packed it."""
-    cover = look.cover - look.clearing * track * (ONE + F(0.8) * m0)
+def _snow(scene, m0, m1, m3, f0, f1, track):
+    """Snow on the road: cover, colour, and share packed by wheels."""
+    cover = scene.cover - scene.clearing * track * (ONE + F(0.8) * m0)
     cover += F(0.55) * m1 + F(0.3) * m0 + F(0.35) * m3 + F(0.5) * f1 + F(0.25) * f0
     cover = GLAZE + (ONE - GLAZE) * _step(cover, F(0.28), F(0.62))
-    packed = track * (F(0.35) + HALF * look.clearing)
-    bump = ONE + look.relief * (F(1.3) * f1 + F(0.6) * f0) * (ONE - F(0.4) * packed)
-    bump *= ONE + look.relief * (F(0.6) * m0 + F(0.8) * m1) - F(0.22) * packed
-    grime = look.dirt * (F(0.7) + F(1.6) * m0 + F(1.2) * m1 + HALF * track)
+    packed = track * (F(0.35) + HALF * scene.clearing)
+    bump = ONE + scene.relief * (F(1.3) * f1 + F(0.6) * f0) * (ONE - F(0.4) * packed)
+    bump *= ONE + scene.relief * (F(0.6) * m0 + F(0.8) * m1) - F(0.22) * packed
+    grime = scene.dirt * (F(0.7) + F(1.6) * m0 + F(1.2) * m1 + HALF * track)
     grime = min(max(grime, F(0.0)), F(0.9))
-    b, g, r = _mix(look.snow_b, look.snow_g, look.snow_r, F(0.16), F(0.165), F(0.17), grime)
+    b, g, r = _mix(scene.snow_b, scene.snow_g, scene.snow_r, F(0.16), F(0.165), F(0.17), grime)
     return cover, b * bump, g * bump, r * bump, packed
 
 
 @njit(inline="always", fastmath=True)
-def _verge(look, kind, m1, m3, f1, f3):
-    """Ground beside the road, with snow on it where there is any."""
-    value = max(ONE + look.verge_grain * (F(1.2) * f3 + F(0.9) * m1 + F(0.7) * m3), F(0.15))
+def _verge(scene, kind, m1, m3, f1, f3):
+    """Colour of the ground beside the road, with its snow."""
+    value = max(ONE + scene.verge_grain * (F(1.2) * f3 + F(0.9) * m1 + F(0.7) * m3), F(0.15))
     if kind == WET:
         value *= F(0.75)
-    b, g, r = look.verge_b * value, look.verge_g * value, look.verge_r * value
-    blanket = look.verge_snow
+    b, g, r = scene.verge_b * value, scene.verge_g * value, scene.verge_r * value
+    blanket = scene.verge_snow
     if kind == SNOW:
-        blanket = max(blanket, look.cover + F(0.1))
+        blanket = max(blanket, scene.cover + F(0.1))
     if blanket > F(0.0):
         cover = _step(blanket + F(0.6) * m1 + HALF * m3 + F(0.7) * f3, F(0.3), F(0.7))
-        bump = ONE + look.relief * (HALF * f1 + F(0.6) * m3 + HALF * m1)
-        b, g, r = _mix(b, g, r, look.snow_b * bump, look.snow_g * bump, look.snow_r * bump, cover)
+        bump = ONE + scene.relief * (HALF * f1 + F(0.6) * m3 + HALF * m1)
+        b, g, r = _mix(b, g, r, scene.snow_b * bump, scene.snow_g * bump, scene.snow_r * bump, cover)
     return b, g, r
 
 
 @njit(inline="always", fastmath=True)
-def _road(look, kind, macro, fine, track, oil, repair, bitumen, paint):
-    """Reflectance of the road, gloss of its film, and share of standing water."""
+def _road(scene, kind, macro, fine, track, oil, repair, bitumen, paint):
+    """Reflectance of the road, gloss of its water film, and share of standing water."""
     m0, m1, m2, m3 = macro
     f0, f1, f2 = fine
-    value = _asphalt(look, m0, m1, m2, m3, track, oil, repair)
-    b, g, r = look.asphalt_b * value, look.asphalt_g * value, look.asphalt_r * value
+    value = _asphalt(scene, m0, m1, m2, m3, track, oil, repair)
+    b, g, r = scene.asphalt_b * value, scene.asphalt_g * value, scene.asphalt_r * value
     if paint > F(0.0):
-        paint *= ONE - _step(look.wear * F(1.5) - F(0.55) + F(0.9) * m1 + F(0.8) * f0, F(0.0), HALF)
-        b, g, r = _mix(b, g, r, look.paint_b, look.paint_g, look.paint_r, paint)
-    grain = F(4.5) * look.grain * f0
+        paint *= ONE - _step(scene.wear * F(1.5) - F(0.55) + F(0.9) * m1 + F(0.8) * f0, F(0.0), HALF)
+        b, g, r = _mix(b, g, r, scene.paint_b, scene.paint_g, scene.paint_r, paint)
+    grain = F(4.5) * scene.grain * f0
     gloss, still = F(0.1) * bitumen, F(0.0)
     if kind >= WET:
-        still, dark, gloss, calm = _water(look, m0, m1, m3, f0, f2, track, oil)
+        still, dark, gloss, calm = _water(scene, m0, m1, m3, f0, f2, track, oil)
         grain *= calm
         b, g, r = b * dark, g * dark, r * dark
     grain = max(grain + ONE, F(0.15))
     b, g, r = b * grain, g * grain, r * grain
     if kind == SNOW:
-        cover, white_b, white_g, white_r, packed = _snow(look, m0, m1, m3, f0, f1, track)
+        cover, white_b, white_g, white_r, packed = _snow(scene, m0, m1, m3, f0, f1, track)
         b, g, r = _mix(b, g, r, white_b, white_g, white_r, cover)
         still *= (ONE - cover) * F(0.6)
-        gloss = gloss * (ONE - cover) + look.ice_gloss * packed * cover
+        gloss = gloss * (ONE - cover) + scene.ice_gloss * packed * cover
     return b, g, r, gloss, still
 
 
 @njit(inline="always", fastmath=True)
-def _mirrored(look, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, still, ripple):
-    """Adds what a wet surface mirrors: blurred by the film on rough stone, sharp in standing water."""
+def _mirrored(scene, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, still, ripple):
+    """Colour with the reflections of a wet surface: blurred on rough stone, sharp in standing water."""
     sway = ripple * F(0.05)
     mb, mg, mr = _panorama(
         rough,
         azimuth + sway,
         F(0.03) - elevation * F(1.15) + sway,
-        look.reach,
-        look.lowest,
-        look.rough_px,
+        scene.reach,
+        scene.lowest,
+        scene.rough_px,
     )
     b, g, r = _mix(b, g, r, mb, mg, mr, gloss * shine)
     if still > F(0.02):
@@ -311,22 +311,22 @@ def _mirrored(look, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, sti
             sharp,
             azimuth + F(0.1) * sway,
             F(0.2) * sway - elevation,
-            look.reach,
-            look.lowest,
-            look.sharp_px,
+            scene.reach,
+            scene.lowest,
+            scene.sharp_px,
         )
         b, g, r = _mix(b, g, r, mb, mg, mr, still * min(ONE, F(0.06) + shine))
     return b, g, r
 
 
 @njit(nogil=True, cache=True, fastmath=True)
-def shade(pixels, maps, look, place, starts, surfaces, image, drivable, shadow, surface):
-    """Fills the picture and the label maps.
+def shade(pixels, maps, scene, pose, starts, surfaces, image, drivable, shadow, surface):
+    """Fill the picture and the label maps.
 
     ``starts`` are the segments' starts ahead of the front axle [m], ``surfaces`` their classes; the outputs have
     shapes (H, W, 3) and (H, W).
     """
-    # Named here, since taking an array from its tuple costs reference counting at every pixel.
+    # Unpacked here, because reading an array from its tuple costs reference counting at every pixel.
     xs, ys, foot_x, foot_y, level_words, azimuths, elevations, shines, distances = pixels
     macro, macro_at, fine, fine_at, decal, decal_at, sharp, rough, tone, lines, profile, clears = maps
     height, width = xs.shape
@@ -334,21 +334,21 @@ def shade(pixels, maps, look, place, starts, surfaces, image, drivable, shadow, 
     four = np.uint32(15)
     for row in range(height):
         for col in range(width):
-            azimuth = azimuths[row, col] + place.heading
+            azimuth = azimuths[row, col] + pose.heading
             elevation = elevations[row, col]
             distance = distances[row, col]
             on_road, shaded_label, kind = False, False, np.int8(-1)
             if distance < F(0.0):
-                b, g, r = _panorama(sharp, azimuth, elevation, look.reach, look.lowest, look.sharp_px)
+                b, g, r = _panorama(sharp, azimuth, elevation, scene.reach, scene.lowest, scene.sharp_px)
             else:
                 x, y = xs[row, col], ys[row, col]
-                ahead = x * place.cos_heading - y * place.sin_heading
-                aside = x * place.sin_heading + y * place.cos_heading
-                t = place.t + aside
-                on_road = look.right <= t <= look.left
-                if not on_road and distance > look.verge_end:
+                ahead = x * pose.cos_heading - y * pose.sin_heading
+                aside = x * pose.sin_heading + y * pose.cos_heading
+                t = pose.t + aside
+                on_road = scene.right <= t <= scene.left
+                if not on_road and distance > scene.verge_end:
                     b, g, r = _panorama(
-                        sharp, azimuth, max(elevation, F(0.002)), look.reach, look.lowest, look.sharp_px
+                        sharp, azimuth, max(elevation, F(0.002)), scene.reach, scene.lowest, scene.sharp_px
                     )
                 else:
                     kind = surfaces[0]
@@ -362,8 +362,8 @@ def shade(pixels, maps, look, place, starts, surfaces, image, drivable, shadow, 
                         11,
                         10,
                         F(50.0),
-                        place.macro_s + ahead,
-                        place.macro_t + aside,
+                        pose.macro_s + ahead,
+                        pose.macro_t + aside,
                         levels & four,
                         (levels >> np.uint32(4)) & four,
                     )
@@ -373,8 +373,8 @@ def shade(pixels, maps, look, place, starts, surfaces, image, drivable, shadow, 
                         10,
                         10,
                         F(250.0),
-                        place.fine_s + ahead,
-                        place.fine_t + aside,
+                        pose.fine_s + ahead,
+                        pose.fine_t + aside,
                         (levels >> np.uint32(8)) & four,
                         (levels >> np.uint32(12)) & four,
                     )
@@ -386,8 +386,8 @@ def shade(pixels, maps, look, place, starts, surfaces, image, drivable, shadow, 
                             12,
                             9,
                             F(1.0 / 0.06),
-                            place.decal_s + ahead,
-                            place.decal_t + aside,
+                            pose.decal_s + ahead,
+                            pose.decal_t + aside,
                             (levels >> np.uint32(16)) & four,
                             (levels >> np.uint32(20)) & four,
                         )
@@ -395,35 +395,35 @@ def shade(pixels, maps, look, place, starts, surfaces, image, drivable, shadow, 
                     f0, f1, f2, f3 = f0 - HALF, f1 - HALF, f2 - HALF, f3 - HALF
                     gloss, still = F(0.0), F(0.0)
                     if on_road:
-                        spot = min(int((t - look.right) * F(50.0)), profile.shape[0] - 1)
+                        spot = min(int((t - scene.right) * F(50.0)), profile.shape[0] - 1)
                         track, oil = profile[spot, 0], profile[spot, 1]
                         paint = _paint(
                             lines,
-                            place.lines_s + ahead,
+                            pose.lines_s + ahead,
                             t,
                             foot_x[row, col],
                             foot_y[row, col],
                         )
                         b, g, r, gloss, still = _road(
-                            look, kind, (m0, m1, m2, m3), (f0, f1, f2), track, oil, repair, bitumen, paint
+                            scene, kind, (m0, m1, m2, m3), (f0, f1, f2), track, oil, repair, bitumen, paint
                         )
                         shaded_label = label >= F(0.502)
                     else:
-                        b, g, r = _verge(look, kind, m1, m3, f1, f3)
+                        b, g, r = _verge(scene, kind, m1, m3, f1, f3)
                         kind = np.int8(-1)
                     lit = ONE - shaded
-                    b = max(b, F(0.004)) * (look.fill_b + look.sun_b * lit)
-                    g = max(g, F(0.004)) * (look.fill_g + look.sun_g * lit)
-                    r = max(r, F(0.004)) * (look.fill_r + look.sun_r * lit)
+                    b = max(b, F(0.004)) * (scene.fill_b + scene.sun_b * lit)
+                    g = max(g, F(0.004)) * (scene.fill_g + scene.sun_g * lit)
+                    r = max(r, F(0.004)) * (scene.fill_r + scene.sun_r * lit)
                     if gloss + still > F(0.02):
                         shine = shines[row, col]
                         b, g, r = _mirrored(
-                            look, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, still, f2
+                            scene, rough, sharp, b, g, r, azimuth, elevation, shine, gloss, still, f2
                         )
-                    b, g, r = _mix(look.haze_b, look.haze_g, look.haze_r, b, g, r, clears[row, col])
-            image[row, col, 0] = tone[min(np.uint64((b + look.veil) * place.gain_b), top)]
-            image[row, col, 1] = tone[min(np.uint64((g + look.veil) * place.gain_g), top)]
-            image[row, col, 2] = tone[min(np.uint64((r + look.veil) * place.gain_r), top)]
+                    b, g, r = _mix(scene.haze_b, scene.haze_g, scene.haze_r, b, g, r, clears[row, col])
+            image[row, col, 0] = tone[min(np.uint64((b + scene.veil) * pose.gain_b), top)]
+            image[row, col, 1] = tone[min(np.uint64((g + scene.veil) * pose.gain_g), top)]
+            image[row, col, 2] = tone[min(np.uint64((r + scene.veil) * pose.gain_r), top)]
             drivable[row, col] = on_road
             shadow[row, col] = shaded_label
             surface[row, col] = kind

@@ -1,4 +1,4 @@
-"""The surroundings at infinity: sky, sun glow, clouds, hills and a line of trees, as one panorama."""
+"""Panorama of the surroundings at infinity: sky, sun glow, clouds, hills and a line of trees."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .scene import SceneLook
+from .scene import Scene
 
 Float = NDArray[np.float32]
 
 AZIMUTH_RAD = 1.0  # the panorama reaches this far to either side
 LOWEST_RAD, HIGHEST_RAD = -0.02, 0.62
 HOUSES, HOUSE_LENGTH = 40, 1.0
-"""Houses of a row, of which the last one goes on for ever, and their length over the row's distance aside [-]."""
+"""Houses of a row, of which the last has no end, and their length over the row's distance aside [-]."""
 ROOFS, FACADES, FACADE_TINTS = (0.7, 1.2), (0.08, 0.5), (0.85, 1.15)
 """Height of a house over its row's, reflectance of its wall, and the tint of each of its channels [-]."""
 STOREYS, WINDOWS, GLASS = 4, 3.0, 0.35
@@ -26,14 +26,14 @@ STOREYS, WINDOWS, GLASS = 4, 3.0, 0.35
 class Panorama:
     """Linear BGR light by direction; rows go up from ``LOWEST_RAD``, columns left to right.
 
-    ``sharp`` is what the camera sees, ``rough`` what a wet road mirrors; both shape (rows, columns, 3),
-    relative to the light that white open ground sends back.
+    ``sharp`` is the camera's view, ``rough`` the blurred reflection in a wet road; both shape (rows, columns, 3),
+    relative to the light from white open ground.
     """
 
     sharp: Float
     rough: Float
-    sharp_px_rad: float
-    rough_px_rad: float
+    sharp_pixel_rad: float
+    rough_pixel_rad: float
     mean: Float
 
 
@@ -62,74 +62,74 @@ def _ridge(rng: np.random.Generator, columns: int, roughness: float) -> Float:
     return (0.5 + 0.2 * line / line.std()).astype(np.float32)
 
 
-def build_panorama(look: SceneLook, px_rad: float) -> Panorama:
-    """The panorama of one look with pixels of ``px_rad`` [rad]."""
-    rng = np.random.default_rng([look.seed, 23])
-    columns = int(2 * AZIMUTH_RAD / px_rad)
-    rows = int((HIGHEST_RAD - LOWEST_RAD) / px_rad)
-    elevation = (LOWEST_RAD + (np.arange(rows) + 0.5) * px_rad).astype(np.float32)
-    azimuth = (AZIMUTH_RAD - (np.arange(columns) + 0.5) * px_rad).astype(np.float32)
-    light = _sky(look, rng, elevation, azimuth)
-    haze = light[int(0.06 / px_rad)].mean(axis=0)
-    _land(look, rng, light, elevation, haze)
-    _houses(look, light, elevation, azimuth)
-    rough_px_rad = max(px_rad, 0.006)
-    factor = px_rad / rough_px_rad
+def build_panorama(scene: Scene, pixel_rad: float) -> Panorama:
+    """The panorama of a scene with pixels of ``pixel_rad`` [rad]."""
+    rng = np.random.default_rng([scene.seed, 23])
+    columns = int(2 * AZIMUTH_RAD / pixel_rad)
+    rows = int((HIGHEST_RAD - LOWEST_RAD) / pixel_rad)
+    elevation = (LOWEST_RAD + (np.arange(rows) + 0.5) * pixel_rad).astype(np.float32)
+    azimuth = (AZIMUTH_RAD - (np.arange(columns) + 0.5) * pixel_rad).astype(np.float32)
+    light = _sky(scene, rng, elevation, azimuth)
+    haze = light[int(0.06 / pixel_rad)].mean(axis=0)
+    _land(scene, rng, light, elevation, haze)
+    _houses(scene, light, elevation, azimuth)
+    rough_pixel_rad = max(pixel_rad, 0.006)
+    factor = pixel_rad / rough_pixel_rad
     small = cv2.resize(light, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     rough = np.asarray(
         cv2.GaussianBlur(small, (0, 0), sigmaX=2.5, sigmaY=14.0, borderType=cv2.BORDER_REPLICATE),
         dtype=np.float32,
     )
     mean = light.mean(axis=(0, 1)).astype(np.float32)
-    return Panorama(light, rough, px_rad, HIGHEST_RAD / rough.shape[0] * 1.03, mean)
+    return Panorama(light, rough, pixel_rad, HIGHEST_RAD / rough.shape[0] * 1.03, mean)
 
 
-def _sky(look: SceneLook, rng: np.random.Generator, elevation: Float, azimuth: Float) -> Float:
+def _sky(scene: Scene, rng: np.random.Generator, elevation: Float, azimuth: Float) -> Float:
     up = np.clip(elevation / HIGHEST_RAD, 0.0, 1.0)[:, None, None]
-    if look.sky == "overcast":
+    if scene.sky == "overcast":
         zenith, horizon = np.array([0.95, 0.93, 0.9]), np.array([0.72, 0.71, 0.7])
-    elif look.sky == "low_sun":
+    elif scene.sky == "low_sun":
         zenith, horizon = np.array([0.55, 0.42, 0.32]), np.array([0.55, 0.75, 1.0])
     else:
         zenith, horizon = np.array([0.62, 0.38, 0.2]), np.array([0.85, 0.75, 0.62])
     tone = rng.uniform(0.7, 1.15)
     light = (tone * (horizon + (zenith - horizon) * up**0.6)).astype(np.float32)
     light = np.repeat(light, len(azimuth), axis=1)
-    if look.sky != "clear":
-        cover = {"broken": 0.5, "overcast": 0.0, "low_sun": 0.45}[look.sky]
+    if scene.sky != "clear":
+        cover = {"broken": 0.5, "overcast": 0.0, "low_sun": 0.45}[scene.sky]
         field = _clouds(rng, elevation, len(azimuth))
         share = np.clip((field - cover) * 4.0, 0.0, 1.0)[..., None]
-        if look.sky == "overcast":
+        if scene.sky == "overcast":
             share = share * 0.55
-        bright = look.cloud_tone * (0.55 + 0.5 * field[..., None]) * np.array([1.0, 0.99, 0.97])
+        bright = scene.cloud_tone * (0.55 + 0.5 * field[..., None]) * np.array([1.0, 0.99, 0.97])
         light = light * (1 - share) + bright.astype(np.float32) * share
-    if look.sun_on_road > 0.0:
+    if scene.sun_on_road > 0.0:
         apart = np.arccos(
             np.clip(
-                np.sin(elevation)[:, None] * np.sin(look.sun_elevation_rad)
+                np.sin(elevation)[:, None] * np.sin(scene.sun_elevation_rad)
                 + np.cos(elevation)[:, None]
-                * np.cos(look.sun_elevation_rad)
-                * np.cos(azimuth - look.sun_azimuth_rad)[None, :],
+                * np.cos(scene.sun_elevation_rad)
+                * np.cos(azimuth - scene.sun_azimuth_rad)[None, :],
                 -1.0,
                 1.0,
             )
         )[..., None]
         glow = 0.6 * np.exp(-apart / 0.25) + 3.0 * np.exp(-apart / 0.06)
-        light = light + look.sun_on_road * glow * np.array([0.75, 0.9, 1.0])
+        light = light + scene.sun_on_road * glow * np.array([0.75, 0.9, 1.0])
     return light.astype(np.float32)
 
 
-def _land(look: SceneLook, rng: np.random.Generator, light: Float, elevation: Float, haze: Float) -> None:
+def _land(scene: Scene, rng: np.random.Generator, light: Float, elevation: Float, haze: Float) -> None:
     columns = light.shape[1]
-    snow = min(look.verge_snow, 1.0)
+    snow = min(scene.verge_snow, 1.0)
     rows = elevation[:, None]
-    if look.hills > 0.05:
-        outline = 0.08 * look.hills * _ridge(rng, columns, 1.4)[None, :]
-        base = np.array([0.14, 0.12, 0.09]) * look.verge_tone * (1 - 0.7 * snow) + 0.45 * snow
+    if scene.hills > 0.05:
+        outline = 0.08 * scene.hills * _ridge(rng, columns, 1.4)[None, :]
+        base = np.array([0.14, 0.12, 0.09]) * scene.verge_tone * (1 - 0.7 * snow) + 0.45 * snow
         far = 0.35 * base + 0.65 * haze
         light[rows < outline] = far.astype(np.float32)
-    if look.tree_line > 0.0:
-        tall = look.tree_line * 0.14
+    if scene.tree_line > 0.0:
+        tall = scene.tree_line * 0.14
         outline = (
             tall
             * (0.4 + 0.6 * _ridge(rng, columns, 0.75))
@@ -149,26 +149,26 @@ def _land(look: SceneLook, rng: np.random.Generator, light: Float, elevation: Fl
             "dry_grass": (0.04, 0.075, 0.08),
             "soil": (0.045, 0.06, 0.065),
             "gravel": (0.05, 0.06, 0.06),
-        }[look.verge]
-        colour = texture[..., None] * np.array(green, dtype=np.float32) * look.verge_tone
+        }[scene.verge]
+        colour = texture[..., None] * np.array(green, dtype=np.float32) * scene.verge_tone
         white = np.clip(leaf * 2.2 - 1.35 + 0.5 * snow, 0, 1)[..., None] * snow * 0.55
         colour = colour * (1 - white) + white * np.array([0.8, 0.76, 0.72], dtype=np.float32)
-        share = 1.0 - np.exp(-120.0 / look.visibility_m)
+        share = 1.0 - np.exp(-120.0 / scene.visibility_m)
         light[inside] = (colour * (1 - share) + haze * share)[inside]
     light[elevation < 0] = light[np.searchsorted(elevation, 0.0)] * 0.8
 
 
-def _houses(look: SceneLook, light: Float, elevation: Float, azimuth: Float) -> None:
-    """A row of houses along each side, in place: seen along the street its roofs fall towards the road's end."""
-    for side, rise in zip((1.0, -1.0), look.house_rise, strict=True):
+def _houses(scene: Scene, light: Float, elevation: Float, azimuth: Float) -> None:
+    """Draw a row of houses along each side into `light`."""
+    for side, rise in zip((1.0, -1.0), scene.house_rise, strict=True):
         if rise == 0.0:
             continue
-        rng = np.random.default_rng([look.seed, 29, int(side > 0.0)])
+        rng = np.random.default_rng([scene.seed, 29, int(side > 0.0)])
         aside = np.maximum(np.sin(side * azimuth), 0.0)
         along = np.cos(azimuth) / np.maximum(aside, 1e-3)  # of each column's wall, over its distance aside
         house = np.minimum(along / HOUSE_LENGTH, HOUSES - 1).astype(int)
         roof = np.arctan(rise * rng.uniform(*ROOFS, HOUSES)[house] * aside)
-        facade = rng.uniform(*FACADES, HOUSES)[house] * rng.uniform(look.ground_light, 1.0)
+        facade = rng.uniform(*FACADES, HOUSES)[house] * rng.uniform(scene.ground_light, 1.0)
         tint = rng.uniform(*FACADE_TINTS, (HOUSES, 3))[house]
         storey = np.tan(elevation)[:, None] / np.maximum(rise * aside, 1e-3) * STOREYS % 1.0
         window = (abs(storey - 0.5) < 0.25) & (along * WINDOWS % 1.0 < 0.5)

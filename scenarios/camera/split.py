@@ -1,4 +1,4 @@
-"""Pictures of a road whose sides differ: two worlds of one look, joined along the car's middle."""
+"""Pictures of a road with different sides: two worlds of one scene, joined along the car's middle."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from trpac_core.vision.camera import Camera
 
 from .renderer import Renderer, ground_beside
-from .scene import RenderedFrame, SceneLook, SurfaceSegment
+from .scene import RenderedFrame, Scene, SurfaceSegment
 
 
 class _Side(Renderer):
-    """One side's world, exposed as the camera that sees both."""
+    """The world of one side, with the exposure of both."""
 
     other: Renderer | None = None
 
@@ -28,7 +28,7 @@ class _Side(Renderer):
 class SplitRenderer:
     """Like `Renderer`, with a list of surfaces for each side of the lane's middle.
 
-    One exposure serves the whole picture: the geometric mean of what each side's road would ask for.
+    The picture has one exposure: the geometric mean of those of the two sides.
     """
 
     def __init__(
@@ -36,9 +36,9 @@ class SplitRenderer:
         camera: Camera,
         left: Sequence[SurfaceSegment],
         right: Sequence[SurfaceSegment],
-        look: SceneLook,
+        scene: Scene,
     ) -> None:
-        self._left, self._right = _Side(camera, left, look), _Side(camera, right, look)
+        self._left, self._right = _Side(camera, left, scene), _Side(camera, right, scene)
         self._left.other, self._right.other = self._right, self._left
         self._on_left = ground_beside(camera) > 0.0
 

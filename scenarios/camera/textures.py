@@ -1,4 +1,4 @@
-"""Periodic ground textures, made once per process, and their anisotropic levels of detail."""
+"""Periodic ground textures, made once per process, with anisotropic levels of detail."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 Float = NDArray[np.float32]
 Texture = NDArray[np.uint8]
 
-MACRO_TEXEL_M = 0.02
+MACRO_TEXEL_M = 0.02  # side of a texel
 MACRO_SHAPE = (2048, 1024)  # along the road, across: 40.96 m x 20.48 m
-MACRO_LEVELS = (9, 8)
-FINE_TEXEL_M = 0.004
+MACRO_LEVELS = (9, 8)  # levels of detail along and across
+FINE_TEXEL_M = 0.004  # side of a texel
 FINE_SHAPE = (1024, 1024)  # 4.096 m x 4.096 m
 FINE_LEVELS = (9, 9)
-BANK_SEED = 20220901
+BANK_SEED = 20220901  # of both textures
 
 
 @dataclass(frozen=True)
 class RipMap:
-    """A texture halved independently along and across the road, so that far ground neither flickers nor smears.
+    """A texture with levels of detail that are halved independently along and across the road.
 
     ``texels`` holds every level one after another, shape (n,), a word of four byte channels each;
     ``offsets[i, j]`` is where the level with ``i`` halvings along and ``j`` halvings across begins.
@@ -51,7 +51,7 @@ def build_ripmap(texture: Texture, levels: tuple[int, int]) -> RipMap:
 
 
 def _halved(level: Texture, axis: int) -> Texture:
-    """Mean of neighbours along one axis; at exactly half the size, linear interpolation is that mean."""
+    """Means of pairs along one axis; linear interpolation at half the size is that mean."""
     along, across = level.shape[:2]
     size = (across, along // 2) if axis == 0 else (across // 2, along)
     return np.asarray(cv2.resize(level, size, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
@@ -81,17 +81,17 @@ def _spectrum_noise(
     return (noise / noise.std()).astype(np.float32)
 
 
-def _to_bytes(noise: Float, spread: float = 42.0) -> Texture:
-    """Normalised noise as bytes around 127.5, ``spread`` per standard deviation."""
-    return np.clip(127.5 + spread * noise, 0, 255).astype(np.uint8)
+def _to_bytes(noise: Float, bytes_per_deviation: float = 42.0) -> Texture:
+    """Normalised noise as bytes around 127.5, ``bytes_per_deviation`` per standard deviation."""
+    return np.clip(127.5 + bytes_per_deviation * noise, 0, 255).astype(np.uint8)
 
 
 def _cracks(rng: np.random.Generator, shape: tuple[int, int]) -> Texture:
-    """Periodic net of wandering cracks: long ones along and across the road, and small branching ones."""
+    """Periodic net of cracks: long ones along and across the road, and small branching ones."""
     along, across = shape
     canvas = np.zeros((along * 2, across * 2), dtype=np.uint8)
 
-    def wander(start: NDArray[np.float64], heading: float, steps: int, turn: float) -> None:
+    def draw_crack(start: NDArray[np.float64], heading: float, steps: int, turn: float) -> None:
         points = [start]
         for _ in range(steps):
             heading += rng.normal(0.0, turn)
@@ -103,13 +103,13 @@ def _cracks(rng: np.random.Generator, shape: tuple[int, int]) -> Texture:
                 cv2.polylines(canvas, [shifted], False, int(rng.integers(120, 256)), 1, cv2.LINE_AA)
 
     for _ in range(5):
-        wander(rng.uniform((0, 0), shape), rng.normal(0.0, 0.15), 150, 0.18)
+        draw_crack(rng.uniform((0, 0), shape), rng.normal(0.0, 0.15), 150, 0.18)
     for _ in range(7):
-        wander(rng.uniform((0, 0), shape), np.pi / 2 + rng.normal(0.0, 0.2), 60, 0.25)
+        draw_crack(rng.uniform((0, 0), shape), np.pi / 2 + rng.normal(0.0, 0.2), 60, 0.25)
     for _ in range(12):
         centre = rng.uniform((0, 0), shape)
         for _ in range(10):
-            wander(centre + rng.normal(0.0, 40.0, 2), rng.uniform(0, 2 * np.pi), 10, 0.6)
+            draw_crack(centre + rng.normal(0.0, 40.0, 2), rng.uniform(0, 2 * np.pi), 10, 0.6)
     top, left = along // 2, across // 2
     return canvas[top : top + along, left : left + across]
 

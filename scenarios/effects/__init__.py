@@ -1,4 +1,4 @@
-"""The effects that the plant can model; ORDER is the one list of them."""
+"""The effects that the plant can model, listed in ORDER."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ and within a stage as the signal passes them."""
 
 
 def _forms_in(file: str) -> tuple[type[Effect], ...]:
-    """The classes of effects that a file of this folder defines, in its order."""
+    """The effect classes of a file of this folder, in order."""
     module = import_module(f"{__name__}.{file}")
     return tuple(
         kind
@@ -60,7 +60,7 @@ def _forms_in(file: str) -> tuple[type[Effect], ...]:
 
 
 FORMS: dict[str, tuple[type[Effect], ...]] = {file: _forms_in(file) for file in ORDER}
-"""Every form of each effect by its id, the plant's own first: the same effect may act in more than one way."""
+"""All forms of each effect by its id, the plant's own first."""
 
 EFFECTS: dict[str, type[Effect]] = {key: forms[0] for key, forms in FORMS.items()}
 """All effects by id, in `ORDER`; each is the first class of its file."""
@@ -69,7 +69,7 @@ __all__ = ["EFFECTS", "FORMS", "ORDER", "Effect", "Parameter", "form_of", "make_
 
 
 def problems_of(effect_id: str, values: Mapping[str, float], vehicle: Vehicle, form: str = "") -> list[str]:
-    """Everything that keeps an effect from being made on this vehicle; empty when nothing does."""
+    """Problems of the values of an effect on this vehicle; empty without any."""
     if effect_id not in EFFECTS:
         return [
             f"{effect_id!r} is not an effect that the plant models; {suggestion(effect_id, list(EFFECTS))}"

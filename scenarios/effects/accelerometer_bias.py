@@ -17,7 +17,7 @@ class AccelerometerBias(Effect):
     equation = "a_read = a + bias"
     source = "definition"
     excited_by = "any driving: accelerometer against the change of speed"
-    look_alikes = ("road_grade",)
+    confounders = ("road_grade",)
 
     bias_m_s2: float = parameter(
         "m/s^2",

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 
 AIR_DENSITY_KG_M3 = 1.225
 """Density of air at sea level and 15 degrees Celsius, ISO 2533 standard atmosphere [kg/m^3]."""
@@ -26,7 +23,7 @@ class AeroDrag(Effect):
     equation = "F_drag = 0.5 rho C_d A v^2"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 4; rho 1.225 kg/m^3 of ISO 2533"
     excited_by = "coasting or holding a high speed"
-    look_alikes = ("rolling_resistance", "road_grade", "mass_offset")
+    confounders = ("rolling_resistance", "road_grade", "mass_offset")
 
     drag_area_m2: float = parameter(
         "m^2",

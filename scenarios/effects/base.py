@@ -1,4 +1,4 @@
-"""What an effect is: a deviation from the nominal plant that vehicle.yaml may switch on by its id.
+"""Base of the effects: deviations from the nominal plant that vehicle.yaml switches on by their ids.
 
 An effect is a frozen dataclass in a file of its own. Its fields are its parameters, made with `parameter`; it
 overrides the hooks of the stages that it acts in. With neutral values every hook reproduces the plant without the
@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects.frames import Frames
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel, RoadTable
-    from trpac_core.vehicle import Vehicle
+from scenarios.plant.parameters import DynamicsParameters, PerWheel, RoadTable
+from trpac_core.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Signals = dict[str, Array]
@@ -37,18 +35,18 @@ Subsystem = Literal[
 ]
 
 Value = float | Callable[["Vehicle"], float]
-"""A number, or what it is for a given vehicle."""
+"""A number, or a function of the vehicle."""
 
 Values = tuple[float, ...] | Callable[["Vehicle"], tuple[float, ...]]
-"""Numbers, or what they are for a given vehicle."""
+"""Numbers, or a function of the vehicle."""
 
 LEAST_OFF = 0.25
-"""Least offset of each wheel, over the mean offset of the four, with which all wheels count as off [-]."""
+"""Least offset of each wheel over the mean offset of the four, for `all_are_off` [-]."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """What is known of one effect parameter beside its value."""
+    """The description of an effect's parameter."""
 
     name: str
     unit: str
@@ -68,7 +66,7 @@ class Parameter:
         return _on(vehicle, self.low), _on(vehicle, self.high)
 
     def start_values(self, vehicle: Vehicle) -> tuple[float, ...]:
-        """Values worth trying first in a fit, in `unit`: they bracket what a real car may plausibly have."""
+        """Start values of a fit, in `unit`, which cover the plausible range of real cars."""
         return self.starts(vehicle) if callable(self.starts) else self.starts
 
 
@@ -88,8 +86,8 @@ def parameter(
 ) -> Any:
     """Declare one effect parameter; values outside [low, high] are refused, fits begin at `starts`.
 
-    `open_share` is the relative error that no log can show, because the value is only known as a product with a
-    constant that others may take otherwise [-]; infinite: a log shows nothing but the bounds.
+    `open_share` is the relative error that no log can show, because only the product of the value with an assumed
+    constant is identifiable [-]; infinite: only the bounds are known.
     """
     about = {"unit": unit, "meaning": meaning, "neutral": neutral, "low": low, "high": high, "starts": starts}
     return field(metadata=about | {"open_share": open_share})
@@ -150,7 +148,7 @@ class Effect:
     form: ClassVar[str] = ""
     """Which of several forms of the effect this is; empty where there is one."""
     structural: ClassVar[bool] = False
-    """Whether it is a difference between models rather than a fault or a setting: a diagnosis never blames it."""
+    """Whether it is a difference between models and no fault or setting: a diagnosis never names it as a cause."""
     of_wheels: ClassVar[bool] = False
     """Whether each wheel has its own value: the mean, `share_of_axles`, and `share_of_sides` of both axles."""
     stage: ClassVar[Stage]
@@ -158,7 +156,7 @@ class Effect:
     equation: ClassVar[str]
     source: ClassVar[str]
     excited_by: ClassVar[str]
-    look_alikes: ClassVar[tuple[str, ...]]
+    confounders: ClassVar[tuple[str, ...]]
 
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
@@ -170,8 +168,13 @@ class Effect:
         """The effect with all parameters at their neutral values for this vehicle."""
         return cls(**{p.name: p.neutral_value(vehicle) for p in cls.parameters()})
 
+    def per_wheel(self, mean: float) -> PerWheel:
+        """Values of the wheels fl, fr, rl, rr, by those shares of `of_each_wheel` that this form has as parameters."""
+        shares = {"unlike", "front_sides", "rear_sides"} & {f.name for f in fields(self)}
+        return of_each_wheel(mean, **{name: getattr(self, name) for name in shares})
+
     def is_itself(self, vehicle: Vehicle) -> bool:
-        """Whether these values are this effect on this vehicle, not a look-alike of fewer parameters."""
+        """Whether these values differ from those of an effect with fewer parameters."""
         return True
 
     def actuate(self, time_s: Array, torque_nm: Array) -> Array:
@@ -191,9 +194,9 @@ class Effect:
         return signals
 
     def correct(self, time_s: Array, signals: Signals) -> Signals:
-        """Undo `sense` as well as can be: what an ideal sensor would have reported; NaN where that is not known."""
+        """Inverse of `sense`: readings of an ideal sensor; NaN where they are not known."""
         return signals
 
     def perceive(self, frames: Frames) -> Frames:
-        """Perception: what the camera chain makes of its pictures."""
+        """Perception: the frames of the camera chain with this effect in them."""
         return frames

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel
+from scenarios.effects.base import Effect, parameter, share_of_axles
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,7 @@ class BrakeDrag(Effect):
     equation = "I omega' = T - F_x R - T_drag"
     source = "Eq. (12) of Tian et al. 2022, doi:10.3390/rs14215583, with a further torque"
     excited_by = "coasting at any speed"
-    look_alikes = ("rolling_resistance", "road_grade", "aero_drag", "torque_gain")
+    confounders = ("rolling_resistance", "road_grade", "aero_drag", "torque_gain")
 
     torque_nm: float = parameter(
         "N m",
@@ -33,13 +30,9 @@ class BrakeDrag(Effect):
         starts=(5.0, 20.0, 60.0),
     )
 
-    def torques_nm(self) -> PerWheel:
-        """Drag torques of the wheels fl, fr, rl, rr [N m]."""
-        return of_each_wheel(self.torque_nm)
-
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each wheel has its torque, whatever its load."""
-        return parameters._replace(drag_torque_nm=self.torques_nm())
+        """The drag torques are independent of load."""
+        return parameters._replace(drag_torque_nm=self.per_wheel(self.torque_nm))
 
 
 @dataclass(frozen=True)
@@ -50,7 +43,3 @@ class BrakeDragOfAxles(BrakeDrag):
     equation = "T_drag (1 + unlike) in front, T_drag (1 - unlike) in the rear"
 
     unlike: float = share_of_axles(start=0.5, most=1.0)
-
-    def torques_nm(self) -> PerWheel:
-        """Drag torques of the wheels fl, fr, rl, rr [N m]."""
-        return of_each_wheel(self.torque_nm, self.unlike)

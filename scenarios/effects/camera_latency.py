@@ -24,7 +24,7 @@ class CameraLatency(Effect):
     equation = "stamp = place seen + X(t) - X(t - delay), which is v delay at constant speed"
     source = "Eq. (11) of Tian et al. (2022), doi:10.3390/rs14215583, with the position taken at arrival"
     excited_by = "passing borders of surfaces at two or more speeds"
-    look_alikes = ("camera_pitch",)
+    confounders = ("camera_pitch",)
 
     delay_s: float = parameter(
         "s",

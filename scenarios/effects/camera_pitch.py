@@ -54,7 +54,7 @@ class CameraPitch(Effect):
     equation = "end seen = h / tan(atan(h / end stamped) + pitch), either end of a stretch"
     source = "Geometry of a pinhole camera over a flat road, Eqs. (5) and (6) of Tian et al. (2022)"
     excited_by = "passing borders of surfaces at two or more speeds"
-    look_alikes = ("camera_latency",)
+    confounders = ("camera_latency",)
 
     pitch_rad: float = parameter(
         "rad",

@@ -1,4 +1,4 @@
-"""The page about all effects, made from their classes.
+"""Writes the page of all effects from their classes.
 
 python -m scenarios.effects.catalogue      # writes docs/effects.md
 """
@@ -16,7 +16,7 @@ from trpac_core.vehicle import Vehicle
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "effects.md"
 
 CAR = Vehicle()
-"""The car whose values stand for those that depend on the vehicle."""
+"""The car for values that depend on the vehicle."""
 
 STAGES = {
     "actuators": "command to torque at the wheels",
@@ -38,16 +38,16 @@ those of the paper's car (Table 3).
 
 
 def page() -> str:
-    """The page's text."""
+    """The page as Markdown text."""
     parts = [HEAD, "| id | stage | subsystem | parameters |\n|---|---|---|---|"]
-    parts[-1] += "".join(f"\n{_line(effect)}" for effect in EFFECTS.values())
+    parts[-1] += "".join(f"\n{_table_row(effect)}" for effect in EFFECTS.values())
     for stage, meaning in STAGES.items():
         parts.append(f"## {stage.capitalize()}: {meaning}")
         parts += [_section(effect) for effect in EFFECTS.values() if effect.stage == stage]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 
-def _line(effect: type[Effect]) -> str:
+def _table_row(effect: type[Effect]) -> str:
     names = ", ".join(f"`{p.name}`" for p in effect.parameters())
     return f"| [`{effect.id}`](#{effect.id}) | {effect.stage} | {effect.subsystem} | {names} |"
 
@@ -61,7 +61,7 @@ def _section(effect: type[Effect]) -> str:
 - Equation: `{effect.equation}`
 - Source: {effect.source}
 - Seen when: {effect.excited_by}
-- Looks like: {", ".join(f"`{key}`" for key in effect.look_alikes)}{"".join(map(_form, FORMS[effect.id][1:]))}
+- Looks like: {", ".join(f"`{key}`" for key in effect.confounders)}{"".join(map(_form, FORMS[effect.id][1:]))}
 
 | parameter | unit | meaning | neutral | bounds | a fit starts at |
 |---|---|---|---|---|---|
@@ -70,8 +70,8 @@ def _section(effect: type[Effect]) -> str:
 
 def _form(other: type[Effect]) -> str:
     further = other.parameters()[len(EFFECTS[other.id].parameters()) :]
-    told = "".join(map(_further, further))
-    return f"\n- A diagnosis also tries it as {other.form}: `{other.equation}`. {getdoc(other)}{told}"
+    added = "".join(map(_further, further))
+    return f"\n- A diagnosis also tries it as {other.form}: `{other.equation}`. {getdoc(other)}{added}"
 
 
 def _further(p: Parameter) -> str:

@@ -24,7 +24,7 @@ class ClassFrictionOffset(Effect):
     equation = "mu_reference = this road's value of the class"
     source = "class values: section 4.1 of Tian et al. (2022), doi:10.3390/rs14215583"
     excited_by = "driving on each class with a friction reference"
-    look_alikes = ("friction_offset",)
+    confounders = ("friction_offset",)
 
     dry: float = parameter(
         "-",

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import (
     Effect,
     mean_of_wheels,
-    of_each_wheel,
     parameter,
     share_of_axles,
     share_of_sides,
 )
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel
+from scenarios.plant.parameters import DynamicsParameters
 
 LARGEST_MOTOR_SHARE = 0.8
 """Of a wheel's inertia, the lighter axle's, that may be the motor's: the wheel itself keeps the rest [-]."""
@@ -41,7 +37,7 @@ class DrivelineCompliance(Effect):
     )
     source = "Kiencke and Nielsen (2005), Automotive Control Systems, drive-shaft model"
     excited_by = "tip-in and tip-out: wheel-speed oscillation after a step of torque"
-    look_alikes = ("torque_lag", "torque_delay", "tyre_relaxation", "wheel_inertia_offset")
+    confounders = ("torque_lag", "torque_delay", "tyre_relaxation", "wheel_inertia_offset")
 
     stiffness_nm_rad: float = parameter(
         "N m/rad",
@@ -63,17 +59,13 @@ class DrivelineCompliance(Effect):
         starts=lambda car: (0.2 * car.wheel_inertia_kg_m2, 0.5 * car.wheel_inertia_kg_m2),
     )
 
-    def stiffnesses_nm_rad(self) -> PerWheel:
-        """Stiffnesses of the shafts fl, fr, rl, rr [N m/rad]."""
-        return of_each_wheel(self.stiffness_nm_rad)
-
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """Motor speed and twist become states of each wheel."""
         inertias = parameters.wheel_inertia_kg_m2
         motor = min(self.motor_inertia_kg_m2, LARGEST_MOTOR_SHARE * min(inertias))
         rigid = motor < LEAST_MOTOR_SHARE * mean_of_wheels(inertias)
         return parameters._replace(
-            shaft_stiffness_nm_rad=self.stiffnesses_nm_rad(),
+            shaft_stiffness_nm_rad=self.per_wheel(self.stiffness_nm_rad),
             shaft_damping_nm_s_rad=self.damping_nm_s_rad,
             motor_inertia_kg_m2=0.0 if rigid else motor,
         )
@@ -88,10 +80,6 @@ class DrivelineComplianceOfAxles(DrivelineCompliance):
 
     unlike: float = share_of_axles(start=0.2, most=0.6)
 
-    def stiffnesses_nm_rad(self) -> PerWheel:
-        """Stiffnesses of the shafts fl, fr, rl, rr [N m/rad]."""
-        return of_each_wheel(self.stiffness_nm_rad, self.unlike)
-
 
 @dataclass(frozen=True)
 class DrivelineComplianceOfWheels(DrivelineComplianceOfAxles):
@@ -105,7 +93,3 @@ class DrivelineComplianceOfWheels(DrivelineComplianceOfAxles):
 
     front_sides: float = share_of_sides("front", start=0.15, most=0.35)
     rear_sides: float = share_of_sides("rear", start=0.15, most=0.35)
-
-    def stiffnesses_nm_rad(self) -> PerWheel:
-        """Stiffnesses of the shafts fl, fr, rl, rr [N m/rad]."""
-        return of_each_wheel(self.stiffness_nm_rad, self.unlike, self.front_sides, self.rear_sides)

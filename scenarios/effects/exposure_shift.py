@@ -36,7 +36,7 @@ class ExposureShift(Effect):
     equation = "Q_v and share of right classes times exp(-(stops / 4.3)^2); linear light times 2^stops"
     source = "measured on the shipped networks, benchmarks/vision/measure_camera_laws.py"
     excited_by = "any drive with a known normal confidence, best with the pictures themselves"
-    look_alikes = ("motion_blur",)
+    confounders = ("motion_blur",)
 
     stops: float = parameter(
         "stops",
@@ -48,5 +48,5 @@ class ExposureShift(Effect):
     )
 
     def perceive(self, frames: Frames) -> Frames:
-        """The picture tells less, whatever the speed."""
+        """Confidence and right classes decrease alike at all speeds."""
         return frames.dimmed(np.full(len(frames.time_s), share_left(self.stops)))

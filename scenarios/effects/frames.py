@@ -1,4 +1,4 @@
-"""The camera chain's pictures, as effects change them."""
+"""The frames of the camera chain, on which effects act."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Frames:
-    """What the camera chain makes of its pictures, one row per picture; effects act on it.
+    """Times, positions and results of the camera chain, one row per picture.
 
     Attributes
     ----------
     time_s, arrival_s : array, shape (n,)
-        When the picture was taken, and when its result comes [s].
+        When the picture was taken, and when its result arrives [s].
     speed_m_s : array, shape (n,)
         Speed when the picture was taken [m/s].
     camera_m, stamp_camera_m : array, shape (n,)
-        Where the camera was when the picture was taken, and where the stamp takes it to have been [m].
+        Position of the camera when the picture was taken, and the position assumed by the stamp [m].
     stamped_m, seen_m : array, shape (n, 2)
-        Begin and end of the stretch ahead of the camera: as the camera file tells it, and as it truly is [m].
+        Begin and end of the stretch ahead of the camera: by the camera file, and true [m].
     confidence, wrong_share : array, shape (n,)
         Q_v, and the probability that the class is wrong [-].
     camera_height_m : float
-        Of the lens above the road [m].
+        Height of the lens above the road [m].
     class_friction : array, shape (3,)
-        The road's friction per class, dry, wet, snow and ice [-].
+        Friction by class, dry, wet, snow and ice [-].
     drive_time_s, drive_camera_m : array, shape (m,)
-        The camera's whole way, for effects that shift time [s], [m].
+        Times and positions of the camera over the drive, for effects that shift time [s], [m].
     """
 
     time_s: Array
@@ -49,6 +49,6 @@ class Frames:
     drive_camera_m: Array
 
     def dimmed(self, share: Array) -> Frames:
-        """The frames where pictures tell less: confidence and right classes fall to a share of them, shape (n,)."""
+        """The frames with confidence and probability of the right class multiplied by `share`, shape (n,)."""
         right = (1.0 - self.wrong_share) * share
         return replace(self, confidence=self.confidence * share, wrong_share=1.0 - right)

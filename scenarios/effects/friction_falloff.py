@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -24,7 +21,7 @@ class FrictionFalloff(Effect):
         "Canudas de Wit et al. (2003), Vehicle System Dynamics 39, doi:10.1076/vesd.39.3.189.14152 (Stribeck)"
     )
     excited_by = "spinning or locked wheels at speed"
-    look_alikes = ("friction_offset", "tyre_stiffness_offset", "mu_split")
+    confounders = ("friction_offset", "tyre_stiffness_offset", "mu_split")
 
     falloff_s_m: float = parameter(
         "s/m",

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import RoadTable
+from scenarios.plant.parameters import RoadTable
 
 
 @dataclass(frozen=True)
@@ -21,7 +18,7 @@ class FrictionOffset(Effect):
     equation = "theta_true = factor theta"
     source = "definition"
     excited_by = "driving or braking near the grip limit"
-    look_alikes = ("mu_split", "tyre_stiffness_offset", "friction_falloff", "load_transfer")
+    confounders = ("mu_split", "tyre_stiffness_offset", "friction_falloff", "load_transfer")
 
     factor: float = parameter(
         "-",

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -21,7 +18,7 @@ class LoadTransfer(Effect):
     equation = "F_z,front = m (g l_r - a_x h) / (2 L) per wheel, F_z,rear = m (g l_f + a_x h) / (2 L)"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 1, dynamic axle loads on level ground"
     excited_by = "strong acceleration or braking on a tyre near its grip limit"
-    look_alikes = ("friction_offset", "tyre_stiffness_offset")
+    confounders = ("friction_offset", "tyre_stiffness_offset")
 
     cog_height_m: float = parameter(
         "m",

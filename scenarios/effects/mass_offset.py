@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,7 @@ class MassOffset(Effect):
     equation = "(m + m_payload) v' = sum F; loads with m + m_payload"
     source = "Newton's second law"
     excited_by = "changes of torque: the acceleration per force"
-    look_alikes = ("torque_gain", "aero_drag", "road_grade", "wheel_radius_offset")
+    confounders = ("torque_gain", "aero_drag", "road_grade", "wheel_radius_offset")
 
     mass_kg: float = parameter(
         "kg",

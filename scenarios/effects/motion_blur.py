@@ -33,7 +33,7 @@ class MotionBlur(Effect):
     equation = "Q_v and share of right classes times exp(-v exposure / 4 m)"
     source = "measured on the shipped networks, benchmarks/vision/measure_camera_laws.py"
     excited_by = "driving slowly and fast on the same surface"
-    look_alikes = ("exposure_shift",)
+    confounders = ("exposure_shift",)
 
     exposure_s: float = parameter(
         "s",
@@ -45,5 +45,5 @@ class MotionBlur(Effect):
     )
 
     def perceive(self, frames: Frames) -> Frames:
-        """The picture tells less, the faster the car."""
+        """Confidence and right classes decrease with speed."""
         return frames.dimmed(share_left(frames.speed_m_s, self.exposure_s))

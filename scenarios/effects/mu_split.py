@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import RoadTable
-    from trpac_core.vehicle import Vehicle
+from scenarios.plant.parameters import RoadTable
+from trpac_core.vehicle import Vehicle
 
 LEAST_SPLIT = 0.01
 """Difference of the factors from which the sides differ [-]."""
@@ -30,7 +27,7 @@ class MuSplit(Effect):
     equation = "theta_left = left_factor theta, theta_right = right_factor theta"
     source = "definition; manoeuvre as in ISO 14512"
     excited_by = "driving or braking near the grip limit: one side's wheels slip more"
-    look_alikes = ("friction_offset", "friction_falloff")
+    confounders = ("friction_offset", "friction_falloff")
 
     left_factor: float = parameter(
         "-",

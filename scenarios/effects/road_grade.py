@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
+from scenarios.plant.parameters import DynamicsParameters
 from trpac_core.vehicle import GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,7 @@ class RoadGrade(Effect):
     equation = "F = -m g s / sqrt(1 + s^2); loads times 1 / sqrt(1 + s^2)"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 1, loads on grades"
     excited_by = "any driving, best with little torque; speed against accelerometer shows it"
-    look_alikes = ("accelerometer_bias", "rolling_resistance", "mass_offset", "aero_drag")
+    confounders = ("accelerometer_bias", "rolling_resistance", "mass_offset", "aero_drag")
 
     grade: float = parameter(
         "-",

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel
+from scenarios.effects.base import Effect, parameter, share_of_axles
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,7 @@ class RollingResistance(Effect):
     equation = "I omega' = T - F_x R - c F_z R"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 4; ISO 28580 defines the coefficient"
     excited_by = "coasting at low speed"
-    look_alikes = ("brake_drag", "road_grade", "torque_gain")
+    confounders = ("brake_drag", "road_grade", "torque_gain")
 
     coefficient: float = parameter(
         "-",
@@ -33,13 +30,9 @@ class RollingResistance(Effect):
         starts=(0.008, 0.02, 0.05),
     )
 
-    def coefficients(self) -> PerWheel:
-        """Coefficients of the wheels fl, fr, rl, rr [-]."""
-        return of_each_wheel(self.coefficient)
-
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The moment is proportional to each wheel's own load."""
-        return parameters._replace(rolling_coefficient=self.coefficients())
+        return parameters._replace(rolling_coefficient=self.per_wheel(self.coefficient))
 
 
 @dataclass(frozen=True)
@@ -62,7 +55,3 @@ class RollingResistanceOfAxles(RollingResistance):
     equation = "c (1 + unlike) in front, c (1 - unlike) in the rear"
 
     unlike: float = share_of_axles(start=0.3, most=1.0)
-
-    def coefficients(self) -> PerWheel:
-        """Coefficients of the wheels fl, fr, rl, rr [-]."""
-        return of_each_wheel(self.coefficient, self.unlike)

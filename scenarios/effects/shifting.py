@@ -1,4 +1,4 @@
-"""Signals shifted in time; what delayed signals have in common."""
+"""Signals shifted in time."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from scenarios.effects.base import Array
 
 
 def delayed(time_s: Array, values: Array, delay_s: float) -> Array:
-    """What a signal was `delay_s` ago, shape (n,); its first value before that. Linear between the rows."""
+    """A signal delayed by `delay_s`, linear between the rows, shape (n,); its first value before the first row."""
     return values if delay_s == 0.0 else np.interp(time_s - delay_s, time_s, values)
 
 
 def advanced(time_s: Array, values: Array, delay_s: float) -> Array:
-    """What a delayed signal really was, shape (n,): NaN at the end, where its report is still to come."""
+    """A signal advanced by `delay_s`, shape (n,); NaN in the last `delay_s`."""
     return values if delay_s == 0.0 else np.interp(time_s + delay_s, time_s, values, right=np.nan)

@@ -20,7 +20,7 @@ class TorqueDelay(Effect):
     equation = "T_true(t) = T(t - delay), linear between the rows"
     source = "definition"
     excited_by = "steps of torque, at any speed"
-    look_alikes = ("torque_lag", "wheel_speed_delay", "tyre_relaxation", "driveline_compliance")
+    confounders = ("torque_lag", "wheel_speed_delay", "tyre_relaxation", "driveline_compliance")
 
     delay_s: float = parameter(
         "s",

@@ -22,7 +22,7 @@ class TorqueGain(Effect):
     equation = "T_true = factor T"
     source = "definition"
     excited_by = "strong torque in both directions"
-    look_alikes = ("mass_offset", "wheel_radius_offset", "brake_drag", "rolling_resistance")
+    confounders = ("mass_offset", "wheel_radius_offset", "brake_drag", "rolling_resistance")
 
     factor: float = parameter(
         "-",

@@ -21,7 +21,7 @@ class TorqueLag(Effect):
     equation = "time_constant T_true' = T - T_true, exact for a command linear between the rows"
     source = "Kiencke and Nielsen (2005), Automotive Control Systems; definition"
     excited_by = "steps of torque, at any speed"
-    look_alikes = ("torque_delay", "tyre_relaxation", "driveline_compliance", "wheel_inertia_offset")
+    confounders = ("torque_delay", "tyre_relaxation", "driveline_compliance", "wheel_inertia_offset")
 
     time_constant_s: float = parameter(
         "s",
@@ -97,12 +97,12 @@ def _follow(torque_nm: Array, growing: float, falling: float) -> Array:
         y = torque_nm[0, wheel]
         followed[0, wheel] = y
         for i in range(1, len(torque_nm)):
-            told = torque_nm[i - 1, wheel]
-            slope = (torque_nm[i, wheel] - told) / PARTS
+            command_nm = torque_nm[i - 1, wheel]
+            slope = (torque_nm[i, wheel] - command_nm) / PARTS
             for _ in range(PARTS):
-                ratio = growing if y * (told + 0.5 * slope - y) >= 0.0 else falling
+                ratio = growing if y * (command_nm + 0.5 * slope - y) >= 0.0 else falling
                 behind = ratio * slope
-                y = told + slope - behind + (y - told + behind) * np.exp(-1.0 / ratio)
-                told += slope
+                y = command_nm + slope - behind + (y - command_nm + behind) * np.exp(-1.0 / ratio)
+                command_nm += slope
             followed[i, wheel] = y
     return followed

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -29,7 +26,7 @@ class TyreFormula(Effect):
     )
     source = "Pacejka (2012), Tyre and Vehicle Dynamics, Eq. (4.49)"
     excited_by = "slip near and beyond the force's maximum"
-    look_alikes = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
+    confounders = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
 
     share: float = parameter(
         "-",

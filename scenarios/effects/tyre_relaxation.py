@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles, share_of_sides
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel
+from scenarios.effects.base import Effect, parameter, share_of_axles, share_of_sides
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,7 @@ class TyreRelaxation(Effect):
     equation = "F_x' = (V / length) (F_steady - F_x), V = max(omega R, v, 0.01 m/s)"
     source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 7, single-point contact patch model"
     excited_by = "steps of torque at low speed: the lag is length / v"
-    look_alikes = ("torque_lag", "torque_delay", "wheel_speed_delay", "driveline_compliance")
+    confounders = ("torque_lag", "torque_delay", "wheel_speed_delay", "driveline_compliance")
 
     length_m: float = parameter(
         "m",
@@ -33,13 +30,9 @@ class TyreRelaxation(Effect):
         starts=(0.1, 0.3, 0.8),
     )
 
-    def lengths_m(self) -> PerWheel:
-        """Lengths of the tyres fl, fr, rl, rr [m]."""
-        return of_each_wheel(self.length_m)
-
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The force becomes a state."""
-        return parameters._replace(relaxation_m=self.lengths_m())
+        return parameters._replace(relaxation_m=self.per_wheel(self.length_m))
 
 
 @dataclass(frozen=True)
@@ -89,10 +82,6 @@ class TyreRelaxationOfAxles(TyreRelaxationOfSlip):
 
     unlike: float = share_of_axles(start=0.15, most=0.5)
 
-    def lengths_m(self) -> PerWheel:
-        """Lengths of the tyres fl, fr, rl, rr [m]."""
-        return of_each_wheel(self.length_m, self.unlike)
-
 
 @dataclass(frozen=True)
 class TyreRelaxationOfWheels(TyreRelaxationOfAxles):
@@ -107,7 +96,3 @@ class TyreRelaxationOfWheels(TyreRelaxationOfAxles):
 
     front_sides: float = share_of_sides("front", start=0.15, most=0.4)
     rear_sides: float = share_of_sides("rear", start=0.15, most=0.4)
-
-    def lengths_m(self) -> PerWheel:
-        """Lengths of the tyres fl, fr, rl, rr [m]."""
-        return of_each_wheel(self.length_m, self.unlike, self.front_sides, self.rear_sides)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import Effect, parameter
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -28,7 +25,7 @@ class TyreShape(Effect):
     )
     source = "own: smooth deviations, as between the formulas in Pacejka (2012), Tyre and Vehicle Dynamics"
     excited_by = "slip near and beyond the force's maximum"
-    look_alikes = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
+    confounders = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
 
     knee: float = parameter(
         "-",

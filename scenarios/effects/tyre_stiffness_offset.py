@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import (
     Effect,
     all_are_off,
-    of_each_wheel,
     parameter,
     share_of_axles,
     share_of_sides,
 )
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel
-    from trpac_core.vehicle import Vehicle
+from scenarios.plant.parameters import DynamicsParameters
+from trpac_core.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,7 @@ class TyreStiffnessOffset(Effect):
     equation = "F_x(lambda) with the true C_x"
     source = "Bian et al. (2014), SAE 2014-01-0123"
     excited_by = "strong torque below the grip limit: slip per force"
-    look_alikes = ("friction_offset", "wheel_radius_offset", "vehicle_speed_scale", "load_transfer")
+    confounders = ("friction_offset", "wheel_radius_offset", "vehicle_speed_scale", "load_transfer")
 
     stiffness_n: float = parameter(
         "N",
@@ -41,13 +37,9 @@ class TyreStiffnessOffset(Effect):
         starts=lambda car: tuple(s * car.longitudinal_stiffness_n for s in (0.5, 0.8, 1.3, 2.0)),
     )
 
-    def stiffnesses_n(self) -> PerWheel:
-        """Stiffnesses of the tyres fl, fr, rl, rr [N]."""
-        return of_each_wheel(self.stiffness_n)
-
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The true stiffnesses take the nominal ones' place."""
-        return parameters._replace(longitudinal_stiffness_n=self.stiffnesses_n())
+        return parameters._replace(longitudinal_stiffness_n=self.per_wheel(self.stiffness_n))
 
 
 @dataclass(frozen=True)
@@ -58,10 +50,6 @@ class TyreStiffnessOffsetOfAxles(TyreStiffnessOffset):
     equation = "C_x (1 + unlike) in front, C_x (1 - unlike) in the rear"
 
     unlike: float = share_of_axles(start=0.1, most=0.5)
-
-    def stiffnesses_n(self) -> PerWheel:
-        """Stiffnesses of the tyres fl, fr, rl, rr [N]."""
-        return of_each_wheel(self.stiffness_n, self.unlike)
 
 
 @dataclass(frozen=True)
@@ -79,11 +67,7 @@ class TyreStiffnessOffsetOfWheels(TyreStiffnessOffsetOfAxles):
 
     def is_itself(self, vehicle: Vehicle) -> bool:
         """Whether all tyres are of another stiffness."""
-        return all_are_off(self.stiffnesses_n(), vehicle.longitudinal_stiffness_n)
-
-    def stiffnesses_n(self) -> PerWheel:
-        """Stiffnesses of the tyres fl, fr, rl, rr [N]."""
-        return of_each_wheel(self.stiffness_n, self.unlike, self.front_sides, self.rear_sides)
+        return all_are_off(self.per_wheel(self.stiffness_n), vehicle.longitudinal_stiffness_n)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ class VehicleSpeedDelay(Effect):
     equation = "v_read(t) = v(t - delay), linear between the rows"
     source = "definition"
     excited_by = "strong changes of acceleration: speed against accelerometer and wheels"
-    look_alikes = ("wheel_speed_delay", "torque_delay", "tyre_relaxation")
+    confounders = ("wheel_speed_delay", "torque_delay", "tyre_relaxation")
 
     delay_s: float = parameter(
         "s", "age of the reported speed", neutral=0.0, low=0.0, high=1.0, starts=(0.01, 0.04, 0.12)

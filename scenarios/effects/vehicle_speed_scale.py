@@ -17,7 +17,7 @@ class VehicleSpeedScale(Effect):
     equation = "v_read = factor v"
     source = "definition"
     excited_by = "free rolling at any speed, and position against speed"
-    look_alikes = ("wheel_radius_offset", "tyre_stiffness_offset")
+    confounders = ("wheel_radius_offset", "tyre_stiffness_offset")
 
     factor: float = parameter(
         "-",

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from scenarios.effects.base import Effect, of_each_wheel, parameter, share_of_axles
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel
+from scenarios.effects.base import Effect, parameter, share_of_axles
+from scenarios.plant.parameters import DynamicsParameters
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,7 @@ class WheelInertiaOffset(Effect):
     equation = "I omega' = T - F_x R with the true I"
     source = "Eq. (12) of Tian et al. 2022, doi:10.3390/rs14215583"
     excited_by = "quick changes of wheel speed: spinning up and locking wheels on a slippery road"
-    look_alikes = ("mass_offset", "torque_gain", "torque_lag", "driveline_compliance")
+    confounders = ("mass_offset", "torque_gain", "torque_lag", "driveline_compliance")
 
     inertia_kg_m2: float = parameter(
         "kg m^2",
@@ -33,13 +30,9 @@ class WheelInertiaOffset(Effect):
         starts=lambda car: tuple(s * car.wheel_inertia_kg_m2 for s in (0.6, 0.85, 1.2, 2.0)),
     )
 
-    def inertias_kg_m2(self) -> PerWheel:
-        """Inertias of the wheels fl, fr, rl, rr with their motors [kg m^2]."""
-        return of_each_wheel(self.inertia_kg_m2)
-
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The true inertias take the nominal ones' place."""
-        return parameters._replace(wheel_inertia_kg_m2=self.inertias_kg_m2())
+        return parameters._replace(wheel_inertia_kg_m2=self.per_wheel(self.inertia_kg_m2))
 
 
 @dataclass(frozen=True)
@@ -50,7 +43,3 @@ class WheelInertiaOffsetOfAxles(WheelInertiaOffset):
     equation = "I (1 + unlike) in front, I (1 - unlike) in the rear"
 
     unlike: float = share_of_axles(start=0.2, most=0.5)
-
-    def inertias_kg_m2(self) -> PerWheel:
-        """Inertias of the wheels fl, fr, rl, rr with their motors [kg m^2]."""
-        return of_each_wheel(self.inertia_kg_m2, self.unlike)

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scenarios.effects.base import (
     Effect,
     all_are_off,
-    of_each_wheel,
     parameter,
     share_of_axles,
     share_of_sides,
 )
-
-if TYPE_CHECKING:
-    from scenarios.plant.parameters import DynamicsParameters, PerWheel
-    from trpac_core.vehicle import Vehicle
+from scenarios.plant.parameters import DynamicsParameters
+from trpac_core.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,7 @@ class WheelRadiusOffset(Effect):
     equation = "rim speed omega R and moment F_x R with the true R"
     source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 1, effective rolling radius"
     excited_by = "free rolling: v per omega at torque zero"
-    look_alikes = ("vehicle_speed_scale", "tyre_stiffness_offset", "mass_offset", "torque_gain")
+    confounders = ("vehicle_speed_scale", "tyre_stiffness_offset", "mass_offset", "torque_gain")
 
     radius_m: float = parameter(
         "m",
@@ -41,13 +37,11 @@ class WheelRadiusOffset(Effect):
         starts=lambda car: tuple(s * car.wheel_radius_m for s in (0.95, 0.985, 1.015, 1.05)),
     )
 
-    def radii_m(self) -> PerWheel:
-        """Rolling radii of the wheels fl, fr, rl, rr [m]."""
-        return of_each_wheel(self.radius_m)
-
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The true radii take the nominal ones' place, in rolling and as levers."""
-        return parameters._replace(wheel_radius_m=self.radii_m(), lever_m=self.radii_m())
+        return parameters._replace(
+            wheel_radius_m=self.per_wheel(self.radius_m), lever_m=self.per_wheel(self.radius_m)
+        )
 
 
 @dataclass(frozen=True)
@@ -60,7 +54,7 @@ class WheelRadiusOffsetRolling(WheelRadiusOffset):
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
         """The levers stay what they were."""
-        return parameters._replace(wheel_radius_m=self.radii_m())
+        return parameters._replace(wheel_radius_m=self.per_wheel(self.radius_m))
 
 
 @dataclass(frozen=True)
@@ -71,10 +65,6 @@ class WheelRadiusOffsetOfAxles(WheelRadiusOffset):
     equation = "R (1 + unlike) in front, R (1 - unlike) in the rear"
 
     unlike: float = share_of_axles(start=0.003, most=0.05)
-
-    def radii_m(self) -> PerWheel:
-        """Rolling radii of the wheels fl, fr, rl, rr [m]."""
-        return of_each_wheel(self.radius_m, self.unlike)
 
 
 @dataclass(frozen=True)
@@ -92,8 +82,4 @@ class WheelRadiusOffsetOfWheels(WheelRadiusOffsetOfAxles):
 
     def is_itself(self, vehicle: Vehicle) -> bool:
         """Whether all wheels are of another size."""
-        return all_are_off(self.radii_m(), vehicle.wheel_radius_m)
-
-    def radii_m(self) -> PerWheel:
-        """Rolling radii of the wheels fl, fr, rl, rr [m]."""
-        return of_each_wheel(self.radius_m, self.unlike, self.front_sides, self.rear_sides)
+        return all_are_off(self.per_wheel(self.radius_m), vehicle.wheel_radius_m)

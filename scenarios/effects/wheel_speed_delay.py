@@ -18,7 +18,7 @@ class WheelSpeedDelay(Effect):
     equation = "omega_read(t) = omega(t - delay), linear between the rows"
     source = "definition"
     excited_by = "strong changes of torque: wheel speeds against speed and accelerometer"
-    look_alikes = ("torque_delay", "vehicle_speed_delay", "wheel_speed_quantisation", "tyre_relaxation")
+    confounders = ("torque_delay", "vehicle_speed_delay", "wheel_speed_quantisation", "tyre_relaxation")
 
     delay_s: float = parameter(
         "s", "age of the reported speeds", neutral=0.0, low=0.0, high=1.0, starts=(0.01, 0.04, 0.12)

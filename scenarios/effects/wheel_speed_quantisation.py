@@ -26,7 +26,7 @@ class WheelSpeedQuantisation(Effect):
     equation = "omega_read = 2 pi counts / (teeth window), counts of the last full window"
     source = "Kiencke and Nielsen (2005), Automotive Control Systems; pulse counting as with a toothed ring"
     excited_by = "any driving: steps of 2 pi / (teeth window), late by one window on average"
-    look_alikes = ("wheel_speed_delay",)
+    confounders = ("wheel_speed_delay",)
 
     teeth: float = parameter(
         "-", "pulses per revolution", neutral=48.0, low=1.0, high=MOST_TEETH, starts=(48.0, 100.0)

@@ -1,1 +1,1 @@
-"""Units by their files: archives that others wrote, opened, unpacked and run."""
+"""Units in files: archives checked, unpacked, opened and run."""

@@ -1,4 +1,4 @@
-"""The one way into zip archives that others wrote: everything that could harm is refused before a byte is written."""
+"""Zip archives from untrusted sources: all checks come before a byte is written."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from trpac_core.errors import TrpacError
 from trpac_core.files import FileError, open_file, quoted
 
 MOST_BYTES = 500_000_000
-"""Size of an archive, and of all that it unpacks to; units of this project have 20 MB [bytes]."""
+"""Largest archive, and largest unpacked content; units of this project have 20 MB [bytes]."""
 MOST_ENTRIES = 10_000
-"""Entries of an archive; units of this project have 100."""
+"""Greatest number of entries; units of this project have 100."""
 MOST_DIRECTORY_BYTES = 4_000_000
-"""An archive's directory of entries, which is read whole: 10,000 of 400 bytes [bytes]."""
+"""Largest directory of entries, which is read at once: 10,000 of 400 bytes [bytes]."""
 MOST_TEXT_BYTES = 16_000_000
-"""An entry that is read whole: descriptions and records; those of this project's units have 0.1 MB [bytes]."""
+"""Largest entry that is read at once: descriptions and records; those of this project have 0.1 MB [bytes]."""
 LONGEST_PART = 255
-"""Part of an entry's path between two slashes, as file systems allow it [bytes]."""
+"""Longest part of an entry's path between two slashes, as of file systems [bytes]."""
 CHUNK_BYTES = 1 << 20
+"""Bytes that are read at once."""
 XML = (".xml", ".ssd", ".ssv", ".ssm", ".ssb")
 DAMAGED = (
     zipfile.BadZipFile,
@@ -40,12 +41,12 @@ DAMAGED = (
     EOFError,
     ValueError,
 )
-"""What zipfile raises of a damaged archive; which one depends on the byte."""
+"""Exceptions that zipfile raises on damaged archives."""
 MEND = "Copy or build it again."
 
 
 class UnitFileError(TrpacError):
-    """A unit's file cannot be used; the text says why and what to do."""
+    """A unit's file cannot be used; the text has reason and remedy."""
 
 
 class _DoctypeError(ValueError):
@@ -53,7 +54,7 @@ class _DoctypeError(ValueError):
 
 
 class _Bounded(io.BufferedReader):
-    """A file that gives no more at once than an archive's directory may have, which zipfile reads whole."""
+    """A file whose reads are limited to `MOST_DIRECTORY_BYTES`, because zipfile reads the directory at once."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         whole = size is None or size < 0
@@ -64,25 +65,25 @@ class _Bounded(io.BufferedReader):
 
 
 class Archive:
-    """An open archive whose entries have been looked at; `names` are theirs."""
+    """An open archive with checked entries; `names` has their names."""
 
     def __init__(self, name: str, content: zipfile.ZipFile) -> None:
         self.name, self._content = name, content
         self.names = content.namelist()
 
     def read(self, entry: str) -> bytes:
-        """Content of an entry that is a text; raises UnitFileError, KeyError where there is none."""
+        """Content of a text entry; raises UnitFileError, and KeyError where there is none."""
         return b"".join(self._chunks(self._content.getinfo(entry), MOST_TEXT_BYTES))
 
     def sha256(self, entry: str) -> str:
-        """SHA-256 of an entry as hexadecimal text; raises UnitFileError, KeyError where there is none."""
+        """SHA-256 of an entry as hexadecimal text; raises UnitFileError, and KeyError where there is none."""
         total = hashlib.sha256()
         for chunk in self._chunks(self._content.getinfo(entry)):
             total.update(chunk)
         return total.hexdigest()
 
     def damage(self) -> str | None:
-        """Name of the first entry that cannot be read to its end; None where the archive is whole."""
+        """Name of the first damaged entry; None without any."""
         for entry in self._content.infolist():
             try:
                 for _ in self._chunks(entry):
@@ -113,7 +114,7 @@ class Archive:
             ) from error
 
     def _chunks(self, entry: zipfile.ZipInfo, most_bytes: int = MOST_BYTES) -> Iterator[bytes]:
-        """An entry's content; what it says of its size is not believed."""
+        """Content of an entry in chunks, limited in size whatever its header states."""
         left = most_bytes
         try:
             with self._content.open(entry) as file:
@@ -136,19 +137,12 @@ def _reason(error: Exception) -> str:
 def opened_archive(
     path: str | Path, expected: str = "a unit, a zip archive such as build_fmu.py makes"
 ) -> Iterator[Archive]:
-    """An archive of a stranger, whose directory keeps all limits and whose XML texts declare nothing.
-
-    Parameters
-    ----------
-    path : str or Path
-        The archive.
-    expected : str
-        What messages say that it should be.
+    """An open archive, after checks of all limits and for XML texts without document types.
 
     Raises
     ------
     UnitFileError
-        If it is no regular file, no archive, too large, or one of its entries is not to be unpacked.
+        If it is no regular file, no archive, too large, or one of its entries must not be unpacked.
     """
     name = quoted(path)
     try:
@@ -171,7 +165,7 @@ def opened_archive(
 
 
 def _problem(entries: Sequence[zipfile.ZipInfo]) -> str | None:
-    """Why these entries are not to be unpacked; None where they are."""
+    """The reason why these entries must not be unpacked; None without one."""
     if len(entries) > MOST_ENTRIES:
         return f"it has {len(entries)} entries, expected at most {MOST_ENTRIES}"
     size = sum(entry.file_size for entry in entries)
@@ -214,7 +208,7 @@ def _entry_problem(entry: zipfile.ZipInfo) -> str | None:
 
 
 def _require_plain_xml(archive: Archive) -> None:
-    """Raise UnitFileError where an XML text declares a document type, and with it entities; parsers tell the rest."""
+    """Raise UnitFileError where an XML text declares a document type, and so entities."""
     for name in archive.names:
         if not name.lower().endswith(XML):
             continue
@@ -226,7 +220,7 @@ def _require_plain_xml(archive: Archive) -> None:
             raise UnitFileError(
                 f"{archive.name}: its entry '{quoted(name)}' declares a document type, expected plain XML. {MEND}"
             ) from error
-        except (expat.ExpatError, UnitFileError):  # told by who reads it
+        except (expat.ExpatError, UnitFileError):  # reported by the reader of the text
             continue
 
 

@@ -1,45 +1,29 @@
-"""The estimator unit as a host sees it: imported, parameterised and stepped through fmpy."""
+"""The estimator unit in a host: imported, parameterised and stepped through fmpy."""
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
 
 from scenarios.camera.files import load_camera
 from scenarios.files import Scenario, ScenarioError
 from scenarios.fmu_client.archives import UnitFileError
-from scenarios.fmu_client.opening import opened_unit
-from scenarios.fmu_client.unpacking import unpack_unit
+from scenarios.fmu_client.opening import Instance, opened
 from scenarios.pictures import frame_steps
+from scenarios.progress import Progress, silent
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
 
 UNIT = "TrpacEstimator"
-OUTPUTS = (
-    "TRPAC",
-    "K_v",
-    "excitation_threshold",
-    "slip",
-    "tyre_force",
-    "TRPAC_image",
-    "TRPAC_dynamics",
-    "TRPAC_peak",
-    "image_confidence",
-    "frame_age",
-    "TRPAC_std",
-)
-FLAGS = ("flag", "excitation_flag")
 INPUTS = ("wheel_speed", "wheel_torque", "vehicle_speed", "longitudinal_acceleration")
 
 
 def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
-    """What the unit is told of the scenario's car, camera and sensors, by the unit's variable names."""
+    """Parameters of the unit for the scenario's car, camera and sensors, by variable name."""
     car, noise = scenario.vehicle.to_core(), scenario.sensors
     values: dict[str, float | int | bool] = car_parameters(car, scenario.wheel) | {
         "confidence.torque_noise": noise.wheel_torque_noise_nm,
@@ -54,7 +38,7 @@ def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
 
 
 def car_parameters(car: Vehicle, wheel: str) -> dict[str, float | int | bool]:
-    """What the unit of one wheel is told of a car, by the unit's variable names; four wheels take all but the place."""
+    """Parameters of the unit of one wheel for a car, by variable name."""
     return {
         "wheel.front": wheel.startswith("f"),
         "wheel.left": wheel.endswith("l"),
@@ -95,9 +79,9 @@ def run_unit(
     signals: pd.DataFrame,
     frames: pd.DataFrame,
     step_s: float,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = silent,
 ) -> pd.DataFrame:
-    """Step the unit over recorded signals and pictures, as a host would.
+    """Outputs of the unit over recorded signals and pictures.
 
     Parameters
     ----------
@@ -108,16 +92,16 @@ def run_unit(
     signals : DataFrame
         One row per step with the columns `INPUTS`, in the unit's units.
     frames : DataFrame
-        row and path of each picture; it is given with that row's signals.
+        row and path of each picture, which is set with that row's signals.
     step_s : float
         Communication step [s].
     progress : callable
-        Told how many of how many steps are done.
+        Called with how many of how many steps are done.
 
     Returns
     -------
     DataFrame
-        One row per step: the unit's outputs at the step's end.
+        One row per step: the unit's Real and Boolean outputs at the step's end.
 
     Raises
     ------
@@ -126,69 +110,42 @@ def run_unit(
         refuses a setting or a step.
     """
     try:
-        folder = unpack_unit(fmu)
+        with opened(fmu, UNIT, settings) as unit:
+            table = _step_all(unit, signals, frames, step_s, progress)
+            unit.slave.terminate()
     except UnitFileError as error:
         raise ScenarioError(str(error)) from error
-    try:
-        try:
-            unit, description = opened_unit(fmu, folder, [UNIT], "estimator")
-        except UnitFileError as error:
-            raise ScenarioError(str(error)) from error
-        references = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
-        try:
-            unit.setupExperiment(startTime=0.0)
-            _set(unit, references, settings)
-            unit.enterInitializationMode()
-            unit.exitInitializationMode()
-            outputs = _step_all(unit, references, signals, frames, step_s, progress)
-            unit.terminate()
-        except FMICallException as error:
-            raise ScenarioError(
-                f"{fmu}: refuses the scenario's settings or a step ({error}); its own words are above. Their ranges "
-                "stand in docs/fmu_variables.md."
-            ) from error
-        finally:
-            unit.freeInstance()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    return outputs
-
-
-def _set(
-    unit: FMU2Slave,
-    references: Mapping[str, tuple[int, str]],
-    settings: Mapping[str, float | int | bool],
-) -> None:
-    for name, value in settings.items():
-        reference, kind = references[name]
-        getattr(unit, f"set{kind}")([reference], [value])
+    except FMICallException as error:
+        raise ScenarioError(
+            f"{fmu}: refuses the scenario's settings or a step ({error}); its own words are above. Their ranges "
+            "stand in docs/fmu_variables.md."
+        ) from error
+    return table
 
 
 def _step_all(
-    unit: FMU2Slave,
-    references: Mapping[str, tuple[int, str]],
-    signals: pd.DataFrame,
-    frames: pd.DataFrame,
-    step_s: float,
-    progress: Callable[[int, int], None],
+    unit: Instance, signals: pd.DataFrame, frames: pd.DataFrame, step_s: float, progress: Progress
 ) -> pd.DataFrame:
-    inputs = [references[name][0] for name in INPUTS]
-    reals, flags = ([references[name][0] for name in names] for names in (OUTPUTS, FLAGS))
-    path, number = references["image_path"][0], references["frame_id"][0]
+    real_names, flag_names = (
+        [v.name for v in unit.variables if v.causality == "output" and v.type == kind]
+        for kind in ("Real", "Boolean")
+    )
+    inputs, reals, flags = map(unit.references, (INPUTS, real_names, flag_names))
+    slave, picture, number = unit.slave, unit.references(["image_path"]), unit.references(["frame_id"])
     pictures = {
         int(row): (str(file), int(frame)) for row, file, frame in frames[["row", "path", "frame"]].values
     }
     values = signals[list(INPUTS)].to_numpy(dtype=float)
-    results = np.empty((len(values), len(OUTPUTS) + len(FLAGS)))
+    results = np.empty((len(values), len(reals) + len(flags)))
     for row, readings in enumerate(values):
         if row in pictures:
-            unit.setString([path], [pictures[row][0]])
-            unit.setInteger([number], [pictures[row][1]])
-        unit.setReal(inputs, readings)
-        unit.doStep(currentCommunicationPoint=row * step_s, communicationStepSize=step_s)
-        results[row, : len(OUTPUTS)] = unit.getReal(reals)
-        results[row, len(OUTPUTS) :] = unit.getBoolean(flags)
+            slave.setString(picture, [pictures[row][0]])
+            slave.setInteger(number, [pictures[row][1]])
+        slave.setReal(inputs, readings)
+        slave.doStep(currentCommunicationPoint=row * step_s, communicationStepSize=step_s)
+        results[row, : len(reals)] = slave.getReal(reals)
+        results[row, len(reals) :] = slave.getBoolean(flags)
         if row % 500 == 0 or row == len(values) - 1:
             progress(row + 1, len(values))
-    table = pd.DataFrame(results, columns=[*OUTPUTS, *FLAGS])
-    return table.astype(dict.fromkeys(FLAGS, bool))
+    table = pd.DataFrame(results, columns=[*real_names, *flag_names])
+    return table.astype(dict.fromkeys(flag_names, bool))

@@ -1,4 +1,4 @@
-"""Friction estimators of the literature on the same inputs as ours, tuned, in one shape."""
+"""Friction estimators of the literature on the same inputs as ours, tuned, with one interface."""
 
 from collections.abc import Callable, Mapping
 
@@ -30,17 +30,17 @@ PEERS: Mapping[str, Callable[[PeerSetup, Tuning], Peer]] = {
     EkfPeer.name: lambda setup, tuning: EkfPeer(setup, tuning.ekf),
     UkfPeer.name: lambda setup, tuning: UkfPeer(setup, tuning.ukf),
 }
-"""How each peer is made on one wheel, by its name."""
+"""Constructor of each peer on one wheel, by name."""
 PEER_NAMES = tuple(PEERS)
-"""All peers by name, in the order of `make_peers`."""
+"""Names of all peers, in the order of `make_peers`."""
 
 
 def make_peer(name: str, setup: PeerSetup, tuning: Tuning | None = None) -> Peer:
-    """The peer of a name on one wheel, with its tuning as delivered unless another is given."""
+    """The peer of a name on one wheel, with the shipped tuning by default."""
     return PEERS[name](setup, tuning or load_tuning())
 
 
 def make_peers(setup: PeerSetup, tuning: Tuning | None = None) -> tuple[Peer, ...]:
-    """All peers on one wheel, with their tuning as delivered unless another is given."""
+    """All peers on one wheel, with the shipped tuning by default."""
     tuned = tuning or load_tuning()
     return tuple(make_peer(name, setup, tuned) for name in PEERS)

@@ -1,4 +1,4 @@
-"""What all peers share: one shape, and what each is told of the car and reads from its sensors.
+"""The common part of the peers: interface, settings and treatment of the sensors.
 
 A peer is a friction estimator from the literature on the same inputs as ours, step for step. It has no camera, so its
 counterpart is the dynamics estimator DE.
@@ -15,21 +15,21 @@ from trpac_core.readings import GREATEST_ACCELERATION_M_S2, Sensors, filter_shar
 from trpac_core.vehicle import Vehicle
 
 UNKNOWN = ConfidenceModel.unknown
-"""Standard deviation where nothing is known, as our estimator's [-]."""
+"""Standard deviation of an unknown theta, that of our estimator [-]."""
 ROAD_CHANGE = ConfidenceModel.road_change
-"""How far friction may wander per root of a metre driven unseen, as our estimator's [1/sqrt(m)]."""
+"""Random walk of theta per root of distance without excitation, that of our estimator [1/sqrt(m)]."""
 
 
 @dataclass(frozen=True, slots=True)
 class PeerEstimate:
-    """What a peer says at a step.
+    """The estimate of a peer at a step.
 
     Attributes
     ----------
     TRPAC, TRPAC_std : float
         Estimate of theta and its standard deviation [-].
     excited : bool
-        Whether the peer takes the tyre to show the road's friction now.
+        Whether the peer takes theta to be identifiable now.
     """
 
     TRPAC: float
@@ -43,18 +43,18 @@ class Peer(Protocol):
 
     @property
     def name(self) -> str:
-        """How tables call it."""
+        """Name in tables."""
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Reset the state."""
 
     def step(self, step_s: float, sensors: Sensors) -> PeerEstimate:
-        """One step; readings are those at its start. Unusable readings hold the estimate."""
+        """The estimate after one step with the readings at its start; unusable readings hold it."""
 
 
 @dataclass(frozen=True)
 class PeerSetup:
-    """What a peer is told of its wheel, the same that our estimator is told.
+    """Settings of a peer on a wheel, equal to those of our estimator.
 
     Attributes
     ----------
@@ -65,9 +65,9 @@ class PeerSetup:
     wheel_speed_noise_rad_s, vehicle_speed_noise_m_s, wheel_torque_noise_nm : float
         Standard deviations of the sensors' white noise per sample; the defaults are the paper simulation's.
     theta_initial : float
-        Estimate before anything is known [-].
+        Estimate at the start [-].
     floor_m_s : float
-        Speed below which slip says nothing [m/s].
+        Speed below which slip is not used [m/s].
     """
 
     vehicle: Vehicle = field(default_factory=Vehicle)
@@ -84,29 +84,31 @@ class Taken(NamedTuple):
 
     wheel_speed_rad_s: float
     wheel_torque_nm: float
-    """Without the rolling resistance [N m]."""
+    """Wheel torque less rolling resistance [N m]."""
     speed_m_s: float
     acceleration_m_s2: float
     load_n: float
 
 
 class SensorFront:
-    """Reads the sensors for a peer as our estimator reads them: the same checks, load and acceleration."""
+    """Treatment of the sensors as in our estimator: checks, load and acceleration."""
 
     ACCELERATION_FILTER_S = 0.010
+    """Time constant of the filter of measured acceleration [s]."""
     DIFFERENTIATION_S = 0.05
+    """Time constant of the differentiation of speed [s]."""
 
     def __init__(self, setup: PeerSetup) -> None:
         self._setup = setup
         self.reset()
 
     def reset(self) -> None:
-        """Forget the car's motion."""
+        """Reset the filters."""
         self._acceleration: float | None = None
         self._lagged_speed: float | None = None
 
     def take(self, step_s: float, sensors: Sensors) -> Taken | None:
-        """The readings, or None where they are unusable or the car stands."""
+        """Usable readings, or None where they are unusable or the car stands."""
         setup = self._setup
         radius_m = setup.vehicle.wheel_radius_m
         if unusable(step_s, sensors, radius_m, setup.floor_m_s) is not None:
@@ -132,7 +134,7 @@ class SensorFront:
         )
 
     def _accelerated(self, step_s: float, sensors: Sensors) -> float:
-        """Measured acceleration, filtered; differentiated from speed where it is not measured [m/s^2]."""
+        """Filtered acceleration, measured or else differentiated from speed [m/s^2]."""
         measured, speed = sensors.longitudinal_acceleration_m_s2, sensors.vehicle_speed_m_s
         if measured is None:
             lagged = speed if self._lagged_speed is None else self._lagged_speed
@@ -145,6 +147,6 @@ class SensorFront:
 
 
 def way(step_s: float, sensors: Sensors) -> float:
-    """Way driven over a step, 0 where the readings do not say [m]."""
+    """Distance driven over a step, 0 for unusable readings [m]."""
     passed = sensors.vehicle_speed_m_s * step_s
     return abs(passed) if math.isfinite(passed) else 0.0

@@ -26,7 +26,7 @@ from trpac_core.tyre import friction_by_theta
 Array = NDArray[np.float64]
 
 MEASURED = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""What of the state is measured: omega and v."""
+"""Measurement matrix: omega and v are measured."""
 THETA = 2
 """Index of theta in the state."""
 
@@ -38,11 +38,11 @@ class KalmanTuning:
     Attributes
     ----------
     torque_share : float
-        What the wheel's equation is wrong by, as a multiple of the torque sensor's noise [-].
+        Process noise of the wheel's equation, as a multiple of the torque sensor's noise [-].
     acceleration_noise_m_s2 : float
-        What the acceleration is wrong by, per root of a second [m/s^2 sqrt(s)].
+        Process noise of the acceleration, per root of time [m/s^2 sqrt(s)].
     theta_walk : float
-        How far friction walks per root of a metre driven [1/sqrt(m)].
+        Random walk of theta per root of distance [1/sqrt(m)].
     measurement_share : float
         Noise of omega and v as a multiple of their sensors' [-].
     spread : float
@@ -57,7 +57,7 @@ class KalmanTuning:
 
 
 class KalmanPeer(ABC):
-    """What the two filters share: when they run, what they are told, what they say."""
+    """The common part of the two filters: start and stop, noise and output."""
 
     name: str
 
@@ -69,13 +69,13 @@ class KalmanPeer(ABC):
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Reset the state."""
         self._front.reset()
         self._theta, self._variance = self._setup.theta_initial, UNKNOWN**2
         self._running = False
 
     def step(self, step_s: float, sensors: Sensors) -> PeerEstimate:
-        """One step, see `Peer`."""
+        """The estimate after one step, see `Peer`."""
         taken = self._front.take(step_s, sensors)
         if taken is None:
             self._running = False
@@ -91,13 +91,13 @@ class KalmanPeer(ABC):
             self._bound()
         x, P = self._state()
         self._theta, self._variance = float(x[THETA]), float(P[THETA, THETA])
-        said = PeerEstimate(self._theta, math.sqrt(self._variance), self._excited(x, taken))
+        estimate = PeerEstimate(self._theta, math.sqrt(self._variance), self._excited(x, taken))
         if step_s > 0.0:
             self._predict(taken, step_s, self._process_noise(taken, step_s))
-        return said
+        return estimate
 
     def _process_noise(self, taken: Taken, step_s: float) -> Array:
-        """Q of a step."""
+        """Covariance Q of the process noise of a step, shape (3, 3)."""
         car, tuning = self._setup.vehicle, self._tuning
         spin = tuning.torque_share * self._setup.wheel_torque_noise_nm * step_s / car.wheel_inertia_kg_m2
         speed = tuning.acceleration_noise_m_s2 * math.sqrt(step_s)
@@ -105,7 +105,7 @@ class KalmanPeer(ABC):
         return np.diag([spin**2, speed**2, theta**2])
 
     def _bound(self) -> None:
-        """Keep theta in its domain, and its deviation at most that of knowing nothing."""
+        """Limit theta to its domain, and its standard deviation to `UNKNOWN`."""
         x, P = self._state()
         x[THETA] = min(max(x[THETA], LEAST_THETA), GREATEST_THETA)
         if P[THETA, THETA] > UNKNOWN**2:
@@ -114,7 +114,7 @@ class KalmanPeer(ABC):
             P[:, THETA] *= share
 
     def _excited(self, x: Array, taken: Taken) -> bool:
-        """Whether the tyre's force depends on theta at the estimate: our estimator's own limit."""
+        """Whether the tyre's force depends on theta at the estimate, by our estimator's limit."""
         car = self._setup.vehicle
         slip = wheel_slip(x[0], x[1], car.wheel_radius_m, self._setup.floor_m_s).size
         if slip == 0.0:
@@ -151,7 +151,7 @@ class KalmanPeer(ABC):
 
 
 class _Ekf(ExtendedKalmanFilter):
-    """The library's filter with a nonlinear prediction, by the hook that it has for it."""
+    """The library's filter with a nonlinear prediction, through its hook `predict_x`."""
 
     ahead: Array
 

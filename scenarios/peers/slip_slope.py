@@ -1,13 +1,13 @@
 """Slip-slope: friction from the slope of used friction over slip, by recursive least squares.
 
 Below the limit rho = K lambda, rho = abs(F_x) / F_z; the slope K is estimated by recursive least squares with
-forgetting (Gustafsson 1997, Automatica 33(6), 1087-1099), here with padasip's filter. That the slope tells the peak is
-a hypothesis from measurements (Mueller, Uchanski, Hedrick 2003, doi:10.1115/1.1636773), and the map is calibrated on
-drives on known roads: theta = intercept + gain * K, a straight line. Where slip is so large that the tyre slides as a
-whole, used friction is the peak friction itself, and a first-order filter over it is the estimate.
+forgetting (Gustafsson 1997, Automatica 33(6), 1087-1099), here with padasip's filter. That the slope depends on the
+peak is a hypothesis from measurements (Mueller, Uchanski, Hedrick 2003, doi:10.1115/1.1636773); the map is calibrated
+on drives on known roads: theta = intercept + gain * K. Where slip is so large that the tyre slides as a whole, used
+friction is the peak friction, and a first-order filter over it is the estimate.
 
-On the modified Dugoff tyre the slope at no slip is 1.27 C_x / F_z on every road: what the slope shows is the bend of
-the curve between it and the limit, so the line is a compromise there. It is the method's, and is left as it is.
+On the modified Dugoff tyre the slope at slip 0 is 1.27 C_x / F_z on every road, so that the estimated slope depends on
+theta only through the curvature below the limit. The method is implemented as published.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ class SlipSlopeTuning:
     Attributes
     ----------
     filter_s : float
-        Time constant of the filter on wheel speed, torque and vehicle speed; the wheel's angular acceleration is
-        taken from it [s].
+        Time constant of the filter on wheel speed, torque and vehicle speed, which also gives the wheel's angular
+        acceleration [s].
     memory_s : float
-        Time over which the regression forgets [s].
+        Time constant of the forgetting [s].
     least_slip : float
-        Slip below which a sample says nothing of the slope [-].
+        Slip below which a sample is not used [-].
     sliding_slip : float
-        Slip above which the tyre is taken to slide as a whole [-].
+        Slip above which the tyre slides as a whole [-].
     intercept, gain : float
         The map from slope to theta [-].
     map_deviation : float
-        What the map leaves over on the drives that it was calibrated on, standard deviation of theta [-].
+        Residual standard deviation of theta on the drives of the calibration [-].
     """
 
     filter_s: float = 0.02
@@ -66,14 +66,16 @@ class SlipSlopePeer:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Reset the state."""
         self._front.reset()
         self._theta, self._variance = self._setup.theta_initial, UNKNOWN**2
         self._filtered: Taken | None = None
         self._sliding: float | None = None
         car = self._setup.vehicle
-        elastic = correction(0.0, 0.0) * car.longitudinal_stiffness_n / car.wheel_load(self._setup.front_axle)
-        self._regression = FilterRLS(1, mu=1.0, eps=1e-3, w=np.array([elastic]))
+        initial_slope = (
+            correction(0.0, 0.0) * car.longitudinal_stiffness_n / car.wheel_load(self._setup.front_axle)
+        )
+        self._regression = FilterRLS(1, mu=1.0, eps=1e-3, w=np.array([initial_slope]))
 
     @property
     def slope(self) -> float | None:
@@ -81,7 +83,7 @@ class SlipSlopePeer:
         return float(self._regression.w[0]) if self._sliding is None else None
 
     def step(self, step_s: float, sensors: Sensors) -> PeerEstimate:
-        """One step, see `Peer`."""
+        """The estimate after one step, see `Peer`."""
         taken = self._front.take(step_s, sensors)
         self._variance = min(self._variance + ROAD_CHANGE**2 * way(step_s, sensors), UNKNOWN**2)
         excited = False
@@ -99,7 +101,7 @@ class SlipSlopePeer:
         return PeerEstimate(self._theta, math.sqrt(self._variance), excited)
 
     def _used(self, taken: Taken, step_s: float) -> tuple[float, float]:
-        """Used friction and slip of the filtered readings [-]; both through the same filter, so they stay in step."""
+        """Used friction and slip of the readings, both through the same filter [-]."""
         before = self._filtered or taken
         share = filter_share(step_s, self._tuning.filter_s)
         now = Taken(*(b + share * (t - b) for b, t in zip(before, taken, strict=True)))
@@ -111,7 +113,7 @@ class SlipSlopePeer:
         return force_n * slip.direction / now.load_n, slip.size
 
     def _judged(self, friction: float, slip: float, step_s: float) -> float:
-        """Theta of an excited sample."""
+        """Theta from an excited sample [-]."""
         tuning = self._tuning
         if slip > tuning.sliding_slip:
             share = filter_share(step_s, tuning.memory_s)

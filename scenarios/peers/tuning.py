@@ -1,4 +1,4 @@
-"""The peers' tuning as a file: values, and how they were found."""
+"""The file of the peers' tuning."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from scenarios.strict import load_strict
 from scenarios.yaml_text import to_yaml
 
 TUNING_FILE = Path(__file__).with_name("tuning.yaml")
-HEADER = "# Written by `python -m benchmarks.accuracy.tune_peers tune`; see docs/peers.md.\n"
+HEADER = "# Written by `python -m benchmarks.accuracy.tune_peers`; see docs/peers.md.\n"
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """Settings of all peers."""
+    """Tuning of all peers."""
 
     slip_slope: SlipSlopeTuning = field(default_factory=SlipSlopeTuning)
     ekf: KalmanTuning = field(default_factory=KalmanTuning)
@@ -38,13 +38,13 @@ class _TuningFile(BaseModel):
 
 @lru_cache
 def load_tuning(path: Path = TUNING_FILE) -> Tuning:
-    """Read a tuning; raises ScenarioError."""
+    """The tuning of a file; raises ScenarioError."""
     file = load_strict(path, _TuningFile)
     return Tuning(file.slip_slope, file.ekf, file.ukf)
 
 
 def write_tuning(path: Path, tuning: Tuning, how: dict[str, Any]) -> None:
-    """Write a tuning with how it was found."""
+    """Write a tuning and the description of how it was found."""
     values = {name: _rounded(part) for name, part in asdict(tuning).items()}
     path.write_text(HEADER + to_yaml({"how": how, **values}), encoding="utf-8")
 

@@ -23,7 +23,7 @@ MOST_GROWTH = 2.0
 """Bound of rate times step where the slope is positive, on the tyre's falling branch [-]."""
 
 MOST_STEP_S = 0.002
-"""The knee of the tyre's curve is crossed in a few milliseconds: a longer step would go on along the old slope [s]."""
+"""Longest step: the wheel crosses the knee of the tyre's curve in a few milliseconds [s]."""
 
 
 class WheelState(NamedTuple):
@@ -35,7 +35,7 @@ class WheelState(NamedTuple):
 
 
 class WheelStep(NamedTuple):
-    """A state one step later, and the first row of the transition's Jacobian; the other rows are those of identity."""
+    """The state after a step, and the first row of the transition's Jacobian, whose other rows are of the identity."""
 
     state: WheelState
     by_wheel_speed: float
@@ -44,7 +44,7 @@ class WheelStep(NamedTuple):
 
 
 class Slope(NamedTuple):
-    """Tyre force [N] and its derivatives by the state."""
+    """Tyre force [N] and its derivatives with respect to the state."""
 
     force_n: float
     by_wheel_speed: float
@@ -53,7 +53,7 @@ class Slope(NamedTuple):
 
 
 def tyre_slope(state: WheelState, load_n: float, vehicle: Vehicle, floor_m_s: float) -> Slope:
-    """Tyre force of a state and how it depends on it; theta outside its domain is taken at the domain's end."""
+    """Tyre force of a state and its derivatives; theta is limited to its domain."""
     stiffness_n, radius_m = vehicle.longitudinal_stiffness_n, vehicle.wheel_radius_m
     theta = min(max(state.theta, LEAST_THETA), GREATEST_THETA)
     omega, speed = state.wheel_speed_rad_s, state.speed_m_s
@@ -86,18 +86,18 @@ def advanced(
     step_s: float,
     floor_m_s: float,
 ) -> WheelStep:
-    """The state one step later under held torque and acceleration, in parts of at most `MOST_STEP_S`.
+    """The state after a step with constant torque and acceleration, in parts of at most `MOST_STEP_S`.
 
     Parameters
     ----------
     state : WheelState
-        Now.
+        State at the start of the step.
     torque_nm, acceleration_m_s2, load_n : float
-        Wheel torque, the car's acceleration and the wheel's load over the step [N m], [m/s^2], [N].
+        Wheel torque [N m], acceleration of the car [m/s^2] and load of the wheel [N] over the step.
     vehicle : Vehicle
         The car.
     step_s, floor_m_s : float
-        Step [s], and the speed below which there is no slip [m/s].
+        Step [s], and the speed below which slip is 0 [m/s].
     """
     parts = max(math.ceil(step_s / MOST_STEP_S - 1e-9), 1)
     by_wheel_speed, by_speed, by_theta = 1.0, 0.0, 0.0
@@ -119,7 +119,7 @@ def _part(
     step_s: float,
     floor_m_s: float,
 ) -> WheelStep:
-    """One exponential step."""
+    """The state after one exponential step."""
     slope = tyre_slope(state, load_n, vehicle, floor_m_s)
     inertia, radius_m = vehicle.wheel_inertia_kg_m2, vehicle.wheel_radius_m
     rate = -radius_m * slope.by_wheel_speed / inertia

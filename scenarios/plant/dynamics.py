@@ -12,8 +12,8 @@ twist and motor speed are states. Both vanish from the step's linear equations b
 The vehicle drives forward or stands: omega >= 0 and v >= 0. A torque that resists (a brake, rolling resistance)
 can bring a wheel to rest and then holds it, it never turns it back; the ground holds a standing car likewise.
 
-All compiled code is in this one file: numba's cache notices changes of a function's own file only, not of those that
-it calls into. Its order: tyre, road, wheel and vehicle, driveline, linear equations of the step, integrator, observer.
+All compiled code is in this file, because numba's cache detects changes of a function's own file only. Its order:
+tyre, road, wheel and vehicle, driveline, linear equations of the step, integrator, observer.
 
 References
 ----------
@@ -52,58 +52,60 @@ from scenarios.plant.parameters import (
 )
 
 FLOOR_SPEED_M_S = 0.01
-"""Least speed that slip is taken relative to: at standstill slip is 0 and not 0/0 [m/s]."""
+"""Least denominator of slip, which is so 0 at standstill [m/s]."""
 
 TOLERANCE_M_S = 2e-5
 """Accepted error estimate of a sub-step at rest, in wheel rim speed and vehicle speed; docs/plant.md [m/s]."""
 
 RELATIVE_TOLERANCE = 5e-5
-"""Growth of the accepted error estimate per vehicle speed, which keeps slip equally accurate at all speeds [-]."""
+"""Growth of the accepted error estimate per vehicle speed, for equal accuracy of slip at all speeds [-]."""
 
 BRAKE_FADE_RAD_S = 0.02
 """Motor speed below which the brake torque falls to 0 at rest; the rim then creeps slower than FLOOR_SPEED_M_S
 [rad/s]."""
 
 FOLLOWING = 4.0
-"""Factor on both tolerances in `follow`: the error stays at a fifteenth of the noise of the measurements [-]."""
+"""Factor on both tolerances in `follow`: the error is a fifteenth of the noise of the measurements [-]."""
 
 SHORTEST_STEP_S = 1e-5
-"""Length at which a sub-step is accepted whatever its error estimate is [s]."""
+"""Length at which a sub-step is accepted with any error estimate [s]."""
 
 ACCELERATION_TOLERANCE_M_S2 = 1e-7
 """Residual of the acceleration under load transfer after which one more Newton correction ends the iteration
 [m/s^2]."""
 
 RELEASE_SPEED_M_S = 1.0
-"""Speed as at which a lagging force that still brakes a standing car relaxes: a real car would rock back [m/s]."""
+"""Speed in the relaxation of a force that still brakes a standing car: a real car would rock back [m/s]."""
 
 LEAST_RELAXATION = 0.1
-"""Least share of its length that a relaxation keeps, where load leaves the tyre or the tyre slides [-]."""
+"""Least share of the relaxation length, where load leaves the tyre or the tyre slides [-]."""
 
 LEAST_STIFFNESS = 0.1
-"""Least share of its stiffness that a tyre keeps where load leaves it; a negative stiffness would push [-]."""
+"""Least share of the tyre stiffness where load leaves the tyre; a negative stiffness would push [-]."""
 
 INITIAL_SLOPE = 1.27
 """Slope of the modified Dugoff force by slip at slip 0, over C_x; the constant of its G, docs/plant.md [-]."""
 
 KNEE_AT, CREST_AT, SLIDING_FROM = 0.6, 2.4, 5.0
-"""Stretches x = C_x lambda / (theta F_z) at which `reshaped` has its two bumps and half of its sliding part [-]."""
+"""Values x = C_x lambda / (theta F_z) at which `reshaped` has its two bumps and half of its sliding part [-]."""
 
 LEAST_GRIP_N = 1.0
-"""Least theta F_z that a stretch is taken relative to; it keeps the quotient finite [N]."""
+"""Least theta F_z in the denominator of x [N]."""
 
 LEAST_SLOPE = 1e-3
 """Least slope of the force by the lagging slip in the Jacobian, over the mean C_x [-]."""
 
 BORDER_TOLERANCE_M = 1e-7
-"""Distance before a road segment's start within which a contact point counts as on it [m]."""
+"""Distance before a road segment's start from which a contact point is on the segment [m]."""
 
-compiled = njit(cache=True, error_model="numpy")  # divisions are guarded here, not by the compiler
-# A call would pass on all parameters and count references of every array, which takes as long as the arithmetic.
+compiled = njit(
+    cache=True, error_model="numpy"
+)  # divisions by 0 are avoided in the code, not by the compiler
+# A call passes all parameters and counts references of every array, which takes as long as the arithmetic.
 # LLVM's inlining (forceinline) compiles faster than numba's (inline="always").
 inlined = njit(cache=True, error_model="numpy", forceinline=True)
 
-# Rows of `Wheels.work`, one array because each array that a call passes on costs time.
+# Rows of `Wheels.work`, which is one array because each array of a call costs time.
 _STEADY, _LAG, _SLOPE_WHEEL, _SLOPE_SPEED = range(4)  # the tyre's, filled by `forces`
 _GAIN, _BY_WHEEL, _BY_SPEED, _OWN, _SHARE, _MOTOR, _BRAKE = range(4, 11)  # the step's linear equations
 _PER_STATE = 11  # force per lagging state: 1 where the force itself lags, C_x or less where the slip does
@@ -155,7 +157,7 @@ def bump(x: float, at: float) -> tuple[float, float]:
     return 4.0 * square / (1.0 + square) ** 2, 8.0 * x / (at * at) * (1.0 - square) / (1.0 + square) ** 3
 
 
-# Every further tyre curve is a function of this one shape: a force and its slopes in, others out.
+# Every further tyre curve has this signature: force and slopes in, force and slopes out.
 @inlined
 def reshaped(
     tyre: tuple[float, float, float],
@@ -165,7 +167,7 @@ def reshaped(
     stiffness_n: float,
     p: DynamicsParameters,
 ) -> tuple[float, float, float]:
-    """A tyre's force and slopes times a function of the stretch x = C_x lambda / (theta F_z) that is 1 at slip 0."""
+    """A tyre's force and slopes times a function of x = C_x lambda / (theta F_z) that is 1 at slip 0."""
     force, by_slip, by_load = tyre
     grip_n = max(theta * load_n, LEAST_GRIP_N)
     x = stiffness_n * slip / grip_n
@@ -184,10 +186,10 @@ def peak_force(theta: float, load_n: float, stiffness_n: float) -> tuple[float, 
     """The greatest force of the modified Dugoff tyre over all slips [N], and its derivative by load [-].
 
     Beyond full adhesion it is theta F_z (1 + a / 4 - a / (4 lambda)) shape(lambda) with a = theta F_z / C_x. Where the
-    derivative vanishes is a fixed point that settles at once, since the force is flat there.
+    derivative vanishes is a fixed point, whose iteration converges in a few steps because the force is flat there.
     """
     a = theta * load_n / stiffness_n
-    # Beyond theta of 2.17 the force does not fall with slip at first, and the bound on slip takes over.
+    # Above theta 2.17 the force does not fall with slip at first, and the bound on slip applies.
     slip = np.sqrt(0.25 * a * INITIAL_SLOPE / max(-falling_shape(theta, 0.0)[1], 1e-3))
     force = by_load = 0.0
     for _ in range(4):
@@ -195,7 +197,7 @@ def peak_force(theta: float, load_n: float, stiffness_n: float) -> tuple[float, 
         shape, shape_by_slip = falling_shape(theta, slip)
         reach = 1.0 + 0.25 * a - 0.25 * a / slip
         force = theta * load_n * reach * shape
-        by_load = theta * (2.0 * reach - 1.0) * shape  # where the force is flat, slip may stay
+        by_load = theta * (2.0 * reach - 1.0) * shape  # where the force is flat, slip may be constant
         slip = np.sqrt(0.25 * a * shape / max(-reach * shape_by_slip, 1e-3))
     return force, by_load
 
@@ -243,7 +245,7 @@ def _mean_of_wheels(values: PerWheel) -> float:
 def steady_tyre(
     theta: float, slip: float, load_n: float, stiffness_n: float, p: DynamicsParameters
 ) -> tuple[float, float, float]:
-    """Steady force of a tyre as the parameters want its curve, and its slopes; arguments and units as `tyre_force`."""
+    """Steady force of a tyre with the parameters' curve, and its slopes; arguments and units as `tyre_force`."""
     tyre = tyre_force(theta, slip, load_n, stiffness_n)
     if p.knee != 0.0 or p.crest != 0.0 or p.sliding != 0.0:
         tyre = reshaped(tyre, theta, slip, load_n, _mean_of_wheels(p.longitudinal_stiffness_n), p)
@@ -254,7 +256,7 @@ def steady_tyre(
 
 @inlined
 def adhesion_left(sliding_m_s: float, p: DynamicsParameters) -> float:
-    """Share of the adhesion that a tyre has at a sliding speed [-]: exponential after [4]_, or hyperbolic."""
+    """Share of the adhesion at a sliding speed [-]: exponential after [4]_, or hyperbolic."""
     if p.falloff_s_m <= 0.0:
         return 1.0
     fallen = p.falloff_s_m * sliding_m_s
@@ -284,8 +286,8 @@ def segment_at(start_m: NDArray, contact_m: float) -> int:
 
 
 @inlined
-def look_up_theta(position_m: float, p: DynamicsParameters, road: RoadTable, theta: NDArray) -> float:
-    """Fill theta under the wheels; return the least distance from a contact to the border ahead of it [m]."""
+def fill_theta(position_m: float, p: DynamicsParameters, road: RoadTable, theta: NDArray) -> float:
+    """Fill theta under the wheels; returns the least distance from a contact to the border ahead of it [m]."""
     front_m = position_m + p.cog_to_front_axle_m
     rear_m = position_m - p.cog_to_rear_axle_m
     front = segment_at(road.start_m, front_m)
@@ -330,14 +332,14 @@ def initial_y(speed_m_s: float, position_m: float, p: DynamicsParameters) -> NDA
 
 @inlined
 def slip_of(rim_m_s: float, speed_m_s: float) -> tuple[float, float]:
-    """Unsigned slip of a wheel [-], Eq. (13) in [1]_ with a floor, and the speed it is relative to [m/s]."""
+    """Unsigned slip of a wheel [-], Eq. (13) in [1]_ with a least denominator, and that denominator [m/s]."""
     reference_m_s = max(rim_m_s, speed_m_s, FLOOR_SPEED_M_S)
     return abs(rim_m_s - speed_m_s) / reference_m_s, reference_m_s
 
 
 @inlined
 def static_loads(p: DynamicsParameters) -> tuple[float, float, float]:
-    """Load of a front and of a rear wheel without acceleration [N], and what moves per acceleration [kg].
+    """Load of a front and of a rear wheel without acceleration [N], and the load transfer per acceleration [kg].
 
     F_z,front = m (g l_r - a h) / (2 L), F_z,rear = m (g l_f + a h) / (2 L); ch. 1 of [5]_.
     """
@@ -349,7 +351,7 @@ def static_loads(p: DynamicsParameters) -> tuple[float, float, float]:
 
 @inlined
 def body_resistance(speed_m_s: float, tyres_n: float, p: DynamicsParameters) -> tuple[float, float]:
-    """Air drag and rolling resistance on the body [N]; the latter holds a standing car and never pushes it back.
+    """Air drag and rolling resistance on the body [N]; the latter holds a standing car and does not push it back.
 
     F = 0.5 rho C_d A v^2 + c_hub m g; ch. 4 of [5]_.
     """
@@ -360,9 +362,9 @@ def body_resistance(speed_m_s: float, tyres_n: float, p: DynamicsParameters) -> 
 
 @inlined
 def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> float:
-    """Fill loads, slips, signed forces and force slopes; return what the accelerometer reads [m/s^2].
+    """Fill loads, slips, signed forces and force slopes; returns the accelerometer's reading [m/s^2].
 
-    With load transfer the acceleration stands on both sides; Newton's method on it starts from `accel`.
+    With load transfer the loads depend on the acceleration, which Newton's method solves for from `accel`.
     """
     speed = max(y[SPEED], 0.0)
     front_n, rear_n, transfer_kg = static_loads(p)
@@ -389,7 +391,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             stiffness_n = p.longitudinal_stiffness_n[i] * softening
             force, by_slip, by_load = steady_tyre(theta, abs(acting), load_n, stiffness_n, p)
             force, by_load = np.copysign(force, acting), np.copysign(by_load, acting)
-            # The falling branch is left out of the Jacobian: it is not stiff, and the method keeps its order.
+            # The falling branch is not in the Jacobian: it is not stiff, and the method keeps its order.
             slope = max(by_slip, 0.0)
             if relaxes:
                 releases = speed <= 0.0 and y[FORCE + i] < 0.0
@@ -421,8 +423,8 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
 
 @inlined
 def refresh(y: NDArray, accel: float, p: DynamicsParameters, road: RoadTable, first: Wheels) -> float:
-    """Make `first` hold what `advance` needs after y was changed from outside; return the accelerometer [m/s^2]."""
-    look_up_theta(y[POSITION], p, road, first.theta)
+    """Update `first` after y was changed outside of `advance`; returns the accelerometer's reading [m/s^2]."""
+    fill_theta(y[POSITION], p, road, first.theta)
     return forces(y, accel, p, first)
 
 
@@ -437,7 +439,7 @@ def _wheel_rate(i: int, speed_rad_s: float, torque_nm: float, p: DynamicsParamet
 
 @inlined
 def _motor_torque(speed_rad_s: float, torque_nm: float) -> tuple[float, float]:
-    """Torque that acts on a motor [N m], and its fall per motor speed [N m s/rad].
+    """Torque on a motor [N m], and its decrease per motor speed [N m s/rad].
 
     A negative torque is a brake, which opposes the motor's motion. Within BRAKE_FADE_RAD_S of rest it acts like a
     damper: a brake that reverses at rest would chatter.
@@ -453,15 +455,17 @@ def _motor_torque(speed_rad_s: float, torque_nm: float) -> tuple[float, float]:
 def _fill_rates(
     y: NDArray, torque_nm: NDArray, next_nm: NDArray, part: float, p: DynamicsParameters, wheels: Wheels
 ) -> None:
-    """Fill the rates of y from the wheel speeds on, and what is free to move, at a part of the output step."""
+    """Fill the rates of y from the wheel speeds on, and the flags of free motion, at a part of the output step."""
     total_n = 0.0
     for i in range(4):
         torque = torque_nm[i] + (next_nm[i] - torque_nm[i]) * part
         if p.motor_inertia_kg_m2 > 0.0:
-            spread = y[MOTOR + i] - y[WHEEL + i]
-            shaft_nm = p.shaft_stiffness_nm_rad[i] * y[TWIST + i] + p.shaft_damping_nm_s_rad * spread
+            speed_difference = y[MOTOR + i] - y[WHEEL + i]
+            shaft_nm = (
+                p.shaft_stiffness_nm_rad[i] * y[TWIST + i] + p.shaft_damping_nm_s_rad * speed_difference
+            )
             motor_nm, wheels.work[_BRAKE, i] = _motor_torque(y[MOTOR + i], torque)
-            wheels.rates[TWIST - WHEEL + i] = spread
+            wheels.rates[TWIST - WHEEL + i] = speed_difference
             wheels.rates[MOTOR - WHEEL + i] = (motor_nm - shaft_nm) / p.motor_inertia_kg_m2
             torque = shaft_nm
         rate = _wheel_rate(i, y[WHEEL + i], torque, p, wheels)
@@ -484,7 +488,7 @@ def _shaft(i: int, gh: float, p: DynamicsParameters) -> tuple[float, float]:
 
 @inlined
 def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> float:
-    """Eliminate all wheels from 1 - gamma h A; fill the pivots, return the vehicle speed's.
+    """Eliminate all wheels from 1 - gamma h A; fills the pivots, returns that of the vehicle speed.
 
     A couples each wheel with the vehicle's speed alone. Within a wheel, shaft and motor act as inertia, and a lagging
     force as a smaller slope of the force.
@@ -513,7 +517,7 @@ def _factor(speed: float, h: float, p: DynamicsParameters, wheels: Wheels) -> fl
 def _solve(
     speed_rhs: float, pivot: float, h: float, p: DynamicsParameters, wheels: Wheels, k: NDArray
 ) -> float:
-    """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; return the vehicle speed's part."""
+    """Solve (1 - gamma h A) k = right-hand side, in place for the wheels; returns the part of the vehicle speed."""
     gh = _GAMMA * h
     at = wheels.work
     has_shaft = p.motor_inertia_kg_m2 > 0.0
@@ -549,7 +553,7 @@ def _solve(
 
 @inlined
 def _states(p: DynamicsParameters) -> int:
-    """How many entries of y are in use."""
+    """Number of used entries of y."""
     return STATES if _relaxes(p) or p.motor_inertia_kg_m2 > 0.0 else FORCE
 
 
@@ -567,7 +571,7 @@ def _try_step(
     first: Wheels,
     second: Wheels,
 ) -> tuple[float, float]:
-    """One two-stage Rosenbrock step, ROS2 of [7]_, from y to trial; return error estimate [m/s], accelerometer."""
+    """Take a two-stage Rosenbrock step, ROS2 of [7]_, from y to trial; returns error estimate [m/s], accelerometer."""
     count = _states(p) - WHEEL
     k_1, k_2 = first.rates, second.rates
     _fill_rates(y, torque_nm, next_torque_nm, begin, p, first)
@@ -611,16 +615,16 @@ def advance(
     h: float,
     looser: float,
 ) -> tuple[float, float]:
-    """Move y over one output step with torque linear between its ends; return the accelerometer there [m/s^2].
+    """Advance y over one output step with torque linear between its ends; returns the accelerometer [m/s^2].
 
     `first` must hold the forces at y, and does so again at the end. Sub-steps end at every road border that a wheel
     crosses and shrink until their error estimate is accepted, from a first one of h [s] and with tolerances `looser`
-    than the plant's own by that factor. Also returns the first sub-step that held [s].
+    than the plant's own by that factor. Also returns the first accepted sub-step [s].
     """
     count = _states(p)
     at_s = 0.0
     held_s = 0.0
-    ahead_m = look_up_theta(y[POSITION], p, road, first.theta)
+    ahead_m = fill_theta(y[POSITION], p, road, first.theta)
     while step_s - at_s > 1e-9 * step_s:
         h = min(h, step_s - at_s)
         if y[SPEED] * h > ahead_m:
@@ -638,7 +642,7 @@ def advance(
         held_s = h if at_s == 0.0 else held_s
         at_s += h
         h *= min(0.9 * np.sqrt(tolerance / max(error, 1e-3 * tolerance)), 10.0)
-        ahead_m = look_up_theta(y[POSITION], p, road, first.theta)
+        ahead_m = fill_theta(y[POSITION], p, road, first.theta)
         accel = forces(y, new_accel, p, first)
     return accel, held_s
 
@@ -651,7 +655,7 @@ def run(
     p: DynamicsParameters,
     road: RoadTable,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Simulate all rows from y, which ends as the last row's state.
+    """Simulate all rows from y, which becomes the last row's state.
 
     Returns
     -------
@@ -727,7 +731,7 @@ def follow(
     thetas: NDArray,
     shares: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Simulate all rows from y while position, speed and wheel speeds are drawn to measurements; see `run`.
+    """Simulate all rows from y with position, speed and wheel speeds corrected towards measurements; see `run`.
 
     Parameters
     ----------
@@ -740,20 +744,20 @@ def follow(
     measured : array, shape (n, 6)
         Position, speed and wheel speeds; NaN where there is none.
     memory_s : array, shape (6,)
-        Time in which a state comes to its measurement [s]; the first rows are averaged instead.
+        Time constant of the correction of a state [s]; the first rows are averaged instead.
     step_s : float
         Time between the rows [s].
     ends : array, shape (1 + m, VALUES)
-        The car as `DynamicsParameters.as_row`, and m others that it may vary towards.
+        The car as `DynamicsParameters.as_row`, and m other cars.
     start_m, thetas : array, shape (segments,), (1 + m, segments, 2)
         Roads of the same segments, likewise.
     shares : array, shape (n, m)
-        How far it is towards each, row by row [-].
+        Share of the difference to each other car, row by row [-].
 
     Returns
     -------
     tuple
-        As `run`, each row before its own measurement is taken in; states (n, 6).
+        As `run`, each row before the correction by its own measurement; states (n, 6).
     """
     n = torque_nm.shape[0]
     states, accels = np.empty((n, 6)), np.empty(n)
@@ -769,7 +773,7 @@ def follow(
         accels[k] = accel
         for j in range(6):
             states[k, j] = y[j]
-        for i in range(4):  # copied as arrays they take a tenth of all time
+        for i in range(4):  # element by element: array copies take a tenth of all time
             slip[k, i], force_n[k, i] = first.slip[i], first.force_n[i]
             load_n[k, i], theta[k, i] = first.load_n[i], first.theta[i]
         if k + 1 == n:

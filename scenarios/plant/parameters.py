@@ -1,4 +1,4 @@
-"""What goes into the plant's compiled step, and what it works on."""
+"""Parameters, road and working arrays of the plant's compiled step."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 from trpac_core.vehicle import GRAVITY_M_S2
 
 POSITION, SPEED, WHEEL, FORCE, TWIST, MOTOR, STATES = 0, 1, 2, 6, 10, 14, 18
-"""Where the state vector y holds what: position [m], vehicle speed [m/s], and four each of wheel speed [rad/s], tyre
+"""Indices of the state vector y: position [m], vehicle speed [m/s], and four each of wheel speed [rad/s], tyre
 force [N] or lagging slip [-] (with relaxation), shaft twist [rad] and motor speed [rad/s] (with a driveline); unused
-ones stay as they are."""
+ones do not change."""
 
 PerWheel = tuple[float, float, float, float]
-"""One value per wheel in the order of `trpac_core.vehicle.WHEELS`: fl, fr, rl, rr. Tuples and not arrays: the compiled
-step counts references of each array that it hands on, which took half of all time."""
+"""One value per wheel in the order of `trpac_core.vehicle.WHEELS`: fl, fr, rl, rr. Tuples and not arrays: the
+compiled step counts references of each array that it passes, which took half of all time."""
 
 PER_WHEEL = 8
 """How many fields of `DynamicsParameters`, the first ones, hold one value per wheel."""
 
 
 class DynamicsParameters(NamedTuple):
-    """Everything that the dynamics stage depends on; effects replace fields."""
+    """Parameters of the dynamics stage; effects replace fields."""
 
     wheel_radius_m: PerWheel
     """Rolling radius: vehicle speed over wheel speed of a wheel that rolls without slip [m]."""
@@ -60,11 +60,11 @@ class DynamicsParameters(NamedTuple):
     falloff_s_m: float = 0.0
     """Rate at which adhesion falls with sliding speed; 0: it does not [s/m]."""
     falloff_floor: float = 1.0
-    """Share of the adhesion that is left at high sliding speed [-]."""
+    """Share of the adhesion at high sliding speed [-]."""
     falloff_hyperbolic: float = 0.0
     """1: adhesion falls as a hyperbola of the sliding speed; 0: exponentially [-]."""
     knee: float = 0.0
-    """Relative deviation of the tyre force where adhesion begins to give way to sliding [-]."""
+    """Relative deviation of the tyre force where the contact patch begins to slide [-]."""
     crest: float = 0.0
     """Relative deviation of the tyre force near its maximum [-]."""
     sliding: float = 0.0
@@ -107,7 +107,7 @@ VALUES = 4 * PER_WHEEL + OF_VEHICLE
 
 
 class RoadTable(NamedTuple):
-    """The road as the compiled step reads it; the first segment also holds before its start."""
+    """The road in the compiled step; the first segment also holds before its start."""
 
     start_m: NDArray[np.float64]
     """Where each segment begins, shape (segments,) [m]."""
@@ -131,4 +131,4 @@ class Wheels(NamedTuple):
     free: NDArray[np.float64]
     """0 for what is held at rest, else 1: four wheels and the vehicle, shape (5,) [-]."""
     work: NDArray[np.float64]
-    """What only the step itself needs, shape (12, 4); dynamics.py names the rows."""
+    """Working array of the step, shape (12, 4); dynamics.py names the rows."""

@@ -1,4 +1,4 @@
-"""The plant as a whole: commanded torque through actuators and dynamics to a trajectory, or step by step."""
+"""The plant: from commanded torque through actuators and dynamics to a trajectory, at once or step by step."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from scenarios.plant.parameters import FORCE, POSITION, SPEED, WHEEL, DynamicsPa
 Array = NDArray[Any]
 
 NO_SHAFT_NM_RAD = 1e4
-"""Torsional stiffness that the parameters hold where no effect adds shafts; nothing depends on it [N m/rad]."""
+"""Torsional stiffness without shafts, which then has no influence [N m/rad]."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class PlantTrajectory:
 
 @dataclass(frozen=True)
 class PlantSetup:
-    """What stays constant while the plant runs."""
+    """Constants of a simulation."""
 
     parameters: DynamicsParameters
     road: RoadTable
@@ -72,13 +72,13 @@ class PlantState:
     setup : PlantSetup
         Its constants.
     time_s, accel_x_m_s2 : float
-        Time [s], and what the accelerometer reads [m/s^2].
+        Time [s], and the accelerometer's reading [m/s^2].
     y : array, shape (18,)
-        The state as the compiled step has it, see `scenarios.plant.parameters`.
+        State of the compiled step, see `scenarios.plant.parameters`.
     wheel_torque_nm : tuple
         Torque at the wheels [N m].
     wheels : Wheels
-        What the tyres do, in arrays to read.
+        Forces, loads and slips of the tyres.
     """
 
     setup: PlantSetup
@@ -130,7 +130,7 @@ def make_setup(vehicle: VehicleFile, road: RoadFile) -> PlantSetup:
 
 
 def actual_torque(vehicle: VehicleFile, time_s: Array, wheel_torque_nm: Array) -> Array:
-    """The torque that a vehicle's actuators make of a commanded one, both shape (n, 4), at uniform times [N m]."""
+    """Torque at the wheels for a commanded one, both shape (n, 4), at uniform times [N m]."""
     for effect in vehicle.make_effects():
         wheel_torque_nm = effect.actuate(time_s, wheel_torque_nm)
     return wheel_torque_nm
@@ -144,12 +144,12 @@ def simulate(
     initial_speed_m_s: float = 0.0,
     initial_position_m: float = 0.0,
 ) -> PlantTrajectory:
-    """Drive a vehicle, at first freely rolling, with a given torque history.
+    """The trajectory of a vehicle, at first freely rolling, under a torque history.
 
     Parameters
     ----------
     vehicle, road : VehicleFile, RoadFile
-        What is driven, with its effects, and where.
+        The vehicle with its effects, and the road.
     wheel_torque_nm : array, shape (n, 4)
         Commanded torque at the output times, linear between them; below 0 it brakes and holds at rest [N m].
     step_s : float
@@ -243,7 +243,7 @@ def advance(state: PlantState, wheel_torque_nm: ArrayLike, step_s: float) -> Pla
 
 
 def drive(scenario: Scenario) -> PlantTrajectory:
-    """Drive a scenario from standstill with the front axle at the road's zero until its end."""
+    """The trajectory of a scenario from standstill, with the front axle at position 0, until its end."""
     time_s: Array = np.arange(round(scenario.end.time_s / scenario.step_s) + 1) * scenario.step_s
     to_front_m = scenario.vehicle.wheelbase_m - scenario.vehicle.cog_to_rear_axle_m
     whole = simulate(

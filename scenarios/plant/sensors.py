@@ -1,4 +1,4 @@
-"""The plant's sensors: from the true trajectory to a log with the column names of the log contract."""
+"""The plant's sensors: from the true trajectory to a log with the columns of the log format."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from trpac_core.vehicle import WHEELS
 Array = NDArray[np.float64]
 
 IDEAL = SensorNoise()
-"""Sensors that read the truth."""
+"""Sensors without noise."""
 
 
 def make_log(
@@ -26,16 +26,16 @@ def make_log(
     noise: SensorNoise = IDEAL,
     seed: int = 0,
 ) -> pd.DataFrame:
-    """A trajectory as the vehicle's sensors report it.
+    """The log of a trajectory by the vehicle's sensors.
 
     Parameters
     ----------
     trajectory, vehicle : PlantTrajectory, VehicleFile
-        The true motion, and the vehicle that made it.
+        The motion, and its vehicle.
     noise : SensorNoise
-        Standard deviations of the white Gaussian noise that is added to each channel.
+        Standard deviations of the white Gaussian noise of each channel.
     seed : int
-        The same seed gives the same noise; every column has a random stream of its own.
+        Seed of the noise; every column has its own random stream.
 
     Returns
     -------
@@ -62,14 +62,14 @@ def make_log(
 
 
 def sense(vehicle: VehicleFile, time_s: Array, signals: dict[str, Array]) -> dict[str, Array]:
-    """A vehicle's true signals as its sensors report them, without noise; by log column, shape (n,) each."""
+    """Readings of the sensors for true signals, without noise, by log column, shape (n,) each."""
     for effect in vehicle.make_effects():
         signals = effect.sense(time_s, signals)
     return signals
 
 
 def correct(vehicle: VehicleFile, time_s: Array, signals: dict[str, Array]) -> dict[str, Array]:
-    """Undo `sense` as well as can be; a lost sample stays NaN, and so does what delayed sensors never told."""
+    """True signals by the inverse of `sense`; lost samples, and the end of delayed signals, are NaN."""
     for effect in reversed(vehicle.make_effects()):
         signals = effect.correct(time_s, signals)
     return signals
@@ -81,7 +81,7 @@ def make_scenario_log(scenario: Scenario, trajectory: PlantTrajectory) -> pd.Dat
 
 
 def write_log(log: pd.DataFrame, path: str | Path) -> None:
-    """Write a log as CSV; numbers keep all digits that they need to be read back unchanged."""
+    """Write a log as CSV, with numbers that are read back unchanged."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     log.to_csv(path, index=False)

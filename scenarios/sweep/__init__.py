@@ -1,1 +1,1 @@
-"""Monte-Carlo over a scenario: draws, runs, results on Dask, report. Start at `files` and `run`."""
+"""Monte-Carlo simulation of a scenario: draws, runs on Dask, results, report. Start at `files` and `run`."""

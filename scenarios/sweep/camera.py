@@ -1,11 +1,10 @@
-"""The camera of a run without pictures: verdicts drawn from records of the real image estimator.
+"""Road classes of a run without pictures, drawn from records of the real image estimator.
 
-`camera_process.yaml` holds what the image estimator said along rendered, disturbed worlds (`measure_camera.py`). A run
-draws one of these worlds and, for each stretch of road, a place in that world's record of the surface; from there
-on the record is played back by the way driven. So wrong classes come as often, as long and with as high a confidence
-as they did there, and worlds that are hard stay hard for the whole run. A verdict comes in the step of its picture, as
-from the unit, which stamps a picture onto the road where it was taken however long it then thinks; `late_s` is what
-a bus adds to that.
+`camera_process.yaml` holds the image estimator's classes along rendered, disturbed worlds; it is written by
+`python -m benchmarks.vision.measure_camera_process`. A run draws one world and, for each stretch of road, an offset in
+that world's record of the surface; from there the record is played back by distance driven. Frequency, length and
+confidence of wrong classes are those of the record, and one world holds for the whole run. A class arrives in the step
+in which its picture was taken, as in the unit, plus the delay `late_s` of a bus.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from scenarios.camera.disturbances import disturb
 from scenarios.files import Scenario
-from scenarios.pictures import DISTURBANCES, frame_steps, scene
+from scenarios.pictures import DISTURBANCES, frame_steps, scene_renderer
 from scenarios.plant.pipeline import PlantTrajectory
 from scenarios.sweep.draw import Camera
 from scenarios.yaml_text import parse_yaml
@@ -36,7 +35,7 @@ CERTAIN = 0.95
 
 
 class Record(NamedTuple):
-    """Verdicts along one surface of one world, at equal spacing: class index and Q_v, shape (n,) each."""
+    """Classes along one surface of one world, at equal spacing: class index and Q_v, shape (n,) each."""
 
     given: NDArray[np.int64]
     Q_v: NDArray[np.float64]
@@ -44,7 +43,7 @@ class Record(NamedTuple):
 
 @dataclass(frozen=True)
 class CameraProcess:
-    """The records, with the way between their verdicts, and ahead of the wheel to what they speak of [m]."""
+    """The records, the distance between their entries [m], and from the front wheel to the road that they show [m]."""
 
     spacing_m: float
     near_m: float
@@ -68,12 +67,12 @@ def _record(entry: dict[str, Any]) -> Record:
 
 
 class Frames(NamedTuple):
-    """The frames of a drive that arrive, and what disturbs them, shape (n,) each."""
+    """The frames of a drive that arrive, and their disturbances, shape (n,) each."""
 
     taken: NDArray[np.int64]
     """Step at which the picture is taken."""
     arrives: NDArray[np.int64]
-    """Step at which its verdict comes."""
+    """Step at which its class arrives."""
     front_m: NDArray[np.float64]
     """Where the front axle is when the picture is taken [m]."""
     wrong: NDArray[np.int64]
@@ -87,19 +86,7 @@ def frames_of(
     process: CameraProcess,
     random: np.random.Generator,
 ) -> Frames:
-    """The frames of a drive with the run's disturbances drawn.
-
-    Parameters
-    ----------
-    scenario, trajectory : Scenario, PlantTrajectory
-        Road and frame rate, and the drive.
-    camera : Camera
-        How much disturbs the frames.
-    process : CameraProcess
-        For how far ahead the verdict's middle lies.
-    random : Generator
-        Where the disturbances are drawn from.
-    """
+    """The frames of a drive with the run's disturbances drawn."""
     taken = np.arange(0, len(trajectory), frame_steps(scenario))
     front_m = trajectory.position_m[taken] + scenario.vehicle.to_core().cog_to_front_axle_m
     true = np.array([int(scenario.road.segment_at(float(m)).surface_class) for m in front_m + process.near_m])
@@ -110,14 +97,14 @@ def frames_of(
     return Frames(taken[kept], taken[kept] + late, front_m[kept], wrong[kept])
 
 
-def class_verdicts(
+def road_classes(
     scenario: Scenario,
     trajectory: PlantTrajectory,
     camera: Camera,
     seed: int,
     process: CameraProcess | None = None,
 ) -> dict[int, RoadClass]:
-    """Verdicts of a drive, by the step at which they arrive; world and disturbances are drawn from the seed."""
+    """Road classes of a drive by the step at which they arrive; world and disturbances are drawn from the seed."""
     process = process or measured_process()
     random, disturbing = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
     frames = frames_of(scenario, trajectory, camera, process, disturbing)
@@ -131,33 +118,27 @@ def class_verdicts(
 
 
 class RenderedFrames:
-    """Pictures of a drive, drawn, disturbed and packed as JPEG when they are asked for.
-
-    Parameters
-    ----------
-    scenario, trajectory, camera, seed
-        As for `class_verdicts`; the world follows the scenario's seed.
-    """
+    """Pictures of a drive, drawn, disturbed and packed as JPEG when they are asked for."""
 
     def __init__(self, scenario: Scenario, trajectory: PlantTrajectory, camera: Camera, seed: int) -> None:
         self._scenario = scenario
-        self._renderer = scene(scenario)
+        self._renderer = scene_renderer(scenario)
         disturbing = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
         frames = frames_of(scenario, trajectory, camera, measured_process(), disturbing)
-        self._frames = {int(row): place for place, row in enumerate(frames.arrives)}
+        self._frames = {int(row): index for index, row in enumerate(frames.arrives)}
         self._taken, self._front_m, self._wrong = frames.taken, frames.front_m, frames.wrong
 
     def get(self, row: int) -> NDArray[np.uint8] | RoadClass | None:
         """The picture that arrives at a step, a wrong class in its place, or None where none arrives."""
-        place = self._frames.get(row)
-        if place is None:
+        index = self._frames.get(row)
+        if index is None:
             return None
-        if self._wrong[place] >= 0:
-            return RoadClass(Surface(int(self._wrong[place])), CERTAIN)
+        if self._wrong[index] >= 0:
+            return RoadClass(Surface(int(self._wrong[index])), CERTAIN)
         pictures = self._scenario.pictures
-        image = self._renderer.frame(float(self._front_m[place])).image
+        image = self._renderer.frame(float(self._front_m[index])).image
         seed = int(
-            np.random.SeedSequence([self._scenario.seed, int(self._taken[place])]).generate_state(1)[0]
+            np.random.SeedSequence([self._scenario.seed, int(self._taken[index])]).generate_state(1)[0]
         )
         image = disturb(image, DISTURBANCES[pictures.disturbance], seed)
         _, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, pictures.jpeg_quality])
@@ -165,17 +146,17 @@ class RenderedFrames:
 
 
 def _played_back(
-    scenario: Scenario, place_m: NDArray[np.float64], process: CameraProcess, random: np.random.Generator
+    scenario: Scenario, position_m: NDArray[np.float64], process: CameraProcess, random: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Class and confidence for the road at places."""
+    """Class index and confidence at road positions, shape (n,) each."""
     world = process.worlds[int(random.integers(len(process.worlds)))]
-    given, Q_v = np.empty(len(place_m), dtype=np.int64), np.empty(len(place_m))
+    given, Q_v = np.empty(len(position_m), dtype=np.int64), np.empty(len(position_m))
     starts = np.array([s.start_m for s in scenario.road.segments])
-    stretch = np.clip(np.searchsorted(starts, place_m, side="right") - 1, 0, None)
+    stretch = np.clip(np.searchsorted(starts, position_m, side="right") - 1, 0, None)
     for index, segment in enumerate(scenario.road.segments):
         record, here = world[segment.surface_class], stretch == index
         offset = int(random.integers(len(record.given)))
-        cell = np.floor((place_m[here] - starts[index]) / process.spacing_m).astype(np.int64)
+        cell = np.floor((position_m[here] - starts[index]) / process.spacing_m).astype(np.int64)
         at = (offset + cell) % len(record.given)
         given[here], Q_v[here] = record.given[at], record.Q_v[at]
     return given, Q_v
@@ -184,7 +165,7 @@ def _played_back(
 def _wrong_way(
     front_m: NDArray[np.float64], camera: Camera, random: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """Where on the way a wrong class is given: stretches and gaps of exponential length in the asked share."""
+    """Whether a wrong class is given, shape (n,); stretches and gaps have exponentially distributed lengths."""
     if camera.wrong_share <= 0.0:
         return np.zeros(len(front_m), dtype=bool)
     if camera.wrong_share >= 1.0:
@@ -192,10 +173,10 @@ def _wrong_way(
     gap_m = camera.wrong_length_m * (1.0 - camera.wrong_share) / camera.wrong_share
     wrong = bool(random.uniform() < camera.wrong_share)
     borders, states = [-np.inf], [wrong]
-    place = float(front_m[0])
-    while place < front_m[-1]:
-        place += float(random.exponential(camera.wrong_length_m if wrong else gap_m))
+    border_m = float(front_m[0])
+    while border_m < front_m[-1]:
+        border_m += float(random.exponential(camera.wrong_length_m if wrong else gap_m))
         wrong = not wrong
-        borders.append(place)
+        borders.append(border_m)
         states.append(wrong)
     return np.array(states)[np.searchsorted(np.array(borders), front_m, side="right") - 1]

@@ -1,4 +1,4 @@
-"""Where the runs of a sweep are done: processes of this machine, or a Dask cluster that strangers cannot steer."""
+"""The workers of a sweep: processes of this machine, or a Dask cluster behind TLS or on this machine."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from scenarios.errors import ScenarioError
 from trpac_core.files import quoted
 
 DEATHS = 3
-"""Workers that one run may take down before it is given up."""
+"""Workers that a run may crash before it is given up."""
 CONNECT_S = 20.0
-"""How long a scheduler's answer is waited for [s]."""
+"""Timeout of the connection to a scheduler [s]."""
 LOOPBACK = "127.0.0.1"
-"""Where a cluster of this machine listens: users of other machines do not reach it."""
+"""Address of a local cluster, which other machines do not reach."""
 
 
 @contextmanager
 def connected(scheduler: str | None, jobs: int) -> Iterator[Client]:
-    """A client of the cluster at an address, or of `jobs` processes of this machine; raises ScenarioError."""
+    """A Dask client of the cluster at an address, or of `jobs` local processes; raises ScenarioError."""
     if scheduler is not None:
         security = security_of(scheduler)
         try:
@@ -54,19 +54,19 @@ def connected(scheduler: str | None, jobs: int) -> Iterator[Client]:
 
 
 def security_of(scheduler: str) -> Security:
-    """Dask's configured certificates, for a scheduler that is on this machine or reached by TLS.
+    """Dask's security settings for a scheduler that is on this machine or reached by TLS.
 
     Raises
     ------
     ScenarioError
-        No address; one elsewhere without TLS, where whoever reaches it could run code as its user; TLS without
-        certificates.
+        An invalid address; one of another machine without TLS, where anyone who reaches it can run code as its user;
+        TLS without certificates.
     """
     name = f"--scheduler {quoted(scheduler)}"
-    scheme, place = parse_address(scheduler)
+    scheme, address = parse_address(scheduler)
     try:
-        here = _is_here(*parse_host_port(place))
-    except (OSError, ValueError) as error:  # of a name that nobody knows, or that is none
+        here = _is_here(*parse_host_port(address))
+    except (OSError, ValueError) as error:  # an unknown or an invalid name
         raise ScenarioError(
             f"{name}: {quoted(error)}; expected tls://HOST:PORT, or an address of this machine, such as "
             f"tcp://{LOOPBACK}:8786."
@@ -82,7 +82,7 @@ def security_of(scheduler: str) -> Security:
 
 
 def _is_here(host: str, port: int) -> bool:
-    """Whether every address of a host is one of this machine's own; raises OSError or ValueError where it has none."""
+    """Whether all addresses of a host are loopback ones; raises OSError or ValueError where it has none."""
     if not host or not 0 < port < 1 << 16:
         raise ValueError("names no host or no port")
     return all(ip_address(found[4][0]).is_loopback for found in socket.getaddrinfo(host, None))

@@ -1,8 +1,8 @@
-"""From a sweep to its runs: what each run is, drawn from its own number alone.
+"""The runs of a sweep, each drawn from its own number alone.
 
 Every run's random numbers come from numpy's SeedSequence of the sweep's seed and the run's number within its level, so
-they depend neither on the order of work nor on who does it. Levels of a varied quantity share them: run 7 at one level
-drives the same road with the same noise as run 7 at the next.
+they depend neither on the order of the runs nor on the worker. Levels of a varied quantity share them: run 7 has the
+same road and noise at all levels.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from scenarios.sweep.files import RoadDraw, Sweep, drawn_numbers, sample
 from scenarios.sweep.pedal import drive_pedal
 
 STREAMS = ("numbers", "road", "pedal", "noise", "camera")
-"""What has a random stream of its own; new ones go to the end, so that the old ones stay."""
+"""Random streams of a run; new ones are appended, so that the others do not change."""
 
 
 @dataclass(frozen=True)
 class RunKey:
-    """Which run: its number in the sweep, what is varied and at which level, its number within the level."""
+    """A run: its number in the sweep, varied parameter and level, and number within the level."""
 
     index: int
     parameter: str
@@ -31,7 +31,7 @@ class RunKey:
 
 @dataclass(frozen=True)
 class Believed:
-    """What the estimator takes for true: factors on what is [-], and the sensors' noise."""
+    """The estimator's assumptions: factors on the true values [-], and the sensors' noise."""
 
     mass_factor: float
     radius_factor: float
@@ -42,7 +42,7 @@ class Believed:
 
 @dataclass(frozen=True)
 class Camera:
-    """What the camera side is and what disturbs its verdicts; see `files.CameraDraw`."""
+    """The camera side and its disturbances; see `files.CameraDraw`."""
 
     source: str
     wrong_share: float
@@ -55,22 +55,22 @@ class Camera:
 
 @dataclass(frozen=True)
 class RunPlan:
-    """One run, everything drawn.
+    """One run with all drawn values.
 
     Attributes
     ----------
     key : RunKey
-        Which run it is.
+        The run.
     scenario : Scenario
-        Car, road, pedal, sensors and seed of this run; its sensors' noise is that of the plant.
+        Car, road, pedal, sensors and seed of this run; the noise is the true one.
     believed : Believed
-        What the estimator believes.
+        The estimator's assumptions.
     speed_bias_m_s : float
         Error of the vehicle speed [m/s].
     camera : Camera
         The camera side.
     camera_seed : int
-        Seed of its stream.
+        Seed of the camera's stream.
     """
 
     key: RunKey
@@ -82,18 +82,18 @@ class RunPlan:
 
 
 def run_keys(sweep: Sweep) -> list[RunKey]:
-    """All runs of a sweep in their order."""
+    """All runs of a sweep in order."""
     file = sweep.file
     levels = [(axis.parameter, level) for axis in file.vary for level in axis.levels] or [("", float("nan"))]
     return [
-        RunKey(place * file.runs + number, parameter, level, number)
-        for place, (parameter, level) in enumerate(levels)
+        RunKey(index * file.runs + number, parameter, level, number)
+        for index, (parameter, level) in enumerate(levels)
         for number in range(file.runs)
     ]
 
 
 def plan_run(sweep: Sweep, key: RunKey) -> RunPlan:
-    """Draw one run."""
+    """The drawn values of one run."""
     file = sweep.file
     seeds = np.random.SeedSequence(file.seed, spawn_key=(key.number,)).spawn(len(STREAMS))
     stream = dict(zip(STREAMS, seeds, strict=True))
@@ -132,7 +132,7 @@ def _seed(stream: np.random.SeedSequence) -> int:
 
 
 def _numbers(sweep: Sweep, key: RunKey, stream: np.random.SeedSequence) -> dict[str, float]:
-    """Every number that is drawn once a run; each from a stream of its own, so that none shifts another."""
+    """Numbers that are drawn once per run, each from its own stream, by their paths in the sweep file."""
     drawn = drawn_numbers(sweep.file)
     values = {}
     for (name, number), own in zip(drawn.items(), stream.spawn(len(drawn)), strict=True):
@@ -163,13 +163,13 @@ def _scenario(sweep: Sweep, numbers: dict[str, float], stream: dict[str, np.rand
 
 
 def draw_road(draw: RoadDraw, random: np.random.Generator) -> tuple[RoadFile, float]:
-    """A road with one stretch per surface, and its length [m]."""
+    """A drawn road with one stretch per surface, and its length [m]."""
     surfaces = list(draw.friction)
     if draw.order == "random":
         surfaces = [surfaces[i] for i in random.permutation(len(surfaces))]
     segments = []
-    for place, surface in enumerate(surfaces):
+    for index, surface in enumerate(surfaces):
         low, high = draw.friction[surface]
         mu = float(random.uniform(low, high))
-        segments.append(RoadSegment(start_m=place * draw.stretch_m, mu_left=mu, mu_right=mu, surface=surface))
+        segments.append(RoadSegment(start_m=index * draw.stretch_m, mu_left=mu, mu_right=mu, surface=surface))
     return RoadFile(schema=1, segments=segments), len(segments) * draw.stretch_m

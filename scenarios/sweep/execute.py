@@ -1,9 +1,9 @@
-"""All runs of a sweep on Dask: local processes, or a running cluster; every finished run is kept at once."""
+"""Runs a sweep on Dask, in local processes or on a running cluster; every finished run is stored at once."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -13,6 +13,7 @@ from distributed import Client, Future, as_completed
 from joblib import cpu_count
 
 from scenarios.errors import ScenarioError
+from scenarios.progress import Progress, silent
 from scenarios.sweep.cluster import connected, security_of
 from scenarios.sweep.draw import RunKey, plan_run, run_keys
 from scenarios.sweep.files import Sweep
@@ -21,15 +22,12 @@ from scenarios.sweep.store import Parts, identity, source_digest
 from trpac_core.files import quoted
 
 AHEAD = 8
-"""Runs handed to Dask per worker thread: enough to keep it busy, few enough to stop quickly."""
-
-Progress = Callable[[int, int], None]
-"""Told how many of how many runs are done."""
+"""Runs that are submitted per worker thread: enough to keep it busy, few enough to stop quickly."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A run that could not be finished, and why."""
+    """A run that failed, and the reason."""
 
     run: int
     why: str
@@ -37,7 +35,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class _Finished:
-    """What comes back from a worker."""
+    """The result of a worker."""
 
     rows: list[dict[str, Any]]
     cpu_s: float
@@ -45,7 +43,7 @@ class _Finished:
 
 
 def run_one(sweep: Sweep, key: RunKey) -> _Finished:
-    """One run, where a worker does it."""
+    """The result of one run; called on a worker."""
     began = time.process_time()
     rows = run_plan(plan_run(sweep, key), sweep.file.estimators, sweep.file.unit)
     return _Finished(rows, time.process_time() - began, source_digest())
@@ -56,33 +54,20 @@ def execute(
     out: Path,
     scheduler: str | None = None,
     jobs: int | None = None,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = silent,
 ) -> tuple[Parts, list[Failure]]:
-    """Do all runs that are not there yet.
-
-    Parameters
-    ----------
-    sweep : Sweep
-        What to run.
-    out : Path
-        Folder of the parts.
-    scheduler : str, optional
-        Address of a running cluster; without it processes of this machine.
-    jobs : int, optional
-        How many of these; the default is one per core.
-    progress : callable
-        Told how far it is.
+    """Run all runs that are not stored yet; returns the stored parts and the failures.
 
     Returns
     -------
     tuple
-        The parts, and the runs that failed.
+        Stored parts, and failed runs.
 
     Raises
     ------
     ScenarioError
-        A folder that holds another sweep, or a damaged part of it; a scheduler that does not answer, or that strangers
-        could steer; workers with other code.
+        A folder with another sweep or a damaged part; a scheduler that does not answer or is not secure; workers with
+        other code.
     """
     if scheduler is not None:
         security_of(scheduler)  # refused before anything is written
@@ -109,8 +94,8 @@ def execute(
 
 
 def _stream(client: Client, sweep: Sweep, todo: list[RunKey]) -> Iterator[tuple[RunKey, Future]]:
-    """Runs as they finish; only so many are handed out ahead."""
-    # The sweep travels with every task, some kB: scattered data would be lost with the worker that holds it.
+    """Runs as they finish; at most `AHEAD` per thread are submitted at a time."""
+    # The sweep, some kB, is sent with every task: scattered data would be lost with the worker that holds them.
     waiting = iter(todo)
     threads = sum(client.nthreads().values()) or 1
 

@@ -1,4 +1,4 @@
-"""Pictures of a sweep: distributions of error and convergence, coverage, degradation curves."""
+"""Figures of a sweep: distributions of error and convergence time, coverage, degradation curves."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from trpac_core.files import quoted
 COLOURS = {"IFE": "#d08a00", "DE": "#4c8fd0", "DIFE": "#c0272d"}
 OTHERS = ("#2c9c5a", "#7a4fb5", "#777777", "#b06d3a")
 ERROR_GOALS, TIME_GOALS = (0.01, 0.02), (0.3, 0.5)
-"""Median and 95th percentile that are asked for: steady-state error [-], excited convergence time [s]."""
+"""Required median and 95th percentile: steady-state error [-], excited convergence time [s]."""
 STYLE: Any = {"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}
 THETA_BIN = 0.1
 """Width of the bins of true friction [-]."""
@@ -32,12 +32,12 @@ def colour(name: str, names: list[str]) -> str:
 
 
 def plain(name: object) -> str:
-    """A name as pictures show it: a dollar begins no formula in it."""
+    """A name for matplotlib, with dollar signs escaped."""
     return quoted(name).replace("$", r"\$")
 
 
 def png(figure: Figure) -> bytes:
-    """A figure as a picture's bytes, without the date that matplotlib would write into it."""
+    """A figure as PNG, without matplotlib's metadata; closes the figure."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=120, metadata={"Software": None})
     plt.close(figure)
@@ -45,7 +45,7 @@ def png(figure: Figure) -> bytes:
 
 
 def distributions(table: pd.DataFrame) -> bytes:
-    """Cumulative distributions on slippery stretches that the tyre showed: error, strict and banded convergence."""
+    """Cumulative distributions of error and both convergence times on slippery stretches with enough excitation."""
     rows = shown_enough(slippery(table))
     names = list(table["estimator"].unique())
     with plt.rc_context(STYLE):
@@ -72,7 +72,7 @@ def distributions(table: pd.DataFrame) -> bytes:
 
 
 def _cumulative(axis: Axes, values: pd.Series, name: str, shade: str) -> None:
-    """Steps up to the share that ever gets there: what is missing never does."""
+    """Draw a cumulative distribution, in which missing values are infinite."""
     if not len(values):
         return
     found = np.sort(values.dropna().to_numpy(dtype=np.float64))
@@ -82,7 +82,7 @@ def _cumulative(axis: Axes, values: pd.Series, name: str, shade: str) -> None:
 
 
 def errors_by_friction(table: pd.DataFrame) -> bytes:
-    """Steady-state error of each stretch over its true friction, DE and DIFE side by side."""
+    """Steady-state error of each stretch over its true friction, one panel per estimator."""
     names = [n for n in table["estimator"].unique() if n != "IFE"]
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
@@ -115,7 +115,7 @@ def errors_by_friction(table: pd.DataFrame) -> bytes:
 
 
 def coverage_figure(table: pd.DataFrame) -> bytes | None:
-    """Share of time within 2 TRPAC_std over true friction, all time and while the tyre shows it."""
+    """Share of time within 2 TRPAC_std over true friction, of all time and of the excited time; None without any."""
     rows = table[table["covered_share"].notna()]
     if rows.empty:
         return None
@@ -128,14 +128,16 @@ def coverage_figure(table: pd.DataFrame) -> bytes | None:
         figure, axis = plt.subplots(figsize=(8.0, 3.8))
         axis.axhspan(*COVERAGE_SPAN, color="#2c9c5a", alpha=0.15, lw=0, label="asked for")
         for name in names:
-            for column, weight, style, said in kinds:
+            for column, weight, style, caption in kinds:
                 mine = rows[(rows["estimator"] == name) & rows[column].notna()]
                 groups = list(mine.groupby(np.floor(mine["theta"] / THETA_BIN).astype(int)))
                 centres = [
                     THETA_BIN * (float(part["theta"].iloc[0]) // THETA_BIN + 0.5) for _, part in groups
                 ]
                 shares = [np.average(part[column], weights=part[weight]) for _, part in groups]
-                axis.plot(centres, shares, style, color=colour(name, names), label=f"{plain(name)}, {said}")
+                axis.plot(
+                    centres, shares, style, color=colour(name, names), label=f"{plain(name)}, {caption}"
+                )
         axis.set_ylim(0.0, 1.02)
         axis.set_xlabel("true TRPAC [-]")
         axis.set_ylabel("share within 2 TRPAC_std")
@@ -145,7 +147,7 @@ def coverage_figure(table: pd.DataFrame) -> bytes | None:
 
 
 def degradations(table: pd.DataFrame) -> Iterator[tuple[str, bytes]]:
-    """One picture per varied quantity: error and convergence over its levels, every estimator."""
+    """Name and figure of each varied quantity: error and convergence time over its levels."""
     names = list(table["estimator"].unique())
     for parameter, part in table[table["parameter"] != ""].groupby("parameter", sort=False):
         with plt.rc_context(STYLE):
@@ -159,7 +161,7 @@ def degradations(table: pd.DataFrame) -> Iterator[tuple[str, bytes]]:
 
 
 def _degradation(axes: np.ndarray, part: pd.DataFrame, names: list[str]) -> None:
-    """Median and 95th percentile of error, time to 0.02, and mean error over all the time."""
+    """Draw median and 95th percentile of error and of time to 0.02, and the mean error of all time."""
     levels = sorted(part["level"].unique())
     slick = slippery(part)
     for name in names:

@@ -1,10 +1,10 @@
-"""The sweep file: which scenario, how often, what is drawn, what is varied level by level."""
+"""The sweep file: scenario, number of runs, drawn values, varied quantities and their levels."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -18,17 +18,17 @@ from trpac_core.files import quoted
 from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
 
 MOST_RUNS = 1_000_000
-"""Runs of a sweep in all its levels."""
+"""Greatest number of runs over all levels."""
 MOST_LISTED = 1000
-"""Levels of a quantity, or values to choose from."""
+"""Greatest number of levels of a quantity, or of values to choose from."""
 MOST_NAMED = 100
-"""Estimators, or varied quantities, of a sweep."""
+"""Greatest number of estimators, or of varied quantities."""
 MOST_ROWS = 20_000
-"""Rows of one run: its stretches of road times its estimators."""
+"""Greatest number of rows of a run: stretches of road times estimators."""
 LARGEST = 1e6
-"""Bound of a parameter of the estimator that the unit leaves open, in the parameter's unit."""
+"""Bound of parameters for which the unit has none, in the parameter's unit."""
 MOST_SEED = 2**63 - 1
-"""The seed goes into a column of 64 bits."""
+"""Greatest seed: it is stored in a column of 64 bits."""
 
 
 class _Section(BaseModel):
@@ -36,14 +36,14 @@ class _Section(BaseModel):
 
 
 class Drawn(_Section):
-    """How a number is drawn for each run; exactly one of the kinds."""
+    """Distribution of a number; exactly one of the kinds."""
 
     uniform: list[float] | None = None
-    """Lowest and highest."""
+    """Lowest and highest value."""
     normal: list[float] | None = None
     """Mean and standard deviation."""
     choice: Annotated[list[float], Field(min_length=1, max_length=MOST_LISTED)] | None = None
-    """One of these, all equally likely."""
+    """Equally likely values."""
 
     @model_validator(mode="after")
     def _check(self) -> Drawn:
@@ -57,7 +57,7 @@ class Drawn(_Section):
         return self
 
     def sample(self, random: np.random.Generator, within: tuple[float, float]) -> float:
-        """One value; of a normal one what lies beyond the range is drawn at its end."""
+        """A drawn value; values of a normal distribution are limited to the range."""
         if self.uniform is not None:
             return float(random.uniform(self.uniform[0], self.uniform[1]))
         if self.normal is not None:
@@ -66,11 +66,11 @@ class Drawn(_Section):
 
 
 Number = float | Drawn
-"""A number, or how it is drawn."""
+"""A number, or its distribution."""
 
 
 def extremes(number: Number) -> tuple[float, float]:
-    """Lowest and highest that a number says it can be; a normal one says its mean."""
+    """Lowest and highest value of a number; of a normal distribution its mean."""
     if not isinstance(number, Drawn):
         return number, number
     if number.uniform is not None:
@@ -82,12 +82,12 @@ def extremes(number: Number) -> tuple[float, float]:
 
 
 class RoadDraw(_Section):
-    """A road per run: one stretch of each surface, its friction drawn within the class's range."""
+    """A road per run: one stretch of each surface, with friction drawn within the range of its class."""
 
     order: Literal["random", "as_listed"] = "random"
     stretch_m: Annotated[float, Field(ge=1.0, le=10_000.0)] = 20.0
     friction: Annotated[dict[SurfaceName, list[float]], Field(min_length=1)]
-    """Surface to its lowest and highest friction [-]."""
+    """Lowest and highest friction by surface [-]."""
 
     @model_validator(mode="after")
     def _check(self) -> RoadDraw:
@@ -100,26 +100,26 @@ class RoadDraw(_Section):
 
 
 class PedalDraw(_Section):
-    """A driver who pulses the pedal and uses some of the grip; see `scenarios.sweep.pedal`."""
+    """A driver of pedal pulses; see `scenarios.sweep.pedal`."""
 
     grip_use: Number = Field(default_factory=lambda: Drawn(uniform=[0.75, 0.95]))
-    """Share of the grip that a pulse asks for, per pulse [-]."""
+    """Share of theta F_z that a pulse demands, per pulse [-]."""
     pulse_s: Number = Field(default_factory=lambda: Drawn(uniform=[0.34, 0.5]))
     """Length of a pulse, per pulse [s]."""
     period_s: Annotated[float, Field(ge=0.3, le=5.0)] = 0.58
     light_torque_nm: Annotated[float, Field(ge=0.0, le=100_000.0)] = 60.0
-    """On roads that the motors cannot excite, after the launch [N m]."""
+    """Torque on dry road after the launch [N m]."""
 
 
 class VehicleDraw(_Section):
-    """The car itself, which plant and estimator both know; factors on the scenario's vehicle file."""
+    """The car of plant and estimator: factors on the scenario's vehicle file [-]."""
 
     mass_factor: Number = 1.0
     stiffness_factor: Number = 1.0
 
 
 class Believed(_Section):
-    """What the estimator takes for true, as a factor on what is true [-]."""
+    """The estimator's assumptions as factors on the true values [-]."""
 
     mass_factor: Number = 1.0
     radius_factor: Number = 1.0
@@ -132,38 +132,38 @@ class SensorDraw(_Section):
 
     noise_factor: Number = 1.0
     noise_known_factor: Number | None = None
-    """What the estimator takes the noise for, as a factor on the scenario's; left out: what it is."""
+    """Noise that the estimator assumes, as a factor on the scenario's; by default the true noise."""
     speed_bias_m_s: Number = 0.0
     """Constant error of the vehicle speed [m/s]."""
 
 
 class CameraDraw(_Section):
-    """Disturbances of the camera's verdicts, on top of what the camera process or the pictures already do."""
+    """Disturbances of the camera's classes, in addition to the errors of class process or pictures."""
 
     source: Literal["class_process", "rendered", "none"] = "class_process"
     wrong_share: Number = 0.0
-    """Share of the way for which another class is given with confidence 0.95: flag 1 [-]."""
+    """Share of the distance with a wrong class of confidence 0.95, so flag 1 [-]."""
     wrong_length_m: Annotated[float, Field(ge=0.1, le=10_000.0)] = 5.0
-    """Mean length of such a stretch [m]."""
+    """Mean length of a stretch with a wrong class [m]."""
     lost_share: Number = 0.0
-    """Share of frames that never come [-]."""
+    """Share of lost frames [-]."""
     late_s: Number = 0.0
-    """How much later than its picture a verdict comes over the bus, and is stamped [s]."""
+    """Delay from picture to class on the bus, where it is stamped [s]."""
     class_value_offset: Number = 0.0
-    """Added to what the estimator takes each class's adhesion for [-]."""
+    """Added to the adhesion that the estimator assumes for each class [-]."""
     confidence_factor: Number = 1.0
-    """On every Q_v; 0: the flag is never up [-]."""
+    """Factor on every Q_v; 0: the flag is never set [-]."""
 
 
 class Axis(_Section):
-    """One quantity that takes several levels, `runs` runs on each, all else drawn alike on every level."""
+    """A varied quantity and its levels, with `runs` runs each; all else is drawn alike on every level."""
 
     parameter: str
     levels: Annotated[list[float], Field(min_length=1, max_length=MOST_LISTED)]
 
 
 class SweepFile(_Section):
-    """sweep.yaml as written; the scenario's path is relative to it."""
+    """The content of sweep.yaml; the scenario's path is relative to it."""
 
     schema_: Literal[1] = Field(alias="schema")
     name: Annotated[str, Field(max_length=200)]
@@ -179,7 +179,7 @@ class SweepFile(_Section):
     sensors: SensorDraw = Field(default_factory=SensorDraw)
     camera: CameraDraw = Field(default_factory=CameraDraw)
     unit: dict[str, float] = Field(default_factory=dict)
-    """Parameters of the estimator by the unit's names, in place of the delivered ones."""
+    """Parameters of the estimator by the unit's names, in place of the default ones."""
     vary: Annotated[list[Axis], Field(max_length=MOST_NAMED)] = Field(default_factory=list)
 
     @model_validator(mode="after")
@@ -204,7 +204,7 @@ class SweepFile(_Section):
 
 
 def _problems_of_unit(given: dict[str, float]) -> list[str]:
-    """What is wrong with parameters of the estimator: their names, or their values by the unit's own bounds."""
+    """Problems of parameters of the estimator: unknown names, and values out of the unit's bounds."""
     reals = {v.name: v for v in ESTIMATOR_PARAMETERS if v.unit}
     problems = []
     for name, value in given.items():
@@ -236,19 +236,19 @@ RANGES = {
     "camera.class_value_offset": (-0.4, 0.4),
     "camera.confidence_factor": (0.0, 1.0),
 }
-"""What each drawn number may be, in the unit of its name."""
+"""Range of each drawn number, in the unit of its name."""
 
 PER_PULSE = ("pedal.grip_use", "pedal.pulse_s")
-"""Drawn anew for every pulse, not once a run."""
+"""Numbers that are drawn for every pulse, not once per run."""
 
 
 def sample(name: str, number: Number, random: np.random.Generator) -> float:
-    """One value of a number of this name."""
+    """A value of the number of this name."""
     return number.sample(random, RANGES[name]) if isinstance(number, Drawn) else float(number)
 
 
 def drawn_numbers(file: SweepFile) -> dict[str, Number]:
-    """Every number that is drawn once a run, by its path in the file."""
+    """Numbers that are drawn once per run, by their paths in the file."""
     return {name: value for name, value in _numbers(file) if name not in PER_PULSE}
 
 
@@ -264,7 +264,7 @@ def _numbers(file: SweepFile) -> list[tuple[str, Number]]:
 
 
 def _all_numbers(file: SweepFile) -> list[tuple[str, Number]]:
-    """The numbers as written and the levels that take their place."""
+    """The numbers of the file, and the levels that replace them."""
     levels = [(axis.parameter, level) for axis in file.vary for level in axis.levels]
     return [*_numbers(file), *levels]
 
@@ -283,7 +283,7 @@ def _out_of_range(name: str, value: Number) -> str | None:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep with its scenario read."""
+    """A sweep file with its scenario."""
 
     path: Path
     file: SweepFile
@@ -291,14 +291,14 @@ class Sweep:
 
 
 def load_sweep(path: str | Path, *, allow_code: bool = False) -> Sweep:
-    """Read a sweep file and its scenario; raises ScenarioError with all problems.
+    """A sweep file with its scenario; raises ScenarioError with all problems.
 
     Parameters
     ----------
     path : str or Path
         The file.
     allow_code : bool
-        Whether estimators may be package.module:function, which is imported and run; else that is a problem.
+        Whether estimators may be package.module:function, which is imported and run.
     """
     path = located("sweep", path)
     file = load_strict(path, SweepFile)
@@ -340,8 +340,3 @@ def load_sweep(path: str | Path, *, allow_code: bool = False) -> Sweep:
     if problems:
         raise ScenarioError("\n".join(problems))
     return Sweep(path, file, scenario)
-
-
-def content(file: SweepFile) -> dict[str, Any]:
-    """The file as plain values, defaults filled in."""
-    return file.model_dump(by_alias=True)

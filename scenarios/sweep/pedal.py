@@ -1,9 +1,9 @@
-"""A driver who pulses the pedal on a road whose friction differs from run to run.
+"""A driver of pedal pulses on roads whose friction differs from run to run.
 
-The paper's pedal trace is made for 0.9, then 0.3, then 0.5: on another order or another friction it would spin the
-wheels up or excite nothing. So each pulse asks for a share of the grip that lies under the front wheels as it begins,
-up to the motors' peak; on a dry road, which the motors cannot excite, one launch is followed by light pulses, as in
-the paper. A pulse that spins a front wheel up, because the road changes under it, is let go after a reaction time.
+The paper's pedal pulses are made for theta 0.9, then 0.3, then 0.5; on other roads they would spin the wheels or not
+excite the tyre. So each pulse demands a share of theta F_z under the front wheels at its start, up to the motors' peak;
+on dry road, where the motors' peak excites too little, a launch is followed by light pulses, as in the paper. A pulse
+that spins a front wheel, because the road changes, ends after a reaction time.
 """
 
 from __future__ import annotations
@@ -21,27 +21,17 @@ from trpac_core.vehicle import Vehicle
 FIRST_S = 0.02
 LAUNCH_S = 1.43
 RAMP_S = 0.05
-"""Begin, launch and ramp of the paper's pedal trace (scenarios/manoeuvres/pulsed_acceleration.yaml) [s]."""
+"""Start, length of the launch and ramp of the paper's pulses (scenarios/manoeuvres/pulsed_acceleration.yaml) [s]."""
 SPINNING = 0.3
-"""Slip of a front wheel at which the driver notices that it spins [-]."""
+"""Slip of a front wheel at which the driver notices the spin [-]."""
 REACTION_S = 0.15
-"""Time from then until the pedal goes up: a quick driver, or a slow traction control [s]."""
+"""Time from then until the pedal is released: a quick driver, or a slow traction control [s]."""
 NOTICED_M_S = 1.0
-"""Car speed below which a spinning wheel is not noticed: at a standing start slip passes through 1 [m/s]."""
+"""Car speed below which spin is not noticed: at a standing start slip is 1 [m/s]."""
 
 
 def drive_pedal(scenario: Scenario, pedal: PedalDraw, random: np.random.Generator) -> Manoeuvre:
-    """The pedal trace of a run, pulse by pulse along the road.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Car, road and end; its own manoeuvre is not looked at.
-    pedal : PedalDraw
-        How pulses are drawn.
-    random : Generator
-        Where they are drawn from.
-    """
+    """The manoeuvre of a run: pedal pulses along the road."""
     setup, car, step_s = (
         make_setup(scenario.vehicle, scenario.road),
         scenario.vehicle.to_core(),
@@ -72,11 +62,11 @@ def drive_pedal(scenario: Scenario, pedal: PedalDraw, random: np.random.Generato
 
 
 def _torque_nm(car: Vehicle, here: RoadSegment, use: float, launch: bool, light_nm: float) -> float:
-    """Torque of each wheel: a share of the grip under a front wheel that acceleration unloads, up to the peak."""
+    """Torque of each wheel: a share of theta F_z of a front wheel under acceleration, up to the peak [N m]."""
     if here.surface == "dry":
         return car.motor_peak_torque_nm if launch else min(light_nm, car.motor_peak_torque_nm)
     peak_n, force_n = car.motor_peak_torque_nm / car.wheel_radius_m, 0.0
-    for _ in range(3):  # the load falls with the acceleration, which falls with the load: this converges fast
+    for _ in range(3):  # load and acceleration depend on each other; this converges fast
         load_n = car.wheel_load(True, 4.0 * force_n / car.mass_kg)
         force_n = min(use * min(here.mu_left, here.mu_right) * load_n, peak_n)
     return force_n * car.wheel_radius_m
@@ -85,7 +75,7 @@ def _torque_nm(car: Vehicle, here: RoadSegment, use: float, launch: bool, light_
 def _advance(
     y: NDArray[np.float64], pulse: Pulse, from_s: float, to_s: float, step_s: float, setup: PlantSetup
 ) -> float | None:
-    """Move y on over one pulse and what follows it; when a front wheel spins up, or None [s]."""
+    """Advance y over one pulse and the pause after it; returns the time at which a front wheel spins, or None [s]."""
     steps = np.arange(round((to_s - from_s) / step_s) + 1, dtype=np.float64)
     time_s: NDArray[np.float64] = from_s + step_s * steps
     torque = np.repeat(pulse.torque(time_s)[:, None], 4, axis=1)

@@ -1,4 +1,4 @@
-"""report.html of a sweep: one file that needs nothing beside it."""
+"""report.html of a sweep, in one file."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ def write_report(
         levels=summary["levels"],
         failures=[f"run {f.run} ({f.why})" for f in failures],
         enough_s=ENOUGH_SHOWN_S,
-        pictures=[(title, said, data_address(data)) for title, said, data in _pictures(table)],
+        pictures=[(title, caption, data_address(data)) for title, caption, data in _pictures(table)],
     )
     path.write_bytes(text.encode("utf-8", "backslashreplace"))  # a name may hold half a surrogate pair
 
 
 def _pictures(table: pd.DataFrame) -> list[tuple[str, str, bytes]]:
-    """Title, sentence and picture of each figure."""
+    """Title, caption and PNG of each figure."""
     shown = []
     if table["parameter"].nunique() == 1 and table["level"].nunique() <= 1:
-        said = "Share of stretches that are at most so far off, or take at most so long. Crosses: what is asked for."
-        shown.append(("Error and convergence", said, figures.distributions(table)))
-        said = "Every stretch of every run. Grey: the tyre did not truly show its friction for long enough there."
-        shown.append(("Error over true friction", said, figures.errors_by_friction(table)))
+        caption = "Share of stretches that are at most so far off, or take at most so long. Crosses: what is asked for."
+        shown.append(("Error and convergence", caption, figures.distributions(table)))
+        caption = "Every stretch of every run. Grey: the tyre did not truly show its friction for long enough there."
+        shown.append(("Error over true friction", caption, figures.errors_by_friction(table)))
     covered = figures.coverage_figure(table)
     if covered is not None:
-        said = "Share of time with the true value within 2 TRPAC_std."
-        shown.append(("Coverage of TRPAC_std", said, covered))
+        caption = "Share of time with the true value within 2 TRPAC_std."
+        shown.append(("Coverage of TRPAC_std", caption, covered))
     for parameter, picture in figures.degradations(table):
-        said = "Slippery stretches that the tyre showed; on the right all the time on slippery stretches."
-        shown.append((f"Degradation over {parameter}", said, picture))
+        caption = "Slippery stretches that the tyre showed; on the right all the time on slippery stretches."
+        shown.append((f"Degradation over {parameter}", caption, picture))
     return shown

@@ -1,4 +1,4 @@
-"""One run of a sweep: plant, sensors, camera, estimators stepped in Python, scores per stretch of road."""
+"""One run of a sweep: plant, sensors, camera and estimators in Python, and scores per stretch of road."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from scenarios.files import Scenario
 from scenarios.fmu_client.estimator import parameters
-from scenarios.metrics import score_run
+from scenarios.metrics import ESTIMATORS, score_run
 from scenarios.peers import PeerSetup
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.runner import segment_starts, under_the_wheel
-from scenarios.sweep.camera import RenderedFrames, class_verdicts
+from scenarios.sweep.camera import RenderedFrames, road_classes
 from scenarios.sweep.draw import RunPlan
-from scenarios.sweep.trackers import OWN, make_peer
+from scenarios.sweep.trackers import make_peer
 from scenarios.vision_overlay import image_estimator
 from trpac_core.dife import GREATEST_THETA, LEAST_SENSITIVITY, LEAST_THETA
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
@@ -35,13 +35,14 @@ Array = NDArray[np.float64]
 Frames = dict[int, RoadClass] | RenderedFrames
 
 BAND = 0.02
-"""The paper's steady-state error, and a band in which an estimate counts as there whatever the step was [-]."""
+"""Error within which an estimate has converged, whatever the step of friction: the paper's steady-state error [-]."""
 COVERAGE_DEVIATIONS = 2.0
+"""Half width of the interval whose coverage is scored, in standard deviations [-]."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """One estimator over a run: estimate, its standard deviation (NaN where it states none), shape (n,) each [-]."""
+    """One estimator over a run: estimate and its standard deviation (NaN without one), shape (n,) each [-]."""
 
     TRPAC: Array
     TRPAC_std: Array
@@ -49,24 +50,14 @@ class Track:
 
 @dataclass(frozen=True)
 class Tracks:
-    """All estimators over a run, and DIFE's start/stop flag, the one clock, shape (n,)."""
+    """All estimators over a run, and DIFE's start/stop flag, by which times of all are counted, shape (n,)."""
 
     by_name: dict[str, Track]
     excited: NDArray[np.bool_]
 
 
 def run_plan(plan: RunPlan, estimators: list[str], unit: dict[str, float]) -> list[dict[str, Any]]:
-    """One run's rows: a score per stretch of road and estimator.
-
-    Parameters
-    ----------
-    plan : RunPlan
-        The run.
-    estimators : list of str
-        Which estimators are scored.
-    unit : dict
-        Parameters of ours by the unit's names, in place of the delivered ones.
-    """
+    """Rows of a run: a score per stretch of road and estimator."""
     trajectory = drive(plan.scenario)
     config = believed_config(plan, unit)
     tracks = step_all(plan, trajectory, config, estimators)
@@ -74,13 +65,13 @@ def run_plan(plan: RunPlan, estimators: list[str], unit: dict[str, float]) -> li
 
 
 def believed_config(plan: RunPlan, unit: dict[str, float]) -> EstimatorConfig:
-    """The estimator's configuration as the unit's would be, with what the run has it believe wrongly."""
+    """The estimator's configuration as in the unit, with the run's wrong assumptions."""
     believed = plan.believed
-    told = dict(parameters(replace(plan.scenario, sensors=believed.noise)))
-    told["vehicle.mass"] *= believed.mass_factor
-    told["vehicle.wheel_radius"] *= believed.radius_factor
-    told["tyre.longitudinal_stiffness"] *= believed.stiffness_factor
-    values: dict[str, Any] = {v.name: v.start for v in ESTIMATOR_PARAMETERS} | told | unit
+    settings = dict(parameters(replace(plan.scenario, sensors=believed.noise)))
+    settings["vehicle.mass"] *= believed.mass_factor
+    settings["vehicle.wheel_radius"] *= believed.radius_factor
+    settings["tyre.longitudinal_stiffness"] *= believed.stiffness_factor
+    values: dict[str, Any] = {v.name: v.start for v in ESTIMATOR_PARAMETERS} | settings | unit
     for surface in Surface:
         name = f"estimator.theta_{surface.label}"
         values[name] = min(max(values[name] + plan.camera.class_value_offset, LEAST_THETA), GREATEST_THETA)
@@ -88,7 +79,7 @@ def believed_config(plan: RunPlan, unit: dict[str, float]) -> EstimatorConfig:
 
 
 def signals_of(plan: RunPlan, trajectory: PlantTrajectory) -> list[list[float]]:
-    """What the wheel's sensors read at each step: wheel speed, torque, vehicle speed, acceleration."""
+    """Sensor signals of the wheel: wheel speed, torque, vehicle speed and acceleration, n values each."""
     log, wheel = make_scenario_log(plan.scenario, trajectory), plan.scenario.wheel
     torque = log[f"wheel_torque_{wheel}_nm"].to_numpy() * plan.believed.torque_factor
     speed = log["vehicle_speed_m_s"].to_numpy() + plan.speed_bias_m_s
@@ -99,11 +90,11 @@ def signals_of(plan: RunPlan, trajectory: PlantTrajectory) -> list[list[float]]:
 def step_all(
     plan: RunPlan, trajectory: PlantTrajectory, config: EstimatorConfig, estimators: list[str]
 ) -> Tracks:
-    """Step ours and the peers over the run's signals; raises ValueError where an estimate is not finite."""
+    """Estimates of ours and of the peers over the run; raises ValueError where one is not finite."""
     frames, ife = camera_of(plan, trajectory)
     estimator, step_s = TrpacEstimator(config, ife), plan.scenario.step_s
-    peers = {name: make_peer(name, told_of(plan, config)) for name in estimators if name not in OWN}
-    names = [*OWN, *peers]
+    peers = {name: make_peer(name, peer_setup(plan, config)) for name in estimators if name not in ESTIMATORS}
+    names = [*ESTIMATORS, *peers]
     theta = np.empty((len(trajectory), len(names)))
     std = np.full((len(trajectory), len(names)), np.nan)
     excited = np.empty(len(trajectory), dtype=bool)
@@ -113,12 +104,12 @@ def step_all(
     ):
         sensors = Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
         estimate = estimator.step(step_s, sensors, frames.get(row))
-        theta[row, : len(OWN)] = estimate.TRPAC_image, estimate.TRPAC_dynamics, estimate.TRPAC
+        theta[row, : len(ESTIMATORS)] = estimate.TRPAC_image, estimate.TRPAC_dynamics, estimate.TRPAC
         std[row, fused] = estimate.TRPAC_std
         excited[row] = estimate.excitation_flag
-        for column, peer in enumerate(peers.values(), start=len(OWN)):
-            said = peer.step(step_s, sensors)
-            theta[row, column], std[row, column] = said.TRPAC, said.TRPAC_std
+        for column, peer in enumerate(peers.values(), start=len(ESTIMATORS)):
+            peer_estimate = peer.step(step_s, sensors)
+            theta[row, column], std[row, column] = peer_estimate.TRPAC, peer_estimate.TRPAC_std
     strange = [name for i, name in enumerate(names) if not np.isfinite(theta[:, i]).all()]
     if strange:
         raise ValueError(f"{strange[0]} gives an estimate that is no finite number.")
@@ -127,18 +118,18 @@ def step_all(
 
 
 def camera_of(plan: RunPlan, trajectory: PlantTrajectory) -> tuple[Frames, Ife | None]:
-    """What comes from the camera at each step, and what judges it where it is pictures."""
+    """Frames by step, and the image estimator where they are pictures."""
     scenario, camera = plan.scenario, plan.camera
     if camera.source == "none":
         return {}, None
     if camera.source == "rendered":
         cv2.setNumThreads(1)
         return RenderedFrames(scenario, trajectory, camera, plan.camera_seed), image_estimator(scenario)
-    return class_verdicts(scenario, trajectory, camera, plan.camera_seed), None
+    return road_classes(scenario, trajectory, camera, plan.camera_seed), None
 
 
-def told_of(plan: RunPlan, config: EstimatorConfig) -> PeerSetup:
-    """What peers are told: what ours is told."""
+def peer_setup(plan: RunPlan, config: EstimatorConfig) -> PeerSetup:
+    """Settings of the peers, equal to those of our estimator."""
     noise = plan.believed.noise
     return PeerSetup(
         vehicle=config.vehicle,
@@ -154,7 +145,7 @@ def told_of(plan: RunPlan, config: EstimatorConfig) -> PeerSetup:
 def rows_of(
     plan: RunPlan, trajectory: PlantTrajectory, tracks: Tracks, theta_initial: float
 ) -> list[dict[str, Any]]:
-    """Scores per stretch of road and estimator, with the truth that they are held against."""
+    """Scores per stretch of road and estimator, with the true values."""
     scenario, key = plan.scenario, plan.key
     under = under_the_wheel(scenario, trajectory)
     theta, segment = under["theta_true"].to_numpy(), under["segment"].to_numpy()
@@ -162,12 +153,12 @@ def rows_of(
     scores = score_run(
         segment_starts(scenario), segment, theta, theta_initial, estimates, tracks.excited, scenario.step_s
     )
-    visible = shown(scenario, trajectory)
+    identified = identifiable(scenario, trajectory)
     by_shown_time = score_run(
-        segment_starts(scenario), segment, theta, theta_initial, estimates, visible, scenario.step_s
+        segment_starts(scenario), segment, theta, theta_initial, estimates, identified, scenario.step_s
     )
     rows = []
-    for place, index in enumerate(np.unique(segment)):
+    for position, index in enumerate(np.unique(segment)):
         here = segment == index
         road = scenario.road.segments[int(index)]
         truth = {
@@ -178,44 +169,44 @@ def rows_of(
             "seed": scenario.seed,
             "stretch": int(index),
             "surface": road.surface,
-            "theta_before": theta_initial if place == 0 else float(theta[np.argmax(here) - 1]),
-            "shown_s": float(visible[here].sum()) * scenario.step_s,
+            "theta_before": theta_initial if position == 0 else float(theta[np.argmax(here) - 1]),
+            "shown_s": float(identified[here].sum()) * scenario.step_s,
             "time_s": float(here.sum()) * scenario.step_s,
         }
         for name, track in tracks.by_name.items():
             part = Track(track.TRPAC[here], track.TRPAC_std[here])
-            measures = extra_scores(part, theta[here], tracks.excited[here], visible[here], scenario.step_s)
-            measures["shown_convergence_time_s"] = by_shown_time[name][place]["convergence_time_s"]
-            rows.append(truth | {"estimator": name} | scores[name][place] | measures)
+            measures = extra_scores(
+                part, theta[here], tracks.excited[here], identified[here], scenario.step_s
+            )
+            measures["shown_convergence_time_s"] = by_shown_time[name][position]["convergence_time_s"]
+            rows.append(truth | {"estimator": name} | scores[name][position] | measures)
     return rows
 
 
-def shown(scenario: Scenario, trajectory: PlantTrajectory) -> NDArray[np.bool_]:
-    """Whether the wheel's true slip and load show theta at all, d mu / d theta at least 0.1, shape (n,).
-
-    It is the plant's truth, no estimator's view: where it is false nobody could tell the road's friction from force
-    and slip.
-    """
+def identifiable(scenario: Scenario, trajectory: PlantTrajectory) -> NDArray[np.bool_]:
+    """Whether theta is identifiable from the wheel's true slip and load, d mu / d theta at least 0.1, shape (n,)."""
     column, car = WHEELS.index(scenario.wheel), scenario.vehicle.to_core()
     values = (trajectory.theta[:, column], trajectory.slip[:, column], trajectory.vertical_load_n[:, column])
-    return np.array([_shows(t, s, f, car) for t, s, f in zip(*(v.tolist() for v in values), strict=True)])
+    return np.array(
+        [_is_identifiable(t, s, f, car) for t, s, f in zip(*(v.tolist() for v in values), strict=True)]
+    )
 
 
-def _shows(theta: float, slip: float, load_n: float, car: Vehicle) -> bool:
+def _is_identifiable(theta: float, slip: float, load_n: float, car: Vehicle) -> bool:
     if not 0.0 < slip < 1.0 or load_n <= 0.0:
         return False
     return friction_by_theta(theta, slip, load_n, car.longitudinal_stiffness_n) >= LEAST_SENSITIVITY
 
 
 def extra_scores(
-    track: Track, theta: Array, excited: NDArray[np.bool_], visible: NDArray[np.bool_], step_s: float
+    track: Track, theta: Array, excited: NDArray[np.bool_], identified: NDArray[np.bool_], step_s: float
 ) -> dict[str, float | None]:
-    """Scores beside those of a single run: a fixed band, the shown time, coverage of the standard deviation."""
+    """Further scores: time to a fixed band, error in the identifiable time, coverage of the standard deviation."""
     error = np.abs(track.TRPAC - theta)
     outside = np.flatnonzero(error > BAND)
     first = int(outside[-1]) + 1 if len(outside) else 0
     clock = np.cumsum(excited) * step_s
-    late = visible & (np.cumsum(visible) > 0.7 * visible.sum())
+    late = identified & (np.cumsum(identified) > 0.7 * identified.sum())
     covered = error <= COVERAGE_DEVIATIONS * track.TRPAC_std
     stated = bool(np.isfinite(track.TRPAC_std).all())
     return {
@@ -226,6 +217,6 @@ def extra_scores(
         "std_end": float(track.TRPAC_std[-1]) if stated else None,
         "std_mean": float(track.TRPAC_std.mean()) if stated else None,
         "covered_share": float(covered.mean()) if stated else None,
-        "covered_share_shown": float(covered[visible].mean()) if stated and visible.any() else None,
+        "covered_share_shown": float(covered[identified].mean()) if stated and identified.any() else None,
         "covered_end": float(covered[-1]) if stated else None,
     }

@@ -1,4 +1,4 @@
-"""Finished runs on disk: one part file each, written whole or not at all, and the table that they make."""
+"""Finished runs on disk, one file each, and their table."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ import pandas as pd
 
 from scenarios.errors import ScenarioError
 from scenarios.metrics import SegmentScore
-from scenarios.sweep.files import Sweep, content
+from scenarios.sweep.files import Sweep
+from scenarios.whole_files import write_whole
 from trpac_core.files import FileError, parse_json, quoted, read_bytes, read_text
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("trpac_core", "scenarios")
-"""Packages whose code decides what a run gives."""
+"""Packages whose code determines the result of a run."""
 TEXT = ("parameter", "surface", "estimator")
 WHOLE = ("run", "number", "seed", "stretch")
 SORT = ["run", "stretch", "estimator"]
@@ -33,17 +34,17 @@ SCORES = (
     *("error_end", "error_mean", "error_shown_late", "std_end", "std_mean"),
     *("covered_share", "covered_share_shown", "covered_end"),
 )
-"""What is null where there is nothing to measure."""
+"""Numeric columns; null where there is nothing to measure."""
 COLUMNS = {*TEXT, *WHOLE, *SCORES}
-"""What a row of a run says; see `run.rows_of`."""
+"""Columns of a run's rows; see `run.rows_of`."""
 IDENTITY = "sweep.json"
 MOST_BYTES = 64_000_000
-"""Size up to which sweep.json or a part is read [bytes]; a row has about 900, and a run at most 20,000 rows."""
+"""Largest sweep.json or part that is read [bytes]; a row has about 900, and a run at most 20,000 rows."""
 
 
 @lru_cache(maxsize=1)
 def source_digest() -> str:
-    """SHA-256 over the code that a run rests on, its networks and its camera records."""
+    """SHA-256 over the code of a run, the networks and the camera records."""
     digest = hashlib.sha256()
     files = sorted(p for name in SOURCES for p in (ROOT / name).rglob("*.py"))
     files += sorted((ROOT / "models").glob("*.onnx"))
@@ -55,10 +56,10 @@ def source_digest() -> str:
 
 
 def identity(sweep: Sweep) -> dict[str, Any]:
-    """What parts of a folder must agree in: the sweep, the scenario with its files, the code; raises FileError."""
+    """The identity of a sweep's parts: sweep file, scenario with its files, and code; raises FileError."""
     scenario = sweep.scenario
     described = {
-        "sweep": content(sweep.file),
+        "sweep": sweep.file.model_dump(by_alias=True),
         "vehicle": scenario.vehicle.model_dump(by_alias=True),
         "road": scenario.road.model_dump(by_alias=True),
         "manoeuvre": scenario.manoeuvre.model_dump(by_alias=True),
@@ -77,14 +78,14 @@ def identity(sweep: Sweep) -> dict[str, Any]:
 
 
 class Parts:
-    """The part files of a sweep's folder; each says which run of which sweep it is, and has a hash of what it says.
+    """The part files of a sweep's folder, each with its run, a hash of the sweep and a hash of its content.
 
     Parameters
     ----------
     out : Path
-        The sweep's folder; it is made when it is opened.
+        The sweep's folder; `open` creates it.
     described : dict
-        See `identity`. Of one that names no sweep, only what a part says of itself is checked.
+        The identity, see `identity`; without a sweep in it parts are checked by their own hashes alone.
     """
 
     def __init__(self, out: Path, described: dict[str, Any]) -> None:
@@ -93,11 +94,11 @@ class Parts:
         self._sha256 = _digest(described)
 
     def open(self) -> set[int]:
-        """Numbers of the runs that are there; raises ScenarioError where the folder holds anything else."""
+        """Numbers of the stored runs; raises ScenarioError where the folder holds anything else."""
         known = self._out / IDENTITY
-        for place in (self._out, self._folder):
-            if os.path.lexists(place) and not place.is_dir():
-                raise ScenarioError(f"{quoted(place)}: a file. Expected a folder to write into.")
+        for folder in (self._out, self._folder):
+            if os.path.lexists(folder) and not folder.is_dir():
+                raise ScenarioError(f"{quoted(folder)}: a file. Expected a folder to write into.")
         if os.path.lexists(known):
             before = _read(known, "what identifies the folder's sweep")
             if not isinstance(before, dict):
@@ -117,17 +118,17 @@ class Parts:
         return {part["run"] for part in self._all()}
 
     def keep(self, index: int, rows: list[dict[str, Any]], cpu_s: float) -> None:
-        """Write one run's rows and the processor time that it took [s]."""
+        """Store a run's rows and its processor time [s]."""
         part = {"run": index, "sweep": self._sha256, "cpu_s": cpu_s, "rows": rows}
         part["sha256"] = _digest(part)
         write_whole(self._folder / _name(index), json.dumps(part).encode())
 
     def empty(self) -> bool:
-        """Whether no run is there."""
+        """Whether no run is stored."""
         return not any(self._folder.glob("*.json"))
 
     def table(self) -> pd.DataFrame:
-        """All runs kept, sorted, with the same columns and types whatever the order of work."""
+        """All stored runs, sorted, with fixed columns and types."""
         return as_table(row for part in self._all() for row in part["rows"])
 
     def cpu_s(self) -> list[float]:
@@ -152,7 +153,7 @@ class Parts:
 
 
 def _count(asked: dict[str, Any]) -> int:
-    """How many runs a sweep asks for, in all its levels."""
+    """Number of runs of a sweep over all levels."""
     return int(asked["runs"]) * (sum(len(axis["levels"]) for axis in asked["vary"]) or 1)
 
 
@@ -166,7 +167,7 @@ def _digest(value: dict[str, Any]) -> str:
 
 
 def _is_part(part: Any) -> bool:
-    """Whether this is what `Parts.keep` writes."""
+    """Whether this is content that `Parts.keep` writes."""
     return (
         isinstance(part, dict)
         and part.keys() == {"run", "sweep", "cpu_s", "rows", "sha256"}
@@ -194,21 +195,21 @@ def _fits(column: str, value: Any) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether it goes into a column of 64 bits, and is finite: what is not measured is null."""
+    """Whether it is finite and fits a column of 64 bits."""
     if isinstance(value, float):
         return math.isfinite(value)
     return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1 << 63
 
 
 def _is_complete(rows: list[dict[str, Any]], estimators: list[str]) -> bool:
-    """Whether each estimator has one row on each stretch that was driven."""
-    places = [(row["stretch"], row["estimator"]) for row in rows]
-    wanted = product({stretch for stretch, _ in places}, estimators)
-    return bool(rows) and sorted(places) == sorted(wanted) and all(row.keys() == COLUMNS for row in rows)
+    """Whether each estimator has one row on each stretch."""
+    pairs = [(row["stretch"], row["estimator"]) for row in rows]
+    wanted = product({stretch for stretch, _ in pairs}, estimators)
+    return bool(rows) and sorted(pairs) == sorted(wanted) and all(row.keys() == COLUMNS for row in rows)
 
 
 def as_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
-    """Rows of runs as a table; what a row does not have is NaN."""
+    """Rows of runs as a table; missing values are NaN."""
     frame = pd.DataFrame(list(rows))
     numbers = [c for c in frame.columns if c not in TEXT + WHOLE]
     frame = frame.astype({**dict.fromkeys(WHOLE, np.int64), **dict.fromkeys(numbers, np.float64)})
@@ -218,17 +219,6 @@ def as_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 def write_table(table: pd.DataFrame, path: Path) -> None:
     """Write runs.parquet; the same table gives the same bytes."""
     table.to_parquet(path, index=False)
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    scratch = path.with_name(path.name + ".part")
-    scratch.unlink(missing_ok=True)
-    with scratch.open("xb") as file:  # a link or a pipe of that name is not written through
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(scratch, path)
 
 
 def _read(path: Path, expected: str) -> Any:

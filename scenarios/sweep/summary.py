@@ -1,4 +1,4 @@
-"""What a sweep showed: quantiles of errors and times, coverage of TRPAC_std, per estimator and level."""
+"""Results of a sweep: quantiles of errors and times, coverage of TRPAC_std, per estimator and level."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 SLIPPERY = ("wet", "snow_ice")
-"""The paper claims its figures for these."""
+"""Surfaces on which the paper states its results."""
 ENOUGH_SHOWN_S = 0.5
-"""Time for which the tyre must truly show theta for a stretch to be judged: the time in which to converge [s]."""
+"""Least time with identifiable theta for a stretch to be scored, which is the required convergence time [s]."""
 MEASURES = (
     "steady_state_error",
     "convergence_time_s",
@@ -20,21 +20,21 @@ MEASURES = (
     "band_time_s",
 )
 COVERAGE_SPAN = (0.90, 0.99)
-"""Between these shares of true values shall lie within 2 TRPAC_std, at a nominal 0.95 [-]."""
+"""Required range of the share of true values within 2 TRPAC_std, at a nominal 0.95 [-]."""
 
 
 def slippery(table: pd.DataFrame) -> pd.DataFrame:
-    """The stretches on which the estimators are judged: wet, snow and ice."""
+    """The rows of wet, snowy and icy stretches."""
     return table[table["surface"].isin(SLIPPERY)]
 
 
 def shown_enough(table: pd.DataFrame) -> pd.DataFrame:
-    """Those on which the tyre truly showed theta for long enough, by the plant's own slip and load."""
+    """The rows with identifiable theta for at least `ENOUGH_SHOWN_S`, by the plant's slip and load."""
     return table[table["shown_s"] >= ENOUGH_SHOWN_S]
 
 
 def quantile(values: pd.Series, share: float, never: bool = False) -> float | None:
-    """A quantile; with `never` what is missing counts as later than everything, and None stands for that."""
+    """A quantile, None without values; with `never` missing values are infinite, and an infinite quantile is None."""
     numbers: NDArray[np.float64] = values.to_numpy(dtype=np.float64)
     numbers = np.where(np.isnan(numbers), np.inf, numbers) if never else numbers[~np.isnan(numbers)]
     if not len(numbers):
@@ -44,7 +44,7 @@ def quantile(values: pd.Series, share: float, never: bool = False) -> float | No
 
 
 def distribution(table: pd.DataFrame) -> dict[str, Any]:
-    """Median and 95th percentile of each measure over some rows, and how many rows say nothing."""
+    """Median, 95th percentile and number of missing values of each measure over rows."""
     result: dict[str, Any] = {"stretches": len(table)}
     for measure in MEASURES:
         never = measure != "steady_state_error"
@@ -57,7 +57,7 @@ def distribution(table: pd.DataFrame) -> dict[str, Any]:
 
 
 def coverage(table: pd.DataFrame) -> dict[str, Any] | None:
-    """Share of true values within 2 TRPAC_std, weighted by time; None where an estimator states none."""
+    """Share of true values within 2 TRPAC_std, weighted by time; None without TRPAC_std."""
     stated = table[table["covered_share"].notna()]
     if stated.empty:
         return None
@@ -74,14 +74,14 @@ def _weighted(values: pd.Series, weights: pd.Series) -> float | None:
 
 
 def summarise(table: pd.DataFrame) -> dict[str, Any]:
-    """All figures of a sweep, by level and estimator.
+    """All results of a sweep by level and estimator.
 
     Returns
     -------
     dict
-        `levels`: a list of parameter, level and, per estimator, distributions over `slippery` stretches, those of them
-        that the tyre has `shown`, these `after_a_change` of road and `from_standstill`, all shown ones `by_surface`,
-        and `coverage`.
+        `levels`: a list of parameter, level and, per estimator, distributions over `slippery` stretches, those with
+        theta `shown` long enough, of these `after_a_change` of road and `from_standstill`, all shown ones
+        `by_surface`, and `coverage`.
     """
     levels = []
     for (parameter, _), part in table.groupby(["parameter", "level"], dropna=False, sort=False):
@@ -102,7 +102,7 @@ def summarise(table: pd.DataFrame) -> dict[str, Any]:
 
 
 def estimator_summary(rows: pd.DataFrame) -> dict[str, Any]:
-    """One estimator at one level."""
+    """Results of one estimator at one level."""
     slick = slippery(rows)
     judged = shown_enough(slick)
     return {

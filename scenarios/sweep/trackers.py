@@ -1,7 +1,7 @@
-"""The estimators that a sweep compares: ours, the peers of `scenarios.peers`, and any that is plugged in.
+"""The estimators that a sweep compares: ours, the peers of `scenarios.peers`, and plug-ins.
 
-A plug-in is what `package.module:function` gives for what the estimators are told, a `PeerSetup`: an object with a
-name, `reset()` and `step(step_s, Sensors)`, see `scenarios.peers.base.Peer`.
+A plug-in is the object that `package.module:function` returns for a `PeerSetup`; it has a name, `reset()` and
+`step(step_s, Sensors)`, see `scenarios.peers.base.Peer`.
 """
 
 from __future__ import annotations
@@ -12,28 +12,26 @@ from collections.abc import Callable
 
 from scenarios import peers
 from scenarios.errors import suggestion
+from scenarios.metrics import ESTIMATORS
 from scenarios.peers import Peer, PeerSetup
 from trpac_core.files import quoted
 
-OWN = {"IFE": "TRPAC_image", "DE": "TRPAC_dynamics", "DIFE": "TRPAC"}
-"""The estimators of this project, and the output of the fused one that holds each."""
-
 ADDRESS = re.compile(r"\w+(\.\w+)*:\w+")
-"""package.module:function, which no formula, markup or relative import is."""
+"""Pattern of package.module:function."""
 
 
 def problem_of_tracker(name: str) -> str | None:
-    """One sentence on what is wrong with an estimator's name in a sweep file; None where it is good, or an address."""
-    if name in OWN or name in peers.PEERS or ADDRESS.fullmatch(name):
+    """The problem of an estimator's name in a sweep file as a sentence; None for a known name or an address."""
+    if name in ESTIMATORS or name in peers.PEERS or ADDRESS.fullmatch(name):
         return None
     problem = f"estimators names {quoted(repr(name))}"
     if ":" in name:
         return f"{problem}; expected package.module:function."
-    return f"{problem}; {suggestion(name, [*OWN, *peers.PEERS])}"
+    return f"{problem}; {suggestion(name, [*ESTIMATORS, *peers.PEERS])}"
 
 
 def problem_of_address(name: str) -> str | None:
-    """One sentence on why the function at an address cannot be called; None where it can. Imports its module."""
+    """The problem of an address as a sentence, None where its function can be called; imports its module."""
     problem = f"estimators names {quoted(repr(name))}"
     module, _, function = name.partition(":")
     try:
@@ -44,7 +42,7 @@ def problem_of_address(name: str) -> str | None:
 
 
 def make_peer(name: str, setup: PeerSetup) -> Peer:
-    """A peer or a plugged-in estimator, fresh; raises TypeError where what the name gives is none."""
+    """A new peer or plug-in; raises TypeError where the plug-in's object is no estimator."""
     if name in peers.PEERS:
         return peers.make_peer(name, setup)
     module, _, function = name.partition(":")

@@ -1,4 +1,4 @@
-"""From files to a finished replay: what `trpac estimate` does."""
+"""From a log to a finished replay: what `trpac estimate` does."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from scenarios.camera.files import load_camera
-from scenarios.files import VehicleFile, load_vehicle
-from scenarios.library import networks_folder, shipped
-from sim2real.logs import Log, load_mapping, read_log
+from scenarios.files import VehicleFile
+from scenarios.library import PAPER_VEHICLE, networks_folder, shipped
+from sim2real.logs import Log
 from sim2real.replay.camera import camera_side
 from sim2real.replay.inputs import make_inputs
 from sim2real.replay.run import OURS, Replay, Told, replay, silent
@@ -17,49 +16,9 @@ from sim2real.replay.score import errors, excitation
 from trpac_core.files import file_sha256
 from trpac_core.vision.camera import Camera
 
-TABLE_3 = shipped("vehicle")["four_in_wheel_motor_ev"]
+TABLE_3 = shipped("vehicle")[PAPER_VEHICLE]
 """The car that is assumed where none is given."""
 PACKAGES = ("trpac-fmu", "numpy", "scipy")
-
-
-def estimate_files(
-    log: Path,
-    vehicle: Path | None = None,
-    camera: Path | None = None,
-    mapping: Path | None = None,
-    peers: bool = False,
-    told: Told = silent,
-) -> tuple[Replay, dict[str, Any]]:
-    """Run the estimators along a log.
-
-    Parameters
-    ----------
-    log : Path
-        CSV, Parquet or MDF.
-    vehicle, camera, mapping : Path, optional
-        vehicle.yaml, without it the paper's Table 3 is assumed; camera.yaml, for logs with pictures; mapping file.
-    peers : bool
-        Whether the estimators of the literature run as well.
-    told : callable
-        Told the stage, and how much of how much is done.
-
-    Returns
-    -------
-    Replay, dict
-        All estimates, and what summary.json holds.
-
-    Raises
-    ------
-    ScenarioError
-        Unusable input, with everything that is wrong with a file.
-    """
-    told("reading", 0, 1)
-    car_path = vehicle or TABLE_3
-    car = load_vehicle(car_path)
-    lens = None if camera is None else load_camera(camera)
-    read = read_log(log, None if mapping is None else load_mapping(mapping))
-    told("reading", 1, 1)
-    return estimate_log(read, car, lens, peers, told, guessed=vehicle is None, vehicle_path=car_path)
 
 
 def estimate_log(
@@ -72,9 +31,30 @@ def estimate_log(
     guessed: bool = False,
     vehicle_path: Path | None = None,
 ) -> tuple[Replay, dict[str, Any]]:
-    """Run the estimators along a log that has been read; see `estimate_files`.
+    """Run the estimators along a log.
 
-    `guessed` says that the car is an assumption; `vehicle_path` is its file, if it is of one.
+    Parameters
+    ----------
+    read, car, lens : Log, VehicleFile, Camera or None
+        The log; the car; the camera, for logs with pictures.
+    peers : bool
+        Whether the estimators of the literature run as well.
+    told : callable
+        Told the stage, and how much of how much is done.
+    guessed : bool
+        Whether the car is an assumption.
+    vehicle_path : Path, optional
+        File of the car.
+
+    Returns
+    -------
+    Replay, dict
+        All estimates, and what summary.json holds.
+
+    Raises
+    ------
+    ScenarioError
+        Unusable input, with everything that is wrong with a file.
     """
     inputs = make_inputs(read, car)
     seen = camera_side(

@@ -68,7 +68,7 @@ class LimitedTorqueRate(Effect):
     equation = "|T_true'| <= 1 kN m / s_per_kn_m"
     source = "definition"
     excited_by = "steps of torque, large ones more"
-    look_alikes = ("torque_lag", "torque_delay")
+    confounders = ("torque_lag", "torque_delay")
 
     s_per_kn_m: float = parameter(
         "s/(kN m)",

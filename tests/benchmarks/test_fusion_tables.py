@@ -1,6 +1,5 @@
 """The road test's scenarios, a run in full, and the generator of docs/fusion.md."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -8,15 +7,16 @@ import pytest
 import yaml
 
 from benchmarks.accuracy import fusion_tables
+from benchmarks.accuracy.full_run import full_run
 from scenarios.figure17 import draw_figure17
 from scenarios.files import load_scenario
 from scenarios.plant.pipeline import drive
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import run_one
 from scenarios.sweep.files import load_sweep
-from scenarios.sweep.run import believed_config, shown, step_all
+from scenarios.sweep.run import believed_config, identifiable, step_all
 from scenarios.sweep.store import Parts, identity
-from scenarios.sweep.trace import trace
+from scenarios.sweep.summary import summarise
 
 ROOT = Path(__file__).parents[2]
 TO_FRONT_M = 1.112
@@ -50,13 +50,13 @@ def test_the_road_test_is_the_papers():
 
 def test_the_motors_show_nothing_of_the_road_tests_friction():
     scenario = load_scenario(ROOT / "scenarios" / "road_test.yaml")
-    assert not shown(scenario, drive(scenario)).any()
+    assert not identifiable(scenario, drive(scenario)).any()
 
 
 def test_brake_pulses_show_both_parts_and_lock_no_wheel():
     scenario = load_scenario(ROOT / "scenarios" / "road_test_brakes.yaml")
     trajectory = drive(scenario)
-    visible = shown(scenario, trajectory)
+    visible = identifiable(scenario, trajectory)
     for theta in (1.0, 0.8):
         assert visible[trajectory.theta[:, 0] == theta].sum() * scenario.step_s > 0.5
     assert trajectory.slip[trajectory.speed_m_s > 1.0, 0].max() < 0.15
@@ -64,7 +64,7 @@ def test_brake_pulses_show_both_parts_and_lock_no_wheel():
 
 def test_a_run_in_full_is_the_run_that_is_scored(short_sweep, tmp_path):
     plan = plan_run(short_sweep, run_keys(short_sweep)[0])
-    full = trace(plan)
+    full = full_run(plan)
     tracks = step_all(plan, drive(plan.scenario), believed_config(plan, {}), ["IFE", "DE", "DIFE"])
     np.testing.assert_array_equal(full.table["TRPAC"], tracks.by_name["DIFE"].TRPAC)
     np.testing.assert_array_equal(full.table["excitation_flag"], tracks.excited)
@@ -77,25 +77,24 @@ def test_the_page_is_written_between_its_markers(short_sweep, tmp_path, monkeypa
     parts.open()
     for key in run_keys(short_sweep):
         parts.keep(key.index, run_one(short_sweep, key).rows, 0.25)
-    page, scores = tmp_path / "fusion.md", tmp_path / "out" / "scores.jsonl"
-    page.write_text(f"before\n{fusion_tables.BEGIN}\nold\n{fusion_tables.END}\nafter\n")
-    for name, path in (("PAGE", page), ("PICTURES", tmp_path / "pictures")):
-        monkeypatch.setattr(fusion_tables, name, path)
+    page = tmp_path / "fusion.md"
+    begin, end = "<!-- measured: begin -->", "<!-- measured: end -->"
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
+    monkeypatch.setattr(fusion_tables, "PAGE", page)
+    monkeypatch.setattr(fusion_tables, "draw", lambda found: None)
     for _ in range(2):
-        fusion_tables.write(tmp_path / "out", pictures=False)
+        fusion_tables.write(tmp_path / "out")
     text = page.read_text()
     assert text.startswith("before\n")
     assert text.endswith("\nafter\n")
     assert "old" not in text
     assert "paper_simulation 2 of 2" in text
     assert "0.25 s (class_process)" in text
-    lines = [json.loads(line) for line in scores.read_text().splitlines()]
-    assert len(lines) == 2
-    assert set(lines[0]["sweeps"]["paper_simulation"]["levels"][0]["estimators"]) == {"IFE", "DE", "DIFE"}
+    table = parts.table()
+    found = summarise(table)["levels"][0]["estimators"]["DIFE"]["coverage"]["all_time"]
     shares = [
         float(line.split("|")[4])
         for line in text.splitlines()
         if line.startswith("| paper_simulation | DIFE | all")
     ]
-    found = lines[0]["sweeps"]["paper_simulation"]["levels"][0]["estimators"]["DIFE"]["coverage"]["all_time"]
     assert shares == [pytest.approx(found, abs=1e-3)]

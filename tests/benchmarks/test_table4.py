@@ -1,6 +1,5 @@
 """The camera's benchmark: what is true of a frame, what counts as wrong, and how sure the shares are."""
 
-import json
 from dataclasses import replace
 
 import cv2
@@ -9,12 +8,11 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from benchmarks.vision.patch_width import changes, table
 from benchmarks.vision.table4 import __main__ as command
 from benchmarks.vision.table4 import drives
 from benchmarks.vision.table4.clips import ASSUMED, AssumedFile, camera_over
 from benchmarks.vision.table4.judge import COLUMNS, Networks, judged, near_corners, within
-from benchmarks.vision.table4.report import Measured, figures_of, tables
+from benchmarks.vision.table4.report import Measured, tables
 from benchmarks.vision.table4.scores import blocks_of, confusion, gate, n_w, share, wilson
 from benchmarks.vision.table4.sequences import Sequence, majority
 from models.training.rendered import SEED_RANGES
@@ -208,18 +206,13 @@ def test_the_command_judges_keeps_and_says_what_it_leaves_out(tmp_path, monkeypa
     command.main(asked)
     told = capsys.readouterr()
     assert "LEFT OUT of the tables: yolop: no networks in 'without_yolop'" in told.err
-    line = json.loads((tmp_path / "out" / "scores.json").read_text())
-    assert set(line["sets"]) == {"(b) rendered"}
-    assert line["sets"]["(b) rendered"]["normal"]["n_w"]["IFE"]["frames"] == 4
+    assert "| rendered, likely weather |" in told.out
+    assert "| yolop |" not in told.out
     kept = {f: f.stat().st_mtime_ns for f in (tmp_path / "out" / "verdicts").iterdir()}
     assert len(kept) == 4  # two drives, two scenarios
 
-    command.main([*asked, "--not-left-out"])
-    told = capsys.readouterr()
-    assert "NOT LEFT OUT" in told.out
+    command.main(asked)
     assert {f: f.stat().st_mtime_ns for f in kept} == kept, "verdicts of the first run are used again"
-    line = json.loads((tmp_path / "out" / "scores.json").read_text())
-    assert line["sources"]["(a) clips: yolop"]["normal"]["frames"] == 2
 
 
 def test_a_folder_without_networks_is_refused(tmp_path):
@@ -238,13 +231,12 @@ def test_kept_verdicts_are_read_as_they_were_written(tmp_path, monkeypatch, netw
     assert (fresh["found"] == judged(sequence, networks, "w/ interference")["found"]).all(), "a run repeats"
     pd.testing.assert_frame_equal(again, fresh)
     measured = Measured(
-        again.assign(networks="full", consecutive=True), (), False, None, 0.0, 0.0, {"full": {"a": "b"}}
+        again.assign(networks="full", consecutive=True), (), None, 0.0, 0.0, {"full": {"a": "b"}}
     )
     assert "| w/ interference | IFE | 12.8 | " in tables(measured)
-    assert json.loads(json.dumps(figures_of(measured)))["networks"] == {"full": {"a": "b"}}
 
 
-def test_wider_patches_are_cut_wider_and_the_table_tells_their_errors(tmp_path, monkeypatch, networks):
+def test_wider_patches_are_cut_wider(tmp_path, monkeypatch, networks):
     monkeypatch.setattr(drives, "FRAMES", 1)
     monkeypatch.setattr(drives, "SCALE", 0.25)
     (sequence,), _ = drives.rendered_drives(tmp_path, 1, lambda *_: None, first_seed=6_000_100)
@@ -256,14 +248,11 @@ def test_wider_patches_are_cut_wider_and_the_table_tells_their_errors(tmp_path, 
     )
     # The first corner of each patch, whatever it shows: a wider one might need another.
     monkeypatch.setattr("trpac_core.vision.region.with_most_road", lambda shares, count: np.arange(count))
-    widths = {text: changes(text) for text in ("1x1.7", "2x1.7")}
-    verdicts = judged(replace(sequence, roi_scale=1.5), networks, "normal", widths)
+    widths = {
+        text: {"roi_width_m": width, "roi_spread": 1.7} for text, width in (("narrow", 1.0), ("wide", 2.0))
+    }
+    judged(replace(sequence, roi_scale=1.5), networks, "normal", widths)
     narrow, wide = np.array(cut[IfeConfig().b[0] :]).reshape(2, -1)  # the first for the near group's corners
     whole = wide < 0.75 * sequence.camera.width_px  # wider ones end with the picture
     assert_allclose(wide[whole], 2.0 * narrow[whole], atol=1)
     assert narrow.max() > LEAST_ROI_WIDTH_PX
-    verdicts["found"] = np.where(verdicts["method"] == "2x1.7", verdicts["truth"], -1)
-    lines = table(verdicts).splitlines()
-    assert lines[0] == "| set | scenario | 1x1.7 | 2x1.7 |"
-    assert lines[2].startswith("| rendered drives | normal | 100.0 (")
-    assert "| 0.0 (" in lines[2]

@@ -15,11 +15,14 @@ import yaml
 from numpy.testing import assert_allclose
 
 from benchmarks.gap.withheld.generator import kernel, severity
+from benchmarks.gap.withheld.generator.camera_case import make_case
 from benchmarks.gap.withheld.generator.car import Car, Road
-from benchmarks.gap.withheld.generator.cases import make_case
 from benchmarks.gap.withheld.generator.details import FLOOR_M_S
-from benchmarks.gap.withheld.generator.forms import NEWEST, PLAIN
-from benchmarks.gap.withheld.generator.kernel import N, V, begin, integrate
+from benchmarks.gap.withheld.generator.driver import drive
+from benchmarks.gap.withheld.generator.forms import ASPECTS, STYLES, draw_forms
+from benchmarks.gap.withheld.generator.kernel import N, V, W, begin, integrate
+from benchmarks.gap.withheld.generator.library import LIBRARY
+from benchmarks.gap.withheld.generator.outside import OUTSIDE
 from benchmarks.gap.withheld.generator.sensor_set import Sensors
 from benchmarks.gap.withheld.generator.sensors import Noise, make_log, noise_of, read
 from benchmarks.gap.withheld.generator.table import SIZES, Group, Spec, table
@@ -60,7 +63,8 @@ def test_generator_imports_nothing_of_the_product(path):
 
 
 def test_generator_loads_nothing_of_the_product():
-    code = "import sys, benchmarks.gap.withheld.generator.cases as _; print(*{m.split('.')[0] for m in sys.modules})"
+    made = "benchmarks.gap.withheld.generator.camera_case"
+    code = f"import sys, {made} as _; print(*{{m.split('.')[0] for m in sys.modules}})"
     loaded = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout
@@ -208,21 +212,46 @@ def test_drives_stay_on_the_road_that_the_plant_is_for(case):
         assert driven.path[:, V].max() < 45.0
 
 
-def test_tables_have_unique_names_and_the_sizes_that_are_stated():
+def test_every_form_is_drawn_and_a_seal_tells_those_of_its_case(case):
+    drawn = [draw_forms(np.random.default_rng(seed), ASPECTS) for seed in range(250)]
+    assert {a: {forms[a] for forms in drawn} for a in ASPECTS} == {a: set(f) for a, f in ASPECTS.items()}
+    assert {a: f for a, f in case.seal()["forms"].items() if f not in ASPECTS[a]} == {}
+
+
+def test_given_forms_are_taken_and_change_no_other_draw(case):
+    forms = dict(case.forms) | {"digits": "all", "noise": "white_and_coloured"}
+    other = make_case(case.spec, 1, forms, attempt=0)
+    assert other.forms == forms
+    assert (other.car, other.roads, other.truth.effects) == (case.car, case.roads, case.truth.effects)
+
+
+@pytest.mark.parametrize("rich", [True, False])
+@pytest.mark.parametrize("style", range(len(STYLES)))
+@pytest.mark.long
+def test_every_driver_stays_within_the_car_and_excites_what_he_should(style, rich):
+    world = nominal(CAR, Road((0.0, 60.0, 120.0), (0.9, 0.3, 0.9)) if rich else Road())
+    done = drive(CAR, world, rich, 30.0, np.random.default_rng(6), list(STYLES.values())[style])
+    speed, wheels = done.path[:, V], done.path[:, W : W + 4]
+    slides = np.any(np.abs(wheels * CAR.wheel_radius_m - speed[:, None]) > 0.15 * speed[:, None], axis=1)
+    assert speed.min() > FLOOR_M_S
+    assert speed.max() < 45.0
+    assert done.command.max() <= CAR.motor_peak_torque_nm
+    assert np.any(slides) == rich
+
+
+def test_tables_have_unique_names_and_every_effect_and_deviation():
     for size in SIZES:
-        for edition in (PLAIN, NEWEST):
-            names = [spec.name for spec in table(size, edition)]
-            assert len(set(names)) == len(names)
-    assert set(table("full", PLAIN)) < set(table("full", NEWEST))
+        names = [spec.name for spec in table(size)]
+        assert len(set(names)) == len(names)
     groups = [spec.group for spec in table("full")]
-    counts = {group: groups.count(group) for group in Group}
-    assert counts == {
-        Group.RICH: 110,
-        Group.TYRE: 22,
-        Group.MILD: 44,
+    assert {group: groups.count(group) for group in Group} == {
+        Group.RICH: 5 * len(LIBRARY),
+        Group.TYRE: len(LIBRARY),
+        Group.MILD: 2 * len(LIBRARY),
         Group.NO_GAP: 75,
-        Group.PAIR: 24,
-        Group.OUTSIDE: 45,
-        Group.REMOVED: 44,
+        Group.PAIR: 45,
+        Group.OUTSIDE: 3 * len(OUTSIDE),
+        Group.REMOVED: 2 * len(LIBRARY),
         Group.TIMING: 1,
     }
+    assert (len(LIBRARY), len(OUTSIDE)) == (22, 63)

@@ -9,10 +9,10 @@ from withheld_cars import (
     DRY,
     NO_COMMAND,
     SLIDING,
-    _slip,
     by_further,
     driven,
     reading,
+    slip_of,
     slopes,
 )
 from withheld_plant import CAR, carried, roll
@@ -212,10 +212,10 @@ def test_the_road_changes_elsewhere_than_its_map_says():
 
 
 def test_tyres_of_two_makes_have_the_mean_of_the_told_stiffness():
-    slips = _slip(by_further("unlike_tyres_by_axle", front_more=0.3), 15.0, 30.0)
+    slips = slip_of(by_further("unlike_tyres_by_axle", front_more=0.3), 15.0, 30.0)
     assert slips[2] / slips[0] == pytest.approx(1.3 / 0.7, rel=0.01)
     stiffness = 1.0 / slips
-    plain = 1.0 / _slip(nominal(CAR, Road()), 15.0, 30.0)
+    plain = 1.0 / slip_of(nominal(CAR, Road()), 15.0, 30.0)
     assert stiffness.mean() == pytest.approx(plain.mean(), rel=0.01)
 
 

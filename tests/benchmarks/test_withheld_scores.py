@@ -13,16 +13,11 @@ import pytest
 import yaml
 
 from benchmarks.gap.withheld import runner
-from benchmarks.gap.withheld.__main__ import Size
-from benchmarks.gap.withheld.baselines import cosine
 from benchmarks.gap.withheld.command import watch
-from benchmarks.gap.withheld.generator.cases import make_case
 from benchmarks.gap.withheld.generator.driver import UndrivableError
-from benchmarks.gap.withheld.generator.forms import NEWEST, PLAIN
-from benchmarks.gap.withheld.generator.table import SIZES, Group, Spec, table
+from benchmarks.gap.withheld.generator.table import Group, Spec, table
 from benchmarks.gap.withheld.outcome import ResultError, outcome_of, read_outcomes
 from benchmarks.gap.withheld.scorer import Scores, load_thresholds, score, score_run
-from benchmarks.gap.withheld.show import draw_confusion
 from benchmarks.gap.withheld.statistics import calibration_error, reliability, wilson
 
 LIMITS = yaml.safe_load(runner.THRESHOLDS.read_text(encoding="utf-8"))
@@ -35,8 +30,6 @@ def cause(effect: str, probability: float, **parameters: tuple[float, float]) ->
         "parameters": {
             name: {"value": sum(i) / 2, "low": i[0], "high": i[1]} for name, i in parameters.items()
         },
-        "gap_after": 1.0 + (1.0 - probability),
-        "fit_bic": -probability,
         "shrink_percent": {"value": 90.0, "low": 88.0, "high": 92.0},
     }
 
@@ -57,7 +50,7 @@ def result(
 ) -> dict[str, Any]:
     seal = {"group": group, "effects": effects, "subsystems": ["tyre", "road"], "gap": gap}
     error = None if said else "ValueError: lost"
-    known = {"case": f"{group}-made-up", "seal": seal, "diagnosis": said, "error": error, "cosine": None}
+    known = {"case": f"{group}-made-up", "seal": seal, "diagnosis": said, "error": error}
     return known | {"achieved_shrink_percent": 85.0} | more
 
 
@@ -137,7 +130,6 @@ def test_only_a_blamed_effect_is_right():
 def test_small_gaps_do_not_count():
     scores = scored(result("rich", LAG, RIGHT), result("rich", LAG, SHY, gap=4.9))
     assert counted(scores, "right_first") == (1, 1)
-    assert scores.by_effect["torque_lag"] == {"cases": 2, "counted": 1, "first": 1, "two": 1}
 
 
 def test_mild_flag_must_hold_the_truth():
@@ -190,16 +182,6 @@ def test_none_of_these_is_an_answer_with_a_probability():
     assert outcome_of(result("rich", LAG, RIGHT)).believed_right
 
 
-def test_baselines_rank_by_their_own_number():
-    odd = answer("identified", cause("torque_lag", 0.9), cause("aero_drag", 0.05))
-    odd["causes"][1] |= {"fit_bic": -5.0, "gap_after": 9.0}
-    scores = scored(result("rich", LAG, odd, cosine=["aero_drag", "torque_lag"]), result("rich", LAG, None))
-    assert scores.baselines["closure only"] == {"first": 1.0, "two": 1.0, "n": 1}
-    assert scores.baselines["in-sample BIC"] == {"first": 0.0, "two": 1.0, "n": 1}
-    assert scores.baselines["cosine"] == {"first": 0.0, "two": 1.0, "n": 1}
-    assert scores.baselines["random"]["first"] == pytest.approx(1 / 22)
-
-
 @pytest.mark.parametrize(
     ("hits", "n", "expected"),
     [(8, 10, (0.4902, 0.9433)), (0, 75, (0.0, 0.0487)), (10, 10, (0.7225, 1.0)), (0, 0, (0.0, 1.0))],
@@ -220,18 +202,17 @@ def test_calibration_error():
 
 
 def test_a_folder_keeps_one_run(tmp_path):
-    runner.seal_run(tmp_path, "small", 7, PLAIN)
-    runner.seal_run(tmp_path, "small", 7, PLAIN)
+    runner.seal_run(tmp_path, "small", 7)
+    runner.seal_run(tmp_path, "small", 7)
     with pytest.raises(runner.RunError, match="seed: 7 there, 8 now"):
-        runner.seal_run(tmp_path, "small", 8, PLAIN)
-    with pytest.raises(runner.RunError, match=r"edition: .* there, .* now"):
-        runner.seal_run(tmp_path, "small", 7, NEWEST)
-    run = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
-    assert (run["seed"], run["edition"]) == (7, {"car": 1, "camera": 1})
+        runner.seal_run(tmp_path, "small", 8)
+    with pytest.raises(runner.RunError, match="size: small there, full now"):
+        runner.seal_run(tmp_path, "full", 7)
+    assert json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["seed"] == 7
 
 
 def test_thresholds_are_frozen_with_the_run(tmp_path, monkeypatch):
-    runner.seal_run(tmp_path, "small", 7, PLAIN)
+    runner.seal_run(tmp_path, "small", 7)
     assert load_thresholds(tmp_path) == LIMITS
     easier = tmp_path / "thresholds.yaml"
     easier.write_text(runner.THRESHOLDS.read_text(encoding="utf-8").replace("0.85", "0.50"), encoding="utf-8")
@@ -285,7 +266,7 @@ BIAS = Spec(
 
 
 def test_the_diagnosis_sees_files_and_no_truth(tmp_path, fake_diagnose):
-    runner.run_case(BIAS, 1, PLAIN, tmp_path, keep=False)
+    runner.run_case(BIAS, 1, tmp_path, keep=False)
     (names, options), *_ = fake_diagnose.calls
     assert options["exclude"] == ("accelerometer_bias",)
     assert not any("bias" in str(path.relative_to(tmp_path)) or path.stem == "fresh" for path in names)
@@ -300,10 +281,10 @@ def test_the_diagnosis_sees_files_and_no_truth(tmp_path, fake_diagnose):
 
 def test_a_diagnosis_that_fails_is_counted_and_not_repeated(tmp_path, fake_diagnose):
     fake_diagnose.problem = ValueError("no such column")
-    waiting, total = runner.pending(tmp_path, "small", PLAIN)
+    waiting, total = runner.pending(tmp_path, "small")
     spec = next(s for s in waiting if s.group is Group.NO_GAP)
-    assert runner.run_case(spec, 1, PLAIN, tmp_path, keep=True)["error"] == "ValueError: no such column"
-    assert runner.pending(tmp_path, "small", PLAIN)[0] == [s for s in waiting if s != spec]
+    assert runner.run_case(spec, 1, tmp_path, keep=True)["error"] == "ValueError: no such column"
+    assert runner.pending(tmp_path, "small")[0] == [s for s in waiting if s != spec]
     assert len(waiting) == total
     assert counted(score(read_outcomes(tmp_path), LIMITS), "false_alarm") == (1, 1)
 
@@ -313,26 +294,16 @@ def test_a_case_that_cannot_be_made_stays_pending_and_stops_no_run(tmp_path, mon
         raise UndrivableError("nothing in the drive shows the deviation")
 
     monkeypatch.setattr(runner, "make_case", nothing_shows)
-    assert "not made: nothing in the drive" in runner.run_case(BIAS, 1, PLAIN, tmp_path, keep=False)["error"]
+    assert "not made: nothing in the drive" in runner.run_case(BIAS, 1, tmp_path, keep=False)["error"]
     assert not list(tmp_path.iterdir())
 
 
-def test_scores_tell_what_is_pending_and_are_drawn(tmp_path, fake_diagnose):
-    runner.seal_run(tmp_path, "small", 1, PLAIN)
-    runner.run_case(
-        next(s for s in table("small") if s.group is Group.NO_GAP), 1, PLAIN, tmp_path, keep=False
-    )
+def test_scores_tell_what_is_pending(tmp_path, fake_diagnose):
+    runner.seal_run(tmp_path, "small", 1)
+    runner.run_case(next(s for s in table("small") if s.group is Group.NO_GAP), 1, tmp_path, keep=False)
     scores = score_run(tmp_path)
     assert len(scores.pending) == len(table("small")) - 1
     assert json.loads(json.dumps(scores.to_json()))["lines"][3]["holds"] is False
-    draw_confusion(scores, tmp_path / "confusion.png")
-    assert (tmp_path / "confusion.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.long
-def test_cosine_finds_an_effect_that_stands_alone_in_its_signal():
-    case = make_case(Spec("rich-accelerometer_bias-1", Group.RICH, BIAS.effects, 10.0, BIAS.data), seed=1)
-    assert cosine(case)[0] == "accelerometer_bias"
 
 
 def test_a_watched_command_tells_memory_of_all_its_processes():
@@ -349,7 +320,3 @@ def test_a_watched_command_tells_memory_of_all_its_processes():
     assert usage.seconds > 1.0
     failed = watch([sys.executable, "-c", "import sys; sys.exit('column missing')"])
     assert (failed.code, failed.errors) == (1, "column missing")
-
-
-def test_every_size_can_be_asked_for():
-    assert [size.value for size in Size] == list(SIZES)

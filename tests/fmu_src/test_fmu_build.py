@@ -22,7 +22,7 @@ from long import beyond
 import build_fmu
 from fmu_src import packaging, variable_table
 from fmu_src.build_command import EXIT_BUILD, EXIT_INVALID, EXIT_RUN, EXIT_USAGE, Product, run_build
-from fmu_src.doctor import State, look_at_file
+from fmu_src.doctor import State, examine_file
 from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.model_description import UNITS as SI_UNITS
 from fmu_src.model_description import flat_name
@@ -343,7 +343,7 @@ def test_a_wrong_checksum_is_found_before_the_unit_is_used(unit_file: Path, tmp_
         UnitFileError, match=r"damaged\.fmu: damaged at modelDescription\.xml\. Copy or build"
     ):
         require_whole(path)
-    found = {finding.what: finding for finding in look_at_file(path)[1]}
+    found = {finding.what: finding for finding in examine_file(path)[1]}
     assert found["archive"].state is State.PROBLEM
     assert found["archive"].text == "damaged at modelDescription.xml"
 
@@ -374,7 +374,7 @@ def test_flat_names_have_no_dots_and_run_the_same(
     assert build_fmu.main(["--flat", "--out", str(tmp_path)]) == 0
     path = tmp_path / "TrpacEstimator_flat.fmu"
     assert str(path) in capsys.readouterr().out
-    assert [found.text for found in look_at_file(path)[1] if found.state is not State.OK] == []
+    assert [found.text for found in examine_file(path)[1] if found.state is not State.OK] == []
     description, dotted = read_model_description(str(path)), read_model_description(str(unit_file))
     assert description.variableNamingConvention == "flat"
     assert description.guid != dotted.guid

@@ -44,7 +44,7 @@ DAMAGED = {
     "sweep_part_json": 300,
     "log_csv": 1600,
     "log_parquet": 600,
-    "log_mf4": 100,
+    "log_mf4": 20,
     "bus_dbc": 200,
     "picture_jpeg": 1000,
     "picture_png": 1000,

@@ -11,7 +11,7 @@ import pytest
 from fmu_unit import DRIVING, STEP_S, Unit
 
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import CLASS_THETA, Surface
 
@@ -30,7 +30,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[Surface, list[Pat
     camera = Camera().scaled(0.5)
     paths: dict[Surface, list[Path]] = {}
     for surface in Surface:
-        renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], SceneLook(seed=4))
+        renderer = Renderer(camera, [SurfaceSegment(0.0, surface)], Scene(seed=4))
         paths[surface] = []
         for frame in range(FRAMES):
             path = folder / f"{surface.label}_{frame:03d}.jpg"

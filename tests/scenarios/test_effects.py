@@ -11,7 +11,8 @@ from scenarios.effects import EFFECTS, FORMS, ORDER, Effect, catalogue, make_eff
 from scenarios.effects.base import Stage, Subsystem, parameter
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
-from scenarios.plant import initial_state, make_log, simulate
+from scenarios.plant.pipeline import initial_state, simulate
+from scenarios.plant.sensors import make_log
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 CAR = load_vehicle(SCENARIOS / "vehicles" / "four_in_wheel_motor_ev.yaml")
@@ -99,8 +100,8 @@ def test_each_effect_describes_itself(effect_id):
     assert effect.excited_by
     assert effect.stage in get_args(Stage)
     assert effect.subsystem in get_args(Subsystem)
-    assert effect.look_alikes
-    assert set(effect.look_alikes) <= CONTRACT_IDS - {effect_id}
+    assert effect.confounders
+    assert set(effect.confounders) <= CONTRACT_IDS - {effect_id}
     assert effect.parameters()
     for p in effect.parameters():
         assert p.unit

@@ -12,9 +12,9 @@ from scipy.signal import StateSpace, lsim
 from scenarios.effects import form_of
 from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
-from scenarios.plant import dynamics, simulate
+from scenarios.plant import dynamics
 from scenarios.plant.parameters import MOTOR, POSITION, SPEED, TWIST, WHEEL
-from scenarios.plant.pipeline import actual_torque, make_setup
+from scenarios.plant.pipeline import actual_torque, make_setup, simulate
 from trpac_core.tyre import force as tyre_force
 
 CAR = load_vehicle(
@@ -204,10 +204,9 @@ def test_one_wrong_wheel_is_no_car_on_other_wheels():
         )
 
     car = CAR.to_core()
-    assert of(0.01, 0.02, 0.015, 0.005).radii_m() == pytest.approx(
-        RADIUS * np.array([1.01, 1.02, 1.015, 1.005])
-    )
-    assert of(0.01, 0.02, 0.015, 0.005).is_itself(car)
+    unlike = of(0.01, 0.02, 0.015, 0.005)
+    assert unlike.per_wheel(unlike.radius_m) == pytest.approx(RADIUS * np.array([1.01, 1.02, 1.015, 1.005]))
+    assert unlike.is_itself(car)
     assert of(-0.01, -0.02, -0.015, -0.005).is_itself(car)
     assert not of(0.0, 0.0, 0.02, 0.0).is_itself(car)
     assert not of(0.02, 0.02, 0.0, 0.0).is_itself(car)

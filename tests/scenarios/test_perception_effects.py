@@ -9,7 +9,7 @@ from scenarios.effects.camera_pitch import seen_distance_m
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.perception import NORMAL_CONFIDENCE, WRONG_SHARE, perceive, plain_frames, surfaces_at
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from trpac_core.vision.camera import Camera
 
 CAR = load_vehicle(Path(__file__).parents[2] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml")

@@ -20,7 +20,7 @@ from scenarios.effects.rolling_resistance import RollingResistanceForce
 from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip, TyreRelaxationWhileItAdheres
 from scenarios.errors import ScenarioError
 from scenarios.files import SensorNoise, load_scenario
-from scenarios.plant import advance, drive, dynamics, initial_state, make_log, simulate, write_log
+from scenarios.plant import dynamics
 from scenarios.plant.dynamics import FLOOR_SPEED_M_S, tyre_force
 from scenarios.plant.parameters import (
     FORCE,
@@ -33,7 +33,8 @@ from scenarios.plant.parameters import (
     WHEEL,
     DynamicsParameters,
 )
-from scenarios.plant.pipeline import make_setup
+from scenarios.plant.pipeline import advance, drive, initial_state, make_setup, simulate
+from scenarios.plant.sensors import make_log, write_log
 from trpac_core import tyre
 
 NOMINAL = CAR.model_copy(update={"effects": {}})
@@ -512,7 +513,7 @@ def test_step_by_step_is_the_same_motion_bit_for_bit(car):
 PLAIN_PYTHON = """
 import numpy as np
 from plant_drives import EVERYTHING, make_road, profile, with_effects
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 torque = profile([(0.0, 0.0), (0.02, 300.0), (0.05, -500.0)], 0.08)
 run = simulate(with_effects(**EVERYTHING), make_road((0.0, 0.9, 0.9), (1.3, 0.3, 0.5)), torque, 1e-3, 1.0)
 np.save("run.npy", np.column_stack([run.speed_m_s, run.wheel_speed_rad_s, run.tyre_force_n]))

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.camera.renderer import Renderer, fresnel_reflectance
-from scenarios.camera.scene import HOUSE_RISE, SceneLook, SurfaceSegment
+from scenarios.camera.scene import HOUSE_RISE, Scene, SurfaceSegment
 from scenarios.camera.sky import AZIMUTH_RAD, LOWEST_RAD, ROOFS, build_panorama
 from scenarios.camera.textures import build_ripmap
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 
 SMALL = Camera().scaled(0.2)
-PLAIN = SceneLook(trees_per_100_m=0, poles_per_100_m=0, walls_per_100_m=0, bridges_per_100_m=0)
-SHADED = SceneLook(
+PLAIN = Scene(trees_per_100_m=0, poles_per_100_m=0, walls_per_100_m=0, bridges_per_100_m=0)
+SHADED = Scene(
     seed=4, trees_per_100_m=0, poles_per_100_m=0, walls_per_100_m=0, bridges_per_100_m=4, patches_per_100_m=0
 )
 
@@ -99,7 +99,7 @@ def test_nothing_is_road_above_the_horizon():
 def test_the_world_stays_in_place_while_the_car_moves(surface):
     """The same ground point, found through the camera geometry, looks alike from two places; another does not."""
     look = replace(
-        PLAIN, seed=9, stains=0.6, cracks=0.9, film=0.05, puddles=0.0, visibility_m=1e6, snow_cover=0.7
+        PLAIN, seed=9, stains=0.6, cracks=0.9, water_film=0.05, puddles=0.0, visibility_m=1e6, snow_cover=0.7
     )
     scene = renderer(Camera().scaled(0.5), look, surface)
     move_m, sideways_m, heading_rad = 3.0, 0.3, 0.02
@@ -122,7 +122,7 @@ def test_the_world_stays_in_place_while_the_car_moves(surface):
 
 
 def test_the_same_look_gives_the_same_bytes_and_survives_pickling():
-    look = SceneLook.random(np.random.default_rng(3))
+    look = Scene.random(np.random.default_rng(3))
     first, second = renderer(look=look), renderer(look=look)
     copy = pickle.loads(pickle.dumps(first))
     for other in (second, copy):
@@ -134,7 +134,7 @@ def test_the_same_look_gives_the_same_bytes_and_survives_pickling():
 
 @pytest.mark.parametrize("surface", list(Surface))
 def test_shadows_darken_the_road_where_the_mask_says(surface):
-    look = replace(SHADED, film=0.3, puddles=0.0)  # a mirror has no shadow to show
+    look = replace(SHADED, water_film=0.3, puddles=0.0)  # a mirror has no shadow to show
     lit_look = replace(look, bridges_per_100_m=0.0)
     positions = range(0, 240, 12)
     shaded_scene, lit_scene = renderer(look=look, surface=surface), renderer(look=lit_look, surface=surface)
@@ -188,7 +188,7 @@ def test_a_camera_in_open_shade_exposes_longer():
 
 
 def test_streets_have_houses_on_one_side_or_both_and_else_the_look_that_they_were_given():
-    look = SceneLook.random(np.random.default_rng(5))
+    look = Scene.random(np.random.default_rng(5))
     streets = [look.in_a_street(np.random.default_rng(seed)) for seed in range(400)]
     assert all(street.open_shade for street in streets)
     assert all(replace(street, open_shade=False, house_rise=(0.0, 0.0)) == look for street in streets)
@@ -229,7 +229,7 @@ def test_dry_wet_and_snow_of_one_look_differ():
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), surface=st.sampled_from(list(Surface)))
 def test_any_random_look_gives_a_picture_with_content(seed, surface):
-    look = SceneLook.random(np.random.default_rng(seed), surface)
+    look = Scene.random(np.random.default_rng(seed), surface)
     frame = renderer(look=look, surface=surface).frame(seed % 500, 0.2, 0.01)
     road = frame.image[frame.drivable]
     assert frame.drivable.mean() > 0.1
@@ -239,8 +239,8 @@ def test_any_random_look_gives_a_picture_with_content(seed, surface):
 
 
 def test_random_looks_differ_but_repeat_from_their_seed():
-    assert SceneLook.random(np.random.default_rng(1)) == SceneLook.random(np.random.default_rng(1))
-    assert SceneLook.random(np.random.default_rng(1)) != SceneLook.random(np.random.default_rng(2))
+    assert Scene.random(np.random.default_rng(1)) == Scene.random(np.random.default_rng(1))
+    assert Scene.random(np.random.default_rng(1)) != Scene.random(np.random.default_rng(2))
 
 
 def test_a_wrong_order_of_segments_is_refused():

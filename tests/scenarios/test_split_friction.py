@@ -13,7 +13,7 @@ import pytest
 from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios import split_friction
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.camera.split import SplitRenderer
 from scenarios.files import load_road
 from scenarios.split_figure import draw_split
@@ -112,7 +112,7 @@ def test_braking_comes_in_pulses() -> None:
 
 @pytest.fixture(scope="module")
 def split_world() -> SplitRenderer:
-    look = SceneLook(seed=1, sky="overcast", sun_share=0.0, trees_per_100_m=0.0, bridges_per_100_m=0.0)
+    look = Scene(seed=1, sky="overcast", sun_share=0.0, trees_per_100_m=0.0, bridges_per_100_m=0.0)
     ice, dry = [SurfaceSegment(0.0, Surface.SNOW_ICE)], [SurfaceSegment(0.0, Surface.DRY)]
     return SplitRenderer(Camera().scaled(0.5), ice, dry, look)
 

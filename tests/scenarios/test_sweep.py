@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from scenarios.errors import ScenarioError
 from scenarios.plant.pipeline import drive
 from scenarios.sweep import execute as execute_module
-from scenarios.sweep.camera import CERTAIN, class_verdicts, measured_process
+from scenarios.sweep.camera import CERTAIN, measured_process, road_classes
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import execute, run_one
 from scenarios.sweep.files import load_sweep
@@ -165,7 +165,7 @@ def test_the_camera_process_gives_what_was_measured(sweep_of):
     moved = np.flatnonzero(trajectory.speed_m_s > 1.0)[0]
     found = []
     for seed in range(300):
-        verdicts = class_verdicts(plan.scenario, trajectory, plan.camera, seed)
+        verdicts = road_classes(plan.scenario, trajectory, plan.camera, seed)
         found.append(np.mean([v.surface != Surface.SNOW_ICE for row, v in verdicts.items() if row > moved]))
     assert np.mean(found) == pytest.approx(np.mean(shares), abs=0.06)
 
@@ -183,7 +183,7 @@ def test_the_camera_sees_the_road_that_lies_ahead(sweep_of):
             for world in measured_process().worlds
         ),
     )
-    verdicts = class_verdicts(plan.scenario, trajectory, plan.camera, 1, clean)
+    verdicts = road_classes(plan.scenario, trajectory, plan.camera, 1, clean)
     front = trajectory.position_m + plan.scenario.vehicle.to_core().cog_to_front_axle_m
     for row, verdict in verdicts.items():
         assert verdict.surface == (Surface.DRY if front[row] + 3.5 < 12.0 else Surface.SNOW_ICE)
@@ -192,19 +192,19 @@ def test_the_camera_sees_the_road_that_lies_ahead(sweep_of):
 def test_disturbances_of_the_camera_do_what_they_say(sweep_of):
     plan = plan_run(*(lambda s: (s, run_keys(s)[0]))(sweep_of()))
     trajectory = drive(plan.scenario)
-    plain = class_verdicts(plan.scenario, trajectory, plan.camera, 3)
-    late = class_verdicts(plan.scenario, trajectory, replace(plan.camera, late_s=0.25), 3)
+    plain = road_classes(plan.scenario, trajectory, plan.camera, 3)
+    late = road_classes(plan.scenario, trajectory, replace(plan.camera, late_s=0.25), 3)
     assert sorted(late) == [row + 250 for row in sorted(plain)]
-    lost = class_verdicts(plan.scenario, trajectory, replace(plan.camera, lost_share=0.5), 3)
+    lost = road_classes(plan.scenario, trajectory, replace(plan.camera, lost_share=0.5), 3)
     assert set(lost) < set(plain)
     assert 0.25 * len(plain) < len(lost) < 0.75 * len(plain)
     assert {row: plain[row] for row in lost} == lost
-    wrong = class_verdicts(plan.scenario, trajectory, replace(plan.camera, wrong_share=1.0), 3)
+    wrong = road_classes(plan.scenario, trajectory, replace(plan.camera, wrong_share=1.0), 3)
     front = trajectory.position_m + plan.scenario.vehicle.to_core().cog_to_front_axle_m
     for row, verdict in wrong.items():
         assert verdict.surface != plan.scenario.road.segment_at(front[row] + 3.5).surface_class
         assert verdict.confidence == CERTAIN
-    unsure = class_verdicts(plan.scenario, trajectory, replace(plan.camera, confidence_factor=0.0), 3)
+    unsure = road_classes(plan.scenario, trajectory, replace(plan.camera, confidence_factor=0.0), 3)
     assert {v.confidence for v in unsure.values()} == {0.0}
 
 

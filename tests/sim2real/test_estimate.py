@@ -11,13 +11,14 @@ import pytest
 from log_maker import make_frame, save
 from typer.testing import CliRunner
 
+from scenarios.camera.files import load_camera
 from scenarios.files import load_scenario, load_vehicle
 from scenarios.library import networks_folder
 from scenarios.plant.pipeline import drive
 from scenarios.plant.sensors import make_scenario_log
-from sim2real.logs import read_log, write_log
+from sim2real.logs import load_mapping, read_log, write_log
 from sim2real.replay.camera import camera_side
-from sim2real.replay.estimate import TABLE_3, estimate_files
+from sim2real.replay.estimate import TABLE_3, estimate_log
 from sim2real.replay.inputs import make_inputs, white_noise
 from sim2real.replay.run import OURS, readings, replay
 from sim2real.replay.score import score
@@ -261,8 +262,8 @@ class TestCamera:
         for name in ("a.jpg", "b.jpg"):
             cv2.imwrite(str(tmp_path / name), rng.integers(0, 255, (1200, 1920, 3), dtype=np.uint8))
         (tmp_path / "c.jpg").write_bytes(b"no picture")
-        done, summary = estimate_files(
-            save(log, tmp_path / "d.csv"), TABLE_3, SCENARIOS / "cameras" / "paper.yaml"
+        done, summary = estimate_log(
+            read_log(save(log, tmp_path / "d.csv")), load_vehicle(TABLE_3), load_camera("paper")
         )
         assert summary["camera"] == "pictures of the log"
         assert len(done.camera.left) == len(done.camera.right) == 3
@@ -344,10 +345,9 @@ def test_a_simulator_of_others_that_slides_shows_its_friction(trpac_data, tmp_pa
     """On snow at the limit, slip above 0.15, the force is near the peak: what no tyre model can get far wrong."""
     folder = trpac_data / "vehicle_logs" / "plants"
     cases = Path(__file__).parents[2] / "sim2real"
-    done, _ = estimate_files(
-        folder / "ocd_nominal_pulses_snow.csv",
-        cases / "cases" / "open_car_dynamics" / "vehicle.yaml",
-        mapping=cases / "mappings" / "plants.yaml",
+    done, _ = estimate_log(
+        read_log(folder / "ocd_nominal_pulses_snow.csv", load_mapping(cases / "mappings" / "plants.yaml")),
+        load_vehicle(cases / "cases" / "open_car_dynamics" / "vehicle.yaml"),
     )
     truth = pd.read_csv(folder / "ocd_nominal_pulses_snow_truth.csv")
     for i, wheel in enumerate(WHEELS):

@@ -13,7 +13,6 @@ from gap_drives import DRY, MODEL, clean, noisy, pulses, random_drives, remeasur
 from gap_files import write_log, write_road
 
 import sim2real
-from benchmarks.gap.development_drives import BARE
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.errors import ScenarioError
 from sim2real.demo import VEHICLE
@@ -454,7 +453,3 @@ def imported(path):
 def test_the_diagnosis_imports_no_benchmark_and_no_test(path):
     ours = {name.split(".")[0] for name in imported(path)}
     assert not ours & {"benchmarks", "tests", "trpac_cli", "conftest"}
-
-
-def test_the_benchmarks_car_has_no_effects():
-    assert BARE.effects == {}

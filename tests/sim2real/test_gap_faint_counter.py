@@ -9,8 +9,8 @@ from gap_drives import MODEL, random_drives
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from long import beyond
+from random_gap_drives import Levels
 
-from benchmarks.gap.development_drives import Levels
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import diagnose, find
 from sim2real.observing.drive import WHEEL

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_drives import BARE, MODEL, clean, noisy, pulses, random_drives, remeasured, rms, trace
+from gap_drives import MODEL, clean, noisy, pulses, random_drives, remeasured, rms, trace
 from long import beyond
+from random_gap_drives import SEVERITY, Levels
 
-from benchmarks.gap.development_drives import SEVERITY, Levels
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.mass_offset import MassOffset
 from scenarios.effects.torque_gain import TorqueGain
@@ -421,11 +421,6 @@ def test_a_pair_is_tried_with_other_partners(heavy_contest):
     assert len({e.ids for e in pairs}) == len(pairs)
     assert [e.loss for e in pairs] == sorted(e.loss for e in pairs)
     assert all(e.loss_fit <= contest.singles[0].loss_fit * 1.02 for e in pairs if "mass_offset" in e.ids)
-
-
-def test_the_models_own_car_is_the_benchmarks():
-    """The drives of this file have no effect that the model has already."""
-    assert BARE.effects == {}
 
 
 def test_an_effect_that_the_shorter_log_alone_excites_is_found():

@@ -95,7 +95,8 @@ def test_wheels_of_a_size_each_are_found_and_one_wrong_wheel_is_no_car_on_other_
     assert found.decision.verdict is verdict
     if verdict is Verdict.IDENTIFIED:
         (told,) = found.added()
-        np.testing.assert_allclose(told.radii_m(), effect.radii_m(), rtol=5e-4)
+        radii_m = (each.per_wheel(each.radius_m) for each in (told, effect))
+        np.testing.assert_allclose(*radii_m, rtol=5e-4)
 
 
 @pytest.mark.parametrize(

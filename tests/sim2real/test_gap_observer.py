@@ -19,8 +19,8 @@ from gap_drives import (
     road_of,
     trace,
 )
+from random_gap_drives import SEVERITY
 
-from benchmarks.gap.development_drives import SEVERITY
 from scenarios.effects import EFFECTS
 from scenarios.effects.aero_drag import AeroDrag
 from scenarios.effects.mass_offset import MassOffset
@@ -28,7 +28,7 @@ from scenarios.effects.road_grade import RoadGrade
 from scenarios.effects.torque_gain import TorqueGain
 from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
 from scenarios.files import VehicleFile
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from sim2real.observing.drive import ACCEL, CHANNELS, POSITION, SPEED, WHEEL, awake
 from sim2real.observing.evidence import residuals
 from sim2real.observing.lattice import SmoothCounter

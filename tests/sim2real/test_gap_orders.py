@@ -5,7 +5,7 @@ import pytest
 from gap_drives import DRY, MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured
 from scipy.integrate import cumulative_trapezoid
 
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from sim2real.diagnose import diagnose, without_order
 from sim2real.observing import orders
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, make_drive

@@ -26,7 +26,8 @@ from camera_drives import (
 from long import beyond
 
 from scenarios.perception import perceive
-from scenarios.plant import make_log, simulate
+from scenarios.plant.pipeline import simulate
+from scenarios.plant.sensors import make_log
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Verdict
 from sim2real.sides import UNKNOWN_BELIEF, camera_side

@@ -21,7 +21,8 @@ from camera_drives import (
 )
 
 from scenarios.effects import make_effect
-from scenarios.plant import make_log, simulate
+from scenarios.plant.pipeline import simulate
+from scenarios.plant.sensors import make_log
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.perception.friction import USUAL
 from sim2real.result import Verdict

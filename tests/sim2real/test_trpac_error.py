@@ -9,8 +9,7 @@ import pytest
 
 from scenarios.effects import EFFECTS, make_effect
 from scenarios.files import RoadFile, VehicleFile
-from scenarios.plant import simulate
-from scenarios.plant.pipeline import make_setup
+from scenarios.plant.pipeline import make_setup, simulate
 from scenarios.plant.sensors import SensorNoise, make_log, mu_reference
 from sim2real.how_far.trpac_error import places, trpac_error
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, make_drive

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from random_gap_drives import BARE, Case, drives
 
-from benchmarks.gap.development_drives import BARE, Case, drives
 from scenarios.files import RoadFile, VehicleFile
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from sim2real.observing.drive import CHANNELS, make_drive
 from sim2real.observing.observer import Simulation
 from trpac_core.vehicle import WHEELS

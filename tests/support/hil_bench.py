@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from hil_fakes import MS, FakeBus, FakeClock, FakeUnit
 
 from trpac_core.vision.preview import PreviewConfig
+from trpac_hil.camera_input import CameraInput
 from trpac_hil.codec import INPUT_MESSAGES, load_codec
 from trpac_hil.deadlines import Deadlines
 from trpac_hil.delays import Delays
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Counts, Loop
-from trpac_hil.placing import Placing
+from trpac_hil.preview_stamps import PreviewStamps
 from trpac_hil.records import columns
 from trpac_hil.shared import Ring
-from trpac_hil.sight import Sight
 
 CODEC = load_codec()
 PERIOD_NS = MS
@@ -44,10 +44,10 @@ class Bench:
     def __post_init__(self) -> None:
         self.bus = FakeBus(CODEC, lambda cycle: driving())
         self.ring = Ring(len(columns(self.unit.wiring)), 5000)
-        self.placing = Placing(PreviewConfig(), 0.05, len(self.unit.wiring.sides))
-        self.sight = Sight(self.placing, 1000 * MS, self.unit.wiring.side_names)
+        self.stamps = PreviewStamps(PreviewConfig(), 0.05, len(self.unit.wiring.sides))
+        self.camera_input = CameraInput(self.stamps, 1000 * MS, self.unit.wiring.side_names)
         self.events = Events(lambda time_s, text: self.told.append(text), lambda: 0.0)
-        self.inputs = Inputs(CODEC, INPUT_MESSAGES, self.events.say)
+        self.inputs = Inputs(CODEC, INPUT_MESSAGES, self.events.report)
 
     def run(self, slots: int) -> Counts:
         start_ns = self.clock.now_ns() + PERIOD_NS
@@ -58,7 +58,7 @@ class Bench:
             self.unit,
             CODEC,
             self.inputs,
-            self.sight,
+            self.camera_input,
             self.ring,
             self.events,
             Delays(self.clock),

@@ -18,4 +18,4 @@ def slow(control: Any) -> None:
     while not control.stopped:
         time.sleep(0.01)
     time.sleep(1.5)
-    control.tell("done", "written")
+    control.send("done", "written")

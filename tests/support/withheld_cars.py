@@ -10,36 +10,19 @@ from withheld_plant import CAR, roll
 
 from benchmarks.gap.withheld.generator import kernel
 from benchmarks.gap.withheld.generator.car import Car, Road
-from benchmarks.gap.withheld.generator.details import (
-    WARM_S,
-)
 from benchmarks.gap.withheld.generator.effects import EFFECT_FORMS
-from benchmarks.gap.withheld.generator.forms import (
-    NEWEST,
-    effect_in,
-)
-from benchmarks.gap.withheld.generator.kernel import (
-    N,
-    V,
-    W,
-    X,
-    integrate,
-)
+from benchmarks.gap.withheld.generator.forms import effect_in
+from benchmarks.gap.withheld.generator.kernel import N, V, W, X, integrate
 from benchmarks.gap.withheld.generator.outside import OUTSIDE
 from benchmarks.gap.withheld.generator.physics import Physics
 from benchmarks.gap.withheld.generator.sensor_set import Sensors
 from benchmarks.gap.withheld.generator.sensors import read
 from benchmarks.gap.withheld.generator.world import World, nominal
 
-LOCKED = 0.79 * 0.9 * 9.81
-"""Deceleration with locked wheels on a dry road [m/s^2]."""
-HALF_WARM_S = WARM_S * np.log(2.0)
-"""When what warms up is as on the mean."""
 NO_COMMAND = np.zeros((2, 4))
 DRY, WET = 0.9, 0.5
 SLIDING = 0.79 * 9.81
 """Deceleration with locked wheels over the friction [m/s^2]."""
-AIRBORNE = Road((0.0,), (1e-9,))
 
 
 def numbered(items):
@@ -47,12 +30,9 @@ def numbered(items):
     return [pytest.param(item, id=str(i)) for i, item in enumerate(items)]
 
 
-def forms_of(*effects: str, but: tuple[str, ...] = (), by: int = NEWEST.car):
-    """Forms of effects up to an edition but some, which have tests of their own."""
-    chosen = (
-        (effect, form, since) for effect in effects for form, (since, _) in EFFECT_FORMS[effect].items()
-    )
-    return numbered((effect, form) for effect, form, since in chosen if form not in but and since <= by)
+def forms_of(*effects: str):
+    """All forms of effects."""
+    return numbered((effect, form) for effect in effects for form in EFFECT_FORMS[effect])
 
 
 def by_further(name: str, **given: float) -> World:
@@ -85,37 +65,26 @@ def reading(path: np.ndarray, sensors: Sensors) -> tuple[np.ndarray, np.ndarray,
     return at, read(path, Sensors(), at), read(path, sensors, at)
 
 
-def _slip(world, speed: float, torque: float, seconds: float = 0.6) -> np.ndarray:
-    """Of each wheel in the end, over its size as the simulation has it [-]."""
-    path = roll(world, speed, seconds, torque)
+def slopes(
+    p: Physics, slip: float = 0.0, speed: float = 20.0, time: float = 0.0, place: float = 0.0
+) -> tuple[np.ndarray, float]:
+    """Derivative of a car whose wheels all slip alike, and what an accelerometer reads [m/s^2]."""
+    y = kernel.begin(p, 0.0, speed, np.full(4, speed / p.radius), time, NO_COMMAND)
+    y[X] = place
+    y[W : W + 4] = speed / p.radius / (1.0 - slip)
+    dy = np.zeros(N)
+    return dy, kernel.slope(p, y, time, NO_COMMAND, dy)
+
+
+def slip_of(world: World, speed: float, torque: float) -> np.ndarray:
+    """Of each wheel after 0.6 s, over its size as the simulation has it [-]."""
+    path = roll(world, speed, 0.6, torque)
     rims = path[-1, W : W + 4] * CAR.wheel_radius_m
     return (rims - path[-1, V]) / np.maximum(rims, path[-1, V])
 
 
-def _warmth(at_s: float) -> float:
-    return float(1.0 - 2.0 * np.exp(-at_s / WARM_S))
-
-
-def moving(p: Physics, slip: float = 0.0, speed: float = 20.0) -> tuple[np.ndarray, np.ndarray, float]:
-    """State of a car whose wheels all slip alike, its derivative, and what an accelerometer reads [m/s^2]."""
-    y = kernel.begin(p, 0.0, speed, np.full(4, speed / p.radius), 0.0, NO_COMMAND)
-    y[W : W + 4] = speed / p.radius / (1.0 - slip)
-    dy = np.zeros(N)
-    return y, dy, kernel.slope(p, y, 0.0, NO_COMMAND, dy)
-
-
-def slopes(
-    p: Physics, slip: float = 0.0, speed: float = 20.0, time: float = 0.0, place: float = 0.0, **state: float
-) -> tuple[np.ndarray, float]:
-    """Derivative of a car whose wheels all slip alike, and what an accelerometer reads [m/s^2].
-
-    `state` is what else is set, by the kernel's names: of the body, and else of all wheels.
-    """
-    y = kernel.begin(p, 0.0, speed, np.full(4, speed / p.radius), time, NO_COMMAND)
-    y[X] = place
-    y[W : W + 4] = speed / p.radius / (1.0 - slip)
-    for name, value in state.items():
-        first = getattr(kernel, name)
-        y[first : first + (1 if name == "PITCH" else 4)] = value
-    dy = np.zeros(N)
-    return dy, kernel.slope(p, y, time, NO_COMMAND, dy)
+def slowing(world: World, speed: float, at_s: float) -> float:
+    """How fast a car that coasts loses speed about a time [m/s^2]."""
+    rows = round(at_s * 1000.0)
+    path = roll(world, speed, at_s + 0.3)
+    return float((path[rows - 200, V] - path[rows + 200, V]) / 0.4)

@@ -21,7 +21,6 @@ SHORT = {
     "libcosimpy": ("steps", "two", "reset", "logging"),
     "ecospy": ("steps", "reset", "state", "nan"),
     "proxyfmu": ("steps",),
-    "ecos": ("steps", "real"),
 }
 
 

@@ -153,7 +153,7 @@ def test_the_diagnosis_is_built_floor_by_floor(floor):
     [
         ("trpac", {"numba", "numpy", "pandas", "scipy", "cv2", "onnxruntime", "matplotlib", "pydantic"}),
         ("trpac_cli.main", {"numba", "numpy", "pandas", "scipy", "cv2", "onnxruntime", "matplotlib"}),
-        ("scenarios.plant", {"scipy.signal", "scipy.stats", "cv2", "onnxruntime", "matplotlib"}),
+        ("scenarios.plant.pipeline", {"scipy.signal", "scipy.stats", "cv2", "onnxruntime", "matplotlib"}),
         ("sim2real.diagnose", {"scipy.signal", "scipy.stats", "matplotlib"}),
     ],
 )

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from benchmarks.vision.odd_pictures import KINDS, verdicts
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.library import networks_folder
 from trpac_cli.main import app
 from trpac_core.vision.camera import Camera
@@ -32,7 +32,7 @@ from trpac_core.vision.networks import Segmenter, SurfaceClassifier
 from trpac_core.vision.trajectory import Motion
 
 CAMERA = Camera().scaled(0.5)
-PLAIN = Renderer(CAMERA, [SurfaceSegment(0.0, Surface.SNOW_ICE)], SceneLook(seed=4)).frame(0.0).image
+PLAIN = Renderer(CAMERA, [SurfaceSegment(0.0, Surface.SNOW_ICE)], Scene(seed=4)).frame(0.0).image
 USED, NOTHING = "used", "shows nothing"
 
 

@@ -13,7 +13,6 @@ from road_picture import road_picture
 import trpac
 from scenarios.files import load_vehicle
 from scenarios.library import FOLDERS, located, shipped
-from sim2real.replay.estimate import estimate_files
 from trpac.extras import EXTRA_OF, MissingExtraError, extras
 
 CAR = trpac.Vehicle.builtin("four_in_wheel_motor_ev")
@@ -159,7 +158,7 @@ def test_a_frame_gives_what_its_file_gives(log, tmp_path, caplog):
     with caplog.at_level(logging.WARNING, "trpac"):
         found = trpac.estimate(log)
     assert "no vehicle file was given" in caplog.text
-    _, summary = estimate_files(tmp_path / "log.csv")
+    summary = trpac.estimate(tmp_path / "log.csv").summary
     assert found.summary["estimate"] == summary["estimate"]
     assert found.summary["warnings"] == summary["warnings"]
     by_path = trpac.estimate(tmp_path / "log.csv", CAR)

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from scenarios.effects import EFFECTS
 from scenarios.errors import ScenarioError
 from scenarios.files import load_road, load_vehicle
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from sim2real import demo
 from sim2real.logs import read_log
 from sim2real.result import Interval

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from scenarios import overlay_video, stills
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from scenarios.library import networks_folder
 from scenarios.stills import CLASSIFY_COLUMNS, StillNetworks, patch_logs
 from scenarios.vision_runs import FRAME_COLUMNS, Frames, run_frames
@@ -44,7 +44,7 @@ BROKEN = b"\xff\xd8\xff\xe0 not a picture"
 
 
 def road(*segments):
-    return Renderer(SMALL, [SurfaceSegment(at, surface) for at, surface in segments], SceneLook(seed=4))
+    return Renderer(SMALL, [SurfaceSegment(at, surface) for at, surface in segments], Scene(seed=4))
 
 
 @pytest.fixture(scope="module")
@@ -265,14 +265,14 @@ def test_one_even_colour_is_refused():
 
 
 @given(st.integers(64, 8000), st.integers(64, 8000))
-def test_looks_lie_in_pictures_of_any_shape(width, height):
-    looks = stills._looks(width, height)
-    assert len(looks) == 6
-    for left, top, right, bottom in looks:
+def test_crops_lie_in_pictures_of_any_shape(width, height):
+    crops = stills._crops(width, height)
+    assert len(crops) == 6
+    for left, top, right, bottom in crops:
         assert 0 <= left < right <= width
         assert height // 2 <= top < bottom <= height
-    assert looks[0][0] <= 0.1 * width
-    assert looks[0][2] >= 0.9 * width
+    assert crops[0][0] <= 0.1 * width
+    assert crops[0][2] >= 0.9 * width
 
 
 class Blind(Certain):

@@ -30,7 +30,7 @@ from long import beyond
 from numpy.testing import assert_allclose
 
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.evidence import EvidenceState, WeightLaw
@@ -356,7 +356,7 @@ def rendered(segments, look, position_m=0.0):
 @pytest.mark.parametrize("position_m", [0.0, 3.0, 6.0])
 def test_where_the_renderer_puts_a_change_of_surface_the_estimator_finds_it(position_m):
     """Two independent geometries: the renderer's labels, painted, through the estimator's projection."""
-    frame = rendered([SurfaceSegment(0.0, DRY), SurfaceSegment(10.6, SNOW)], SceneLook(seed=4), position_m)
+    frame = rendered([SurfaceSegment(0.0, DRY), SurfaceSegment(10.6, SNOW)], Scene(seed=4), position_m)
     picture = grained(np.repeat(PAINT[np.maximum(frame.surface, 0)][..., None], 3, axis=2))
     drivable = cv2.resize(frame.drivable.astype(np.float32), (256, 160), interpolation=cv2.INTER_AREA)
     _, result = run(picture, masks=Masks(drivable), with_view=True)
@@ -380,7 +380,7 @@ def test_trained_networks_on_rendered_road(surface, sky):
         pytest.skip(f"needs the trained networks: {missing} not in models/")
     ife = Ife(IfeConfig(), Segmenter(files[0]), SurfaceClassifier(files[1]))
     light = {"sky": sky, "sun_share": 0.0 if sky == "overcast" else 0.8}
-    look = SceneLook(seed=11, film=0.95, puddles=0.8, **light)
+    look = Scene(seed=11, water_film=0.95, puddles=0.8, **light)
     renderer = Renderer(CAMERA, [SurfaceSegment(0.0, surface)], look)
     state, results = IfeState(), []
     for position_m in (0.0, 6.0, 12.0, 18.0, 24.0):
@@ -407,7 +407,7 @@ def test_the_near_group_alone_gives_the_same_verdicts_bit_by_bit():
     """The trained networks, over frames whose history matters: what the units leave out is not missed."""
     networks = Segmenter(MODELS / "segmenter.onnx"), SurfaceClassifier(MODELS / "surface.onnx")
     camera = CAMERA.scaled(0.5)
-    renderer = Renderer(camera, [SurfaceSegment(0.0, WET), SurfaceSegment(8.0, DRY)], SceneLook(seed=3))
+    renderer = Renderer(camera, [SurfaceSegment(0.0, WET), SurfaceSegment(8.0, DRY)], Scene(seed=3))
     whole = Ife(IfeConfig(camera=camera), *networks)
     near = Ife(IfeConfig(camera=camera, groups_looked_at=1), *networks)
     states = IfeState(), IfeState()

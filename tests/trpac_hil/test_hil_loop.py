@@ -228,7 +228,7 @@ def test_a_camera_that_falls_silent_is_lost_and_one_that_sees_nothing_is_believe
     bench = Bench()
     bench.bus.messages = lambda cycle: driving(1.0) | (road(0.0, cycle) if cycle == 100 else {})
     bench.run(1500)
-    assert bench.sight.losses == 1
+    assert bench.camera_input.losses == 1
     assert [text for text in bench.told if text.startswith("No result of a picture for ")]
     assert bench.table["age_picture_ms"][-1] != bench.table["age_picture_ms"][-1]
     blind = Bench()
@@ -248,7 +248,7 @@ def test_a_confidence_at_either_end_is_no_failed_picture(confidence: float) -> N
     said["RoadClass"]["RoadClassConfidence_Left"] = confidence
     bench.bus.messages = lambda cycle: driving() | (said if cycle == 50 else {})
     bench.run(60)
-    assert (bench.placing.counts.results, bench.placing.counts.failed) == (1, 0)
+    assert (bench.stamps.counts.results, bench.stamps.counts.failed) == (1, 0)
 
 
 def test_of_four_wheels_one_without_its_signals_holds_alone_and_each_has_its_own_estimate_on_the_bus() -> (

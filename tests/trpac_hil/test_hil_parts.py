@@ -24,31 +24,32 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.errors import ScenarioError
+from trpac_core.estimator import RoadClass
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil import helper
 from trpac_hil.bus import BusSettings, Link, bus_options
+from trpac_hil.bus_relay import BusRelay, RelayedBus, relay_ring
 from trpac_hil.camera import FAILED, MOTION, result_columns
+from trpac_hil.camera_input import CameraInput
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, OUTPUT_MESSAGES, load_codec
 from trpac_hil.dbc_table import TARGET, document
 from trpac_hil.deadlines import Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
-from trpac_hil.ferry import Ferry, Wire, ferry_ring
-from trpac_hil.figures import SPREADS, Figures
+from trpac_hil.figures import SKETCHED_COLUMNS, Figures
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
-from trpac_hil.placing import CameraResult, Odometer, Placing, Verdict
-from trpac_hil.plant_node import PLAIN_SCENARIO, Partner, PartnerJob
-from trpac_hil.quantile_sketch import Spread
+from trpac_hil.plant_node import PLAIN_SCENARIO, PlantJob, PlantNode
+from trpac_hil.preview_stamps import CameraResult, Odometer, PreviewStamps
+from trpac_hil.quantile_sketch import QuantileSketch
 from trpac_hil.realtime import as_before, loop_core, pin, undisturbed
 from trpac_hil.records import columns
 from trpac_hil.rig import Rig, Stopper, _vision
 from trpac_hil.settings import HilSettings
 from trpac_hil.shared import Numbers, Ring
-from trpac_hil.sight import Sight
 from trpac_hil.unit import NO_CLASS, Wiring
 
 CODEC = load_codec()
@@ -237,17 +238,17 @@ def driven(speed_m_s: float, seconds: float, odometer: Odometer, from_ns: int = 
 
 
 def result(number: int, captured_ns: int, arrived_ns: int, surface: Surface | None) -> CameraResult:
-    verdict = None if surface is None else Verdict(surface, 0.9)
-    return CameraResult(number, captured_ns, arrived_ns, (verdict,))
+    road_class = None if surface is None else RoadClass(surface, 0.9)
+    return CameraResult(number, captured_ns, arrived_ns, (road_class,))
 
 
-def placing() -> Placing:
-    return Placing(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, sides=1)
+def preview_stamps() -> PreviewStamps:
+    return PreviewStamps(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, sides=1)
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.06, 0.12])
 def test_a_result_is_placed_where_its_picture_was_taken_however_late_it_comes(late_s: float) -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     captured_ns = driven(20.0, 1.0, odometer)
     captured_m = odometer.position_m
     now_ns = driven(20.0, late_s, odometer, captured_ns)
@@ -262,7 +263,7 @@ def test_a_result_is_placed_where_its_picture_was_taken_however_late_it_comes(la
 
 
 def test_a_result_that_comes_on_its_stretch_acts_from_then_on_and_one_beyond_it_never() -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     captured_ns = driven(20.0, 1.0, odometer)
     now_ns = driven(20.0, 0.2, odometer, captured_ns)
     places.take(result(1, captured_ns, now_ns, Surface.WET), odometer, 1000 * MS)
@@ -276,7 +277,7 @@ def test_a_result_that_comes_on_its_stretch_acts_from_then_on_and_one_beyond_it_
 
 
 def test_a_result_that_was_overtaken_or_is_older_than_the_memory_is_not_placed() -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     now_ns = driven(10.0, 1.0, odometer)
     places.take(result(1, now_ns - 50 * MS, now_ns, Surface.DRY), odometer, 1000 * MS)
     places.take(result(0, now_ns - 90 * MS, now_ns, Surface.WET), odometer, 1000 * MS)
@@ -285,7 +286,7 @@ def test_a_result_that_was_overtaken_or_is_older_than_the_memory_is_not_placed()
 
 
 def test_while_pictures_fail_nothing_is_known_and_after_a_good_one_it_is_again() -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     now_ns = driven(10.0, 1.0, odometer)
     places.take(result(1, now_ns, now_ns, Surface.DRY), odometer, 1000 * MS)
     now_ns = driven(10.0, 0.3, odometer, now_ns)
@@ -299,24 +300,28 @@ def test_while_pictures_fail_nothing_is_known_and_after_a_good_one_it_is_again()
 
 def test_results_of_the_cameras_process_come_with_its_work_and_what_it_left_out() -> None:
     results, motion = Ring(result_columns(2), 8), Numbers(len(MOTION))
-    sight = Sight(
-        Placing(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, 2), 1000 * MS, ("left", "right"), results, motion
+    camera = CameraInput(
+        PreviewStamps(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, 2),
+        1000 * MS,
+        ("left", "right"),
+        results,
+        motion,
     )
     odometer, heard = Odometer(), Inputs(CODEC, INPUT_MESSAGES, unsaid).heard["RoadClass"]
     captured_ns = driven(20.0, 1.0, odometer)
-    sight.share_motion(odometer, {"AccelX": math.nan, "SteeringAngle": 1.6, "YawRate": 0.2})
+    camera.share_motion(odometer, {"AccelX": math.nan, "SteeringAngle": 1.6, "YawRate": 0.2})
     assert motion.get() == pytest.approx([20.0, 0.0, 0.0, 0.2, 20.0])
-    sight.share_motion(odometer, {"AccelX": 1.5, "SteeringAngle": -0.1, "YawRate": 0.2})
+    camera.share_motion(odometer, {"AccelX": 1.5, "SteeringAngle": -0.1, "YawRate": 0.2})
     assert motion.get()[1:3] == pytest.approx([1.5, -0.1])
-    assert not sight.news(heard, False, False, odometer, captured_ns, unsaid)
+    assert not camera.news(heard, False, False, odometer, captured_ns, unsaid)
     results.write([4, captured_ns, captured_ns, 2, 17.5, FAILED, 0.0, 1.0, 0.8])
     results.write([5, captured_ns + 1, captured_ns, 3, 18.5, FAILED, 0.0, 1.0, 0.9])
     now_ns = driven(20.0, 0.14, odometer, captured_ns)
-    assert sight.news(heard, False, False, odometer, now_ns, unsaid)
-    assert sight.classes == [(NO_CLASS, 0.0), (int(Surface.WET), 0.9)]
-    assert (sight.left_out, sight.work_ms, sight.number) == (3, [17.5, 18.5], 1)
-    assert sight.picture_age_ms(now_ns) == pytest.approx(140.0)
-    assert sight.age_under_wheel_ms(now_ns) == pytest.approx(140.0, abs=1e-3)
+    assert camera.news(heard, False, False, odometer, now_ns, unsaid)
+    assert camera.classes == [(NO_CLASS, 0.0), (int(Surface.WET), 0.9)]
+    assert (camera.left_out, camera.work_ms, camera.number) == (3, [17.5, 18.5], 1)
+    assert camera.picture_age_ms(now_ns) == pytest.approx(140.0)
+    assert camera.age_under_wheel_ms(now_ns) == pytest.approx(140.0, abs=1e-3)
 
 
 def test_the_place_between_two_looks_is_interpolated() -> None:
@@ -334,7 +339,7 @@ def test_the_place_between_two_looks_is_interpolated() -> None:
 def test_after_a_camera_was_lost_what_it_said_before_no_longer_counts(
     silent_s: float, believed: bool
 ) -> None:
-    odometer, places = Odometer(), placing()
+    odometer, places = Odometer(), preview_stamps()
     first_ns = driven(1.0, 1.0, odometer)
     first_m = odometer.position_m
     places.take(result(1, first_ns, first_ns, Surface.WET), odometer, 1000 * MS)
@@ -376,10 +381,10 @@ def test_a_lost_bus_is_tried_again_whatever_opening_it_raises(why: Exception) ->
 
 @pytest.mark.parametrize(("key", "value"), [("scenario", "nowhere.yaml"), ("dbc", "nowhere.dbc")])
 def test_what_a_plant_on_the_bus_refuses_leaves_no_open_bus(key: str, value: str, tmp_path: Path) -> None:
-    job = PartnerJob(PLAIN_SCENARIO, BusSettings("virtual", "none"), DBC_FILE, 1000.0)
+    job = PlantJob(PLAIN_SCENARIO, BusSettings("virtual", "none"), DBC_FILE, 1000.0)
     opened: list[int] = []
     with pytest.raises((ScenarioError, HilError), match="nowhere"):
-        Partner(replace(job, **{key: tmp_path / value}), lambda: opened.append(1), SystemClock())
+        PlantNode(replace(job, **{key: tmp_path / value}), lambda: opened.append(1), SystemClock())
     assert not opened
 
 
@@ -453,12 +458,12 @@ def test_what_goes_into_the_wire_comes_out_of_the_bus_in_order(
     sent = [
         (frame_id if extended else frame_id % 2**11, extended, data) for frame_id, extended, data in messages
     ]
-    settings, ring = BusSettings("virtual", "test-ferry"), ferry_ring()
-    wire, link, listener = Wire(ring), Link(settings.open, unsaid), settings.open()
+    settings, ring = BusSettings("virtual", "test-ferry"), relay_ring()
+    wire, link, listener = RelayedBus(ring), Link(settings.open, unsaid), settings.open()
     for message in sent:
         wire.send(*message)
     assert wire.receive() == []
-    Ferry(ring, link, FakeClock()).take_over()
+    BusRelay(ring, link, FakeClock()).take_over()
     heard = []
     while (message := listener.recv(0.0)) is not None:
         heard.append((message.arbitration_id, message.is_extended_id, bytes(message.data)))
@@ -497,14 +502,14 @@ def test_a_reader_that_is_too_slow_loses_the_oldest_rows_and_knows_how_many() ->
 
 def test_quantiles_are_right_to_half_a_per_cent_and_the_greatest_is_exact() -> None:
     values = np.random.default_rng(1).lognormal(3.0, 1.0, 20_000)
-    spread = Spread()
+    sketch = QuantileSketch()
     for part in np.array_split(values, 7):
-        spread.add([*part, math.nan])
-    assert spread.count == len(values)
-    assert spread.greatest == values.max()
+        sketch.add([*part, math.nan])
+    assert sketch.count == len(values)
+    assert sketch.greatest == values.max()
     for share in (0.5, 0.99):
-        assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=0.006)
-    assert Spread().summary() is None
+        assert sketch.quantile(share) == pytest.approx(np.quantile(values, share), rel=0.006)
+    assert QuantileSketch().summary() is None
 
 
 def test_figures_are_those_of_all_rows_and_the_newest_one_counts() -> None:
@@ -515,7 +520,7 @@ def test_figures_are_those_of_all_rows_and_the_newest_one_counts() -> None:
     assert math.isnan(figures.now("TRPAC"))
     for part in (rows[:0], rows[:400], rows[400:]):
         figures.add(part)
-    for name, column in SPREADS.items():
+    for name, column in SKETCHED_COLUMNS.items():
         assert figures.summary()[name]["max"] == pytest.approx(rows[:, places[column]].max(), rel=1e-3)
         assert figures.summary()[name]["median"] == pytest.approx(
             np.median(rows[:, places[column]]), rel=0.01
@@ -529,7 +534,7 @@ def test_events_are_said_once_and_counted_always() -> None:
     told: list[tuple[float, str]] = []
     events = Events(lambda time_s, text: told.append((time_s, text)), lambda: 1.5)
     for _ in range(3):
-        events.say("a", "first")
+        events.report("a", "first")
     assert told == [(1.5, "first")]
     assert events.summary() == [{"kind": "a", "first_s": 1.5, "count": 3, "said": "first"}]
 

@@ -19,7 +19,7 @@ from trpac_hil.bus import BusSettings
 from trpac_hil.camera import FAILED, HEAD, CameraJob, result_columns
 from trpac_hil.codec import load_codec
 from trpac_hil.driver import FAST_M_S, GRIP_SHARE, PAUSE_S, PULSE_S, RAMP_S, SLOW_M_S, Driver, EndlessDrive
-from trpac_hil.plant_node import P_0_M, PLAIN_SCENARIO, Partner, PartnerJob
+from trpac_hil.plant_node import P_0_M, PLAIN_SCENARIO, PlantJob, PlantNode
 from trpac_hil.shared import Numbers, Ring
 
 CODEC = load_codec()
@@ -110,36 +110,36 @@ class Listener:
         return [(at_ns, values) for at_ns, sent, values in self.heard if sent == name]
 
 
-def sent_in(seconds: float, **job: Any) -> tuple[Listener, Partner, list[tuple[int, Any]]]:
+def sent_in(seconds: float, **job: Any) -> tuple[Listener, PlantNode, list[tuple[int, Any]]]:
     """What a plant sends, and where the car was in each slot."""
     clock = FakeClock()
     bus = Listener(clock)
-    partner = Partner(PartnerJob(bus=BusSettings("virtual", "none"), **job), lambda: bus, clock)
-    advance, places = partner.drive.advance, []
+    node = PlantNode(PlantJob(bus=BusSettings("virtual", "none"), **job), lambda: bus, clock)
+    advance, places = node.drive.advance, []
 
     def watched(steps: int) -> None:
         advance(steps)
-        ahead = tuple(int(s) for s in partner.drive.surfaces_ahead(P_0_M))
-        places.append((clock.now_ns(), partner.drive.now, ahead))
+        ahead = tuple(int(s) for s in node.drive.surfaces_ahead(P_0_M))
+        places.append((clock.now_ns(), node.drive.now, ahead))
 
-    partner.drive.advance = watched  # type: ignore[method-assign]
+    node.drive.advance = watched  # type: ignore[method-assign]
     rate_hz = job.get("rate_hz", 1000.0)
-    partner.run(clock.now_ns(), lambda: False, round(seconds * rate_hz))
-    return bus, partner, places
+    node.run(clock.now_ns(), lambda: False, round(seconds * rate_hz))
+    return bus, node, places
 
 
 @pytest.fixture(scope="module")
-def driven() -> tuple[Listener, Partner, list[tuple[int, Any]]]:
+def driven() -> tuple[Listener, PlantNode, list[tuple[int, Any]]]:
     return sent_in(12.0, rate_hz=200.0, camera_fps=20.0, camera_delay_s=0.06)
 
 
 def test_each_slot_has_its_signals_as_the_sensors_read_them_and_the_bus_is_emptied(driven: Any) -> None:
-    bus, partner, places = driven
+    bus, node, places = driven
     assert Counter(name for _, name, _ in bus.heard) == {
         "WheelSpeeds": 2400, "WheelTorques": 2400, "VehicleMotion": 2400, "PlantTruth": 1200, "RoadClass": 239
     }  # fmt: skip
     assert bus.looks == 2400
-    assert partner.left_out == 0
+    assert node.left_out == 0
     noise, channels = SCENARIO.sensors, ("FL", "FR", "RL", "RR")
     read = {name: bus.named(name) for name in ("WheelSpeeds", "WheelTorques", "VehicleMotion")}
     pairs = [
@@ -195,7 +195,7 @@ def test_each_picture_is_taken_when_it_is_due_and_where_that_is_too_fast_the_new
     monkeypatch.setattr(camera, "SystemClock", lambda: clock)
     start_ns, taken = clock.now_ns() + 10 * MS, []
 
-    def look(image: int, motion: Any) -> list[Any]:
+    def process(image: int, motion: Any) -> list[Any]:
         taken.append((image, motion.speed_m_s))
         clock.time_ns += work_ms * MS
         if image == 2:
@@ -205,7 +205,7 @@ def test_each_picture_is_taken_when_it_is_due_and_where_that_is_too_fast_the_new
     told: list[str] = []
 
     class Told:
-        tell = staticmethod(lambda kind, text: told.append(text))
+        send = staticmethod(lambda kind, text: told.append(text))
         stopped = property(lambda self: len(taken) == 6)
 
     control = Told()
@@ -213,7 +213,7 @@ def test_each_picture_is_taken_when_it_is_due_and_where_that_is_too_fast_the_new
     job = CameraJob(SimpleNamespace(picture=lambda number: number), SimpleNamespace(flag_threshold=0.4), 10.0)  # type: ignore[arg-type]
     motion, results = Numbers(5), Ring(result_columns(1), 64)
     motion.set([12.0, 0.0, 0.0, 0.0, 0.0])
-    camera._play(job, SimpleNamespace(look=look), motion, results, control)  # type: ignore[arg-type]
+    camera._play(job, SimpleNamespace(process=process), motion, results, control)  # type: ignore[arg-type]
     rows = results.read()
     assert taken == [(number, 12.0) for number in numbers]
     assert rows[:, 0].tolist() == numbers
@@ -221,6 +221,6 @@ def test_each_picture_is_taken_when_it_is_due_and_where_that_is_too_fast_the_new
     assert rows[:, 3].tolist() == [number - count for count, number in enumerate(numbers)]
     assert rows[:, 4] == pytest.approx(work_ms)
     assert (rows[:, 2] - rows[:, 1]).min() >= work_ms * MS
-    verdicts = rows[:, HEAD:].tolist()
-    assert verdicts == [[FAILED, 0.0] if number == 2 else [float(Surface.WET), 0.4] for number in numbers]
+    classes = rows[:, HEAD:].tolist()
+    assert classes == [[FAILED, 0.0] if number == 2 else [float(Surface.WET), 0.4] for number in numbers]
     assert len(told) == 1

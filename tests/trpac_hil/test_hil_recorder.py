@@ -44,7 +44,7 @@ class Told:
     def refuse(self, text: str) -> None:
         self.refused.append(text)
 
-    def tell(self, kind: str, content: Any) -> None:
+    def send(self, kind: str, content: Any) -> None:
         self.said.append((kind, content))
 
     def wait_for_start(self) -> bool:

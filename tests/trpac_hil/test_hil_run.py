@@ -26,8 +26,8 @@ from trpac_cli.main import app
 from trpac_hil.bus import BusSettings
 from trpac_hil.codec import load_codec
 from trpac_hil.errors import HilError
-from trpac_hil.placing import UNIT_PREVIEW
-from trpac_hil.plant_node import PartnerJob
+from trpac_hil.plant_node import PlantJob
+from trpac_hil.preview_stamps import UNIT_PREVIEW
 from trpac_hil.rig import Rig, run_hil
 from trpac_hil.settings import HilSettings
 
@@ -119,7 +119,7 @@ def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(unit_file: Pa
         frames=pictures(tmp_path / "frames"),
         camera=CAMERA,
         fps=10.0,
-        plant=PartnerJob(bus=bus, rate_hz=200.0, camera_fps=0.0),
+        plant=PlantJob(bus=bus, rate_hz=200.0, camera_fps=0.0),
     )
     listener = Listener(bus)
     summary = run_hil(settings)
@@ -259,7 +259,7 @@ def test_the_unit_of_four_wheels_runs_on_the_same_bus(tmp_path: Path) -> None:
 
     archive = build_unit(UNITS["TrpacEstimator4W"], tmp_path / "TrpacEstimator4W.fmu")
     bus = BusSettings("virtual", "test-four")
-    job = PartnerJob(bus=bus, rate_hz=100.0, camera_delay_s=0.03)
+    job = PlantJob(bus=bus, rate_hz=100.0, camera_delay_s=0.03)
     summary = run_hil(HilSettings(tmp_path / "out", archive, bus, rate_hz=100.0, duration_s=1.5, plant=job))
     log = columns(tmp_path / "out" / "log.mf4")
     assert (summary["unit"], summary["wheel"]) == ("TrpacEstimator4W", "all")
@@ -285,7 +285,7 @@ def test_a_full_disk_costs_the_log_and_not_the_run() -> None:
         def __init__(self) -> None:
             self.said: list[tuple[str, str]] = []
 
-        def tell(self, kind: str, text: str) -> None:
+        def send(self, kind: str, text: str) -> None:
             self.said.append((kind, text))
 
     full, ear = Full(), Ear()

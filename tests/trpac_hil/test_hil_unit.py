@@ -23,8 +23,8 @@ def test_what_is_read_of_a_unit_is_what_its_variables_say(name: str, tmp_path: P
     wheels = unit.wiring.wheels
 
     def value(variable: str) -> float | bool:
-        reference, kind = unit._references[variable]
-        return getattr(unit._instance, f"get{kind}")([reference])[0]
+        read = unit._instance.getBoolean if "flag" in variable else unit._instance.getReal
+        return read(unit.references([variable]))[0]
 
     def of_each(variable: str) -> list[float | bool]:
         return [value(variable if len(wheels) == 1 else f"{variable}.{wheel}") for wheel in wheels]

@@ -9,97 +9,39 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress
 
 from .frozen import run_frozen, write_list
-from .generator.forms import NEWEST, PLAIN
-from .generator.making import make_case
-from .generator.table import table
+from .generator.table import SIZES
 from .outcome import ResultError
-from .runner import RunError, pending, run, seal_run, write_case
-from .scorer import score_run
-from .show import draw_confusion, print_scores
+from .runner import RunError, pending, run, seal_run
+from .scorer import print_scores, score_run
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 console, complaints = Console(), Console(stderr=True, soft_wrap=True)
 
 
-class Size(StrEnum):
-    """The keys of `SIZES`, as choices."""
-
-    DEV = "dev"
-    SMALL = "small"
-    MEDIUM = "medium"
-    FULL = "full"
-    CAMERA = "camera"
-    CAMERA_SMALL = "camera_small"
-
-
+Size = StrEnum("Size", list(SIZES))
 Out = Annotated[Path, typer.Option(help="Folder of the run.")]
-Cases = Annotated[
-    Size, typer.Option(help="How many: a handful, a few of each kind, or all; or the camera's.")
-]
-Seed = Annotated[
-    int, typer.Option(min=0, help="1 is for development; a seal wants one that nobody has looked at.")
-]
-
-
-class Forms(StrEnum):
-    """What a case draws among."""
-
-    PLAIN = "plain"
-    NEWEST = "newest"
-
-
-EDITIONS = {Forms.PLAIN: PLAIN, Forms.NEWEST: NEWEST}
-FormsOf = Annotated[
-    Forms, typer.Option(help="What is drawn among: one form of everything, or all that the generator has.")
-]
-
-
-@app.command("cases")
-def cases_command(
-    out: Out,
-    cases: Cases = Size.DEV,
-    seed: Seed = 1,
-    forms: FormsOf = Forms.PLAIN,
-) -> None:
-    """Only write the cases' files, with their seals beside, to look at."""
-    with _progress() as progress:
-        edition = EDITIONS[forms]
-        specs = table(cases.value, edition)
-        task = progress.add_task("cases", total=len(specs))
-        for spec in specs:
-            case = make_case(spec, seed, edition)
-            folder = write_case(case, seed, out)
-            folder.with_suffix(".seal.json").write_text(json.dumps(case.seal(), indent=1), encoding="utf-8")
-            progress.advance(task)
 
 
 @app.command("run")
 def run_command(
     out: Out,
-    cases: Cases = Size.SMALL,
-    seed: Seed = 1,
-    forms: FormsOf = Forms.NEWEST,
+    cases: Annotated[Size, typer.Option(help="A few of each kind, or all; or the camera's.")] = Size.small,
+    seed: Annotated[
+        int, typer.Option(min=0, help="1 is for development; a seal wants one that nobody has looked at.")
+    ] = 1,
     jobs: Annotated[int, typer.Option(min=1, help="Cases side by side.")] = 2,
     keep: Annotated[bool, typer.Option(help="Keep the cases' logs.")] = False,
 ) -> None:
     """Make the cases and have each diagnosed; a stopped run goes on where it stopped."""
-    edition = EDITIONS[forms]
-    seal_run(out, cases.value, seed, edition)
-    waiting, total = pending(out, cases.value, edition)
+    seal_run(out, cases.value, seed)
+    waiting, total = pending(out, cases.value)
     failed = 0
-    with _progress() as progress:
+    with Progress(console=complaints) as progress:
         task = progress.add_task("diagnoses", total=total, completed=total - len(waiting))
-        for result in run(out, cases.value, seed, edition, jobs, keep):
+        for result in run(out, cases.value, seed, jobs, keep):
             failed += result["error"] is not None
             progress.update(
                 task, advance=1, description=f"diagnoses, {failed} failed" if failed else "diagnoses"
@@ -108,11 +50,10 @@ def run_command(
 
 @app.command("score")
 def score_command(out: Out) -> None:
-    """Open the seal: print the scores, write scores.json and confusion.png. Exit code 1 where a threshold is missed."""
+    """Open the seal: print the scores, write scores.json. Exit code 1 where a threshold is missed."""
     scores = score_run(out)
     print_scores(scores, console)
     (out / "scores.json").write_text(json.dumps(scores.to_json(), indent=1), encoding="utf-8")
-    draw_confusion(scores, out / "confusion.png")
     if any(line.n and not line.holds for line in scores.lines):
         raise typer.Exit(1)
 
@@ -132,15 +73,8 @@ def frozen_command(
         now.append(after)
         lost = before.right == "yes" and after.right == "no"
         worse += lost
-        mark = (
-            "LOST"
-            if lost
-            else ""
-            if before.right == after.right
-            else "not run before"
-            if not before.right
-            else "won"
-        )
+        won = after.right == "yes" and before.right == "no"
+        mark = "LOST" if lost else "won" if won else "" if before.right else "not run before"
         then = f"{before.verdict or '-'} {before.first}".strip()
         said = f"{after.spec.name}: {after.verdict} {after.first} (right: {after.right}; then: {then}) {mark}"
         console.print(said, highlight=False)
@@ -149,17 +83,6 @@ def frozen_command(
         write_list(now)
     if worse:
         raise typer.Exit(1)
-
-
-def _progress() -> Progress:
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    return Progress(*columns, console=complaints)
 
 
 def main() -> None:

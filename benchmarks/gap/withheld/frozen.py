@@ -15,14 +15,13 @@ from typing import Any
 
 from joblib import Parallel, delayed, parallel_config
 
-from .generator.camera_forms import OF_EFFECT
-from .generator.forms import Edition
+from .generator.cases import Forms
 from .generator.table import Group, Spec, table
 from .outcome import Outcome, outcome_of
 from .runner import RunError, result_path, run_case
 
 LIST = Path(__file__).with_name("frozen.csv")
-COLUMNS = ("size", "car", "camera", "seed", "case", "forms", "expected", "verdict", "first", "right")
+COLUMNS = ("size", "seed", "case", "attempt", "forms", "expected", "verdict", "first", "right")
 
 
 @dataclass(frozen=True)
@@ -32,45 +31,46 @@ class Frozen:
     Attributes
     ----------
     spec : Spec
-    edition : Edition
-    seed : int
-    forms : str
-        Of what is hidden, as the seal tells them.
+    seed, attempt : int
+        Of the generator, and which of its draws could be driven.
+    forms : mapping
+        Of all that matters to the case.
     expected : str
         The right answer.
     verdict, first, right : str
         What was said when it was frozen: the verdict, the first cause, and "yes" or "no"; empty where it was not run.
-    size : str
-        Table that the case stands in.
     """
 
     spec: Spec
-    edition: Edition
     seed: int
-    forms: str
+    attempt: int
+    forms: Forms
     expected: str
     verdict: str
     first: str
     right: str
-    size: str
 
     def row(self) -> dict[str, str]:
         """Of the list."""
-        own = {name: str(getattr(self, name)) for name in COLUMNS if hasattr(self, name)}
-        numbers = {"car": str(self.edition.car), "camera": str(self.edition.camera)}
-        return {name: ({"case": self.spec.name} | numbers | own)[name] for name in COLUMNS}
+        written = {
+            "size": "camera" if self.spec.camera else "full",
+            "case": self.spec.name,
+            "forms": " ".join(f"{aspect}={form}" for aspect, form in self.forms.items()),
+        }
+        return {name: str(written[name] if name in written else getattr(self, name)) for name in COLUMNS}
 
 
 def frozen() -> list[Frozen]:
     """The list."""
     with LIST.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
+    specs = {(size, spec.name): spec for size in ("full", "camera") for spec in table(size)}
     cases = []
     for row in rows:
-        edition = Edition(int(row["car"]), int(row["camera"]))
-        spec = next(s for s in table(row["size"], edition) if s.name == row["case"])
-        said = {name: row[name] for name in ("forms", "expected", "verdict", "first", "right", "size")}
-        cases.append(Frozen(spec, edition, int(row["seed"]), **said))
+        forms = dict(pair.split("=") for pair in row["forms"].split())
+        said = (row[name] for name in ("expected", "verdict", "first", "right"))
+        spec = specs[row["size"], row["case"]]
+        cases.append(Frozen(spec, int(row["seed"]), int(row["attempt"]), forms, *said))
     return cases
 
 
@@ -111,7 +111,7 @@ def run_frozen(out: Path, jobs: int, only: str = "") -> Iterator[tuple[Frozen, F
 
 def _judged(case: Frozen, out: Path) -> tuple[Frozen, Frozen]:
     folder = out / ("camera" if case.spec.camera else "car")
-    problem = run_case(case.spec, case.seed, case.edition, folder, False)["error"]
+    problem = run_case(case.spec, case.seed, folder, False, case.forms, case.attempt)["error"]
     path = result_path(folder, case.spec)
     if not path.exists():
         raise RunError(f"{case.spec.name}: {problem}")
@@ -120,14 +120,9 @@ def _judged(case: Frozen, out: Path) -> tuple[Frozen, Frozen]:
 
 def answered(case: Frozen, result: dict[str, Any]) -> Frozen:
     """A case with what a result of `run_case` says of it."""
-    seal, outcome = result["seal"], outcome_of(result)
-    forms = seal["camera"]["chain"]["forms"] if case.spec.camera else seal["forms"]
-    aspects = OF_EFFECT if case.spec.camera else {}
-    told = [forms[a] for e in case.spec.effects for a in aspects.get(e, (e,)) if a in forms]
-    told += [forms["foreign_tyre"]] if case.spec.group is Group.TYRE else []
+    outcome = outcome_of(result)
     first = outcome.causes[0][0] if outcome.blames and outcome.causes else ""
-    right = "yes" if is_right(outcome) else "no"
-    return replace(case, forms=" ".join(told), verdict=outcome.verdict, first=first, right=right)
+    return replace(case, verdict=outcome.verdict, first=first, right="yes" if is_right(outcome) else "no")
 
 
 def write_list(cases: list[Frozen]) -> None:

@@ -9,9 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .baselines import closure, in_sample_bic
-from .generator.camera_library import CAMERA_LIBRARY
-from .generator.library import LIBRARY
 from .generator.table import Group
 
 NONE = "none of these"
@@ -38,8 +35,6 @@ class Outcome:
         "error" where the diagnosis failed.
     causes : tuple of (str, float)
         Effects and their probabilities as ranked; a cause of several effects gives them in a row.
-    camera : bool
-        The logs have a camera, so that its effects are candidates too.
     """
 
     name: str
@@ -57,11 +52,7 @@ class Outcome:
     achieved_shrink: float
     seconds: float
     memory_gib: float
-    cosine: tuple[str, ...]
-    bic: tuple[str, ...]
-    closure: tuple[str, ...]
     error: str | None
-    camera: bool = False
 
     @property
     def blames(self) -> bool:
@@ -105,11 +96,6 @@ class Outcome:
         inside = self.group in (Group.RICH, Group.TYRE, Group.MILD)
         return self.most_probable[0] == (self.truth[0] if inside else NONE)
 
-    @property
-    def answer(self) -> str:
-        """What a reader takes from it: an effect, or the verdict."""
-        return self.causes[0][0] if self.blames and self.causes else self.verdict
-
 
 def read_outcomes(folder: Path) -> list[Outcome]:
     """All results of a run.
@@ -145,8 +131,6 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
     first = said["causes"][0] if said["causes"] else {"parameters": {}}
     unexplained = said.get("unexplained")
     usage = result.get("usage", {})
-    camera = "camera" in seal
-    known = {**LIBRARY, **CAMERA_LIBRARY} if camera else LIBRARY
     return Outcome(
         name=result["case"],
         group=Group(seal["group"]),
@@ -163,11 +147,7 @@ def outcome_of(result: Mapping[str, Any]) -> Outcome:
         achieved_shrink=_number(result.get("achieved_shrink_percent")),
         seconds=_number(usage.get("seconds", result.get("wall_s"))),
         memory_gib=_number(usage.get("peak_bytes")) / 2**30,
-        cosine=tuple(result.get("cosine") or ()),
-        bic=tuple(in_sample_bic(said, known)),
-        closure=tuple(closure(said, known)),
         error=result["error"],
-        camera=camera,
     )
 
 

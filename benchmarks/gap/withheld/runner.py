@@ -20,17 +20,13 @@ from typing import Any
 
 from joblib import Parallel, delayed, parallel_config
 
-from .baselines import cosine
 from .command import arguments, watch
-from .generator.cases import Case, UndrivableError
-from .generator.forms import Edition
-from .generator.making import make_case
+from .generator.camera_case import make_case
+from .generator.cases import Case, Forms, UndrivableError
 from .generator.table import Group, Spec, table
 
 HERE = Path(__file__).resolve().parent
 THRESHOLDS = HERE / "thresholds.yaml"
-COSINE_CASE = "-0"
-"""Cases of the cosine baseline, one per effect of the car: it simulates each anew, longer than a diagnosis takes."""
 
 
 class RunError(ValueError):
@@ -45,13 +41,13 @@ def digest(*paths: Path) -> str:
     return total.hexdigest()
 
 
-def seal_run(out: Path, size: str, seed: int, edition: Edition) -> None:
+def seal_run(out: Path, size: str, seed: int) -> None:
     """Write what the run is before any case is made; refuse a folder that holds another one.
 
     Raises
     ------
     RunError
-        `out` holds a run of another seed, size, edition, generator or thresholds.
+        `out` holds a run of another seed, size, generator or thresholds.
     """
     commit = subprocess.run(
         ["git", "rev-parse", "HEAD"], cwd=HERE, capture_output=True, text=True, check=False
@@ -59,7 +55,6 @@ def seal_run(out: Path, size: str, seed: int, edition: Edition) -> None:
     run = {
         "seed": seed,
         "size": size,
-        "edition": asdict(edition),
         "generator_sha256": digest(*(HERE / "generator").glob("*.py")),
         "thresholds_sha256": digest(THRESHOLDS),
     }
@@ -76,10 +71,10 @@ def seal_run(out: Path, size: str, seed: int, edition: Edition) -> None:
     _write(path, run | {"commit": commit.stdout.strip() or None})
 
 
-def pending(out: Path, size: str, edition: Edition) -> tuple[list[Spec], int]:
+def pending(out: Path, size: str) -> tuple[list[Spec], int]:
     """Cases without a result, and how many there are in all; in mixed order, so that a stopped run is a fair sample."""
     specs = sorted(
-        table(size, edition),
+        table(size),
         key=lambda spec: (spec.group is Group.TIMING, zlib.crc32(spec.name.encode())),
     )
     return [spec for spec in specs if not result_path(out, spec).exists()], len(specs)
@@ -90,42 +85,30 @@ def result_path(out: Path, spec: Spec) -> Path:
     return out / "results" / f"{spec.name}.json"
 
 
-def run(
-    out: Path,
-    size: str,
-    seed: int,
-    edition: Edition,
-    jobs: int,
-    keep: bool,
-) -> Iterator[dict[str, Any]]:
+def run(out: Path, size: str, seed: int, jobs: int, keep: bool) -> Iterator[dict[str, Any]]:
     """Run what is pending; results come as they are done, the timed cases last and alone."""
-    specs, _ = pending(out, size, edition)
+    specs, _ = pending(out, size)
     side_by_side = [spec for spec in specs if spec.group is not Group.TIMING]
     with parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
         yield from Parallel(return_as="generator_unordered")(
-            delayed(run_case)(spec, seed, edition, out, keep) for spec in side_by_side
+            delayed(run_case)(spec, seed, out, keep) for spec in side_by_side
         )
     for spec in specs:
         if spec.group is Group.TIMING:
-            yield run_case(spec, seed, edition, out, keep)
+            yield run_case(spec, seed, out, keep)
 
 
 def run_case(
-    spec: Spec,
-    seed: int,
-    edition: Edition,
-    out: Path,
-    keep: bool,
+    spec: Spec, seed: int, out: Path, keep: bool, forms: Forms | None = None, attempt: int | None = None
 ) -> dict[str, Any]:
     """Make one case, have it diagnosed, write the result; a case that cannot be made stays pending."""
     try:
-        case = make_case(spec, seed, edition)
+        case = make_case(spec, seed, forms, attempt)
     except UndrivableError as problem:
         return {"case": spec.name, "error": f"not made: {problem}"}
     folder = write_case(case, seed, out)
     said = _timed(folder) if spec.group is Group.TIMING else _in_process(case, folder, seed)
-    ranked = spec.group is Group.RICH and spec.name.endswith(COSINE_CASE) and not spec.camera
-    result = {"case": spec.name, **said, "cosine": cosine(case) if ranked else None}
+    result = {"case": spec.name, **said}
     _write(result_path(out, spec), result | {"seal": case.seal()})
     if not keep:
         shutil.rmtree(folder)

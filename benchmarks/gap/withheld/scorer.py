@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 import yaml
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
-from .generator.camera_library import CAMERA_LIBRARY
-from .generator.forms import Edition
-from .generator.library import LIBRARY
 from .generator.table import Group, table
 from .outcome import Outcome, ResultError, read_outcomes
 from .runner import THRESHOLDS, digest
@@ -52,10 +52,7 @@ class Scores:
 
     lines: list[Line]
     asides: list[Line]
-    by_effect: dict[str, dict[str, int]]
-    confusion: dict[str, dict[str, int]]
     bins: list[dict[str, float]]
-    baselines: dict[str, dict[str, float]]
     verdicts: dict[str, dict[str, int]]
     errors: dict[str, str]
     pending: list[str]
@@ -96,9 +93,8 @@ def score_run(folder: Path) -> Scores:
     limits = load_thresholds(folder)
     outcomes = read_outcomes(folder)
     run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    specs = table(run["size"], Edition(**run["edition"]))
     done = {o.name for o in outcomes}
-    return score(outcomes, limits, [spec.name for spec in specs if spec.name not in done])
+    return score(outcomes, limits, [spec.name for spec in table(run["size"]) if spec.name not in done])
 
 
 def score(outcomes: Sequence[Outcome], limits: dict[str, Any], pending: Sequence[str] = ()) -> Scores:
@@ -125,16 +121,7 @@ def score(outcomes: Sequence[Outcome], limits: dict[str, Any], pending: Sequence
 
     def value(name: str, text: str, numbers: Sequence[float], total: Callable[[Any], float]) -> Line:
         finite = [x for x in numbers if math.isfinite(x)]
-        return Line(
-            name,
-            text,
-            float(total(finite)) if finite else math.nan,
-            len(finite),
-            None,
-            None,
-            None,
-            limits[name],
-        )
+        return _value(name, text, float(total(finite)) if finite else math.nan, len(finite), limits[name])
 
     lines = [
         share("right_first", "rich: the true effect blamed first", rich, lambda o: o.right_within(1)),
@@ -178,14 +165,11 @@ def score(outcomes: Sequence[Outcome], limits: dict[str, Any], pending: Sequence
         value(
             "shrink_difference_points", "predicted less achieved shrink, median [points]", shrinks, np.median
         ),
-        Line(
+        _value(
             "calibration_error",
             "expected calibration error",
             calibration_error(bins),
             len(labelled),
-            None,
-            None,
-            None,
             limits["calibration_error"],
         ),
         value("seconds", "60 s log at 1 kHz, two cores: slowest [s]", [o.seconds for o in timed], max),
@@ -194,10 +178,7 @@ def score(outcomes: Sequence[Outcome], limits: dict[str, Any], pending: Sequence
     return Scores(
         lines=lines,
         asides=_asides(outcomes, of, rich, shrinks),
-        by_effect=_by_effect(outcomes, limits["gap"]),
-        confusion=_confusion(seen),
         bins=[asdict(b) for b in bins],
-        baselines=_baselines(of[Group.RICH]),
         verdicts={
             str(group): dict(Counter(o.verdict for o in members)) for group, members in sorted(of.items())
         },
@@ -219,79 +200,79 @@ def _share(name: str, text: str, hits: Sequence[bool], limits: dict[str, float])
     return Line(name, text, hit / n if n else math.nan, n, hit, low, high, limits)
 
 
+def _value(name: str, text: str, value: float, n: int, limits: dict[str, float]) -> Line:
+    return Line(name, text, value, n, None, None, None, limits)
+
+
 def _asides(
     outcomes: Sequence[Outcome], of: dict[Group, list[Outcome]], rich: list[Outcome], shrinks: list[float]
 ) -> list[Line]:
     """What explains the lines: the same by severity, by tyre, by rank alone; without limits."""
-    asides = []
-
-    def aside(text: str, members: Iterable[Outcome], hit: Callable[[Outcome], bool]) -> None:
-        asides.append(_share("", text, [hit(o) for o in members], {}))
-
-    for low, high in SEVERITIES:
-        inside = [o for o in rich if low <= o.gap < high]
-        aside(f"rich, gap {low:g} to {high:g}: right first", inside, lambda o: o.right_within(1))
-    aside("rich, the simulation's tyre: right first", of[Group.RICH], lambda o: o.right_within(1))
-    aside("rich, another tyre: right first", of[Group.TYRE], lambda o: o.right_within(1))
-    aside("rich: ranked first, whatever the verdict", rich, lambda o: o.ranked_within(1))
-    aside("rich: ranked first or second, whatever the verdict", rich, lambda o: o.ranked_within(2))
-    aside("rich: called compound though one effect", rich, lambda o: o.verdict == "compound")
     small = [o for o in outcomes if o.group is Group.MILD and o not in of[Group.MILD]]
-    aside(
-        "mild, gap below the limit: right, flagged or no_gap",
-        small,
-        lambda o: o.right_within(1) or o.flagged or o.verdict == "no_gap",
+    asides = [
+        (
+            f"rich, gap {low:g} to {high:g}: right first",
+            [o.right_within(1) for o in rich if low <= o.gap < high],
+        )
+        for low, high in SEVERITIES
+    ]
+    asides += [
+        ("rich, the simulation's tyre: right first", [o.right_within(1) for o in of[Group.RICH]]),
+        ("rich, another tyre: right first", [o.right_within(1) for o in of[Group.TYRE]]),
+        ("rich: ranked first, whatever the verdict", [o.ranked_within(1) for o in rich]),
+        ("rich: ranked first or second, whatever the verdict", [o.ranked_within(2) for o in rich]),
+        ("rich: called compound though one effect", [o.verdict == "compound" for o in rich]),
+        (
+            "mild, gap below the limit: right, flagged or no_gap",
+            [o.right_within(1) or o.flagged or o.verdict == "no_gap" for o in small],
+        ),
+        (
+            "pairs: both in the first three, whatever the verdict",
+            [set(o.truth) <= {e for e, _ in o.causes[:3]} for o in of[Group.PAIR]],
+        ),
+        ("shrink within 10 points", [s <= 10.0 for s in shrinks if math.isfinite(s)]),
+    ]
+    return [_share("", text, hits, {}) for text, hits in asides]
+
+
+def print_scores(scores: Scores, console: Console) -> None:
+    """Thresholds first, then what explains them."""
+    console.print(_lines(scores.lines, "Thresholds (frozen before the cases were opened)"))
+    console.print(_lines(scores.asides, "Asides"))
+    table = Table(
+        "probability", "cases", "believed", "right", title="Reliability of the most probable answer"
     )
-    aside(
-        "pairs: both in the first three, whatever the verdict",
-        of[Group.PAIR],
-        lambda o: set(o.truth) <= {e for e, _ in o.causes[:3]},
-    )
-    aside(
-        "pairs: at least one blamed first", of[Group.PAIR], lambda o: o.blames and o.causes[0][0] in o.truth
-    )
-    asides.append(_share("", "shrink within 10 points", [s <= 10.0 for s in shrinks if math.isfinite(s)], {}))
-    return asides
+    for b in scores.bins:
+        between = f"{b['low']:.1f} to {b['high']:.1f}"
+        table.add_row(between, str(b["n"]), _percent(b["believed"]), _percent(b["right"]))
+    console.print(table)
+    table = Table("kind", "verdicts", title="Verdicts")
+    for group, verdicts in scores.verdicts.items():
+        table.add_row(group, ", ".join(f"{n} {verdict}" for verdict, n in sorted(verdicts.items())))
+    console.print(table)
+    for name, error in scores.errors.items():
+        console.print(f"[red]{name}[/red]: {escape(error)}", highlight=False)
+    if scores.pending:
+        console.print(f"{len(scores.pending)} cases have no result yet: the figures are not the run's.")
 
 
-def _by_effect(outcomes: Iterable[Outcome], gap: float) -> dict[str, dict[str, int]]:
-    """Per effect over rich driving: cases, those large enough, right first, right in the first two."""
-    counts: dict[str, dict[str, int]] = {}
-    for o in outcomes:
-        if o.group in SINGLE_RICH:
-            row = counts.setdefault(o.truth[0], {"cases": 0, "counted": 0, "first": 0, "two": 0})
-            counted = o.gap >= gap
-            row["cases"] += 1
-            row["counted"] += counted
-            row["first"] += counted and o.right_within(1)
-            row["two"] += counted and o.right_within(2)
-    return dict(sorted(counts.items()))
+def _lines(lines: list[Line], title: str) -> Table:
+    table = Table("line", "value", "hits", "95 %", "limit", "", title=title)
+    for line in lines:
+        counted = line.hits is not None
+        value = _percent(line.value) if counted else f"{line.value:.3g}"
+        between = f"{_percent(line.low)} to {_percent(line.high)}" if line.low is not None else ""
+        limit = " and ".join(
+            f"{'>=' if key == 'at_least' else '<='} {_percent(x) if counted else f'{x:g}'}"
+            for key, x in line.limits.items()
+        )
+        mark = (
+            "" if not line.limits else "-" if line.n == 0 else "holds" if line.holds else "[red]missed[/red]"
+        )
+        hits = f"{line.hits}/{line.n}" if counted else f"n = {line.n}"
+        table.add_row(escape(line.text), value, hits, between, limit, mark)
+    return table
 
 
-def _confusion(outcomes: Iterable[Outcome]) -> dict[str, dict[str, int]]:
-    """Truth, or kind of case, to answer to number."""
-    cells: dict[str, Counter[str]] = defaultdict(Counter)
-    for o in outcomes:
-        if o.group in SINGLE_RICH:
-            cells[o.truth[0]][o.answer] += 1
-        elif o.group in (Group.NO_GAP, Group.OUTSIDE):
-            cells[f"({o.group})"][o.answer] += 1
-    order = [*LIBRARY, *sorted(set(cells) - set(LIBRARY))]
-    return {truth: dict(cells[truth]) for truth in order if truth in cells}
-
-
-def _baselines(rich: Sequence[Outcome]) -> dict[str, dict[str, float]]:
-    """Right first and in the first two of the simple rankers, over the rich cases with the simulation's tyre."""
-    ranks: dict[str, Callable[[Outcome], tuple[str, ...]]] = {
-        "cosine": lambda o: o.cosine,
-        "in-sample BIC": lambda o: o.bic,
-        "closure only": lambda o: o.closure,
-    }
-    known = len(LIBRARY) + len(CAMERA_LIBRARY) * any(o.camera for o in rich)
-    shares: dict[str, dict[str, float]] = {"random": {"first": 1 / known, "two": 2 / known, "n": len(rich)}}
-    for name, rank in ranks.items():
-        answered = [o for o in rich if rank(o)]
-        n = len(answered)
-        first, two = (sum(o.truth[0] in rank(o)[:k] for o in answered) for k in (1, 2))
-        shares[name] = {"first": first / n if n else math.nan, "two": two / n if n else math.nan, "n": n}
-    return shares
+def _percent(share: float | None) -> str:
+    return "-" if share is None or math.isnan(share) else f"{100 * share:.1f} %"

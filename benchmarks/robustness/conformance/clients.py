@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 from . import transports
 from .cases import Case
 from .cosim import Cosim
-from .ecos import Ecos, EcosProgram
+from .ecos import Ecos
 from .operations import Host
 
 
@@ -37,6 +37,5 @@ CLIENTS = {
     "libcosimpy": Client("libcosimpy", "libcosimpy", lambda c, a, _, p: Cosim(c, a, p)),
     "ecospy": Client("ecospy", "ecospy", lambda c, a, _, p: Ecos(c, a, p)),
     "proxyfmu": Client("ecospy, proxyfmu", "ecospy", lambda c, a, _, p: Ecos(c, a, p, apart=True)),
-    "ecos": Client("program ecos", "ecospy", lambda c, a, _, p: EcosProgram(c, a, p)),
 }
 """By short name."""

@@ -21,10 +21,10 @@ everything in the first column, in a process of its own, so that a crash is a ce
 unit's own code, called without FMI, gives the same outputs bit for bit. `-` is not offered by the client or not there
 in the unit, `FAILED` what it says; the numbers stand for the reasons below.
 
-Two clients round what they pass on. libcosim hands over step sizes that are differences of times: compared to 1e-12,
-without `TRPAC_std`, which is renewed block of time by block of time, one step earlier or later there. The program
-`ecos` writes six digits. fmpy's own remoting serves units for another platform only (Windows units under wine), so
-"fmpy, own process" is fmpy behind a pipe. The C program is ours, on the FMI headers that fmpy ships.
+libcosim hands over step sizes that are differences of times: it is compared to 1e-12,
+without `TRPAC_std`, which is renewed block of time by block of time, one step earlier or later there. fmpy's own
+remoting serves units for another platform only (Windows units under wine), so "fmpy, own process" is fmpy behind a
+pipe. The C program is ours, on the FMI headers that fmpy ships.
 """
 
 

@@ -11,7 +11,7 @@ import os
 import sys
 from pathlib import Path
 
-from benchmarks.ledger import append
+from benchmarks.report import append
 
 from .run import KIND_NAMES, RESULTS, UNIT_NAMES, child, run_kind
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import shutil
 import sys
@@ -17,11 +16,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from fmu_src.doctor import State, UnusableError, look_at_file
+from fmu_src.doctor import State, UnusableError, examine_file
 from fmu_src.units import ROOT
 from scenarios.library import networks_folder
 
-from .forked import forked
 from .mutations import BINARY, TEXT, Rng, damaged
 
 LONGEST_ERROR = 20_000
@@ -196,16 +194,6 @@ def _read_log(path: Path) -> Any:
     return read_log(path).to_frame().to_numpy(dtype=float)
 
 
-def _read_mdf(path: Path) -> Any:
-    from sim2real.logs.mdf_file import EXTRACTOR
-
-    sys.path.insert(0, str(EXTRACTOR.parent))
-    importlib.import_module(EXTRACTOR.stem)  # before the first fork: that is what takes the time
-    sys.path.remove(str(EXTRACTOR.parent))
-    with forked(EXTRACTOR):
-        return _read_log(path)
-
-
 # Networks, units, buses
 
 
@@ -263,7 +251,7 @@ class ProblemFoundError(Exception):
 
 def _examine(path: Path) -> Any:
     """What a unit holds that the doctor finds nothing in."""
-    problems = [found.text for found in look_at_file(path)[1] if found.state is State.PROBLEM]
+    problems = [found.text for found in examine_file(path)[1] if found.state is State.PROBLEM]
     if problems:
         raise ProblemFoundError("; ".join(problems))
     return _read_unit(path)
@@ -307,7 +295,7 @@ KINDS = {
     ),
     "log_csv": Kind(_log(".csv"), _read_log, _scenario_errors, text=True),
     "log_parquet": Kind(_log(".parquet"), _read_log, _scenario_errors, exact=True),
-    "log_mf4": Kind(_log(".mf4"), _read_mdf, _scenario_errors),
+    "log_mf4": Kind(_log(".mf4"), _read_log, _scenario_errors),
     "bus_dbc": Kind(
         _shipped("trpac_hil", "trpac.dbc"),
         _load("load_codec", "trpac_hil.codec"),

@@ -8,39 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 Rng = np.random.Generator
-NUMBERS = (
-    b"nan",
-    b"inf",
-    b"-1",
-    b"0",
-    b"1e308",
-    b"-1e308",
-    b"1e-320",
-    b"99999999999999999999",
-    b"",
-    b"~",
-    b"[]",
-    b"{}",
-    b"true",
-    b"'x'",
-)
+NUMBERS = (*b"nan inf -1 0 1e308 -1e308 1e-320 99999999999999999999 ~ [] {} true 'x'".split(), b"")
 WORDS = (
-    b": ",
-    b"\n",
-    b"\t",
-    b"- ",
-    b"{",
-    b"[",
-    b"&a ",
-    b"*a",
-    b"<<: ",
-    b"!!python/object:os.system ",
-    b"\xff\xfe",
-    b"\x00",
-    b"%",
-    b"'",
-    b'"',
-    b"#",
+    *(b": ", b"\n", b"\t", b"- ", b"{", b"[", b"&a ", b"*a", b"<<: ", b"!!python/object:os.system "),
+    *(b"\xff\xfe", b"\x00", b"%", b"'", b'"', b"#"),
 )
 
 

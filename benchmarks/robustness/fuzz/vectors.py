@@ -21,7 +21,7 @@ from benchmarks.robustness.conformance.outcome import NotAsExpectedError
 from benchmarks.robustness.conformance.transports import Fmpy
 from trpac_core.readings import PLAUSIBLE
 
-from .mutations import BINARY, TEXT, Rng
+from .mutations import Rng
 
 DISCARD = 2
 ODD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e-308, -0.0, 0.0, 1e9, -1e9, 2.0**31, 5e-324)
@@ -32,8 +32,7 @@ SHARE = {
     "stretch": 0.04,
     "odd_step": 0.04,
     "restart": 0.03,
-    "state": 0.04,
-    "broken_state": 0.03,
+    "state": 0.07,
 }
 """How often each act is."""
 GOOD_SHARE = 0.6
@@ -226,19 +225,6 @@ class Driven:
         else:
             self._unit.call("save", "0")
         self._saved = not self._saved
-        return []
-
-    def _broken_state(self, rng: Rng) -> list[str]:
-        """A damaged state is refused, or is one: what follows must be as good as ever."""
-        self._unit.call("save", "1")
-        content = bytes.fromhex(self._unit.call("serialise", "1").value)
-        self._unit.call("drop", "1")
-        ways = (*BINARY, *TEXT)
-        spoilt = ways[int(rng.integers(len(ways)))](content, rng) if content else content
-        self._unit.call("deserialise", "2", spoilt.hex())
-        self._unit.call("restore", "2")
-        self._unit.call("drop", "2")
-        self._look()
         return []
 
     def _look(self) -> None:

@@ -4,7 +4,7 @@ python -m benchmarks.vision.table4 --models DIR --data ROAD_IMAGES --frames-cach
 
 DIR of --models holds `full/` and a folder per source left out of training (`without_extreme`, `without_yolop`,
 `without_camvid`, `without_lums`), each with segmenter.onnx and surface.onnx. A row whose networks are not there is
-left out, and said so; with --not-left-out the networks of `full` judge it, and the page says so. A folder that holds
+left out, and said so. A folder that holds
 segmenter.onnx itself, such as `models`, counts as `full`. Verdicts are kept in --out and used again for the same
 networks, pictures and code, so that a run broken off goes on. --page writes docs/camera_scores.md.
 """
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import json
 import sys
 import time
 from collections.abc import Sequence as Row
@@ -27,7 +26,7 @@ from rich.progress import Progress
 from .clips import ASSUMED, real_sequences
 from .drives import rendered_drives
 from .judge import COLUMNS, SCENARIOS, Networks, judged
-from .report import Measured, figures_of, tables, write_page
+from .report import Measured, tables, write_page
 from .sequences import Sequence
 from .timing import frame_times
 
@@ -62,7 +61,6 @@ def main(arguments: Row[str] | None = None) -> None:
     measured = Measured(
         table=table,
         missing=tuple(sorted(missing)),
-        not_left_out=options.not_left_out,
         time=None if options.no_time else frame_times(folders[FULL]),
         render_cpu_min=cpu_s / 60.0,
         judge_cpu_min=(time.process_time() - begin) / 60.0,
@@ -72,13 +70,11 @@ def main(arguments: Row[str] | None = None) -> None:
     )
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "tables.md").write_text(tables(measured), encoding="utf-8")
-    (options.out / "scores.json").write_text(json.dumps(figures_of(measured)) + "\n", encoding="utf-8")
     print(tables(measured))
     if options.page:
         write_page(measured)
     for reason in sorted(missing):
-        how = "NOT LEFT OUT of training" if options.not_left_out else "LEFT OUT of the tables"
-        print(f"{how}: {reason}", file=sys.stderr)
+        print(f"LEFT OUT of the tables: {reason}", file=sys.stderr)
 
 
 def _options(arguments: Row[str] | None) -> argparse.Namespace:
@@ -99,9 +95,6 @@ def _options(arguments: Row[str] | None) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("out/table4"), help="verdicts and tables")
     parser.add_argument(
         "--drives", type=int, default=60, help="rendered drives of 60 frames; 0: real pictures only"
-    )
-    parser.add_argument(
-        "--not-left-out", action="store_true", help="judge by `full` where a folder is missing"
     )
     parser.add_argument("--no-time", action="store_true", help="do not measure the frame time")
     parser.add_argument("--page", action="store_true", help="write docs/camera_scores.md")
@@ -129,16 +122,14 @@ def _verdicts(
     for sequence in sequences:
         wanted = {sequence.left_out, FULL} if sequence.left_out != FULL else {FULL}
         for name in sorted(wanted):
-            used = name if name in folders else FULL
             if name not in folders:
                 missing.add(f"{sequence.source}: no networks in '{name}'")
-                if not options.not_left_out:
-                    continue
+                continue
             shown = sequence.validation_part() if name == FULL and sequence.left_out != FULL else sequence
             if not shown.frames:
                 continue
             for scenario in SCENARIOS:
-                verdicts = _kept(shown, folders[used], scenario, options.out, lambda used=used: load(used))
+                verdicts = _kept(shown, folders[name], scenario, options.out, lambda name=name: load(name))
                 found.append(verdicts.assign(networks=name, consecutive=sequence.consecutive))
         bars.advance(task, len(SCENARIOS))
     if not found:

@@ -126,7 +126,6 @@ def _stills(pictures: Iterable[Picture]) -> Iterator[Sequence]:
                 camera=camera_over(picture.boxes[0], width, height),
                 motion=Motion(STILL_SPEED_M_S),
                 frames=(_frame(picture),),
-                memory=False,
                 consecutive=False,
             )
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from models.training.rendered import SEED_RANGES, random_camera
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.trajectory import Motion
@@ -45,7 +45,7 @@ class Plan:
 
     seed: int
     camera: Camera
-    look: SceneLook
+    look: Scene
     segments: tuple[SurfaceSegment, ...]
     likely_weather: bool
     speed_m_s: float
@@ -70,7 +70,7 @@ def plan(seed: int, streets: bool = False) -> Plan:
     likely = seed // len(PAIRS) % 2 == 0
     camera = random_camera(rng, SCALE)
     segments = (SurfaceSegment(-1000.0, first), SurfaceSegment(float(rng.uniform(*CHANGE_M)), second))
-    look = SceneLook.random(rng, first if likely else None)
+    look = Scene.random(rng, first if likely else None)
     if streets:
         look = look.in_a_street(np.random.default_rng([seed, STREET]))
     way = STEP_M * np.arange(FRAMES)

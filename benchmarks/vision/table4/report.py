@@ -1,23 +1,23 @@
-"""Tables, figure, page and figures in JSON of the camera's scores."""
+"""Tables, figure and page of the camera's scores."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from benchmarks.report import markdown, write_between
 from trpac_core.vision.classes import Surface
 
 from .judge import SCENARIOS, VARIANTS, VOTING
-from .scores import Share, blocks_of, confusion, gate, method_of, n_w, recalls, summary
+from .scores import Share, blocks_of, confusion, gate, method_of, n_w, recalls
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE, FIGURE = ROOT / "docs" / "camera_scores.md", ROOT / "docs" / "camera_scores.png"
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 PAPER = {("normal", VOTING): 21.6621, ("normal", "IFE"): 1.5327, ("w/ interference", VOTING): 31.4714,
          ("w/ interference", "IFE"): 12.8406}  # fmt: skip
 CLIPS, SETS, STILLS, PARTS, RENDERED = (
@@ -42,7 +42,6 @@ class Measured:
 
     table: pd.DataFrame
     missing: tuple[str, ...]
-    not_left_out: bool
     time: dict[str, Any] | None
     render_cpu_min: float
     judge_cpu_min: float
@@ -63,12 +62,6 @@ def groups(table: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     for name, rows in chosen.items():
         if rows.any():
             yield name, table[rows]
-
-
-def _markdown(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    head = list(head)
-    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
-    return "\n".join([*lines, *(f"| {' | '.join(map(str, row))} |" for row in rows)])
 
 
 def tables(measured: Measured) -> str:
@@ -92,12 +85,7 @@ def _warning(measured: Measured) -> list[str]:
     """What the reader must know before the first figure."""
     if not measured.missing:
         return []
-    mark = (
-        "NOT LEFT OUT: the networks that judge these sources were trained on them: their rows say nothing of new roads"
-        if measured.not_left_out
-        else "No rows, for want of networks that never saw the source"
-    )
-    return [f"**{mark}**: {'; '.join(measured.missing)}."]
+    return [f"**No rows, for want of networks that never saw the source**: {'; '.join(measured.missing)}."]
 
 
 def _in(table: pd.DataFrame, scenario: str, method: str) -> pd.DataFrame:
@@ -117,7 +105,7 @@ def _table_4(named: dict[str, pd.DataFrame]) -> str:
     ]
     frames = ("", "frames (blocks)", "", *(f"{s.frames} ({s.blocks})" for s in map(_size, named.values())))
     heads = ("scenario", "method", "paper", *(SAID[name] for name in named))
-    return _markdown(heads, [*rows, frames])
+    return markdown(heads, [*rows, frames])
 
 
 def _size(table: pd.DataFrame) -> Share:
@@ -134,7 +122,7 @@ def _sources(named: dict[str, pd.DataFrame]) -> str:
             )
             rows.append((SAID[name].split(",")[0], source, f"{size.frames} ({size.blocks})", *scores))
     heads = [f"{method}, {scenario}" for scenario in SCENARIOS for method in (VOTING, "IFE")]
-    return _markdown(("set", "source", "frames (blocks)", *heads), rows)
+    return markdown(("set", "source", "frames (blocks)", *heads), rows)
 
 
 def _borders(named: dict[str, pd.DataFrame]) -> str:
@@ -147,7 +135,7 @@ def _borders(named: dict[str, pd.DataFrame]) -> str:
             mixed = table["share"] < 1.0
             rows.append((scenario, method, n_w(table[~mixed]), n_w(table[mixed]), int(mixed.sum())))
     heads = ("scenario", "method", "one class in the near group", "two classes in it", "frames with two")
-    return _markdown(heads, rows)
+    return markdown(heads, rows)
 
 
 def _ablations(named: dict[str, pd.DataFrame]) -> str:
@@ -158,7 +146,7 @@ def _ablations(named: dict[str, pd.DataFrame]) -> str:
         for variant in VARIANTS
     ]
     heads = [h for name in kept for h in (f"{name}: n_w", "less IFE's")]
-    return _markdown(("scenario", "variant", *heads), rows)
+    return markdown(("scenario", "variant", *heads), rows)
 
 
 def _variant(table: pd.DataFrame, scenario: str, variant: str) -> tuple[object, object]:
@@ -194,7 +182,7 @@ def _gates(named: dict[str, pd.DataFrame]) -> str:
         "of wrong frames, flag 0 [%]",
         "of right frames, flag 0 [%]",
     )
-    return _markdown(("set", "scenario", *heads), rows)
+    return markdown(("set", "scenario", *heads), rows)
 
 
 def _confusions(named: dict[str, pd.DataFrame]) -> str:
@@ -205,7 +193,7 @@ def _confusions(named: dict[str, pd.DataFrame]) -> str:
             counts = " / ".join(" ".join(map(str, row[: len(Surface)])) for row in confusion(part).tolist())
             rows.append((SAID[name].split(",")[0], scenario, *recalls(part).values(), counts))
     heads = (*(f"recall {s.label} [%]" for s in Surface), "confusion, rows true, dry wet snow_ice")
-    return _markdown(("set", "scenario", *heads), rows)
+    return markdown(("set", "scenario", *heads), rows)
 
 
 def _times(times: dict[str, Any] | None) -> str:
@@ -221,7 +209,7 @@ def _times(times: dict[str, Any] | None) -> str:
         f"{times['threads']} threads per network, {times['cpus']} processors, {times['frames']} frames; load of the "
         f"machine before the start {times['load_1min_before']:.1f}. Decoding is not in the estimator's rows."
     )
-    return f"{_markdown(heads, rows)}\n\n{said}"
+    return f"{markdown(heads, rows)}\n\n{said}"
 
 
 def _how(measured: Measured) -> str:
@@ -240,41 +228,9 @@ def _how(measured: Measured) -> str:
     return "\n\n".join(said)
 
 
-def figures_of(measured: Measured) -> dict[str, Any]:
-    """Everything that scores.json holds."""
-    return {
-        "networks": measured.networks,
-        "missing": list(measured.missing),
-        "not_left_out": measured.not_left_out,
-        "render_cpu_min": round(measured.render_cpu_min, 2),
-        "judge_cpu_min": round(measured.judge_cpu_min, 2),
-        "time": measured.time,
-        "sets": {name: _rounded(summary(table)) for name, table in groups(measured.table)},
-        "sources": {
-            f"{name}: {source}": {s: asdict(n_w(_in(part, s, "IFE"))) for s in SCENARIOS}
-            for name, table in groups(measured.table)
-            for source, part in table.groupby("source", sort=False)
-        },
-    }
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _rounded(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_rounded(inner) for inner in value]
-    if isinstance(value, float):
-        return round(value, 2) if np.isfinite(value) else None
-    return value
-
-
 def write_page(measured: Measured) -> None:
     """Write the tables between the page's markers, and the figure."""
-    text = PAGE.read_text(encoding="utf-8")
-    if BEGIN not in text or END not in text:
-        raise SystemExit(f"{PAGE}: expected the lines {BEGIN} and {END}, between which the tables go.")
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
-    PAGE.write_text(f"{before}{BEGIN}\n\n{tables(measured)}\n{END}{after}", encoding="utf-8")
+    write_between(PAGE, tables(measured))
     draw(measured, FIGURE)
 
 
@@ -302,6 +258,4 @@ def draw(measured: Measured, path: Path) -> None:
     figure.legend(
         *figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8
     )
-    if measured.missing and measured.not_left_out:
-        figure.suptitle("Provisional: the networks were trained on the sources of (a)", fontsize=10)
     figure.savefig(path, dpi=110, metadata={"Software": None})

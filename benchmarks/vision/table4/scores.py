@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -11,14 +10,13 @@ from numpy.typing import NDArray
 
 from trpac_core.vision.classes import Surface
 
-from .judge import NO_ROAD, VARIANTS, VOTING
+from .judge import NO_ROAD
 
 BLOCK = 20
 """Frames of a real drive that count as one observation: 2 s at 10 frames per second."""
 LEAST_BLOCKS = 5
 DRAWS = 2000
 Z = 1.96
-METHODS = (VOTING, *VARIANTS)
 
 
 @dataclass(frozen=True)
@@ -110,21 +108,3 @@ def recalls(table: pd.DataFrame) -> dict[str, Share]:
         own = table[table["truth"] == int(surface)]
         found[surface.label] = share((own["found"] == own["truth"]).to_numpy(), blocks_of(own))
     return found
-
-
-def summary(table: pd.DataFrame) -> dict[str, Any]:
-    """All scores of one set of sequences, per scenario and method, as JSON-able values."""
-    out: dict[str, Any] = {}
-    for scenario, part in table.groupby("scenario", sort=False):
-        ife = method_of(part, "IFE")
-        border = ife["share"].to_numpy() < 1.0
-        out[str(scenario)] = {
-            "n_w": {name: asdict(n_w(method_of(part, name))) for name in METHODS},
-            "n_w_away_from_borders": asdict(n_w(ife[~border])),
-            "n_w_at_borders": asdict(n_w(ife[border])),
-            "gate": {name: asdict(value) for name, value in gate(ife).items()},
-            "recall": {name: asdict(value) for name, value in recalls(ife).items()},
-            "confusion": confusion(ife)[:, : len(Surface)].tolist(),
-            "confusion_voting": confusion(method_of(part, VOTING)).tolist(),
-        }
-    return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -52,8 +52,6 @@ class Sequence:
         Width of the regions over the default one [-].
     cropped_rows : int
         Rows kept from the top of the picture; 0 keeps all.
-    memory : bool
-        False for stills: each is a drive of its own.
     consecutive : bool
         Whether the pictures follow each other at a frame rate.
     """
@@ -67,9 +65,7 @@ class Sequence:
     usable: tuple[tuple[float, float, float, float], ...] = WHOLE
     roi_scale: float = 1.0
     cropped_rows: int = 0
-    memory: bool = True
     consecutive: bool = True
-    notes: dict[str, str] = field(default_factory=dict)
 
     def validation_part(self) -> Sequence:
         """The frames of the split's part 'val': networks that learned from the source have not seen them."""

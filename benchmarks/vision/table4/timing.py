@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from scenarios.camera.renderer import Renderer
-from scenarios.camera.scene import SceneLook, SurfaceSegment
+from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
@@ -32,7 +32,7 @@ def frame_times(models: Path) -> dict[str, Any]:
         Segmenter(models / "segmenter.onnx", THREADS),
         SurfaceClassifier(models / "surface.onnx", THREADS),
     )
-    renderer = Renderer(Camera(), [SurfaceSegment(0.0, Surface.WET)], SceneLook(seed=1))
+    renderer = Renderer(Camera(), [SurfaceSegment(0.0, Surface.WET)], Scene(seed=1))
     pictures = [renderer.frame(float(place)).image for place in range(0, 50, 10)]
     files = [cv2.imencode(".jpg", picture)[1].tobytes() for picture in pictures]
     found: dict[str, Any] = {

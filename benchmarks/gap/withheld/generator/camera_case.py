@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .camera_chain import results
 from .camera_faults import jumps_m
-from .camera_forms import draw_forms_of, form
+from .camera_forms import CAMERA_FORMS
 from .camera_gap import Stage, crossings, gap_of
 from .camera_layouts import SPEEDS, draw_laid_road
 from .camera_library import Scene
@@ -25,9 +25,9 @@ from .camera_road import CLASS_FRICTION, CameraRoad, Passage, draw_camera_road, 
 from .camera_system import Chain, Fault, draw_chain
 from .camera_telling import columns
 from .car import Car, draw_car
-from .cases import LOGS, MUST_SHOW, SHOWS, Case, Truth, first_drivable, generator_of
+from .cases import LOGS, MUST_SHOW, SHOWS, Case, Truth, draw_case, first_drivable, generator_of
 from .driver import Drive, Style, UndrivableError, drive
-from .forms import PLAIN, RATES_HZ, Edition, draw_forms, form_of
+from .forms import ASPECTS, RATES_HZ, Forms, draw_forms, form_of
 from .kernel import RECORD_STEP_S
 from .sensors import draw_noise, make_log
 from .severity import find_severity
@@ -51,7 +51,6 @@ class CameraCase(Case):
     """A case with what its camera is."""
 
     chain: Chain
-    edition: int
 
     @property
     def subsystems(self) -> set[str]:
@@ -64,23 +63,22 @@ class CameraCase(Case):
             effect: {name: given[name] for name in ALL_EFFECTS[effect].found}
             for effect, given in self.truth.effects.items()
         }
-        camera = {
-            "edition": self.edition,
-            "hidden": self.truth.effects,
-            "chain": asdict(self.chain),
-        }
+        camera = {"hidden": self.truth.effects, "chain": asdict(self.chain)}
         return super().seal() | {"effects": effects, "camera": camera}
 
 
-def make_camera_case(spec: Spec, seed: int, edition: Edition = PLAIN) -> CameraCase:
-    """Draw a case of the camera, with forms that the `edition` has of it and of all else.
+def make_case(spec: Spec, seed: int, forms: Forms | None = None, attempt: int | None = None) -> Case:
+    """A case of the car or of the camera on one, drawn anew until it can be driven; or one attempt, with given forms.
 
     Raises
     ------
     UndrivableError
         No draw gives a car that can be driven and a deviation that shows.
     """
-    return first_drivable(spec, lambda key: _draw(spec, seed, key, edition))
+    draw = draw_camera_case if spec.camera else draw_case
+    if attempt is not None:
+        return draw(spec, seed, attempt, forms)
+    return first_drivable(spec.name, lambda attempt: draw(spec, seed, attempt, forms))
 
 
 @dataclass(frozen=True)
@@ -107,10 +105,10 @@ class _Ground:
 
 def _ground(spec: Spec, key: str, seed: int, driver: str, chain: Chain, rng: Generator) -> _Ground:
     few = not spec.rich and rng.random() < 0.5
-    speeds = SPEEDS[form(chain.forms, "speeds")]
+    speeds = SPEEDS[chain.forms["speeds"]]
     style = form_of("driver", driver) if (rng.random() < 0.4 if spec.rich else few) else speeds
     road, elsewhere = (draw_camera_road(rng, "few" if few else "usual") for _ in range(2))
-    layout = form(chain.forms, "layout")
+    layout = chain.forms["layout"]
     if layout != "usual" and not few:
         laid = generator_of(seed, key, "camera layout")
         road, elsewhere = (draw_laid_road(laid, layout) for _ in range(2))
@@ -123,14 +121,17 @@ def _ground(spec: Spec, key: str, seed: int, driver: str, chain: Chain, rng: Gen
     return _Ground(spec, draw_car(rng, ()), style, roads, durations, (seed, key))
 
 
-def _draw(spec: Spec, seed: int, key: str, edition: Edition) -> CameraCase:
-    rng, forms = generator_of(seed, key, "camera"), draw_forms(edition.car, generator_of(seed, key, "forms"))
-    chain = draw_chain(rng, draw_forms_of(edition.camera, generator_of(seed, key, "camera forms")))
+def draw_camera_case(spec: Spec, seed: int, attempt: int, forms: Forms | None = None) -> CameraCase:
+    """A case of the camera, with these forms or drawn ones; raises UndrivableError."""
+    key = f"{spec.data}/{attempt}"
+    forms = forms or draw_forms(generator_of(seed, key, "forms"), ASPECTS | CAMERA_FORMS)
+    rng = generator_of(seed, key, "camera")
+    chain = draw_chain(rng, forms)
     if "class_friction_offset" in spec.effects and chain.reference_noise is None:
         raise UndrivableError("nothing measures the friction")
     ground = _ground(spec, key, seed, forms["driver"], chain, rng)
     car, roads, noise = ground.car, ground.roads, draw_noise(rng)
-    rate = float(rng.choice(list(RATES_HZ[edition.car]), p=list(RATES_HZ[edition.car].values())))
+    rate = float(rng.choice(list(RATES_HZ), p=list(RATES_HZ.values())))
     driven = ground.drive(roads)
     passages = {name: passage_of(driven[name][0].path, car) for name in LOGS}
     driven_on = (c for c in range(3) if all(_driven(chain, passages[n], roads[n], n, c) for n in LOGS))
@@ -157,9 +158,7 @@ def _draw(spec: Spec, seed: int, key: str, edition: Edition) -> CameraCase:
     drives = {name: done for name, (done, _) in driven.items()}
     base = {name: nominal(car, road) for name, road in told.items()}
     truth = Truth(parts, {}, gap, alone)
-    return CameraCase(
-        spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, chain, edition.camera
-    )
+    return CameraCase(spec, forms, car, dict(told), noise, rate, truth, logs, drives, base, chain)
 
 
 def _check_borders(passage: Passage, road: CameraRoad, rich: bool) -> None:
@@ -219,7 +218,7 @@ def _position(chain: Chain, position_m: Array, fault: Fault, time_s: Array, end_
         position_m = np.round(position_m + jumps_m(chain, fault, time_s, end_s, name), 4)
     if fault.wandered_m != 0.0:
         position_m = np.round(position_m + wandered_m(chain, fault, time_s, name), 4)
-    kind = form(chain.forms, "position")
+    kind = chain.forms["position"]
     if kind == "steps":
         position_m = np.round(np.round(position_m / POSITION_STEP_M) * POSITION_STEP_M, 4)
     elif kind == "noisy":

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from .camera_faults import courses, jumps_m, kept_of, nod_of, outside_kept, pitch_of, shown_s
-from .camera_forms import form
 from .camera_outside_faults import extrapolated_m, rained_on, wandered_m
 from .camera_road import CameraRoad, Passage, Whole
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault, Results
@@ -28,7 +27,6 @@ POINTS = {
     "near": (1.0 / 3.0,),
     "majority": (0.1, 0.3, 0.5, 0.7, 0.9),
     "far": (2.0 / 3.0,),
-    "most_slippery": (0.1, 0.5, 0.9),
     "wider": (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25),
 }
 """Shares of the stamped stretch whose surface a result has; some look beyond it."""
@@ -52,13 +50,13 @@ def results(chain: Chain, passage: Passage, road: CameraRoad, fault: Fault, log:
     taken, ready = timing(chain, passage, log)
     at, length = passage.at(taken), _length(chain, passage, taken, ready)
     shown, nod = shown_s(chain, fault, passage, taken, log), nod_of(chain, passage, taken)
-    pitch = pitch_of(chain, fault, passage, taken, log) + nod
+    pitch = pitch_of(chain, fault, taken.size) + nod
     places, shift = _places(chain, passage, shown, at, length, pitch)
     middle = places.mean(axis=0)
-    really = _class_of(chain, road, places)
-    honest = _class_of(chain, road, _places(chain, passage, taken, at, length, nod)[0])
+    really = _class_of(road, places)
+    honest = _class_of(road, _places(chain, passage, taken, at, length, nod)[0])
     true, mistaken = _as_mistaken(chain, fault, (really, honest), middle, taken, log)
-    by = courses(chain, fault, really, middle, taken, log)
+    by = courses(chain, middle, taken, log)
     kept = kept_of(chain, fault, passage.speed(shown), by)
     kept = kept * outside_kept(chain, fault, passage, taken, middle, really, log)
     border = _shows_border(chain, road, at, length, places)
@@ -122,11 +120,9 @@ def _places(
     return really, (at - BEHIND_M + distance - really).mean(axis=0)
 
 
-def _class_of(chain: Chain, road: CameraRoad, places: Array) -> Whole:
-    """Surface of most of the places, of equally many the least slippery one; or the most slippery of all."""
+def _class_of(road: CameraRoad, places: Array) -> Whole:
+    """Surface of most of the places, of equally many the least slippery one."""
     found = road.class_at(np.atleast_2d(places))
-    if chain.forms["belongs"] == "most_slippery":
-        return found.max(axis=0)
     return np.argmax([(found == surface).sum(axis=0) for surface in range(3)], axis=0)
 
 
@@ -134,9 +130,8 @@ def _shows_border(
     chain: Chain, road: CameraRoad, at: Array, length: Array, places: Array
 ) -> NDArray[np.bool_]:
     """Whether a picture shows more than one surface."""
-    usual = replace(chain, forms={**chain.forms, "belongs": "centre"})
     ends = (at + BEHIND_M, at + chain.preview_m + length + BEHIND_M)
-    near, far = (_class_of(usual, road, end) for end in ends)
+    near, far = (_class_of(road, end) for end in ends)
     return np.asarray((near != far) | (np.ptp(road.class_at(places), axis=0) > 0))
 
 
@@ -167,7 +162,7 @@ def _as_mistaken(
 
 def _stamp_noise(chain: Chain, n: int, log: str) -> Array | float:
     """Of where the system believes to be [m]."""
-    kind, rng = form(chain.forms, "stamp_noise"), chain.rng(log, 32)
+    kind, rng = chain.forms["stamp_noise"], chain.rng(log, 32)
     if kind == "noisy":
         return STAMP_M * rng.standard_normal(n)
     if kind == "wandering":
@@ -179,7 +174,7 @@ def _stamp_noise(chain: Chain, n: int, log: str) -> Array | float:
 
 def _unsaid(chain: Chain, confidence: Array, none: NDArray[np.bool_]) -> Array:
     """The confidence of a result that says nothing."""
-    kind = form(chain.forms, "none_says")
+    kind = chain.forms["none_says"]
     if kind == "last":
         return confidence
     return np.where(none, np.nan if kind == "nan" else 0.0, confidence)

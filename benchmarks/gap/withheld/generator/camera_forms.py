@@ -1,7 +1,7 @@
 """Forms of a camera's chain: what the contract leaves open of how a real system sees, reckons and tells.
 
 Each is an honest reading: none leaves a gap of its own, and none changes what a parameter means; what varies about a
-deviation varies about its value. Each tells since which edition of the camera's cases it is drawn.
+deviation varies about its value.
 """
 
 from __future__ import annotations
@@ -17,9 +17,6 @@ from scipy.signal import lfilter
 Array = NDArray[np.floating[Any]]
 Flags = NDArray[np.bool_]
 
-NEWEST_CAMERA = 3
-"""Edition of the camera's cases: several forms of most aspects in the first, more of nearly all in each after it."""
-
 STREAK = 4.0
 """Mean length of a streak of errors [results]."""
 TAIL = 5.0
@@ -28,14 +25,10 @@ STANDS_S = 0.1
 """How long a sample stands."""
 KEY_EVERY, KEY_WORK = 5, 1.8
 """Pictures from one that is looked at in full to the next, and its work over the mean [-]."""
-AGAIN, AGAIN_TIMES = 0.2, 1.7
-"""Share of results whose message has to be sent again, and their delay over the mean [-]."""
 WIPES_S, WIPED = (0.8, 1.6), 0.12
 """From one wipe to the next, and the share of it that the blade is in the picture."""
 AXLE_HZ = (11.2, 13.8)
 """An axle's own frequency, none that would beat with a reference that has a rate of its own."""
-BOX, BOX_MOST = 0.4, 0.9
-"""Cycles of a texture that is told by over which an amount of blur of 1 smears, and where it stays [-]."""
 
 
 def _square(n: int, step: float, period: tuple[float, float], rng: Generator) -> Array:
@@ -51,16 +44,6 @@ def even(cycle_s: float, n: int, rng: Generator) -> Array:
     return np.full(n, cycle_s)
 
 
-def jittered(cycle_s: float, n: int, rng: Generator) -> Array:
-    """Of a busy computer."""
-    return cycle_s * np.clip(1.0 + 0.12 * rng.standard_normal(n), 0.6, 1.4)
-
-
-def alternating(cycle_s: float, n: int, rng: Generator) -> Array:
-    """Of a camera that takes pictures in pairs."""
-    return cycle_s * (1.0 + 0.25 * np.where(np.arange(n) % 2 == 0, 1.0, -1.0))
-
-
 def breathing(cycle_s: float, n: int, rng: Generator) -> Array:
     """Slower where it is dark, over many seconds."""
     phase = np.arange(n) * cycle_s / rng.uniform(6.0, 15.0) + rng.random()
@@ -70,11 +53,6 @@ def breathing(cycle_s: float, n: int, rng: Generator) -> Array:
 def missed(cycle_s: float, n: int, rng: Generator) -> Array:
     """One trigger in ten comes to nothing."""
     return cycle_s / 1.1 * np.where(rng.random(n) < 0.1, 2.0, 1.0)
-
-
-def stepping(cycle_s: float, n: int, rng: Generator) -> Array:
-    """Two rates in turn."""
-    return cycle_s * (1.0 + 0.2 * _square(n, cycle_s, (5.0, 12.0), rng))
 
 
 def shared(cycle_s: float, n: int, rng: Generator) -> Array:
@@ -126,20 +104,9 @@ def constant(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
     return np.full(n, delay_s)
 
 
-def scattered(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
-    """From result to result."""
-    return delay_s * (1.0 + 0.2 * np.clip(rng.standard_normal(n), -2.5, 2.5))
-
-
 def in_frames(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
     """A queue holds whole frames, one more or one less, as many as make the mean."""
     return cycle_s * np.floor(delay_s / cycle_s + rng.random(n))
-
-
-def waving(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
-    """Two clocks that beat."""
-    phase = 2.0 * np.pi * (np.arange(n) * cycle_s / rng.uniform(2.0, 5.0) + rng.random())
-    return delay_s * (1.0 + 0.25 * np.sin(phase))
 
 
 def long_tail(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
@@ -147,25 +114,9 @@ def long_tail(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
     return delay_s * (0.6 + 0.4 * rng.exponential(1.0, n))
 
 
-def resynced(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
-    """A clock that runs off until it is set again."""
-    return delay_s * (0.75 + 0.5 * ((np.arange(n) * cycle_s / rng.uniform(1.0, 6.0) + rng.random()) % 1.0))
-
-
 def sharing(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
     """Another task runs half of the time."""
     return delay_s * (1.0 + 0.25 * _square(n, cycle_s, (2.0, 6.0), rng))
-
-
-def warming(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
-    """Ever later, as the computer gets warm."""
-    return delay_s * np.linspace(0.8, 1.2, n)
-
-
-def sent_again(delay_s: float, cycle_s: float, n: int, rng: Generator) -> Array:
-    """Some messages come through only when they are sent a second time: delay of each result [s]."""
-    others = (1.0 - AGAIN * AGAIN_TIMES) / (1.0 - AGAIN)
-    return delay_s * np.where(rng.random(n) < AGAIN, AGAIN_TIMES, others)
 
 
 # --- what is lost at an amount of blur or wrong exposure, 1 the amount that tells
@@ -186,39 +137,14 @@ def threshold(amount: Array) -> Array:
     return np.asarray((1.0 + np.exp(-4.0)) / (1.0 + np.exp(4.0 * (amount - 1.0))))
 
 
-def hyperbolic(amount: Array) -> Array:
-    """As a ratio of signal to noise falls."""
-    return np.asarray(1.0 / (1.0 + amount))
-
-
 def linear(amount: Array) -> Array:
     """Share of the confidence that is kept."""
     return np.asarray(np.maximum(1.0 - 0.3 * amount, 0.05))
 
 
-def knee(amount: Array) -> Array:
-    """Nothing up to a quarter."""
-    return np.asarray(np.exp(-0.8 * np.maximum(amount - 0.25, 0.0)))
-
-
-def bell(amount: Array) -> Array:
-    """Soon, and then ever less."""
-    return np.asarray(1.0 / (1.0 + amount**2))
-
-
 def saturating(amount: Array) -> Array:
     """Down to a third that a coarse feature still gives."""
     return np.asarray(1.0 / 3.0 + 2.0 / 3.0 * np.exp(-amount))
-
-
-def box(amount: Array) -> Array:
-    """As a texture's contrast falls that is smeared evenly: share of the confidence that is kept."""
-    return np.asarray(np.sinc(np.minimum(BOX * amount, BOX_MOST)))
-
-
-def rounded(amount: Array) -> Array:
-    """Little at first, and then at an even rate of what is left."""
-    return np.asarray(np.exp(-1.2 * (np.hypot(1.0, amount) - 1.0)))
 
 
 # --- classification errors
@@ -299,146 +225,86 @@ def vibrating(n: int, step_s: float, rng: Generator) -> Array:
     return np.asarray(np.sqrt(0.5) * (rng.standard_normal(n) + hop))
 
 
-FormsOf = dict[str, tuple[int, Callable[..., Any] | None]]
+def _choices(names: str) -> dict[str, None]:
+    """Forms without a function: choices beside a chain's parts."""
+    return dict.fromkeys(names.split())
 
 
-def _choices(*since: tuple[int, str]) -> FormsOf:
-    """Forms without a function: choices beside a chain's parts, each edition's names in a row."""
-    return {name: (edition, None) for edition, names in since for name in names.split()}
-
-
-LAWS: FormsOf = {
-    "exponential": (1, exponential),
-    "gaussian": (1, gaussian),
-    "threshold": (1, threshold),
-    "hyperbolic": (1, hyperbolic),
-    "linear": (2, linear),
-    "knee": (2, knee),
-    "bell": (2, bell),
-    "saturating": (2, saturating),
-    "box": (3, box),
-    "rounded": (3, rounded),
+LAWS = {
+    "exponential": exponential,
+    "gaussian": gaussian,
+    "threshold": threshold,
+    "linear": linear,
+    "saturating": saturating,
 }
-CAMERA_FORMS: dict[str, FormsOf] = {
-    "captures": {
-        "even": (1, even),
-        "jittered": (1, jittered),
-        "alternating": (1, alternating),
-        "breathing": (2, breathing),
-        "missed": (2, missed),
-        "stepping": (2, stepping),
-        "by_way": (2, None),
-        "shared": (3, shared),
-    },
+CAMERA_FORMS: dict[str, Mapping[str, Callable[..., Any] | None]] = {
+    "captures": {"even": even, "breathing": breathing, "missed": missed, "by_way": None, "shared": shared},
     "work": {
-        "steady": (1, steady_work),
-        "varying": (1, varying_work),
-        "waiting": (1, waiting_work),
-        "loaded": (2, loaded_work),
-        "throttled": (2, throttled_work),
-        "keyframes": (3, keyframes),
+        "steady": steady_work,
+        "varying": varying_work,
+        "waiting": waiting_work,
+        "loaded": loaded_work,
+        "throttled": throttled_work,
+        "keyframes": keyframes,
     },
-    "lateness": {
-        "constant": (1, constant),
-        "scattered": (1, scattered),
-        "in_frames": (1, in_frames),
-        "waving": (1, waving),
-        "long_tail": (2, long_tail),
-        "resynced": (2, resynced),
-        "sharing": (2, sharing),
-        "warming": (2, warming),
-        "when_fast": (2, None),
-        "sent_again": (3, sent_again),
-    },
-    "mounting": _choices((1, "firm shaking"), (2, "squatting creeping rattling swaying"), (3, "bouncing")),
-    "stamp": _choices((1, "cycle to_next window"), (2, "overlapping bounded worked")),
-    "belongs": _choices((1, "centre near majority"), (2, "far most_slippery"), (3, "wider")),
-    "errors": {"independent": (1, independent), "in_streaks": (1, in_streaks)},
+    "lateness": {"constant": constant, "in_frames": in_frames, "long_tail": long_tail, "sharing": sharing},
+    "mounting": _choices("firm creeping"),
+    "stamp": _choices("cycle to_next window overlapping bounded worked"),
+    "belongs": _choices("centre near majority far wider"),
+    "errors": {"independent": independent, "in_streaks": in_streaks},
     "confidence": {
-        "white": (1, white),
-        "slow": (1, slow),
-        "skewed": (1, skewed),
-        "heavy_tailed": (2, heavy_tailed),
-        "two_levels": (2, two_levels),
-        "standing": (2, standing),
-        "wiped": (3, wiped),
+        "white": white,
+        "skewed": skewed,
+        "heavy_tailed": heavy_tailed,
+        "two_levels": two_levels,
+        "wiped": wiped,
     },
     "blur_law": LAWS,
     "exposure_law": LAWS,
-    "kept": _choices((1, "to_nothing to_a_guess"), (2, "to_a_sixth")),
-    "begins": _choices((1, "with_the_log before"), (2, "late"), (3, "ends_early")),
+    "kept": _choices("to_nothing to_a_guess to_a_sixth"),
+    "begins": _choices("with_the_log before late ends_early"),
     "reference": {
-        "white": (1, white),
-        "slow": (1, slow),
-        "drifting": (1, drifting),
-        "heavy_tailed": (2, heavy_tailed),
-        "standing": (2, standing),
-        "vibrating": (3, vibrating),
-        "by_stretch": (3, None),
+        "white": white,
+        "slow": slow,
+        "drifting": drifting,
+        "heavy_tailed": heavy_tailed,
+        "standing": standing,
+        "vibrating": vibrating,
+        "by_stretch": None,
     },
-    "reference_filter": _choices((1, "none low_pass"), (2, "mean middle"), (3, "rate_limited")),
-    "reference_lost": _choices((1, "none samples runs"), (3, "beside_borders")),
-    "sent": _choices((2, "at_once on_a_bus"), (3, "through_gateway")),
-    "lost": _choices((2, "one_by_one in_runs repeated")),
-    "numbering": _choices((2, "counted dense strided wraps clock"), (3, "four_bits")),
-    "stamp_noise": _choices((2, "exact noisy wandering")),
-    "stamp_steps": _choices((2, "fine decimetres quarters")),
-    "body": _choices((2, "level nods")),
-    "exposure_course": _choices((2, "steady by_light hunting scattered by_class"), (3, "in_shade")),
-    "blur_course": _choices((2, "steady by_light hunting by_class"), (3, "stepped")),
-    "poor_pictures": _choices((2, "square hardly one_way say_none"), (3, "hold_last")),
-    "error_odds": _choices((2, "even one_class at_patches at_times"), (3, "in_shadows")),
-    "mistaken_for": _choices((2, "usual grippier slippery")),
-    "voted": _choices((2, "each of_three confirmed"), (3, "of_five")),
-    "told_confidence": _choices((2, "as_is coarse bytes capped smoothed overconfident"), (3, "three_bits")),
-    "border_memory": _choices((2, "none recovers")),
-    "levels": _choices((2, "alike one_lower"), (3, "wandering")),
-    "none_says": _choices((2, "zero nan last")),
-    "pauses": _choices((2, "none some"), (3, "when_slow")),
-    "rows": _choices((2, "each lost_samples every_second"), (3, "on_arrival")),
-    "position": _choices((2, "as_is steps lost_samples"), (3, "noisy")),
-    "reference_rate": _choices((2, "each_row sparse held")),
-    "reference_when": _choices((2, "always slipping at_times"), (3, "moving")),
-    "reference_steps": _choices((2, "fine hundredths fiftieths")),
-    "friction_off": _choices(
-        (2, "as_drawn each_stretch all_alike one_only"), (3, "uneven_stretches slippery_only")
-    ),
-    "layout": _choices((2, "usual two_classes patches very_uneven clustered"), (3, "through_wet repeated")),
-    "speeds": _choices((2, "all_speeds town surging in_waves"), (3, "plateaus")),
+    "reference_filter": _choices("none low_pass mean middle rate_limited"),
+    "reference_lost": _choices("none samples runs beside_borders"),
+    "sent": _choices("at_once on_a_bus through_gateway"),
+    "lost": _choices("one_by_one in_runs repeated"),
+    "numbering": _choices("counted dense strided wraps clock four_bits"),
+    "stamp_noise": _choices("exact noisy wandering"),
+    "stamp_steps": _choices("fine decimetres quarters"),
+    "body": _choices("level nods"),
+    "exposure_course": _choices("steady by_light hunting"),
+    "blur_course": _choices("steady by_light hunting"),
+    "poor_pictures": _choices("square hardly one_way say_none hold_last"),
+    "error_odds": _choices("even one_class at_patches at_times in_shadows"),
+    "mistaken_for": _choices("usual grippier slippery"),
+    "voted": _choices("each of_three confirmed of_five"),
+    "told_confidence": _choices("as_is coarse bytes capped smoothed overconfident three_bits"),
+    "border_memory": _choices("none recovers"),
+    "levels": _choices("alike one_lower wandering"),
+    "none_says": _choices("zero nan last"),
+    "pauses": _choices("none some when_slow"),
+    "rows": _choices("each lost_samples every_second on_arrival"),
+    "position": _choices("as_is steps lost_samples noisy"),
+    "reference_rate": _choices("each_row sparse held"),
+    "reference_when": _choices("always slipping at_times moving"),
+    "reference_steps": _choices("fine hundredths fiftieths"),
+    "friction_off": _choices("as_drawn each_stretch"),
+    "layout": _choices("usual two_classes patches very_uneven clustered through_wet repeated"),
+    "speeds": _choices("all_speeds town surging in_waves plateaus"),
 }
-"""All that a camera's chain has forms of; of an aspect that an edition lacks, a chain has the first."""
-
-OF_EFFECT: dict[str, tuple[str, ...]] = {
-    "camera_latency": ("lateness",),
-    "camera_pitch": ("mounting",),
-    "exposure_shift": ("exposure_law", "exposure_course", "kept", "poor_pictures"),
-    "motion_blur": ("blur_law", "blur_course", "kept", "poor_pictures"),
-    "class_friction_offset": ("friction_off",),
-}
-"""Aspects that are an effect's own; all else is the system's that it is hidden in."""
-
-
-def camera_forms_by(edition: int) -> dict[str, list[str]]:
-    """Each aspect's forms that there were by an edition."""
-    known = {
-        aspect: [form for form, (since, _) in forms.items() if since <= edition]
-        for aspect, forms in CAMERA_FORMS.items()
-    }
-    return {aspect: forms for aspect, forms in known.items() if forms}
-
-
-def draw_forms_of(edition: int, rng: Generator) -> dict[str, str]:
-    """A form of each of the edition's aspects, all equally likely."""
-    return {aspect: str(rng.choice(forms)) for aspect, forms in camera_forms_by(edition).items()}
-
-
-def form(forms: Mapping[str, str], aspect: str) -> str:
-    """Which one a system has; of what its edition does not list, the first."""
-    return forms.get(aspect) or next(iter(CAMERA_FORMS[aspect]))
+"""All that a camera's chain has forms of."""
 
 
 def function(forms: Mapping[str, str], aspect: str) -> Callable[..., Any]:
     """That of a form that has one."""
-    found = CAMERA_FORMS[aspect][form(forms, aspect)][1]
+    found = CAMERA_FORMS[aspect][forms[aspect]]
     assert found is not None
     return found

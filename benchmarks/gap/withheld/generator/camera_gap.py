@@ -39,8 +39,6 @@ SLOW = {
     "by_stretch": 0.32,
 }
 """Share of a reference's noise that is left in a second's mean [-]."""
-SLIPPERIER = 0.4
-"""How far from its middle a class begins and ends where the most slippery surface counts [stretches]."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +99,6 @@ def _place(stage: Stage, plain: Results, moved: Array, told: CameraRoad) -> floa
     apart = (0.5 - np.mean(POINTS[chain.forms["belongs"]])) * np.interp(
         there, middle, plain.to_m - plain.from_m
     )
-    if chain.forms["belongs"] == "most_slippery":
-        apart = SLIPPERIER * np.interp(there, middle, plain.to_m - plain.from_m)
     odds = np.interp(there, middle, plain.odds)
     spread = np.sqrt(step**2 / 12.0 + apart**2 + step**2 * odds + PLACE_M**2)
     return float(np.sqrt(np.mean((shift / spread) ** 2)))

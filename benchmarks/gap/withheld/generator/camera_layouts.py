@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .camera_road import ALL_SPEEDS, CLASS_FRICTION, ODDS, ROAD_M, CameraRoad
 from .car import Car
 from .driver import COAST, Piece, Style
-from .pedals import clock_of, faded, squeezed
+from .pedals import clock_of, drag, faded, power, pressed, squeezed
 
 Array = NDArray[np.floating[Any]]
 Stretches = Iterator[tuple[float, int]]
@@ -103,16 +103,6 @@ def draw_laid_road(rng: Generator, layout: str) -> CameraRoad:
 # --- drivers
 
 
-def _off(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.3, 0.5)
-    return squeezed((0.4, level), (rng.uniform(2.0, 4.0), level), (0.4, 0.0))
-
-
-def _towards_a_light(car: Car, rng: Generator) -> Array:
-    level = -car.motor_peak_torque_nm * rng.uniform(0.25, 0.45)
-    return squeezed((0.6, level), (rng.uniform(1.5, 3.5), level), (0.6, 0.0))
-
-
 def _along(car: Car, rng: Generator) -> Array:
     return faded(car.motor_peak_torque_nm * np.full(round(rng.uniform(150, 350)), rng.uniform(0.01, 0.04)))
 
@@ -124,16 +114,6 @@ def _surge(car: Car, rng: Generator) -> Array:
     return squeezed((0.5, up), (there, up), (0.8, 0.0), (0.8, -down), (back, -down), (0.5, 0.0))
 
 
-def _step_up(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.3, 0.45)
-    return squeezed((0.6, level), (rng.uniform(1.5, 3.5), level), (0.6, 0.0))
-
-
-def _step_down(car: Car, rng: Generator) -> Array:
-    level = -car.motor_peak_torque_nm * rng.uniform(0.25, 0.4)
-    return squeezed((0.6, level), (rng.uniform(1.0, 2.5), level), (0.6, 0.0))
-
-
 def _wave(car: Car, rng: Generator) -> Array:
     """Up hill and down dale."""
     period = rng.uniform(7.0, 11.0)
@@ -143,31 +123,35 @@ def _wave(car: Car, rng: Generator) -> Array:
 
 
 _ALONG = Piece(5.0, 99.0, _along)
+_OFF = pressed(power, (0.3, 0.5), (0.4, 1.0), ((2.0, 4.0), 1.0), (0.4, 0.0))
+_TOWARDS_A_LIGHT = pressed(drag, (0.25, 0.45), (0.6, 1.0), ((1.5, 3.5), 1.0), (0.6, 0.0))
+_STEP_UP = pressed(power, (0.3, 0.45), (0.6, 1.0), ((1.5, 3.5), 1.0), (0.6, 0.0))
+_STEP_DOWN = pressed(drag, (0.25, 0.4), (0.6, 1.0), ((1.0, 2.5), 1.0), (0.6, 0.0))
 TOWN = Style(
-    rich=(Piece(0.0, 9.0, _off), _ALONG, Piece(9.5, 99.0, _towards_a_light)),
+    rich=(Piece(0.0, 9.0, _OFF), _ALONG, Piece(9.5, 99.0, _TOWARDS_A_LIGHT)),
     mild=(_ALONG,),
     drive_front=(0.5,),
     brake_front=0.62,
 )
 SURGING = Style(
-    rich=(Piece(7.0, 16.0, _surge), _ALONG, Piece(16.0, 99.0, _towards_a_light), Piece(0.0, 12.0, _off)),
+    rich=(Piece(7.0, 16.0, _surge), _ALONG, Piece(16.0, 99.0, _TOWARDS_A_LIGHT), Piece(0.0, 12.0, _OFF)),
     mild=(_ALONG, COAST),
     drive_front=(0.4, 0.6),
     brake_front=0.6,
 )
 IN_WAVES = Style(
-    rich=(Piece(7.0, 20.0, _wave), Piece(0.0, 12.0, _off), Piece(15.0, 99.0, _towards_a_light)),
+    rich=(Piece(7.0, 20.0, _wave), Piece(0.0, 12.0, _OFF), Piece(15.0, 99.0, _TOWARDS_A_LIGHT)),
     mild=(_ALONG, COAST, _ALONG),
     drive_front=(0.5, 0.55),
     brake_front=0.65,
 )
 PLATEAUS = Style(
     rich=(
-        Piece(0.0, 20.0, _step_up),
+        Piece(0.0, 20.0, _STEP_UP),
         _ALONG,
-        Piece(0.0, 14.0, _step_up),
+        Piece(0.0, 14.0, _STEP_UP),
         _ALONG,
-        Piece(12.0, 99.0, _step_down),
+        Piece(12.0, 99.0, _STEP_DOWN),
         _ALONG,
     ),
     mild=(_ALONG,),

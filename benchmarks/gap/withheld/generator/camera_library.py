@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from .camera_forms import form
 from .camera_road import CLASS_FRICTION, SURFACES
 from .camera_system import BEHIND_M, HEIGHT_M, Chain, Fault
 from .details import USUAL_M_S
@@ -65,13 +64,6 @@ def _friction(scene: Scene, rng: Generator) -> Scale:
     """One class, two or all that are driven on; each its own way or all alike, and none beyond what roads have."""
     off = rng.permutation(scene.driven)[: rng.integers(1, len(scene.driven) + 1)]
     signs, shares = rng.choice([-1.0, 1.0], 3, p=[0.6, 0.4]), rng.uniform(0.6, 1.0, 3)
-    kind = form(scene.chain.forms, "friction_off")
-    if kind == "one_only":
-        off = off[:1]
-    elif kind == "slippery_only":  # the dry value is the one that is known best
-        off = np.array([surface for surface in scene.driven if surface > 0] or scene.driven)
-    elif kind == "all_alike":  # cold tyres, or a road that was never like the others
-        off, signs, shares = np.array(scene.driven), signs[[0, 0, 0]], shares[[0, 0, 0]]
     most = {1.0: np.array([0.4, 0.5, 1.5]), -1.0: np.array([0.45, 0.5, 0.5])}
 
     def parameters(severity: float) -> Parameters:

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import lfilter
 
 from .camera_faults import acceleration
-from .camera_forms import form, function
+from .camera_forms import function
 from .camera_outside_faults import pushed_share
 from .camera_road import CLASS_FRICTION, CameraRoad, Passage
 from .camera_system import Chain, Fault
@@ -37,8 +37,6 @@ OF_STRETCH = 0.3
 STEPS = {"fine": 1e-4, "hundredths": 0.01, "fiftieths": 0.02}
 UNLIKE = 0.12
 """By which a class's deviation is more on one of its stretches and less on the next."""
-UNEVEN = 0.15
-"""The same where it is more on one of three, less on another and neither on the third."""
 
 
 def reference(
@@ -50,7 +48,7 @@ def reference(
     values = friction_under(chain, passage, road, fault, time_s)
     values = values + chain.reference_noise * _noise(chain, passage, road, time_s, log)
     values = np.clip(values, LEAST, MOST)
-    kind, coarse = form(chain.forms, "reference_rate"), STEPS[form(chain.forms, "reference_steps")]
+    kind, coarse = chain.forms["reference_rate"], STEPS[chain.forms["reference_steps"]]
     values = (
         np.round(values, 4) if coarse == STEPS["fine"] else np.round(np.round(values / coarse) * coarse, 4)
     )
@@ -77,7 +75,7 @@ def _noise(chain: Chain, passage: Passage, road: CameraRoad, time_s: Array, log:
 
 def measured_at(chain: Chain, passage: Passage, time_s: Array, log: str) -> Flags:
     """Whether there is a reference at a time, but for lost samples."""
-    kind, there = form(chain.forms, "reference_when"), np.ones(time_s.size, bool)
+    kind, there = chain.forms["reference_when"], np.ones(time_s.size, bool)
     if kind == "slipping":
         clock = np.arange(0.0, passage.end_s, 0.02)
         enough = np.quantile(np.abs(acceleration(passage, clock)), 1.0 - SLIPPING)
@@ -96,16 +94,12 @@ def measured_at(chain: Chain, passage: Passage, time_s: Array, log: str) -> Flag
 def friction_of(chain: Chain, road: CameraRoad, fault: Fault) -> Array:
     """What each stretch of the road really has [-]."""
     surface, true = np.array(road.surface), np.array(fault.friction)
-    kind = form(chain.forms, "friction_off")
-    if kind not in ("each_stretch", "uneven_stretches"):
+    if chain.forms["friction_off"] != "each_stretch":
         return np.asarray(true[surface])
     usual, nth = np.array(CLASS_FRICTION), np.zeros(surface.size, int)
     for s in range(3):
         nth[surface == s] = np.arange(np.count_nonzero(surface == s))
     unlike = 1.0 + UNLIKE * np.where(nth % 2 == 0, 1.0, -1.0)
-    if kind == "uneven_stretches":
-        thirds = chain.rng("", 45).permuted(np.tile([-1.0, 0.0, 1.0], (surface.size, 1)), axis=1)
-        unlike = 1.0 + UNEVEN * thirds[nth // 3, nth % 3]
     return np.asarray(np.round(usual[surface] + (true - usual)[surface] * unlike, 4))
 
 

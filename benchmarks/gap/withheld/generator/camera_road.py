@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .car import Car, Road
 from .driver import COAST, Piece, Style
 from .kernel import RECORD_STEP_S, V, X
-from .pedals import clock_of, faded, squeezed
+from .pedals import clock_of, drag, faded, power, pressed, squeezed
 
 Array = NDArray[np.floating[Any]]
 Whole = NDArray[np.integer[Any]]
@@ -111,16 +111,6 @@ def passage_of(path: Array, car: Car) -> Passage:
 # --- drivers that every surface bears
 
 
-def _up(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.25, 0.5)
-    return squeezed((0.5, level), (rng.uniform(2.5, 6.0), level), (0.5, 0.0))
-
-
-def _down(car: Car, rng: Generator) -> Array:
-    level = -car.motor_peak_torque_nm * rng.uniform(0.25, 0.45)
-    return squeezed((0.5, level), (rng.uniform(2.0, 5.0), level), (0.5, 0.0))
-
-
 def _keep(car: Car, rng: Generator) -> Array:
     """As good as one speed."""
     clock = clock_of(rng.uniform(3.0, 6.0))
@@ -134,15 +124,17 @@ def _nudge(car: Car, rng: Generator) -> Array:
 
 
 _KEEP = Piece(6.0, 99.0, _keep)
+_UP = pressed(power, (0.25, 0.5), (0.5, 1.0), ((2.5, 6.0), 1.0), (0.5, 0.0))
+_DOWN = pressed(drag, (0.25, 0.45), (0.5, 1.0), ((2.0, 5.0), 1.0), (0.5, 0.0))
 ALL_SPEEDS = Style(
     rich=(
-        Piece(0.0, 20.0, _up),
+        Piece(0.0, 20.0, _UP),
         _KEEP,
-        Piece(13.0, 99.0, _down),
+        Piece(13.0, 99.0, _DOWN),
         Piece(7.0, 26.0, _nudge),
-        Piece(0.0, 17.0, _up),
+        Piece(0.0, 17.0, _UP),
         COAST,
-        Piece(11.0, 99.0, _down),
+        Piece(11.0, 99.0, _DOWN),
     ),
     mild=(_KEEP,),
     drive_front=(0.5, 0.6),

@@ -149,7 +149,7 @@ class Results:
 def draw_chain(rng: Generator, forms: Forms) -> Chain:
     """A system that a car may well have."""
     least = 10.0 if forms["belongs"] in ("near", "far", "wider") else 5.0
-    if forms.get("voted") == "of_five":  # else short stretches would be outvoted
+    if forms["voted"] == "of_five":  # else short stretches would be outvoted
         least = 20.0
     rate = float(np.exp(rng.uniform(*np.log((least, 60.0)))))
     level = rng.uniform(0.87, 0.96)

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .camera_forms import form, function
+from .camera_forms import function
 from .camera_road import Whole
 from .camera_system import Chain, Fault, Results
 
@@ -58,7 +58,7 @@ STEPS_M = {"fine": 0.0, "decimetres": 0.1, "quarters": 0.25}
 def odds_of(chain: Chain, border: Flags, surface: Whole, place_m: Array, taken: Array, log: str) -> Array:
     """Of an ordinary error [-]."""
     odds = chain.errors * np.where(border, chain.more_at_border, 1.0)
-    kind = form(chain.forms, "error_odds")
+    kind = chain.forms["error_odds"]
     if kind == "one_class":
         odds = odds * np.where(surface == chain.rng("", 24).integers(3), *ONE_CLASS)
     elif kind == "at_patches":
@@ -77,9 +77,9 @@ def classified(
     chain: Chain, fault: Fault, true: Whole, odds: Array, kept: Array, log: str
 ) -> tuple[Whole, Flags, Flags]:
     """Classes with errors, which results are wrong, and which say nothing."""
-    n, kind = true.size, form(chain.forms, "poor_pictures")
+    n, kind = true.size, chain.forms["poor_pictures"]
     errors = function(chain.forms, "errors")
-    mistaken = MISTAKEN[form(chain.forms, "mistaken_for")]
+    mistaken = MISTAKEN[chain.forms["mistaken_for"]]
     poor = (1.0 - kept) ** 2 * (HARDLY if kind == "hardly" else 1.0)
     more = (MOST_WRONG - odds) * poor
     wrong = errors(odds + more, chain.rng(log, 6))
@@ -106,17 +106,17 @@ def confidence_of(
 ) -> Array:
     """Q_v [-]."""
     noise = function(chain.forms, "confidence")
-    level, kind = np.array(chain.level), form(chain.forms, "told_confidence")
-    if form(chain.forms, "levels") == "one_lower":
+    level, kind = np.array(chain.level), chain.forms["told_confidence"]
+    if chain.forms["levels"] == "one_lower":
         level = level - LOWER * (np.arange(3) == chain.rng("", 24).integers(3))
     values = level[true]
-    if form(chain.forms, "levels") == "wandering":
+    if chain.forms["levels"] == "wandering":
         rng = chain.rng(log, 43)
         values = values * (
             1.0 + LOWER * np.sin(2.0 * np.pi * (taken / rng.uniform(*WANDERS_S) + rng.random()))
         )
     values = values * (1.0 - chain.border_dip * border) * (1.0 - chain.wrong_dip * wrong)
-    if form(chain.forms, "border_memory") == "recovers":
+    if chain.forms["border_memory"] == "recovers":
         changed = np.flatnonzero(np.diff(true, prepend=true[:1]))
         last = np.searchsorted(changed, np.arange(true.size), side="right") - 1
         since = np.where(last >= 0, taken - taken[np.append(changed, 0)[last]], np.inf)
@@ -135,7 +135,7 @@ def confidence_of(
 
 def voted(chain: Chain, surface: Whole, ready: Array) -> tuple[Whole, Array]:
     """What neighbours agree on, told one result later, or two, and stamped as before."""
-    kind = form(chain.forms, "voted")
+    kind = chain.forms["voted"]
     if kind == "each":
         return surface, ready
     if kind == "of_five":
@@ -178,7 +178,7 @@ def columns(chain: Chain, said: Results, time_s: Array, log: str = "") -> pd.Dat
 
 def _logged(chain: Chain, seen: pd.DataFrame, fresh: Flags, log: str) -> pd.DataFrame:
     """With the samples that the logger has; all columns of a result come in one message."""
-    kind = form(chain.forms, "rows")
+    kind = chain.forms["rows"]
     if kind == "each":
         return seen
     gone = np.arange(len(seen)) % 2 == 1
@@ -192,12 +192,12 @@ def _logged(chain: Chain, seen: pd.DataFrame, fresh: Flags, log: str) -> pd.Data
 def _before(chain: Chain) -> int:
     """`frame_id` before the first result."""
     number = chain.first_id - 1
-    return number % 256 if form(chain.forms, "numbering") == "wraps" else number
+    return number % 256 if chain.forms["numbering"] == "wraps" else number
 
 
 def _stamps(chain: Chain, said: Results) -> tuple[Array, Array]:
     """In the steps that they are told in, and never of no length."""
-    step = STEPS_M[form(chain.forms, "stamp_steps")]
+    step = STEPS_M[chain.forms["stamp_steps"]]
     if step == 0.0:
         return said.from_m, said.to_m
     begin = np.round(said.from_m / step) * step

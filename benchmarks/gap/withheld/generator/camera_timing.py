@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera_forms import form, function
+from .camera_forms import function
 from .camera_road import Passage
 from .camera_system import Chain
 
@@ -44,10 +44,10 @@ def timing(chain: Chain, passage: Passage, log: str) -> tuple[Array, Array]:
         taken = first + np.cumsum(function(chain.forms, "captures")(cycle, n, rng)) - cycle
     work = function(chain.forms, "work")(chain.work_s, taken.size, chain.rng(log, 2))
     ready = np.maximum.accumulate(taken + work)
-    if form(chain.forms, "sent") == "on_a_bus":
+    if chain.forms["sent"] == "on_a_bus":
         message = chain.rng("", 20).choice(BUS_S)
         ready = np.ceil(ready / message) * message
-    elif form(chain.forms, "sent") == "through_gateway":
+    elif chain.forms["sent"] == "through_gateway":
         ready = np.maximum.accumulate(ready + chain.rng(log, 40).gamma(2.0, GATEWAY_S / 2.0, ready.size))
     there = (taken < end_s) & _awake(chain, passage, taken, log)
     return taken[there], ready[there]
@@ -68,10 +68,10 @@ def _awake(chain: Chain, passage: Passage, taken: Array, log: str) -> Flags:
         awake &= taken >= chain.rng(log, 21).uniform(*LATE_S)
     elif chain.forms["begins"] == "ends_early":
         awake &= taken < end_s - chain.rng(log, 21).uniform(*LATE_S)
-    if form(chain.forms, "pauses") == "when_slow":
+    if chain.forms["pauses"] == "when_slow":
         least = min(chain.rng("", 41).uniform(*SLOW_M_S), SLOW_SHARE * float(passage.speed_m_s.mean()))
         awake &= passage.speed(taken) >= least
-    if form(chain.forms, "pauses") == "some":
+    if chain.forms["pauses"] == "some":
         rng, at = chain.rng(log, 22), 0.0
         while (at := at + rng.exponential(PAUSE_EVERY_S)) < end_s - PAUSE_S[1]:
             until = at + rng.uniform(*PAUSE_S)
@@ -82,7 +82,7 @@ def _awake(chain: Chain, passage: Passage, taken: Array, log: str) -> Flags:
 
 def delivered(chain: Chain, n: int, log: str) -> tuple[NDArray[np.integer[Any]], Flags]:
     """Which result is told in each one's place, and whether any is."""
-    rng, itself, kind = chain.rng(log, 3), np.arange(n), form(chain.forms, "lost")
+    rng, itself, kind = chain.rng(log, 3), np.arange(n), chain.forms["lost"]
     if kind == "one_by_one":
         return itself, rng.random(n) >= chain.dropped
     share = max(chain.dropped, LEAST_LOST)
@@ -97,7 +97,7 @@ def delivered(chain: Chain, n: int, log: str) -> tuple[NDArray[np.integer[Any]],
 
 def numbers(chain: Chain, taken: Array, there: Flags) -> NDArray[np.integer[Any]]:
     """`frame_id` of each result that is told."""
-    kind, counted = form(chain.forms, "numbering"), chain.first_id + np.arange(taken.size)
+    kind, counted = chain.forms["numbering"], chain.first_id + np.arange(taken.size)
     if kind == "dense":
         return chain.first_id + np.arange(np.count_nonzero(there))
     if kind == "four_bits":  # of a message, not of a picture

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ from numpy.random import Generator
 
 from .car import Car, Road, draw_car, draw_road
 from .driver import Drive, UndrivableError, drive
-from .forms import PLAIN, RATES_HZ, Edition, Forms, draw_forms, effect_in, form_of
+from .forms import ASPECTS, RATES_HZ, Forms, draw_forms, effect_in, form_of
 from .sensors import Noise, draw_noise, make_log
 from .severity import CEILING, Size, drive_or_none, find_severity, residual, size_of
 from .table import Group, Spec
@@ -74,7 +74,7 @@ class Case:
             "group": str(self.spec.group),
             "effects": truth.effects,
             "subsystems": sorted(self.subsystems),
-            "forms": self.forms,
+            "forms": dict(self.forms),
             "tyre": truth.tyre,
             "target": self.spec.target,
             "gap": truth.gap.total,
@@ -95,34 +95,20 @@ class Case:
             log.to_csv(folder / f"{name}.csv", index=False)
 
 
-AnyCase = TypeVar("AnyCase", bound=Case)
-
-
 def generator_of(seed: int, *names: str) -> Generator:
     """Independent of every other name's, and of the order in which cases are made."""
     return np.random.default_rng([seed, *(zlib.crc32(name.encode()) for name in names)])
 
 
-def make_case(spec: Spec, seed: int, edition: Edition = PLAIN) -> Case:
-    """Draw a case, with forms that the `edition` has.
-
-    Raises
-    ------
-    UndrivableError
-        None of `TRIES` draws gives a car that can be driven.
-    """
-    return first_drivable(spec, lambda key: _draw(spec, seed, key, edition))
-
-
-def first_drivable(spec: Spec, draw: Callable[[str], AnyCase]) -> AnyCase:
-    """What the first of `TRIES` keys gives that does not raise UndrivableError; that error where all do."""
+def first_drivable(name: str, draw: Callable[[int], Case]) -> Case:
+    """What the first of `TRIES` attempts gives that does not raise UndrivableError; that error where all do."""
     problems = []
     for attempt in range(TRIES):
         try:
-            return draw(f"{spec.data}/{attempt}")
+            return draw(attempt)
         except UndrivableError as problem:
             problems.append(str(problem))
-    raise UndrivableError(f"{spec.name}: no drivable car in {TRIES} draws; the last: {problems[-1]}")
+    raise UndrivableError(f"{name}: no drivable car in {TRIES} draws; the last: {problems[-1]}")
 
 
 @dataclass(frozen=True)
@@ -143,8 +129,10 @@ class _Stage:
         return CEILING if driven is None else size_of(residual(world, self.base, driven), noise).total
 
 
-def _draw(spec: Spec, seed: int, key: str, edition: Edition) -> Case:
-    rng, forms = generator_of(seed, key), draw_forms(edition.car, generator_of(seed, key, "forms"))
+def draw_case(spec: Spec, seed: int, attempt: int, forms: Forms | None = None) -> Case:
+    """A case of the car, with these forms or drawn ones; raises UndrivableError."""
+    key = f"{spec.data}/{attempt}"
+    rng, forms = generator_of(seed, key), forms or draw_forms(generator_of(seed, key, "forms"), ASPECTS)
     car = draw_car(rng, spec.effects)
     road, elsewhere = draw_road(rng, spec.rich), draw_road(rng, spec.rich)
     hold = elsewhere if rng.random() < 0.25 else road
@@ -152,9 +140,8 @@ def _draw(spec: Spec, seed: int, key: str, edition: Edition) -> Case:
     base = {name: nominal(car, place) for name, place in roads.items()}
     timing = spec.group is Group.TIMING
     durations = {name: 60.0 if timing else float(rng.uniform(24.0, 34.0)) for name in LOGS}
-    rates = RATES_HZ[edition.car]
     noise = draw_noise(rng)
-    rate = 1000.0 if timing else float(rng.choice(list(rates), p=list(rates.values())))
+    rate = 1000.0 if timing else float(rng.choice(list(RATES_HZ), p=list(RATES_HZ.values())))
     stage = _Stage(spec, forms, car, base["holdout"], durations["holdout"], (seed, key, "holdout"))
     parts, gap_of, noise = _deviations(stage, noise, rng)
     tyre = _tyre(stage, noise, rng) if spec.group is Group.TYRE else {}

@@ -15,7 +15,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .car import Car
-from .kernel import COMMAND_STEP_S, GRAVITY, RECORD_STEP_S, N, V, W, begin, integrate
+from .kernel import GRAVITY, RECORD_STEP_S, N, V, W, begin, integrate
+from .motors import COMMAND_STEP_S
 from .world import World
 
 Array = NDArray[np.floating[Any]]
@@ -58,26 +59,6 @@ class Piece:
     fast_m_s: float
     torque: Callable[[Car, Generator], Array]
     patience_s: tuple[float, float] = (0.05, 0.3)
-
-
-@dataclass(frozen=True)
-class Style:
-    """What a driver does with his car, and how the car shares it out.
-
-    Attributes
-    ----------
-    rich, mild : tuple of Piece
-        Pieces of driving that excite everything, and calm ones; each is done once before any is repeated.
-    drive_front : tuple of float
-        Front shares of the motors, one of which is drawn for each piece [-].
-    brake_front : float
-        Front share of the brakes [-].
-    """
-
-    rich: tuple[Piece, ...]
-    mild: tuple[Piece, ...]
-    drive_front: tuple[float, ...]
-    brake_front: float
 
 
 def _line(*corners: tuple[float, float]) -> Array:
@@ -176,7 +157,29 @@ GENTLY = Piece(0.0, 22.0, _gently)
 COAST = Piece(8.0, 99.0, _coast)
 EASE = Piece(13.0, 99.0, _ease)
 MILD = (Piece(7.0, 99.0, _cruise), GENTLY, COAST)
-BRISK = Style(RICH, MILD, (0.5, 0.5, 0.4, 0.6, 0.7), 0.6)
+
+
+@dataclass(frozen=True)
+class Style:
+    """What a driver does with his car, and how the car shares it out.
+
+    Attributes
+    ----------
+    rich, mild : tuple of Piece
+        Pieces of driving that excite everything, and calm ones; each is done once before any is repeated.
+    drive_front : tuple of float
+        Front shares of the motors, one of which is drawn for each piece [-].
+    brake_front : float
+        Front share of the brakes [-].
+    """
+
+    rich: tuple[Piece, ...]
+    drive_front: tuple[float, ...]
+    brake_front: float
+    mild: tuple[Piece, ...] = MILD
+
+
+BRISK = Style(RICH, (0.5, 0.5, 0.4, 0.6, 0.7), 0.6)
 """Straight ramps and plateaus, one kind of driving after the other."""
 
 

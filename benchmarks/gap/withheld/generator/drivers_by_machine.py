@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import COAST, Piece, Style
-from .kernel import COMMAND_STEP_S
-from .pedals import clock_of, faded, limit_of, squeezed
+from .pedals import brake, clock_of, faded, limit_of, power, pressed, rolling, squeezed
 
 Array = NDArray[np.floating[Any]]
 
@@ -50,37 +49,11 @@ def _follow(car: Car, rng: Generator) -> Array:
     return faded(car.motor_peak_torque_nm * smooth)
 
 
-def _emergency(car: Car, rng: Generator) -> Array:
-    """A warning jerk, half a brake, then all of it (the driver lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.15) * limit_of(car)
-    return squeezed(
-        (0.1, 0.2 * limit),
-        (0.15, 0.0),
-        (0.2, 0.4 * limit),
-        (rng.uniform(0.4, 0.8), 0.4 * limit),
-        (0.2, limit),
-        (rng.uniform(0.3, 0.7), limit),
-        (0.2, 0.0),
-        (0.2, 0.0),
-    )
-
-
 def _ramp_up(car: Car, rng: Generator) -> Array:
     """A speed controller's: straight up, held, straight down."""
     level = car.motor_peak_torque_nm * rng.uniform(0.35, 0.75)
     clock = clock_of(rng.uniform(2.5, 4.5))
     return level * np.clip(np.minimum(clock, clock[-1] - clock) / rng.uniform(0.5, 1.0), 0.0, 1.0)
-
-
-def _follow_gently(car: Car, rng: Generator) -> Array:
-    return 0.2 * _follow(car, rng)
-
-
-def _controlled(car: Car, rng: Generator) -> Array:
-    """A held speed: an integrator that hunts a little."""
-    clock = clock_of(rng.uniform(4.0, 7.0))
-    hunt = np.sin(2.0 * np.pi * clock / rng.uniform(1.5, 3.0)) * np.exp(-clock / rng.uniform(2.0, 5.0))
-    return faded(car.motor_peak_torque_nm * (rng.uniform(0.02, 0.07) + rng.uniform(0.01, 0.05) * hunt))
 
 
 ASSISTED = Style(
@@ -89,25 +62,25 @@ ASSISTED = Style(
         Piece(12.0, 99.0, _anti_lock, (0.3, 0.6)),
         Piece(0.0, 22.0, _traction, (0.2, 0.5)),
         Piece(8.0, 26.0, _follow),
-        Piece(12.0, 99.0, _emergency),
+        # A warning jerk, half a brake, then all of it (the driver lets go when the wheels slide).
+        Piece(
+            12.0,
+            99.0,
+            pressed(
+                brake,
+                (1.0, 1.15),
+                *((0.1, 0.2), (0.15, 0.0), (0.2, 0.4), ((0.4, 0.8), 0.4)),
+                *((0.2, 1.0), ((0.3, 0.7), 1.0), (0.2, 0.0), (0.2, 0.0)),
+            ),
+        ),
         COAST,
         Piece(12.0, 99.0, _anti_lock, (0.3, 0.6)),
-    ),
-    mild=(
-        Piece(7.0, 99.0, _controlled),
-        Piece(0.0, 24.0, lambda car, rng: 0.35 * _ramp_up(car, rng)),
-        Piece(9.0, 26.0, _follow_gently),
-        COAST,
     ),
     drive_front=(0.5, 0.4, 0.75),
     brake_front=0.66,
 )
 
 # --- robot
-
-
-def _nothing(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.5, 3.0) * 100.0))
 
 
 def _many_tones(car: Car, rng: Generator) -> Array:
@@ -171,7 +144,7 @@ ROBOT = Style(
         _TO_LIMIT,
         Piece(0.0, 21.0, _at_once, (0.1, 0.5)),
         Piece(10.0, 24.0, _twice),
-        Piece(7.0, 99.0, _nothing),
+        Piece(7.0, 99.0, rolling(1.5, 3.0)),
         _TO_LIMIT,
         Piece(8.0, 25.0, _impulses),
     ),
@@ -210,32 +183,12 @@ def _brake_in_steps(car: Car, rng: Generator) -> Array:
     return squeezed(*corners, (0.2, 0.0), (0.3, 0.0))
 
 
-def _stop_hard(car: Car, rng: Generator) -> Array:
-    """At once as hard as a dry road bears, until the wheels slide."""
-    limit = -rng.uniform(1.0, 1.15) * limit_of(car)
-    return squeezed((rng.uniform(0.15, 0.3), limit), (rng.uniform(0.4, 0.9), limit), (0.15, 0.0), (0.3, 0.0))
-
-
 def _full_ramp(car: Car, rng: Generator) -> Array:
     """Evenly up to all that the motors have (the driver lets go when the wheels spin)."""
     peak, clock = car.motor_peak_torque_nm, clock_of(rng.uniform(1.5, 3.0))
     return np.concatenate(
         [peak * clock / clock[-1], np.full(50, peak), np.linspace(peak, 0.0, 25), np.zeros(20)]
     )
-
-
-def _roll_out(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(2.5, 4.5) / COMMAND_STEP_S))
-
-
-def _hold(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.02, 0.07)
-    return squeezed((0.8, level), (rng.uniform(3.0, 6.0), level), (0.8, 0.0))
-
-
-def _steps_gently(car: Car, rng: Generator) -> Array:
-    height, tread = car.motor_peak_torque_nm * rng.uniform(0.04, 0.08), rng.uniform(0.8, 1.5)
-    return squeezed(*(corner for n in (1, 2, 3, 1, 0) for corner in ((0.5, n * height), (tread, n * height))))
 
 
 _IN_STEPS = Piece(12.0, 99.0, _brake_in_steps, (0.1, 0.5))
@@ -247,14 +200,14 @@ PROVING = Style(
         _IN_STEPS,
         Piece(8.0, 24.0, _switch),
         Piece(8.0, 26.0, _swing),
-        Piece(13.0, 99.0, _stop_hard),
-        Piece(8.0, 99.0, _roll_out),
+        # At once as hard as a dry road bears, until the wheels slide.
+        Piece(
+            13.0,
+            99.0,
+            pressed(brake, (1.0, 1.15), ((0.15, 0.3), 1.0), ((0.4, 0.9), 1.0), (0.15, 0.0), (0.3, 0.0)),
+        ),
+        Piece(8.0, 99.0, rolling(2.5, 4.5)),
         _IN_STEPS,
-    ),
-    mild=(
-        Piece(7.0, 99.0, _hold),
-        Piece(0.0, 22.0, _steps_gently),
-        Piece(8.0, 99.0, _roll_out),
     ),
     drive_front=(0.5, 0.35, 0.65),
     brake_front=0.6,
@@ -303,12 +256,6 @@ def _cruise_control_emergency(car: Car, rng: Generator) -> Array:
     )
 
 
-def _enough(car: Car, rng: Generator) -> Array:
-    """His own foot down, all that the motors have (he lets go when the wheels spin)."""
-    peak = car.motor_peak_torque_nm
-    return squeezed((rng.uniform(0.1, 0.25), peak), (rng.uniform(0.8, 1.8), peak), (0.2, 0.0), (0.4, 0.0))
-
-
 def _pulled_back(car: Car, rng: Generator) -> Array:
     """On and off as lanes ahead open and close."""
     corners = []
@@ -319,18 +266,6 @@ def _pulled_back(car: Car, rng: Generator) -> Array:
     return car.motor_peak_torque_nm * squeezed(*corners, (0.3, 0.0))
 
 
-def _let_run(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.5, 3.0) * 100.0))
-
-
-def _resume_gently(car: Car, rng: Generator) -> Array:
-    return 0.35 * _resume(car, rng)
-
-
-def _keeping_gently(car: Car, rng: Generator) -> Array:
-    return 0.25 * _keeping_distance(car, rng)
-
-
 _EMERGENCY = Piece(12.0, 99.0, _cruise_control_emergency)
 
 
@@ -339,13 +274,13 @@ CRUISE_CONTROL = Style(
         Piece(0.0, 23.0, _resume),
         _EMERGENCY,
         Piece(8.0, 25.0, _keeping_distance),
-        Piece(0.0, 21.0, _enough),
+        # His own foot down, all that the motors have (he lets go when the wheels spin).
+        Piece(0.0, 21.0, pressed(power, 1.0, ((0.1, 0.25), 1.0), ((0.8, 1.8), 1.0), (0.2, 0.0), (0.4, 0.0))),
         Piece(12.0, 99.0, _cut_in),
         Piece(8.0, 25.0, _pulled_back),
         _EMERGENCY,
-        Piece(8.0, 99.0, _let_run),
+        Piece(8.0, 99.0, rolling(1.5, 3.0)),
     ),
-    mild=(Piece(0.0, 22.0, _resume_gently), Piece(8.0, 24.0, _keeping_gently), COAST),
     drive_front=(0.5, 0.4, 0.55),
     brake_front=0.64,
 )

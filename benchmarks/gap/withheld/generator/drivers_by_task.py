@@ -10,16 +10,12 @@ from numpy.typing import NDArray
 
 from .car import Car
 from .driver import COAST, Piece, Style
-from .pedals import clock_of, faded, limit_of, squeezed
+from .pedals import brake, clock_of, drag, faded, gently, limit_of, power, pressed, rolling, squeezed
 
 Array = NDArray[np.floating[Any]]
 
 
 # --- winter
-
-
-def _nothing(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.5, 3.0) * 100.0))
 
 
 def _feeling(car: Car, rng: Generator) -> Array:
@@ -31,14 +27,6 @@ def _feeling(car: Car, rng: Generator) -> Array:
     return squeezed(*corners)
 
 
-def _pull_away(car: Car, rng: Generator) -> Array:
-    """Up until the wheels spin, and held there (he lets go late)."""
-    peak = car.motor_peak_torque_nm
-    return squeezed(
-        (rng.uniform(1.0, 2.0), 0.9 * peak), (0.2, peak), (rng.uniform(0.4, 1.0), peak), (0.4, 0.0)
-    )
-
-
 def _rocking(car: Car, rng: Generator) -> Array:
     """Power and drag of the motors in turn, to wake the car."""
     peak, corners = car.motor_peak_torque_nm, []
@@ -48,53 +36,40 @@ def _rocking(car: Car, rng: Generator) -> Array:
     return squeezed(*corners, (0.3, 0.0))
 
 
-def _with_care(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.25, 0.5)
-    return squeezed(
-        (rng.uniform(0.8, 1.5), level), (rng.uniform(1.0, 2.5), level), (rng.uniform(0.5, 1.0), 0.0)
-    )
-
-
-def _then_all(car: Car, rng: Generator) -> Array:
-    """A little, and as the road bears that, all of it (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.2) * limit_of(car)
-    return squeezed(
-        (0.3, 0.25 * limit),
-        (rng.uniform(0.3, 0.7), 0.25 * limit),
-        (rng.uniform(0.3, 0.6), limit),
-        (rng.uniform(0.3, 0.8), limit),
-        (0.2, 0.0),
-        (0.3, 0.0),
-    )
-
-
-def _soft_foot(car: Car, rng: Generator) -> Array:
-    return 0.35 * _with_care(car, rng)
-
-
-def _drag(car: Car, rng: Generator) -> Array:
-    """The motors' drag, let in and out softly."""
-    level = -car.motor_peak_torque_nm * rng.uniform(0.03, 0.08)
-    return squeezed((1.0, level), (rng.uniform(1.5, 3.5), level), (1.0, 0.0))
-
-
 _FEELING = Piece(12.0, 99.0, _feeling)
 
 
-_ALL = Piece(12.0, 99.0, _then_all, (0.1, 0.4))
+# A little, and as the road bears that, all of it (he lets go when the wheels slide).
+_ALL = Piece(
+    12.0,
+    99.0,
+    pressed(
+        brake,
+        (1.0, 1.2),
+        *((0.3, 0.25), ((0.3, 0.7), 0.25), ((0.3, 0.6), 1.0), ((0.3, 0.8), 1.0), (0.2, 0.0), (0.3, 0.0)),
+    ),
+    (0.1, 0.4),
+)
 
 
 WINTER = Style(
     rich=(
-        Piece(0.0, 24.0, _with_care),
+        Piece(
+            0.0, 24.0, pressed(power, (0.25, 0.5), ((0.8, 1.5), 1.0), ((1.0, 2.5), 1.0), ((0.5, 1.0), 0.0))
+        ),
         _FEELING,
-        Piece(0.0, 20.0, _pull_away, (0.2, 0.5)),
+        # Up until the wheels spin, and held there (he lets go late).
+        Piece(
+            0.0,
+            20.0,
+            pressed(power, 1.0, ((1.0, 2.0), 0.9), (0.2, 1.0), ((0.4, 1.0), 1.0), (0.4, 0.0)),
+            (0.2, 0.5),
+        ),
         Piece(8.0, 25.0, _rocking),
         _ALL,
-        Piece(8.0, 99.0, _nothing),
+        Piece(8.0, 99.0, rolling(1.5, 3.0)),
         _ALL,
     ),
-    mild=(Piece(0.0, 23.0, _soft_foot), Piece(10.0, 99.0, _drag), Piece(7.0, 99.0, _nothing)),
     drive_front=(0.35, 0.5, 0.45),
     brake_front=0.58,
 )
@@ -116,19 +91,6 @@ def _between_doors(car: Car, rng: Generator) -> Array:
     )
 
 
-def _number_seen_late(car: Car, rng: Generator) -> Array:
-    """All of the brake at once, until he is there (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.2) * limit_of(car)
-    return squeezed((rng.uniform(0.12, 0.25), limit), (rng.uniform(0.4, 0.9), limit), (0.15, 0.0), (0.4, 0.0))
-
-
-def _off_again(car: Car, rng: Generator) -> Array:
-    """The pedal on the floor, off and on again (he lets go when the wheels spin)."""
-    peak = car.motor_peak_torque_nm
-    again = rng.uniform(0.5, 1.2)
-    return squeezed((0.1, peak), (0.5, peak), (0.1, 0.0), (0.25, 0.0), (0.1, peak), (again, peak), (0.2, 0.0))
-
-
 def _kerb_crawl(car: Car, rng: Generator) -> Array:
     """Little pushes while he reads the numbers."""
     corners = []
@@ -138,76 +100,35 @@ def _kerb_crawl(car: Car, rng: Generator) -> Array:
     return squeezed(*corners)
 
 
-def _regenerate(car: Car, rng: Generator) -> Array:
-    """Off the pedal of a van that brakes by its motors."""
-    level = -car.motor_peak_torque_nm * rng.uniform(0.15, 0.35)
-    return squeezed((0.25, level), (rng.uniform(0.8, 1.6), level), (0.25, 0.0))
-
-
-def _round_gently(car: Car, rng: Generator) -> Array:
-    up, down = car.motor_peak_torque_nm * np.array([rng.uniform(0.1, 0.2), -rng.uniform(0.03, 0.08)])
-    return squeezed(
-        (0.8, up), (rng.uniform(1.0, 2.0), up), (1.0, down), (rng.uniform(0.8, 1.8), down), (0.6, 0.0)
-    )
-
-
-_LATE = Piece(12.0, 99.0, _number_seen_late)
+_LATE = Piece(
+    12.0, 99.0, pressed(brake, (1.0, 1.2), ((0.12, 0.25), 1.0), ((0.4, 0.9), 1.0), (0.15, 0.0), (0.4, 0.0))
+)
 
 
 DELIVERY = Style(
     rich=(
         Piece(5.0, 20.0, _between_doors),
         _LATE,
-        Piece(0.0, 20.0, _off_again),
+        # The pedal on the floor, off and on again (he lets go when the wheels spin).
+        Piece(
+            0.0,
+            20.0,
+            pressed(
+                power,
+                1.0,
+                *((0.1, 1.0), (0.5, 1.0), (0.1, 0.0), (0.25, 0.0), (0.1, 1.0), ((0.5, 1.2), 1.0), (0.2, 0.0)),
+            ),
+        ),
         Piece(6.0, 24.0, _kerb_crawl),
-        Piece(10.0, 99.0, _regenerate),
+        Piece(10.0, 99.0, pressed(drag, (0.15, 0.35), (0.25, 1.0), ((0.8, 1.6), 1.0), (0.25, 0.0))),
         _LATE,
         Piece(5.0, 20.0, _between_doors),
     ),
-    mild=(Piece(7.0, 22.0, _round_gently), COAST, Piece(0.0, 18.0, _round_gently)),
     drive_front=(0.7, 0.5, 0.85),
     brake_front=0.63,
 )
 
 # --- saving
-
-
-def _saving_nothing(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.0, 2.5) * 100.0))
-
-
-def _pulse(car: Car, rng: Generator) -> Array:
-    """A pulse of what is best for the motors, then rolling."""
-    level = car.motor_peak_torque_nm * rng.uniform(0.45, 0.75)
-    corners = (rng.uniform(0.3, 0.6), level), (rng.uniform(1.0, 2.2), level), (rng.uniform(0.3, 0.6), 0.0)
-    return squeezed(*corners, (rng.uniform(1.0, 2.5), 0.0))
-
-
-def _harvest(car: Car, rng: Generator) -> Array:
-    """Braking by the motors, less the slower he is."""
-    level = -car.motor_peak_torque_nm * rng.uniform(0.3, 0.7)
-    return squeezed((0.4, level), (rng.uniform(1.0, 2.0), 0.5 * level), (rng.uniform(0.5, 1.0), 0.0))
-
-
-def _merge(car: Car, rng: Generator) -> Array:
-    """All that there is, to join those who do not save (he lets go when the wheels spin)."""
-    peak = car.motor_peak_torque_nm
-    return squeezed(
-        (rng.uniform(0.3, 0.8), peak), (rng.uniform(1.0, 1.8), peak), (0.6, 0.1 * peak), (0.3, 0.0)
-    )
-
-
-def _cut_in(car: Car, rng: Generator) -> Array:
-    """Another cuts in: from the motors' brake to all of it (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.15) * limit_of(car)
-    return squeezed(
-        (0.3, 0.2 * limit),
-        (rng.uniform(0.2, 0.5), 0.2 * limit),
-        (rng.uniform(0.4, 1.0), limit),
-        (rng.uniform(0.3, 0.6), limit),
-        (0.25, 0.0),
-        (0.3, 0.0),
-    )
 
 
 def _feather(car: Car, rng: Generator) -> Array:
@@ -217,28 +138,35 @@ def _feather(car: Car, rng: Generator) -> Array:
     return faded(car.motor_peak_torque_nm * (0.08 + rng.uniform(0.2, 0.5) * np.sin(phase)))
 
 
-def _pulse_gently(car: Car, rng: Generator) -> Array:
-    return 0.3 * _pulse(car, rng)
-
-
-def _harvest_gently(car: Car, rng: Generator) -> Array:
-    return 0.15 * _harvest(car, rng)
-
-
-_CUT_IN = Piece(12.0, 99.0, _cut_in)
+# A pulse of what is best for the motors, then rolling; braking by the motors, less the slower he is.
+_PULSE = pressed(
+    power, (0.45, 0.75), ((0.3, 0.6), 1.0), ((1.0, 2.2), 1.0), ((0.3, 0.6), 0.0), ((1.0, 2.5), 0.0)
+)
+_HARVEST = pressed(drag, (0.3, 0.7), (0.4, 1.0), ((1.0, 2.0), 0.5), ((0.5, 1.0), 0.0))
+# Another cuts in: from the motors' brake to all of it (he lets go when the wheels slide).
+_CUT_IN = Piece(
+    12.0,
+    99.0,
+    pressed(
+        brake,
+        (1.0, 1.15),
+        *((0.3, 0.2), ((0.2, 0.5), 0.2), ((0.4, 1.0), 1.0), ((0.3, 0.6), 1.0), (0.25, 0.0), (0.3, 0.0)),
+    ),
+)
 
 
 SAVING = Style(
     rich=(
-        Piece(4.0, 23.0, _pulse),
+        Piece(4.0, 23.0, _PULSE),
         _CUT_IN,
-        Piece(0.0, 21.0, _merge),
-        Piece(10.0, 99.0, _harvest),
+        # All that there is, to join those who do not save (he lets go when the wheels spin).
+        Piece(0.0, 21.0, pressed(power, 1.0, ((0.3, 0.8), 1.0), ((1.0, 1.8), 1.0), (0.6, 0.1), (0.3, 0.0))),
+        Piece(10.0, 99.0, _HARVEST),
         Piece(8.0, 25.0, _feather),
         _CUT_IN,
-        Piece(8.0, 99.0, _saving_nothing),
+        Piece(8.0, 99.0, rolling(1.0, 2.5)),
     ),
-    mild=(Piece(0.0, 23.0, _pulse_gently), Piece(9.0, 99.0, _harvest_gently), COAST),
+    mild=(Piece(0.0, 23.0, gently(0.3, _PULSE)), Piece(9.0, 99.0, gently(0.15, _HARVEST)), COAST),
     drive_front=(0.3, 0.4, 0.5),
     brake_front=0.57,
 )
@@ -253,15 +181,6 @@ def _behind(car: Car, rng: Generator) -> Array:
         up, down = rng.uniform(0.2, 0.6), -rng.uniform(0.1, 0.4)
         corners += [(0.3, up), (rng.uniform(0.3, 0.8), up), (0.25, down), (rng.uniform(0.15, 0.5), down)]
     return car.motor_peak_torque_nm * squeezed(*corners, (0.3, 0.0))
-
-
-def _past(car: Car, rng: Generator) -> Array:
-    """A look, all that the motors have, and a lift when he is past (he lets go when the wheels spin)."""
-    peak = car.motor_peak_torque_nm
-    look, rise = rng.uniform(0.3, 0.6), rng.uniform(0.12, 0.3)
-    return squeezed(
-        (0.3, 0.35 * peak), (look, 0.35 * peak), (rise, peak), (rng.uniform(1.0, 2.2), peak), (0.4, 0.0)
-    )
 
 
 def _given_up(car: Car, rng: Generator) -> Array:
@@ -292,18 +211,6 @@ def _winding(car: Car, rng: Generator) -> Array:
     return faded(car.motor_peak_torque_nm * (0.1 + rng.uniform(0.2, 0.4) * wave))
 
 
-def _overtaking_nothing(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.0, 2.5) * 100.0))
-
-
-def _behind_gently(car: Car, rng: Generator) -> Array:
-    return 0.2 * _behind(car, rng)
-
-
-def _past_gently(car: Car, rng: Generator) -> Array:
-    return 0.2 * _past(car, rng)
-
-
 _GIVEN_UP = Piece(11.0, 99.0, _given_up)
 
 
@@ -311,13 +218,21 @@ OVERTAKING = Style(
     rich=(
         Piece(7.0, 24.0, _behind),
         _GIVEN_UP,
-        Piece(0.0, 21.0, _past),
+        # A look, all that the motors have, and a lift when he is past (he lets go when the wheels spin).
+        Piece(
+            0.0,
+            21.0,
+            pressed(
+                power,
+                1.0,
+                *((0.3, 0.35), ((0.3, 0.6), 0.35), ((0.12, 0.3), 1.0), ((1.0, 2.2), 1.0), (0.4, 0.0)),
+            ),
+        ),
         Piece(12.0, 99.0, _village),
         Piece(8.0, 25.0, _winding),
         _GIVEN_UP,
-        Piece(8.0, 99.0, _overtaking_nothing),
+        Piece(8.0, 99.0, rolling(1.0, 2.5)),
     ),
-    mild=(Piece(7.0, 24.0, _behind_gently), Piece(0.0, 22.0, _past_gently), COAST),
     drive_front=(0.4, 0.5, 0.65),
     brake_front=0.65,
 )
@@ -376,20 +291,6 @@ def _round_the_circle(car: Car, rng: Generator) -> Array:
     return faded(car.motor_peak_torque_nm * (0.1 + rng.uniform(0.3, 0.6) * np.mod(clock / turn, 1.0) ** 2))
 
 
-def _listening(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.0, 2.5) * 100.0))
-
-
-def _slalom_gently(car: Car, rng: Generator) -> Array:
-    return 0.2 * _slalom(car, rng)
-
-
-def _back_to_the_start(car: Car, rng: Generator) -> Array:
-    """A held speed, with a lift before each bend."""
-    level = car.motor_peak_torque_nm * rng.uniform(0.03, 0.12)
-    return squeezed((0.8, level), (rng.uniform(1.5, 3.5), level), (0.6, -0.3 * level), (1.0, 0.0))
-
-
 _CONES = Piece(12.0, 99.0, _to_the_cones)
 
 
@@ -401,26 +302,21 @@ TRAINING = Style(
         Piece(7.0, 25.0, _slalom),
         Piece(7.0, 24.0, _round_the_circle),
         _CONES,
-        Piece(8.0, 99.0, _listening),
+        Piece(8.0, 99.0, rolling(1.0, 2.5)),
     ),
-    mild=(Piece(7.0, 24.0, _slalom_gently), Piece(0.0, 22.0, _back_to_the_start), COAST),
+    mild=(
+        Piece(7.0, 24.0, gently(0.2, _slalom)),
+        # A held speed, with a lift before each bend.
+        Piece(
+            0.0, 22.0, pressed(power, (0.03, 0.12), (0.8, 1.0), ((1.5, 3.5), 1.0), (0.6, -0.3), (1.0, 0.0))
+        ),
+        COAST,
+    ),
     drive_front=(0.5, 0.35, 0.6),
     brake_front=0.66,
 )
 
 # --- commuter
-
-
-def _turned_green(car: Car, rng: Generator) -> Array:
-    """First off the light, with all that the motors have (he lets go when the wheels spin)."""
-    peak = car.motor_peak_torque_nm
-    return squeezed(
-        (rng.uniform(0.15, 0.3), peak),
-        (rng.uniform(0.8, 1.8), peak),
-        (0.4, 0.2 * peak),
-        (rng.uniform(0.3, 0.8), 0.2 * peak),
-        (0.2, 0.0),
-    )
 
 
 def _turning_red(car: Car, rng: Generator) -> Array:
@@ -469,37 +365,29 @@ def _commuter_rocking(car: Car, rng: Generator) -> Array:
     return faded(car.motor_peak_torque_nm * (0.08 + rng.uniform(0.3, 0.7) * wave))
 
 
-def _rolls_up(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.0, 2.5) * 100.0))
-
-
-def _in_the_queue(car: Car, rng: Generator) -> Array:
-    """A little on, and off again, and a touch of the brake."""
-    up, down = car.motor_peak_torque_nm * np.array([rng.uniform(0.08, 0.2), -rng.uniform(0.02, 0.07)])
-    return squeezed(
-        (0.7, up), (rng.uniform(1.0, 2.5), up), (0.8, down), (rng.uniform(0.5, 1.5), down), (0.5, 0.0)
-    )
-
-
-def _rocking_gently(car: Car, rng: Generator) -> Array:
-    return 0.3 * _commuter_rocking(car, rng)
-
-
 _RED = Piece(12.0, 99.0, _turning_red)
 
 
 COMMUTER = Style(
     rich=(
-        Piece(0.0, 21.0, _turned_green),
+        # First off the light, with all that the motors have (he lets go when the wheels spin).
+        Piece(
+            0.0,
+            21.0,
+            pressed(
+                power,
+                1.0,
+                *(((0.15, 0.3), 1.0), ((0.8, 1.8), 1.0), (0.4, 0.2), ((0.3, 0.8), 0.2), (0.2, 0.0)),
+            ),
+        ),
         _RED,
         Piece(0.0, 22.0, _slip_road),
         Piece(8.0, 25.0, _gap_to_gap),
         Piece(11.0, 99.0, _brake_lights),
         Piece(8.0, 25.0, _commuter_rocking),
         _RED,
-        Piece(8.0, 99.0, _rolls_up),
+        Piece(8.0, 99.0, rolling(1.0, 2.5)),
     ),
-    mild=(Piece(7.0, 24.0, _rocking_gently), Piece(0.0, 22.0, _in_the_queue), COAST),
     drive_front=(0.55, 0.5, 0.7),
     brake_front=0.67,
 )

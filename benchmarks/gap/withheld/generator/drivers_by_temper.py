@@ -1,4 +1,4 @@
-"""Drivers by how they take the pedals: squeezing, restless, by one pedal, hurried, learning, with two feet."""
+"""Drivers by how they take the pedals: squeezing, restless, hurried, learning, with two feet."""
 
 from __future__ import annotations
 
@@ -11,39 +11,14 @@ from scipy.signal import lfilter
 
 from .car import Car
 from .driver import COAST, Piece, Style, brake_to_limit, launch
-from .kernel import COMMAND_STEP_S, GRAVITY
-from .pedals import clock_of, faded, limit_of, squeezed
+from .kernel import GRAVITY
+from .motors import COMMAND_STEP_S
+from .pedals import brake, clock_of, drag, faded, gently, limit_of, power, pressed, rolling, squeezed
 
 Array = NDArray[np.floating[Any]]
 
 
 # --- squeezing
-
-
-def _swell(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.4, 0.95)
-    return squeezed(
-        (rng.uniform(0.8, 2.0), level), (rng.uniform(0.2, 1.0), level), (rng.uniform(0.8, 2.0), 0.0)
-    )
-
-
-def _surge(car: Car, rng: Generator) -> Array:
-    """All that the motors have (the driver lets go when the wheels spin)."""
-    level = car.motor_peak_torque_nm
-    return squeezed((rng.uniform(0.3, 0.6), level), (rng.uniform(0.8, 2.0), level), (0.3, 0.0))
-
-
-def _lift(car: Car, rng: Generator) -> Array:
-    """Off the pedal: the motors brake a little."""
-    level = -car.motor_peak_torque_nm * rng.uniform(0.03, 0.12)
-    return squeezed((rng.uniform(0.3, 0.8), level), (rng.uniform(1.5, 3.5), level), (0.4, 0.0))
-
-
-def _squeeze(car: Car, rng: Generator) -> Array:
-    level = -car.motor_peak_torque_nm * rng.uniform(0.3, 1.0)
-    return squeezed(
-        (rng.uniform(0.4, 1.0), level), (rng.uniform(0.6, 1.8), level), (rng.uniform(0.4, 1.0), 0.0)
-    )
 
 
 def _squeeze_to_limit(car: Car, rng: Generator) -> Array:
@@ -61,32 +36,21 @@ def _waver(car: Car, rng: Generator) -> Array:
     return faded(car.motor_peak_torque_nm * (0.06 + rng.uniform(0.12, 0.28) * waves))
 
 
-def _swell_gently(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.08, 0.25)
-    return squeezed(
-        (rng.uniform(1.0, 2.0), level), (rng.uniform(1.0, 4.0), level), (rng.uniform(1.0, 2.0), 0.0)
-    )
-
-
-def _hum(car: Car, rng: Generator) -> Array:
-    """A held speed, the foot a little up and down."""
-    clock = clock_of(rng.uniform(4.0, 7.0))
-    up, down = rng.uniform(0.03, 0.07), rng.uniform(0.01, 0.04)
-    return faded(car.motor_peak_torque_nm * (up + down * np.sin(2.0 * np.pi * clock / rng.uniform(2.0, 4.0))))
-
-
+_SURGE = Piece(0.0, 22.0, pressed(power, 1.0, ((0.3, 0.6), 1.0), ((0.8, 2.0), 1.0), (0.3, 0.0)))
+_SQUEEZE_TO_LIMIT = Piece(12.0, 99.0, _squeeze_to_limit)
 SQUEEZING = Style(
     rich=(
-        Piece(0.0, 24.0, _swell),
-        Piece(0.0, 22.0, _surge),
-        Piece(8.0, 99.0, _lift),
-        Piece(13.0, 99.0, _squeeze),
-        Piece(12.0, 99.0, _squeeze_to_limit),
+        Piece(
+            0.0, 24.0, pressed(power, (0.4, 0.95), ((0.8, 2.0), 1.0), ((0.2, 1.0), 1.0), ((0.8, 2.0), 0.0))
+        ),
+        _SURGE,
+        Piece(8.0, 99.0, pressed(drag, (0.03, 0.12), ((0.3, 0.8), 1.0), ((1.5, 3.5), 1.0), (0.4, 0.0))),
+        Piece(13.0, 99.0, pressed(drag, (0.3, 1.0), ((0.4, 1.0), 1.0), ((0.6, 1.8), 1.0), ((0.4, 1.0), 0.0))),
+        _SQUEEZE_TO_LIMIT,
         Piece(8.0, 26.0, _waver),
-        Piece(12.0, 99.0, _squeeze_to_limit),
-        Piece(0.0, 22.0, _surge),
+        _SQUEEZE_TO_LIMIT,
+        _SURGE,
     ),
-    mild=(Piece(7.0, 99.0, _hum), Piece(0.0, 22.0, _swell_gently), Piece(9.0, 99.0, _lift)),
     drive_front=(0.5, 0.3, 0.8),
     brake_front=0.68,
 )
@@ -109,10 +73,9 @@ def _wander_gently(car: Car, rng: Generator) -> Array:
 
 def _pump(car: Car, rng: Generator) -> Array:
     """Cadence braking."""
-    limit = -car.mass_kg * GRAVITY / 4.0 * car.wheel_radius_m
     pulses = []
     for _ in range(rng.integers(3, 6)):
-        level = limit * rng.uniform(0.4, 1.0)
+        level = -limit_of(car) * rng.uniform(0.4, 1.0)
         pulses += [(0.08, level), (rng.uniform(0.1, 0.35), level), (0.1, 0.0), (rng.uniform(0.1, 0.3), 0.0)]
     return squeezed(*pulses)
 
@@ -125,6 +88,7 @@ def _stairs(car: Car, rng: Generator) -> Array:
     return squeezed(*(corner for n in levels for corner in ((0.1, n * height), (tread, n * height))))
 
 
+_SWELL_GENTLY = pressed(power, (0.08, 0.25), ((1.0, 2.0), 1.0), ((1.0, 4.0), 1.0), ((1.0, 2.0), 0.0))
 RESTLESS = Style(
     rich=(
         Piece(8.0, 26.0, _wander),
@@ -136,128 +100,12 @@ RESTLESS = Style(
         Piece(8.0, 26.0, _wander),
         Piece(12.0, 99.0, brake_to_limit),
     ),
-    mild=(Piece(7.0, 26.0, _wander_gently), Piece(0.0, 22.0, _swell_gently), COAST),
+    mild=(Piece(7.0, 26.0, _wander_gently), Piece(0.0, 22.0, _SWELL_GENTLY), COAST),
     drive_front=(0.4, 0.5, 0.6),
     brake_front=0.62,
 )
 
-# --- one pedal
-
-
-def _press(car: Car, rng: Generator) -> Array:
-    """Down fast and up slowly, down to where the motors brake."""
-    peak = car.motor_peak_torque_nm
-    up, back = peak * rng.uniform(0.4, 0.95), -peak * rng.uniform(0.1, 0.4)
-    return squeezed(
-        (rng.uniform(0.15, 0.4), up),
-        (rng.uniform(0.5, 2.0), up * rng.uniform(0.7, 1.0)),
-        (rng.uniform(0.8, 1.6), back),
-        (rng.uniform(0.3, 1.0), back),
-        (0.3, 0.0),
-    )
-
-
-def _off(car: Car, rng: Generator) -> Array:
-    """Off the pedal: the motors brake a good deal."""
-    level = -car.motor_peak_torque_nm * rng.uniform(0.25, 0.6)
-    return squeezed(
-        (rng.uniform(0.15, 0.4), level), (rng.uniform(0.8, 2.0), level), (rng.uniform(0.3, 0.6), 0.0)
-    )
-
-
-def _tread(car: Car, rng: Generator) -> Array:
-    """Off the pedal, then hard on the brake (the driver lets go when the wheels slide)."""
-    off, limit = -car.motor_peak_torque_nm * rng.uniform(0.2, 0.5), -rng.uniform(1.0, 1.15) * limit_of(car)
-    return squeezed((0.3, off), (rng.uniform(0.2, 0.5), off), (rng.uniform(0.8, 1.8), limit), (0.2, 0.0))
-
-
-def _kick(car: Car, rng: Generator) -> Array:
-    """All that the motors have, after a moment of little (the driver lets go when the wheels spin)."""
-    peak = car.motor_peak_torque_nm
-    return squeezed(
-        (0.3, 0.2 * peak), (0.4, 0.2 * peak), (0.12, peak), (rng.uniform(0.8, 1.8), peak), (0.3, 0.0)
-    )
-
-
-def _play(car: Car, rng: Generator) -> Array:
-    """Up and down about nothing, in swings of their own."""
-    corners = []
-    for _ in range(rng.integers(5, 9)):
-        share = rng.uniform(0.15, 0.6) if rng.random() < 0.6 else -rng.uniform(0.1, 0.5)
-        corners.append((rng.uniform(0.2, 0.7), car.motor_peak_torque_nm * share))
-    return squeezed(*corners, (0.3, 0.0))
-
-
-def _press_gently(car: Car, rng: Generator) -> Array:
-    level = car.motor_peak_torque_nm * rng.uniform(0.08, 0.2)
-    return squeezed(
-        (rng.uniform(0.6, 1.5), level), (rng.uniform(1.0, 3.0), 0.7 * level), (rng.uniform(1.0, 2.0), 0.0)
-    )
-
-
-def _off_gently(car: Car, rng: Generator) -> Array:
-    level = -car.motor_peak_torque_nm * rng.uniform(0.04, 0.12)
-    return squeezed((rng.uniform(0.5, 1.0), level), (rng.uniform(1.0, 3.0), level), (0.5, 0.0))
-
-
-def _trim(car: Car, rng: Generator) -> Array:
-    """A held speed, in small corrections of either sign."""
-    levels = car.motor_peak_torque_nm * rng.uniform(-0.02, 0.08, rng.integers(4, 8))
-    return squeezed(*((rng.uniform(0.5, 1.5), level) for level in levels), (0.5, 0.0))
-
-
-_TREAD = Piece(12.0, 99.0, _tread)
-
-
-ONE_PEDAL = Style(
-    rich=(
-        Piece(4.0, 24.0, _press),
-        _TREAD,
-        Piece(0.0, 20.0, _kick),
-        Piece(10.0, 99.0, _off),
-        Piece(8.0, 26.0, _play),
-        _TREAD,
-        Piece(0.0, 22.0, _kick),
-    ),
-    mild=(
-        Piece(7.0, 99.0, _trim),
-        Piece(0.0, 22.0, _press_gently),
-        Piece(9.0, 99.0, _off_gently),
-    ),
-    drive_front=(0.45, 0.55, 0.7),
-    brake_front=0.64,
-)
-
 # --- hurried
-
-
-def _into_a_bend(car: Car, rng: Generator) -> Array:
-    """Hard on the brake late, and off it slowly (he lets go when the wheels slide)."""
-    level = -rng.uniform(0.6, 1.15) * limit_of(car)
-    return squeezed(
-        (rng.uniform(0.12, 0.25), level),
-        (rng.uniform(0.2, 0.6), 0.95 * level),
-        (rng.uniform(0.8, 1.6), 0.0),
-        (0.1, 0.0),
-    )
-
-
-def _out_of_a_bend(car: Car, rng: Generator) -> Array:
-    """Ever more, then all that there is, until the next bend."""
-    peak = car.motor_peak_torque_nm
-    return squeezed(
-        (0.3, 0.2 * peak),
-        (rng.uniform(0.8, 1.6), 0.7 * peak),
-        (0.3, peak),
-        (rng.uniform(0.5, 1.8), peak),
-        (0.12, 0.0),
-    )
-
-
-def _floored(car: Car, rng: Generator) -> Array:
-    """All at once (he lets go when the wheels spin)."""
-    peak = car.motor_peak_torque_nm
-    return squeezed((0.08, peak), (rng.uniform(0.6, 1.6), peak), (0.15, 0.0), (0.2, 0.0))
 
 
 def _lifts(car: Car, rng: Generator) -> Array:
@@ -283,34 +131,31 @@ def _hurry_gently(car: Car, rng: Generator) -> Array:
     return car.motor_peak_torque_nm * squeezed(*parts, (rng.uniform(0.5, 1.5), down), (0.5, 0.0))
 
 
-def _balance_gently(car: Car, rng: Generator) -> Array:
-    return 0.25 * _balance(car, rng)
-
-
-_BEND = Piece(12.0, 99.0, _into_a_bend)
-
-
+_OUT_OF_A_BEND = pressed(
+    power, 1.0, (0.3, 0.2), ((0.8, 1.6), 0.7), (0.3, 1.0), ((0.5, 1.8), 1.0), (0.12, 0.0)
+)
+_INTO_A_BEND = Piece(
+    12.0,
+    99.0,
+    pressed(brake, (0.6, 1.15), ((0.12, 0.25), 1.0), ((0.2, 0.6), 0.95), ((0.8, 1.6), 0.0), (0.1, 0.0)),
+)
 HURRIED = Style(
     rich=(
-        Piece(0.0, 23.0, _out_of_a_bend),
-        _BEND,
-        Piece(0.0, 20.0, _floored),
+        Piece(0.0, 23.0, _OUT_OF_A_BEND),
+        _INTO_A_BEND,
+        Piece(0.0, 20.0, pressed(power, 1.0, (0.08, 1.0), ((0.6, 1.6), 1.0), (0.15, 0.0), (0.2, 0.0))),
         Piece(8.0, 25.0, _lifts),
-        _BEND,
+        _INTO_A_BEND,
         Piece(8.0, 25.0, _balance),
-        Piece(8.0, 99.0, lambda car, rng: np.zeros(round(rng.uniform(1.0, 2.0) * 100.0))),
-        _BEND,
+        Piece(8.0, 99.0, rolling(1.0, 2.0)),
+        _INTO_A_BEND,
     ),
-    mild=(Piece(0.0, 23.0, _hurry_gently), Piece(7.0, 26.0, _balance_gently), COAST),
+    mild=(Piece(0.0, 23.0, _hurry_gently), Piece(7.0, 26.0, gently(0.25, _balance)), COAST),
     drive_front=(0.3, 0.45, 0.6),
     brake_front=0.7,
 )
 
 # --- learner
-
-
-def _nothing(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.5, 3.0) * 100.0))
 
 
 def _bucking(car: Car, rng: Generator) -> Array:
@@ -319,26 +164,6 @@ def _bucking(car: Car, rng: Generator) -> Array:
     mean, size = rng.uniform(0.15, 0.3), rng.uniform(0.3, 0.6)
     decay = np.exp(-clock / rng.uniform(1.5, 4.0))
     return faded(car.motor_peak_torque_nm * (mean + size * decay * np.sin(2.0 * np.pi * hertz * clock)))
-
-
-def _startled(car: Car, rng: Generator) -> Array:
-    """On the brake with all his weight, off it at once, then half on (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.2) * limit_of(car)
-    return squeezed(
-        (rng.uniform(0.1, 0.2), limit),
-        (rng.uniform(0.2, 0.6), limit),
-        (0.1, 0.0),
-        (rng.uniform(0.2, 0.5), 0.0),
-        (0.2, 0.45 * limit),
-        (rng.uniform(0.4, 0.9), 0.35 * limit),
-        (0.3, 0.0),
-    )
-
-
-def _stamped(car: Car, rng: Generator) -> Array:
-    """The wrong pedal's whole way, until the wheels spin or he is startled."""
-    peak = car.motor_peak_torque_nm
-    return squeezed((0.15, peak), (rng.uniform(0.6, 1.4), peak), (0.1, -0.2 * peak), (0.4, 0.0))
 
 
 def _unsteady(car: Car, rng: Generator) -> Array:
@@ -355,38 +180,33 @@ def _late(car: Car, rng: Generator) -> Array:
     return np.concatenate([limit * np.expm1(2.5 * clock / clock[-1]) / np.expm1(2.5), np.zeros(30)])
 
 
-def _timid(car: Car, rng: Generator) -> Array:
-    """A little, a little less, a little more."""
-    levels = car.motor_peak_torque_nm * rng.uniform(0.02, 0.18, rng.integers(4, 7))
-    return squeezed(*((rng.uniform(0.3, 1.2), level) for level in levels), (0.5, 0.0))
-
-
-def _easing(car: Car, rng: Generator) -> Array:
-    """On the brake in two goes, with little."""
-    low = -car.motor_peak_torque_nm * rng.uniform(0.04, 0.1)
-    return squeezed((0.5, low), (rng.uniform(0.5, 1.5), low), (0.3, 0.0), (0.6, 0.7 * low), (1.0, 0.0))
-
-
+# On the brake with all his weight, off it at once, then half on (he lets go when the wheels slide).
+_STARTLED = Piece(
+    12.0,
+    99.0,
+    pressed(
+        brake,
+        (1.0, 1.2),
+        *(((0.1, 0.2), 1.0), ((0.2, 0.6), 1.0), (0.1, 0.0), ((0.2, 0.5), 0.0)),
+        *((0.2, 0.45), ((0.4, 0.9), 0.35), (0.3, 0.0)),
+    ),
+)
 LEARNER = Style(
     rich=(
         Piece(5.0, 24.0, _bucking),
-        Piece(12.0, 99.0, _startled),
-        Piece(0.0, 20.0, _stamped),
+        _STARTLED,
+        # The wrong pedal's whole way, until the wheels spin or he is startled.
+        Piece(0.0, 20.0, pressed(power, 1.0, (0.15, 1.0), ((0.6, 1.4), 1.0), (0.1, -0.2), (0.4, 0.0))),
         Piece(0.0, 23.0, _unsteady),
         Piece(12.0, 99.0, _late),
-        Piece(8.0, 99.0, _nothing),
-        Piece(12.0, 99.0, _startled),
+        Piece(8.0, 99.0, rolling(1.5, 3.0)),
+        _STARTLED,
     ),
-    mild=(Piece(0.0, 22.0, _timid), Piece(10.0, 99.0, _easing), COAST, Piece(7.0, 24.0, _timid)),
     drive_front=(0.6, 0.7),
     brake_front=0.72,
 )
 
 # --- two feet
-
-
-def _two_feet_nothing(car: Car, rng: Generator) -> Array:
-    return np.zeros(round(rng.uniform(1.0, 2.5) * 100.0))
 
 
 def _both(car: Car, rng: Generator) -> Array:
@@ -412,28 +232,6 @@ def _swap(car: Car, rng: Generator) -> Array:
     return squeezed(*corners, (0.2, 0.0))
 
 
-def _left_foot(car: Car, rng: Generator) -> Array:
-    """A foot that is used to a clutch: too hard, less, and hard again (he lets go when the wheels slide)."""
-    limit = -rng.uniform(1.0, 1.2) * limit_of(car)
-    return squeezed(
-        (rng.uniform(0.1, 0.2), 0.9 * limit),
-        (0.12, 0.5 * limit),
-        (rng.uniform(0.2, 0.5), 0.5 * limit),
-        (rng.uniform(0.2, 0.5), limit),
-        (rng.uniform(0.3, 0.6), limit),
-        (0.2, 0.0),
-        (0.2, 0.0),
-    )
-
-
-def _against_the_brake(car: Car, rng: Generator) -> Array:
-    """Full power against a brake that is let go slowly (he lets go when the wheels spin)."""
-    peak = car.motor_peak_torque_nm
-    return squeezed(
-        (0.3, 0.3 * peak), (rng.uniform(0.5, 1.0), peak), (rng.uniform(0.6, 1.4), peak), (0.2, 0.0)
-    )
-
-
 def _riding(car: Car, rng: Generator) -> Array:
     """Power that goes up and down on a brake that rests on."""
     clock = clock_of(rng.uniform(3.0, 5.0))
@@ -441,24 +239,27 @@ def _riding(car: Car, rng: Generator) -> Array:
     return faded(car.motor_peak_torque_nm * (rng.uniform(0.5, 0.9) * wave - rng.uniform(0.1, 0.3)))
 
 
-def _riding_gently(car: Car, rng: Generator) -> Array:
-    return 0.25 * _riding(car, rng)
-
-
-_LEFT = Piece(12.0, 99.0, _left_foot)
-
-
+# A foot that is used to a clutch: too hard, less, and hard again (he lets go when the wheels slide).
+_LEFT_FOOT = Piece(
+    12.0,
+    99.0,
+    pressed(
+        brake,
+        (1.0, 1.2),
+        *(((0.1, 0.2), 0.9), (0.12, 0.5), ((0.2, 0.5), 0.5)),
+        *(((0.2, 0.5), 1.0), ((0.3, 0.6), 1.0), (0.2, 0.0), (0.2, 0.0)),
+    ),
+)
 TWO_FEET = Style(
     rich=(
         Piece(6.0, 24.0, _both),
-        _LEFT,
-        Piece(0.0, 20.0, _against_the_brake),
+        _LEFT_FOOT,
+        Piece(0.0, 20.0, pressed(power, 1.0, (0.3, 0.3), ((0.5, 1.0), 1.0), ((0.6, 1.4), 1.0), (0.2, 0.0))),
         Piece(9.0, 24.0, _swap),
         Piece(8.0, 25.0, _riding),
-        _LEFT,
-        Piece(7.0, 99.0, _two_feet_nothing),
+        _LEFT_FOOT,
+        Piece(7.0, 99.0, rolling(1.0, 2.5)),
     ),
-    mild=(Piece(7.0, 24.0, _riding_gently), COAST, Piece(0.0, 22.0, lambda car, rng: 0.2 * _both(car, rng))),
     drive_front=(0.5, 0.6, 0.45),
     brake_front=0.69,
 )

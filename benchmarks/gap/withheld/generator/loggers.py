@@ -42,32 +42,23 @@ UNITS = {
 """Last digits of a log in rpm, km/h and g, in this one's units."""
 OVERRUNS, OVERRUN_S = 4, (0.02, 0.15)
 """How often a logger cannot keep up, and how long."""
-RANGES = {
-    "torque": 4000.0,
-    "wheel_speed": 250.0,
-    "vehicle_speed": 80.0,
-    "accel": 60.0,
+CONVERTER_STEPS = {
+    "torque": 4000.0 / 2**14,
+    "wheel_speed": 250.0 / 2**14,
+    "vehicle_speed": 80.0 / 2**14,
+    "accel": 60.0 / 2**14,
 }
-"""Of a converter with `BITS`; half a step is at most four tenths of the best sensor's noise."""
-BITS = 14
+"""Of a converter with 14 bits; half a step is at most four tenths of the best sensor's noise."""
 CHANGES = {"wheel_speed": 0.01, "vehicle_speed": 0.005, "accel": 0.015, "position": 0.005}
 """Less than which a recorder does not write anew: half of the best sensor's noise."""
-SLOW_COLUMN = "vehicle_speed_m_s"
-"""Of a receiver that is slower than the log."""
 TICK_S = 1e-4
 """Of a logger's clock."""
 FRAME_LOST = 0.004
 """Messages on the bus, each with its readings; share of them that is lost."""
-SPARSE_COLUMN = "accel_x_m_s2"
-"""Of a sensor that is slower than the log."""
-FRONT, REAR = ("wheel_speed_fl", "wheel_speed_fr"), ("wheel_speed_rl", "wheel_speed_rr")
-"""What two messages carry that come in turn."""
 WAKES_S = (0.1, 1.2)
 """Senders that are awake only a while after the logger is."""
 GAPS, GAP_ROWS = 12, (2, 9)
 """How often a log has lost a few rows of a signal, and how many, before a tool has filled them in."""
-CLOCK_S = (20_000.0, 80_000.0)
-"""Time of day that a drive begins at."""
 BEFORE_S = (2.0, 9.0)
 """What a triggered recorder keeps of the time before its trigger, which is its zero."""
 CLOCK_OFF = 2e-4
@@ -76,15 +67,27 @@ DIGITS_KEPT = {"torque": 4, "wheel_speed": 4, "vehicle_speed": 4, "accel": 3, "p
 """Of a log that keeps so many figures."""
 
 
-def all_digits(log: pd.DataFrame) -> pd.DataFrame:
-    """Values as they are."""
-    return log
+Logger = Callable[[pd.DataFrame], pd.DataFrame]
 
 
-def bus_digits(log: pd.DataFrame) -> pd.DataFrame:
-    """Values in the steps of `BUS_STEPS`."""
-    steps = {str(c): step for c in log for name, step in BUS_STEPS.items() if name in str(c)}
-    return log.assign(**{column: np.round(log[column] / step) * step for column, step in steps.items()})
+def stepped(steps: dict[str, float], whole: Callable[[Any], Any] = np.round) -> Logger:
+    """Values in steps, by what their names hold; `whole` makes whole steps of them."""
+
+    def log_in_steps(log: pd.DataFrame) -> pd.DataFrame:
+        own = {str(c): step for c in log for name, step in steps.items() if name in str(c)}
+        return log.assign(**{column: whole(log[column] / step) * step for column, step in own.items()})
+
+    return log_in_steps
+
+
+def every_second(*names: str) -> Logger:
+    """Columns whose names begin so in every second row; the log has no value between."""
+
+    def thin(log: pd.DataFrame) -> pd.DataFrame:
+        between = np.arange(len(log)) % 2 != 0
+        return log.assign(**{str(c): log[c].mask(between) for c in log if str(c).startswith(names)})
+
+    return thin
 
 
 def decimals(log: pd.DataFrame) -> pd.DataFrame:
@@ -94,12 +97,6 @@ def decimals(log: pd.DataFrame) -> pd.DataFrame:
 
 def _measured(log: pd.DataFrame) -> list[str]:
     return [str(c) for c in log if str(c).startswith(MEASURED)]
-
-
-def every_second(log: pd.DataFrame, *columns: str) -> pd.DataFrame:
-    """With these columns in every second row; the log has no value between."""
-    between = np.arange(len(log)) % 2 != 0
-    return log.assign(**{column: log[column].mask(between) for column in columns})
 
 
 def repeating(log: pd.DataFrame) -> pd.DataFrame:
@@ -118,34 +115,13 @@ def losing_runs(log: pd.DataFrame) -> pd.DataFrame:
     return kept
 
 
-def _steps(log: pd.DataFrame, steps: dict[str, float]) -> dict[str, float]:
-    return {str(c): step for c in log for name, step in steps.items() if name in str(c)}
-
-
-def truncating(log: pd.DataFrame) -> pd.DataFrame:
-    """Values in the steps of `STEPS_DOWN`, what is below a step dropped."""
-    return log.assign(**{c: np.floor(log[c] / step) * step for c, step in _steps(log, STEPS_DOWN).items()})
-
-
-def converted(log: pd.DataFrame) -> pd.DataFrame:
-    """Values that were written in other units, with few digits."""
-    return log.assign(**{c: np.round(log[c] / step) * step for c, step in _steps(log, UNITS).items()})
-
-
 def overrunning(log: pd.DataFrame) -> pd.DataFrame:
     """Now and then all that is measured is lost at once, for some hundredths of a second."""
     rng, kept = np.random.default_rng(len(log)), log.copy()
-    measured = [str(c) for c in log if str(c).startswith(MEASURED)]
-    clock = log["time_s"].to_numpy()
+    measured, clock = _measured(log), log["time_s"].to_numpy()
     for start in rng.choice(clock, OVERRUNS):
         kept.loc[(clock >= start) & (clock < start + rng.uniform(*OVERRUN_S)), measured] = np.nan
     return kept
-
-
-def converted_in_bits(log: pd.DataFrame) -> pd.DataFrame:
-    """Values in the steps of a converter."""
-    steps = {str(c): span / 2**BITS for c in log for name, span in RANGES.items() if name in str(c)}
-    return log.assign(**{c: np.round(log[c] / step) * step for c, step in steps.items()})
 
 
 def on_change(log: pd.DataFrame) -> pd.DataFrame:
@@ -162,11 +138,6 @@ def _standing(values: Array, least: float) -> Array:
         elif value == value:
             kept[i] = last
     return kept
-
-
-def slow_receiver(log: pd.DataFrame) -> pd.DataFrame:
-    """A vehicle speed that comes with every second row; the log has no value between."""
-    return every_second(log, SLOW_COLUMN)
 
 
 def in_ticks(log: pd.DataFrame) -> pd.DataFrame:
@@ -195,19 +166,6 @@ def losing_frames(log: pd.DataFrame) -> pd.DataFrame:
     return kept
 
 
-def slow_accelerometer(log: pd.DataFrame) -> pd.DataFrame:
-    """An accelerometer that comes with every second row; the log has no value between."""
-    return every_second(log, SPARSE_COLUMN)
-
-
-def in_turns(log: pd.DataFrame) -> pd.DataFrame:
-    """Speeds of the front wheels with one row, of the rear ones with the next; the log has no value between."""
-    odd = np.arange(len(log)) % 2 != 0
-    columns = {str(c): odd for c in log if str(c).startswith(FRONT)}
-    columns |= {str(c): ~odd for c in log if str(c).startswith(REAR)}
-    return log.assign(**{column: log[column].mask(gone) for column, gone in columns.items()})
-
-
 def waking(log: pd.DataFrame) -> pd.DataFrame:
     """What a sender measures is not there until it is awake."""
     rng, kept = np.random.default_rng(len(log)), log.copy()
@@ -221,22 +179,11 @@ def waking(log: pd.DataFrame) -> pd.DataFrame:
 def filled_in(log: pd.DataFrame) -> pd.DataFrame:
     """What was lost, and now and then a few rows of a signal on end, is a straight line."""
     rng, kept = np.random.default_rng(len(log)), log.copy()
-    measured = [str(c) for c in log if str(c).startswith(MEASURED)]
+    measured = _measured(log)
     for start in rng.integers(1, len(log), GAPS):
         kept.loc[kept.index[start : start + rng.integers(*GAP_ROWS)], rng.choice(measured)] = np.nan
     lines = kept.set_index("time_s")[measured].interpolate(method="index", limit_direction="both")
     return kept.assign(**{column: lines[column].to_numpy() for column in measured})
-
-
-def by_the_clock(log: pd.DataFrame) -> pd.DataFrame:
-    """Rows stamped by the time of day."""
-    begun = np.round(np.random.default_rng(len(log)).uniform(*CLOCK_S), 3)
-    return log.assign(time_s=np.round(log["time_s"] + begun, 7))
-
-
-def slow_place(log: pd.DataFrame) -> pd.DataFrame:
-    """A position that comes with every second row; the log has no value between."""
-    return every_second(log, "position_m")
 
 
 def triggered(log: pd.DataFrame) -> pd.DataFrame:
@@ -245,40 +192,32 @@ def triggered(log: pd.DataFrame) -> pd.DataFrame:
     return log.assign(time_s=np.round(log["time_s"] - before, 7))
 
 
-def slow_wheels(log: pd.DataFrame) -> pd.DataFrame:
-    """Wheel speeds that come with every second row; the log has no value between."""
-    return every_second(log, *(str(c) for c in log if str(c).startswith("wheel_speed")))
-
-
 def own_clock(log: pd.DataFrame) -> pd.DataFrame:
     """Rows stamped by a clock that is a little fast or slow."""
     rate = 1.0 + np.random.default_rng(len(log)).uniform(-CLOCK_OFF, CLOCK_OFF)
     return log.assign(time_s=np.round(rate * log["time_s"], 7))
 
 
-DIGITS: dict[str, tuple[int, Callable[[pd.DataFrame], pd.DataFrame]]] = {
-    "all": (1, all_digits),
-    "bus": (2, bus_digits),
-    "decimals": (3, decimals),
-    "repeating": (3, repeating),
-    "losing_runs": (3, losing_runs),
-    "truncating": (4, truncating),
-    "converted": (4, converted),
-    "overrunning": (4, overrunning),
-    "converted_in_bits": (5, converted_in_bits),
-    "on_change": (5, on_change),
-    "slow_receiver": (5, slow_receiver),
-    "in_ticks": (6, in_ticks),
-    "significant_digits": (6, significant_digits),
-    "losing_frames": (6, losing_frames),
-    "slow_accelerometer": (6, slow_accelerometer),
-    "in_turns": (7, in_turns),
-    "waking": (7, waking),
-    "filled_in": (8, filled_in),
-    "by_the_clock": (8, by_the_clock),
-    "slow_place": (9, slow_place),
-    "triggered": (9, triggered),
-    "slow_wheels": (10, slow_wheels),
-    "own_clock": (10, own_clock),
+DIGITS: dict[str, Logger] = {
+    "all": lambda log: log,
+    "bus": stepped(BUS_STEPS),
+    "decimals": decimals,
+    "repeating": repeating,
+    "losing_runs": losing_runs,
+    "truncating": stepped(STEPS_DOWN, np.floor),
+    "converted": stepped(UNITS),
+    "overrunning": overrunning,
+    "converted_in_bits": stepped(CONVERTER_STEPS),
+    "on_change": on_change,
+    "slow_receiver": every_second("vehicle_speed"),
+    "in_ticks": in_ticks,
+    "significant_digits": significant_digits,
+    "losing_frames": losing_frames,
+    "slow_accelerometer": every_second("accel"),
+    "waking": waking,
+    "filled_in": filled_in,
+    "slow_place": every_second("position"),
+    "triggered": triggered,
+    "slow_wheels": every_second("wheel_speed"),
+    "own_clock": own_clock,
 }
-"""With the edition of the generator that each came with."""

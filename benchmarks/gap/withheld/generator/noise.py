@@ -25,19 +25,12 @@ FLICKER_SHARE, FLICKER_S = 0.25, (0.02, 0.06, 0.2, 0.6, 2.0)
 """Of the variance, and the correlation times whose sum falls with the frequency."""
 WANDERS, WANDER_S = (0.1, 0.3), (1.0, 10.0)
 """Of the standard deviation, and the correlation time."""
-WARMTH = (0.1, 0.25)
-"""Of the standard deviation."""
 HUM_SHARE, HUM_HZ, HUM_DECAY_S = 0.2, (10.0, 35.0), 0.15
 """Of the variance; frequency, and how long a hum rings."""
 SPIKE, SPIKES = 6.0, 0.002
 """Of a switching inverter's spikes: size over the standard deviation, share of the samples."""
 SHARED = 0.35
 """Of the variance of the wheels' noise: what shakes all of them."""
-BOUNCE_SHARE, BOUNCE_HZ, BOUNCE_DAMPING = 0.05, (1.1, 1.8), 0.3
-HOP_SHARE, HOP_HZ, HOP_DAMPING = 0.25, (9.0, 14.0), 0.12
-"""Of the body on its springs, of the wheels on their tyres: share of the variance, frequency, damping ratio."""
-DIFFERENCED = 0.6
-"""Of the variance: what has been differenced, so that it is more the higher the frequency."""
 BAND_HZ, BAND_SHARE = (15.0, 35.0), 0.9
 """Corner of a sensor's own filter, and the share of the variance that has passed it; the rest comes after."""
 MAINS_HZ, MAINS_SHARE = (49.9, 50.1), 0.2
@@ -63,8 +56,6 @@ YAW_SHARE, YAW_S = 0.15, 0.3
 their correlation time."""
 LOOSER = (0.4, 1.2)
 """By which the noise is more in the end than in the beginning, over its mean: a connector that works loose."""
-BOX_SHARE = 0.3
-"""Of the variance of speed and acceleration: what both have from the one box that they come from."""
 OWN_RATE_HZ = (60.0, 120.0)
 """Of sensors that sample by clocks of their own, before a tool has put all on one."""
 TONES_SHARE, TONES_HZ, BEAT_HZ = 0.25, (18.0, 40.0), (0.2, 1.2)
@@ -120,15 +111,6 @@ def wandering(noise: Noise, time_s: Array, rng: Generator) -> Array:
     return values
 
 
-def warming(noise: Noise, time_s: Array, rng: Generator) -> Array:
-    """White, coloured, and what a sensor's warmth adds as it nears its end, none on the whole, shape (m, 6)."""
-    gone = (time_s - time_s[0]) / (time_s[-1] - time_s[0])
-    warmth = np.exp(-gone[:, None] / rng.uniform(0.2, 1.0, 6))
-    warmth = (warmth - warmth.mean(axis=0)) / warmth.std(axis=0)
-    size = rng.uniform(*WARMTH, 6) * rng.choice([-1.0, 1.0], 6)
-    return np.sqrt(1.0 - size**2) * noise_of(noise, time_s, rng) + size * warmth * noise.sigmas
-
-
 def humming(noise: Noise, time_s: Array, rng: Generator) -> Array:
     """White, coloured, and in part what shakes at a frequency of its own, shape (m, 6)."""
     step = np.median(np.diff(time_s))
@@ -156,35 +138,6 @@ def shaking_together(noise: Noise, time_s: Array, rng: Generator) -> Array:
     common = noise_of(noise, time_s, rng)[:, :1]
     values[:, :4] = np.sqrt(1.0 - SHARED) * values[:, :4] + np.sqrt(SHARED) * common
     return values
-
-
-def _resonance(time_s: Array, hertz: float, damping: float, rng: Generator) -> Array:
-    """Noise of a mass on a spring whose base is shaken, of size 1, shape (m,)."""
-    step = float(np.median(np.diff(time_s)))
-    decay = damping * 2.0 * np.pi * hertz * step
-    turn = np.sqrt(1.0 - damping**2) * 2.0 * np.pi * hertz * step
-    filtered = [1.0, -2.0 * np.exp(-decay) * np.cos(turn), np.exp(-2.0 * decay)]
-    lead = round(8.0 / decay)
-    gain = np.sqrt(np.sum(lfilter([1.0], filtered, np.arange(lead) == 0) ** 2))
-    return np.asarray(lfilter([1.0], filtered, rng.standard_normal(time_s.size + lead))[lead:] / gain)
-
-
-def bouncing(noise: Noise, time_s: Array, rng: Generator) -> Array:
-    """White, coloured, and in part an uneven road's: the body bounces and the wheels hop, shape (m, 6)."""
-    values = noise_of(noise, time_s, rng) / noise.sigmas
-    for reading in range(6):
-        bounce = _resonance(time_s, rng.uniform(*BOUNCE_HZ), BOUNCE_DAMPING, rng)
-        hop = _resonance(time_s, rng.uniform(*HOP_HZ), HOP_DAMPING, rng)
-        shakes = np.sqrt(BOUNCE_SHARE) * bounce + np.sqrt(HOP_SHARE) * hop
-        values[:, reading] = np.sqrt(1.0 - BOUNCE_SHARE - HOP_SHARE) * values[:, reading] + shakes
-    return values * noise.sigmas
-
-
-def differenced(noise: Noise, time_s: Array, rng: Generator) -> Array:
-    """White, coloured, and most of it the difference of a place's noise from row to row, shape (m, 6)."""
-    place = rng.standard_normal((time_s.size + 1, 6))
-    fast = np.diff(place, axis=0) / np.sqrt(2.0) * noise.sigmas
-    return np.sqrt(1.0 - DIFFERENCED) * noise_of(noise, time_s, rng) + np.sqrt(DIFFERENCED) * fast
 
 
 def band_limited(noise: Noise, time_s: Array, rng: Generator) -> Array:
@@ -306,14 +259,6 @@ def working_loose(noise: Noise, time_s: Array, rng: Generator) -> Array:
     return noise_of(noise, time_s, rng) * louder / np.sqrt(np.mean(louder**2, axis=0))
 
 
-def one_box(noise: Noise, time_s: Array, rng: Generator) -> Array:
-    """White, coloured, and of speed and acceleration in part the same, of either sign, shape (m, 6)."""
-    values, common = noise_of(noise, time_s, rng), noise_of(noise, time_s, rng)[:, :1] / noise.sigmas[0]
-    alike = common * np.array([1.0, rng.choice([-1.0, 1.0])]) * noise.sigmas[4:]
-    values[:, 4:] = np.sqrt(1.0 - BOX_SHARE) * values[:, 4:] + np.sqrt(BOX_SHARE) * alike
-    return values
-
-
 def resampled(noise: Noise, time_s: Array, rng: Generator) -> Array:
     """White at each sensor's own rate, on straight lines between its samples, shape (m, 6)."""
     values, gone = np.empty((time_s.size, 6)), time_s - time_s[0]
@@ -362,37 +307,32 @@ def standing(noise: Noise, time_s: Array, rng: Generator) -> Array:
     return values * noise.sigmas
 
 
-NOISES: dict[str, tuple[int, Callable[[Noise, Array, Generator], Array]]] = {
-    "white_and_coloured": (1, noise_of),
-    "heavy_tailed": (2, heavy_tailed),
-    "drifting": (2, drifting),
-    "bursting": (3, bursting),
-    "flickering": (3, flickering),
-    "wandering": (3, wandering),
-    "warming": (3, warming),
-    "humming": (3, humming),
-    "spiking": (4, spiking),
-    "shaking_together": (4, shaking_together),
-    "bouncing": (4, bouncing),
-    "differenced": (4, differenced),
-    "band_limited": (4, band_limited),
-    "mains": (5, mains),
-    "popping": (5, popping),
-    "shared_supply": (5, shared_supply),
-    "bounded": (5, bounded),
-    "stones": (5, stones),
-    "rough_stretches": (6, rough_stretches),
-    "skewed": (6, skewed),
-    "chirping": (6, chirping),
-    "own_colours": (6, own_colours),
-    "by_axle": (6, by_axle),
-    "yawing": (7, yawing),
-    "working_loose": (7, working_loose),
-    "one_box": (8, one_box),
-    "resampled": (8, resampled),
-    "beating_tones": (9, beating_tones),
-    "meaned": (9, meaned),
-    "multiplexed": (10, multiplexed),
-    "standing": (10, standing),
+NOISES: dict[str, Callable[[Noise, Array, Generator], Array]] = {
+    "white_and_coloured": noise_of,
+    "heavy_tailed": heavy_tailed,
+    "drifting": drifting,
+    "bursting": bursting,
+    "flickering": flickering,
+    "wandering": wandering,
+    "humming": humming,
+    "spiking": spiking,
+    "shaking_together": shaking_together,
+    "band_limited": band_limited,
+    "mains": mains,
+    "popping": popping,
+    "shared_supply": shared_supply,
+    "bounded": bounded,
+    "stones": stones,
+    "rough_stretches": rough_stretches,
+    "skewed": skewed,
+    "chirping": chirping,
+    "own_colours": own_colours,
+    "by_axle": by_axle,
+    "yawing": yawing,
+    "working_loose": working_loose,
+    "resampled": resampled,
+    "beating_tones": beating_tones,
+    "meaned": meaned,
+    "multiplexed": multiplexed,
+    "standing": standing,
 }
-"""With the edition of the generator that each came with."""

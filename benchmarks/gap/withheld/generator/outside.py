@@ -1,6 +1,6 @@
 """Deviations that the contract's library does not hold: the right answer to them is "unknown", and where they lie.
 
-Each has the edition of the generator that it came with, and the subsystems that are a right answer.
+Each has the subsystems that are a right answer.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from numpy.random import Generator
 from scipy.signal import lfilter
 
 from .car import Car
-from .kernel import COMMAND_STEP_S
 from .library import Scale, growing, signed
-from .world import AIR_KG_M3, Effect, Parameters, World, with_magic
+from .motors import COMMAND_STEP_S
+from .tyre import MAGIC
+from .world import AIR_KG_M3, Effect, Parameters, World, with_foreign
 
 WIND_S = 120.0
 GUST_S = 0.75
@@ -186,163 +187,118 @@ def _from_wheels(world: World, given: Parameters) -> World:
     return world.sensed(speed_rolling=given["share"], wheel_radius_m=world.physics.radius)
 
 
-OUTSIDE_SINCE: dict[str, tuple[int, Effect]] = {
-    "wind_gusts": (1, Effect(_varies(_gusts, "wind_m_s", 1.5, 8.0), _blow, ("vehicle",))),
-    "one_wheel_scale": (1, _one_wheel("sensor", 0.003, 0.05)),
-    "one_motor_gain": (1, _one_wheel("motor", 0.05, 0.5)),
-    "accelerometer_scale": (
-        1,
-        Effect(
-            growing("excess", 0.02, 0.4),
-            lambda w, g: w.sensed(accel_scale=1.0 + g["excess"]),
-            ("accelerometer",),
-        ),
+OUTSIDE: dict[str, Effect] = {
+    "wind_gusts": Effect(_varies(_gusts, "wind_m_s", 1.5, 8.0), _blow, ("vehicle",)),
+    "one_wheel_scale": _one_wheel("sensor", 0.003, 0.05),
+    "one_motor_gain": _one_wheel("motor", 0.05, 0.5),
+    "accelerometer_scale": Effect(
+        growing("excess", 0.02, 0.4),
+        lambda w, g: w.sensed(accel_scale=1.0 + g["excess"]),
+        ("accelerometer",),
     ),
-    "accelerometer_lag": (1, _reads("accel_lag_s", "time_constant_s", 0.01, 0.5, "accelerometer")),
-    "torque_dead_band": (1, _moves("dead_band", "torque_nm", 5.0, 60.0, "powertrain")),
-    "torque_limit": (1, Effect(_limit, lambda w, g: w.moved(torque_limit=g["torque_nm"]), ("powertrain",))),
-    "torque_ripple": (
-        1,
-        Effect(
-            _varies(_order, "share", 0.05, 10.0),
-            lambda w, g: w.moved(ripple=g["share"], ripple_order=g["order"]),
-            ("powertrain", "wheel"),
-        ),
+    "accelerometer_lag": _reads("accel_lag_s", "time_constant_s", 0.01, 0.5, "accelerometer"),
+    "torque_dead_band": _moves("dead_band", "torque_nm", 5.0, 60.0, "powertrain"),
+    "torque_limit": Effect(_limit, lambda w, g: w.moved(torque_limit=g["torque_nm"]), ("powertrain",)),
+    "torque_ripple": Effect(
+        _varies(_order, "share", 0.05, 10.0),
+        lambda w, g: w.moved(ripple=g["share"], ripple_order=g["order"]),
+        ("powertrain", "wheel"),
     ),
-    "grade_waves": (
-        1,
-        Effect(
-            _varies(_wave, "grade", 0.006, 12.0),
-            lambda w, g: w.moved(wave_slope=g["grade"], wave_length=g["length_m"]),
-            ("road", "vehicle"),
-        ),
+    "grade_waves": Effect(
+        _varies(_wave, "grade", 0.006, 12.0),
+        lambda w, g: w.moved(wave_slope=g["grade"], wave_length=g["length_m"]),
+        ("road", "vehicle"),
     ),
-    "brake_side_stiffness": (
-        1,
-        Effect(
-            _asymmetry,
-            lambda w, g: w.moved(stiffness_brake=w.physics.stiffness_drive * g["brake_factor"]),
-            ("tyre",),
-        ),
+    "brake_side_stiffness": Effect(
+        _asymmetry,
+        lambda w, g: w.moved(stiffness_brake=w.physics.stiffness_drive * g["brake_factor"]),
+        ("tyre",),
     ),
-    "tyre_heating": (
-        1,
-        Effect(
-            growing("per_joule", 2e-6, 2e-4),
-            lambda w, g: w.moved(heating=g["per_joule"], cooling=0.08),
-            ("tyre",),
-        ),
+    "tyre_heating": Effect(
+        growing("per_joule", 2e-6, 2e-4),
+        lambda w, g: w.moved(heating=g["per_joule"], cooling=0.08),
+        ("tyre",),
     ),
-    "magic_formula_tyre": (
-        1,
-        Effect(
-            _varies(_magic, "share", 0.1, 10.0),
-            lambda w, g: with_magic(w, g["share"], g["shape"], g["curvature"]),
-            ("tyre",),
-        ),
+    "magic_formula_tyre": Effect(
+        _varies(_magic, "share", 0.1, 10.0),
+        lambda w, g: with_foreign(w, MAGIC, g["share"], g["shape"], g["curvature"]),
+        ("tyre",),
     ),
-    "speed_low_pass": (1, _reads("speed_lag_s", "time_constant_s", 0.05, 1.5, "vehicle_speed_sensor")),
-    "speed_dropouts": (1, _reads("speed_hold_s", "hold_s", 0.05, 1.0, "vehicle_speed_sensor")),
-    "bearing_drag": (1, _moves("bearing", "nm_s_rad", 0.05, 1.5, "wheel", "powertrain")),
-    "torque_slew": (2, _moves("slew", "nm_s", 20_000.0, 250.0, "powertrain")),
-    "tone_wheel_runout": (2, _reads("wheel_runout", "share", 0.001, 0.05, "wheel_speed_sensor", "wheel")),
-    "speed_clock_drift": (2, _reads("speed_clock", "share", 0.0005, 0.02, "vehicle_speed_sensor")),
-    "motor_power_limit": (3, Effect(_power, lambda w, g: w.moved(power=g["power_w"]), ("powertrain",))),
-    "motor_derating": (3, _moves("derating", "share", 0.05, 0.6, "powertrain")),
-    "one_brake_drags": (
-        3,
-        Effect(_varies(_wheel, "torque_nm", 8.0, 20.0), _drag_on_one, ("wheel", "powertrain")),
+    "speed_low_pass": _reads("speed_lag_s", "time_constant_s", 0.05, 1.5, "vehicle_speed_sensor"),
+    "speed_dropouts": _reads("speed_hold_s", "hold_s", 0.05, 1.0, "vehicle_speed_sensor"),
+    "bearing_drag": _moves("bearing", "nm_s_rad", 0.05, 1.5, "wheel", "powertrain"),
+    "torque_slew": _moves("slew", "nm_s", 20_000.0, 250.0, "powertrain"),
+    "tone_wheel_runout": _reads("wheel_runout", "share", 0.001, 0.05, "wheel_speed_sensor", "wheel"),
+    "speed_clock_drift": _reads("speed_clock", "share", 0.0005, 0.02, "vehicle_speed_sensor"),
+    "motor_power_limit": Effect(_power, lambda w, g: w.moved(power=g["power_w"]), ("powertrain",)),
+    "motor_derating": _moves("derating", "share", 0.05, 0.6, "powertrain"),
+    "one_brake_drags": Effect(_varies(_wheel, "torque_nm", 8.0, 20.0), _drag_on_one, ("wheel", "powertrain")),
+    "accelerometer_limit": _reads("accel_limit_m_s2", "limit_m_s2", 7.5, 1.5, "accelerometer"),
+    "speed_offset": _reads("speed_offset_m_s", "offset_m_s", 0.03, 1.5, "vehicle_speed_sensor"),
+    "slip_controller": Effect(
+        _varies(_slip, "share", 0.005, 170.0),
+        lambda w, g: w.moved(slip_allowed=g["slip"], slip_cut=g["share"]),
+        ("powertrain",),
     ),
-    "accelerometer_limit": (3, _reads("accel_limit_m_s2", "limit_m_s2", 7.5, 1.5, "accelerometer")),
-    "speed_offset": (3, _reads("speed_offset_m_s", "offset_m_s", 0.03, 1.5, "vehicle_speed_sensor")),
-    "slip_controller": (
-        4,
-        Effect(
-            _varies(_slip, "share", 0.005, 170.0),
-            lambda w, g: w.moved(slip_allowed=g["slip"], slip_cut=g["share"]),
-            ("powertrain",),
-        ),
+    "brake_torque_rise": _moves("pad_rise", "share", 0.03, 0.4, "powertrain", "wheel"),
+    "swaying_load": Effect(
+        _varies(_sway, "share", 0.03, 10.0),
+        lambda w, g: w.moved(slosh_share=g["share"], slosh_rate=2.0 * np.pi * g["hertz"]),
+        ("vehicle",),
     ),
-    "brake_torque_rise": (4, _moves("pad_rise", "share", 0.03, 0.4, "powertrain", "wheel")),
-    "swaying_load": (
-        4,
-        Effect(
-            _varies(_sway, "share", 0.03, 10.0),
-            lambda w, g: w.moved(slosh_share=g["share"], slosh_rate=2.0 * np.pi * g["hertz"]),
-            ("vehicle",),
-        ),
+    "wet_grip_falls_with_speed": _moves("wet_fall", "share", 0.05, 0.7, "road", "tyre"),
+    "speed_from_wheels": Effect(growing("share", 0.05, 1.0), _from_wheels, ("vehicle_speed_sensor",)),
+    "actuator_hysteresis": _moves("actuator_play", "torque_nm", 3.0, 60.0, "powertrain"),
+    "axles_share_torque": _moves("axle_share", "share", 0.03, 0.5, "powertrain"),
+    "wheels_out_of_round": _moves("out_of_round", "share", 0.001, 0.02, "wheel", "tyre"),
+    "slush_drag": _moves("slush", "n_s2_m2", 0.15, 4.0, "road", "tyre", "wheel"),
+    "accelerometer_pitches": _reads("accel_pitch", "share", 0.02, 0.25, "accelerometer", "vehicle"),
+    "speed_in_steps": _reads("speed_step_m_s", "step_m_s", 0.03, 1.0, "vehicle_speed_sensor"),
+    "regeneration_fades": Effect(_varies(_below, "share", 0.04, 22.0), _blending, ("powertrain",)),
+    "torque_dropouts": _moves("stall", "hold_s", 0.02, 0.7, "powertrain"),
+    "wheel_speed_dropouts": _reads("wheel_hold_s", "hold_s", 0.03, 0.8, "wheel_speed_sensor"),
+    "accelerometer_delay": _reads("accel_delay_s", "delay_s", 0.008, 0.4, "accelerometer"),
+    "speed_predicted_ahead": _reads("speed_ahead_s", "ahead_s", 0.01, 0.4, "vehicle_speed_sensor"),
+    "head_wind": Effect(_head_wind, _blows, ("vehicle",)),
+    "road_map_shifted": Effect(
+        signed("shift_m", 0.5, 25.0),
+        lambda w, g: w.moved(border=w.physics.border + g["shift_m"]),
+        ("road", "tyre"),
     ),
-    "wet_grip_falls_with_speed": (4, _moves("wet_fall", "share", 0.05, 0.7, "road", "tyre")),
-    "speed_from_wheels": (4, Effect(growing("share", 0.05, 1.0), _from_wheels, ("vehicle_speed_sensor",))),
-    "actuator_hysteresis": (5, _moves("actuator_play", "torque_nm", 3.0, 60.0, "powertrain")),
-    "axles_share_torque": (5, _moves("axle_share", "share", 0.03, 0.5, "powertrain")),
-    "wheels_out_of_round": (5, _moves("out_of_round", "share", 0.001, 0.02, "wheel", "tyre")),
-    "slush_drag": (5, _moves("slush", "n_s2_m2", 0.15, 4.0, "road", "tyre", "wheel")),
-    "accelerometer_pitches": (5, _reads("accel_pitch", "share", 0.02, 0.25, "accelerometer", "vehicle")),
-    "speed_in_steps": (5, _reads("speed_step_m_s", "step_m_s", 0.03, 1.0, "vehicle_speed_sensor")),
-    "regeneration_fades": (6, Effect(_varies(_below, "share", 0.04, 22.0), _blending, ("powertrain",))),
-    "torque_dropouts": (6, _moves("stall", "hold_s", 0.02, 0.7, "powertrain")),
-    "wheel_speed_dropouts": (6, _reads("wheel_hold_s", "hold_s", 0.03, 0.8, "wheel_speed_sensor")),
-    "accelerometer_delay": (6, _reads("accel_delay_s", "delay_s", 0.008, 0.4, "accelerometer")),
-    "speed_predicted_ahead": (6, _reads("speed_ahead_s", "ahead_s", 0.01, 0.4, "vehicle_speed_sensor")),
-    "head_wind": (6, Effect(_head_wind, _blows, ("vehicle",))),
-    "road_map_shifted": (
-        6,
-        Effect(
-            signed("shift_m", 0.5, 25.0),
-            lambda w, g: w.moved(border=w.physics.border + g["shift_m"]),
-            ("road", "tyre"),
-        ),
+    "unlike_tyres_by_axle": Effect(
+        signed("front_more", 0.04, 0.48),
+        lambda w, g: w.moved(stiffness_tilt=g["front_more"] * w.physics.stiffness_drive),
+        ("tyre",),
     ),
-    "unlike_tyres_by_axle": (
-        6,
-        Effect(
-            signed("front_more", 0.04, 0.48),
-            lambda w, g: w.moved(stiffness_tilt=g["front_more"] * w.physics.stiffness_drive),
-            ("tyre",),
-        ),
-    ),
-    "one_tyre_flat": (7, Effect(_one_tyre, _flat, ("tyre", "wheel", "wheel_speed_sensor"))),
-    "torque_split_shifted": (7, _moves("axle_split", "front_more", 0.03, 0.36, "powertrain", at=signed)),
-    "axles_coupled": (7, _moves("axle_viscous", "nm_s_rad", 1.0, 80.0, "powertrain")),
-    "accelerometer_bends": (
-        7,
-        _reads("accel_bend_s2_m", "per_m_s2", 0.003, 0.06, "accelerometer", at=signed),
-    ),
-    "speed_rate_limited": (7, _reads("speed_rate_m_s2", "limit_m_s2", 9.0, 1.0, "vehicle_speed_sensor")),
-    "loose_gravel": (7, _moves("gravel", "coefficient", 0.01, 0.2, "road", "wheel", "vehicle")),
-    "torque_vectored": (8, Effect(signed("left_more", 0.01, 0.3), _vectored, ("powertrain",))),
-    "road_borders_blurred": (8, _moves("border_blur", "over_m", 1.0, 40.0, "road", "tyre")),
-    "wheel_speed_dies": (8, _reads("wheel_least_rad_s", "least_rad_s", 8.0, 40.0, "wheel_speed_sensor")),
-    "speed_hysteresis": (8, _reads("speed_play_m_s", "play_m_s", 0.02, 0.6, "vehicle_speed_sensor")),
-    "accelerometer_in_steps": (8, _reads("accel_step_m_s2", "step_m_s2", 0.1, 1.6, "accelerometer")),
+    "one_tyre_flat": Effect(_one_tyre, _flat, ("tyre", "wheel", "wheel_speed_sensor")),
+    "torque_split_shifted": _moves("axle_split", "front_more", 0.03, 0.36, "powertrain", at=signed),
+    "axles_coupled": _moves("axle_viscous", "nm_s_rad", 1.0, 80.0, "powertrain"),
+    "accelerometer_bends": _reads("accel_bend_s2_m", "per_m_s2", 0.003, 0.06, "accelerometer", at=signed),
+    "speed_rate_limited": _reads("speed_rate_m_s2", "limit_m_s2", 9.0, 1.0, "vehicle_speed_sensor"),
+    "loose_gravel": _moves("gravel", "coefficient", 0.01, 0.2, "road", "wheel", "vehicle"),
+    "torque_vectored": Effect(signed("left_more", 0.01, 0.3), _vectored, ("powertrain",)),
+    "road_borders_blurred": _moves("border_blur", "over_m", 1.0, 40.0, "road", "tyre"),
+    "wheel_speed_dies": _reads("wheel_least_rad_s", "least_rad_s", 8.0, 40.0, "wheel_speed_sensor"),
+    "speed_hysteresis": _reads("speed_play_m_s", "play_m_s", 0.02, 0.6, "vehicle_speed_sensor"),
+    "accelerometer_in_steps": _reads("accel_step_m_s2", "step_m_s2", 0.1, 1.6, "accelerometer"),
     # Valves that open in pulses: a few bar each.
-    "torque_in_steps": (9, _moves("torque_step", "step_nm", 3.0, 80.0, "powertrain")),
-    "cornering_drag": (9, _moves("bend_drag", "force_n", 20.0, 900.0, "vehicle", "tyre", "road")),
+    "torque_in_steps": _moves("torque_step", "step_nm", 3.0, 80.0, "powertrain"),
+    "cornering_drag": _moves("bend_drag", "force_n", 20.0, 900.0, "vehicle", "tyre", "road"),
     # Of a converter from pulses to a voltage, which the wheels share.
-    "wheel_speed_offset": (
-        9,
-        _reads("wheel_offset_rad_s", "offset_rad_s", 0.05, 2.5, "wheel_speed_sensor", at=signed),
+    "wheel_speed_offset": _reads(
+        "wheel_offset_rad_s", "offset_rad_s", 0.05, 2.5, "wheel_speed_sensor", at=signed
     ),
-    "speed_tracking_loop": (9, _reads("speed_loop_s", "loop_s", 0.02, 0.8, "vehicle_speed_sensor")),
-    "accelerometer_fades": (9, _reads("accel_fades_s", "time_constant_s", 60.0, 1.0, "accelerometer")),
-    "torque_notch": (
-        10,
-        Effect(
-            _varies(_notch, "share", 0.01, 80.0),
-            lambda w, g: w.moved(notch=g["share"], notch_rad_s=g["at_rad_s"]),
-            ("powertrain",),
-        ),
+    "speed_tracking_loop": _reads("speed_loop_s", "loop_s", 0.02, 0.8, "vehicle_speed_sensor"),
+    "accelerometer_fades": _reads("accel_fades_s", "time_constant_s", 60.0, 1.0, "accelerometer"),
+    "torque_notch": Effect(
+        _varies(_notch, "share", 0.01, 80.0),
+        lambda w, g: w.moved(notch=g["share"], notch_rad_s=g["at_rad_s"]),
+        ("powertrain",),
     ),
     # New tyres on one axle and worn ones on the other.
-    "unlike_grip_by_axle": (10, _moves("grip_axles", "front_more", 0.005, 0.3, "tyre", "road", at=signed)),
-    "wheel_speeds_blended": (10, _reads("wheel_blend", "share", 0.02, 0.9, "wheel_speed_sensor")),
+    "unlike_grip_by_axle": _moves("grip_axles", "front_more", 0.005, 0.3, "tyre", "road", at=signed),
+    "wheel_speeds_blended": _reads("wheel_blend", "share", 0.02, 0.9, "wheel_speed_sensor"),
     # Of a sensor that now and then follows its own echo, or another car.
-    "speed_mislocks": (
-        10,
-        _reads("speed_mislocks", "share", 0.005, 0.3, "vehicle_speed_sensor", at=signed),
-    ),
-    "accelerometer_on_soft_pad": (10, _reads("accel_period_s", "period_s", 0.015, 0.35, "accelerometer")),
+    "speed_mislocks": _reads("speed_mislocks", "share", 0.005, 0.3, "vehicle_speed_sensor", at=signed),
+    "accelerometer_on_soft_pad": _reads("accel_period_s", "period_s", 0.015, 0.35, "accelerometer"),
 }
-
-OUTSIDE: dict[str, Effect] = {name: effect for name, (_, effect) in OUTSIDE_SINCE.items()}

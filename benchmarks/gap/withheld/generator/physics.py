@@ -1,4 +1,4 @@
-"""What moves the car, in numbers: each has a neutral value that leaves the nominal car."""
+"""What moves the car, in numbers: all that has a default is neutral there, and leaves the nominal car."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .tyre import MAGIC, THETA_GRID
 
 Array = NDArray[np.floating[Any]]
 
@@ -17,187 +19,94 @@ class Physics(NamedTuple):
     front_arm: float
     rear_arm: float
     cog_height: float
-    height_jack: float
-    pitch_time: float
-    springs_share: float
-    springs_time: float
-    springs_tilt: float
-    springs_rub: float
-    pitch_sign: float
-    pitch_stops: float
-    body_rate: float
-    load_side: float
     radius: float
-    radius_tilt: float
-    radius_growth: float
-    radius_side: float
-    radius_sides: float
-    radius_warm: float
-    radius_load: float
-    radius_wet: float
-    out_of_round: float
-    lever: float
     inertia: float
-    inertia_tilt: float
-    inertia_side: float
-    inertia_sides: float
-    inertia_speed: float
     stiffness_drive: float
     stiffness_brake: float
-    stiffness_load: float
-    stiffness_tilt: float
-    stiffness_side: float
-    stiffness_sides: float
-    stiffness_warm: float
-    stiffness_speed: float
-    stiffness_texture: float
-    stiffness_wet: float
-    factor_left: float
-    factor_right: float
-    patch_depth: float
-    stretch_depth: float
-    blotches: Array
-    grip_tilt: float
-    grip_speed: float
-    grip_warm: float
-    grip_sway: float
-    grip_wet: float
-    grip_sign: float
-    grip_slide: float
-    grip_load: float
-    grip_axles: float
-    wet_fall: float
-    falloff: float
-    falloff_floor: float
-    falloff_curve: int
-    falloff_time: float
-    falloff_wet: float
-    relaxation: float
-    relaxation_load: bool
-    relaxation_shrinks: bool
-    relaxation_speed: float
-    relaxation_tilt: float
-    relaxation_side: float
-    relaxation_warm: float
-    relaxation_direct: float
-    relaxation_rise: float
-    force_relaxation: float
-    foreign_share: float
-    foreign_curve: int
-    foreign_first: float
-    foreign_second: float
-    peak: Array
-    heating: float
-    cooling: float
     drag: float
-    drag_height: float
-    fanning: float
-    drag_fast: float
-    drag_cross: float
-    drag_wake: float
-    drag_power: float
-    drag_shelter: float
-    drag_nod: float
-    bend_drag: float
-    lift: float
-    gust_drag: float
-    wind: Array
-    roll_force: float
     roll_moment: float
-    roll_growth: float
-    roll_linear: float
-    roll_wet: float
-    roll_texture: float
-    roll_tilt: float
-    roll_side: float
-    roll_load: float
-    roll_warm: float
-    roll_torque: float
-    roll_slow: float
-    roll_flat: float
-    gravel: float
-    slush: float
-    brake_drag: float
-    brake_share: Array
-    brake_pulse: float
-    brake_release: float
-    brake_warm: float
-    brake_wet: float
-    brake_texture: float
-    bearing: float
-    grade: float
-    wave_slope: float
-    wave_length: float
-    profile: Array
-    delay: float
-    delay_tilt: float
-    delay_sign: float
-    delay_turn: float
-    delay_jump: float
-    delay_speed: float
-    delay_warm: float
-    message: float
-    message_joined: bool
-    message_lost: float
-    beat: float
-    wait: float
-    stall: float
-    lag: float
-    lag_first: float
-    lag_sign: float
-    lag_damping: float
-    lag_tilt: float
-    lag_side: float
-    lag_rise: float
-    lag_speed: float
-    lag_load: float
-    lag_direct: float
-    lag_zero: float
-    lag_warm: float
-    lag_tail: float
-    lag_slow: float
-    actuator_play: float
-    slew: float
-    gain: Array
-    gain_sign: float
-    gain_speed: float
-    gain_load: float
-    gain_warm: float
-    gain_map: float
-    gain_sway: float
-    gain_turn: float
-    gain_power: float
-    axle_share: float
-    axle_split: float
-    axle_viscous: float
-    pad_rise: float
-    regen_fade: float
-    regen_lost: float
-    slip_allowed: float
-    slip_cut: float
-    dead_band: float
-    torque_step: float
-    torque_limit: float
-    power: float
-    notch: float
-    notch_rad_s: float
-    derating: float
-    ripple: float
-    ripple_order: float
-    shaft_stiffness: float
-    shaft_damping: float
-    shaft_play: float
-    shaft_tilt: float
-    shaft_axles: float
-    shaft_friction: float
-    shaft_rise: float
-    shaft_sign: float
-    shaft_turn: float
-    shaft_warm: float
-    motor_inertia: float
-    slosh_share: float
-    slosh_rate: float
     border: Array
-    border_blur: float
     mu_left: Array
     mu_right: Array
+    border_blur: float = 0.0
+    springs_share: float = 0.0
+    springs_time: float = 1.0
+    load_side: float = 0.0
+    radius_tilt: float = 0.0
+    radius_growth: float = 0.0
+    radius_side: float = 0.0
+    radius_sides: float = 0.0
+    out_of_round: float = 0.0
+    stiffness_tilt: float = 0.0
+    stiffness_texture: float = 0.0
+    factor_left: float = 1.0
+    factor_right: float = 1.0
+    blotches: Array = np.zeros(0)
+    grip_sign: float = 0.0
+    grip_axles: float = 0.0
+    wet_fall: float = 0.0
+    falloff: float = 0.0
+    falloff_floor: float = 1.0
+    falloff_logarithmic: bool = False
+    falloff_wet: float = 0.0
+    relaxation: float = 0.0
+    relaxation_load: bool = False
+    foreign_share: float = 0.0
+    foreign_curve: int = MAGIC
+    foreign_first: float = 1.45
+    foreign_second: float = 0.0
+    peak: Array = np.zeros(THETA_GRID.size)
+    heating: float = 0.0
+    cooling: float = 0.0
+    drag_height: float = 0.0
+    bend_drag: float = 0.0
+    lift: float = 0.0
+    gust_drag: float = 0.0
+    wind: Array = np.zeros(2)
+    roll_force: float = 0.0
+    roll_growth: float = 0.0
+    roll_linear: float = 0.0
+    roll_load: float = 0.0
+    roll_warm: float = 0.0
+    gravel: float = 0.0
+    slush: float = 0.0
+    brake_drag: float = 0.0
+    brake_share: Array = np.ones(4)
+    brake_pulse: float = 0.0
+    bearing: float = 0.0
+    grade: float = 0.0
+    wave_slope: float = 0.0
+    wave_length: float = 1.0
+    delay: float = 0.0
+    message: float = 0.0
+    stall: float = 0.0
+    lag: float = 0.0
+    lag_zero: float = 0.0
+    actuator_play: float = 0.0
+    slew: float = 0.0
+    gain: Array = np.ones(4)
+    gain_sway: float = 0.0
+    gain_power: float = 0.0
+    axle_share: float = 0.0
+    axle_split: float = 0.0
+    axle_viscous: float = 0.0
+    pad_rise: float = 0.0
+    regen_fade: float = 1.0
+    regen_lost: float = 0.0
+    slip_allowed: float = 1.0
+    slip_cut: float = 0.0
+    dead_band: float = 0.0
+    torque_step: float = 0.0
+    torque_limit: float = 1e9
+    power: float = 0.0
+    notch: float = 0.0
+    notch_rad_s: float = 1.0
+    derating: float = 0.0
+    ripple: float = 0.0
+    ripple_order: float = 1.0
+    shaft_stiffness: float = 1.0
+    shaft_damping: float = 0.0
+    shaft_axles: float = 0.0
+    motor_inertia: float = 0.0
+    slosh_share: float = 0.0
+    slosh_rate: float = 1.0

@@ -12,34 +12,17 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .counting import count
-from .details import USUAL_M_S, USUAL_RAD_S, WAIT_S
-from .kernel import ANGLE, COMMAND_STEP_S, MOTOR, RECORD_STEP_S, N, V, W, X
-from .scales import NODDING_S, bias_of, scale_of
+from .kernel import ANGLE, RECORD_STEP_S, N, V, W, X
+from .motors import COMMAND_STEP_S
 from .sensor_set import Sensors
-from .signals import (
-    beat,
-    extrapolated,
-    fitted,
-    hold,
-    joined,
-    jumping,
-    lag,
-    limited,
-    mean,
-    mean_age,
-    middle,
-    mislocked,
-    paced,
-    played,
-    ringing,
-    sent,
-    tracked,
-    wait,
-)
+from .signals import beat, hold, lag, limited, mean_age, mislocked, played, ringing, tracked
 
 Array = NDArray[np.floating[Any]]
 WHEELS = ("fl", "fr", "rl", "rr")
+NODDING_S, MOST_NODDING = 0.1, 0.4
+"""How late a body pitches, and by how much that changes a scale's deviation at most [-]."""
+MEMORY_S, MEMORY_M_S2 = 1.5, 1.0
+"""How long an accelerometer remembers where it was bent to, and from what acceleration on."""
 
 
 @dataclass(frozen=True)
@@ -96,46 +79,17 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     """
     record = np.arange(len(path)) * RECORD_STEP_S
     rng = np.random.default_rng([sensors.seed, 11])
-    wheel_phase, speed_phase, *turns = np.random.default_rng([sensors.seed, 12]).uniform(0.0, 1.0, 6)
-    waits = np.random.default_rng([sensors.seed, 13]).uniform(-0.5, 0.5, (2, int(record[-1] / WAIT_S) + 2))
+    wheel_phase, _, *turns = np.random.default_rng([sensors.seed, 12]).uniform(0.0, 1.0, 6)
     wheel_at: Array = time_s - sensors.wheel_delay_s - beat(time_s, sensors.wheel_beat_s, wheel_phase)
-    filters = 2.0 if sensors.wheel_filter_twice else 1.0
-    wheel_at = (
-        wheel_at + filters * mean_age(sensors.wheel_filter_s) - wait(time_s, sensors.wheel_wait_s, waits[0])
-    )
-    if sensors.wheel_queue_s > 0.0:
-        late = sensors.wheel_queue_s * jumping(time_s, sensors.seed)
-        wheel_at = np.maximum.accumulate(wheel_at - late)
-    if not sensors.wheel_joined:
-        wheel_at = sent(wheel_at, sensors.wheel_message_s, wheel_phase, sensors.wheel_lost, sensors.seed)
-    speed_at: Array = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s
-    speed_at = speed_at - beat(time_s, sensors.speed_beat_s, speed_phase)
-    speed_at = speed_at + mean_age(sensors.speed_filter_s) - wait(time_s, sensors.speed_wait_s, waits[1])
-    if not (sensors.speed_joined or sensors.speed_extrapolated):
-        speed_at = sent(speed_at, sensors.speed_message_s, speed_phase, sensors.speed_lost, sensors.seed)
-    if sensors.speed_paced_s > 0.0:
-        pace = paced(np.interp(time_s, record, path[:, V]), USUAL_M_S)
-        speed_at = speed_at - sensors.speed_paced_s * pace
-    out, asked = np.empty((time_s.size, 6)), wheel_at
+    wheel_at = wheel_at + mean_age(sensors.wheel_filter_s)
+    out = np.empty((time_s.size, 6))
     for w in range(4):
-        if sensors.wheel_turn_s > 0.0:
-            wheel_at = asked - sensors.wheel_turn_s * (2.0 * w / 3.0 - 1.0)
-        if sensors.wheel_axles_s > 0.0:
-            wheel_at = asked - (-sensors.wheel_axles_s if w < 2 else sensors.wheel_axles_s)
-        if sensors.wheel_paced_s > 0.0:
-            pace = paced(np.interp(time_s, record, path[:, W + w]), USUAL_RAD_S)
-            wheel_at = asked - sensors.wheel_paced_s * pace
         if sensors.wheel_window_s > 0.0:
-            wheel = count(record, path[:, ANGLE + w], sensors, wheel_at, rng, wheel_phase)
+            wheel = _counted(record, path[:, ANGLE + w], sensors, wheel_at, rng)
         else:
-            turning = lag(path[:, (MOTOR if sensors.wheel_at_motor else W) + w], sensors.wheel_filter_s)
-            if sensors.wheel_filter_twice:
-                turning = lag(turning, sensors.wheel_filter_s)
-            turning = middle(turning, sensors.wheel_median_s)
+            turning = lag(path[:, W + w], sensors.wheel_filter_s)
             turning = hold(turning, sensors.wheel_hold_s, np.random.default_rng([sensors.seed, 17]))
-            if sensors.wheel_joined:
-                turning = joined(record, turning, sensors.wheel_message_s, wheel_phase)
-            wheel = mean(record, turning, wheel_at, sensors.wheel_average_s)
+            wheel = np.interp(wheel_at, record, turning)
         if sensors.wheel_runout > 0.0:
             angle = np.interp(wheel_at, record, path[:, ANGLE + w])
             wheel = wheel * (1.0 + sensors.wheel_runout * np.cos(angle + 2.0 * np.pi * turns[w]))
@@ -146,6 +100,28 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
             out[out[:, w] < sensors.wheel_least_rad_s, w] = 0.0
     if sensors.wheel_blend > 0.0:
         out[:, :4] += sensors.wheel_blend * (out[:, :4].mean(axis=1, keepdims=True) - out[:, :4])
+    out[:, 4] = _speed(path, record, sensors, time_s, rng)
+    out[:, 5] = _acceleration(path, record, sensors, time_s)
+    return out
+
+
+def _counted(record: Array, angle: Array, sensors: Sensors, time_s: Array, rng: Generator) -> Array:
+    """Speed from the pulses of each finished window [rad/s]; a wheel that was rolling before the record began."""
+    teeth, window = sensors.wheel_teeth, sensors.wheel_window_s
+    phase, first = rng.uniform(0.0, 1.0), rng.uniform(0.0, window)
+    ends = time_s if sensors.wheel_window_runs else np.floor((time_s - first) / window) * window + first
+    before = np.gradient(angle[:3], RECORD_STEP_S)[0]
+
+    def pulses(at: Array) -> Array:
+        turned = np.interp(at, record, angle) + before * np.minimum(at, 0.0)
+        return np.floor(turned * teeth / (2.0 * np.pi) + phase)
+
+    return (pulses(ends) - pulses(ends - window)) * 2.0 * np.pi / (teeth * window)
+
+
+def _speed(path: Array, record: Array, sensors: Sensors, time_s: Array, rng: Generator) -> Array:
+    """Reading of the vehicle speed sensor [m/s]."""
+    at = time_s * (1.0 - sensors.speed_clock) - sensors.speed_delay_s + mean_age(sensors.speed_filter_s)
     speed = path[:, V]
     if sensors.speed_rolling > 0.0:
         rolled = path[:, W : W + 4].mean(axis=1) * sensors.wheel_radius_m
@@ -159,19 +135,20 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
     if np.isfinite(sensors.speed_rate_m_s2):
         speed = limited(speed, sensors.speed_rate_m_s2)
     speed = hold(lag(speed, sensors.speed_lag_s + sensors.speed_filter_s), sensors.speed_hold_s, rng)
-    if sensors.speed_joined:
-        speed = joined(record, speed, sensors.speed_message_s, speed_phase)
-    if sensors.speed_extrapolated:
-        speed = extrapolated(record, speed, sensors.speed_message_s, speed_phase)
-    speed = fitted(speed, sensors.speed_fitted_s)
-    if sensors.speed_average_twice:
-        speed = mean(record, speed, record, sensors.speed_average_s)
-    shown_speed = mean(record, speed, speed_at, sensors.speed_average_s)
-    out[:, 4] = scale_of(path, sensors, time_s, shown_speed) * shown_speed + sensors.speed_offset_m_s
+    scale: float | Array = sensors.speed_scale
+    if sensors.speed_scale_pitch != 0.0:
+        nod = sensors.speed_scale_pitch * np.interp(time_s, record, lag(path[:, N], NODDING_S))
+        scale = 1.0 + (sensors.speed_scale - 1.0) * (1.0 + np.clip(nod, -MOST_NODDING, MOST_NODDING))
+    shown = scale * np.interp(at, record, speed) + sensors.speed_offset_m_s
     if sensors.speed_mislocks != 0.0:
-        out[:, 4] *= 1.0 + sensors.speed_mislocks * mislocked(time_s, sensors.seed)
+        shown *= 1.0 + sensors.speed_mislocks * mislocked(time_s, sensors.seed)
     if sensors.speed_step_m_s > 0.0:
-        out[:, 4] = np.floor(out[:, 4] / sensors.speed_step_m_s) * sensors.speed_step_m_s
+        shown = np.floor(shown / sensors.speed_step_m_s) * sensors.speed_step_m_s
+    return np.asarray(shown)
+
+
+def _acceleration(path: Array, record: Array, sensors: Sensors, time_s: Array) -> Array:
+    """Reading of the accelerometer [m/s^2]."""
     accel = ringing(lag(path[:, N], sensors.accel_lag_s), sensors.accel_period_s)
     if sensors.accel_fades_s > 0.0:
         accel = accel - lag(accel, sensors.accel_fades_s)
@@ -179,12 +156,15 @@ def read(path: Array, sensors: Sensors, time_s: Array) -> Array:
         accel = accel + sensors.accel_pitch * lag(path[:, N], NODDING_S)
     if sensors.accel_bend_s2_m != 0.0:
         accel = accel + sensors.accel_bend_s2_m * accel * accel
-    shown = sensors.accel_scale * np.interp(time_s - sensors.accel_delay_s, record, accel)
-    shown = shown + bias_of(path, sensors, time_s)
-    out[:, 5] = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
+    bias: float | Array = sensors.accel_bias_m_s2
+    if sensors.accel_bias_memory > 0.0:
+        bent = lag(np.tanh(path[:, N] / MEMORY_M_S2), MEMORY_S)
+        bias = bias * (1.0 + sensors.accel_bias_memory * np.interp(time_s, record, bent))
+    shown = sensors.accel_scale * np.interp(time_s - sensors.accel_delay_s, record, accel) + bias
+    shown = np.clip(shown, -sensors.accel_limit_m_s2, sensors.accel_limit_m_s2)
     if sensors.accel_step_m_s2 > 0.0:
-        out[:, 5] = np.round(out[:, 5] / sensors.accel_step_m_s2) * sensors.accel_step_m_s2
-    return out
+        shown = np.round(shown / sensors.accel_step_m_s2) * sensors.accel_step_m_s2
+    return np.asarray(shown)
 
 
 def noise_of(noise: Noise, time_s: Array, rng: Generator) -> Array:

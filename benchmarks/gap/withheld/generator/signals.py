@@ -7,56 +7,21 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from .compiling import compiled
-from .details import WAIT_S
 from .kernel import RECORD_STEP_S
-from .motors import BEAT_S
 
 Array = NDArray[np.floating[Any]]
 
-SLOW_S = (5.3, 11.0, 17.0)
-"""Periods of what a bias wanders by."""
-JUMP_S = 3.5
-"""From one jump of a scale to the next."""
-FAN_S, COOLING_S = 4.0, 3.0
-"""How long a box's fan runs, and stands; how fast what is in it follows."""
+BEAT_S = 0.7
+"""In which two clocks of nearly the same cycle pass each other once."""
 RELOCK_S, MISLOCK_S = 1.8, 0.25
 """Of a sensor that locks onto what it sees: in how long it goes wrong once, and how long it takes to notice."""
 PAD_DAMPING = 0.12
 """Of a sensor on a soft pad, over the critical one."""
 LOOP_DAMPING = 0.5
 """Of a loop that tracks a speed, over the critical one."""
-MOST_PACED = 3.0
-"""How much older than at the usual speed a value that comes with the distance may be."""
-
-
-def slow(time_s: Array, seed: int) -> Array:
-    """What a bias wanders by, of size 1 at most [-]."""
-    phases = np.random.default_rng([seed, 14]).uniform(0.0, 2.0 * np.pi, len(SLOW_S))
-    waves = [np.sin(2.0 * np.pi * time_s / s + phase) for s, phase in zip(SLOW_S, phases, strict=True)]
-    return np.mean(waves, axis=0)
-
-
-def paced(turning: Array, usual: float) -> Array:
-    """How much older than at the `usual` speed a value is that takes a distance, over its age there [-]."""
-    return np.asarray(np.minimum(usual / np.maximum(turning, 1e-3), MOST_PACED) - 1.0)
-
-
-def jumping(time_s: Array, seed: int) -> Array:
-    """One of two levels, every `JUMP_S` the other [-]."""
-    phase = np.random.default_rng([seed, 16]).uniform(0.0, 2.0)
-    return 1.0 - 2.0 * (np.floor(time_s / JUMP_S + phase) % 2.0)
-
-
-def cycling(time_s: Array, seed: int) -> Array:
-    """What warms up and cools down in turn, of size 1 [-]."""
-    half = np.mod(time_s / FAN_S + np.random.default_rng([seed, 18]).uniform(0.0, 2.0), 2.0)
-    most = np.tanh(0.5 * FAN_S / COOLING_S)
-    risen = (1.0 - (1.0 + most) * np.exp(-np.mod(half, 1.0) * FAN_S / COOLING_S)) / most
-    return np.asarray(np.where(half < 1.0, risen, -risen))
 
 
 def mislocked(time_s: Array, seed: int) -> Array:
@@ -73,53 +38,9 @@ def mean_age(filter_s: float) -> float:
     return float(RECORD_STEP_S * keep / (1.0 - keep))
 
 
-def wait(time_s: Array, size_s: float, waits: Array) -> Array:
-    """How much later than on average a value comes whose message had to wait for others [s]."""
-    return size_s * waits[np.clip(time_s / WAIT_S, 0, waits.size - 1).astype(int)]
-
-
 def beat(time_s: Array, size_s: float, phase: float) -> Array:
     """How much later than on average a value comes whose sender's clock passes the reader's [s]."""
     return size_s * (np.mod(time_s / BEAT_S + phase, 1.0) - 0.5)
-
-
-def joined(record: Array, signal: Array, message_s: float, phase: float) -> Array:
-    """The signal as straight lines between its messages."""
-    if message_s == 0.0:
-        return signal
-    sent = np.arange(phase * message_s, record[-1], message_s)
-    return np.interp(record, sent, np.interp(sent, record, signal))
-
-
-def extrapolated(record: Array, signal: Array, message_s: float, phase: float) -> Array:
-    """The signal as each message and the one before it let one expect it until the next."""
-    if message_s == 0.0:
-        return signal
-    sent = np.arange(phase - 2.0, record[-1] / message_s + 1.0) * message_s
-    told = np.interp(sent, record, signal)
-    last = np.searchsorted(sent, record, side="right") - 1
-    rate = (told[last] - told[last - 1]) / message_s
-    return np.asarray(told[last] + rate * (record - sent[last]))
-
-
-def middle(signal: Array, over_s: float) -> Array:
-    """The middle one of all values over `over_s` around each of a record's."""
-    if over_s == 0.0:
-        return signal
-    half = int(0.5 * over_s / RECORD_STEP_S)
-    return np.asarray(median_filter(signal, size=2 * half + 1, mode="nearest"))
-
-
-def fitted(signal: Array, over_s: float) -> Array:
-    """The slope of a line through the places of `over_s` around each of a record's values.
-
-    By least squares, so that a speed counts by how far from both ends it was: as a parabola.
-    """
-    if over_s == 0.0:
-        return signal
-    half = int(0.5 * over_s / RECORD_STEP_S)
-    weights = 1.0 - (np.arange(-half, half + 1) / (half + 1.0)) ** 2
-    return np.convolve(np.pad(signal, half, "edge"), weights / weights.sum(), "valid")
 
 
 def ringing(signal: Array, period_s: float) -> Array:
@@ -130,31 +51,6 @@ def ringing(signal: Array, period_s: float) -> Array:
     pad = [rate**2], [1.0, 2.0 * PAD_DAMPING * rate, rate**2]
     (told,), given, _ = cont2discrete(pad, RECORD_STEP_S, method="foh")
     return np.asarray(lfilter(told, given, signal, zi=lfilter_zi(told, given) * signal[0])[0])
-
-
-def sent(at: Array, message_s: float, phase: float, lost: float, seed: int) -> Array:
-    """The messages' times nearest to `at` [s]; of a lost one, that of the last that was not."""
-    if message_s == 0.0:
-        return at
-    sent = np.floor(at / message_s - phase + 0.5)
-    if lost > 0.0:
-        number = (sent - sent.min()).astype(int)
-        kept = np.random.default_rng([seed, 15]).random(number.max() + 1) >= lost
-        kept[0] = True
-        sent = sent.min() + np.maximum.accumulate(np.where(kept, np.arange(kept.size), 0))[number]
-    return (sent + phase) * message_s
-
-
-def mean(record: Array, signal: Array, at: Array, over_s: float) -> Array:
-    """Mean of the signal over `over_s` around `at`; what it was when the record began stands for all before."""
-    if over_s == 0.0:
-        return np.interp(at, record, signal)
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))]) * RECORD_STEP_S
-
-    def until(end: Array) -> Array:
-        return np.interp(end, record, area) + signal[0] * np.minimum(end, 0.0)
-
-    return (until(at + 0.5 * over_s) - until(at - 0.5 * over_s)) / over_s
 
 
 def lag(signal: Array, time_constant_s: float) -> Array:

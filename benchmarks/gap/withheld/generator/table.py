@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from .camera_library import CAMERA_LIBRARY
-from .camera_outside import camera_outside_by
-from .forms import PLAIN, Edition, outside_by
+from .camera_outside import CAMERA_OUTSIDE
 from .library import LIBRARY
+from .outside import OUTSIDE
 
 
 class Group(StrEnum):
@@ -31,94 +31,67 @@ class Group(StrEnum):
     """A log of 60 s at 1 kHz, by the command, alone on the machine."""
 
 
-Pairs = tuple[tuple[str, str], ...]
-PAIRS: dict[int, Pairs] = {
-    1: (
-        ("aero_drag", "rolling_resistance"),
-        ("aero_drag", "mass_offset"),
-        ("aero_drag", "torque_delay"),
-        ("rolling_resistance", "wheel_radius_offset"),
-        ("rolling_resistance", "torque_lag"),
-        ("road_grade", "vehicle_speed_scale"),
-        ("road_grade", "accelerometer_bias"),
-        ("road_grade", "torque_gain"),
-        ("mass_offset", "tyre_stiffness_offset"),
-        ("mass_offset", "accelerometer_bias"),
-        ("mass_offset", "friction_offset"),
-        ("wheel_radius_offset", "torque_lag"),
-        ("wheel_radius_offset", "wheel_speed_delay"),
-        ("load_transfer", "aero_drag"),
-        ("load_transfer", "torque_delay"),
-        ("tyre_relaxation", "vehicle_speed_delay"),
-        ("tyre_relaxation", "brake_drag"),
-        ("tyre_stiffness_offset", "friction_offset"),
-        ("friction_falloff", "torque_gain"),
-        ("mu_split", "vehicle_speed_delay"),
-        ("torque_gain", "vehicle_speed_scale"),
-        ("torque_delay", "wheel_speed_quantisation"),
-        ("driveline_compliance", "vehicle_speed_scale"),
-        ("wheel_inertia_offset", "aero_drag"),
-    ),
-    # Other tyres, a load, a polished road, worn brakes, a slow bus.
-    5: (
-        ("wheel_radius_offset", "tyre_stiffness_offset"),
-        ("mass_offset", "load_transfer"),
-        ("friction_offset", "friction_falloff"),
-        ("brake_drag", "torque_gain"),
-        ("wheel_speed_delay", "vehicle_speed_delay"),
-    ),
-    # A load, other wheels, other tyres, a weak inverter.
-    6: (
-        ("mass_offset", "rolling_resistance"),
-        ("wheel_radius_offset", "wheel_inertia_offset"),
-        ("tyre_relaxation", "tyre_stiffness_offset"),
-        ("torque_gain", "torque_lag"),
-    ),
-    # A journey to the mountains, cheap wheel sensors, one box for speed and acceleration.
-    7: (
-        ("mass_offset", "road_grade"),
-        ("wheel_speed_delay", "wheel_speed_quantisation"),
-        ("vehicle_speed_scale", "accelerometer_bias"),
-    ),
-    # A busy bus both ways, winter tyres, a load on brakes that stick.
-    8: (
-        ("torque_delay", "wheel_speed_delay"),
-        ("rolling_resistance", "tyre_stiffness_offset"),
-        ("mass_offset", "brake_drag"),
-    ),
-    # Saving tyres, a cheap receiver, a kit for rough country.
-    9: (
-        ("rolling_resistance", "friction_offset"),
-        ("vehicle_speed_delay", "vehicle_speed_scale"),
-        ("aero_drag", "wheel_radius_offset"),
-    ),
-    # Tyres that have aged, other motors, a load on soft tyres.
-    10: (
-        ("friction_falloff", "tyre_stiffness_offset"),
-        ("wheel_inertia_offset", "torque_gain"),
-        ("mass_offset", "wheel_radius_offset"),
-    ),
-}
-"""Pairs that one car may well have together, by the edition that added them."""
+PAIRS = (
+    ("aero_drag", "rolling_resistance"),
+    ("aero_drag", "mass_offset"),
+    ("aero_drag", "torque_delay"),
+    ("rolling_resistance", "wheel_radius_offset"),
+    ("rolling_resistance", "torque_lag"),
+    ("road_grade", "vehicle_speed_scale"),
+    ("road_grade", "accelerometer_bias"),
+    ("road_grade", "torque_gain"),
+    ("mass_offset", "tyre_stiffness_offset"),
+    ("mass_offset", "accelerometer_bias"),
+    ("mass_offset", "friction_offset"),
+    ("wheel_radius_offset", "torque_lag"),
+    ("wheel_radius_offset", "wheel_speed_delay"),
+    ("load_transfer", "aero_drag"),
+    ("load_transfer", "torque_delay"),
+    ("tyre_relaxation", "vehicle_speed_delay"),
+    ("tyre_relaxation", "brake_drag"),
+    ("tyre_stiffness_offset", "friction_offset"),
+    ("friction_falloff", "torque_gain"),
+    ("mu_split", "vehicle_speed_delay"),
+    ("torque_gain", "vehicle_speed_scale"),
+    ("torque_delay", "wheel_speed_quantisation"),
+    ("driveline_compliance", "vehicle_speed_scale"),
+    ("wheel_inertia_offset", "aero_drag"),
+    ("wheel_radius_offset", "tyre_stiffness_offset"),
+    ("mass_offset", "load_transfer"),
+    ("friction_offset", "friction_falloff"),
+    ("brake_drag", "torque_gain"),
+    ("wheel_speed_delay", "vehicle_speed_delay"),
+    ("mass_offset", "rolling_resistance"),
+    ("wheel_radius_offset", "wheel_inertia_offset"),
+    ("tyre_relaxation", "tyre_stiffness_offset"),
+    ("torque_gain", "torque_lag"),
+    ("mass_offset", "road_grade"),
+    ("wheel_speed_delay", "wheel_speed_quantisation"),
+    ("vehicle_speed_scale", "accelerometer_bias"),
+    ("torque_delay", "wheel_speed_delay"),
+    ("rolling_resistance", "tyre_stiffness_offset"),
+    ("mass_offset", "brake_drag"),
+    ("rolling_resistance", "friction_offset"),
+    ("vehicle_speed_delay", "vehicle_speed_scale"),
+    ("aero_drag", "wheel_radius_offset"),
+    ("friction_falloff", "tyre_stiffness_offset"),
+    ("wheel_inertia_offset", "torque_gain"),
+    ("mass_offset", "wheel_radius_offset"),
+)
+"""Pairs that one car may well have together."""
 
-CAMERA_PAIRS: dict[int, Pairs] = {
-    1: (
-        ("camera_latency", "camera_pitch"),
-        ("motion_blur", "exposure_shift"),
-        ("camera_latency", "class_friction_offset"),
-        ("camera_pitch", "motion_blur"),
-        ("exposure_shift", "class_friction_offset"),
-    ),
-    2: (
-        ("camera_latency", "exposure_shift"),
-        ("camera_pitch", "class_friction_offset"),
-        ("camera_latency", "motion_blur"),
-    ),
-    3: (
-        ("camera_pitch", "exposure_shift"),
-        ("motion_blur", "class_friction_offset"),
-    ),
-}
+CAMERA_PAIRS = (
+    ("camera_latency", "camera_pitch"),
+    ("motion_blur", "exposure_shift"),
+    ("camera_latency", "class_friction_offset"),
+    ("camera_pitch", "motion_blur"),
+    ("exposure_shift", "class_friction_offset"),
+    ("camera_latency", "exposure_shift"),
+    ("camera_pitch", "class_friction_offset"),
+    ("camera_latency", "motion_blur"),
+    ("camera_pitch", "exposure_shift"),
+    ("motion_blur", "class_friction_offset"),
+)
 """The same of one camera: new, in the dark, on a strange road, knocked, slow, behind a tinted windscreen."""
 
 TARGETS = (5.5, 10.0, 20.0)
@@ -179,25 +152,18 @@ class Counts:
 
 
 SIZES: dict[str, Counts] = {
-    "dev": Counts(rich=1, tyre=0, mild=0, no_gap=1, pairs=1, outside=1, removed=0, timing=0, every=8),
     "small": Counts(rich=1, tyre=1, mild=1, no_gap=3, pairs=1, outside=1, removed=1, timing=0, every=5),
-    "medium": Counts(rich=2, tyre=1, mild=1, no_gap=50, pairs=1, outside=1, removed=1, timing=1),
     "full": Counts(rich=5, tyre=1, mild=2, no_gap=75, pairs=1, outside=3, removed=2, timing=1),
     "camera": Counts(rich=6, tyre=0, mild=3, no_gap=25, pairs=2, outside=2, removed=2, timing=0, camera=True),
-    "camera_small": Counts(
-        rich=1, tyre=0, mild=1, no_gap=2, pairs=1, outside=1, removed=0, timing=0, every=3, camera=True
-    ),
 }
-"""Cases of each size; the edition says what lies outside and which pairs there are, and so how many."""
+"""Cases of each size."""
 
 
-def table(size: str, edition: Edition = PLAIN) -> list[Spec]:
+def table(size: str) -> list[Spec]:
     """All cases of a size, in a fixed order."""
     counts = SIZES[size]
-    library, beyond = (
-        (CAMERA_LIBRARY, camera_outside_by(edition.camera))
-        if counts.camera
-        else (LIBRARY, outside_by(edition.car))
+    library, beyond, pairs = (
+        (CAMERA_LIBRARY, CAMERA_OUTSIDE, CAMERA_PAIRS) if counts.camera else (LIBRARY, OUTSIDE, PAIRS)
     )
     inside, outside = list(library)[:: counts.every], list(beyond)[:: counts.every]
     specs = [_single(Group.RICH, e, i) for e in inside for i in range(counts.rich)]
@@ -206,25 +172,18 @@ def table(size: str, edition: Edition = PLAIN) -> list[Spec]:
     for i in range(counts.no_gap):
         name = f"no_gap-{i}-{'calm' if i % 3 == 2 else 'rich'}"
         specs.append(Spec(name, Group.NO_GAP, (), 1.0, name))
-    for pair in _pairs(counts, edition):
+    for pair in pairs[:: counts.every]:
         for i in range(counts.pairs):
             name = f"pair-{pair[0]}-{pair[1]}-{i}"
             specs.append(Spec(name, Group.PAIR, pair, 10.0, name))
     specs += [_single(Group.OUTSIDE, e, i) for e in outside for i in range(counts.outside)]
     for effect in inside:
         for twin in [_single(Group.RICH, effect, i) for i in range(1, 1 + counts.removed)]:
-            specs.append(
-                Spec(f"removed-{effect}-{twin.name[-1]}", Group.REMOVED, (effect,), twin.target, twin.name)
-            )
+            name = f"removed-{effect}-{twin.name[-1]}"
+            specs.append(Spec(name, Group.REMOVED, (effect,), twin.target, twin.name))
     for i in range(counts.timing):
         specs.append(Spec(f"timing-{i}", Group.TIMING, ("torque_lag",), 10.0, f"timing-{i}"))
     return [replace(spec, camera=True) for spec in specs] if counts.camera else specs
-
-
-def _pairs(counts: Counts, edition: Edition) -> Pairs:
-    known, by = (CAMERA_PAIRS, edition.camera) if counts.camera else (PAIRS, edition.car)
-    added = [pairs[:: counts.every] for since, pairs in known.items() if since <= by]
-    return tuple(pair for pairs in added for pair in pairs)
 
 
 def _single(group: Group, effect: str, i: int) -> Spec:

@@ -1,4 +1,4 @@
-"""The camera side: single pictures of any camera, and the frames of one drive."""
+"""Road surface in single pictures of any camera, and in the frames of one drive."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ Order = Literal["bgr", "rgb"]
 
 @dataclass(frozen=True)
 class PictureClass:
-    """What a picture shows.
+    """The surface of the road in a picture.
 
     Attributes
     ----------
     surface : str
         dry, wet or snow_ice.
     confidence : float
-        Its probability; of a frame the quality Q_v [-].
+        Its probability; of a frame the confidence Q_v [-].
     probabilities : dict
         Each surface's probability [-].
     flag : bool
-        Whether the class may be used; of a single picture whether it is likelier than all others together.
+        Whether the class is used; of a single picture whether its probability is above 0.5.
     """
 
     surface: str
@@ -47,7 +47,7 @@ class PictureClass:
 
 
 def picture_of(image: str | Path | NDArray[np.uint8], order: Order, upright: bool) -> NDArray[np.uint8]:
-    """A picture as BGR of 8 bits; raises TrpacError for an array of another kind."""
+    """A picture as BGR of 8 bits, shape (height, width, 3); raises TrpacError."""
     if isinstance(image, (str, Path)):
         return decode_image(image, upright=upright)
     array = np.asarray(image)
@@ -74,12 +74,12 @@ def classify(image: str | Path | NDArray[np.uint8], *, order: Order = "bgr") -> 
     image : path, or array of uint8, shape (height, width, 3)
         JPEG or PNG, or its pixels.
     order : {'bgr', 'rgb'}
-        Of an array's channels: OpenCV's, or that of most others.
+        Channel order of an array.
 
     Raises
     ------
     TrpacError
-        A picture that cannot be used, or shows no road that could be judged.
+        A picture that cannot be read, or without usable road.
     """
     name = str(image) if isinstance(image, (str, Path)) else "image"
     shares = _networks().probabilities(picture_of(image, order, upright=True), name)
@@ -89,17 +89,17 @@ def classify(image: str | Path | NDArray[np.uint8], *, order: Order = "bgr") -> 
 
 
 class VisionEstimator:
-    """The image estimator over the frames of one drive; it remembers the road that it has seen.
+    """The image estimator over the frames of one drive, with its state.
 
     Parameters
     ----------
     camera : path, name or Camera
-        Its lens and mounting: camera.yaml.
+        Lens and mounting, as in camera.yaml.
 
     Raises
     ------
     TrpacError
-        A camera file that cannot be used.
+        A camera file that is wrong.
     """
 
     def __init__(self, camera: str | Path | Camera) -> None:
@@ -116,23 +116,23 @@ class VisionEstimator:
         steering: float = 0.0,
         order: Order = "bgr",
     ) -> PictureClass:
-        """What the next frame shows of the road ahead of the wheels.
+        """The surface of the road ahead of the wheels in the next frame.
 
         Parameters
         ----------
         image : path, or array of uint8, shape (height, width, 3)
             The frame.
         t : float
-            When it was taken [s].
+            Time at which it was taken [s].
         speed, steering : float
-            Of the car [m/s], and of the front wheels, positive to the left [rad].
+            Speed of the car [m/s], and steering angle of the front wheels, positive to the left [rad].
         order : {'bgr', 'rgb'}
-            Of an array's channels.
+            Channel order of an array.
 
         Raises
         ------
         TrpacError
-            A frame that cannot be used: nothing is remembered of it.
+            A frame that cannot be used; the state is then unchanged.
         """
         way_m = self._way_m + max(0.0, t - self._time_s) * speed * (self._state.frame_count > 0)
         motion = Motion(speed, steering_angle_rad=steering, way_m=way_m)

@@ -1,7 +1,7 @@
-"""Drives of the product's own plant with known effects: what the tests of the diagnosis are held on, and a first look.
+"""Random drives of the product's own plant with known effects, on the diagnosis' grid.
 
-No command: `tests/support/gap_drives.py` uses them. They flatter it, since plant and library share their forms:
-its gates were set on opened cases of `benchmarks/gap/withheld`.
+They flatter the diagnosis, since plant and library share their forms: its gates were set on opened cases of
+`benchmarks/gap/withheld`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import RoadFile, VehicleFile, load_vehicle
-from scenarios.plant import simulate
+from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import sense
 from sim2real.observing.drive import CHANNELS, Drive, grid_step, make_drive
 from sim2real.observing.lattice import fast_spread

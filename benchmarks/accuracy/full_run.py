@@ -6,21 +6,18 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from scenarios.metrics import score_run
+from fmu_src.estimate_outputs import OF_ESTIMATE
+from scenarios.metrics import ESTIMATORS, score_run
 from scenarios.plant.pipeline import drive
 from scenarios.plant.sensors import make_scenario_log
-from scenarios.runner import ESTIMATORS, Run, segment_starts, under_the_wheel
+from scenarios.runner import Run, segment_starts, under_the_wheel
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.run import believed_config, camera_of, signals_of
 from trpac_core.estimator import TrpacEstimator
-from trpac_core.estimator_data import OUTPUTS
 from trpac_core.readings import Sensors
 
-RENAMED = {"tyre_force_n": "tyre_force", "frame_age_s": "frame_age"}
-"""Fields of an estimate whose column has the unit's name."""
 
-
-def trace(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:
+def full_run(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:
     """A run as `runner.run_scenario` gives it, stepped in Python with the sweep's camera.
 
     Parameters
@@ -38,10 +35,10 @@ def trace(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:
     for row, (omega, torque, speed, acceleration) in enumerate(signals):
         sensors = Sensors(omega, torque, speed, longitudinal_acceleration_m_s2=acceleration)
         rows.append(estimator.step(plan.scenario.step_s, sensors, frames.get(row)))
-    outputs = pd.DataFrame([{name: getattr(e, name) for name in OUTPUTS} for e in rows])
+    outputs = pd.DataFrame([{name: read(e) for name, read in OF_ESTIMATE.items()} for e in rows])
     parts = [
         make_scenario_log(plan.scenario, trajectory),
-        outputs.rename(columns=RENAMED),
+        outputs,
         under_the_wheel(plan.scenario, trajectory),
     ]
     table = pd.concat(parts, axis=1)

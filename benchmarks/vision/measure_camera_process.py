@@ -1,8 +1,8 @@
-"""Measures what the camera side says of rendered, disturbed roads: the source of camera_process.yaml.
+"""Measures the classes that the camera side gives rendered, disturbed roads: the source of camera_process.yaml.
 
-``python -m scenarios.sweep.measure_camera --worlds 24`` draws that many random worlds, each with the three surfaces in
-a random order over 20 m each, passes pictures every 0.75 m through the disturbances of the scenario, the JPEG
-encoder and the image estimator with the shipped networks, and writes down every verdict on ground of one surface.
+``python -m benchmarks.vision.measure_camera_process --worlds 24`` draws that many random worlds, each with the three
+surfaces in a random order over 20 m each, passes pictures every 0.75 m through the disturbances of the scenario, the
+JPEG encoder and the image estimator with the shipped networks, and writes the class of every picture of one surface.
 The worlds' seeds begin at 900 000, apart from those of any scenario or sweep in this project.
 """
 
@@ -21,7 +21,8 @@ import numpy as np
 
 from scenarios.camera.disturbances import disturb
 from scenarios.files import RoadFile, RoadSegment, Scenario, load_scenario
-from scenarios.pictures import DISTURBANCES, scene
+from scenarios.pictures import DISTURBANCES, scene_renderer
+from scenarios.sweep.camera import RECORDS
 from scenarios.vision_overlay import image_estimator
 from scenarios.yaml_text import to_yaml
 from trpac_core.vision.classes import Surface
@@ -34,12 +35,10 @@ STRETCH_M = 20.0
 SPACING_M = 0.75
 """Way between pictures: three frames of 20 Hz at 5 m/s [m]."""
 SPEED_M_S = 7.0
-SCENARIO = Path(__file__).resolve().parents[1] / "paper_simulation.yaml"
-OUT = Path(__file__).with_name("camera_process.yaml")
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ImageResult:
     """What was said of one picture; surface is None where the near group lies on two."""
 
     surface: Surface | None
@@ -56,38 +55,40 @@ def world(base: Scenario, seed: int) -> Scenario:
     segments = [
         RoadSegment.model_validate(
             {
-                "start_m": STRETCH_M * place,
+                "start_m": STRETCH_M * number,
                 "mu_left": 0.5,
                 "mu_right": 0.5,
                 "surface": Surface(int(index)).label,
             }
         )
-        for place, index in enumerate(order)
+        for number, index in enumerate(order)
     ]
     return replace(base, seed=seed, road=RoadFile(schema=1, segments=segments))
 
 
-def verdicts(scenario: Scenario) -> Iterator[Verdict]:
+def image_results(scenario: Scenario) -> Iterator[ImageResult]:
     """The image estimator's verdicts along a world, in the order of a drive."""
-    renderer, ife, state = scene(scenario), image_estimator(scenario), IfeState()
+    renderer, ife, state = scene_renderer(scenario), image_estimator(scenario), IfeState()
     near_m, far_m = ife.config.ranges_m[0]
     disturbance = DISTURBANCES[scenario.pictures.disturbance]
     quality = [cv2.IMWRITE_JPEG_QUALITY, scenario.pictures.jpeg_quality]
-    for number, place in enumerate(np.arange(0.0, 3.0 * STRETCH_M - far_m, SPACING_M)):
+    for number, position_m in enumerate(np.arange(0.0, 3.0 * STRETCH_M - far_m, SPACING_M)):
         seed = int(np.random.SeedSequence([scenario.seed, number]).generate_state(1)[0])
-        image = disturb(renderer.frame(float(place)).image, disturbance, seed)
+        image = disturb(renderer.frame(float(position_m)).image, disturbance, seed)
         _, packed = cv2.imencode(".jpg", image, quality)
         began = time.perf_counter()
         decoded = decode_image(packed.tobytes())
-        state, result = ife.process(state, decoded, Motion(SPEED_M_S, way_m=float(place)))
+        state, result = ife.process(state, decoded, Motion(SPEED_M_S, way_m=float(position_m)))
         passed = time.perf_counter() - began
-        ends = [scenario.road.segment_at(float(place) + ahead).surface_class for ahead in (near_m, far_m)]
-        middle = scenario.road.segment_at(float(place) + 0.5 * (near_m + far_m)).surface_class
+        ends = [
+            scenario.road.segment_at(float(position_m) + ahead).surface_class for ahead in (near_m, far_m)
+        ]
+        middle = scenario.road.segment_at(float(position_m) + 0.5 * (near_m + far_m)).surface_class
         pure = ends[0] if ends[0] == ends[1] else None
-        yield Verdict(pure, middle, result.surface, float(result.Q_v), bool(result.flag), passed)
+        yield ImageResult(pure, middle, result.surface, float(result.Q_v), bool(result.flag), passed)
 
 
-def record(found: list[Verdict], seed: int) -> dict[str, Any]:
+def record(found: list[ImageResult], seed: int) -> dict[str, Any]:
     """One world's verdicts per surface: classes as digits, confidences in hundredths, 0.5 at most without flag."""
     entry: dict[str, Any] = {"seed": seed}
     for surface in Surface:
@@ -100,9 +101,9 @@ def record(found: list[Verdict], seed: int) -> dict[str, Any]:
     return entry
 
 
-def statistics(worlds: list[list[Verdict]]) -> dict[str, Any]:
+def statistics(worlds: list[list[ImageResult]]) -> dict[str, Any]:
     """Confusion, flags, persistence of errors and time, for a person to read; the process draws from the records."""
-    found = [v for verdicts_ in worlds for v in verdicts_]
+    found = [v for along_world in worlds for v in along_world]
     confusion, flags = {}, {}
     for surface in Surface:
         here = [v for v in found if v.surface == surface]
@@ -140,14 +141,14 @@ def main() -> None:
     """Command line of the measurement."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--worlds", type=int, default=24)
-    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--out", type=Path, default=RECORDS)
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    base = load_scenario(SCENARIO)
+    base = load_scenario("paper_simulation")
     seeds = range(FIRST_SEED, FIRST_SEED + options.worlds)
     worlds = []
     for seed in seeds:
-        worlds.append(list(verdicts(world(base, seed))))
+        worlds.append(list(image_results(world(base, seed))))
         print(f"world {seed - FIRST_SEED + 1} of {options.worlds}", flush=True)
     content = {
         "schema": 1,
