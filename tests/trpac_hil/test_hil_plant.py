@@ -54,6 +54,7 @@ def test_the_drive_goes_on_for_ever_between_its_speeds_on_a_road_that_repeats_it
     drive, length_m, car = EndlessDrive(SCENARIO, 0.02), SCENARIO.end.position_m, SCENARIO.vehicle.to_core()
     speeds, slips, came_back = [], [], 0
     before = drive.now
+    assert before.position_m == pytest.approx(SLOW_M_S * 0.02, rel=0.05)
     for _ in range(3000):
         drive.advance()
         now = drive.now
