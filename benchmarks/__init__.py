@@ -9,7 +9,8 @@ gap
 vision
     How often is the camera side wrong?
 robustness
-    What do the units and the readers of files do with rubbish, in the long run, and under other clients?
+    What do the units and the readers of files do with rubbish, in the long run, and under other clients? Which faults
+    in the code would no test find?
 
 Figures go to standard output or to `--out`, by default below out/; those that are kept stand in docs/.
 """

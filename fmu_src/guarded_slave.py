@@ -105,8 +105,6 @@ def holes(items: list[Any]) -> list[int]:
 
     The address of its items is the fourth word of a list object (CPython 3.11, Include/cpython/listobject.h).
     """
-    if not items:
-        return []
     word = ctypes.sizeof(ctypes.c_void_p)
     address = ctypes.c_void_p.from_address(id(items) + 3 * word).value
     if address is None:
@@ -143,7 +141,6 @@ class GuardedSlave(Fmi2Slave):
     """Inputs of one step only, such as addresses: `clear_volatile` resets them, the state does not contain them."""
     views: ClassVar[frozenset[str]] = frozenset()
     """Outputs that `shown` returns; `values` does not contain them."""
-    _prepared: ClassVar[bool] = False
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -169,15 +166,11 @@ class GuardedSlave(Fmi2Slave):
         try:
             self.prepare()
         except Exception as error:
+            # During instantiation the wrapper handles an exception, which is how the host learns of it. Many hosts show
+            # no log of a unit that they could not instantiate.
             text = quoted(f"{self.modelName} cannot be instantiated: {error}", LONGEST_LOG)
-            if not type(self)._prepared:
-                # During instantiation the wrapper handles an exception, which is how the host learns of it. Many
-                # hosts show no log of a unit that they could not instantiate.
-                print(text, file=sys.stderr)
-                raise InstantiationError(log_text(text)) from error
-            self.report("prepare", Fmi2Status.error, text)
-        else:
-            type(self)._prepared = True
+            print(text, file=sys.stderr)
+            raise InstantiationError(log_text(text)) from error
         finally:
             # Called after all libraries are loaded, so that in a host without Python the interpreter ends before them.
             end_in_order(str(self.resources))

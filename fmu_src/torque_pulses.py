@@ -25,7 +25,6 @@ class TorquePulses(GuardedSlave):
         """Apply the parameters; ValueError where they cannot be applied."""
         check_parameters(self.variables, self.values)
         self._time_s = 0.0
-        self._publish()
 
     def step(self, step_s: float) -> None:
         """Advance the time; a step below 0, above 10 s or not finite is ignored."""

@@ -132,10 +132,10 @@ class Link:
             if not self.receive() and self.backlogs == backlogs:
                 return
 
-    def send(self, frame_id: int, extended: bool, data: bytes) -> bool:
-        """Send a message; returns whether that succeeded."""
+    def send(self, frame_id: int, extended: bool, data: bytes) -> None:
+        """Send a message; one that cannot be sent is counted in `unsent`."""
         if self._bus is None:
-            return False
+            return
         message = can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data)
         try:
             self._bus.send(message)
@@ -143,12 +143,9 @@ class Link:
             # The transmit buffer is full: no node acknowledges, or too much is sent. The bus is not lost.
             self.unsent += 1
             self._report("unsent", f"A message could not be sent: {quoted(error)}")
-            return False
         except BUS_ERRORS as error:
             self.unsent += 1
             self._lose(f"{type(error).__name__}: {quoted(error)}")
-            return False
-        return True
 
     def check(self) -> None:
         """Treat the bus as lost where the interface reports the controller as bus-off."""

@@ -32,10 +32,9 @@ class RelayedBus:
     def __init__(self, ring: Ring) -> None:
         self._ring = ring
 
-    def send(self, frame_id: int, extended: bool, data: bytes) -> bool:
-        """Write a message of at most 8 bytes to the shared memory; returns True."""
+    def send(self, frame_id: int, extended: bool, data: bytes) -> None:
+        """Write a message of at most 8 bytes to the shared memory."""
         self._ring.write([frame_id, extended, len(data), *_BYTES.unpack(data.ljust(_BYTES.size, b"\0"))])
-        return True
 
     def receive(self) -> list[can.Message]:
         """An empty list."""

@@ -98,10 +98,9 @@ class EndlessDrive:
         self._instants = self._drive()
         self.now = next(self._instants)
 
-    def advance(self, steps: int = 1) -> Instant:
-        """The plant's outputs some steps later."""
+    def advance(self, steps: int = 1) -> None:
+        """Make `now` the plant's outputs some steps later."""
         self.now = next(islice(self._instants, steps - 1, None))
-        return self.now
 
     def _drive(self) -> Iterator[Instant]:
         """The plant's outputs step by step, without end."""

@@ -31,7 +31,6 @@ class MdfLog:
         self._scratch = Path(tempfile.mkdtemp(dir=path.parent, prefix=SCRATCH_PREFIX))
         self._mdf: Any = MDF(version="4.10", temporary_folder=str(self._scratch))
         self._mdf.header.comment = comment
-        self._begun = False
         self.rows = 0
 
     def add(self, rows: NDArray[np.float64]) -> None:
@@ -41,7 +40,7 @@ class MdfLog:
         if not len(rows):
             return
         samples = [_stored(rows[:, i], c.kind) for i, c in enumerate(self._columns)]
-        if self._begun:
+        if self.rows:
             self._mdf.extend(0, [(part, None) for part in samples])
         else:
             signals = [
@@ -49,7 +48,6 @@ class MdfLog:
                 for c, part in zip(self._columns[1:], samples[1:], strict=True)
             ]
             self._mdf.append(signals, common_timebase=True)
-            self._begun = True
         self.rows += len(rows)
 
     def finish(self) -> None:

@@ -61,7 +61,7 @@ class Screen:
 
 
 def _estimate(figures: Figures, title: str) -> Table:
-    table = Table(title=title, title_justify="left", show_header=False, box=None, pad_edge=False)
+    table = Table(title=escape(title), title_justify="left", show_header=False, box=None, pad_edge=False)
     status = figures.now("status")
     truth = figures.now("theta_true_fl")
     rows = [
@@ -94,5 +94,5 @@ def _timing(figures: Figures) -> Table:
         sketch = figures.sketches[name].summary()
         if sketch is not None:
             numbers = (figures.now(column), sketch["median"], sketch["p99"], sketch["max"])
-            table.add_row(label, *("-" if math.isnan(n) else f"{n:.4g}" for n in numbers))
+            table.add_row(escape(label), *("-" if math.isnan(n) else f"{n:.4g}" for n in numbers))
     return table

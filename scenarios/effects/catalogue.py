@@ -70,17 +70,27 @@ def _section(effect: type[Effect]) -> str:
 
 def _form(other: type[Effect]) -> str:
     further = other.parameters()[len(EFFECTS[other.id].parameters()) :]
-    added = "".join(f" Further parameter `{p.name}` [{p.unit}]: {p.meaning}." for p in further)
+    added = "".join(map(_further, further))
     return f"\n- A diagnosis also tries it as {other.form}: `{other.equation}`. {getdoc(other)}{added}"
 
 
+def _further(p: Parameter) -> str:
+    neutral, bounds, starts = _values(p)
+    about = f"neutral {neutral}, bounds {bounds}, a fit starts at {starts}"
+    return f" Further parameter `{p.name}` [{p.unit}]: {p.meaning}; {about}."
+
+
 def _row(p: Parameter) -> str:
+    return f"| `{p.name}` | {p.unit} | {p.meaning} | {' | '.join(_values(p))} |"
+
+
+def _values(p: Parameter) -> tuple[str, str, str]:
+    """Neutral value, bounds and starts."""
     low, high = p.bounds(CAR)
     starts = ", ".join(f"{value:.4g}" for value in p.start_values(CAR))
     starts += "*" if callable(p.starts) else ""
-    bounds = f"{_value(p.low, low)} to {_value(p.high, high)}"
     neutral = _value(p.neutral, p.neutral_value(CAR))
-    return f"| `{p.name}` | {p.unit} | {p.meaning} | {neutral} | {bounds} | {starts} |"
+    return neutral, f"{_value(p.low, low)} to {_value(p.high, high)}", starts
 
 
 def _value(declared: Value, value: float) -> str:

@@ -57,7 +57,7 @@ class WheelSpeedQuantisation(Effect):
     def _count(self, time_s: Array, speed_rad_s: Array) -> Array:
         since = time_s - time_s[0]
         # A row that falls on a window's end already reports that window, however its time was rounded.
-        window = np.floor(since / self.window_s * (1.0 + 1e-12) + 1e-9)
+        window = np.floor(since / self.window_s + 1e-9)
         ends = np.asarray(np.arange(-1, int(window[-1]) + 1) * self.window_s, dtype=np.float64)
         pulses = np.floor(_angle(since, speed_rad_s, ends) * (self.teeth / (2.0 * np.pi)) + 1e-9)
         return (np.diff(pulses) * (2.0 * np.pi / (self.teeth * self.window_s)))[window.astype(int)]

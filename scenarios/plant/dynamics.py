@@ -139,10 +139,9 @@ def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> 
     shape, shape_by_slip = falling_shape(theta, slip)
     grip_n = theta * load_n
     if grip_n * (1.0 - slip) >= 2.0 * stiffness_n * slip:  # L >= 1: the whole contact patch adheres
-        stretch = slip / (1.0 - slip) if slip < 1.0 else 0.0
-        force = stiffness_n * stretch * shape
-        by_slip = stiffness_n * (shape / (1.0 - slip) ** 2 + stretch * shape_by_slip) if slip < 1.0 else 0.0
-        return force, by_slip, 0.0
+        stretch = slip / (1.0 - slip)
+        by_slip = stiffness_n * (shape / (1.0 - slip) ** 2 + stretch * shape_by_slip)
+        return stiffness_n * stretch * shape, by_slip, 0.0
     # C_x lambda / (1 - lambda) L = grip / 2, so that lambda = 1 needs no special case.
     adhering = grip_n * (1.0 - slip) / (2.0 * stiffness_n * slip)
     adhering_by_slip = -grip_n / (2.0 * stiffness_n * slip * slip)

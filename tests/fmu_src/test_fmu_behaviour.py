@@ -604,6 +604,18 @@ def test_outputs_read_under_parameters_that_cannot_be_are_told_at_the_end_alone(
     assert [line.status for line in unit.log] == [ERROR]
 
 
+def test_after_an_initialisation_that_failed_the_outputs_are_those_of_before_it(open_unit: Open) -> None:
+    unit = open_unit(initialise=False)
+    before = unit.outputs()
+    unit.slave.setupExperiment(startTime=0.0)
+    unit.slave.enterInitializationMode()
+    unit.set({"estimator.theta_initial": 0.7})
+    assert unit.get("TRPAC") == 0.7
+    unit.set({"vehicle.mass": -1.0})
+    unit.slave.exitInitializationMode()
+    assert unit.outputs() == before
+
+
 def test_each_signal_is_told_of_once_and_hides_no_other(open_unit: Open) -> None:
     unit = open_unit()
     flag_up(unit)

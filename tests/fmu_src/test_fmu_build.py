@@ -10,6 +10,7 @@ import zipfile
 from dataclasses import fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -20,7 +21,7 @@ from long import beyond
 
 import build_fmu
 from fmu_src import packaging, variable_table
-from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
+from fmu_src.build_command import EXIT_BUILD, EXIT_INVALID, EXIT_RUN, EXIT_USAGE, Product, run_build
 from fmu_src.doctor import State, examine_file
 from fmu_src.interface import TRPAC_ESTIMATOR
 from fmu_src.model_description import UNITS as SI_UNITS
@@ -101,6 +102,9 @@ def test_archive_holds_no_cache_and_no_time(unit_file: Path) -> None:
     names = [entry.filename for entry in entries]
     assert names == sorted(names)
     assert {entry.date_time for entry in entries} == {packaging.ZIP_TIME}
+    assert {oct(entry.external_attr >> 16) for entry in entries} == {"0o644"}, (
+        "what unzip makes can be read by all"
+    )
     assert {entry.compress_type for entry in entries} == {zipfile.ZIP_STORED}, (
         "zlib versions differ in their bytes"
     )
@@ -410,6 +414,45 @@ def test_flat_names_are_names_of_one_variable_each(unit: str) -> None:
 def test_command_line_suggests_units(capsys: pytest.CaptureFixture[str]) -> None:
     assert build_fmu.main(["--slave", "TrpacEstimater"]) == EXIT_USAGE
     assert "TrpacEstimator" in capsys.readouterr().err
+
+
+def raises(error: Exception) -> Any:
+    def call(*_: object) -> None:
+        raise error
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "words"),
+    [
+        ({}, 0, "SHA-256"),
+        ({"known": ("other",)}, EXIT_USAGE, "'thing' is not a kind. Known: other."),
+        ({"build": raises(BuildError("lacks a part"))}, EXIT_BUILD, "lacks a part"),
+        ({"build": raises(OSError("disk full"))}, EXIT_BUILD, "disk full"),
+        ({"validate": lambda path: ["one", "two"]}, EXIT_INVALID, "does not validate:\none\ntwo"),
+        ({"run": raises(Exception("step refused"))}, EXIT_RUN, "the unit does not run: step refused"),
+    ],
+)
+def test_each_way_to_fail_has_its_exit_code_and_says_why(
+    changes: dict[str, Any], code: int, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = tmp_path / "thing"
+    made.write_bytes(b"content")
+    fine = Product(
+        "unit", "kind", ("thing",), lambda name: made, lambda path: [], "fine", lambda path: "a step"
+    )
+    assert run_build("build.py", lambda: replace(fine, **changes), "thing") == code
+    said = capsys.readouterr()
+    assert words in (said.err if code else said.out)
+    assert ("SHA-256" in said.out) == (code == 0)
+
+
+def test_another_interpreter_than_the_projects_is_told_which_to_use(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run_build("build.py", raises(ImportError("no module named fmpy")), "thing") == EXIT_BUILD
+    assert ".venv/bin/python build.py" in capsys.readouterr().err
 
 
 @pytest.mark.e2e

@@ -63,6 +63,95 @@ def test_compiled_tyre_is_the_estimators_tyre(theta, slip, load_n, stiffness_n):
         assert by_load == pytest.approx(by_load_numeric, abs=2e-4)
 
 
+CURVES = {
+    "modified Dugoff": {},
+    "reshaped": {"knee": 0.3, "crest": -0.2, "sliding": 0.25},
+    "magic formula": {"formula_share": 1.0, "formula_shape": 1.5, "formula_curvature": -0.5},
+    "half of each": {"knee": -0.2, "crest": 0.1, "formula_share": 0.5},
+}
+
+
+@pytest.mark.parametrize("curve", CURVES)
+@pytest.mark.parametrize("theta", [0.2, 0.9])
+def test_the_slopes_of_each_tyre_curve_are_those_of_its_force(curve, theta):
+    p = make_setup(NOMINAL, DRY).parameters._replace(**CURVES[curve])
+    stiffness_n = p.longitudinal_stiffness_n[0]
+
+    def force(slip, load_n):
+        return dynamics.steady_tyre(theta, slip, load_n, stiffness_n, p)[0]
+
+    for slip in np.linspace(0.002, 0.9, 60):
+        for load_n in (1500.0, 4000.0):
+            _, by_slip, by_load = dynamics.steady_tyre(theta, slip, load_n, stiffness_n, p)
+            rise_n = (force(slip + 1e-6, load_n) - force(slip - 1e-6, load_n)) / 2e-6
+            assert by_slip == pytest.approx(rise_n, rel=1e-4, abs=1e-3 * theta * load_n)
+            more = (force(slip, load_n + 0.1) - force(slip, load_n - 0.1)) / 0.2
+            assert by_load == pytest.approx(more, abs=2e-3 * theta)
+
+
+STATES_OF_THE_STEP = {
+    "tyres alone": {},
+    "drag": {"drag_kg_m": 40.0},
+    "lagging forces": {"relaxation_m": (0.3, 0.25, 0.2, 0.35)},
+    "lagging slips": {"relaxation_m": (0.3, 0.25, 0.2, 0.35), "slip_lags": 1.0},
+    "shafts": {"motor_inertia_kg_m2": 0.4, "shaft_damping_nm_s_rad": 12.0},
+    "shafts and lagging forces": {
+        "motor_inertia_kg_m2": 0.4, "shaft_damping_nm_s_rad": 12.0, "relaxation_m": (0.3, 0.25, 0.2, 0.35)
+    },
+    "shafts and lagging slips": {
+        "motor_inertia_kg_m2": 0.4, "relaxation_m": (0.3, 0.25, 0.2, 0.35), "slip_lags": 1.0
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", STATES_OF_THE_STEP)
+@pytest.mark.parametrize("torque_nm", [250.0, -250.0])
+def test_the_steps_equations_are_solved_with_the_exact_jacobian(case, torque_nm):
+    """Elimination by wheel against a dense solution with a Jacobian of differences.
+
+    Speeds differ from wheel to wheel, and lags have settled, since the Jacobian leaves out how their rate changes.
+    """
+    p = make_setup(NOMINAL, DRY).parameters._replace(
+        lever_m=(0.29, 0.3, 0.28, 0.27),
+        wheel_inertia_kg_m2=(0.9, 1.0, 1.1, 1.2),
+        shaft_stiffness_nm_rad=(9e3, 1e4, 1.1e4, 1.2e4),
+        **STATES_OF_THE_STEP[case],
+    )
+    road, torque, h = make_setup(NOMINAL, DRY).road, np.full(4, torque_nm), 2e-3
+    wheels, _ = dynamics.new_wheels()
+    y = dynamics.initial_y(12.0, 5.0, p)
+    y[WHEEL:FORCE] *= 1.0 + np.sign(torque_nm) * np.array([0.004, 0.006, 0.008, 0.01])
+    y[MOTOR:] = y[WHEEL:FORCE]
+    dynamics.refresh(y, 0.0, p, road, wheels)
+    y[FORCE:TWIST] = wheels.work[0]  # the steady value
+    y[TWIST:MOTOR] = 0.01
+
+    def rates(state):
+        accel = dynamics.refresh(state, 0.0, p, road, wheels)
+        dynamics._fill_rates(state, torque, torque, 0.0, p, wheels)
+        return np.array([accel - p.slope_m_s2, *wheels.rates])
+
+    lags, shafts = p.relaxation_m[0] > 0.0, p.motor_inertia_kg_m2 > 0.0
+    used = [
+        *range(SPEED, FORCE),
+        *(range(FORCE, TWIST) if lags else ()),
+        *(range(TWIST, 18) if shafts else ()),
+    ]
+    columns = np.array(used) - SPEED
+    steps = 1e-6 * np.maximum(np.abs(y), 1.0)
+    jacobian = np.column_stack(
+        [(rates(y + step) - rates(y - step))[columns] / (2.0 * step.sum()) for step in np.diag(steps)[used]]
+    )
+    given = np.random.default_rng(1).normal(size=17)
+    gamma = 1.0 - np.sqrt(0.5)
+    expected = np.linalg.solve(np.eye(len(used)) - gamma * h * jacobian, given[columns])
+    rates(y)
+    k = given[1:].copy()
+    pivot = dynamics._factor(y[SPEED], h, p, wheels)
+    speed = dynamics._solve(given[0], pivot, h, p, wheels, k)
+    assert np.array([speed, *k])[columns] == pytest.approx(expected, rel=1e-4, abs=1e-6)
+
+
 def test_locked_wheel_keeps_the_sliding_share_of_the_grip():
     assert tyre_force(0.5, 1.0, 3000.0, 5e4)[0] == pytest.approx(0.79 * 0.5 * 3000.0)
     assert tyre_force(0.5, 0.0, 3000.0, 5e4)[0] == 0.0

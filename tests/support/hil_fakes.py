@@ -61,10 +61,9 @@ class FakeBus:
         self.polls += 1
         return made
 
-    def send(self, frame_id: int, extended: bool, data: bytes) -> bool:
+    def send(self, frame_id: int, extended: bool, data: bytes) -> None:
         coded = self.codec.by_id(self.codec.messages)[frame_id, extended]
         self.sent.append((coded.message.name, *coded.decode(data)))
-        return True
 
     def check(self) -> None:
         return None

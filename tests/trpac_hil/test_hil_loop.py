@@ -139,6 +139,7 @@ def test_before_the_first_messages_it_is_starting_and_holds() -> None:
     counts = bench.run(20)
     assert bench.sent("Status")[:20] == [STARTING] * 10 + [RUNNING] * 10
     assert counts.lost == {}
+    assert bench.told == [], "what comes for the first time is not back"
 
 
 def test_a_lost_bus_holds_and_a_recovered_one_goes_on() -> None:
@@ -161,6 +162,7 @@ def test_a_step_that_the_unit_discards_is_held_said_once_and_made_up_for() -> No
     assert bench.sent("Status")[:10] == [RUNNING] * 4 + [HELD_UNIT] * 2 + [RUNNING] * 4
     assert bench.sent("Flag")[4:6] == [0.0, 0.0]
     assert bench.unit.steps[4][1] == pytest.approx(3e-3)
+    assert bench.table["step_s"] == pytest.approx([1e-3] * 4 + [0.0] * 2 + [3e-3] + [1e-3] * 3)
     assert sum(step for _, step, _ in bench.unit.steps) == pytest.approx(0.010)
     assert counts.discarded == 2
     assert len([text for text in bench.told if "discarded" in text]) == 1
@@ -227,6 +229,7 @@ def test_a_camera_that_falls_silent_is_lost_and_one_that_sees_nothing_is_believe
     bench.bus.messages = lambda cycle: driving(1.0) | (road(0.0, cycle) if cycle == 100 else {})
     bench.run(1500)
     assert bench.camera_input.losses == 1
+    assert [text for text in bench.told if text.startswith("No result of a picture for ")]
     assert bench.table["age_picture_ms"][-1] != bench.table["age_picture_ms"][-1]
     blind = Bench()
     blind.bus.messages = lambda cycle: (
@@ -236,6 +239,16 @@ def test_a_camera_that_falls_silent_is_lost_and_one_that_sees_nothing_is_believe
     called, classes, _ = blind.unit.classes[-1]
     assert called == 400
     assert classes == [(int(Surface.WET), 0.0)]
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1.0])
+def test_a_confidence_at_either_end_is_no_failed_picture(confidence: float) -> None:
+    bench = Bench()
+    said = road(0.0, 7)
+    said["RoadClass"]["RoadClassConfidence_Left"] = confidence
+    bench.bus.messages = lambda cycle: driving() | (said if cycle == 50 else {})
+    bench.run(60)
+    assert (bench.stamps.counts.results, bench.stamps.counts.failed) == (1, 0)
 
 
 def test_of_four_wheels_one_without_its_signals_holds_alone_and_each_has_its_own_estimate_on_the_bus() -> (

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import math
 import os
 import re
+import signal as signals
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import can
 import hil_bodies
@@ -24,24 +29,28 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.preview import PreviewConfig
+from trpac_hil import helper
 from trpac_hil.bus import BusSettings, Link, bus_options
 from trpac_hil.bus_relay import BusRelay, RelayedBus, relay_ring
+from trpac_hil.camera import FAILED, MOTION, result_columns
+from trpac_hil.camera_input import CameraInput
 from trpac_hil.codec import DBC_FILE, INPUT_MESSAGES, OUTPUT_MESSAGES, load_codec
 from trpac_hil.dbc_table import TARGET, document
 from trpac_hil.deadlines import Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
+from trpac_hil.figures import SKETCHED_COLUMNS, Figures
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
 from trpac_hil.plant_node import PLAIN_SCENARIO, PlantJob, PlantNode
 from trpac_hil.preview_stamps import CameraResult, Odometer, PreviewStamps
 from trpac_hil.quantile_sketch import QuantileSketch
-from trpac_hil.realtime import as_before, loop_core, pin
+from trpac_hil.realtime import as_before, loop_core, pin, undisturbed
 from trpac_hil.records import columns
-from trpac_hil.rig import Rig, _vision
+from trpac_hil.rig import Rig, Stopper, _vision
 from trpac_hil.settings import HilSettings
-from trpac_hil.shared import Ring
-from trpac_hil.unit import Wiring
+from trpac_hil.shared import Numbers, Ring
+from trpac_hil.unit import NO_CLASS, Wiring
 
 CODEC = load_codec()
 
@@ -117,6 +126,22 @@ def test_a_dbc_file_without_ranges_leaves_what_the_bits_can_hold(tmp_path: Path)
         for signal, (low, high) in coded.bounds.items():
             stated = CODEC[name].bounds[signal]
             assert low <= stated[0] <= stated[1] <= high
+
+
+def test_a_message_without_a_counter_is_new_each_time(tmp_path: Path) -> None:
+    uncounted = tmp_path / "uncounted.dbc"
+    text = DBC_FILE.read_text(encoding="utf-8")
+    uncounted.write_text(
+        re.sub(r"^ SG_ WheelSpeeds_?Counter .*\n", "", text, flags=re.MULTILINE), encoding="utf-8"
+    )
+    codec = load_codec(uncounted)
+    coded = codec["WheelSpeeds"]
+    assert not coded.counter
+    data = coded.encode(dict.fromkeys(coded.signals, 50.0), 3)
+    assert coded.decode(data)[1] == -1
+    inputs = Inputs(codec, INPUT_MESSAGES, unsaid)
+    assert [inputs.take(256, False, data, at) for at in (0, 20 * MS, 40 * MS)] == ["WheelSpeeds"] * 3
+    assert inputs.heard["WheelSpeeds"].lost == 0
 
 
 # Time
@@ -273,14 +298,57 @@ def test_while_pictures_fail_nothing_is_known_and_after_a_good_one_it_is_again()
     assert places.counts.failed == 1
 
 
+def test_results_of_the_cameras_process_come_with_its_work_and_what_it_left_out() -> None:
+    results, motion = Ring(result_columns(2), 8), Numbers(len(MOTION))
+    camera = CameraInput(
+        PreviewStamps(PreviewConfig(P_0_m=2.5, hold_m=2.0), 0.05, 2),
+        1000 * MS,
+        ("left", "right"),
+        results,
+        motion,
+    )
+    odometer, heard = Odometer(), Inputs(CODEC, INPUT_MESSAGES, unsaid).heard["RoadClass"]
+    captured_ns = driven(20.0, 1.0, odometer)
+    camera.share_motion(odometer, {"AccelX": math.nan, "SteeringAngle": 1.6, "YawRate": 0.2})
+    assert motion.get() == pytest.approx([20.0, 0.0, 0.0, 0.2, 20.0])
+    camera.share_motion(odometer, {"AccelX": 1.5, "SteeringAngle": -0.1, "YawRate": 0.2})
+    assert motion.get()[1:3] == pytest.approx([1.5, -0.1])
+    assert not camera.news(heard, False, False, odometer, captured_ns, unsaid)
+    results.write([4, captured_ns, captured_ns, 2, 17.5, FAILED, 0.0, 1.0, 0.8])
+    results.write([5, captured_ns + 1, captured_ns, 3, 18.5, FAILED, 0.0, 1.0, 0.9])
+    now_ns = driven(20.0, 0.14, odometer, captured_ns)
+    assert camera.news(heard, False, False, odometer, now_ns, unsaid)
+    assert camera.classes == [(NO_CLASS, 0.0), (int(Surface.WET), 0.9)]
+    assert (camera.left_out, camera.work_ms, camera.number) == (3, [17.5, 18.5], 1)
+    assert camera.picture_age_ms(now_ns) == pytest.approx(140.0)
+    assert camera.age_under_wheel_ms(now_ns) == pytest.approx(140.0, abs=1e-3)
+
+
 def test_the_place_between_two_looks_is_interpolated() -> None:
     odometer = Odometer()
-    odometer.drive(0, 0.0, 0.0)
-    odometer.drive(10 * MS, 10.0, 0.01)
-    assert odometer.at(5 * MS) == pytest.approx(0.05)
-    odometer.drive(20 * MS, math.nan, 0.01)
+    odometer.drive(70 * MS, 0.0, 0.0)
+    odometer.drive(80 * MS, 10.0, 0.01)
+    assert odometer.at(74 * MS) == pytest.approx(0.04)
+    odometer.drive(90 * MS, math.nan, 0.01)
     assert odometer.position_m == pytest.approx(0.2), "without a speed the last one counts"
-    assert odometer.at(-1) is None
+    assert [odometer.at(at * MS) for at in (70, 80, 85, 90, 99)] == pytest.approx([0.0, 0.1, 0.15, 0.2, 0.2])
+    assert odometer.at(70 * MS - 1) is None
+
+
+@pytest.mark.parametrize(("silent_s", "believed"), [(0.9, True), (1.1, False)])
+def test_after_a_camera_was_lost_what_it_said_before_no_longer_counts(
+    silent_s: float, believed: bool
+) -> None:
+    odometer, places = Odometer(), preview_stamps()
+    first_ns = driven(1.0, 1.0, odometer)
+    first_m = odometer.position_m
+    places.take(result(1, first_ns, first_ns, Surface.WET), odometer, 1000 * MS)
+    now_ns = driven(1.0, silent_s, odometer, first_ns)
+    places.take(result(2, now_ns, now_ns, Surface.DRY), odometer, 1000 * MS)
+    assert (places.known(0, first_m + 3.0) is not None) == believed
+    ahead = places.known(0, odometer.position_m + 3.0)
+    assert ahead is not None
+    assert ahead.surface is Surface.DRY
 
 
 # Bus
@@ -330,7 +398,7 @@ def test_a_bus_that_raises_is_lost_said_once_and_opened_again(error: Exception) 
     assert link.receive() == []
     assert not link.up
     assert link.losses == 1
-    assert link.send(1, False, b"") is False
+    link.send(1, False, b"")
     until_back(link)
     assert link.up
     assert buses[0].shut
@@ -348,7 +416,7 @@ def test_a_full_transmit_buffer_is_no_lost_bus() -> None:
     bus = RaisingBus()
     link = Link(lambda: bus, unsaid)
     bus.failing = can.CanOperationError("Transmit buffer full")
-    assert link.send(1, False, b"") is False
+    link.send(1, False, b"")
     assert link.up
     assert link.unsent == 1
 
@@ -393,7 +461,7 @@ def test_what_goes_into_the_wire_comes_out_of_the_bus_in_order(
     settings, ring = BusSettings("virtual", "test-ferry"), relay_ring()
     wire, link, listener = RelayedBus(ring), Link(settings.open, unsaid), settings.open()
     for message in sent:
-        assert wire.send(*message)
+        wire.send(*message)
     assert wire.receive() == []
     BusRelay(ring, link, FakeClock()).take_over()
     heard = []
@@ -444,6 +512,24 @@ def test_quantiles_are_right_to_half_a_per_cent_and_the_greatest_is_exact() -> N
     assert QuantileSketch().summary() is None
 
 
+def test_figures_are_those_of_all_rows_and_the_newest_one_counts() -> None:
+    kinds = columns(Wiring.of_one("fl"))
+    places = {column.name: place for place, column in enumerate(kinds)}
+    rows = np.random.default_rng(2).uniform(1.0, 9.0, (900, len(kinds)))
+    figures = Figures(kinds)
+    assert math.isnan(figures.now("TRPAC"))
+    for part in (rows[:0], rows[:400], rows[400:]):
+        figures.add(part)
+    for name, column in SKETCHED_COLUMNS.items():
+        assert figures.summary()[name]["max"] == pytest.approx(rows[:, places[column]].max(), rel=1e-3)
+        assert figures.summary()[name]["median"] == pytest.approx(
+            np.median(rows[:, places[column]]), rel=0.01
+        )
+    assert figures.rows == 900
+    assert figures.now("TRPAC") == rows[-1, places["TRPAC"]]
+    assert math.isnan(figures.now("no such column"))
+
+
 def test_events_are_said_once_and_counted_always() -> None:
     told: list[tuple[float, str]] = []
     events = Events(lambda time_s, text: told.append((time_s, text)), lambda: 1.5)
@@ -461,6 +547,7 @@ def test_the_log_appears_whole_and_nothing_else_is_left(tmp_path: Path) -> None:
     log.add(rows[:2])
     log.add(rows[2:])
     assert not (tmp_path / "log.mf4").exists()
+    assert log.rows == 6
     log.finish()
     assert [p.name for p in tmp_path.iterdir()] == ["log.mf4"]
     with MDF(tmp_path / "log.mf4") as mdf:
@@ -479,6 +566,53 @@ def test_priority_and_cores_are_given_back():
         assert os.sched_getaffinity(0) == {min(cores)}
     assert os.sched_getaffinity(0) == cores
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
+
+
+def test_a_process_beside_the_loop_is_over_when_it_is_told_so_or_its_parent_is_gone(monkeypatch):
+    now_s, alive, looks = [100.0], [True], []
+    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
+    parent = SimpleNamespace(is_alive=lambda: looks.append(now_s[0]) or alive[0])
+    monkeypatch.setattr(helper, "parent_process", lambda: parent)
+    control = helper.Control("camera")
+    assert [control.stopped for _ in range(5)] == [False] * 5
+    assert len(looks) == 1, "a look at the parent each second is enough"
+    alive[0] = False
+    now_s[0] += 1.5 * helper.PARENT_EVERY_S
+    assert control.stopped
+    monkeypatch.setattr(helper, "parent_process", lambda: None)
+    now_s[0] += 1.5 * helper.PARENT_EVERY_S
+    assert not control.stopped, "the loop's own process has no parent to lose"
+    control.stop()
+    assert control.stopped
+    assert not control.wait_for_start()
+
+
+@pytest.mark.parametrize("number", [signals.SIGINT, signals.SIGTERM])
+def test_a_signal_stops_the_loop_not_the_program_and_means_what_it_meant_afterwards(number):
+    before, stopper = signals.getsignal(number), Stopper()
+    with stopper.by_signal():
+        assert stopper() is False
+        signals.raise_signal(number)
+        assert stopper() is True
+    assert signals.getsignal(number) is before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="timer slack is Linux's")
+def test_undisturbed_the_garbage_collector_rests_and_sleeps_end_on_time_and_then_all_is_as_before():
+    timer_slack = ctypes.CDLL(None).prctl
+    gc.enable()
+    interval_s = sys.getswitchinterval()
+    with undisturbed():
+        assert not gc.isenabled()
+        assert sys.getswitchinterval() == pytest.approx(2e-4)
+        assert timer_slack(30, 0, 0, 0, 0) == 1000, "PR_GET_TIMERSLACK [ns]"
+    assert gc.isenabled()
+    assert sys.getswitchinterval() == interval_s
+    gc.disable()
+    with undisturbed():
+        pass
+    assert not gc.isenabled(), "what was off stays off"
+    gc.enable()
 
 
 def test_a_helper_that_does_not_stop_is_ended():

@@ -132,6 +132,7 @@ def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(unit_file: Pa
     assert summary["cycles"] == len(log["time_s"]) == len(estimates) - 1
     assert summary["cycles"] + summary["overruns"]["left_out"] == 800
     assert summary["discarded_steps"] == 0
+    assert summary["wheel"] == "fl"
     assert summary["camera"]["failed"] > 0
     assert np.nanmax(log["vehicle_speed_m_s"]) > 4.0
     assert log["frame_id"].max() > 1, "pictures reached the unit"
@@ -270,7 +271,7 @@ def test_the_unit_of_four_wheels_runs_on_the_same_bus(tmp_path: Path) -> None:
     job = PlantJob(bus=bus, rate_hz=100.0, camera_delay_s=0.03)
     summary = run_hil(HilSettings(tmp_path / "out", archive, bus, rate_hz=100.0, duration_s=1.5, plant=job))
     log = columns(tmp_path / "out" / "log.mf4")
-    assert summary["unit"] == "TrpacEstimator4W"
+    assert (summary["unit"], summary["wheel"]) == ("TrpacEstimator4W", "all")
     assert (log["status"] == 1).sum() > 10
     assert log["image_class_right"].max() >= 0
     assert np.isfinite(log["TRPAC_rr"]).all()
