@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from trpac_core.confidence import ConfidenceModel
+from trpac_core.readings import Sensors
 from typer.testing import CliRunner
 
 from fmu_src.packaging import build_unit
@@ -19,10 +21,8 @@ from scenarios.pictures import frame_name, record
 from scenarios.plant.pipeline import drive
 from scenarios.runner import run_scenario
 from trpac_cli.main import app
-from trpac_core.confidence import ConfidenceModel
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
-from trpac_core.readings import Sensors
 
 ROOT = Path(__file__).parents[2]
 

@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from quarter_car import LOAD, I, R, driven, magic_formula, pulses, softer_curve, told_curve
-
 from trpac_core.elastic import ElasticModel
+
 from trpac_core.robust import belief as beliefs
 from trpac_core.robust.belief import Belief, WheelModel, hypotheses
 from trpac_core.robust.interval import Interval, interval
