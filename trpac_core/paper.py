@@ -15,7 +15,8 @@ Errata. Printed, (14) and (15) hold for the opposite sign of the force, and the 
 are as Eq. (12) needs them. The equations are solved over a step with held inputs, not by Euler's rule.
 
 Left open by the print, and read here as follows. The fuzzy sets lie evenly over the printed domains. Without a picture
-the threshold is that of the estimate itself. Where no theta gives the observed force, the estimate holds.
+the threshold is that of the estimate itself, so that from 0.8 DE does not begin below a slip of 0.048. Where no theta
+gives the observed force, the estimate holds.
 
 References
 ----------

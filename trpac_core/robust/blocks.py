@@ -23,16 +23,19 @@ class Noise(NamedTuple):
     """Its difference to the one before that."""
     values: int = 0
     """How many new values came, up to 3."""
+    held_s: float = 0.0
+    """Time since the last one [s]."""
 
 
 def heard(noise: Noise, value: float, step_s: float, least: float) -> Noise:
     """The noise after a reading; a value that is held over several steps counts once. Variance at least `least`."""
+    held_s = noise.held_s + step_s
     if noise.values > 0 and value == noise.before:
-        return noise
+        return noise._replace(held_s=held_s)
     variance, difference = noise.variance, value - noise.before
     if noise.values >= 2:
         second = difference - noise.difference
-        share = 1.0 - math.exp(-step_s / NOISE_MEMORY_S)
+        share = 1.0 - math.exp(-held_s / NOISE_MEMORY_S)
         variance += share * (second * second / SECOND_DIFFERENCE - variance)
         variance = max(variance, least)
     return Noise(variance, value, difference, min(noise.values + 1, 3))

@@ -123,8 +123,9 @@ def advanced(memory: ClassUnderWheel, given: int, way_m: float) -> Change:
     last, driven_m, stood, silent_m = memory
     if given == NONE:
         silent_m += abs(way_m)
-        kept = NONE if silent_m > STOOD_M else stood
-        return Change(ClassUnderWheel(last, driven_m, kept, silent_m), share, False)
+        if silent_m > STOOD_M:
+            driven_m, stood = 0.0, NONE
+        return Change(ClassUnderWheel(last, driven_m, stood, silent_m), share, False)
     if given != last:
         driven_m = 0.0
         if given != stood:

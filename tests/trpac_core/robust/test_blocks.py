@@ -135,7 +135,16 @@ def test_the_first_value_may_be_nought():
     """A first value of 0 is a value, not one that is held."""
     first = heard(Noise(1.0), 0.0, 1e-3, 0.1)
     assert first.values == 1
-    assert heard(first, 0.0, 1e-3, 0.1) == first
+    assert heard(first, 0.0, 1e-3, 0.1) == first._replace(held_s=1e-3)
+
+
+def test_the_noise_of_held_values_is_forgotten_as_fast_as_that_of_values_that_are_not():
+    """Twenty values a second, louder from the middle on, by steps of 1 and of 50 ms."""
+    rng = np.random.default_rng(5)
+    values = np.concatenate([rng.normal(0.0, 0.1, 100), rng.normal(0.0, 1.0, 60)])
+    held, each = (noise_of(np.repeat(values, times), 0.05 / times, least=1e-6)[-1] for times in (50, 1))
+    assert held == pytest.approx(each, rel=1e-6)
+    assert 0.3 < held < 3.0
 
 
 def test_the_noise_is_at_least_the_told():
