@@ -44,6 +44,9 @@ LEAST_SLOPE = 0.5
 """Slope of the curve by slip below which it does not count in the normalisation [-]."""
 LEAST_SPEED_M_S, LEAST_RIM_M_S = 1.5, 0.5
 """Speed below which slip says nothing, and rim speed below which the brake's torque is not the road's [m/s]."""
+MOST_SLIP = 0.4
+"""Slip of a driven wheel above which it spins, and what its tyre loses is not known: to a fifth of the peak by magic
+formulas, hardly any by others [-]."""
 NEVER = 1e-30
 """Weight that each cell keeps [-]."""
 
@@ -182,8 +185,10 @@ class WheelModel:
 
 
 def shows(reading: Reading) -> bool:
-    """Whether the tyre says anything: the car drives and the wheel turns."""
-    return reading.speed_m_s > LEAST_SPEED_M_S and reading.rim_m_s > LEAST_RIM_M_S
+    """Whether the tyre says anything: the car drives, and the wheel neither stands nor spins."""
+    return (
+        reading.speed_m_s > LEAST_SPEED_M_S and reading.rim_m_s > LEAST_RIM_M_S and reading.slip < MOST_SLIP
+    )
 
 
 def read(

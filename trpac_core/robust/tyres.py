@@ -146,7 +146,10 @@ def curves(
     stiffness = stiffness_n * exp(-softness)
     told = dugoff(theta, size[:FORMULAS], load_n, stiffness[:FORMULAS])
     own = size[FORMULAS:]
-    # A braked wheel's slip is already taken over the road's speed.
-    over_road = np.where(slip[FORMULAS:] > 0.0, own / (1.0 - own), own)
-    other = peaked(theta, over_road, stiffness[FORMULAS:] / mean_load_n, peak[FORMULAS:], fall[FORMULAS:])
+    # A braked wheel's slip is already taken over the road's speed, a driven one's over the rim's.
+    road_share = np.where(slip[FORMULAS:] > 0.0, 1.0 - own, 1.0)
+    other = peaked(
+        theta, own / road_share, stiffness[FORMULAS:] / mean_load_n, peak[FORMULAS:], fall[FORMULAS:]
+    )
+    other = other._replace(by_slip=other.by_slip / (road_share * road_share))
     return Curve(*(np.concatenate(both) for both in zip(told, other, strict=True)))

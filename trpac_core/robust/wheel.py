@@ -108,8 +108,7 @@ def setup(
     )
 
 
-@dataclass(frozen=True)
-class RobustState:
+class RobustState(NamedTuple):
     """What the robust estimator remembers.
 
     Attributes
@@ -155,7 +154,7 @@ class RobustState:
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        values = self._asdict()
         values["belief"] = {f.name: getattr(self.belief, f.name).tolist() for f in fields(Belief)}
         return values
 
@@ -236,11 +235,9 @@ def stepped(
     unread_m, stale = (0.0, False) if observed else (state.unread_m + way_m, state.stale)
     way_m += state.way_m
     if sample is None:
-        filled = Filling(duration_s=state.filling.duration_s + step_s)
-        state = replace(state, filling=filled, before=None, way_m=way_m, unread_m=unread_m, stale=stale)
-        if filled.duration_s < BLOCK_S:
-            return state
-        return _on_road(state, known, None, given, filled.duration_s)
+        # What the block had is dropped: its means would count the lost time as standstill.
+        state = state._replace(way_m=way_m, unread_m=unread_m, stale=stale)
+        return _on_road(state, known, None, given, state.filling.duration_s + step_s)
     wheel_noise, speed_noise = state.wheel_noise, state.speed_noise
     new = wheel_noise.values == 0 or sample.wheel_speed_rad_s != wheel_noise.before
     wheel_noise = heard(wheel_noise, sample.wheel_speed_rad_s, step_s, known.wheel_noise)
@@ -254,8 +251,7 @@ def stepped(
         old.duration_s + step_s,
         old.samples + new,
     )
-    state = replace(
-        state,
+    state = state._replace(
         filling=filling,
         way_m=way_m,
         wheel_noise=wheel_noise,
@@ -321,8 +317,7 @@ def _on_road(
         elif abs(friction) > LEAST_USED_SHARE * said.mean:
             doubted_s += duration_s
         offset_s = offset_s + duration_s if _offset_is_strange(belief, known, slowness) else 0.0
-    return replace(
-        state,
+    return state._replace(
         belief=belief,
         said=said,
         memory=memory,
