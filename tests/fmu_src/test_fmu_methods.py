@@ -17,7 +17,7 @@ from fmu_src.signals import INPUTS, INTERVAL_OUTPUTS, OUTPUTS
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig, SideClasses
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
 

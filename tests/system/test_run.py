@@ -19,10 +19,10 @@ from scenarios.pictures import frame_name, record
 from scenarios.plant.pipeline import drive
 from scenarios.runner import run_scenario
 from trpac_cli.main import app
-from trpac_core.confidence import ConfidenceModel
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
+from trpac_core.theta_variance import VarianceModel
 
 ROOT = Path(__file__).parents[2]
 
@@ -131,7 +131,7 @@ def test_another_method_is_that_of_the_unit_and_of_the_report(scenario_file, uni
     config = EstimatorConfig(
         scenario.vehicle.to_core(),
         method=Method.of(method),
-        confidence=replace(ConfidenceModel(), torque_noise_nm=noise.wheel_torque_noise_nm),
+        confidence=replace(VarianceModel(), torque_noise_nm=noise.wheel_torque_noise_nm),
         sliding_speed_noise_m_s=float(
             np.hypot(
                 noise.vehicle_speed_noise_m_s, scenario.vehicle.wheel_radius_m * noise.wheel_speed_noise_rad_s

@@ -16,7 +16,7 @@ from scenarios.library import FOLDERS, located, shipped
 from trpac.extras import EXTRA_OF, MissingExtraError, extras
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
-from trpac_core.readings import Sensors
+from trpac_core.sensors import Sensors
 
 CAR = trpac.Vehicle.builtin("four_in_wheel_motor_ev")
 TIME_S = np.arange(0.0, 4.0, 0.01)

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from trpac_core.readings import Sensors
 
 from trpac_core import tyre
 from trpac_core.car_friction import Friction, car_friction
@@ -15,6 +14,7 @@ from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.estimator_data import Method, Source
 from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig
 from trpac_core.robust.messages import LASTING_S
+from trpac_core.sensors import Sensors
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
 

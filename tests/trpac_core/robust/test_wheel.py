@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from quarter_car import LOAD, I, R, driven, magic_formula, pulses, softer_curve, told_curve
 
-from trpac_core.elastic import ElasticModel
 from trpac_core.robust import belief as beliefs
 from trpac_core.robust.belief import Belief, WheelModel, hypotheses
 from trpac_core.robust.interval import Interval, interval
 from trpac_core.robust.roads import NONE, priors
 from trpac_core.robust.tyres import TYRES
 from trpac_core.robust.wheel import RobustState, Sample, begun, point, setup, stepped
+from trpac_core.slip_calibration import CarTolerance
 
 DRY, WET, SNOW = range(3)
 CLASSES = (0.8, 0.6, 0.2)
 WHEEL = WheelModel(5e4, LOAD, I, R)
-KNOWN = setup(WHEEL, 0.0, 0.0042, 3.2, ElasticModel(), CLASSES)
+KNOWN = setup(WHEEL, 0.0, 0.0042, 3.2, CarTolerance(), CLASSES)
 CURVES = {"told": told_curve, "softer": softer_curve, "magic formula": magic_formula}
 
 
@@ -268,7 +268,7 @@ def test_a_wheel_that_stands_says_nothing():
 
 def test_a_constant_error_of_the_speed_is_another_slip_at_another_speed():
     """Coasting at 5 m/s, then at 20: the offset's variance gains b^2 (1 / 5 - 1 / 20) / 5, less what is read."""
-    told = setup(WHEEL, 0.0, 0.0042, 3.2, ElasticModel(speed_bias_m_s=0.0), CLASSES)
+    told = setup(WHEEL, 0.0, 0.0042, 3.2, CarTolerance(speed_bias_m_s=0.0), CLASSES)
     biased = replace(told, speed_bias_m_s=0.1)
     slow, fast = (driven(lambda t: 0.0, lambda t: 0.9, 0.05, speed_m_s=v, noise=0.0) for v in (5.0, 20.0))
     gap = [np.full(10, np.nan)] * 3
@@ -282,7 +282,7 @@ def test_a_constant_error_of_the_speed_is_another_slip_at_another_speed():
 
 
 def test_the_set_up_takes_what_is_told():
-    known = setup(WHEEL, 0.0065, 0.0042, 3.2, ElasticModel(0.014, ratio=0.001, compliance=0.02), CLASSES)
+    known = setup(WHEEL, 0.0065, 0.0042, 3.2, CarTolerance(0.014, ratio=0.001, compliance=0.02), CLASSES)
     assert known.tyres.offset_variance[:, 0] == pytest.approx([0.001**2, 0.005**2, 0.005**2, 0.005**2])
     assert known.tyres.softness_variance[:, 0] == pytest.approx([0.02**2, 0.15**2, 0.2**2, 0.2**2])
     assert (known.rolling_resistance, known.torque_noise_nm, known.speed_bias_m_s) == (0.0065, 3.2, 0.014)
@@ -296,7 +296,7 @@ def test_the_set_up_takes_what_is_told():
 
 
 def test_a_car_that_is_exactly_as_told_still_has_a_variance():
-    known = setup(WHEEL, 0.0, 0.0, 0.0, ElasticModel(0.0, 0.0, 0.0, 0.0), CLASSES)
+    known = setup(WHEEL, 0.0, 0.0, 0.0, CarTolerance(0.0, 0.0, 0.0, 0.0), CLASSES)
     assert known.tyres.offset_variance[0, 0] == pytest.approx(1e-8)
     assert known.tyres.softness_variance[0, 0] == pytest.approx(1e-8)
     drive = driven(pulses(230.0), lambda t: 0.3, 1.0, noise=0.0)
