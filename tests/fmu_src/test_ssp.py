@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import zipfile
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -89,6 +90,9 @@ def test_sets_hold_parameters_that_their_elements_have_at_the_elements_own_start
             differ = {parameter for parameter in values if shared[parameter] != values[parameter]}
             known = {"tyre.rolling_resistance"} if element == ESTIMATOR else set()
             assert differ == known, "tools that read no sets drive the same car over the same road"
+    bound = Counter(p for elements, values in wiring.sets.values() if PLANT in elements for p in values)
+    own = [v for v in UNITS["ReferencePlant"].variables if v.causality == "parameter" and v.start is not None]
+    assert bound == dict.fromkeys([v.name for v in own if v.kind is not Kind.STRING], 1)
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

@@ -88,7 +88,7 @@ class Bench:
                     self._by_line[file][number].add(test)
 
     def tests_of(self, mutant: Mutant) -> list[str]:
-        """The tests that run a mutant's place, those first that found others near it, then the quick ones."""
+        """The tests that run a mutant's place: first those that found others near it, then what is near, then quick."""
         place = mutant.place
         lines = range(place.lines[0], place.lines[1] + 1)
         tests = set().union(*(self._by_line[place.file][n] for n in lines))
@@ -97,7 +97,8 @@ class Bench:
         tests = tests or self._naming(place.file)  # as where an isolated interpreter runs it
         killers = self._killers[f"{place.file} {place.function}"][::-1] + self._killers[place.file][::-1]
         likely = list(dict.fromkeys(t for t in killers if t in tests))
-        ordered = likely + sorted(tests - set(likely), key=lambda t: (self.took[t], t))
+        near = self._naming(place.file).union(*self._by_line[place.file].values())
+        ordered = likely + sorted(tests - set(likely), key=lambda t: (t not in near, self.took[t], t))
         total, enough = 0.0, []
         for test in ordered:
             total += self.took[test]
