@@ -89,6 +89,28 @@ def test_the_slopes_of_each_tyre_curve_are_those_of_its_force(curve, theta):
             assert by_load == pytest.approx(more, abs=2e-3 * theta)
 
 
+@pytest.mark.parametrize("theta", [0.3, 0.9])
+@pytest.mark.parametrize(
+    ("field", "shares"),
+    [
+        ("knee", {0.3: 0.64, 0.6: 1.0, 1.2: 0.64}),  # 4 u^2 / (1 + u^2)^2 at half, once and twice its place
+        ("crest", {1.2: 0.64, 2.4: 1.0, 4.8: 0.64}),
+        ("sliding", {0.5: 1.0 / 101.0, 5.0: 0.5, 10.0: 0.8}),
+    ],
+)
+def test_a_reshaped_tyre_deviates_at_the_stretch_that_is_said_whatever_grip_and_stiffness(
+    theta, field, shares
+):
+    p = make_setup(NOMINAL, DRY).parameters._replace(**{field: 0.2})
+    stiffness_n, load_n = p.longitudinal_stiffness_n[0], 3000.0
+    for stretch, share in shares.items():
+        slip = stretch * theta * load_n / stiffness_n
+        plain = tyre_force(theta, slip, load_n, stiffness_n)[0]
+        assert dynamics.steady_tyre(theta, slip, load_n, stiffness_n, p)[0] / plain == pytest.approx(
+            1.0 + 0.2 * share
+        )
+
+
 STATES_OF_THE_STEP = {
     "tyres alone": {},
     "drag": {"drag_kg_m": 40.0},

@@ -34,9 +34,7 @@ def main() -> int:
     )
     parser.add_argument("--again", type=Path, help="file of results: only the mutants that survived there")
     parser.add_argument("--root", type=Path, default=ROOT, help="of the git tree")
-    parser.add_argument(
-        "--work", type=Path, help="folder to keep: copy of the tree, and what the tests run in it"
-    )
+    parser.add_argument("--work", type=Path, help="folder to keep, while neither code nor tests change")
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="trpac-mutants-") as place:

@@ -6,6 +6,7 @@ import importlib
 import json
 import math
 import os
+import re
 import resource
 import shutil
 import signal
@@ -45,8 +46,7 @@ class Bench:
         self._folders, self._tests, self._marks = folders, tests, marks
         self._tests_s, self._hangs_s = tests_s, hangs_s
         self._killers: defaultdict[str, list[str]] = defaultdict(list)
-        if not self.copy.exists():
-            _copy(root, self.copy)
+        _copy(root, self.copy)
         hooks = work / "hooks"
         hooks.mkdir(exist_ok=True)
         (work / "numba").mkdir(exist_ok=True)
@@ -116,7 +116,8 @@ class Bench:
     def _naming(self, file: str) -> set[str]:
         """The tests in files that name this one."""
         files = {test: self.copy / test.partition("::")[0] for test in self.took}
-        naming = {f for f in set(files.values()) if Path(file).stem in f.read_text(encoding="utf-8")}
+        name = re.compile(rf"\b{Path(file).stem}\b")
+        naming = {f for f in set(files.values()) if name.search(f.read_text(encoding="utf-8"))}
         return {test for test, f in files.items() if f in naming}
 
     # Mutants
