@@ -51,4 +51,5 @@ def full_run(plan: RunPlan, unit: Mapping[str, float] | None = None) -> Run:
         table["excitation_flag"].to_numpy(),
         plan.scenario.step_s,
     )
-    return Run(plan.scenario, trajectory, pd.DataFrame(), table, {"estimators": scores})
+    summary = {"estimators": scores, "method": estimator.config.method.label}
+    return Run(plan.scenario, trajectory, pd.DataFrame(), table, summary)
