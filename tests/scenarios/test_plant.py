@@ -111,6 +111,15 @@ def test_a_reshaped_tyre_deviates_at_the_stretch_that_is_said_whatever_grip_and_
         )
 
 
+@pytest.mark.parametrize("speed_rad_s", [-3.0, -0.015, -0.001, 0.0, 0.004, 0.019, 0.5])
+def test_a_brake_on_a_motor_opposes_its_motion_and_fades_evenly_through_rest(speed_rad_s):
+    fade = dynamics.BRAKE_FADE_RAD_S
+    braked, fall = dynamics._motor_torque(speed_rad_s, -50.0)
+    assert braked == pytest.approx(np.interp(speed_rad_s, [-fade, fade], [50.0, -50.0]))
+    assert fall == pytest.approx(50.0 / fade if abs(speed_rad_s) < fade else 0.0)
+    assert dynamics._motor_torque(speed_rad_s, 50.0) == (50.0, 0.0)
+
+
 STATES_OF_THE_STEP = {
     "tyres alone": {},
     "drag": {"drag_kg_m": 40.0},
