@@ -54,7 +54,8 @@ DAMAGED = {
     "picture_onnx": 60,
     "state_TrpacEstimator": 60,
 }
-"""Damaged files of each kind, 12,000 in all: many of those that are read in a millisecond, few of those that a process reads."""
+"""Damaged files of each kind, 12,000 in all: many of those that are read in a millisecond, few of those that a process
+reads."""
 
 
 def test_many_steps_and_instances_leave_nothing_behind(unit_folder: Path) -> None:
