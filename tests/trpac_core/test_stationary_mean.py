@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-
-from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
 from trpac_core.excitation import FuzzyScheduler
 from trpac_core.identifiability import (
     SHORT_MEAN_S,
@@ -14,7 +12,6 @@ from trpac_core.identifiability import (
     point_of_mean,
     significance_of_mean,
 )
-from trpac_core.slip import Slip
 from trpac_core.stationary_mean import (
     GREATEST_GAMMA_FACTOR,
     MEMORY_S,
@@ -26,6 +23,9 @@ from trpac_core.stationary_mean import (
     unsettled_slip,
     with_reading,
 )
+
+from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
+from trpac_core.slip import Slip
 from trpac_core.tyre import force, sliding_onset_friction
 
 STEP_S, TAU_S, NOISE = 1e-3, 0.01, 1e-4
