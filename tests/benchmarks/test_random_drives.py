@@ -9,7 +9,7 @@ from scenarios.files import load_vehicle
 CAR = load_vehicle(CAR_FILE)
 
 
-class Stopped(Exception):
+class NotDrivenError(Exception):
     """Instead of the drive."""
 
 
@@ -20,7 +20,7 @@ def driven(monkeypatch):
 
     def stop(car, *_):
         cars.append(car)
-        raise Stopped
+        raise NotDrivenError
 
     monkeypatch.setattr(random_drives, "_driven", stop)
     return cars
@@ -29,7 +29,7 @@ def driven(monkeypatch):
 @pytest.mark.parametrize("tyre", [None, Tyre(1.6, -0.5, relaxation_m=0.3)])
 def test_the_stiffness_of_all_drawn_cars_goes_with_the_load(driven, tyre):
     for seed in range(20):
-        with pytest.raises(Stopped):
+        with pytest.raises(NotDrivenError):
             make_drive(seed, CarError(stiffness=0.1), tyre=tyre)
     for car in driven:
         assert car.forms["tyre_stiffness_offset"] == "with load"
