@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from trpac_core.slip_calibration import EXACT_CAR, CarTolerance
+from trpac_core.vehicle import EXACT_CAR, CarTolerance
 from trpac_core.stationary_mean import NO_MEAN, StationaryMean, aged, mean_slip_deviation
 from trpac_core.theta_variance import drifted_variance, unknown_variance
 

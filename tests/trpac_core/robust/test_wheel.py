@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from quarter_car import LOAD, I, R, driven, magic_formula, pulses, softer_curve, told_curve
-from trpac_core.slip_calibration import CarTolerance
+from trpac_core.vehicle import CarTolerance
 
 from trpac_core.robust import belief as beliefs
 from trpac_core.robust.belief import Belief, WheelModel, hypotheses
