@@ -9,11 +9,12 @@ and exponential curves near the second.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from .arrays import Array, exp
+from .arrays import Array, exp, stacked
+from .roads import THETA, PerCell
 
 LEAST_SLIP = 1e-9
 """Slip below which the tyre is taken at this slip: its formula divides by slip [-]."""
@@ -62,6 +63,13 @@ TYRES = (
 2012, ch. 3 and 4); beyond it steep magic formulas lose to 0.6 at three times the peak's slip, which is `fall` 1."""
 FORMULAS = 2
 """How many of the tyres, the first ones, have the told formula."""
+PerTyre = Annotated[Array, (len(TYRES),)]
+Column = Annotated[Array, (len(TYRES), 1)]
+"""One value for each tyre: alone, and beside an axis of cells."""
+Grid = Annotated[Array, (len(TYRES), len(THETA))]
+"""One value for each tyre and cell."""
+IS_TOLD = np.array([[float(index == TOLD)] for index in range(len(TYRES))])
+"""1 for the tyre that is as told, else 0."""
 
 
 class Curve(NamedTuple):
@@ -75,6 +83,7 @@ class Curve(NamedTuple):
     """From 0 where the tyre adheres to 1 where it slides all over."""
 
 
+GridCurve = Annotated[Curve, (len(TYRES), len(THETA))]
 SLIDES_AT = 5.0
 """Normalised slip at which a tyre counts as half sliding: about twice that of its peak [-]."""
 
@@ -120,15 +129,15 @@ def peaked(theta: Array, slip: Array, stiffness: Array, peak: Array, fall: Array
 
 
 def curves(
-    theta: Array,
-    slip: Array,
-    softness: Array,
+    theta: PerCell,
+    slip: Grid,
+    softness: Grid,
     load_n: float,
     stiffness_n: float,
     mean_load_n: float,
-    peak: Array,
-    fall: Array,
-) -> Curve:
+    peak: Column,
+    fall: Column,
+) -> GridCurve:
     """Curve of each tyre in each cell, shape (tyres, cells).
 
     Parameters
@@ -152,4 +161,4 @@ def curves(
         theta, own / road_share, stiffness[FORMULAS:] / mean_load_n, peak[FORMULAS:], fall[FORMULAS:]
     )
     other = other._replace(by_slip=other.by_slip / (road_share * road_share))
-    return Curve(*(np.concatenate(both) for both in zip(told, other, strict=True)))
+    return stacked(told, other)
