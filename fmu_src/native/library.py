@@ -71,28 +71,36 @@ class Library:
             ctypes.byref(value) if kind.big or kind.kind == "array" else value
             for value, kind in zip(values, kinds, strict=True)
         ]
-        returned = self.kind(function.returns) if function.returns.kind != "nothing" else None
         if function.updates:
             called.restype = None
             called(*given)
             return self.to_python(values[0], function.returns)
         if function.by_pointer:
             called.restype = None
-            result = returned()
+            result = self.kind(function.returns)()
             called(ctypes.byref(result), *given)
             return self.to_python(result, function.returns)
-        called.restype = returned
-        result = called(*given)
-        return None if returned is None else self.to_python(result, function.returns)
+        if function.returns.kind == "nothing":
+            called.restype = None
+            called(*given)
+            return None
+        called.restype = self.kind(function.returns)
+        return self.to_python(called(*given), function.returns)
 
     def kind(self, kind: Type) -> Any:
         """The type of ctypes."""
         if kind.kind in ("double", "int", "bool", "enum"):
-            simple = {"double": ctypes.c_double, "int": ctypes.c_int, "bool": ctypes.c_bool, "enum": ctypes.c_int}
+            simple = {
+                "double": ctypes.c_double,
+                "int": ctypes.c_int,
+                "bool": ctypes.c_bool,
+                "enum": ctypes.c_int,
+            }
             return simple[kind.kind]
         if kind.kind == "array" and kind.item is not None:
             return self.kind(kind.item) * kind.size
         if kind.c not in self._kinds:
+            fields: list[tuple[str, Any]]
             if kind.kind == "tuple":
                 fields = [("at", ctypes.c_double * kind.size)]
             elif kind.kind == "optional" and kind.item is not None:
@@ -109,7 +117,9 @@ class Library:
             return made(value.value)
         if kind.kind == "array" and kind.item is not None:
             if kind.item.kind == "record":
-                rows = zip(*(np.ravel(getattr(value, f.name)).tolist() for f in kind.item.fields), strict=True)
+                rows = zip(
+                    *(np.ravel(getattr(value, f.name)).tolist() for f in kind.item.fields), strict=True
+                )
                 return made(*(self.kind(kind.item)(*row) for row in rows))
             return made(*np.ravel(value).tolist())
         if kind.kind == "tuple":

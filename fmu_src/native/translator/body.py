@@ -118,10 +118,13 @@ class Body(Loops):
         self.put(f"if ({self.truth(node.test).text}) {{")
         self.inner(node.body)
         rest = node.orelse
-        while len(rest) == 1 and isinstance(rest[0], ast.If) and not (id(rest) in self.homes or needs_line(rest[0].test)):
-            self.put(f"}} else if ({self.truth(rest[0].test).text}) {{")
-            self.inner(rest[0].body)
-            rest = rest[0].orelse
+        while len(rest) == 1 and isinstance(rest[0], ast.If) and id(rest) not in self.homes:
+            inner = rest[0]
+            if needs_line(inner.test):
+                break
+            self.put(f"}} else if ({self.truth(inner.test).text}) {{")
+            self.inner(inner.body)
+            rest = inner.orelse
         if rest:
             self.put("} else {")
             self.inner(rest)
@@ -310,19 +313,27 @@ class Body(Loops):
 
     def replace_in(self, target: str, kind: Type, given: dict[str, ast.expr]) -> None:
         """Set fields of a record in place; what they become is worked out before."""
-        later = []
-        for field, node in given.items():
+        later: list[tuple[str, Type, str | ast.expr | Expression]] = []
+        for field, value in given.items():
+            node: Any = value
             f = kind.field(field)
             if f is None:
                 raise self.refuse(node, f"{kind.c} has no field {field}.")
             if f.type.big or f.type.kind == "array":
+                if not simple(node):
+                    name = self.temporary(f.type)
+                    self.fill(name, f.type, node)
+                    self.flush()
+                    node = f"memcpy(&{part_of(target, field)}, &{name}, sizeof {name});"
                 later.append((part_of(target, field), f.type, node))
                 continue
             e = self.coerced(self.expr(node, f.type), f.type, node)
             self.flush()
             later.append((part_of(target, field), f.type, e if simple(node) else self.named(e)))
         for place, field_type, what in later:
-            if isinstance(what, Expression):
+            if isinstance(what, str):
+                self.put(what)
+            elif isinstance(what, Expression):
                 self.put(f"{place} = {what.text};")
             else:
                 self.fill(place, field_type, what)

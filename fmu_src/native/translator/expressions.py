@@ -259,7 +259,7 @@ class Expressions:
         if base.type.kind == "tuple":
             return Expression(f"{base.bound(ATOM)}.at[{self.index(node.slice)}]", DOUBLE)
         if base.type.kind == "record" and isinstance(node.slice, ast.Constant):
-            f = base.type.fields[node.slice.value]
+            f = base.type.fields[self.whole(node.slice)]
             return base.member(f.name, f.type)
         if base.type.kind != "array":
             raise self.refuse(node, f"an index into {base.type.c}.")

@@ -56,7 +56,7 @@ static int count_below(const double *ascending, double value, int n)
     int low = 0, high = n;
     while (low < high) {
         const int middle = low + (high - low) / 2;
-        if (ascending[middle] < value)
+        if (before(ascending[middle], value))
             low = middle + 1;
         else
             high = middle;
@@ -69,7 +69,7 @@ static int count_up_to(const double *ascending, double value, int n)
     int low = 0, high = n;
     while (low < high) {
         const int middle = low + (high - low) / 2;
-        if (ascending[middle] <= value)
+        if (!before(value, ascending[middle]))
             low = middle + 1;
         else
             high = middle;
@@ -259,10 +259,10 @@ class Loops(Expressions):
             parts = [self.expr(v, DOUBLE) for v in node.args]
             self.wanted = wanted
             if name == "stacked":
-                shape = (sum(p.type.shape[0] for p in parts), *parts[0].type.shape[1:])
+                rows = (sum(p.type.shape[0] for p in parts), *parts[0].type.shape[1:])
                 names = frozenset[str]().union(*(p.names for p in parts))
                 return Expression(
-                    "", array_of(parts[0].type.item or DOUBLE, shape), names=names, stack=tuple(parts)
+                    "", array_of(parts[0].type.item or DOUBLE, rows), names=names, stack=tuple(parts)
                 )
             return (
                 self._total(parts[0], name) if name in ("total", "over_rows") else self._helper(name, parts)

@@ -295,7 +295,12 @@ def array_at(address: str, kind: Type, names: frozenset[str] = frozenset()) -> E
 
 def flat_index(indices: tuple[str, ...], shape: tuple[int, ...]) -> str:
     """The place of an element in the memory of an array; within a loop over two dimensions `k` is that of i and j."""
-    if len(shape) == 2 and 1 not in shape and indices[1] == "j" and indices[0].startswith(("i", "(i + ")):
+    if (
+        len(shape) == 2
+        and 1 not in shape
+        and indices[1] == "j"
+        and (indices[0] == "i" or indices[0].startswith("(i + "))
+    ):
         rows = int(indices[0].strip("()").removeprefix("i").removeprefix(" + ") or 0)
         return f"k + {rows * shape[1]}" if rows else "k"
     terms, stride = [], 1

@@ -1,0 +1,32 @@
+"""The estimator's functions that the native unit is made of."""
+
+from __future__ import annotations
+
+from trpac_core import car_friction, excitation, local_speed, paper, tyre
+from trpac_core.robust import wheel
+
+from .translator.body import translated
+from .translator.program import Program
+
+ROOTS = (
+    tyre.peak_friction,
+    excitation.FuzzyScheduler.threshold,
+    excitation.FuzzyScheduler.K_v,
+    paper.begun,
+    paper.printed_step,
+    wheel.setup,
+    wheel.begun,
+    wheel.stepped,
+    wheel.point,
+    local_speed.local_speeds,
+    car_friction.car_friction,
+)
+"""What the unit calls; all that these need is translated with them."""
+
+
+def estimator_program() -> Program:
+    """The estimator in C."""
+    program = Program(translated)
+    for function in ROOTS:
+        program.require(function)
+    return program
