@@ -39,8 +39,9 @@ def take_frame(
     else:
         state.frame_failed = True
         return
-    state.preview = add_frame(
-        prune(state.preview, preview, state.position_m),
+    prune(state.preview, preview, state.position_m)
+    add_frame(
+        state.preview,
         preview,
         outcome,
         position_m=state.position_m,

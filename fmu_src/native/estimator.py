@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from trpac_core import car_friction, excitation, local_speed, paper, tyre
 from trpac_core.robust import wheel
+from trpac_core.vision import preview
 
 from .translator.body import translated
 from .translator.program import Program
@@ -12,6 +13,9 @@ ROOTS = (
     tyre.peak_friction,
     excitation.FuzzyScheduler.threshold,
     excitation.FuzzyScheduler.K_v,
+    preview.add_frame,
+    preview.prune,
+    preview.covering,
     paper.begun,
     paper.printed_step,
     wheel.setup,

@@ -14,7 +14,7 @@ import numpy as np
 
 from trpac_core.errors import TrpacError
 
-from .translator.program import Program
+from .translator.program import Function, Program
 from .translator.types import Type, safe
 
 FLAGS = ("-O2", "-std=c99", "-ffp-contract=off")
@@ -62,11 +62,19 @@ class Library:
         self._library = ctypes.CDLL(str(compiled([files[1]], folder / "trpac.so", *WARNINGS)))
 
     def call(self, python: Any, *arguments: Any) -> Any:
-        """What the C of a function returns for these arguments, as the Python function would."""
+        """What the C of a function returns for these arguments; those that Python changes in place are changed."""
         function = self.program.require(python)
         called = getattr(self._library, function.c)
         kinds = [kind for _, kind in function.parameters]
         values = [self.to_c(value, kind) for value, kind in zip(arguments, kinds, strict=True)]
+        result = self._called(function, called, values, kinds)
+        for argument, value, kind in zip(arguments, values, kinds, strict=True):
+            if kind.mutable:
+                for f in kind.fields:
+                    setattr(argument, f.name, self.to_python(getattr(value, safe(f.name)), f.type))
+        return result
+
+    def _called(self, function: Function, called: Any, values: list[Any], kinds: list[Type]) -> Any:
         given = [
             ctypes.byref(value) if kind.big or kind.kind == "array" else value
             for value, kind in zip(values, kinds, strict=True)

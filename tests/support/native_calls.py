@@ -35,6 +35,14 @@ RANGES = {
     "fall": (0.0, 1.0),
     "wheelbase_m": (2.0, 4.0),
     "cog_to_rear_axle_m": (0.5, 1.9),
+    "first": (0, 511),
+    "count": (0, 512),
+    "surface": (0, 2),
+    "k": (0, 511),
+    "place": (0, 511),
+    "X_lb_m": (0.0, 20.0),
+    "X_ub_m": (0.0, 20.0),
+    "position_m": (0.0, 20.0),
     "samples": (1, 10),
     "given": (-1, 2),
     "stood": (-1, 2),
@@ -92,7 +100,7 @@ def bits(value):
         return [bits(item) for item in value.ravel().tolist()]
     if isinstance(value, float):
         return "nan" if math.isnan(value) else struct.pack("d", value)
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return [bits(item) for item in value]
     if dataclasses.is_dataclass(value):
         return [bits(getattr(value, field.name)) for field in dataclasses.fields(value)]

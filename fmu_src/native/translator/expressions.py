@@ -349,6 +349,8 @@ class Expressions:
             raise self.refuse(
                 node, "a power, whose last bit differs between compilers: multiply, or take math.sqrt."
             )
+        if isinstance(node.op, ast.FloorDiv) and left.type == right.type == INT:
+            return Expression(f"floor_divided({left.text}, {right.text})", INT)
         if type(node.op) not in BINARY:
             raise self.refuse(node, f"the operator {type(node.op).__name__} is not known to the translator.")
         sign, binds = BINARY[type(node.op)]
@@ -597,6 +599,10 @@ class Expressions:
         """Write an expression or a default value to a place."""
         if isinstance(value, ast.expr):
             self.fill(target, kind, value)
+        elif kind.kind == "array":
+            if any(value):
+                raise self.refuse(node, "an array whose default is not 0 everywhere.")
+            self.put(f"memset({target}, 0, sizeof {target});")
         else:
             self.put(f"{target} = {literal(value, kind, self.source.file)};")
 

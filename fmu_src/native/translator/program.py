@@ -35,6 +35,7 @@ static inline int most_int(int a, int b) { return b > a ? b : a; }
 /* As numpy has them: NaN where either is. */
 static inline double minimum(double a, double b) { return a < b || a != a ? a : b; }
 static inline double maximum(double a, double b) { return a > b || a != a ? a : b; }
+static inline int floor_divided(int a, int b) { return a / b - ((a % b != 0) && ((a < 0) != (b < 0))); }
 /* Whether a is sorted before b, NaN last. */
 static inline bool before(double a, double b) { return a < b || (b != b && a == a); }
 """

@@ -17,7 +17,7 @@ from .source import Unsupported, field_texts
 
 _KEYWORDS = """
 auto break case char const default do double else enum extern float for goto if inline int long register restrict return
-short signed sizeof static struct switch typedef union unsigned void volatile while bool true false i j result"""
+short signed sizeof static struct switch typedef union unsigned void volatile while bool true false i j k result"""
 KEYWORDS = frozenset(_KEYWORDS.split())
 """Names that C or the generated code uses itself."""
 ARRAY = NDArray[np.float64]
@@ -117,7 +117,8 @@ class Types:
             return NOTHING
         origin, arguments = get_origin(hint), get_args(hint)
         if origin is Annotated and isinstance(hint.__metadata__[0], tuple):
-            return array_of(self.of(arguments[0], where), hint.__metadata__[0])
+            item = get_args(arguments[0])[0] if get_origin(arguments[0]) is list else arguments[0]
+            return array_of(self.of(item, where), hint.__metadata__[0])
         if origin in (Union, types.UnionType) and len(arguments) == 2 and arguments[1] is type(None):
             return self.optional(self.of(arguments[0], where))
         if origin is tuple and ... not in arguments:
