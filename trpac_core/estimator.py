@@ -35,11 +35,11 @@ from .robust.wheel import INNOVATION, RobustState, Sample, begun, point, setup, 
 from .sensors import (
     GREATEST_ACCELERATION_M_S2,
     LONGEST_STEP_S,
-    MOTION,
     FilteredReadings,
     Sensors,
-    implausible,
+    motion_plausible,
     unusable,
+    unusable_text,
 )
 from .slip_calibration import SlipCalibration, calibrated
 from .stationary_mean import gamma_factor, unsettled_slip
@@ -201,7 +201,8 @@ class TrpacEstimator:
             If the picture does not fit the camera; nothing has changed then.
         """
         config, state = self.config, self._state
-        problem = unusable(step_s, sensors, self._wheel.radius_m, config.floor_m_s)
+        reason = unusable(step_s, sensors, self._wheel.radius_m, config.floor_m_s)
+        problem = unusable_text(reason, step_s, sensors, 0.0)
         if frame is not None and isinstance(frame, RoadClass) and not 0.0 <= frame.confidence <= 1.0:
             problem = problem or f"Class confidence is {frame.confidence}; expected a number between 0 and 1."
             frame, frame_failed = None, True
@@ -473,7 +474,7 @@ class TrpacEstimator:
         if step_s > LONGEST_STEP_S:
             # The car may be anywhere: what was seen ahead is not under the wheel.
             state.preview, state.ife = PreviewState(), state.ife.elsewhere()
-        if not implausible(sensors, MOTION):
+        if motion_plausible(sensors):
             if frame is not None or frame_failed:
                 acceleration = state.acceleration_m_s2
                 take_frame(state, self.config, self._preview, self._ife, frame, sensors, acceleration)

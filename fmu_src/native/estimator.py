@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from trpac_core import car_friction, excitation, local_speed, paper, tyre
-from trpac_core.robust import wheel
+from trpac_core import car_friction, excitation, local_speed, paper, sensors, tyre
+from trpac_core.robust import messages, wheel
 from trpac_core.vision import preview
 
 from .translator.body import translated
@@ -13,6 +13,10 @@ ROOTS = (
     tyre.peak_friction,
     excitation.FuzzyScheduler.threshold,
     excitation.FuzzyScheduler.K_v,
+    sensors.unusable,
+    sensors.motion_plausible,
+    messages.learnt_stiffness_n,
+    messages.learnt_offset,
     preview.add_frame,
     preview.prune,
     preview.covering,

@@ -57,6 +57,11 @@ def greatest(values: Array) -> float:
     return float(values.max())
 
 
+def first_greatest(values: Array) -> int:
+    """Place of the greatest of values, the first of those alike."""
+    return int(values.argmax())
+
+
 def count_below(ascending: Array, value: float) -> int:
     """How many of ascending values are less than a value."""
     return int(np.searchsorted(ascending, value))

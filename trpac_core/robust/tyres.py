@@ -70,6 +70,8 @@ Grid = Annotated[Array, (len(TYRES), len(THETA))]
 """One value for each tyre and cell."""
 IS_TOLD = np.array([[float(index == TOLD)] for index in range(len(TYRES))])
 """1 for the tyre that is as told, else 0."""
+PEAKS = np.array([tyre.peak for tyre in TYRES])
+"""`Tyre.peak` of each [-]."""
 
 
 class Curve(NamedTuple):

@@ -35,6 +35,15 @@ static double greatest(const double *values, int n)
             most = most != most ? most : values[j];
     return most;
 }""",
+    "first_greatest": """\
+static int first_greatest(const double *values, int n)
+{
+    int most = 0;
+    for (int j = 1; j < n && values[most] == values[most]; j++)
+        if (!(values[j] <= values[most]))
+            most = j;
+    return most;
+}""",
     "cumulated": """\
 static void cumulated(double *result, const double *values, int n)
 {
@@ -304,6 +313,8 @@ class Loops(Expressions):
         address = self.placed(e)
         if name == "greatest":
             return Expression(f"greatest({address}, {e.type.size})", DOUBLE)
+        if name == "first_greatest":
+            return Expression(f"first_greatest({address}, {e.type.size})", INT)
         if name in ("count_below", "count_up_to"):
             return Expression(f"{name}({address}, {parts[1].text}, {e.type.size})", INT)
         result = self.temporary_array(e.type)
