@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from trpac_core.dife import GREATEST_THETA
 from trpac_core.four_wheels import FourWheelsConfig
 from trpac_core.parameters.variables import Kind, Variable
+from trpac_core.tyre import GREATEST_THETA
 from trpac_core.vehicle import WHEELS
 
 from .settings import PARAMETERS

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from trpac_core.dife import GREATEST_THETA
 from trpac_core.estimator_data import Source
 from trpac_core.parameters.variables import Kind, Variable
+from trpac_core.tyre import GREATEST_THETA
 from trpac_core.vision.classes import Surface
 
 NO_ROAD_CLASS = -1

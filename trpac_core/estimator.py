@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -11,27 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import paper as printed
-from .dife import (
-    GREATEST_THETA,
-    NEVER_SEEN_M,
-    SEEN_HOLD_M,
-    FusionState,
-    FusionStep,
-    VisualTerm,
-    Wheel,
-    fusion_step,
-    settled,
-    unread,
-)
+from .dife import FusionState, VisualTerm, Wheel, fusion_step, settled, visual_gain
 from .estimator_data import Estimate, EstimatorConfig, EstimatorState, Method, Rates, RoadClass, Source
-from .identifiability import WheelInputs
 from .paper import PrintedWheel, printed_step
 from .preprocessing import LOCKED_M_S, jumped, preprocess
 from .road_buffer import take_frame
 from .robust import roads
 from .robust.belief import WheelModel
 from .robust.messages import radius_message, tyre_message
-from .robust.wheel import INNOVATION, RobustState, Sample, begun, point, setup, stepped
+from .robust.wheel import Sample, begun, claim, point, setup, stepped
 from .sensors import (
     GREATEST_ACCELERATION_M_S2,
     LONGEST_STEP_S,
@@ -41,18 +28,8 @@ from .sensors import (
     unusable,
     unusable_text,
 )
-from .slip_calibration import SlipCalibration, calibrated
-from .stationary_mean import gamma_factor, unsettled_slip
-from .stiffness_mismatch import updated_mismatch
-from .theta_variance import (
-    Evidence,
-    advanced_variance,
-    drifted_variance,
-    reading_noise,
-    unknown_variance,
-    variance_with_camera,
-)
-from .tyre import tyre_at_slip
+from .stationary_mean import NO_MEAN
+from .tyre import onset_slip
 from .vision.ife import Ife
 from .vision.preview import Outcome, PreviewState, covering
 
@@ -68,10 +45,6 @@ __all__ = [
 
 LEAST_LOAD = 0.05
 """Share of its static load below which a wheel's load is not taken [-]: the tyre's equations divide by it."""
-LEAST_FRICTION = 1e-6
-"""Used friction below which a reading says nothing of the tyre's curve, whatever the noise is said to be [-]."""
-BOUNDS = 2.0
-"""Standard deviations from TRPAC to the ends of the interval where it is symmetric [-]."""
 
 
 class TrpacEstimator:
@@ -99,60 +72,53 @@ class TrpacEstimator:
         self._load_by_acceleration = car.wheel_load(config.front_axle, 1.0) - self._static_load_n
         self._setback_m = 0.0 if config.front_axle else car.wheelbase_m
         self._preview = replace(config.preview, behind_m=max(config.preview.behind_m, self._setback_m))
-        smoothing = config.gains.gamma * config.sensor_filter_s
-        self._averaged = smoothing / (1.0 + smoothing)
         self._rates = Rates.at(config, 0.0, 0.0)
         self._least_load_n = LEAST_LOAD * self._static_load_n
-        self._robust = None
-        self._gains = config.gains
-        if config.method is Method.ROBUST:
-            self._gains = replace(config.gains, innovation=INNOVATION)
-            mean_load_n = 0.5 * (car.wheel_load(True) + car.wheel_load(False))
-            self._robust = setup(
-                WheelModel(
-                    car.longitudinal_stiffness_n, mean_load_n, car.wheel_inertia_kg_m2, car.wheel_radius_m
-                ),
-                car.rolling_resistance,
-                config.sliding_speed_noise_m_s,
-                config.confidence.torque_noise_nm,
-                config.tolerance,
-                config.class_theta,
-            )
+        mean_load_n = 0.5 * (car.wheel_load(True) + car.wheel_load(False))
+        self._known = setup(
+            WheelModel(
+                car.longitudinal_stiffness_n, mean_load_n, car.wheel_inertia_kg_m2, car.wheel_radius_m
+            ),
+            car.rolling_resistance,
+            config.sliding_speed_noise_m_s,
+            config.torque_noise_nm,
+            config.tolerance,
+            config.class_theta,
+        )
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
-        config, theta = self.config, self.config.theta_initial
-        stiffness_n, start = self._wheel.longitudinal_stiffness_n, FusionState(theta, 0.0)
-        variance = unknown_variance(config.confidence, theta)
-        readings = FilteredReadings(0.0, 0.0, 0.0)
-        self._state = EstimatorState(start, start, readings, config.tolerance.prior, variance)
+        theta, load_n, C_x = (
+            self.config.theta_initial,
+            self._static_load_n,
+            self._wheel.longitudinal_stiffness_n,
+        )
+        start, robust = FusionState(theta, 0.0), begun(self._known)
+        self._state = EstimatorState(start, start, FilteredReadings(0.0, 0.0, 0.0), robust)
         self._state.printed = self._state.printed_alone = printed.begun(theta)
-        deviation = math.sqrt(variance)
+        theta = self._point(theta, theta)
+        of_belief = claim(robust.said, theta)
         self._last = Estimate(
             TRPAC=theta,
             flag=False,
             K_v=0.0,
             excitation_flag=False,
-            excitation_threshold=config.scheduler.threshold(None, self._static_load_n, stiffness_n, 0.0),
+            excitation_threshold=onset_slip(robust.onset_theta, load_n, C_x, sensitivity=0.0),
             slip=0.0,
             tyre_force_n=0.0,
             TRPAC_image=theta,
             TRPAC_dynamics=theta,
             image_confidence=0.0,
             frame_age_s=-1.0,
-            TRPAC_std=deviation,
-            load_n=self._static_load_n,
-            longitudinal_stiffness_n=stiffness_n,
-            TRPAC_low=0.0,
-            TRPAC_high=GREATEST_THETA,
-            TRPAC_expected=theta,
-            TRPAC_expected_std=deviation,
+            TRPAC_std=of_belief.deviation,
+            load_n=load_n,
+            longitudinal_stiffness_n=C_x,
+            TRPAC_low=of_belief.low,
+            TRPAC_high=of_belief.high,
+            TRPAC_expected=robust.said.mean,
+            TRPAC_expected_std=robust.said.std,
         )
-        if self._robust is not None:
-            self._state.robust = robust = begun(self._robust)
-            last = _with_robust(self._last, robust, theta)
-            self._last = last._replace(TRPAC_image=last.TRPAC, TRPAC_dynamics=last.TRPAC)
 
     @property
     def last(self) -> Estimate:
@@ -246,91 +212,81 @@ class TrpacEstimator:
         lagged_speed_m_s: float,
         load_n: float,
     ) -> Estimate:
-        """Run both estimators over the step with the road that lies under the wheel at its start."""
-        config, state, gains = self.config, self._state, self._gains
-        wheel = self._calibrated_wheel(state.calibration)
-        prepared = preprocess(config, self._rates, state, sensors, wheel.radius_m, step_s, load_n)
-        inputs, fusion, dynamics = prepared.inputs, state.fusion, state.dynamics
-        if not state.settled:
-            fusion = settled(fusion, inputs, wheel, gains)
-            dynamics = settled(dynamics, inputs, wheel, gains)
+        """Run the estimator over the step with the road that lies under the wheel at its start."""
+        config, state, gains, wheel = self.config, self._state, self.config.gains, self._wheel
         outcome = self._under_wheel()
         flag = outcome is not None and outcome.flag and not state.frame_failed
         theta_img = config.class_theta[outcome.surface] if outcome is not None and flag else None
-        alone = fusion_step(dynamics, inputs, wheel, gains, config.scheduler, None, step_s)
-        fused = alone
-        if config.method is Method.DIFE and (theta_img is not None or fusion != dynamics):
-            fused = fusion_step(
-                fusion,
-                inputs,
-                wheel,
-                gains,
-                config.scheduler,
-                theta_img,
-                step_s,
-                config.confidence,
-                state.variance,
-            )
-        state.since_update_s += step_s
-        class_changed = fused.state.theta_img != fusion.theta_img
-        if state.since_update_s >= config.sensor_filter_s or class_changed:
-            if config.method is Method.DIFE:
-                self._update_variance(fused, inputs, wheel, state.since_update_s)
-            self._update_calibration(alone, inputs, prepared.read_slip, state.since_update_s)
-            state.since_update_s = 0.0
-        state.fusion, state.dynamics, state.readings = fused.state, alone.state, prepared.readings
-        state.locked_s, state.lagged_slip = prepared.locked_s, prepared.lagged_slip
-        state.time_s += step_s
-        state.position_m += inputs.way_m
-        state.speed_m_s, state.lagged_speed_m_s = sensors.vehicle_speed_m_s, lagged_speed_m_s
-        state.acceleration_m_s2, state.load_n = acceleration_m_s2, load_n
-        state.step_s, state.settled = step_s or state.step_s, True
-        theta = fused.state.theta_hat
-        variance = variance_with_camera(config.confidence, state.variance, theta, theta_img)
-        image, bounds = self._image(outcome), _symmetric(theta, math.sqrt(variance))
-        estimate = Estimate(
-            TRPAC=theta,
-            flag=flag,
-            K_v=fused.K_v,
-            excitation_flag=fused.excited,
-            excitation_threshold=fused.threshold,
-            slip=inputs.slip.size,
-            tyre_force_n=fused.tyre_force_n,
-            TRPAC_image=image.theta,
-            TRPAC_dynamics=alone.state.theta_hat,
-            image_confidence=image.Q_v,
-            frame_age_s=image.age_s,
-            TRPAC_std=bounds.deviation,
-            load_n=load_n,
-            longitudinal_stiffness_n=wheel.longitudinal_stiffness_n,
-            TRPAC_low=bounds.low,
-            TRPAC_high=bounds.high,
-            TRPAC_expected=theta,
-            TRPAC_expected_std=bounds.deviation,
-        )
+        prepared = preprocess(config, self._rates, state, sensors, step_s, load_n)
+        inputs, way_m = prepared.inputs, sensors.vehicle_speed_m_s * step_s
         if config.method is Method.AS_PRINTED:
-            estimate = self._printed(estimate, sensors, theta_img, step_s)
-        elif state.robust is not None and self._robust is not None:
+            step = self._printed(sensors, load_n, theta_img, step_s)
+        else:
+            fusion, dynamics = state.fusion, state.dynamics
+            if not state.settled:
+                fusion = settled(fusion, inputs, wheel, gains)
+                dynamics = settled(dynamics, inputs, wheel, gains)
+            onset_theta = state.robust.onset_theta
+            fused = alone = fusion_step(dynamics, inputs, wheel, gains, None, onset_theta, step_s)
+            if theta_img is not None or fusion != dynamics:
+                # A class has one value wherever it is: beside a tyre that has shown this road it says nothing new.
+                unseen_img = theta_img if state.robust.stale else None
+                fused = fusion_step(fusion, inputs, wheel, gains, unseen_img, onset_theta, step_s)
+            state.fusion, state.dynamics = fused.state, alone.state
             sample = Sample(
                 sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s, load_n
             )
             road_class = int(outcome.surface) if outcome is not None and flag else roads.NONE
-            observed = alone.theta_tyre is not None
-            state.robust = stepped(
-                state.robust, self._robust, sample, road_class, step_s, inputs.way_m, observed
+            shown = alone.theta_tyre is not None
+            state.robust = stepped(state.robust, self._known, sample, road_class, step_s, way_m, shown)
+            step = _Step(
+                self._point(fused.state.theta_hat, alone.state.theta_hat),
+                alone.state.theta_hat,
+                inputs.slip.size,
+                fused.tyre_force_n,
+                fused.threshold,
+                fused.excited,
+                fused.K_v,
             )
-            estimate = _with_robust(estimate, state.robust, estimate.TRPAC_dynamics)
-            if estimate.excitation_flag and theta_img is not None:
-                K_v = config.scheduler.K_v(abs(theta_img - estimate.TRPAC))
-                estimate = estimate._replace(K_v=K_v)
-        self._last = estimate._replace(source=self._source(flag, estimate.excitation_flag))
+            if config.method is Method.ROBUST and fused.excited and theta_img is not None:
+                step = step._replace(K_v=visual_gain(gains, theta_img, step.theta))
+        state.readings, state.lagged_slip = prepared.readings, prepared.lagged_slip
+        state.locked_s = prepared.locked_s
+        state.time_s += step_s
+        state.position_m += way_m
+        state.speed_m_s, state.lagged_speed_m_s = sensors.vehicle_speed_m_s, lagged_speed_m_s
+        state.acceleration_m_s2, state.load_n = acceleration_m_s2, load_n
+        state.step_s, state.settled = step_s or state.step_s, True
+        image, said = self._image(outcome), state.robust.said
+        of_belief = claim(said, step.theta)
+        self._last = Estimate(
+            TRPAC=step.theta,
+            flag=flag,
+            K_v=step.K_v,
+            excitation_flag=step.excited,
+            excitation_threshold=step.threshold,
+            slip=step.slip,
+            tyre_force_n=step.tyre_force_n,
+            TRPAC_image=image.theta,
+            TRPAC_dynamics=step.theta_alone,
+            image_confidence=image.Q_v,
+            frame_age_s=image.age_s,
+            TRPAC_std=of_belief.deviation,
+            load_n=load_n,
+            longitudinal_stiffness_n=wheel.longitudinal_stiffness_n,
+            TRPAC_low=of_belief.low,
+            TRPAC_high=of_belief.high,
+            TRPAC_expected=said.mean,
+            TRPAC_expected_std=said.std,
+            source=self._source(flag, step.excited),
+        )
         return self._last
 
-    def _calibrated_wheel(self, calibration: SlipCalibration) -> Wheel:
-        """The wheel with the stiffness that was learnt."""
-        wheel = self._wheel
-        stiffness_n = wheel.longitudinal_stiffness_n / (1.0 + calibration.compliance())
-        return Wheel(wheel.inertia_kg_m2, wheel.radius_m, stiffness_n)
+    def _point(self, fused: float, observer: float) -> float:
+        """TRPAC of the method, with the estimates with and without the camera [-]."""
+        if self.config.method is Method.ROBUST:
+            return point(self._state.robust, observer)
+        return fused
 
     def _under_wheel(self) -> Outcome | None:
         """What the camera gave for the road under the wheel."""
@@ -345,20 +301,12 @@ class TrpacEstimator:
 
     def _source(self, flag: bool, excited: bool) -> Source:
         """What the estimate rests on; the estimator as printed remembers no road that the tyre has shown."""
-        state, fusion = self._state, self._state.fusion
-        if state.robust is not None:
-            tyre = not state.robust.stale
-        elif self.config.method is Method.AS_PRINTED:
-            tyre = excited
-        else:
-            classes = fusion.theta_img is not None
-            tyre = fusion.rests or fusion.unseen_m < (SEEN_HOLD_M if classes else NEVER_SEEN_M)
+        printed_only = self.config.method is Method.AS_PRINTED
+        tyre = excited if printed_only else not self._state.robust.stale
         return Source(tyre + 2 * flag)
 
-    def _printed(
-        self, estimate: Estimate, sensors: Sensors, theta_img: float | None, step_s: float
-    ) -> Estimate:
-        """The estimate after a step of Eqs. (12) to (19) with the camera, and beside it of the same without it."""
+    def _printed(self, sensors: Sensors, load_n: float, theta_img: float | None, step_s: float) -> _Step:
+        """A step of Eqs. (12) to (19) with the camera, and beside it of the same without it."""
         state, gains, wheel = self._state, self.config.gains, self._wheel
         constants = PrintedWheel(
             wheel.inertia_kg_m2,
@@ -369,92 +317,18 @@ class TrpacEstimator:
             gains.visual_term is VisualTerm.INSIDE,
             self.config.floor_m_s,
         )
-        read = sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s, estimate.load_n
+        read = sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s, load_n
         fused = printed_step(state.printed, constants, *read, theta_img, step_s)
         alone = printed_step(state.printed_alone, constants, *read, None, step_s)
         state.printed, state.printed_alone = fused.state, alone.state
-        theta = fused.state.theta_hat
-        # The paper's estimate has no deviation: that of a road of which nothing is known.
-        state.variance = unknown_variance(self.config.confidence, theta)
-        bounds = _symmetric(theta, math.sqrt(state.variance))
-        return estimate._replace(
-            TRPAC=theta,
-            TRPAC_dynamics=alone.state.theta_hat,
-            slip=fused.slip,
-            tyre_force_n=fused.force_n,
-            excitation_threshold=fused.threshold,
-            excitation_flag=fused.excited,
-            K_v=fused.K_v,
-            TRPAC_std=bounds.deviation,
-            TRPAC_low=bounds.low,
-            TRPAC_high=bounds.high,
-            TRPAC_expected=theta,
-            TRPAC_expected_std=bounds.deviation,
-        )
-
-    def _update_variance(self, fused: FusionStep, inputs: WheelInputs, wheel: Wheel, passed_s: float) -> None:
-        """Bring the variance of the fused estimate up to date after a time."""
-        config, state, theta_hat = self.config, self._state, fused.state.theta_hat
-        theta_tyre, mean = fused.theta_tyre, fused.dynamics.mean
-        way_m = state.speed_m_s * passed_s
-        before, after = state.fusion.theta_img, fused.state.theta_img
-        if (
-            theta_tyre is None
-            and before is not None
-            and after is not None
-            and abs(after - theta_hat) > abs(before - theta_hat)
-        ):
-            # A class that is farther from the estimate than the one before: the road may be another.
-            way_m += config.confidence.class_change_m
-        if inputs.slip.size == 0.0 or passed_s == 0.0 or not inputs.torque_known:
-            state.variance = drifted_variance(config.confidence, state.variance, theta_hat, way_m)
-            state.lag = 0.0
-            return
-        speed_m_s = max(state.speed_m_s, config.floor_m_s)
-        slip, friction = inputs.slip.size, inputs.friction(fused.tyre_force_n)
-        if mean.duration_s > state.step_s:
-            slip, friction = mean.slip, mean.friction
-        tyre = tyre_at_slip(slip, inputs.load_n, wheel.longitudinal_stiffness_n)
-        noise_share = (self._rates.noise_m_s / speed_m_s + inputs.slip_change) / slip
-        torque_noise_nm = self._rates.noise_gain * config.confidence.torque_noise_nm
-        torque_friction, mismatch = torque_noise_nm / (wheel.radius_m * inputs.load_n), 0.0
-        if theta_tyre is not None and friction > max(torque_friction, LEAST_FRICTION):
-            noise = reading_noise(friction, tyre, noise_share, torque_friction)
-            state.mismatch = updated_mismatch(state.mismatch, tyre.adhering, theta_tyre, noise, passed_s)
-            mismatch = state.mismatch.share()
-        line_share = math.sqrt(state.calibration.slip_variance(slip, speed_m_s)) / slip
-        state.variance, state.lag = advanced_variance(
-            config.confidence,
-            state.variance,
-            state.lag,
-            theta_hat,
-            Evidence(theta_tyre, friction, tyre, line_share, noise_share, torque_friction, mismatch),
-            self._averaged,
-            config.gains.gamma * gamma_factor(mean, inputs.noise_s),
-            way_m,
-            passed_s,
-        )
-
-    def _update_calibration(
-        self, alone: FusionStep, inputs: WheelInputs, read_slip: float, passed_s: float
-    ) -> None:
-        """Bring the calibration up to date with the slip that is read now."""
-        config, state, speed_m_s = self.config, self._state, self._state.speed_m_s
-        state.calibration = state.calibration.drifted(config.tolerance, passed_s)
-        if not (state.settled and inputs.torque_known and speed_m_s > config.floor_m_s):
-            return
-        noise = self._rates.noise_m_s / speed_m_s
-        state.unsettled_slip = unsettled_slip(state.unsettled_slip, inputs.slip_change, noise, passed_s)
-        state.calibration = calibrated(
-            state.calibration,
-            config.tolerance,
-            read_slip,
-            speed_m_s,
-            alone.tyre_force_n,
-            inputs.load_n,
-            self._wheel.longitudinal_stiffness_n,
-            noise,
-            state.unsettled_slip,
+        return _Step(
+            fused.state.theta_hat,
+            alone.state.theta_hat,
+            fused.slip,
+            fused.force_n,
+            fused.threshold,
+            fused.excited,
+            fused.K_v,
         )
 
     def _hold(
@@ -482,54 +356,37 @@ class TrpacEstimator:
         way_m = state.speed_m_s * passed_s
         state.time_s += passed_s
         state.position_m += way_m
-        theta, model = state.fusion.theta_hat, self.config.confidence
-        state.variance = drifted_variance(model, state.variance, theta, way_m)
-        state.fusion = unread(state.fusion, passed_s, way_m)
-        state.dynamics = unread(state.dynamics, passed_s, way_m)
+        state.settled = False
+        state.fusion = state.fusion._replace(mean=NO_MEAN)
+        state.dynamics = state.dynamics._replace(mean=NO_MEAN)
         if step_s > LONGEST_STEP_S:
-            state.variance = unknown_variance(model, theta)
-            state.fusion = FusionState(theta, state.fusion.s)
-            state.dynamics = FusionState(state.dynamics.theta_hat, state.dynamics.s)
-        state.lag, state.settled = 0.0, False
-        if state.robust is not None and self._robust is not None:
-            state.robust = (
-                begun(self._robust)
-                if step_s > LONGEST_STEP_S
-                else stepped(state.robust, self._robust, None, roads.NONE, passed_s, way_m, False)
+            state.robust = begun(self._known)
+        elif self.config.method is not Method.AS_PRINTED:
+            state.robust = stepped(
+                state.robust, self._known, None, roads.NONE, passed_s, way_m, observed=False
             )
-        image, theta = self._image(self._under_wheel()), self._last.TRPAC
-        bounds = _symmetric(theta, math.sqrt(state.variance))
-        held = self._last._replace(
+        image, said, theta = self._image(self._under_wheel()), state.robust.said, self._last.TRPAC
+        of_belief = claim(said, theta)
+        self._last = self._last._replace(
             flag=False,
             K_v=0.0,
             excitation_flag=False,
             TRPAC_image=image.theta,
             image_confidence=image.Q_v,
             frame_age_s=image.age_s,
-            TRPAC_std=bounds.deviation,
-            TRPAC_low=bounds.low,
-            TRPAC_high=bounds.high,
-            TRPAC_expected_std=bounds.deviation,
+            TRPAC_std=of_belief.deviation,
+            TRPAC_low=of_belief.low,
+            TRPAC_high=of_belief.high,
+            TRPAC_expected=said.mean,
+            TRPAC_expected_std=said.std,
             source=self._source(False, False),
             problem=problem,
         )
-        if state.robust is not None:
-            interval = state.robust.said
-            held = held._replace(
-                TRPAC_std=math.hypot(interval.std, interval.mean - theta),
-                TRPAC_low=min(interval.low, theta),
-                TRPAC_high=max(interval.high, theta),
-                TRPAC_expected=interval.mean,
-                TRPAC_expected_std=interval.std,
-            )
-        self._last = held
-        return held
+        return self._last
 
     def messages(self) -> dict[str, str]:
-        """Sentences on what the drive shows of a car that is not as told, by what they concern; robust method only."""
-        state, known = self._state.robust, self._robust
-        if state is None or known is None:
-            return {}
+        """Sentences on what the drive shows of a car that is not as told, by what they concern; none as printed."""
+        state, known = self._state.robust, self._known
         axle = "Front" if self.config.front_axle else "Rear"
         texts = {
             f"{axle} tyres": tyre_message(state, known, axle, self._static_load_n),
@@ -555,29 +412,13 @@ class _Image(NamedTuple):
     age_s: float
 
 
-class _Bounds(NamedTuple):
-    """Standard deviation of an estimate, and its interval."""
+class _Step(NamedTuple):
+    """What a method makes of a step; as in `Estimate`."""
 
-    deviation: float
-    low: float
-    high: float
-
-
-def _symmetric(theta: float, deviation: float) -> _Bounds:
-    """The interval about an estimate that is symmetric but for the bounds of theta [-]."""
-    low, high = theta - BOUNDS * deviation, theta + BOUNDS * deviation
-    return _Bounds(deviation, max(low, 0.0), min(high, GREATEST_THETA))
-
-
-def _with_robust(estimate: Estimate, state: RobustState, observer: float) -> Estimate:
-    """The estimate of the robust method, by the observer's theta_hat [-]."""
-    theta, deviation = point(state, observer)
-    interval = state.said
-    return estimate._replace(
-        TRPAC=theta,
-        TRPAC_std=deviation,
-        TRPAC_low=interval.low,
-        TRPAC_high=interval.high,
-        TRPAC_expected=interval.mean,
-        TRPAC_expected_std=interval.std,
-    )
+    theta: float
+    theta_alone: float
+    slip: float
+    tyre_force_n: float
+    threshold: float
+    excited: bool
+    K_v: float

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, fields, replace
 from enum import Enum, IntEnum
 from typing import Any, NamedTuple
 
-from .dife import GREATEST_THETA, FusionState, Gains
+from .dife import FusionState, Gains
 from .errors import TrpacError
-from .excitation import FuzzyScheduler
 from .observer import seen_at
 from .paper import Printed
 from .robust.wheel import RobustState
@@ -22,12 +21,9 @@ from .sensors import (
     FilteredReadings,
     filter_share,
 )
-from .slip_calibration import CarTolerance, SlipCalibration
 from .stationary_mean import StationaryMean
-from .stiffness_mismatch import StiffnessMismatch
-from .theta_variance import VarianceModel
-from .tyre import peak_friction
-from .vehicle import Vehicle
+from .tyre import GREATEST_THETA, peak_friction
+from .vehicle import CarTolerance, Vehicle
 from .vision.classes import CLASS_THETA, Surface
 from .vision.ife import IfeState
 from .vision.ife_config import IfeConfig
@@ -48,9 +44,9 @@ class Method(Enum):
     AS_PRINTED = 0
     """Eqs. (12) to (19) of the paper as they are printed."""
     DIFE = 1
-    """The paper's, with what noise, wrong classes and a car that is not as told ask for."""
+    """The paper's, run where the belief about road and tyre says that the tyre slides."""
     ROBUST = 2
-    """Beliefs about road and tyre beside the observer: what the car is told to be may be wrong."""
+    """The observer without the camera as far as the belief bears it out, else the belief's mean."""
 
     @property
     def label(self) -> str:
@@ -101,11 +97,10 @@ class EstimatorConfig:
         Whether it is on the left: which wheel's track the camera follows.
     vision : IfeConfig
         Settings of the image estimator but for what the vehicle and the wheel already say, see `image_settings`.
-    gains, scheduler, preview, confidence
+    gains, preview
         Settings of the parts.
     tolerance : CarTolerance
-        How well slip and stiffness are known before the car drives; `slip_calibration.EXACT_CAR` to learn nothing of
-        them.
+        How well the car is known; `vehicle.EXACT_CAR` where it is just as told.
     class_theta : tuple of 3 floats
         Adhesion of dry, wet, snow and ice [-].
     theta_initial : float
@@ -119,6 +114,8 @@ class EstimatorConfig:
         it. One filter for all keeps Eq. (12) true between the filtered signals [s].
     sliding_speed_noise_m_s : float
         Standard deviation of the sliding speed omega R - v per sample: that of the car's sensors [m/s].
+    torque_noise_nm : float
+        Standard deviation of the wheel torque per sample [N m].
     acceleration_filter_s : float
         Time constant for the acceleration that the load follows where it is differentiated from speed [s].
     method : Method
@@ -130,9 +127,7 @@ class EstimatorConfig:
     left_side: bool = True
     vision: IfeConfig = field(default_factory=IfeConfig)
     gains: Gains = field(default_factory=Gains)
-    scheduler: FuzzyScheduler = field(default_factory=FuzzyScheduler)
     preview: PreviewConfig = field(default_factory=PreviewConfig)
-    confidence: VarianceModel = field(default_factory=VarianceModel)
     tolerance: CarTolerance = field(default_factory=CarTolerance)
     class_theta: tuple[float, float, float] = (
         CLASS_THETA[Surface.DRY],
@@ -143,8 +138,9 @@ class EstimatorConfig:
     floor_m_s: float = 1.0
     sensor_filter_s: float = 0.010
     sliding_speed_noise_m_s: float = 0.0042
+    torque_noise_nm: float = 3.2
     acceleration_filter_s: float = 0.05
-    method: Method = Method.DIFE
+    method: Method = Method.ROBUST
 
     @property
     def image_settings(self) -> IfeConfig:
@@ -162,17 +158,17 @@ class Estimate(NamedTuple):
     """What the estimator says at a step."""
 
     TRPAC: float
-    """Fused estimate theta_hat (DIFE) [-]."""
+    """Estimated adhesion of the road under the wheel [-]."""
     flag: bool
     """Epsilon: whether the camera's verdict on the road under the wheel is used."""
     K_v: float
     """Visual gain [-] or [1/s], after Eq. (17) or (18)."""
     excitation_flag: bool
-    """Whether DIFE runs: slip is above the threshold, or the tyre visibly slides."""
+    """Whether the estimator runs: slip is above the threshold."""
     excitation_threshold: float
-    """Slip above which DIFE runs in any case [-]."""
+    """Slip above which it runs [-]."""
     slip: float
-    """Longitudinal slip, unsigned, filtered and less what it reads on a coasting car [-]."""
+    """Longitudinal slip, unsigned and filtered [-]."""
     tyre_force_n: float
     """Observed longitudinal force F_hat [N]."""
     TRPAC_image: float
@@ -188,7 +184,7 @@ class Estimate(NamedTuple):
     load_n: float
     """Vertical load that all this rests on [N]."""
     longitudinal_stiffness_n: float
-    """Likewise C_x [N]."""
+    """Told C_x [N]."""
     TRPAC_low: float = 0.0
     """Lower bound of the interval that holds the road's TRPAC with 95 % [-]."""
     TRPAC_high: float = GREATEST_THETA
@@ -242,16 +238,7 @@ class EstimatorState:
     fusion: FusionState
     dynamics: FusionState
     readings: FilteredReadings
-    calibration: SlipCalibration
-    variance: float
-    mismatch: StiffnessMismatch = field(default_factory=StiffnessMismatch)
-    """How the tyre's theta follows its slip."""
-    unsettled_slip: float = 0.0
-    """Recent distance of slip from its lagged value [-]."""
-    lag: float = 0.0
-    """Smoothed distance of the tyre's theta from the estimate [-]."""
-    since_update_s: float = 0.0
-    """Time since calibration and variance were last brought up to date: once per time constant of the filter [s]."""
+    robust: RobustState
     locked_s: float = math.inf
     """Time since the wheel was last locked [s]."""
     time_s: float = 0.0
@@ -270,8 +257,6 @@ class EstimatorState:
     frame_failed: bool = False
     ife: IfeState = field(default_factory=IfeState)
     preview: PreviewState = field(default_factory=PreviewState)
-    robust: RobustState | None = None
-    """None with another method."""
     printed: Printed = field(default_factory=nothing_printed)
     printed_alone: Printed = field(default_factory=nothing_printed)
     """Of the estimator as printed, with the camera and without."""
@@ -287,7 +272,7 @@ class EstimatorState:
         for name in ("printed", "printed_alone"):
             values[name] = [None if math.isnan(value) else value for value in values[name]]
         values["ife"], values["preview"] = self.ife.to_json(), self.preview.to_json()
-        values["robust"] = None if self.robust is None else self.robust.to_json()
+        values["robust"] = self.robust.to_json()
         return values
 
     @classmethod
@@ -302,7 +287,7 @@ class EstimatorState:
             values[name] = Printed(theta, math.nan if s is None else s)
         values["ife"] = IfeState.from_json(values["ife"])
         values["preview"] = PreviewState.from_json(values["preview"])
-        values["robust"] = None if values["robust"] is None else RobustState.from_json(values["robust"])
+        values["robust"] = RobustState.from_json(values["robust"])
         return cls(**values)
 
 
@@ -315,8 +300,6 @@ _PARTS: Mapping[str, Any] = {
     "fusion": _fusion_state,
     "dynamics": _fusion_state,
     "readings": FilteredReadings,
-    "calibration": SlipCalibration,
-    "mismatch": StiffnessMismatch,
 }
 
 
@@ -329,8 +312,6 @@ class Rates:
     """Of the sensor filter [-]."""
     acceleration_share: float
     """Of the filter that differentiates speed [-]."""
-    noise_gain: float
-    """What the sensor filter leaves of white noise's standard deviation [-]."""
     noise_m_s: float
     """Standard deviation of the filtered sliding speed [m/s]."""
     most_m_s: float
@@ -344,19 +325,15 @@ class Rates:
 
     @classmethod
     def at(cls, config: EstimatorConfig, step_s: float, before_s: float) -> Rates:
-        """Rates of a step; a step of 0 keeps the noise of the one before it."""
-        sensor_share = filter_share(step_s, config.sensor_filter_s)
+        """Rates of a step; a step of 0 keeps noise and differentiator of the one before it."""
+        sensor_share, lag_s = filter_share(step_s, config.sensor_filter_s), step_s or before_s
         # White noise per sample through a discrete first-order filter
-        share = sensor_share or filter_share(before_s, config.sensor_filter_s)
-        gain = math.sqrt(share / (2.0 - share))
-        noise_m_s = config.sliding_speed_noise_m_s * gain
-        lag_s = step_s or before_s
+        share = filter_share(lag_s, config.sensor_filter_s)
         return cls(
             step_s,
             sensor_share,
             filter_share(step_s, config.acceleration_filter_s),
-            gain,
-            noise_m_s,
+            noise_m_s=config.sliding_speed_noise_m_s * math.sqrt(share / (2.0 - share)),
             most_m_s=JUMP_M_S + GREATEST_ACCELERATION_M_S2 * step_s,
             most_rim_m_s=RIM_JUMP_M_S + RIM_ACCELERATION_M_S2 * step_s,
             ahead=seen_at(config.gains.K * step_s),

@@ -28,10 +28,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from .excitation import Partition
+from .fuzzy import Partition
 from .observer import advanced_state, observed_force, settled_state
 from .slip import wheel_slip
-from .tyre import tyre_at_slip
+from .tyre import GREATEST_THETA, LEAST_THETA, tyre_at_slip
 
 THETA_SETS = Partition(0.0, 0.5, 1.0)
 """Sets S, M, B of the camera's adhesion, even over the printed domain [-]."""
@@ -41,8 +41,6 @@ THRESHOLDS = (0.0, 0.03, 0.06)
 """Slip thresholds S, M, B, even over the printed domain [-]."""
 GAINS = (0.0, 1.5, 3.0)
 """Visual gains K_v S, M, B, even over the printed domain [-] in (17), [1/s] in (18)."""
-LEAST_THETA, GREATEST_THETA = 0.02, 1.2
-"""Bounds of the estimate: those of the domains of Table 2 [-]."""
 
 
 class PrintedWheel(NamedTuple):

@@ -1,12 +1,12 @@
-"""Preprocessing of the sensors: filtered readings, slip with what is known of its offset, noise."""
+"""What one wheel's observer is given at a step: the readings behind their filter, and the slip of the wheel."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
+from .dife import WheelInputs
 from .estimator_data import EstimatorConfig, EstimatorState, Rates
-from .identifiability import WheelInputs
 from .sensors import FilteredReadings, Sensors
 from .slip import GREATEST_SLIP, Slip, signed_slip
 
@@ -17,9 +17,6 @@ LOCKED_M_S = 0.5
 torque that was commanded [m/s]."""
 RELEASED = 5.0
 """Time constants of the sensor filter until it has forgotten a locked wheel's torque to 1 % [-]."""
-BIAS_SHARE = 0.5
-"""Share of a constant error's deviation that the guard against noise counts [-]. Noise pulls the estimate at each of
-its peaks and so adds up; an offset shifts it once, and `TRPAC_std` tells by how much it may."""
 
 
 class Preprocessed(NamedTuple):
@@ -27,10 +24,8 @@ class Preprocessed(NamedTuple):
 
     readings: FilteredReadings
     inputs: WheelInputs
-    read_slip: float
-    """Signed slip as it is read [-]."""
     lagged_slip: float
-    """Signed slip less its offset, filtered once more [-]."""
+    """Signed slip, filtered once more [-]."""
     locked_s: float
     """Time since the wheel was last locked [s]."""
 
@@ -50,51 +45,45 @@ def preprocess(
     rates: Rates,
     state: EstimatorState,
     sensors: Sensors,
-    radius_m: float,
     step_s: float,
     load_n: float,
 ) -> Preprocessed:
     """What a step makes of the sensors; at the start, and after a gap, they are not filtered."""
-    floor_m_s, settled = config.floor_m_s, state.settled
-    share = rates.sensor_share if settled else 1.0
-    sample = FilteredReadings(sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s)
-    readings = state.readings.with_sample(sensors, share) if settled else sample
+    car, floor_m_s = config.vehicle, config.floor_m_s
+    readings = FilteredReadings(sensors.wheel_speed_rad_s, sensors.wheel_torque_nm, sensors.vehicle_speed_m_s)
     omega_ahead, torque_ahead_nm = readings.wheel_speed_rad_s, readings.wheel_torque_nm
-    if settled:
+    if state.settled:
         # Signals that go on as they came, where the observer sees them over the step to come.
+        readings = state.readings.with_sample(sensors, rates.sensor_share)
         ratio = step_s / state.step_s if state.step_s else 0.0
         ahead = rates.ahead * min(ratio, GREATEST_STEP_RATIO)
-        omega_ahead += ahead * (readings.wheel_speed_rad_s - state.readings.wheel_speed_rad_s)
-        torque_ahead_nm += ahead * (readings.wheel_torque_nm - state.readings.wheel_torque_nm)
-    rim_m_s, speed_m_s = readings.wheel_speed_rad_s * radius_m, readings.vehicle_speed_m_s
+        omega_ahead = readings.wheel_speed_rad_s + ahead * (
+            readings.wheel_speed_rad_s - state.readings.wheel_speed_rad_s
+        )
+        torque_ahead_nm = readings.wheel_torque_nm + ahead * (
+            readings.wheel_torque_nm - state.readings.wheel_torque_nm
+        )
+    rim_m_s = readings.wheel_speed_rad_s * car.wheel_radius_m
     if rim_m_s >= floor_m_s:
-        torque_ahead_nm -= config.vehicle.rolling_resistance * load_n * radius_m
-    read_slip = signed_slip(rim_m_s, speed_m_s, floor_m_s)
-    slip, bias_deviation = read_slip, 0.0
-    if read_slip or speed_m_s >= floor_m_s:
-        calibrated_m_s = max(speed_m_s, floor_m_s)
-        slip -= state.calibration.offset(calibrated_m_s)
-        curve = config.confidence.tyre_share * read_slip
-        offset_deviation = math.sqrt(state.calibration.offset_variance(calibrated_m_s))
-        bias_deviation = BIAS_SHARE * math.sqrt(offset_deviation * offset_deviation + curve * curve)
-    lagged_slip = state.lagged_slip + share * (slip - state.lagged_slip) if settled else slip
+        torque_ahead_nm -= car.rolling_resistance * load_n * car.wheel_radius_m
+    slip = signed_slip(rim_m_s, readings.vehicle_speed_m_s, floor_m_s)
+    lagged_slip = (
+        state.lagged_slip + rates.sensor_share * (slip - state.lagged_slip) if state.settled else slip
+    )
     direction = math.copysign(1.0, slip) if slip else 0.0
-    is_locked = sensors.vehicle_speed_m_s > floor_m_s and sensors.wheel_speed_rad_s * radius_m < LOCKED_M_S
-    locked_s = 0.0 if is_locked else state.locked_s + step_s
-    noise = rates.noise_m_s / max(sensors.vehicle_speed_m_s, floor_m_s)
+    locked = (
+        sensors.vehicle_speed_m_s > floor_m_s and sensors.wheel_speed_rad_s * car.wheel_radius_m < LOCKED_M_S
+    )
+    locked_s = 0.0 if locked else state.locked_s + step_s
     inputs = WheelInputs(
-        wheel_speed_rad_s=readings.wheel_speed_rad_s,
-        wheel_speed_ahead_rad_s=omega_ahead,
-        wheel_torque_nm=torque_ahead_nm,
-        slip=Slip(min(abs(slip), GREATEST_SLIP), direction),
-        load_n=load_n,
-        slip_deviation=max(noise, bias_deviation),
-        slip_change=abs(slip - lagged_slip),
-        way_m=sensors.vehicle_speed_m_s * step_s,
+        readings.wheel_speed_rad_s,
+        omega_ahead,
+        torque_ahead_nm,
+        Slip(min(abs(slip), GREATEST_SLIP), direction),
+        load_n,
         torque_known=locked_s > RELEASED * config.sensor_filter_s,
-        slip_noise=noise,
-        slip_bias_deviation=bias_deviation,
+        slip_noise=rates.noise_m_s / max(sensors.vehicle_speed_m_s, floor_m_s),
         slip_rise=direction * (slip - lagged_slip),
         noise_s=2.0 * config.sensor_filter_s,
     )
-    return Preprocessed(readings, inputs, read_slip, lagged_slip, locked_s)
+    return Preprocessed(readings, inputs, lagged_slip, locked_s)

@@ -17,8 +17,15 @@ RISING_DEVIATIONS = 2.1
 of the difference, whose variance is half the slip's [-]."""
 MEMORY_S = 0.2
 """Longest memory of a mean [s]."""
-FORCE_SETTLING_S = 0.016
-"""Time in which the observed force settles after slip moved: 1 / K [s]."""
+SIGNIFICANCE = 1.5
+"""How many standard deviations of slip must lie between the tyre and one that does not slide at all, for a mean over
+a long time [-]."""
+SHORT_MEAN_SIGNIFICANCE = 1.0
+"""How many more for a single reading [-]: a short mean is another one at each step, and one of many is soon far off."""
+CURVE_SHARE = 0.005
+"""Standard deviation of the slip at which the tyre's curve has a force, as a share of it, which no mean lessens [-]."""
+SHORT_MEAN_S = 0.08
+"""Time constant with which a longer mean needs less of that [s]."""
 GREATEST_GAMMA_FACTOR = 2.0
 """Most by which gamma grows with a mean: K must stay well above it [-]."""
 
@@ -68,36 +75,25 @@ def with_reading(
     )
 
 
-def aged(mean: StationaryMean, passed_s: float) -> StationaryMean:
-    """The means after a time without readings, as if so much less had gone into them; none after their memory."""
-    if passed_s == 0.0:
-        return mean
-    duration_s = min(mean.duration_s, 2.0 * MEMORY_S)
-    duration_s -= passed_s * max(duration_s / MEMORY_S, 1.0)
-    return mean._replace(duration_s=duration_s) if duration_s > 0.0 else NO_MEAN
+def least_slip(mean: StationaryMean, noise: float, noise_s: float) -> float:
+    """The slip that the wheel has with significance: that of the mean less what noise and movement may add to it [-].
 
-
-def mean_slip_deviation(mean: StationaryMean, noise: float, noise_s: float, bias_deviation: float) -> float:
-    """Standard deviation of the mean slip [-].
+    On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
+    end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
 
     Parameters
     ----------
     mean : StationaryMean
         The means.
     noise, noise_s : float
-        That of one filtered reading through noise [-], and twice the filter's time constant [s].
-    bias_deviation : float
-        Standard deviation of a constant error of the slip, which no mean lessens [-].
+        Standard deviation of one filtered reading through noise [-], and twice the filter's time constant [s].
     """
     # A mean that forgets with a time constant is as sure as an even one over twice that.
-    duration_s = min(mean.duration_s, 2.0 * MEMORY_S)
-    return math.sqrt(noise * noise / (1.0 + duration_s / noise_s) + bias_deviation * bias_deviation)
-
-
-def unsettled_slip(before: float, slip_change: float, noise: float, passed_s: float) -> float:
-    """Recent distance of slip from its lagged value, beyond noise, as far as the force has not settled since [-]."""
-    left = before * math.exp(-passed_s / FORCE_SETTLING_S)
-    return slip_change if slip_change > RISING_DEVIATIONS * noise and slip_change > left else left
+    by_noise = noise * noise / (1.0 + min(mean.duration_s, 2.0 * MEMORY_S) / noise_s)
+    by_curve = CURVE_SHARE * mean.slip
+    deviation = math.sqrt(by_noise + by_curve * by_curve)
+    significance = SIGNIFICANCE + SHORT_MEAN_SIGNIFICANCE * math.exp(-mean.duration_s / SHORT_MEAN_S)
+    return mean.slip - significance * (deviation + abs(mean.rise))
 
 
 def gamma_factor(mean: StationaryMean, noise_s: float) -> float:

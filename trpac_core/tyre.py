@@ -21,6 +21,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+LEAST_THETA, GREATEST_THETA = 0.02, 1.2
+"""Frictions that a road may have [-]: at 0 the tyre has no force and an estimate could never leave it; the upper end is
+that of the difference's domain in section 4.2 of Tian et al. 2022."""
 INITIAL_SLOPE = 1.27
 """G at slip 0: the curve starts with 1.27 C_x [-]."""
 NEWTON_STEPS = 50

@@ -52,3 +52,26 @@ class Vehicle:
         lever_m = self.cog_to_rear_axle_m if front else self.wheelbase_m - self.cog_to_rear_axle_m
         transfer = longitudinal_acceleration_m_s2 * self.cog_height_m * (-1.0 if front else 1.0)
         return self.mass_kg * (GRAVITY_M_S2 * lever_m + transfer) / (2.0 * self.wheelbase_m)
+
+
+@dataclass(frozen=True)
+class CarTolerance:
+    """How well the car is known.
+
+    Parameters
+    ----------
+    speed_bias_m_s : float
+        Standard deviation of a constant error of the sliding speed: an INS drifts by 0.05 km/h [m/s].
+    ratio : float
+        Standard deviation of the rolling radius as a share of it, over load and temperature [-].
+    compliance : float
+        Standard deviation of ln(told stiffness / stiffness) of the tyre [-].
+    """
+
+    speed_bias_m_s: float = 0.014
+    ratio: float = 0.003
+    compliance: float = 0.05
+
+
+EXACT_CAR = CarTolerance(0.0, 0.0, 0.0)
+"""The car is as it is told."""

@@ -31,6 +31,10 @@ NOISE = SensorNoise(
     vehicle_speed_noise_m_s=0.003,
     accel_x_noise_m_s2=0.05,
 )
+BY_LOAD = (0.7, 1.0)
+"""Exponents of a car tyre's stiffness over its load (Pacejka 2012, ch. 4), of which one is drawn [-]."""
+BY_LOAD_STREAM = 1
+"""Names the random stream that it is drawn from, so that no other draw depends on it."""
 COLUMNS = ["wheel_speed_fl_rad_s", "wheel_torque_fl_nm", "vehicle_speed_m_s", "accel_x_m_s2"]
 
 
@@ -61,37 +65,25 @@ class CarError:
 class Tyre:
     """How the tyre is built, where it is not the modified Dugoff tyre of constant stiffness.
 
-    A magic formula of shape factor C and curvature E, whose stiffness grows with the load by a share, and whose force
-    follows the slip over the relaxation length [m].
+    A magic formula of shape factor C and curvature E, whose force follows the slip over the relaxation length [m].
     """
 
     shape: float
     curvature: float
-    by_load: float = 0.0
     relaxation_m: float = 0.0
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, foreign: bool) -> "Tyre":
-        """A formula as car tyres have it; a foreign one with stiffness by load and relaxation as they have it too."""
+        """A formula as car tyres have it; a foreign one with relaxation as they have it too."""
         shape, curvature = float(rng.uniform(1.25, 1.9)), float(rng.uniform(-1.0, 0.6))
-        if not foreign:
-            return cls(shape, curvature)
-        return cls(shape, curvature, float(rng.uniform(0.7, 1.0)), float(rng.uniform(0.05, 0.5)))
+        return cls(shape, curvature, float(rng.uniform(0.05, 0.5)) if foreign else 0.0)
 
     def put_on(self, car: VehicleFile) -> VehicleFile:
         """The car with this tyre."""
-        effects: dict[str, dict[str, float]] = {
-            "tyre_formula": {"share": 1.0, "shape": self.shape, "curvature": self.curvature}
-        }
-        if self.relaxation_m > 0.0:
-            effects["tyre_relaxation"] = {"length_m": self.relaxation_m}
-        stiffness = {
-            "stiffness_n": car.tyre.longitudinal_stiffness_n,
-            "by_load": self.by_load,
-        }
-        effects["tyre_stiffness_offset"] = stiffness
         values = car.model_dump(by_alias=True)
-        values |= {"effects": effects, "forms": {"tyre_stiffness_offset": "with load"}}
+        values["effects"]["tyre_formula"] = {"share": 1.0, "shape": self.shape, "curvature": self.curvature}
+        if self.relaxation_m > 0.0:
+            values["effects"]["tyre_relaxation"] = {"length_m": self.relaxation_m}
         return VehicleFile.model_validate(values)
 
 
@@ -117,11 +109,14 @@ def _road(rng: np.random.Generator) -> RoadFile:
     return RoadFile.model_validate({"schema": 1, "segments": segments})
 
 
-def _actual(car: VehicleFile, error: CarError) -> VehicleFile:
+def _actual(car: VehicleFile, error: CarError, by_load: float) -> VehicleFile:
     values = car.model_dump(by_alias=True)
     values["mass_kg"] *= 1.0 + error.mass
     values["wheel_radius_m"] *= 1.0 + error.radius
     values["tyre"]["longitudinal_stiffness_n"] *= 1.0 + error.stiffness
+    stiffness = {"stiffness_n": values["tyre"]["longitudinal_stiffness_n"], "by_load": by_load}
+    values["effects"]["tyre_stiffness_offset"] = stiffness
+    values["forms"]["tyre_stiffness_offset"] = "with load"
     return VehicleFile.model_validate(values)
 
 
@@ -165,13 +160,17 @@ def _frames(rng: np.random.Generator, road: RoadFile, front_m: NDArray[np.float6
 def make_drive(
     seed: int, error: CarError | None = None, noise: float | None = None, tyre: Tyre | None = None
 ) -> Drive:
-    """A drive; without a car error one is drawn, and so is the noise, between half and twice the scenario's."""
+    """A drive; without a car error one is drawn, and so is the noise, between half and twice the scenario's.
+
+    The tyres' stiffness goes with their load, by a share that is drawn.
+    """
     rng = np.random.default_rng(seed)
     road = _road(rng)
     drawn, scale = CarError.drawn(rng), float(2.0 ** rng.uniform(-1.0, 1.0))
     error, scale = error or drawn, noise or scale
     car = load_vehicle(CAR_FILE)
-    actual = _actual(car, error)
+    by_load = float(np.random.default_rng((seed, BY_LOAD_STREAM)).uniform(*BY_LOAD))
+    actual = _actual(car, error, by_load)
     if tyre is not None:
         actual = tyre.put_on(actual)
     run = _driven(actual, road, 1.0 + error.torque)

@@ -6,7 +6,8 @@ Prints a table of the methods dife and robust over sets of drives. `covered` is 
 the true friction, `worst` that of the worst drive; `sure, wrong` the share of rows with an interval below 0.4 that does
 not; `useful` the share of rows with an interval below 0.3 among those in which more than 0.7 of the peak is used;
 `narrow, right` the share of rows with an interval below 0.3 that holds the truth; `error` the mean error of TRPAC.
-DIR is the folder that holds vehicle_logs/ with the logs of foreign simulators.
+DIR is the folder that holds vehicle_logs/ with logs of other simulators; `ucd_tvidano` is left out: its loads and
+torques do not fit its own forces. They are told truly, or with a fault or a guessed stiffness.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from rich.progress import track
 
+from benchmarks.accuracy.estimate_logs import plants
 from benchmarks.accuracy.random_drives import (
     CAR_FILE,
     COLUMNS,
@@ -42,7 +44,7 @@ from scenarios.files import RoadFile, load_road, load_vehicle
 from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import make_log
 from sim2real.logs import read_log
-from sim2real.replay.inputs import make_inputs
+from sim2real.replay.inputs import Inputs, make_inputs
 from sim2real.replay.run import readings
 from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors, TrpacEstimator
 from trpac_core.estimator_data import Method
@@ -151,34 +153,61 @@ def on_drive(make: Callable[[int], Drive], camera: bool, seed: int) -> dict[str,
     return {method.label: over(drive, method, camera).score() for method in METHODS}
 
 
-def on_log(folder: Path) -> dict[str, Score]:
-    """Scores by method on a case of a foreign simulator: fit and hold-out, one front and one rear wheel."""
-    car, rows = load_vehicle(folder / "vehicle.yaml"), {method: [] for method in METHODS}
+@dataclass(frozen=True)
+class Recorded:
+    """A car of another simulator: whether all of it is told truly, and what it read with the truth, shape (n, 4)."""
+
+    truly: bool
+    parts: tuple[tuple[Inputs, Array], ...]
+
+
+def recorded_case(folder: Path) -> Recorded:
+    """A case of CommonRoad's multi-body car: fit and hold-out; that friction is another changes nothing of the car."""
+    car = load_vehicle(folder / "vehicle.yaml")
     told_of = json.loads((folder.parent / "truth.json").read_text(encoding="utf-8"))[folder.name]
-    factor = np.broadcast_to(told_of["fault"].get("mu_factor", 1.0), 4)
+    factor, parts = np.broadcast_to(told_of["fault"].pop("mu_factor", 1.0), 4), []
     for part in ("fit", "holdout"):
-        inputs, road = (
-            make_inputs(read_log(folder / f"{part}.csv"), car),
-            load_road(folder / f"road_{part}.yaml"),
-        )
-        core = inputs.vehicle
-        for wheel, ahead_m in ((0, core.cog_to_front_axle_m), (2, -core.cog_to_rear_axle_m)):
-            place = inputs.position_m + ahead_m
-            truth = np.array([road.segment_at(x).mu_left for x in place]) * factor[wheel]
-            for method in METHODS:
+        inputs = make_inputs(read_log(folder / f"{part}.csv"), car)
+        road, core = load_road(folder / f"road_{part}.yaml"), inputs.vehicle
+        under = [
+            [road.segment_at(x + ahead_m).mu_left for x in inputs.position_m]
+            for ahead_m in (core.cog_to_front_axle_m, -core.cog_to_rear_axle_m)
+        ]
+        parts.append((inputs, np.repeat(under, 2, axis=0).T * factor))
+    return Recorded(not (told_of["fault"] or told_of["not_in_vehicle_yaml"]), tuple(parts))
+
+
+def recorded(data: Path) -> list[Recorded]:
+    """The cases, and the logs of the other simulators: told their own stiffness, and told what is published."""
+    cases = sorted((data / "vehicle_logs" / "foreign_commonroad").glob("case_*"))
+    others = [d for d in plants(data) if d.car in ("own C_x", "as published")]
+    return [
+        *map(recorded_case, cases),
+        *(Recorded(d.car == "own C_x", ((d.inputs, d.truth),)) for d in others),
+    ]
+
+
+def on_record(record: Recorded) -> dict[str, Score]:
+    """Scores by method of one front and one rear wheel without a camera."""
+    scores = {}
+    for method in METHODS:
+        rows = []
+        for inputs, truth in record.parts:
+            for wheel in (0, 2):
                 config = EstimatorConfig(
                     method=method,
-                    vehicle=core,
+                    vehicle=inputs.vehicle,
                     front_axle=wheel < 2,
                     sliding_speed_noise_m_s=float(inputs.noise.sliding_speed_m_s[wheel]),
                 )
                 estimator = TrpacEstimator(config)
-                for sensors, mu in zip(readings(inputs, wheel), truth, strict=True):
+                for sensors, mu in zip(readings(inputs, wheel), truth[:, wheel], strict=True):
                     e = estimator.step(inputs.step_s, sensors)
                     if sensors.vehicle_speed_m_s > LEAST_M_S:
                         used = abs(e.tyre_force_n) / e.load_n
-                        rows[method].append((e.TRPAC, e.TRPAC_low, e.TRPAC_high, mu, used))
-    return {method.label: Rows(*np.array(values).T).score() for method, values in rows.items()}
+                        rows.append((e.TRPAC, e.TRPAC_low, e.TRPAC_high, mu, used))
+        scores[method.label] = Rows(*np.array(rows).T).score()
+    return scores
 
 
 ONSETS = (
@@ -287,22 +316,25 @@ def main() -> None:
     parser.add_argument("--drives", type=int, default=50, help="drives of each set")
     parser.add_argument("--first", type=int, default=7000, help="first seed")
     parser.add_argument("--sets", nargs="*", default=[*SETS, "onset"], help="names of sets, and onset")
-    parser.add_argument("--logs", type=Path, help="folder that holds vehicle_logs/foreign_commonroad")
+    parser.add_argument("--logs", type=Path, help="folder that holds vehicle_logs/")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, help="JSON file for all scores")
     options = parser.parse_args()
     seeds, table, all_scores = range(options.first, options.first + options.drives), [], {}
+
+    def add(name: str, found: list[dict[str, Score]]) -> None:
+        all_scores[name] = [{m: asdict(s) for m, s in each.items()} for each in found]
+        table.extend(line(name, m.label, [each[m.label] for each in found]) for m in METHODS)
+
     for name in options.sets:
         if name == "onset":
             continue
-        found = in_parallel(partial(on_drive, *SETS[name]), options.jobs, seeds, name)
-        all_scores[name] = [{m: asdict(s) for m, s in each.items()} for each in found]
-        table += [line(name, m.label, [each[m.label] for each in found]) for m in METHODS]
-    if options.logs is not None:
-        folders = sorted((options.logs / "vehicle_logs" / "foreign_commonroad").glob("case_*"))
-        found = in_parallel(on_log, options.jobs, folders, "logs of foreign simulators")
-        all_scores["logs"] = [{m: asdict(s) for m, s in each.items()} for each in found]
-        table += [line("logs of a foreign simulator", m.label, [f[m.label] for f in found]) for m in METHODS]
+        add(name, in_parallel(partial(on_drive, *SETS[name]), options.jobs, seeds, name))
+    records = [] if options.logs is None else recorded(options.logs)
+    for name, truly in (("simulators of others, told truly", True), ("with faults", False)):
+        todo = [record for record in records if record.truly == truly]
+        if todo:
+            add(name, in_parallel(on_record, options.jobs, todo, name))
     print(markdown(HEADS, table))
     if "onset" in options.sets:
         onsets = in_parallel(at_onset, options.jobs, seeds, "onset of braking")

@@ -26,7 +26,7 @@ def parameters(scenario: Scenario) -> dict[str, float | int | bool]:
     """Parameters of the unit for the scenario's car, camera and sensors, by variable name."""
     car, noise = scenario.vehicle.to_core(), scenario.sensors
     values: dict[str, float | int | bool] = car_parameters(car, scenario.wheel) | {
-        "confidence.torque_noise": noise.wheel_torque_noise_nm,
+        "estimator.torque_noise": noise.wheel_torque_noise_nm,
         "estimator.sliding_speed_noise": float(
             np.hypot(noise.vehicle_speed_noise_m_s, car.wheel_radius_m * noise.wheel_speed_noise_rad_s)
         ),

@@ -11,13 +11,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from trpac_core.sensors import GREATEST_ACCELERATION_M_S2, Sensors, filter_share, unusable
-from trpac_core.theta_variance import VarianceModel
 from trpac_core.vehicle import Vehicle
 
-UNKNOWN = VarianceModel.unknown
-"""Standard deviation of an unknown theta, that of our estimator [-]."""
-ROAD_CHANGE = VarianceModel.road_change
-"""Random walk of theta per root of distance without excitation, that of our estimator [1/sqrt(m)]."""
+UNKNOWN = 0.33
+"""Standard deviation of an unknown theta: anywhere between 0.05 and 1.2 [-]."""
+ROAD_CHANGE = 0.05
+"""Random walk of theta per root of distance without excitation [1/sqrt(m)]."""
 
 
 @dataclass(frozen=True, slots=True)

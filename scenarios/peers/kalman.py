@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 
 from scenarios.peers.base import UNKNOWN, PeerEstimate, PeerSetup, SensorFront, Taken, way
 from scenarios.peers.wheel_model import WheelState, advanced
-from trpac_core.dife import LEAST_THETA
-from trpac_core.identifiability import GREATEST_THETA, LEAST_SENSITIVITY
+from trpac_core.dife import LEAST_SENSITIVITY
 from trpac_core.sensors import Sensors
 from trpac_core.slip import wheel_slip
-from trpac_core.tyre import friction_by_theta
+from trpac_core.tyre import GREATEST_THETA, LEAST_THETA, friction_by_theta
 
 Array = NDArray[np.float64]
 

@@ -19,10 +19,9 @@ import numpy as np
 from padasip.filters import FilterRLS
 
 from scenarios.peers.base import ROAD_CHANGE, UNKNOWN, PeerEstimate, PeerSetup, SensorFront, Taken, way
-from trpac_core.dife import GREATEST_THETA, LEAST_THETA
 from trpac_core.sensors import Sensors, filter_share
 from trpac_core.slip import wheel_slip
-from trpac_core.tyre import correction
+from trpac_core.tyre import GREATEST_THETA, LEAST_THETA, correction
 
 
 @dataclass(frozen=True)

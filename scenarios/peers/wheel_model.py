@@ -14,9 +14,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from trpac_core.dife import GREATEST_THETA, LEAST_THETA
 from trpac_core.slip import GREATEST_SLIP, wheel_slip
-from trpac_core.tyre import friction_by_slip, friction_by_theta, used_friction
+from trpac_core.tyre import GREATEST_THETA, LEAST_THETA, friction_by_slip, friction_by_theta, used_friction
 from trpac_core.vehicle import Vehicle
 
 MOST_GROWTH = 2.0

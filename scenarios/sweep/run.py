@@ -21,14 +21,13 @@ from scenarios.sweep.camera import RenderedFrames, road_classes
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.trackers import METHODS, make_peer
 from scenarios.vision_overlay import image_estimator
-from trpac_core.dife import LEAST_THETA
+from trpac_core.dife import LEAST_SENSITIVITY
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.estimator_data import Method
-from trpac_core.identifiability import GREATEST_THETA, LEAST_SENSITIVITY
 from trpac_core.parameters.configuration import configuration
 from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
 from trpac_core.sensors import Sensors
-from trpac_core.tyre import friction_by_theta
+from trpac_core.tyre import GREATEST_THETA, LEAST_THETA, friction_by_theta
 from trpac_core.vehicle import WHEELS, Vehicle
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife

@@ -26,19 +26,22 @@ from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive
 from sim2real.observing.noise import read_noise
 from sim2real.observing.observer import Prediction, Simulation
 from sim2real.result import RmsError
+from trpac_core.dife import LEAST_SENSITIVITY
 from trpac_core.estimator import LOCKED_M_S, EstimatorConfig, TrpacEstimator
-from trpac_core.identifiability import WheelInputs, visible_theta
+from trpac_core.estimator_data import Method
 from trpac_core.sensors import Sensors, filter_share
-from trpac_core.slip import GREATEST_SLIP, Slip
-from trpac_core.slip_calibration import EXACT_CAR
-from trpac_core.tyre import used_friction
-from trpac_core.vehicle import Vehicle
+from trpac_core.slip import GREATEST_SLIP
+from trpac_core.tyre import tyre_at_slip
+from trpac_core.vehicle import EXACT_CAR, Vehicle
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SETTLING = 5.0
 """Time constants of the estimator that it is given after a change of the road; 0.7 % of a step are left then [-]."""
+
+SURELY = 2.5
+"""Standard deviations of the slip's noise by which the tyre must slide to count as one that shows the road [-]."""
 
 PARAMETERS = {
     "mass_kg": "the mass",
@@ -236,7 +239,10 @@ def _sliding_speed_noise(model: Simulation, drive: Drive, prediction: Prediction
 def _run(inputs: Inputs, drive: Drive, sliding_speed_noise_m_s: float) -> Run:
     # What a model is worth shows where the estimator does not mend it by itself.
     config = EstimatorConfig(
-        vehicle=inputs.vehicle, tolerance=EXACT_CAR, sliding_speed_noise_m_s=sliding_speed_noise_m_s
+        vehicle=inputs.vehicle,
+        tolerance=EXACT_CAR,
+        sliding_speed_noise_m_s=sliding_speed_noise_m_s,
+        method=Method.DIFE,
     )
     estimator, step_s, said = TrpacEstimator(config), drive.step_s, []
     for wheel_rad_s, torque_nm, speed_m_s, *accel in zip(
@@ -259,7 +265,7 @@ def _truth(model: Prediction, mu_reference: Array | None) -> Array:
 
 
 def _shown(truth: Array, model: Prediction, inputs: Inputs, step_s: float, noise_m_s: float) -> Mask:
-    """Where the wheel turns in a moving car and its tyre shows these sensors the road, by the estimator's own rule."""
+    """Where the wheel turns in a moving car and its tyre shows these sensors the road."""
     stiffness_n = inputs.vehicle.longitudinal_stiffness_n
     share = filter_share(step_s, EstimatorConfig.sensor_filter_s)
     filtered_m_s = noise_m_s * np.sqrt(share / (2.0 - share))
@@ -269,10 +275,12 @@ def _shown(truth: Array, model: Prediction, inputs: Inputs, step_s: float, noise
     shown = np.zeros(len(truth), dtype=np.bool_)
     for k in np.flatnonzero(able):
         slip, load_n = min(float(model.slip[k, 0]), GREATEST_SLIP), float(model.load_n[k, 0])
-        force_n = load_n * used_friction(float(truth[k]), slip, load_n, stiffness_n)
-        deviation = float(filtered_m_s / inputs.vehicle_speed_m_s[k])
-        wheel = WheelInputs(0.0, 0.0, 0.0, Slip(slip, 1.0), load_n, deviation, 0.0)
-        shown[k] = visible_theta(force_n, wheel, stiffness_n) is not None
+        surely = slip - SURELY * float(filtered_m_s / inputs.vehicle_speed_m_s[k])
+        if surely > 0.0:
+            theta = float(truth[k])
+            slides = theta < 2.0 * tyre_at_slip(surely, load_n, stiffness_n).adhering
+            sensitivity = tyre_at_slip(slip, load_n, stiffness_n).friction_by_theta(theta)
+            shown[k] = slides and sensitivity >= LEAST_SENSITIVITY
     return shown
 
 

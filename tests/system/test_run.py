@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from trpac_core.theta_variance import VarianceModel
 from typer.testing import CliRunner
 
 from fmu_src.packaging import build_unit
@@ -22,7 +23,6 @@ from trpac_cli.main import app
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.sensors import Sensors
-from trpac_core.theta_variance import VarianceModel
 
 ROOT = Path(__file__).parents[2]
 

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from trpac_core.excitation import FuzzyScheduler
+from trpac_core.identifiability import WheelInputs, least_theta, visible_theta
+from trpac_core.theta_variance import VarianceModel
 
 from trpac_core import tyre
 from trpac_core.dife import (
@@ -21,10 +24,7 @@ from trpac_core.dife import (
     fusion_step,
     settled,
 )
-from trpac_core.excitation import FuzzyScheduler
-from trpac_core.identifiability import WheelInputs, least_theta, visible_theta
 from trpac_core.slip import Slip
-from trpac_core.theta_variance import VarianceModel
 
 WHEEL = Wheel(1.2, 0.29, 50_000.0)
 SCHEDULER = FuzzyScheduler()

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from trpac_core.slip_calibration import EXACT_CAR, CarTolerance
+from trpac_core.theta_variance import drifted_variance, unknown_variance
 
 from trpac_core import tyre
 from trpac_core.dife import NEVER_SEEN_M
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.observer import seen_at
 from trpac_core.sensors import Sensors
-from trpac_core.slip_calibration import EXACT_CAR, CarTolerance
 from trpac_core.stationary_mean import NO_MEAN, StationaryMean, aged, mean_slip_deviation
-from trpac_core.theta_variance import drifted_variance, unknown_variance
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
 

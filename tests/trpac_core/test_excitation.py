@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from trpac_core.excitation import K_V_LIMIT, THRESHOLD_LIMIT, FuzzyScheduler, Partition
 
 from trpac_core import tyre
-from trpac_core.excitation import K_V_LIMIT, THRESHOLD_LIMIT, FuzzyScheduler, Partition
 
 TABLE_2 = (("SS", "SM", "SB"), ("MS", "MM", "MB"), ("BS", "BM", "BB"))
 LETTER = {"S": 0, "M": 1, "B": 2}

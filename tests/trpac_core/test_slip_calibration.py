@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from trpac_core.slip_calibration import CORRELATED, EXACT_CAR, SETTLING, CarTolerance, calibrated
+
 from trpac_core.tyre import INITIAL_SLOPE, used_friction
 
 LOAD_N, C_X = 3400.0, 50_000.0

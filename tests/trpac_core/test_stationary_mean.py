@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-
-from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
 from trpac_core.excitation import FuzzyScheduler
 from trpac_core.identifiability import (
     SHORT_MEAN_S,
@@ -14,6 +12,8 @@ from trpac_core.identifiability import (
     point_of_mean,
     significance_of_mean,
 )
+
+from trpac_core.dife import FusionState, Gains, Wheel, fusion_step, settled
 from trpac_core.slip import Slip
 from trpac_core.stationary_mean import (
     GREATEST_GAMMA_FACTOR,

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from trpac_core.stiffness_mismatch import StiffnessMismatch, updated_mismatch
 
 from trpac_core import tyre
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.sensors import Sensors
-from trpac_core.stiffness_mismatch import StiffnessMismatch, updated_mismatch
 from trpac_core.vehicle import Vehicle
 
 CAR = Vehicle()

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from trpac_core.theta_variance import (
     GREATEST_ROAD,
     LEAST_ROAD,
@@ -18,6 +17,7 @@ from trpac_core.theta_variance import (
     unknown_variance,
     variance_with_camera,
 )
+
 from trpac_core.tyre import tyre_at_slip
 
 MODEL = VarianceModel()

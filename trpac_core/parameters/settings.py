@@ -5,11 +5,12 @@ A parameter's start is the default of the estimator's own configuration, so that
 
 from __future__ import annotations
 
-from trpac_core.dife import GREATEST_THETA, VisualTerm
+from trpac_core.dife import VisualTerm
 from trpac_core.estimator_data import Method
-from trpac_core.excitation import K_V_LIMIT
+from trpac_core.fuzzy import K_V_LIMIT
 from trpac_core.parameters.estimator_parameter import parameter
 from trpac_core.parameters.image_settings import CAMERA_PARAMETERS, IMAGE_PARAMETERS
+from trpac_core.tyre import GREATEST_THETA
 from trpac_core.vision.classes import Surface
 
 _VEHICLE_PARAMETERS = (
@@ -78,12 +79,6 @@ _FUSION_PARAMETERS = (
         max(form.value for form in VisualTerm),
     ),
     parameter(
-        "estimator.tyre_first",
-        "",
-        "gains.tyre_first",
-        "The visual term never pulls against what the tyre shows, in DIFE",
-    ),
-    parameter(
         "estimator.theta_initial",
         "1",
         "theta_initial",
@@ -101,6 +96,14 @@ _FUSION_PARAMETERS = (
         "sliding_speed_noise_m_s",
         "Standard deviation of the sliding speed omega R - v per sample",
         0.0,
+    ),
+    parameter(
+        "estimator.torque_noise",
+        "N.m",
+        "torque_noise_nm",
+        "Standard deviation of the wheel torque per sample",
+        0.0,
+        1e6,
     ),
     parameter(
         "estimator.acceleration_filter",
@@ -122,20 +125,9 @@ _FUSION_PARAMETERS = (
     ),
     *(
         parameter(
-            f"scheduler.theta_{size}",
-            "1",
-            f"scheduler.theta_sets.{size}",
-            f"Camera's adhesion at which the set '{size}' is full",
-            0.0,
-            GREATEST_THETA,
-        )
-        for size in ("small", "medium", "big")
-    ),
-    *(
-        parameter(
             f"scheduler.difference_{size}",
             "1",
-            f"scheduler.difference_sets.{size}",
+            f"gains.difference_sets.{size}",
             f"Difference of camera and estimate at which the set '{size}' is full",
             0.0,
             GREATEST_THETA,
@@ -146,35 +138,12 @@ _FUSION_PARAMETERS = (
         parameter(
             f"scheduler.K_v_{size}",
             "1/s",
-            f"scheduler.K_v_values.{index}",
+            f"gains.K_v_values.{index}",
             f"K_v of the set '{size}', in 1/s as the visual term is in form (18)",
             0.0,
             K_V_LIMIT,
         )
         for index, size in enumerate(("small", "medium", "big"))
-    ),
-    parameter(
-        "scheduler.class_scatter",
-        "1",
-        "scheduler.class_scatter",
-        "How much more slippery than its class a road may be and still be seen",
-        0.0,
-        1.0,
-    ),
-    parameter(
-        "scheduler.onset_sensitivity",
-        "1",
-        "scheduler.onset_sensitivity",
-        "Sensitivity d mu / d theta from which the tyre shows theta",
-        0.0,
-        1.0,
-    ),
-    parameter(
-        "scheduler.noise_factor",
-        "1",
-        "scheduler.noise_factor",
-        "Noise deviations that the threshold stays above",
-        0.0,
     ),
     parameter("preview.P_0", "m", "preview.P_0_m", "Preview distance P_0", 0.0),
     parameter("preview.hold", "m", "preview.hold_m", "How far beyond its end a frame holds", 0.0),
@@ -186,66 +155,10 @@ _FUSION_PARAMETERS = (
         0.0,
     ),
     parameter(
-        "confidence.torque_noise",
-        "N.m",
-        "confidence.torque_noise_nm",
-        "Standard deviation of the torque",
-        0.0,
-        1e6,
-    ),
-    parameter(
-        "confidence.tyre_share",
-        "1",
-        "confidence.tyre_share",
-        "Error of the tyre model, as a share of the used friction",
-        0.0,
-        10.0,
-    ),
-    parameter(
-        "confidence.road_change",
-        "1/m0.5",
-        "confidence.road_change",
-        "Wander of the adhesion per root of a metre driven unseen",
-        0.0,
-        10.0,
-    ),
-    parameter(
-        "confidence.car_share",
-        "1",
-        "confidence.car_share",
-        "Error of load and torque, as a share of the adhesion that no driving can tell",
-        0.0,
-        10.0,
-    ),
-    parameter(
-        "confidence.class_change",
-        "m",
-        "confidence.class_change_m",
-        "Way driven unseen that a change of the camera's class counts as",
-        0.0,
-        1e6,
-    ),
-    parameter(
-        "confidence.class_scatter",
-        "1",
-        "confidence.class_scatter",
-        "Standard deviation of a road from the value of the class that the camera gave it",
-        0.0,
-        10.0,
-    ),
-    parameter(
         "tolerance.speed_bias",
         "m/s",
         "tolerance.speed_bias_m_s",
-        "Standard deviation of a constant error of the sliding speed, learnt while the tyre adheres",
-        0.0,
-        100.0,
-    ),
-    parameter(
-        "tolerance.speed_drift",
-        "m/s1.5",
-        "tolerance.speed_drift_m_s",
-        "How far that error wanders per root of a second",
+        "Standard deviation of a constant error of the sliding speed",
         0.0,
         100.0,
     ),
@@ -253,7 +166,7 @@ _FUSION_PARAMETERS = (
         "tolerance.rolling_radius",
         "1",
         "tolerance.ratio",
-        "Standard deviation of the rolling radius as a share of it, learnt while the tyre adheres",
+        "Standard deviation of the rolling radius as a share of it",
         0.0,
         1.0,
     ),
@@ -261,15 +174,7 @@ _FUSION_PARAMETERS = (
         "tolerance.longitudinal_stiffness",
         "1",
         "tolerance.compliance",
-        "Standard deviation of the tyre's compliance as a share of it, learnt while the tyre adheres",
-        0.0,
-        10.0,
-    ),
-    parameter(
-        "confidence.unknown",
-        "1",
-        "confidence.unknown",
-        "Standard deviation where nothing is known",
+        "Standard deviation of the tyre's longitudinal stiffness as a share of it",
         0.0,
         10.0,
     ),

@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array, exp, greatest, log, total
+from .arrays import Array, count_below, cumulated, exp, greatest, log, total
 from .blocks import Reading
 from .roads import PerCell
-from .tyres import FORMULAS, IS_TOLD, TYRES, Column, Grid, PerTyre, Tyre, curves
+from .tyres import FORMULAS, IS_TOLD, TOLD, TYRES, Column, Grid, PerTyre, Tyre, curves
 
 POWER_PER_S = 20.0
 """Power with which the likelihood of a second of readings counts, as of independent readings; a reading
@@ -47,6 +47,8 @@ LEAST_SPEED_M_S, LEAST_RIM_M_S = 1.5, 0.5
 MOST_SLIP = 0.4
 """Slip of a driven wheel above which it spins, and what its tyre loses is not known: to a fifth of the peak by magic
 formulas, hardly any by others [-]."""
+SLIDES = 0.05
+"""Probability that the road is so slippery that the told tyre slides, from which the observer reads theta [-]."""
 NEVER = 1e-30
 """Weight that each cell keeps [-]."""
 
@@ -286,6 +288,12 @@ def read(
 def told_formula(belief: Belief) -> float:
     """Probability that the tyre has the told formula [-]."""
     return float(total(belief.tyre[:FORMULAS])[0])
+
+
+def onset_theta(belief: Belief, theta: PerCell) -> float:
+    """Friction that the road has at most with the probability `SLIDES`, if the tyre is as told [-]."""
+    up_to = cumulated(belief.road[TOLD])
+    return float(theta[min(count_below(up_to, SLIDES), len(theta) - 1)])
 
 
 def mean_offset(belief: Belief) -> float:

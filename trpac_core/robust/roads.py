@@ -7,10 +7,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from ..tyre import GREATEST_THETA, LEAST_THETA
 from .arrays import Array, exp, spacing, total
 
-LEAST, GREATEST = 0.02, 1.2
-"""Frictions of the first and about the last cell: wet ice, and a racing tyre on a dry road [-]."""
 CELL, CELL_SHARE = 0.006, 0.025
 """Width of a cell: the greater of a number and of a share of its friction. It is below the standard deviation that the
 tyre leaves after half a second of sliding [-]."""
@@ -30,8 +29,8 @@ CHANGE_PER_M = 0.02
 
 def cells() -> Array:
     """Frictions of the cells, shape (cells,) [-]."""
-    values = [LEAST]
-    while values[-1] < GREATEST:
+    values = [LEAST_THETA]
+    while values[-1] < GREATEST_THETA:
         values.append(values[-1] + max(CELL, CELL_SHARE * values[-1]))
     return np.array(values)
 

@@ -1,9 +1,9 @@
 """The tyres that a wheel may have, and their curves of used friction over slip.
 
 Nobody knows a tyre's curve. Four hypotheses stand beside each other: the told modified Dugoff tyre, the same with
-another stiffness, and two rational curves that bend from the first slip on, whose stiffness goes with the load. The
-two differ in where their peak lies and in what they lose beyond it; magic formulas lie near the first, brush models
-and exponential curves near the second.
+another stiffness, and two rational curves that bend from the first slip on. The stiffness of all but the told one goes
+with the load, as that of real tyres does (Pacejka 2012, ch. 4). The two rational curves differ in where their peak lies
+and in what they lose beyond it; magic formulas lie near the first, brush models and exponential curves near the second.
 """
 
 from __future__ import annotations
@@ -155,6 +155,8 @@ def curves(
     """
     size = np.minimum(np.maximum(np.abs(slip), LEAST_SLIP), GREATEST_SLIP)
     stiffness = stiffness_n * exp(-softness)
+    # C_x is told at the mean load; a tyre that is not as told has a stiffness that goes with the load.
+    stiffness[TOLD + 1 : FORMULAS] *= load_n / mean_load_n
     told = dugoff(theta, size[:FORMULAS], load_n, stiffness[:FORMULAS])
     own = size[FORMULAS:]
     # A braked wheel's slip is already taken over the road's speed, a driven one's over the rim's.

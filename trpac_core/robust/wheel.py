@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..slip_calibration import CarTolerance
+from ..vehicle import CarTolerance
 from .belief import (
     FIRST,
     Belief,
@@ -22,6 +22,7 @@ from .belief import (
     as_told,
     driven,
     mean_offset,
+    onset_theta,
     read,
     shows,
     told_formula,
@@ -32,8 +33,6 @@ from .interval import Interval, interval
 from .roads import STOOD_M, THETA, ClassUnderWheel, PerCell, Priors, advanced, prior_of, priors
 from .tyres import TOLD
 
-INNOVATION = 20.0
-"""How much faster the observer's estimate follows per distance from what the tyre shows: at 0.1 twice as fast [-]."""
 DOUBTED, BELIEVED = 0.05, 0.2
 """Probability of the told formula up to which the observer does not count, and from which it counts fully [-]."""
 LEAST_TOLERANCE = 1e-4
@@ -119,6 +118,8 @@ class RobustState(NamedTuple):
         The block that fills, and the one before it.
     friction : float
         Used friction that was read last, 0 before any [-].
+    onset_theta : float
+        Friction that the road has at most with the probability `belief.SLIDES`, if the tyre is as told [-].
     slowness_s_m : float
         One over the speed of the last reading, 0 before any [s/m].
     way_m : float
@@ -139,6 +140,7 @@ class RobustState(NamedTuple):
     filling: Filling
     before: Means | None
     friction: float
+    onset_theta: float
     slowness_s_m: float
     way_m: float
     wheel_noise: Noise
@@ -165,6 +167,7 @@ class RobustState(NamedTuple):
             Filling(*data["filling"]),
             None if before is None else Means(*before),
             data["friction"],
+            data["onset_theta"],
             data["slowness_s_m"],
             data["way_m"],
             Noise(*data["wheel_noise"]),
@@ -186,6 +189,7 @@ def begun(known: RobustSetup) -> RobustState:
         Filling(),
         None,
         0.0,
+        onset_theta(belief, known.theta),
         0.0,
         0.0,
         Noise(known.wheel_noise),
@@ -321,6 +325,7 @@ def _on_road(
         filling=Filling(),
         before=means,
         friction=friction,
+        onset_theta=onset_theta(belief, known.theta),
         slowness_s_m=slowness,
         way_m=0.0,
         # What the observer reads on the class's own road is not undone by it.
@@ -337,11 +342,24 @@ def _offset_is_strange(belief: Belief, known: RobustSetup, slowness_s_m: float) 
     return bool(offset * offset > OFFSET_DEVIATIONS * OFFSET_DEVIATIONS * told)
 
 
-def point(state: RobustState, observer: float) -> tuple[float, float]:
-    """TRPAC and its standard deviation, with the observer's theta_hat [-]."""
+def point(state: RobustState, observer: float) -> float:
+    """TRPAC, with the observer's theta_hat [-]."""
     said = state.said
     believed = min(max((told_formula(state.belief) - DOUBTED) / (BELIEVED - DOUBTED), 0.0), 1.0)
     share = 0.0 if state.stale else believed
-    theta = min(max(share * observer + (1.0 - share) * said.mean, said.clip), said.unmoved_high)
+    return min(max(share * observer + (1.0 - share) * said.mean, said.clip), said.unmoved_high)
+
+
+class Claim(NamedTuple):
+    """What the belief says of an estimate [-]."""
+
+    deviation: float
+    low: float
+    high: float
+
+
+def claim(said: Interval, theta: float) -> Claim:
+    """Standard deviation of an estimate under the belief, and the interval, which holds the estimate."""
     off, scale = said.mean - theta, SCALE_DEVIATION * said.mean
-    return theta, math.sqrt(said.std * said.std + off * off + scale * scale)
+    deviation = math.sqrt(said.std * said.std + off * off + scale * scale)
+    return Claim(deviation, min(said.low, theta), max(said.high, theta))

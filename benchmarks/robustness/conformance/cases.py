@@ -103,7 +103,7 @@ CASES = {
             {"vehicle_speed": math.nan},
             {"vehicle_speed": 1e6},
             {"frame_id": 7},
-            {"estimator.tyre_first": False},
+            {"image.buffers_enabled": False},
             {"image_path": "nothing.png"},
             ("estimator.theta_initial", 0.3),
             ("image_path", False),

@@ -6,11 +6,11 @@ import inspect
 import numpy as np
 import pytest
 from native_calls import bits, build, drawn
+from trpac_core.slip_calibration import CarTolerance
 
 from fmu_src.native.estimator import estimator_program
 from trpac_core.robust import wheel as robust
 from trpac_core.robust.belief import WheelModel
-from trpac_core.slip_calibration import CarTolerance
 from trpac_core.vehicle import Vehicle
 
 PROGRAM = estimator_program()

@@ -21,7 +21,7 @@ from trpac_core.robust.belief import (
     unread,
 )
 from trpac_core.robust.blocks import Reading
-from trpac_core.robust.tyres import TYRES
+from trpac_core.robust.tyres import TOLD, TYRES
 
 THETA = np.array([0.1, 0.2, 0.35, 0.5, 0.8, 1.1])
 KNOWN = hypotheses(TYRES)
@@ -83,13 +83,19 @@ def blank():
 # A plain filter of one tyre and cell
 
 
+def stiffness_of(tyre_at, softness, load_n):
+    """Told at the mean load; that of all but the told tyre goes with the load."""
+    by_load = 1.0 if tyre_at == TOLD else load_n / WHEEL.mean_load_n
+    return WHEEL.stiffness_n * math.exp(-softness) * by_load
+
+
 def used(tyre_at, theta, slip, softness, load_n):
     """Signed used friction of a hypothesis at a signed slip."""
-    told, size, stiffness = TYRES[tyre_at], abs(slip), WHEEL.stiffness_n * math.exp(-softness)
+    told, size, stiffness = TYRES[tyre_at], abs(slip), stiffness_of(tyre_at, softness, load_n)
     if told.peak == 0.0:
         return math.copysign(tyre.used_friction(theta, size, load_n, stiffness), slip)
     over_road = size / (1.0 - size) if slip > 0.0 else size
-    x = stiffness / WHEEL.mean_load_n * over_road / theta
+    x = stiffness / load_n * over_road / theta
     s = x / told.peak
     share = x / (1.0 + s * (s + told.peak - 2.0))
     if s > 1.0:
@@ -99,10 +105,9 @@ def used(tyre_at, theta, slip, softness, load_n):
 
 def slides(tyre_at, theta, slip, softness, load_n):
     """From 0 to 1 where the normalised slip goes beyond 5, twice that of the peak."""
-    told, size, stiffness = TYRES[tyre_at], abs(slip), WHEEL.stiffness_n * math.exp(-softness)
+    told, size, stiffness = TYRES[tyre_at], abs(slip), stiffness_of(tyre_at, softness, load_n)
     over_road = size / (1.0 - size) if slip > 0.0 or told.peak == 0.0 else size
-    load = load_n if told.peak == 0.0 else WHEEL.mean_load_n
-    x = stiffness * over_road / load / theta
+    x = stiffness * over_road / load_n / theta
     return x * x / (x * x + 25.0)
 
 
@@ -225,8 +230,8 @@ def test_no_cell_is_ruled_out_for_good():
     assert 1e-31 <= belief.road[0].min() < 1e-20
 
 
-def test_the_order_of_the_tyres_does_not_matter():
-    order = [1, 0, 3, 2]
+def test_the_order_of_the_tyres_with_a_peak_does_not_matter():
+    order = [0, 1, 3, 2]
     permuted = hypotheses(tuple(TYRES[i] for i in order))
     belief = drawn(2)
     found = read(

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from quarter_car import LOAD, I, R, driven, magic_formula, pulses, softer_curve, told_curve
+from trpac_core.slip_calibration import CarTolerance
 
 from trpac_core.robust import belief as beliefs
 from trpac_core.robust.belief import Belief, WheelModel, hypotheses
@@ -14,7 +15,6 @@ from trpac_core.robust.interval import Interval, interval
 from trpac_core.robust.roads import NONE, priors
 from trpac_core.robust.tyres import TYRES
 from trpac_core.robust.wheel import RobustState, Sample, begun, point, setup, stepped
-from trpac_core.slip_calibration import CarTolerance
 
 DRY, WET, SNOW = range(3)
 CLASSES = (0.8, 0.6, 0.2)
