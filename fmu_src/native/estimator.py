@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from trpac_core import car_friction, excitation, local_speed, paper, sensors, tyre
+from trpac_core import car_friction, dife, local_speed, paper, sensors, tyre, wheel_step
 from trpac_core.robust import messages, wheel
 from trpac_core.vision import preview
 
@@ -11,8 +11,17 @@ from .translator.program import Program
 
 ROOTS = (
     tyre.peak_friction,
-    excitation.FuzzyScheduler.threshold,
-    excitation.FuzzyScheduler.K_v,
+    wheel_step.wheel_setup,
+    wheel_step.first_state,
+    wheel_step.first_estimate,
+    wheel_step.unusable_input,
+    wheel_step.rates_of,
+    wheel_step.outcome_of,
+    wheel_step.stepped,
+    wheel_step.held,
+    dife.fusion_step,
+    dife.settled,
+    dife.visual_gain,
     sensors.unusable,
     sensors.motion_plausible,
     messages.learnt_stiffness_n,
@@ -26,6 +35,7 @@ ROOTS = (
     wheel.begun,
     wheel.stepped,
     wheel.point,
+    wheel.claim,
     local_speed.local_speeds,
     car_friction.car_friction,
 )

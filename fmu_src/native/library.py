@@ -58,18 +58,23 @@ class Library:
     def __init__(self, program: Program, folder: Path) -> None:
         self.program = program
         self._kinds: dict[str, Any] = {}
-        files = program.write(folder, "trpac", "Made of the Python package trpac_core: change that.")
+        files = folder / "trpac.h", folder / "trpac.c"
+        for file, text in zip(files, program.texts("trpac", "Made of Python: change that."), strict=True):
+            file.write_text(text, encoding="utf-8")
         self._library = ctypes.CDLL(str(compiled([files[1]], folder / "trpac.so", *WARNINGS)))
 
     def call(self, python: Any, *arguments: Any) -> Any:
-        """What the C of a function returns for these arguments; those that Python changes in place are changed."""
+        """What the C of a function returns for these arguments.
+
+        Arguments that Python changes in place are changed; one that is a value of C, see `kept`, stays one.
+        """
         function = self.program.require(python)
         called = getattr(self._library, function.c)
         kinds = [kind for _, kind in function.parameters]
         values = [self.to_c(value, kind) for value, kind in zip(arguments, kinds, strict=True)]
         result = self._called(function, called, values, kinds)
         for argument, value, kind in zip(arguments, values, kinds, strict=True):
-            if kind.mutable:
+            if kind.mutable and argument is not value:
                 for f in kind.fields:
                     setattr(argument, f.name, self.to_python(getattr(value, safe(f.name)), f.type))
         return result
@@ -94,6 +99,14 @@ class Library:
             return None
         called.restype = self.kind(function.returns)
         return self.to_python(called(*given), function.returns)
+
+    def kept(self, value: Any) -> Any:
+        """A record as a value of C that calls take, and change in place, without conversion."""
+        return self.to_c(value, self.program.types.of_value(value, "a value"))
+
+    def back(self, kept: Any, like: Any) -> Any:
+        """The Python value of what is kept; `like` is one of its type."""
+        return self.to_python(kept, self.program.types.of_value(like, "a value"))
 
     def kind(self, kind: Type) -> Any:
         """The type of ctypes."""
@@ -121,6 +134,8 @@ class Library:
     def to_c(self, value: Any, kind: Type) -> Any:
         """A Python value in C."""
         made = self.kind(kind)
+        if isinstance(value, ctypes.Structure):
+            return value
         if kind.kind == "enum":
             return made(value.value)
         if kind.kind == "array" and kind.item is not None:
@@ -153,6 +168,6 @@ class Library:
         if kind.kind == "optional" and kind.item is not None:
             return self.to_python(value.value, kind.item) if value.has else None
         if kind.kind == "record":
-            parts = [self.to_python(getattr(value, safe(f.name)), f.type) for f in kind.fields]
-            return tuple(parts) if kind.python is tuple else kind.python(*parts)
+            parts = {f.name: self.to_python(getattr(value, safe(f.name)), f.type) for f in kind.fields}
+            return tuple(parts.values()) if kind.python is tuple else kind.python(**parts)
         return value

@@ -15,7 +15,7 @@ LASTING_S = 2.0
 
 
 def learnt_stiffness_n(state: RobustState, known: RobustSetup, load_n: float) -> float | None:
-    """Stiffness of a tyre that does not follow the told formula, at a load [N]; None where it does, or none was read."""
+    """Stiffness of a tyre that does not follow the told formula, at a load [N]; None where it does, or is unread."""
     if state.doubted_s < LASTING_S:
         return None
     tyre = first_greatest(state.belief.tyre)

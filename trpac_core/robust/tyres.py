@@ -130,6 +130,11 @@ def peaked(theta: Array, slip: Array, stiffness: Array, peak: Array, fall: Array
     return Curve(theta * share, by_x * stiffness, by_x * stiffness * slip, sliding(rate * slip))
 
 
+def size(slip: Array) -> Array:
+    """Unsigned slip, within what the formulas can take, shape as given [-]."""
+    return np.minimum(np.maximum(np.abs(slip), LEAST_SLIP), GREATEST_SLIP)
+
+
 def curves(
     theta: PerCell,
     slip: Grid,
@@ -153,16 +158,12 @@ def curves(
     peak, fall : array, shape (tyres, 1)
         As in `Tyre` [-].
     """
-    size = np.minimum(np.maximum(np.abs(slip), LEAST_SLIP), GREATEST_SLIP)
-    stiffness = stiffness_n * exp(-softness)
     # C_x is told at the mean load; a tyre that is not as told has a stiffness that goes with the load.
-    stiffness[TOLD + 1 : FORMULAS] *= load_n / mean_load_n
-    told = dugoff(theta, size[:FORMULAS], load_n, stiffness[:FORMULAS])
-    own = size[FORMULAS:]
+    by_load = np.where(IS_TOLD[:FORMULAS] > 0.0, 1.0, load_n / mean_load_n)
+    told_n = stiffness_n * exp(-softness[:FORMULAS]) * by_load
+    told = dugoff(theta, size(slip[:FORMULAS]), load_n, told_n)
+    own, stiffness = size(slip[FORMULAS:]), stiffness_n * exp(-softness[FORMULAS:]) / mean_load_n
     # A braked wheel's slip is already taken over the road's speed, a driven one's over the rim's.
     road_share = np.where(slip[FORMULAS:] > 0.0, 1.0 - own, 1.0)
-    other = peaked(
-        theta, own / road_share, stiffness[FORMULAS:] / mean_load_n, peak[FORMULAS:], fall[FORMULAS:]
-    )
-    other = other._replace(by_slip=other.by_slip / (road_share * road_share))
-    return stacked(told, other)
+    other = peaked(theta, own / road_share, stiffness, peak[FORMULAS:], fall[FORMULAS:])
+    return stacked(told, other._replace(by_slip=other.by_slip / (road_share * road_share)))

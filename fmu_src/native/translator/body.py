@@ -30,10 +30,11 @@ class Body(Loops):
         self.homes = homes(statements, set(self.parameters))
         names = [n for n in ast.walk(self.function.node) if isinstance(n, ast.Name)]
         self.assigned = [n.id for n in names if isinstance(n.ctx, ast.Store)]
+        self.read = [n.id for n in names if isinstance(n.ctx, ast.Load)]
         while True:
             self.out: list[str] = []
             self.depth, self.temporaries, self.changed = 1, 0, False
-            self.aliases, self.arrays, self.steps = {}, {}, []
+            self.aliases, self.arrays, self.steps, self.remarks = {}, {}, [], []
             self.last_line = statements[0].lineno
             self.block(statements)
             if self.final:
@@ -70,8 +71,7 @@ class Body(Loops):
     def _comments(self, statement: ast.stmt) -> None:
         for line in range(self.last_line + 1, statement.lineno):
             if line in self.source.comments:
-                self.flush()
-                self.put(f"/* {self.source.comments[line]} */")
+                self.remark(f"/* {self.source.comments[line]} */")
         self.last_line = max(self.last_line, statement.lineno)
 
     def statement(self, node: ast.stmt) -> None:
@@ -89,10 +89,11 @@ class Body(Loops):
                 node.target, ast.copy_location(ast.BinOp(as_value(node.target), node.op, node.value), node)
             )
             return
-        self.flush()
         if isinstance(node, ast.Return):
             self.give(node)
-        elif isinstance(node, ast.If):
+            return
+        self.flush()
+        if isinstance(node, ast.If):
             self.branch(node)
         elif isinstance(node, ast.While) and not node.orelse:
             self.put(f"while ({self.truth(node.test).text}) {{")
@@ -147,6 +148,7 @@ class Body(Loops):
         """`return`."""
         function = self.function
         if node.value is None or function.returns == NOTHING:
+            self.flush()
             self.put("return;")
         elif function.updates:
             self.update(function.parameters[0][0], node.value)
@@ -227,10 +229,11 @@ class Body(Loops):
         return f"{kind.c} {safe(name)}" if fresh else safe(name)
 
     def array(self, name: str, e: Expression) -> None:
-        """An array to a variable; a part of another one, or one under two names, needs no place of its own."""
+        """An array to a variable; a part of another one, and records that are read once, need no place of their own."""
         if e.names == {name} and e.address == safe(name):
             return
-        if e.part and self.assigned.count(name) == 1:
+        once = e.type.item is not None and e.type.item.kind == "record" and self.read.count(name) == 1
+        if (e.part or once) and self.assigned.count(name) == 1:
             self.aliases[name] = e
             return
         self.fresh(name, e.type)
@@ -316,7 +319,7 @@ class Body(Loops):
         later: list[tuple[str, Type, str | ast.expr | Expression]] = []
         for field, value in given.items():
             node: Any = value
-            f = kind.field(field)
+            f = kind.found(field)
             if f is None:
                 raise self.refuse(node, f"{kind.c} has no field {field}.")
             if f.type.big or f.type.kind == "array":
@@ -391,10 +394,10 @@ class Body(Loops):
             called: Any = self.known(node.func)
             keywords = {str(k.arg): k.value for k in node.keywords}
             if isinstance(called, type):
-                for name, value in self.values_of(kind, node.args, keywords, node).items():
-                    field = kind.field(name)
-                    if field is not None:
-                        self.fill_part(part_of(target, name), field.type, value, node)
+                values = self.values_of(kind, node.args, keywords, node)
+                # Those first that can share the loop that waits.
+                for field in sorted(kind.fields, key=lambda f: f.type.shape != self.waiting_shape):
+                    self.fill_part(part_of(target, field.name), field.type, values[field.name], node)
                 return
             if called is not MISSING:
                 self.flush()

@@ -238,7 +238,7 @@ class Expressions:
         base = self.plain(self.expr(node.value))
         if base.type.kind == "array":
             item = base.type.item
-            found = item.field(node.attr) if item else None
+            found = item.found(node.attr) if item else None
             if found is None:
                 raise self.refuse(node, f"an array's {node.attr}.")
             return self.elementwise(
@@ -246,13 +246,14 @@ class Expressions:
             )
         if base.type.kind == "enum" and node.attr == "value":
             return Expression(f"(int){base.bound(UNARY)}", INT, UNARY)
-        found = base.type.field(node.attr) if base.type.kind == "record" else None
+        found = base.type.found(node.attr) if base.type.kind == "record" else None
         if found is not None:
             return base.member(found.name, found.type)
         method = getattr(base.type.python, node.attr, None)
         if isinstance(method, property):
             return self.called(self.program.require(method.fget), [base], node, [], {})
-        raise self.refuse(node, f"{base.type.c}.{node.attr} is not known.")
+        why = base.type.left_out.get(node.attr, "is not known")
+        raise self.refuse(node, f"{base.type.c}.{node.attr}: {why}.")
 
     def _subscript(self, node: ast.Subscript, want: Type | None) -> Expression:
         base = self.plain(self.expr(node.value))
@@ -567,6 +568,9 @@ class Expressions:
         """The values of a record's fields: expressions, or Python's defaults."""
         given: dict[str, Any] = dict(zip((f.name for f in kind.fields), arguments, strict=False))
         given |= keywords
+        for name in given:
+            if kind.found(name) is None:
+                raise self.refuse(node, f"{kind.c}.{name}: {kind.left_out.get(name, 'is not known')}.")
         for f in kind.fields:
             if f.name not in given:
                 given[f.name] = default_of(kind.python, f.name)
@@ -603,6 +607,9 @@ class Expressions:
             if any(value):
                 raise self.refuse(node, "an array whose default is not 0 everywhere.")
             self.put(f"memset({target}, 0, sizeof {target});")
+        elif kind.big and kind.kind == "record":
+            for f in kind.fields:
+                self.fill_part(f"{target}.{safe(f.name)}", f.type, getattr(value, f.name), node)
         else:
             self.put(f"{target} = {literal(value, kind, self.source.file)};")
 

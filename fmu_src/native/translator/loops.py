@@ -7,7 +7,8 @@ its own loop reads is a number there.
 from __future__ import annotations
 
 import ast
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 from .expressions import Expressions, added, element
 from .program import Function, Program
@@ -102,13 +103,14 @@ ARRAY_FUNCTIONS = frozenset((*HELPERS, *ELEMENTWISE, "total", "over_rows", "stac
 
 @dataclass(frozen=True)
 class Step:
-    """A statement of every element: where it is written to, from which row on, and whether it is added up there."""
+    """A statement of every element: where it is written to, from which row on, whether it is added up, and comments."""
 
     target: str
     value: Expression
     name: str = ""
     row: int = 0
     sums: bool = False
+    remarks: tuple[str, ...] = ()
 
 
 class Loops(Expressions):
@@ -117,6 +119,7 @@ class Loops(Expressions):
     def __init__(self, program: Program, function: Function) -> None:
         super().__init__(program, function)
         self.steps: list[Step] = []
+        self.remarks: list[str] = []
         self.stored: set[str] = set()
         """Local arrays that other loops read too."""
         self.here: set[str] = set()
@@ -150,24 +153,27 @@ class Loops(Expressions):
 
     def step(self, step: Step) -> None:
         """Put a statement of every element into the loop that waits, or begin another."""
+        if step.value.stack:
+            row = 0
+            for part in step.value.stack:
+                self.step(Step(step.target, part, step.name, row))
+                row += part.type.shape[0]
+            if step.name:
+                self.flush()
+            return
         sums = {s.name for s in self.steps if s.sums}
         if self.steps and (
             step.value.type.shape != self.steps[0].value.type.shape or step.value.names & sums
         ):
             self.flush()
-        if step.value.stack:
-            self.flush()
-            row = 0
-            for part in step.value.stack:
-                self.steps.append(Step(step.target, part, step.name, row, step.sums))
-                self.flush()
-                row += part.type.shape[0]
-            return
-        self.steps.append(step)
+        self.steps.append(replace(step, remarks=tuple(self.remarks)))
+        self.remarks = []
 
     def flush(self) -> None:
         """Write the loop that waits."""
         if not self.steps:
+            self._put_remarks(self.remarks)
+            self.remarks = []
             return
         steps, self.steps = self.steps, []
         shape = steps[0].value.type.shape
@@ -198,6 +204,22 @@ class Loops(Expressions):
             self._close()
         self.here = set()
 
+    @property
+    def waiting_shape(self) -> tuple[int, ...]:
+        """Shape of the loop that waits; empty for none."""
+        return self.steps[0].value.type.shape if self.steps else ()
+
+    def remark(self, text: str) -> None:
+        """A comment, before what comes next."""
+        if self.steps:
+            self.remarks.append(text)
+        else:
+            self.put(text)
+
+    def _put_remarks(self, remarks: Iterable[str]) -> None:
+        for text in remarks:
+            self.put(text)
+
     depth = 0
     out: list[str]
 
@@ -207,6 +229,7 @@ class Loops(Expressions):
 
     def _write(self, s: Step, indices: tuple[str, ...], shape: tuple[int, ...]) -> None:
         e = element(s.value, indices)
+        self._put_remarks(s.remarks)
         if s.sums:
             self.put(f"{f'{s.name}_sum' if len(shape) > 1 else safe(s.name)} += {e.text};")
         elif s.name and s.name not in self.stored:

@@ -8,14 +8,13 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import FunctionType
 from typing import Any, get_type_hints
 
 import numpy as np
 
 from .source import Unsupported, definition, source_of, summary
-from .types import Type, Types, comment, literal, safe
+from .types import Type, Types, comment, initialiser, safe
 
 WIDTH = 110
 
@@ -145,14 +144,12 @@ class Program:
         if self._values.setdefault(c, value) is not value and not np.array_equal(self._values[c], value):
             c = f"{module.rpartition('.')[2].upper()}_{c}"
             self._values[c] = value
-        text = literal(value, kind, where)
-        if kind.kind in ("record", "tuple"):
-            text = text.removeprefix(f"({kind.c})")
+        text = initialiser(value, kind, where)
         size = f"[{kind.size}]" if kind.kind == "array" else ""
         self.constants[c] = f"static const {kind.c} {c}{size} = {text};"
         return c, kind
 
-    def write(self, folder: Path, name: str, note: str) -> tuple[Path, Path]:
+    def texts(self, name: str, note: str) -> tuple[str, str]:
         """Header and code; `note` is their first line."""
         functions = list(self.functions.values())
         public = [f"{f.head()};" for f in functions if not f.private]
@@ -168,12 +165,10 @@ class Program:
         ]  # fmt: skip
         for f in functions:
             code += [comment(f"{summary(f.node)} ({f.file})"), f.head(), *self.bodies[f.c], ""]
-        folder.mkdir(parents=True, exist_ok=True)
-        files = folder / f"{name}.h", folder / f"{name}.c"
-        for file, lines in zip(files, (header, code), strict=True):
-            broken = [part for line in lines for whole in line.split("\n") for part in wrapped(whole)]
-            file.write_text("\n".join(broken), encoding="utf-8")
-        return files
+        return tuple(  # type: ignore[return-value]
+            "\n".join(part for line in lines for whole in line.split("\n") for part in wrapped(whole))
+            for lines in (header, code)
+        )
 
 
 def _module(python: FunctionType) -> Any:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
+import re
 import types
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -20,6 +21,8 @@ auto break case char const default do double else enum extern float for goto if 
 short signed sizeof static struct switch typedef union unsigned void volatile while bool true false i j k result"""
 KEYWORDS = frozenset(_KEYWORDS.split())
 """Names that C or the generated code uses itself."""
+MOST_BY_VALUE = 16
+"""Most numbers in a record that is passed by value."""
 ARRAY = NDArray[np.float64]
 """Python's type of an array without a shape: in C one of its elements."""
 
@@ -53,6 +56,8 @@ class Type:
         The class.
     mutable : bool
         Whether fields may be set in place.
+    left_out : mapping
+        Fields that have no type in C, and why.
     """
 
     c: str
@@ -62,6 +67,7 @@ class Type:
     shape: tuple[int, ...] = ()
     python: Any = None
     mutable: bool = False
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Type) and (self.c, self.kind, self.shape) == (
@@ -80,17 +86,28 @@ class Type:
 
     @property
     def big(self) -> bool:
-        """Whether it goes by pointer: a record that can be changed in place, or with an array in it."""
+        """Whether it goes by pointer: a record that can be changed in place, or of many numbers."""
         if self.kind == "optional" and self.item is not None:
             return self.item.big
-        return self.mutable or any(f.type.kind == "array" or f.type.big for f in self.fields)
+        if self.kind != "record":
+            return False
+        return self.mutable or self.numbers > MOST_BY_VALUE
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers it holds; an array is too many to go by value."""
+        if self.kind == "array":
+            return MOST_BY_VALUE + 1
+        if self.kind == "record":
+            return sum(f.type.numbers for f in self.fields)
+        return self.size if self.kind == "tuple" else 1 if self.item is None else 1 + self.item.numbers
 
     @property
     def size(self) -> int:
         """Number of elements of an array."""
         return math.prod(self.shape)
 
-    def field(self, name: str) -> Field | None:
+    def found(self, name: str) -> Field | None:
         """The field of that name."""
         return next((f for f in self.fields if f.name == name), None)
 
@@ -158,9 +175,23 @@ class Types:
         texts, place = field_texts(python), f"{where}, {python.__name__}"
         hints = get_type_hints(python, include_extras=True)
         names = getattr(python, "_fields", None) or [f.name for f in dataclasses.fields(python)]
-        fields = tuple(Field(name, self.of(hints[name], place), texts.get(name, "")) for name in names)
+        fields, left_out = [], {}
+        for name in names:
+            try:
+                fields.append(Field(name, self.of(hints[name], f"{place}.{name}"), texts.get(name, "")))
+            except Unsupported as reason:
+                left_out[name] = str(reason)
         frozen = hasattr(python, "_fields") or python.__dataclass_params__.frozen
-        return self._named(Type(python.__name__, "record", fields, python=python, mutable=not frozen))
+        return self._named(
+            Type(
+                python.__name__,
+                "record",
+                tuple(fields),
+                python=python,
+                mutable=not frozen,
+                left_out=left_out,
+            )
+        )
 
     def _named(self, made: Type) -> Type:
         return self.named.setdefault(made.c, made)
@@ -243,6 +274,11 @@ def literal(value: Any, kind: Type, where: str) -> str:
     if kind == INT and isinstance(value, int):
         return repr(int(value))
     raise Unsupported(f"{where}: {value!r} cannot be written as {kind.c}.")
+
+
+def initialiser(value: Any, kind: Type, where: str) -> str:
+    """A Python value within braces, as it begins a constant."""
+    return re.sub(r"\(\w+\)\{", "{", literal(value, kind, where))
 
 
 ATOM, UNARY, PRODUCT, SUM, RELATION, AND, OR, TERNARY = 100, 90, 80, 70, 60, 50, 45, 40
