@@ -9,6 +9,8 @@ from pathlib import Path
 
 from fmu_src.build_command import EPILOG, Product, run_build
 
+PYTHON, NATIVE = KINDS = ("python", "native")
+"""Kinds of a unit."""
 SMOKE_STEPS, SMOKE_STEP_S = 100, 0.001
 """Steps of the smoke run, and their length [s]."""
 
@@ -18,6 +20,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, epilog=EPILOG)
     parser.add_argument(
         "--slave", default="TrpacEstimator", metavar="NAME", help="unit to build (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--kind",
+        choices=KINDS,
+        default=PYTHON,
+        help="python: with the networks, the host needs Python; native: in C, no pictures, the host needs nothing; "
+        "the file is NAME_native.fmu (default: %(default)s)",
     )
     parser.add_argument(
         "--flat",
@@ -30,14 +39,21 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
 
     def load() -> Product:
+        from fmu_src.native.build import NATIVE_UNITS, build_native
         from fmu_src.packaging import build_unit
         from fmu_src.units import UNITS
 
-        def build(name: str) -> Path:
-            file = f"{name}_flat.fmu" if options.flat else f"{name}.fmu"
-            return build_unit(UNITS[name], options.out / file, flat=options.flat)
+        native = options.kind == NATIVE
+        ending = f"{'_native' if native else ''}{'_flat' if options.flat else ''}.fmu"
 
-        return Product("unit", "unit", UNITS, build, validate, "no problems found", smoke_run)
+        def build(name: str) -> Path:
+            target = options.out / f"{name}{ending}"
+            if native:
+                return build_native(UNITS[name].info, target, flat=options.flat)
+            return build_unit(UNITS[name], target, flat=options.flat)
+
+        known = [name for name in UNITS if name in NATIVE_UNITS or not native]
+        return Product("unit", f"{options.kind} unit", known, build, validate, "no problems found", smoke_run)
 
     return run_build("build_fmu.py", load, options.slave)
 
@@ -54,7 +70,7 @@ def smoke_run(path: Path) -> str:
     from fmu_src.trial import rolling
     from scenarios.fmu_client.opening import opened
 
-    with opened(path, path.stem.removesuffix("_flat"), {}) as unit:
+    with opened(path, path.stem.removesuffix("_flat").removesuffix("_native"), {}) as unit:
         for variable in unit.variables:
             value = rolling(variable.name) if variable.causality == "input" else None
             if value is not None:
@@ -64,7 +80,7 @@ def smoke_run(path: Path) -> str:
             unit.slave.doStep(step * SMOKE_STEP_S, SMOKE_STEP_S)
         elapsed = time.perf_counter() - started
         unit.slave.terminate()
-    return f"{SMOKE_STEPS} steps, {elapsed / SMOKE_STEPS * 1e6:.0f} us each"
+    return f"{SMOKE_STEPS} steps, {elapsed / SMOKE_STEPS * 1e6:.1f} us each"
 
 
 if __name__ == "__main__":

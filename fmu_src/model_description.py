@@ -61,12 +61,17 @@ class UnitInfo:
 
 
 def model_description(
-    unit: UnitInfo, variables: Sequence[Variable], guid: str, *, flat: bool = False
+    unit: UnitInfo,
+    variables: Sequence[Variable],
+    guid: str,
+    *,
+    flat: bool = False,
+    sources: Sequence[str] = (),
 ) -> bytes:
     """The XML text of a unit's description; the same arguments give the same bytes.
 
     With `flat` names consist of letters, digits and underscores, for tools that make structures of dotted names; the
-    annotations of binary data are then left out.
+    annotations of binary data are then left out. With `sources` it is a unit of these C files, which needs no Python.
     """
     root = Element(
         "fmiModelDescription",
@@ -78,11 +83,16 @@ def model_description(
             "author": "The TRPAC-FMU authors",
             "version": unit.version,
             "license": "MIT",
-            "generationTool": f"TRPAC-FMU {unit.version} with PythonFMU",
+            "generationTool": f"TRPAC-FMU {unit.version}" + ("" if sources else " with PythonFMU"),
             "variableNamingConvention": "flat" if flat else "structured",
         },
     )
-    SubElement(root, "CoSimulation", {"modelIdentifier": unit.name, **CAPABILITIES})
+    needs = {"needsExecutionTool": "false"} if sources else {}
+    simulation = SubElement(root, "CoSimulation", {"modelIdentifier": unit.name, **CAPABILITIES, **needs})
+    if sources:
+        files = SubElement(simulation, "SourceFiles")
+        for name in sources:
+            SubElement(files, "File", {"name": name})
     _units(SubElement(root, "UnitDefinitions"), {v.unit for v in variables if v.unit})
     categories = SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():

@@ -97,8 +97,8 @@ def build_unit(slave: Slave, target: Path, *, flat: bool = False) -> Path:
     missing = [str(path) for path in slave.resources if not path.is_file()]
     if missing:
         raise BuildError(f"These files belong into the unit and are not there: {', '.join(missing)}.")
-    content = _resources(slave) | _binaries(slave.info.name) | _licences()
-    digest = _digest(model_description(slave.info, slave.variables, "", flat=flat), content)
+    content = _resources(slave) | _binaries(slave.info.name) | licences("trpac-fmu", "pythonfmu")
+    digest = digest_of(model_description(slave.info, slave.variables, "", flat=flat), content)
     content = {_renamed(path, digest): _renamed_imports(path, data, digest) for path, data in content.items()}
     content[f"resources/{slave.info.name}_{digest}.py"] = _entry(slave, digest)
     content["resources/slavemodule.txt"] = f"{slave.info.name}_{digest}".encode()
@@ -163,17 +163,19 @@ def _binaries(name: str) -> dict[str, bytes]:
     return files
 
 
-def _licences() -> dict[str, bytes]:
+def licences(*packages: str) -> dict[str, bytes]:
+    """The licences of packages that a unit contains, by path."""
     names = {"trpac-fmu": "license.txt", "pythonfmu": "pythonfmu.txt"}
     return {
         f"documentation/licenses/{name}": Path(str(path.locate())).read_bytes()
         for package, name in names.items()
+        if package in packages
         for path in distribution(package).files or []
         if path.name == "LICENSE"
     }
 
 
-def _digest(description: bytes, content: dict[str, bytes]) -> str:
+def digest_of(description: bytes, content: dict[str, bytes]) -> str:
     """Hash of the unit's content and of its description without a hash."""
     total = hashlib.sha256(description)
     for path in sorted(content):

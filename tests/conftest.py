@@ -13,6 +13,8 @@ import pytest
 from fmu_unit import Unit
 from hypothesis import settings
 
+from fmu_src.native.build import build_native
+from fmu_src.native.library import CompilerError, compiler
 from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios.fmu_client.unpacking import unpack_unit
@@ -94,6 +96,36 @@ def _built(name: str, folders: pytest.TempPathFactory) -> Path:
 def open_unit(unit_folder: Path) -> Iterator[Callable[..., Unit]]:
     """Opens initialised instances of the unit, with parameters by name, and frees them after the test."""
     yield from _opener(unit_folder)
+
+
+@pytest.fixture(scope="session")
+def native_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The native unit TrpacEstimator of this machine's compiler, built once per test run; skips where there is none."""
+    try:
+        compiler()
+    except CompilerError as error:
+        pytest.skip(str(error))
+    target = tmp_path_factory.mktemp("native") / "TrpacEstimator_native.fmu"
+    return build_native(UNITS["TrpacEstimator"].info, target, everywhere=False)
+
+
+@pytest.fixture(scope="session")
+def native_folder(native_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same unit, unpacked."""
+    return unpack_unit(native_file, tmp_path_factory.mktemp("unpacked"))
+
+
+@pytest.fixture
+def open_native(native_folder: Path) -> Iterator[Callable[..., Unit]]:
+    """Opens instances of the native unit."""
+    yield from _opener(native_folder)
+
+
+@pytest.fixture(params=["python", "native"])
+def open_any(request: pytest.FixtureRequest) -> Iterator[Callable[..., Unit]]:
+    """The same for each kind of the unit, with Python and without."""
+    folder = "unit_folder" if request.param == "python" else "native_folder"
+    yield from _opener(request.getfixturevalue(folder))
 
 
 @pytest.fixture

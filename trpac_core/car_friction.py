@@ -45,10 +45,15 @@ def surer(front: Friction, rear: Friction, axle_deviation: float) -> tuple[Frict
     `axle_deviation` is the standard deviation of the road's change over a wheelbase [-].
     """
     if front.deviation <= rear.deviation:
-        from_front = Friction(front.theta, math.hypot(front.deviation, axle_deviation))
+        from_front = Friction(front.theta, _together(front.deviation, axle_deviation))
         return front, rear if rear.deviation <= from_front.deviation else from_front
-    from_rear = Friction(rear.theta, math.hypot(rear.deviation, axle_deviation))
+    from_rear = Friction(rear.theta, _together(rear.deviation, axle_deviation))
     return front if front.deviation <= from_rear.deviation else from_rear, rear
+
+
+def _together(first: float, second: float) -> float:
+    """Standard deviation of the sum of two independent errors; math.hypot's last bit differs between its versions."""
+    return math.sqrt(first * first + second * second)
 
 
 def lower(first: Friction, second: Friction) -> Friction:
@@ -60,7 +65,7 @@ def lower(first: Friction, second: Friction) -> Friction:
     0.02
     """
     low, high = (first, second) if first.theta <= second.theta else (second, first)
-    deviation = math.hypot(low.deviation, high.deviation)
+    deviation = _together(low.deviation, high.deviation)
     if deviation == 0.0:
         return low
     gap = high.theta - low.theta

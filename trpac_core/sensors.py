@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import NamedTuple
 
 PLAUSIBLE = {
@@ -16,9 +17,7 @@ PLAUSIBLE = {
     "yaw_rate_rad_s": 20.0,
 }
 """Sizes beyond which a reading of a road car is a fault or in another unit, in the unit of its name."""
-
-MOTION = ("vehicle_speed_m_s", "steering_angle_rad", "yaw_rate_rad_s")
-"""The readings that place a picture on the road."""
+_WHEEL_SPEED, _TORQUE, _SPEED, _LOAD, _STEERING, _ACCELERATION, _YAW_RATE = PLAUSIBLE.values()
 
 GREATEST_ACCELERATION_M_S2 = 15.0
 """No road car's tyres give more: a steeper change of speed is a jump of the signal [m/s^2]."""
@@ -70,29 +69,76 @@ def filter_share(step_s: float, time_constant_s: float) -> float:
     return 1.0 - math.exp(-step_s / time_constant_s)
 
 
-def implausible(sensors: Sensors, names: tuple[str, ...]) -> list[str]:
-    """Which of these readings are not finite or beyond what a road car gives, each with what was expected."""
-    return [
-        f"{name} is {value:g}, expected a number within +-{PLAUSIBLE[name]:g}"
-        for name in names
-        if (value := getattr(sensors, name)) is not None and not abs(value) <= PLAUSIBLE[name]
-    ]
+class Unusable(IntEnum):
+    """What makes the input of a step unusable, NOTHING where it is good; in the order in which it is looked for."""
+
+    NOTHING = 0
+    STEP = 1
+    READING = 2
+    LOAD = 3
+    ROLLING_BACK = 4
+    TURNING_BACK = 5
+    CONFIDENCE = 6
 
 
-def unusable(step_s: float, sensors: Sensors, wheel_radius_m: float, floor_m_s: float) -> str | None:
-    """One sentence on what makes a step's input unusable, None where it is good.
+def motion_plausible(sensors: Sensors) -> bool:
+    """Whether the readings that place a picture on the road are finite and what a road car gives."""
+    yaw_rate = sensors.yaw_rate_rad_s
+    return (
+        abs(sensors.vehicle_speed_m_s) <= _SPEED
+        and abs(sensors.steering_angle_rad) <= _STEERING
+        and (yaw_rate is None or abs(yaw_rate) <= _YAW_RATE)
+    )
+
+
+def plausible(sensors: Sensors) -> bool:
+    """Whether all readings are finite and what a road car gives."""
+    load_n, acceleration = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
+    return (
+        abs(sensors.wheel_speed_rad_s) <= _WHEEL_SPEED
+        and abs(sensors.wheel_torque_nm) <= _TORQUE
+        and motion_plausible(sensors)
+        and (load_n is None or abs(load_n) <= _LOAD)
+        and (acceleration is None or abs(acceleration) <= _ACCELERATION)
+    )
+
+
+def unusable(step_s: float, sensors: Sensors, wheel_radius_m: float, floor_m_s: float) -> Unusable:
+    """What makes a step's input unusable.
 
     A wheel that reads a little below 0 is locked, not reversed: what counts is its speed against the floor.
     """
     if not 0.0 <= step_s <= LONGEST_STEP_S:
-        return f"Step size is {step_s} s; expected 0 to {LONGEST_STEP_S:g} s. No time has passed."
-    bad = implausible(sensors, tuple(PLAUSIBLE))
-    if bad:
-        return f"{'; '.join(bad)}. Check the signal's source and unit."
-    if sensors.vertical_load_n is not None and sensors.vertical_load_n <= 0.0:
-        return f"vertical_load_n is {sensors.vertical_load_n:g}: a wheel without load has no friction to estimate."
+        return Unusable.STEP
+    if not plausible(sensors):
+        return Unusable.READING
+    load_n = sensors.vertical_load_n
+    if load_n is not None and load_n <= 0.0:
+        return Unusable.LOAD
     if sensors.vehicle_speed_m_s < -floor_m_s:
-        return "The car rolls backwards: the camera looks the other way, and the estimate is held."
+        return Unusable.ROLLING_BACK
     if sensors.wheel_speed_rad_s * wheel_radius_m < -floor_m_s and sensors.vehicle_speed_m_s > floor_m_s:
+        return Unusable.TURNING_BACK
+    return Unusable.NOTHING
+
+
+def unusable_text(reason: Unusable, step_s: float, sensors: Sensors, confidence: float) -> str | None:
+    """One sentence on what makes a step's input unusable, with the confidence of a class by bus; None for NOTHING."""
+    if reason is Unusable.NOTHING:
+        return None
+    if reason is Unusable.STEP:
+        return f"Step size is {step_s} s; expected 0 to {LONGEST_STEP_S:g} s. No time has passed."
+    if reason is Unusable.READING:
+        bad = [
+            f"{name} is {value:g}, expected a number within +-{most:g}"
+            for name, most in PLAUSIBLE.items()
+            if (value := getattr(sensors, name)) is not None and not abs(value) <= most
+        ]
+        return f"{'; '.join(bad)}. Check the signal's source and unit."
+    if reason is Unusable.LOAD:
+        return f"vertical_load_n is {sensors.vertical_load_n:g}: a wheel without load has no friction to estimate."
+    if reason is Unusable.ROLLING_BACK:
+        return "The car rolls backwards: the camera looks the other way, and the estimate is held."
+    if reason is Unusable.TURNING_BACK:
         return "The wheel turns backwards while the car drives forwards; check the sign of wheel_speed_rad_s."
-    return None
+    return f"Class confidence is {confidence}; expected a number between 0 and 1."

@@ -155,7 +155,8 @@ def friction_by_theta(theta: float, slip: float, load_n: float, longitudinal_sti
 def friction_by_slip(theta: float, slip: float, load_n: float, longitudinal_stiffness_n: float) -> float:
     """Slope d mu / d lambda at constant theta [-]."""
     adhering = slip_ratio_force(slip, longitudinal_stiffness_n) / load_n
-    adhering_by_slip = longitudinal_stiffness_n / (load_n * (1.0 - slip) ** 2)
+    rolls = 1.0 - slip
+    adhering_by_slip = longitudinal_stiffness_n / (load_n * rolls * rolls)
     correction_by_slip = 2.0 * (1.15 - 0.75 * theta) * slip - (1.63 - 0.75 * theta)
     if theta >= 2.0 * adhering:
         return adhering_by_slip * correction(theta, slip) + adhering * correction_by_slip

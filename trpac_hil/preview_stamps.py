@@ -107,7 +107,7 @@ class PreviewStamps:
         self.counts = StampCounts()
         self.newest: CameraResult | None = None
         self._config, self._interval_s = config, frame_interval_s
-        self._states = [PreviewState()] * sides
+        self._states = [PreviewState() for _ in range(sides)]
         self._failed = [False] * sides
 
     def take(self, result: CameraResult, odometer: Odometer, stale_ns: int) -> None:
@@ -123,9 +123,7 @@ class PreviewStamps:
         self.newest = result
         near_m = captured_m + self._config.P_0_m
         for side, road_class in enumerate(result.classes):
-            self._states[side] = self._stamped(
-                side, road_class, captured_m, 1e-9 * result.captured_ns, odometer
-            )
+            self._stamp(side, road_class, captured_m, 1e-9 * result.captured_ns, odometer)
             self._failed[side] = road_class is None
         self.counts.failed += None in result.classes
         if odometer.position_m > near_m:
@@ -136,23 +134,24 @@ class PreviewStamps:
     def _sides(self) -> range:
         return range(len(self._states))
 
-    def _stamped(
+    def _stamp(
         self,
         side: int,
         road_class: RoadClass | None,
         captured_m: float,
         captured_s: float,
         odometer: Odometer,
-    ) -> PreviewState:
-        state = prune(self._states[side], self._config, odometer.position_m)
+    ) -> None:
+        state = self._states[side]
+        prune(state, self._config, odometer.position_m)
         if road_class is not None:
             # The unit decides by its own threshold whether the class is used.
             outcome = Outcome(road_class.surface, road_class.confidence, True, captured_s)
         elif state.stamps:
             outcome = Outcome(state.stamps[-1].outcome.surface, 0.0, False, captured_s)
         else:
-            return state
-        return add_frame(
+            return
+        add_frame(
             state,
             self._config,
             outcome,
@@ -171,5 +170,5 @@ class PreviewStamps:
 
     def forget(self) -> None:
         """Discard all results, because the camera is lost."""
-        self._states = [PreviewState()] * len(self._states)
+        self._states = [PreviewState() for _ in self._states]
         self._failed = [False] * len(self._states)

@@ -1,4 +1,4 @@
-"""How fast are estimator, four wheels and plant? One command, one line of JSON added to out/speed.jsonl (`--out`).
+"""How fast are estimator, four wheels, plant, native unit? One command, one line of JSON in out/speed.jsonl (`--out`).
 
 `make bench` on a machine that does nothing else; ``python -m benchmarks.speed plant`` measures one and adds no line.
 Figures compare within a line: each holds its own reference loop.
@@ -12,9 +12,14 @@ from pathlib import Path
 
 from benchmarks.report import append
 
-from . import estimator, four_wheels, plant
+from . import estimator, four_wheels, native, plant
 
-PARTS = {"one_wheel": estimator.measure, "four_wheels": four_wheels.measure, "plant": plant.measure_all}
+PARTS = {
+    "one_wheel": estimator.measure,
+    "four_wheels": four_wheels.measure,
+    "plant": plant.measure_all,
+    "native": native.measure,
+}
 
 
 def main() -> None:

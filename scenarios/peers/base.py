@@ -110,7 +110,7 @@ class SensorFront:
         """Usable readings, or None where they are unusable or the car stands."""
         setup = self._setup
         radius_m = setup.vehicle.wheel_radius_m
-        if unusable(step_s, sensors, radius_m, setup.floor_m_s) is not None:
+        if unusable(step_s, sensors, radius_m, setup.floor_m_s):
             self.reset()
             return None
         acceleration = self._accelerated(step_s, sensors)

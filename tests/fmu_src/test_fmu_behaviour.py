@@ -53,9 +53,9 @@ def flag_up(unit: Unit) -> None:
 
 
 @pytest.mark.parametrize("step_s", [11.0, 1e300])
-def test_a_step_over_which_nobody_knows_where_the_car_has_gone(open_unit: Open, step_s: float) -> None:
+def test_a_step_over_which_nobody_knows_where_the_car_has_gone(open_any: Open, step_s: float) -> None:
     """It was taken: after 1e300 s no frame could ever come under the wheel again."""
-    unit = open_unit()
+    unit = open_any()
     flag_up(unit)
     held = unit.get("TRPAC")
     unit.step({"road_class": -1}, step_s=step_s)
@@ -67,8 +67,8 @@ def test_a_step_over_which_nobody_knows_where_the_car_has_gone(open_unit: Open, 
     flag_up(unit)
 
 
-def test_unit_and_estimator_agree_bit_by_bit(open_unit: Open) -> None:
-    unit, estimator = open_unit(), Estimator(EstimatorConfig())
+def test_unit_and_estimator_agree_bit_by_bit(open_any: Open) -> None:
+    unit, estimator = open_any(), Estimator(EstimatorConfig())
     rng = np.random.default_rng(0)
     for _ in range(300):
         wheel, torque, speed = 50.0 + rng.random(), 300.0 * rng.random(), 14.0 + 0.1 * rng.random()
@@ -81,21 +81,21 @@ def test_unit_and_estimator_agree_bit_by_bit(open_unit: Open) -> None:
     assert unit.log == []
 
 
-def test_unconnected_it_runs_and_holds_its_start(open_unit: Open) -> None:
-    unit = open_unit()
+def test_unconnected_it_runs_and_holds_its_start(open_any: Open) -> None:
+    unit = open_any()
     start = unit.outputs()
     unit.step(count=10)
     assert unit.outputs()["TRPAC"] == start["TRPAC"] == 0.8
     assert unit.log == []
 
 
-def test_parameters_change_the_run(open_unit: Open) -> None:
-    plain, icy = open_unit(), open_unit(estimator__theta_initial=0.3)
+def test_parameters_change_the_run(open_any: Open) -> None:
+    plain, icy = open_any(), open_any(estimator__theta_initial=0.3)
     assert (plain.get("TRPAC"), icy.get("TRPAC")) == (0.8, 0.3)
 
 
-def test_optional_inputs_count_from_their_first_value_other_than_zero(open_unit: Open) -> None:
-    static, loaded = open_unit(), open_unit()
+def test_optional_inputs_count_from_their_first_value_other_than_zero(open_any: Open) -> None:
+    static, loaded = open_any(), open_any()
     static.step(DRIVING)
     loaded.step({**DRIVING, "vertical_load": 2000.0})
     assert loaded.get("TRPAC_peak") != static.get("TRPAC_peak")
@@ -106,11 +106,11 @@ def test_optional_inputs_count_from_their_first_value_other_than_zero(open_unit:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_an_optional_input_that_was_no_number_once_is_not_connected_for_it(
-    open_unit: Open, value: float
+    open_any: Open, value: float
 ) -> None:
-    other = open_unit()
+    other = open_any()
     other.step({**DRIVING, "vertical_load": 0.0}, count=100)
-    unit = open_unit()
+    unit = open_any()
     unit.step({**DRIVING, "vertical_load": value})
     unit.step({"vertical_load": 0.0}, count=100)
     assert unit.get("TRPAC_peak") == pytest.approx(other.get("TRPAC_peak"), rel=1e-3)
@@ -120,7 +120,7 @@ def test_an_optional_input_that_was_no_number_once_is_not_connected_for_it(
 @pytest.mark.parametrize("by", ["yaw_rate", "steering_angle"])
 @pytest.mark.parametrize(("front", "left"), [(True, True), (True, False), (False, True), (False, False)])
 def test_in_a_curve_a_wheel_that_adheres_shows_no_slip(
-    open_unit: Open, by: str, front: bool, left: bool
+    open_any: Open, by: str, front: bool, left: bool
 ) -> None:
     """Radii about the turning centre on the rear axle's line, by geometry."""
     radius_m, speed, car = 30.0, 10.0, EstimatorConfig().vehicle
@@ -131,7 +131,7 @@ def test_in_a_curve_a_wheel_that_adheres_shows_no_slip(
         own = own * math.cos(steering) + speed / radius_m * car.wheelbase_m * math.sin(steering)
     told = {"steering_angle": steering} if by == "steering_angle" or front else {}
     told |= {"yaw_rate": speed / radius_m} if by == "yaw_rate" else {}
-    unit = open_unit(wheel__front=front, wheel__left=left)
+    unit = open_any(wheel__front=front, wheel__left=left)
     unit.step(
         {"wheel_speed": own / car.wheel_radius_m, "wheel_torque": 0.0, "vehicle_speed": speed, **told},
         count=300,
@@ -145,8 +145,8 @@ def test_in_a_curve_a_wheel_that_adheres_shows_no_slip(
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", REAL_INPUTS)
-def test_value_that_is_no_number(open_unit: Open, name: str, value: float) -> None:
-    unit = open_unit()
+def test_value_that_is_no_number(open_any: Open, name: str, value: float) -> None:
+    unit = open_any()
     flag_up(unit)
     held = unit.get("TRPAC")
     unit.step({name: value}, count=20)
@@ -163,9 +163,9 @@ def test_value_that_is_no_number(open_unit: Open, name: str, value: float) -> No
 @pytest.mark.parametrize("value", [1e300, -1e300])
 @pytest.mark.parametrize("name", [name for name in REAL_INPUTS if name != "road_class_confidence"])
 def test_absurd_values_leave_finite_outputs_and_the_unit_alive(
-    open_unit: Open, name: str, value: float
+    open_any: Open, name: str, value: float
 ) -> None:
-    unit = open_unit()
+    unit = open_any()
     flag_up(unit)
     unit.step({name: value}, count=5)
     assert all(math.isfinite(v) for v in unit.outputs().values())
@@ -186,8 +186,8 @@ def test_absurd_values_leave_finite_outputs_and_the_unit_alive(
     ],
     ids=str,
 )
-def test_standstill_locked_wheel_and_reversed_signs(open_unit: Open, values: dict[str, float]) -> None:
-    unit = open_unit()
+def test_standstill_locked_wheel_and_reversed_signs(open_any: Open, values: dict[str, float]) -> None:
+    unit = open_any()
     flag_up(unit)
     unit.step({**DRIVING, **values}, count=50)
     assert all(math.isfinite(v) for v in unit.outputs().values())
@@ -196,8 +196,8 @@ def test_standstill_locked_wheel_and_reversed_signs(open_unit: Open, values: dic
     assert 0.0 < unit.get("TRPAC") < 1.2
 
 
-def test_zero_and_varying_step_sizes(open_unit: Open) -> None:
-    unit = open_unit()
+def test_zero_and_varying_step_sizes(open_any: Open) -> None:
+    unit = open_any()
     flag_up(unit)
     before = unit.outputs()
     unit.step(step_s=0.0, count=3)
@@ -211,8 +211,8 @@ def test_zero_and_varying_step_sizes(open_unit: Open) -> None:
 
 
 @pytest.mark.parametrize("step_s", [-0.001, math.nan, math.inf])
-def test_impossible_step_sizes_hold_the_estimate(open_unit: Open, step_s: float) -> None:
-    unit = open_unit()
+def test_impossible_step_sizes_hold_the_estimate(open_any: Open, step_s: float) -> None:
+    unit = open_any()
     flag_up(unit)
     held = unit.get("TRPAC")
     unit.step(step_s=step_s, count=3)
@@ -265,8 +265,8 @@ def test_picture_that_cannot_be_used(
 
 
 @pytest.mark.parametrize("road_class", [-2, 3, 2**31 - 1])
-def test_class_out_of_range(open_unit: Open, road_class: int) -> None:
-    unit = open_unit()
+def test_class_out_of_range(open_any: Open, road_class: int) -> None:
+    unit = open_any()
     flag_up(unit)
     unit.step({"road_class": road_class}, count=20)
     assert not unit.get("flag")
@@ -274,9 +274,9 @@ def test_class_out_of_range(open_unit: Open, road_class: int) -> None:
 
 
 def test_bad_parameters_are_all_named_and_every_step_is_discarded(
-    open_unit: Open, capfd: pytest.CaptureFixture[str]
+    open_any: Open, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    unit = open_unit(vehicle__mass=-1.0, camera__pitch=math.nan)
+    unit = open_any(vehicle__mass=-1.0, camera__pitch=math.nan)
     assert "vehicle.mass" in capfd.readouterr().err, "a host without a log must see it as well"
     assert unit.log[0].status == ERROR
     assert "vehicle.mass" in unit.log[0].text
@@ -291,8 +291,8 @@ def test_parameters_that_contradict_each_other_are_refused(open_unit: Open) -> N
     assert "k1 < k2" in unit.log[0].text
 
 
-def test_parameter_set_too_late_and_output_set_are_refused_with_a_log_line(open_unit: Open) -> None:
-    unit = open_unit()
+def test_parameter_set_too_late_and_output_set_are_refused_with_a_log_line(open_any: Open) -> None:
+    unit = open_any()
     unit.set({"vehicle.mass": 1.0})
     unit.set({"TRPAC": 0.1})
     unit.step(DRIVING)
@@ -300,8 +300,8 @@ def test_parameter_set_too_late_and_output_set_are_refused_with_a_log_line(open_
     assert unit.get("TRPAC") > 0.5
 
 
-def test_unknown_value_references_are_survived(open_unit: Open) -> None:
-    unit = open_unit()
+def test_unknown_value_references_are_survived(open_any: Open) -> None:
+    unit = open_any()
     for reference in (9999, 2**32 - 1):
         assert unit.slave.getReal([reference]) == [0.0]
         unit.slave.setReal([reference], [1.0])
@@ -345,8 +345,8 @@ def test_numbered_classes_count_once_each(open_unit: Open) -> None:
     assert (first, len(_state(unit)["inner"]["estimator"]["state"]["preview"]["stamps"])) == (1, 2)
 
 
-def test_the_class_by_bus_reaches_the_outputs(open_unit: Open) -> None:
-    unit = open_unit()
+def test_the_class_by_bus_reaches_the_outputs(open_any: Open) -> None:
+    unit = open_any()
     flag_up(unit)
     assert unit.get("TRPAC_image") == CLASS_THETA[Surface.SNOW_ICE]
     assert unit.get("image_confidence") == 0.9
@@ -473,8 +473,8 @@ def test_restored_instance_knows_the_frame_that_was_taken(open_unit: Open, pictu
     assert _frames_seen(other) == 1
 
 
-def test_restored_instance_knows_which_inputs_are_connected(open_unit: Open) -> None:
-    unit, other = open_unit(), open_unit()
+def test_restored_instance_knows_which_inputs_are_connected(open_any: Open) -> None:
+    unit, other = open_any(), open_any()
     unit.step({**DRIVING, "longitudinal_acceleration": 1.0})
     unit.set({"longitudinal_acceleration": 0.0})
     _hand_over(unit, other)
@@ -499,9 +499,9 @@ def _hand_over(unit: Unit, other: Unit) -> None:
     unit.slave.freeFMUstate(state)
 
 
-def test_a_state_from_before_the_initialisation_unlocks_the_parameters(open_unit: Open) -> None:
-    expected = open_unit(vehicle__mass=1900.0)
-    unit = open_unit(initialise=False, vehicle__mass=1300.0)
+def test_a_state_from_before_the_initialisation_unlocks_the_parameters(open_any: Open) -> None:
+    expected = open_any(vehicle__mass=1900.0)
+    unit = open_any(initialise=False, vehicle__mass=1300.0)
     state = unit.slave.getFMUstate()
     unit.initialise()
     flag_up(unit)
@@ -517,9 +517,9 @@ def test_a_state_from_before_the_initialisation_unlocks_the_parameters(open_unit
     assert [line.status for line in unit.log] == [ERROR], "and the initialisation locks them again"
 
 
-def test_a_state_from_after_the_initialisation_locks_the_parameters(open_unit: Open) -> None:
-    run = open_unit(vehicle__mass=1900.0)
-    fresh = open_unit(initialise=False)
+def test_a_state_from_after_the_initialisation_locks_the_parameters(open_any: Open) -> None:
+    run = open_any(vehicle__mass=1900.0)
+    fresh = open_any(initialise=False)
     saved = run.slave.serializeFMUstate(run.slave.getFMUstate())
     fresh.slave.setFMUstate(fresh.slave.deSerializeFMUstate(saved))
     fresh.set({"vehicle.mass": 1.0})
@@ -550,8 +550,8 @@ def test_state_of_something_else_is_refused(open_unit: Open, spoil: Callable[[by
     assert [line.status for line in unit.log] == [ERROR]
 
 
-def test_reset_goes_back_to_the_start(open_unit: Open) -> None:
-    unit = open_unit()
+def test_reset_goes_back_to_the_start(open_any: Open) -> None:
+    unit = open_any()
     start = unit.outputs()
     flag_up(unit)
     first = unit.outputs()
@@ -562,10 +562,10 @@ def test_reset_goes_back_to_the_start(open_unit: Open) -> None:
     assert unit.outputs() == first
 
 
-def test_two_instances_do_not_touch_each_other(open_unit: Open) -> None:
-    alone = open_unit()
+def test_two_instances_do_not_touch_each_other(open_any: Open) -> None:
+    alone = open_any()
     flag_up(alone)
-    first, second = open_unit(), open_unit()
+    first, second = open_any(), open_any()
     for _ in range(250):
         first.step(SLIPPERY)
         second.step({**DRIVING, "wheel_speed": 60.0})
@@ -576,9 +576,9 @@ def test_two_instances_do_not_touch_each_other(open_unit: Open) -> None:
     assert first.get("flag")
 
 
-def test_outputs_can_be_read_while_the_host_initialises(open_unit: Open) -> None:
+def test_outputs_can_be_read_while_the_host_initialises(open_any: Open) -> None:
     """A master hands them on before the first step: a controller must not take a friction of 0 from it."""
-    unit = open_unit()
+    unit = open_any()
     unit.reset()
     unit.slave.setupExperiment(startTime=0.0)
     unit.slave.enterInitializationMode()
@@ -592,8 +592,8 @@ def test_outputs_can_be_read_while_the_host_initialises(open_unit: Open) -> None
     assert unit.log == []
 
 
-def test_outputs_read_under_parameters_that_cannot_be_are_told_at_the_end_alone(open_unit: Open) -> None:
-    unit = open_unit()
+def test_outputs_read_under_parameters_that_cannot_be_are_told_at_the_end_alone(open_any: Open) -> None:
+    unit = open_any()
     unit.reset()
     unit.slave.setupExperiment(startTime=0.0)
     unit.slave.enterInitializationMode()
@@ -604,8 +604,8 @@ def test_outputs_read_under_parameters_that_cannot_be_are_told_at_the_end_alone(
     assert [line.status for line in unit.log] == [ERROR]
 
 
-def test_after_an_initialisation_that_failed_the_outputs_are_those_of_before_it(open_unit: Open) -> None:
-    unit = open_unit(initialise=False)
+def test_after_an_initialisation_that_failed_the_outputs_are_those_of_before_it(open_any: Open) -> None:
+    unit = open_any(initialise=False)
     before = unit.outputs()
     unit.slave.setupExperiment(startTime=0.0)
     unit.slave.enterInitializationMode()
@@ -640,17 +640,17 @@ def test_each_signal_is_told_of_once_and_hides_no_other(open_unit: Open) -> None
         assert word in text
 
 
-def test_a_step_before_the_initialisation_is_told(open_unit: Open) -> None:
-    unit = open_unit()
+def test_a_step_before_the_initialisation_is_told(open_any: Open) -> None:
+    unit = open_any()
     unit.reset()
     with pytest.raises(FMICallException):
         unit.step()
     assert "before the initialisation has ended" in unit.log[0].text
 
 
-def test_a_state_restored_while_the_host_initialises_is_what_is_read(open_unit: Open) -> None:
+def test_a_state_restored_while_the_host_initialises_is_what_is_read(open_any: Open) -> None:
     """And one that was saved there is read by what is set from then on, not by where the unit had come."""
-    unit = open_unit()
+    unit = open_any()
     flag_up(unit)
     driven, state = unit.outputs(), unit.slave.getFMUstate()
     unit.reset()

@@ -1,5 +1,6 @@
 """Displacement stamps: which frame speaks of the road under the wheel now."""
 
+import copy
 import json
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.preview import (
+    MOST_STAMPS,
     Outcome,
     PreviewConfig,
     PreviewState,
@@ -29,7 +31,7 @@ def outcome(frame: int, surface: Surface = Surface.DRY) -> Outcome:
 def drive(positions_m, config=CONFIG, speed_m_s=10.0) -> PreviewState:
     state = PreviewState()
     for frame, position in enumerate(positions_m):
-        state = add_frame(
+        add_frame(
             state, config, outcome(frame), position_m=position, speed_m_s=speed_m_s, frame_interval_s=0.025
         )
     return state
@@ -63,7 +65,7 @@ def test_surface_changes_under_the_wheel_where_it_was_seen_to_change():
     for frame in range(80):
         position = 0.25 * frame
         surface = Surface.DRY if position + 2.5 < 10.0 else Surface.SNOW_ICE
-        state = add_frame(
+        add_frame(
             state,
             CONFIG,
             outcome(frame, surface),
@@ -97,7 +99,8 @@ def test_older_longer_stamp_does_not_come_back_when_a_newer_one_has_ended():
     # Frame 1 reaches to 8.5 + 2, frame 2 begins at 5.6 and reaches to 5.7 + 2.
     assert frame_at(state, 7.6, config) == 2.0
     assert frame_at(state, 7.8, config) is None
-    assert frame_at(prune(state, config, 7.8), 7.8, config) is None
+    prune(state, config, 7.8)
+    assert frame_at(state, 7.8, config) is None
 
 
 def test_standing_car_keeps_one_stamp_with_the_newest_result():
@@ -153,7 +156,8 @@ def test_pruning_changes_no_answer_ahead_of_the_rear_wheel(steps, ahead, behind)
     config = PreviewConfig(behind_m=behind)
     positions = [sum(steps[: k + 1]) for k in range(len(steps))]
     state = drive(positions, config)
-    pruned = prune(state, config, positions[-1])
+    pruned = copy.deepcopy(state)
+    prune(pruned, config, positions[-1])
     for probe in (positions[-1] + ahead, positions[-1] - behind):
         assert covering(pruned, config, probe) == covering(state, config, probe)
     assert len(pruned.stamps) <= len(state.stamps)
@@ -163,10 +167,8 @@ def test_pruning_bounds_a_long_drive():
     state = PreviewState()
     for frame in range(4000):
         position = 0.1 * frame
-        state = add_frame(
-            state, CONFIG, outcome(frame), position_m=position, speed_m_s=4.0, frame_interval_s=0.025
-        )
-        state = prune(state, CONFIG, position)
+        add_frame(state, CONFIG, outcome(frame), position_m=position, speed_m_s=4.0, frame_interval_s=0.025)
+        prune(state, CONFIG, position)
     assert len(state.stamps) <= (CONFIG.P_0_m + CONFIG.hold_m) / 0.1 + 3
 
 
@@ -178,7 +180,7 @@ def test_pruning_bounds_a_long_drive():
 )
 def test_state_survives_json_bit_for_bit(bounds, confidence, surface, flag):
     said = Outcome(surface, confidence / 3.0, flag, 0.1 + 0.2)
-    state = PreviewState(tuple(Stamp(b, b + 0.1, said) for b in bounds), bounds[-1] if bounds else None)
+    state = PreviewState.of((Stamp(b, b + 0.1, said) for b in bounds), bounds[-1] if bounds else None)
     back = PreviewState.from_json(json.loads(json.dumps(state.to_json())))
     assert back == state
     assert all(isinstance(stamp.outcome.surface, Surface) for stamp in back.stamps)
@@ -200,3 +202,13 @@ def test_a_rolled_back_drive_is_known_as_one_after_json_too():
     state = drive([0.0, 1.0, 0.5])
     assert not state.ascending
     assert not PreviewState.from_json(json.loads(json.dumps(state.to_json()))).ascending
+
+
+def test_of_more_stamps_than_fit_the_oldest_go_and_the_order_stays():
+    config = PreviewConfig(resolution_m=0.0, hold_m=1e6)
+    state = drive([float(k) for k in range(MOST_STAMPS + 100)], config)
+    assert state.count == MOST_STAMPS
+    assert [stamp.outcome.captured_s for stamp in state.stamps] == list(range(100, MOST_STAMPS + 100))
+    assert frame_at(state, 101.9, config) is None
+    assert frame_at(state, 102.6, config) == 100.0
+    assert frame_at(state, 1e4, config) == MOST_STAMPS + 99

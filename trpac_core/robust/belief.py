@@ -12,16 +12,16 @@ with a power below 1: readings 10 ms apart are not independent, and no model of 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array, exp, log, total
+from .arrays import Array, count_below, cumulated, exp, greatest, log, total
 from .blocks import Reading
-from .tyres import FORMULAS, TOLD, Tyre, curves
+from .roads import PerCell
+from .tyres import FORMULAS, IS_TOLD, TOLD, TYRES, Column, Grid, PerTyre, Tyre, curves
 
 POWER_PER_S = 20.0
 """Power with which the likelihood of a second of readings counts, as of independent readings; a reading
@@ -56,14 +56,14 @@ NEVER = 1e-30
 class Hypotheses(NamedTuple):
     """The tyres as arrays, shape (tyres, 1) each but for the weights; attributes as in `Tyre`."""
 
-    weight: Array
+    weight: PerTyre
     """Shape (tyres,)."""
-    offset_variance: Array
-    softness_variance: Array
-    mean_softness: Array
-    peak: Array
-    fall: Array
-    softer: Array
+    offset_variance: Column
+    softness_variance: Column
+    mean_softness: Column
+    peak: Column
+    fall: Column
+    softer: Column
     """Variance that the softness gains where the road changes [-]."""
 
 
@@ -75,12 +75,29 @@ def hypotheses(tyres: tuple[Tyre, ...]) -> Hypotheses:
 
     return Hypotheses(
         np.array([tyre.weight for tyre in tyres]),
-        column(tyre.slip_offset**2 for tyre in tyres),
-        column(tyre.softness**2 for tyre in tyres),
+        column(tyre.slip_offset * tyre.slip_offset for tyre in tyres),
+        column(tyre.softness * tyre.softness for tyre in tyres),
         column(tyre.mean_softness for tyre in tyres),
         column(tyre.peak for tyre in tyres),
         column(tyre.fall for tyre in tyres),
-        column(SOFTER**2 if tyre.peak > 0.0 else 0.0 for tyre in tyres),
+        column(SOFTER * SOFTER if tyre.peak > 0.0 else 0.0 for tyre in tyres),
+    )
+
+
+FIRST = hypotheses(TYRES)
+"""Those that a wheel may have."""
+
+
+def as_told(tyres: Hypotheses, slip_offset: float, softness: float) -> Hypotheses:
+    """The tyres where the told one has these standard deviations of slip offset and softness [-]."""
+    return Hypotheses(
+        tyres.weight,
+        np.where(IS_TOLD > 0.0, slip_offset * slip_offset, tyres.offset_variance),
+        np.where(IS_TOLD > 0.0, softness * softness, tyres.softness_variance),
+        tyres.mean_softness,
+        tyres.peak,
+        tyres.fall,
+        tyres.softer,
     )
 
 
@@ -100,16 +117,16 @@ class Belief:
         Their covariance matrix.
     """
 
-    tyre: Array
-    road: Array
-    offset: Array
-    softness: Array
-    offset_variance: Array
-    covariance: Array
-    softness_variance: Array
+    tyre: PerTyre
+    road: Grid
+    offset: Grid
+    softness: Grid
+    offset_variance: Grid
+    covariance: Grid
+    softness_variance: Grid
 
 
-def unread(tyres: Hypotheses, prior: Array) -> Belief:
+def unread(tyres: Hypotheses, prior: PerCell) -> Belief:
     """The belief before anything was read, with the cells as likely as the prior says, shape (cells,) [-]."""
     like = np.zeros((len(tyres.weight), len(prior)))
     return Belief(
@@ -126,7 +143,7 @@ def unread(tyres: Hypotheses, prior: Array) -> Belief:
 def driven(
     belief: Belief,
     tyres: Hypotheses,
-    prior: Array,
+    prior: PerCell,
     changed: float,
     duration_s: float,
     slip_drift: float = 0.0,
@@ -196,7 +213,7 @@ def shows(reading: Reading) -> bool:
 def read(
     belief: Belief,
     tyres: Hypotheses,
-    theta: Array,
+    theta: PerCell,
     reading: Reading,
     wheel: WheelModel,
     wheel_noise: float,
@@ -215,14 +232,16 @@ def read(
         Standard deviation of a sample of the torque [N m].
     """
     samples, duration_s, radius_m = reading.samples, reading.duration_s, wheel.radius_m
-    inertial = 2.0 * (wheel.inertia_kg_m2 / duration_s) ** 2 * wheel_noise / samples
+    spun_up, arm_nm = wheel.inertia_kg_m2 / duration_s, radius_m * reading.load_n
+    inertial = 2.0 * spun_up * spun_up * wheel_noise / samples
     # The force follows the slip over the relaxation length, and both change within a block.
     lag = 1.0 + RELAXATION_M / (reading.speed_m_s * duration_s)
-    friction_variance = (torque_noise_nm**2 / samples + inertial) / (radius_m * reading.load_n) ** 2 + (
-        lag * reading.friction_change
-    ) ** 2
-    speed_variance = (wheel_noise * radius_m**2 + speed_noise) / samples
-    slip_variance = speed_variance / reading.speed_m_s**2 + (0.5 * reading.slip_change) ** 2
+    lagged = lag * reading.friction_change
+    torque_variance = torque_noise_nm * torque_noise_nm / samples + inertial
+    friction_variance = torque_variance / (arm_nm * arm_nm) + lagged * lagged
+    speed_variance = (wheel_noise * radius_m * radius_m + speed_noise) / samples
+    within = 0.5 * reading.slip_change
+    slip_variance = speed_variance / (reading.speed_m_s * reading.speed_m_s) + within * within
     slip = reading.slip - belief.offset
     direction = np.where(slip >= 0.0, 1.0, -1.0)
     curve = curves(
@@ -251,7 +270,7 @@ def read(
     normalisation = np.maximum(np.abs(by_slip), LEAST_SLOPE) / np.sqrt(variance)
     likelihood = -0.5 * power * error * error / variance + INDEPENDENT_1_S * duration_s * log(normalisation)
     gain_offset, gain_softness = power * to_offset / variance, power * to_softness / variance
-    road = belief.road * exp(likelihood - likelihood.max())
+    road = belief.road * exp(likelihood - greatest(likelihood))
     mass = total(road)
     tyre = belief.tyre * mass[:, 0]
     forgotten = FORGETTING_1_S * duration_s
@@ -268,15 +287,16 @@ def read(
 
 def told_formula(belief: Belief) -> float:
     """Probability that the tyre has the told formula [-]."""
-    return float(math.fsum(belief.tyre[:FORMULAS].tolist()))
+    return float(total(belief.tyre[:FORMULAS])[0])
 
 
-def onset_theta(belief: Belief, theta: Array) -> float:
+def onset_theta(belief: Belief, theta: PerCell) -> float:
     """Friction that the road has at most with the probability `SLIDES`, if the tyre is as told [-]."""
-    cumulated = np.cumsum(belief.road[TOLD])
-    return float(theta[min(int(np.searchsorted(cumulated, SLIDES)), len(theta) - 1)])
+    up_to = cumulated(belief.road[TOLD])
+    return float(theta[min(count_below(up_to, SLIDES), len(theta) - 1)])
 
 
 def mean_offset(belief: Belief) -> float:
     """Mean of the slip offset over all tyres and cells [-]."""
-    return float((belief.tyre * (belief.road * belief.offset).sum(axis=1)).sum())
+    under_each = total(belief.road * belief.offset)
+    return float(total(belief.tyre * under_each[:, 0])[0])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-import numpy as np
-
-from .arrays import Array
+from .arrays import count_below, count_up_to, cumulated, over_rows, total
 from .belief import Belief
+from .roads import PerCell
 
 LOW, HIGH = 0.005, 0.965
 """Quantiles that the interval lies between. The lower bound is the more careful one: to claim grip that is not there
@@ -32,19 +32,19 @@ class Interval(NamedTuple):
     """The upper bound before it moves out."""
 
 
-def interval(belief: Belief, theta: Array) -> Interval:
+def interval(belief: Belief, theta: PerCell) -> Interval:
     """What the belief says; a bound lies at the next cell outside of its quantile."""
-    likely = (belief.road * belief.tyre[:, None]).sum(axis=0)
-    cumulated = np.cumsum(likely)
-    mean = float((likely * theta).sum())
-    variance = float((likely * theta * theta).sum()) - mean * mean
+    likely = over_rows(belief.road * belief.tyre[:, None])
+    up_to = cumulated(likely)
+    mean = float(total(likely * theta)[0])
+    variance = float(total(likely * theta * theta)[0]) - mean * mean
     last = len(theta) - 1
-    low = theta[max(int(np.searchsorted(cumulated, LOW, side="right")) - 1, 0)]
-    clip = theta[max(int(np.searchsorted(cumulated, CLIP, side="right")) - 1, 0)]
-    high = theta[min(int(np.searchsorted(cumulated, HIGH)) + 1, last)]
+    low = theta[max(count_up_to(up_to, LOW) - 1, 0)]
+    clip = theta[max(count_up_to(up_to, CLIP) - 1, 0)]
+    high = theta[min(count_below(up_to, HIGH) + 1, last)]
     return Interval(
         mean,
-        max(variance, 0.0) ** 0.5,
+        math.sqrt(max(variance, 0.0)),
         float(low) * (1.0 - LOW_SHARE),
         float(high) * (1.0 + HIGH_SHARE),
         float(clip),

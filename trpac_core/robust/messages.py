@@ -5,24 +5,34 @@ from __future__ import annotations
 import math
 
 from ..tyre import INITIAL_SLOPE
+from .arrays import first_greatest, total
 from .belief import mean_offset
-from .tyres import TYRES
+from .tyres import PEAKS
 from .wheel import RobustSetup, RobustState
 
 LASTING_S = 2.0
 """Time of readings for which the belief must contradict what is told [s]."""
 
 
+def learnt_stiffness_n(state: RobustState, known: RobustSetup, load_n: float) -> float | None:
+    """Stiffness of a tyre that does not follow the told formula, at a load [N]; None where it does, or is unread."""
+    if state.doubted_s < LASTING_S:
+        return None
+    tyre = first_greatest(state.belief.tyre)
+    if PEAKS[tyre] == 0.0:
+        return None
+    softness = total(state.belief.road[tyre] * state.belief.softness[tyre])[0]
+    return known.wheel.stiffness_n * math.exp(-softness) * load_n / known.wheel.mean_load_n
+
+
 def tyre_message(state: RobustState, known: RobustSetup, axle: str, load_n: float) -> str | None:
-    """Sentences where the tyre does not follow the told formula; None where it does, or too little was read.
+    """Sentences where the tyre does not follow the told formula, else None.
 
     `axle` is the first word of the sentences, `load_n` the load at which the stiffness is named [N].
     """
-    tyre = int(state.belief.tyre.argmax())
-    if state.doubted_s < LASTING_S or TYRES[tyre].peak == 0.0:
+    learnt_n = learnt_stiffness_n(state, known, load_n)
+    if learnt_n is None:
         return None
-    softness = float((state.belief.road[tyre] * state.belief.softness[tyre]).sum())
-    learnt_n = known.wheel.stiffness_n * math.exp(-softness) * load_n / known.wheel.mean_load_n
     told_n = INITIAL_SLOPE * known.wheel.stiffness_n
     return (
         f"{axle} tyres do not follow the told curve: slip stiffness learnt {1e-3 * learnt_n:.0f} kN per unit slip at "
@@ -31,11 +41,16 @@ def tyre_message(state: RobustState, known: RobustSetup, axle: str, load_n: floa
     )
 
 
+def learnt_offset(state: RobustState) -> float | None:
+    """Slip of a wheel without force that the told tolerances do not explain [-]; None where they do."""
+    return mean_offset(state.belief) if state.offset_s >= LASTING_S else None
+
+
 def radius_message(state: RobustState, known: RobustSetup, axle: str) -> str | None:
     """Sentences where a wheel without force reads a slip that the told tolerances do not explain; else None."""
-    if state.offset_s < LASTING_S:
+    offset, told_m = learnt_offset(state), known.wheel.radius_m
+    if offset is None:
         return None
-    offset, told_m = mean_offset(state.belief), known.wheel.radius_m
     return (
         f"{axle} wheels do not have the told radius: slip without force learnt {100.0 * offset:+.1f} %, as of a radius "
         f"of {told_m * (1.0 - offset):.4f} m, told {told_m:.4f} m. Adjust wheel_radius_m in vehicle.yaml."

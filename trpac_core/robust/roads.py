@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from ..tyre import GREATEST_THETA, LEAST_THETA
-from .arrays import Array, exp
+from .arrays import Array, exp, spacing, total
 
 CELL, CELL_SHARE = 0.006, 0.025
 """Width of a cell: the greater of a number and of a share of its friction. It is below the standard deviation that the
@@ -35,13 +35,21 @@ def cells() -> Array:
     return np.array(values)
 
 
-def unseen(theta: Array) -> Array:
+THETA = cells()
+"""The cells."""
+PerCell = Annotated[Array, (len(THETA),)]
+"""One value for each cell."""
+PerClass = Annotated[Array, (3, len(THETA))]
+"""One value for each class and cell."""
+
+
+def unseen(theta: PerCell) -> PerCell:
     """Probability of each cell without a camera, shape (cells,): all frictions alike, the most slippery ones rarer."""
-    likely = np.gradient(theta) * np.where(theta < SLIPPERY, SLIPPERY_SHARE, 1.0)
-    return likely / likely.sum()
+    likely = spacing(theta) * np.where(theta < SLIPPERY, SLIPPERY_SHARE, 1.0)
+    return likely / total(likely)
 
 
-def of_class(theta: Array, value: float, greatest: bool, scatter: float, wrong: float) -> Array:
+def of_class(theta: PerCell, value: float, greatest: bool, scatter: float, wrong: float) -> PerCell:
     """Probability of each cell for a class, shape (cells,).
 
     Parameters
@@ -55,32 +63,43 @@ def of_class(theta: Array, value: float, greatest: bool, scatter: float, wrong: 
     scatter, wrong : float
         Standard deviation of a road from the value, and the probability that the class says nothing [-].
     """
-    off = (theta - value) / scatter
-    if greatest:
-        off = np.minimum(off, 0.0)
-    likely = exp(-0.5 * off * off) * np.gradient(theta)
-    return (1.0 - wrong) * likely / likely.sum() + wrong * unseen(theta)
+    most, without = math.inf if not greatest else 0.0, unseen(theta)
+    off = np.minimum((theta - value) / scatter, most)
+    likely = exp(-0.5 * off * off) * spacing(theta)
+    return (1.0 - wrong) * likely / total(likely) + wrong * without
 
 
 class Priors(NamedTuple):
     """Probability of each cell by what the camera says."""
 
-    new: Array
+    new: PerClass
     """Of a class that is new, shape (classes, cells)."""
-    stood: Array
+    stood: PerClass
     """Of one that has stood, shape (classes, cells)."""
-    none: Array
+    none: PerCell
     """Without one, shape (cells,)."""
 
 
-def priors(theta: Array, class_theta: tuple[float, ...]) -> Priors:
+def of_classes(
+    theta: PerCell, class_theta: tuple[float, float, float], scatter: float, wrong: float
+) -> PerClass:
+    """Probability of each cell for each class, see `of_class`."""
+    dry, wet, snow_ice = class_theta
+    most = max(dry, wet, snow_ice)
+    return np.array(
+        [
+            of_class(theta, dry, dry == most, scatter, wrong),
+            of_class(theta, wet, wet == most, scatter, wrong),
+            of_class(theta, snow_ice, snow_ice == most, scatter, wrong),
+        ]
+    )
+
+
+def priors(theta: PerCell, class_theta: tuple[float, float, float]) -> Priors:
     """The priors for classes of these adhesions [-]."""
-    most = max(class_theta)
     return Priors(
-        np.array([of_class(theta, value, value == most, NEW_SCATTER, NEW_WRONG) for value in class_theta]),
-        np.array(
-            [of_class(theta, value, value == most, CLASS_SCATTER, WRONG_CLASS) for value in class_theta]
-        ),
+        of_classes(theta, class_theta, NEW_SCATTER, NEW_WRONG),
+        of_classes(theta, class_theta, CLASS_SCATTER, WRONG_CLASS),
         unseen(theta),
     )
 
@@ -136,7 +155,7 @@ def advanced(memory: ClassUnderWheel, given: int, way_m: float) -> Change:
     return Change(ClassUnderWheel(given, driven_m, stood, 0.0), share, turned)
 
 
-def prior_of(memory: ClassUnderWheel, given: int, known: Priors) -> Array:
+def prior_of(memory: ClassUnderWheel, given: int, known: Priors) -> PerCell:
     """Probability of each cell by what the camera says now and has said, shape (cells,) [-]."""
     if given not in (NONE, memory.stood):
         return known.new[given]

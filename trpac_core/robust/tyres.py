@@ -9,11 +9,12 @@ and in what they lose beyond it; magic formulas lie near the first, brush models
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from .arrays import Array, exp
+from .arrays import Array, exp, stacked
+from .roads import THETA, PerCell
 
 LEAST_SLIP = 1e-9
 """Slip below which the tyre is taken at this slip: its formula divides by slip [-]."""
@@ -62,6 +63,15 @@ TYRES = (
 2012, ch. 3 and 4); beyond it steep magic formulas lose to 0.6 at three times the peak's slip, which is `fall` 1."""
 FORMULAS = 2
 """How many of the tyres, the first ones, have the told formula."""
+PerTyre = Annotated[Array, (len(TYRES),)]
+Column = Annotated[Array, (len(TYRES), 1)]
+"""One value for each tyre: alone, and beside an axis of cells."""
+Grid = Annotated[Array, (len(TYRES), len(THETA))]
+"""One value for each tyre and cell."""
+IS_TOLD = np.array([[float(index == TOLD)] for index in range(len(TYRES))])
+"""1 for the tyre that is as told, else 0."""
+PEAKS = np.array([tyre.peak for tyre in TYRES])
+"""`Tyre.peak` of each [-]."""
 
 
 class Curve(NamedTuple):
@@ -75,6 +85,7 @@ class Curve(NamedTuple):
     """From 0 where the tyre adheres to 1 where it slides all over."""
 
 
+GridCurve = Annotated[Curve, (len(TYRES), len(THETA))]
 SLIDES_AT = 5.0
 """Normalised slip at which a tyre counts as half sliding: about twice that of its peak [-]."""
 
@@ -119,16 +130,21 @@ def peaked(theta: Array, slip: Array, stiffness: Array, peak: Array, fall: Array
     return Curve(theta * share, by_x * stiffness, by_x * stiffness * slip, sliding(rate * slip))
 
 
+def size(slip: Array) -> Array:
+    """Unsigned slip, within what the formulas can take, shape as given [-]."""
+    return np.minimum(np.maximum(np.abs(slip), LEAST_SLIP), GREATEST_SLIP)
+
+
 def curves(
-    theta: Array,
-    slip: Array,
-    softness: Array,
+    theta: PerCell,
+    slip: Grid,
+    softness: Grid,
     load_n: float,
     stiffness_n: float,
     mean_load_n: float,
-    peak: Array,
-    fall: Array,
-) -> Curve:
+    peak: Column,
+    fall: Column,
+) -> GridCurve:
     """Curve of each tyre in each cell, shape (tyres, cells).
 
     Parameters
@@ -142,16 +158,12 @@ def curves(
     peak, fall : array, shape (tyres, 1)
         As in `Tyre` [-].
     """
-    size = np.minimum(np.maximum(np.abs(slip), LEAST_SLIP), GREATEST_SLIP)
-    stiffness = stiffness_n * exp(-softness)
     # C_x is told at the mean load; a tyre that is not as told has a stiffness that goes with the load.
-    stiffness[TOLD + 1 : FORMULAS] *= load_n / mean_load_n
-    told = dugoff(theta, size[:FORMULAS], load_n, stiffness[:FORMULAS])
-    own = size[FORMULAS:]
+    by_load = np.where(IS_TOLD[:FORMULAS] > 0.0, 1.0, load_n / mean_load_n)
+    told_n = stiffness_n * exp(-softness[:FORMULAS]) * by_load
+    told = dugoff(theta, size(slip[:FORMULAS]), load_n, told_n)
+    own, stiffness = size(slip[FORMULAS:]), stiffness_n * exp(-softness[FORMULAS:]) / mean_load_n
     # A braked wheel's slip is already taken over the road's speed, a driven one's over the rim's.
     road_share = np.where(slip[FORMULAS:] > 0.0, 1.0 - own, 1.0)
-    other = peaked(
-        theta, own / road_share, stiffness[FORMULAS:] / mean_load_n, peak[FORMULAS:], fall[FORMULAS:]
-    )
-    other = other._replace(by_slip=other.by_slip / (road_share * road_share))
-    return Curve(*(np.concatenate(both) for both in zip(told, other, strict=True)))
+    other = peaked(theta, own / road_share, stiffness, peak[FORMULAS:], fall[FORMULAS:])
+    return stacked(told, other._replace(by_slip=other.by_slip / (road_share * road_share)))

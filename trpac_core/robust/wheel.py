@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..vehicle import CarTolerance
-from .arrays import Array
 from .belief import (
+    FIRST,
     Belief,
     Hypotheses,
     WheelModel,
+    as_told,
     driven,
-    hypotheses,
     mean_offset,
     onset_theta,
     read,
@@ -30,8 +30,8 @@ from .belief import (
 )
 from .blocks import BLOCK_S, Filling, Means, Noise, heard, means_of, reading
 from .interval import Interval, interval
-from .roads import STOOD_M, ClassUnderWheel, Priors, advanced, cells, prior_of, priors
-from .tyres import TOLD, TYRES
+from .roads import STOOD_M, THETA, ClassUnderWheel, PerCell, Priors, advanced, prior_of, priors
+from .tyres import TOLD
 
 DOUBTED, BELIEVED = 0.05, 0.2
 """Probability of the told formula up to which the observer does not count, and from which it counts fully [-]."""
@@ -69,7 +69,7 @@ class RobustSetup:
         Standard deviation of a constant error of the sliding speed [m/s].
     """
 
-    theta: Array
+    theta: PerCell
     known: Priors
     tyres: Hypotheses
     wheel: WheelModel
@@ -86,22 +86,17 @@ def setup(
     sliding_speed_noise_m_s: float,
     torque_noise_nm: float,
     tolerance: CarTolerance,
-    class_theta: tuple[float, ...],
+    class_theta: tuple[float, float, float],
 ) -> RobustSetup:
     """The set-up of a wheel; the told noise of the sliding speed [m/s] is shared evenly by its two sensors."""
-    told = replace(
-        TYRES[TOLD],
-        slip_offset=max(tolerance.ratio, LEAST_TOLERANCE),
-        softness=max(tolerance.compliance, LEAST_TOLERANCE),
-    )
-    theta, half = cells(), 0.5 * sliding_speed_noise_m_s**2
+    half = 0.5 * sliding_speed_noise_m_s * sliding_speed_noise_m_s
     return RobustSetup(
-        theta,
-        priors(theta, class_theta),
-        hypotheses((told, *TYRES[TOLD + 1 :])),
+        THETA,
+        priors(THETA, class_theta),
+        as_told(FIRST, max(tolerance.ratio, LEAST_TOLERANCE), max(tolerance.compliance, LEAST_TOLERANCE)),
         wheel,
         rolling_resistance,
-        half / wheel.radius_m**2,
+        half / (wheel.radius_m * wheel.radius_m),
         half,
         torque_noise_nm,
         tolerance.speed_bias_m_s,
@@ -294,7 +289,8 @@ def _on_road(
             # A constant error of the speed is another slip at another speed.
             slowness = 1.0 / now.speed_m_s
             slip_drift = (
-                known.speed_bias_m_s**2
+                known.speed_bias_m_s
+                * known.speed_bias_m_s
                 * abs(slowness - state.slowness_s_m)
                 * max(slowness, state.slowness_s_m)
             )
@@ -341,8 +337,9 @@ def _on_road(
 
 def _offset_is_strange(belief: Belief, known: RobustSetup, slowness_s_m: float) -> bool:
     """Whether the slip offset lies beyond what radius and speed bias are told to make of it."""
-    told = known.tyres.offset_variance[TOLD, 0] + (known.speed_bias_m_s * slowness_s_m) ** 2
-    return bool(mean_offset(belief) ** 2 > OFFSET_DEVIATIONS**2 * told)
+    by_speed, offset = known.speed_bias_m_s * slowness_s_m, mean_offset(belief)
+    told = known.tyres.offset_variance[TOLD, 0] + by_speed * by_speed
+    return bool(offset * offset > OFFSET_DEVIATIONS * OFFSET_DEVIATIONS * told)
 
 
 def point(state: RobustState, observer: float) -> float:

@@ -12,22 +12,20 @@ the tiling is read as:
   gap: no result. The default is the depth of the near group, the stretch of road that the result was taken from.
 * Where several stamps cover a position, the newest frame wins.
 * Frames less than `resolution_m` apart share one stamp, with the newest result: a car that stands, or shunts to and
-  fro, does not pile up stamps.
+  fro, does not pile up stamps. Of more than `MOST_STAMPS` the oldest goes.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from operator import attrgetter
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
 
 from .classes import Surface
 
-_begin = attrgetter("X_lb_m")
+MOST_STAMPS = 512
+"""Most stamps that are kept; with the default settings and a class in each millisecond there are 230 at most."""
 
 
 @dataclass(frozen=True)
@@ -79,14 +77,65 @@ class PreviewConfig:
             )
 
 
-@dataclass(frozen=True)
-class PreviewState:
-    """Stamps from the oldest frame to the newest, and where the newest was captured [m]."""
+def _zeros() -> list[float]:
+    return [0.0] * MOST_STAMPS
 
-    stamps: tuple[Stamp, ...] = ()
+
+def _none() -> list[int]:
+    return [0] * MOST_STAMPS
+
+
+def _down() -> list[bool]:
+    return [False] * MOST_STAMPS
+
+
+Numbers = Annotated[list[float], (MOST_STAMPS,)]
+
+
+@dataclass(slots=True)
+class PreviewState:
+    """Stamps from the oldest frame to the newest, as columns that are filled in a ring; changed in place.
+
+    Attributes
+    ----------
+    captured_at_m : float or None
+        Where the newest frame was captured [m].
+    ascending : bool
+        Whether no stamp begins before one of an older frame: so it is unless the car has rolled back.
+    first, count : int
+        Place of the oldest stamp, and how many there are.
+    X_lb_m, X_ub_m : list of float
+        Stretch of road of each stamp [m].
+    surface, Q_v, flag, captured_s : list
+        Its outcome.
+    """
+
     captured_at_m: float | None = None
-    ascending: bool = field(default=True, compare=False)
-    """Whether no stamp begins before one of an older frame: so it is unless the car has rolled back."""
+    ascending: bool = True
+    first: int = 0
+    count: int = 0
+    X_lb_m: Numbers = field(default_factory=_zeros)
+    X_ub_m: Numbers = field(default_factory=_zeros)
+    surface: Annotated[list[int], (MOST_STAMPS,)] = field(default_factory=_none)
+    Q_v: Numbers = field(default_factory=_zeros)
+    flag: Annotated[list[bool], (MOST_STAMPS,)] = field(default_factory=_down)
+    captured_s: Numbers = field(default_factory=_zeros)
+
+    @property
+    def stamps(self) -> tuple[Stamp, ...]:
+        """The stamps from the oldest frame to the newest."""
+        return tuple(
+            Stamp(self.X_lb_m[place], self.X_ub_m[place], outcome_at(self, place))
+            for place in (place_of(self, k) for k in range(self.count))
+        )
+
+    @classmethod
+    def of(cls, stamps: Iterable[Stamp], captured_at_m: float | None) -> PreviewState:
+        """The state with these stamps, from the oldest frame to the newest."""
+        state = cls(captured_at_m)
+        for stamp in stamps:
+            _append(state, stamp.X_lb_m, stamp.X_ub_m, stamp.outcome)
+        return state
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""
@@ -102,11 +151,24 @@ class PreviewState:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> PreviewState:
         """The state that `to_json` wrote."""
-        stamps = tuple(
+        stamps = (
             Stamp(X_lb, X_ub, Outcome(Surface(surface), Q_v, flag, captured_s))
             for X_lb, X_ub, surface, Q_v, flag, captured_s in data["stamps"]
         )
-        return cls(stamps, data["captured_at_m"], _ascend(stamps))
+        return cls.of(stamps, data["captured_at_m"])
+
+
+def place_of(state: PreviewState, k: int) -> int:
+    """Place in the ring of the k-th stamp, counted from the oldest."""
+    place = state.first + k
+    return place - MOST_STAMPS if place >= MOST_STAMPS else place
+
+
+def outcome_at(state: PreviewState, place: int) -> Outcome:
+    """Outcome of the stamp at a place in the ring."""
+    return Outcome(
+        Surface(state.surface[place]), state.Q_v[place], state.flag[place], state.captured_s[place]
+    )
 
 
 def add_frame(
@@ -117,13 +179,13 @@ def add_frame(
     position_m: float,
     speed_m_s: float,
     frame_interval_s: float,
-) -> PreviewState:
+) -> None:
     """Stamp a frame's outcome, Eq. (11).
 
     Parameters
     ----------
     state : PreviewState
-        Before the frame.
+        Before the frame; changed in place.
     config : PreviewConfig
         Settings.
     outcome : Outcome
@@ -134,59 +196,103 @@ def add_frame(
         Speed then and the camera's cycle time, for the length of a first stamp [m/s], [s].
     """
     X_lb = position_m + config.P_0_m
-    if state.captured_at_m is None:
-        length = max(0.0, speed_m_s * frame_interval_s)
-    else:
-        length = max(0.0, position_m - state.captured_at_m)
-    newest = Stamp(X_lb, X_lb + length, outcome)
-    kept, shared = _apart(state, X_lb, config.resolution_m)
-    if shared:
-        begin_m = min(stamp.X_lb_m for stamp in shared)
-        newest = Stamp(begin_m, max(newest.X_ub_m, *(stamp.X_ub_m for stamp in shared)), outcome)
-    ascending = state.ascending or (bool(shared) and _ascend(kept))
-    ascending = ascending and (not kept or kept[-1].X_lb_m <= newest.X_lb_m)
-    return PreviewState((*kept, newest), position_m, ascending)
+    driven_m = (
+        speed_m_s * frame_interval_s if state.captured_at_m is None else position_m - state.captured_at_m
+    )
+    X_ub = X_lb + max(0.0, driven_m)
+    begin_m = math.inf
+    newest_m = state.X_lb_m[place_of(state, state.count - 1)] if state.count > 0 else -math.inf
+    if not (state.ascending and X_lb - newest_m >= config.resolution_m):
+        # Without the stamps that it shares a place with, which it reaches over.
+        kept = 0
+        for k in range(state.count):
+            place = place_of(state, k)
+            if abs(X_lb - state.X_lb_m[place]) < config.resolution_m:
+                begin_m, X_ub = min(begin_m, state.X_lb_m[place]), max(X_ub, state.X_ub_m[place])
+            else:
+                _move(state, place, place_of(state, kept))
+                kept += 1
+        if kept < state.count:
+            state.count = kept
+            state.ascending = state.ascending or _ascend(state)
+    if begin_m < math.inf:
+        X_lb = begin_m
+    _append(state, X_lb, X_ub, outcome)
+    state.captured_at_m = position_m
 
 
-def _apart(
-    state: PreviewState, X_lb_m: float, resolution_m: float
-) -> tuple[tuple[Stamp, ...], tuple[Stamp, ...]]:
-    """The stamps that begin elsewhere than a new one, and those that it shares a place with."""
-    if state.ascending and (not state.stamps or X_lb_m - state.stamps[-1].X_lb_m >= resolution_m):
-        return state.stamps, ()
-    shared = tuple(s for s in state.stamps if abs(X_lb_m - s.X_lb_m) < resolution_m)
-    return tuple(s for s in state.stamps if abs(X_lb_m - s.X_lb_m) >= resolution_m), shared
+def _move(state: PreviewState, place: int, to: int) -> None:
+    """Copy a stamp to another place."""
+    if place != to:
+        state.X_lb_m[to] = state.X_lb_m[place]
+        state.X_ub_m[to] = state.X_ub_m[place]
+        state.surface[to] = state.surface[place]
+        state.Q_v[to] = state.Q_v[place]
+        state.flag[to] = state.flag[place]
+        state.captured_s[to] = state.captured_s[place]
 
 
-def _ascend(stamps: tuple[Stamp, ...]) -> bool:
-    return all(older.X_lb_m <= newer.X_lb_m for older, newer in pairwise(stamps))
+def _append(state: PreviewState, X_lb_m: float, X_ub_m: float, outcome: Outcome) -> None:
+    """Put a stamp behind the newest one."""
+    if state.count == MOST_STAMPS:
+        state.first = place_of(state, 1)
+        state.count -= 1
+    if state.count > 0 and X_lb_m < state.X_lb_m[place_of(state, state.count - 1)]:
+        state.ascending = False
+    place = place_of(state, state.count)
+    state.X_lb_m[place] = X_lb_m
+    state.X_ub_m[place] = X_ub_m
+    state.surface[place] = int(outcome.surface)
+    state.Q_v[place] = outcome.Q_v
+    state.flag[place] = outcome.flag
+    state.captured_s[place] = outcome.captured_s
+    state.count += 1
+
+
+def _ascend(state: PreviewState) -> bool:
+    """Whether each stamp begins where the one before it begins, or farther on."""
+    ascending = True
+    for k in range(1, state.count):
+        before_m, begin_m = state.X_lb_m[place_of(state, k - 1)], state.X_lb_m[place_of(state, k)]
+        ascending = ascending and before_m <= begin_m
+    return ascending
 
 
 def covering(state: PreviewState, config: PreviewConfig, position_m: float) -> Outcome | None:
     """Outcome for the road at a coordinate now, of the newest frame that covers it; None in a gap."""
+    begun, begun_m = state.count, -math.inf
     if state.ascending:
-        begun = bisect_right(state.stamps, position_m, key=_begin)
-        newest = state.stamps[begun - 1] if begun else None
-        return newest.outcome if newest and position_m < newest.X_ub_m + config.hold_m else None
-    begun_m = -math.inf
-    for stamp in reversed(state.stamps):
-        if begun_m < stamp.X_lb_m <= position_m:
-            if position_m < stamp.X_ub_m + config.hold_m:
-                return stamp.outcome
+        begun = _begun(state, position_m)
+    for back in range(begun):
+        place = place_of(state, begun - 1 - back)
+        if begun_m < state.X_lb_m[place] <= position_m:
+            if position_m < state.X_ub_m[place] + config.hold_m:
+                return outcome_at(state, place)
             # A newer frame that began here has ended all older ones that began before it.
-            begun_m = stamp.X_lb_m
+            begun_m = state.X_lb_m[place]
+        if state.ascending:
+            return None
     return None
 
 
-def prune(state: PreviewState, config: PreviewConfig, position_m: float) -> PreviewState:
-    """The state without the oldest stamps that lie behind the wheels when the front wheel is at a coordinate.
+def _begun(state: PreviewState, position_m: float) -> int:
+    """How many of ascending stamps begin at a coordinate or before it."""
+    low, high = 0, state.count
+    while low < high:
+        middle = (low + high) // 2
+        if position_m < state.X_lb_m[place_of(state, middle)]:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+def prune(state: PreviewState, config: PreviewConfig, position_m: float) -> None:
+    """Take away, in place, the oldest stamps that lie behind the wheels when the front wheel is at a coordinate.
 
     An expired stamp after one that still holds stays: it ends the older ones that began before it.
     """
     rear_m = position_m - config.behind_m
-    expired = 0
-    for stamp in state.stamps:
-        if stamp.X_ub_m + config.hold_m > rear_m:
-            break
-        expired += 1
-    return replace(state, stamps=state.stamps[expired:]) if expired else state
+    while state.count > 0 and state.X_ub_m[state.first] + config.hold_m <= rear_m:
+        state.first = place_of(state, 1)
+        state.count -= 1

@@ -1,0 +1,173 @@
+"""Translated functions as a library of this machine's C compiler, called from Python: what the tests compare."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from trpac_core.errors import TrpacError
+
+from .translator.program import Function, Program
+from .translator.types import Type, safe
+
+FLAGS = ("-O2", "-std=c99", "-ffp-contract=off")
+"""How the C is compiled everywhere; fast math would change the results, and the code refuses it."""
+WARNINGS = ("-Wall", "-Wextra", "-pedantic", "-Werror")
+
+
+class CompilerError(TrpacError):
+    """There is no C compiler, or it refuses the code."""
+
+
+def compiler() -> list[str]:
+    """The command of the C compiler: that of the variable CC, else cc; CompilerError where there is none."""
+    command = shlex.split(os.environ.get("CC", "cc"))
+    if not command or shutil.which(command[0]) is None:
+        raise CompilerError(f"There is no C compiler {' '.join(command)!r}: install one, or name one in CC.")
+    return command
+
+
+def compiled(sources: list[Path], target: Path, *options: str) -> Path:
+    """A shared library of C files; CompilerError with the compiler's messages."""
+    files = [str(path) for path in sources]
+    command = [*compiler(), *FLAGS, "-fPIC", "-shared", *options, *files, "-o", str(target), "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise CompilerError(f"{' '.join(command)}\n{done.stderr}")
+    return target
+
+
+class Library:
+    """The functions of a program, by their Python functions.
+
+    Parameters
+    ----------
+    program : Program
+        What was translated.
+    folder : Path
+        Where code and library are written.
+    """
+
+    def __init__(self, program: Program, folder: Path) -> None:
+        self.program = program
+        self._kinds: dict[str, Any] = {}
+        files = folder / "trpac.h", folder / "trpac.c"
+        for file, text in zip(files, program.texts("trpac", "Made of Python: change that."), strict=True):
+            file.write_text(text, encoding="utf-8")
+        self._library = ctypes.CDLL(str(compiled([files[1]], folder / "trpac.so", *WARNINGS)))
+
+    def call(self, python: Any, *arguments: Any) -> Any:
+        """What the C of a function returns for these arguments.
+
+        Arguments that Python changes in place are changed; one that is a value of C, see `kept`, stays one.
+        """
+        function = self.program.require(python)
+        called = getattr(self._library, function.c)
+        kinds = [kind for _, kind in function.parameters]
+        values = [self.to_c(value, kind) for value, kind in zip(arguments, kinds, strict=True)]
+        result = self._called(function, called, values, kinds)
+        for argument, value, kind in zip(arguments, values, kinds, strict=True):
+            if kind.mutable and argument is not value:
+                for f in kind.fields:
+                    setattr(argument, f.name, self.to_python(getattr(value, safe(f.name)), f.type))
+        return result
+
+    def _called(self, function: Function, called: Any, values: list[Any], kinds: list[Type]) -> Any:
+        given = [
+            ctypes.byref(value) if kind.big or kind.kind == "array" else value
+            for value, kind in zip(values, kinds, strict=True)
+        ]
+        if function.updates:
+            called.restype = None
+            called(*given)
+            return self.to_python(values[0], function.returns)
+        if function.by_pointer:
+            called.restype = None
+            result = self.kind(function.returns)()
+            called(ctypes.byref(result), *given)
+            return self.to_python(result, function.returns)
+        if function.returns.kind == "nothing":
+            called.restype = None
+            called(*given)
+            return None
+        called.restype = self.kind(function.returns)
+        return self.to_python(called(*given), function.returns)
+
+    def kept(self, value: Any) -> Any:
+        """A record as a value of C that calls take, and change in place, without conversion."""
+        return self.to_c(value, self.program.types.of_value(value, "a value"))
+
+    def back(self, kept: Any, like: Any) -> Any:
+        """The Python value of what is kept; `like` is one of its type."""
+        return self.to_python(kept, self.program.types.of_value(like, "a value"))
+
+    def kind(self, kind: Type) -> Any:
+        """The type of ctypes."""
+        if kind.kind in ("double", "int", "bool", "enum"):
+            simple = {
+                "double": ctypes.c_double,
+                "int": ctypes.c_int,
+                "bool": ctypes.c_bool,
+                "enum": ctypes.c_int,
+            }
+            return simple[kind.kind]
+        if kind.kind == "array" and kind.item is not None:
+            return self.kind(kind.item) * kind.size
+        if kind.c not in self._kinds:
+            fields: list[tuple[str, Any]]
+            if kind.kind == "tuple":
+                fields = [("at", ctypes.c_double * kind.size)]
+            elif kind.kind == "optional" and kind.item is not None:
+                fields = [("has", ctypes.c_bool), ("value", self.kind(kind.item))]
+            else:
+                fields = [(safe(f.name), self.kind(f.type)) for f in kind.fields]
+            self._kinds[kind.c] = type(kind.c, (ctypes.Structure,), {"_fields_": fields})
+        return self._kinds[kind.c]
+
+    def to_c(self, value: Any, kind: Type) -> Any:
+        """A Python value in C."""
+        made = self.kind(kind)
+        if isinstance(value, ctypes.Structure):
+            return value
+        if kind.kind == "enum":
+            return made(value.value)
+        if kind.kind == "array" and kind.item is not None:
+            if kind.item.kind == "record":
+                rows = zip(
+                    *(np.ravel(getattr(value, f.name)).tolist() for f in kind.item.fields), strict=True
+                )
+                return made(*(self.kind(kind.item)(*row) for row in rows))
+            return made(*np.ravel(value).tolist())
+        if kind.kind == "tuple":
+            return made((ctypes.c_double * kind.size)(*value))
+        if kind.kind == "optional" and kind.item is not None:
+            return made() if value is None else made(True, self.to_c(value, kind.item))
+        if kind.kind == "record":
+            parts = value if type(value) is tuple else [getattr(value, f.name) for f in kind.fields]
+            return made(*(self.to_c(part, f.type) for part, f in zip(parts, kind.fields, strict=True)))
+        return made(value)
+
+    def to_python(self, value: Any, kind: Type) -> Any:
+        """A value of C in Python."""
+        if kind.kind == "enum":
+            return kind.python(value)
+        if kind.kind == "array" and kind.item is not None:
+            if kind.item.kind == "record":
+                columns = [[getattr(item, safe(f.name)) for item in value] for f in kind.item.fields]
+                return kind.item.python(*(np.array(column).reshape(kind.shape) for column in columns))
+            return np.array(value[:]).reshape(kind.shape)
+        if kind.kind == "tuple":
+            return tuple(value.at)
+        if kind.kind == "optional" and kind.item is not None:
+            return self.to_python(value.value, kind.item) if value.has else None
+        if kind.kind == "record":
+            parts = {f.name: self.to_python(getattr(value, safe(f.name)), f.type) for f in kind.fields}
+            return tuple(parts.values()) if kind.python is tuple else kind.python(**parts)
+        return value
