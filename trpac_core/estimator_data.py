@@ -104,7 +104,7 @@ class EstimatorConfig:
     class_theta : tuple of 3 floats
         Adhesion of dry, wet, snow and ice [-].
     theta_initial : float
-        Estimate before anything is known: a dry road [-].
+        The observer's estimate before anything is known: a dry road [-].
     floor_m_s : float
         Speed below which slip says nothing. At 1 m/s a speed error of 0.014 m/s is a slip of 0.014, as
         large as the excitation threshold [m/s].

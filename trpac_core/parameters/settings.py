@@ -82,7 +82,7 @@ _FUSION_PARAMETERS = (
         "estimator.theta_initial",
         "1",
         "theta_initial",
-        "Estimate at the start",
+        "Estimate of the observer at the start",
         0.02,
         GREATEST_THETA,
     ),

@@ -1,7 +1,7 @@
 """The robust estimator of one wheel: readings in blocks, the belief about road and tyre, the point value.
 
-The point value follows the observer of Eqs. (14) to (16) as far as the told formula is believed and the road is the one
-that the observer has read; else it is the mean of the belief. Either way it lies within the belief's bounds.
+The point value is the observer's, Eqs. (14) to (16), within the belief's bounds, on a road that the observer has read;
+before, and where the camera has found another road since, it is the mean of the belief.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from .interval import Interval, interval
 from .roads import STOOD_M, THETA, ClassUnderWheel, PerCell, Priors, advanced, prior_of, priors
 from .tyres import TOLD
 
-DOUBTED, BELIEVED = 0.05, 0.2
-"""Probability of the told formula up to which the observer does not count, and from which it counts fully [-]."""
+BELIEVED = 0.2
+"""Probability of the told formula from which the tyre is taken to be as told [-]."""
 LEAST_TOLERANCE = 1e-4
 """Tolerance of radius and stiffness below which they are not taken: a filter divides by what it does not know [-]."""
 LEAST_USED_SHARE = 0.1
@@ -343,11 +343,9 @@ def _offset_is_strange(belief: Belief, known: RobustSetup, slowness_s_m: float) 
 
 
 def point(state: RobustState, observer: float) -> float:
-    """TRPAC, with the observer's theta_hat [-]."""
+    """TRPAC, with the observer's theta_hat [-]: the belief's mean until the tyre has shown this road."""
     said = state.said
-    believed = min(max((told_formula(state.belief) - DOUBTED) / (BELIEVED - DOUBTED), 0.0), 1.0)
-    share = 0.0 if state.stale else believed
-    return min(max(share * observer + (1.0 - share) * said.mean, said.clip), said.unmoved_high)
+    return said.mean if state.stale else min(max(observer, said.clip), said.unmoved_high)
 
 
 class Claim(NamedTuple):
