@@ -1,14 +1,12 @@
 """A scenario through the command line, from files to report, on the real unit."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from trpac_core.theta_variance import VarianceModel
 from typer.testing import CliRunner
 
 from fmu_src.packaging import build_unit
@@ -131,7 +129,7 @@ def test_another_method_is_that_of_the_unit_and_of_the_report(scenario_file, uni
     config = EstimatorConfig(
         scenario.vehicle.to_core(),
         method=Method.of(method),
-        confidence=replace(VarianceModel(), torque_noise_nm=noise.wheel_torque_noise_nm),
+        torque_noise_nm=noise.wheel_torque_noise_nm,
         sliding_speed_noise_m_s=float(
             np.hypot(
                 noise.vehicle_speed_noise_m_s, scenario.vehicle.wheel_radius_m * noise.wheel_speed_noise_rad_s

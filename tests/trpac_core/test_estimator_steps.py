@@ -8,23 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from trpac_core.slip_calibration import EXACT_CAR, CarTolerance
-from trpac_core.theta_variance import drifted_variance, unknown_variance
 
 from trpac_core import tyre
-from trpac_core.dife import NEVER_SEEN_M
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.estimator_data import Method
 from trpac_core.observer import seen_at
 from trpac_core.sensors import Sensors
-from trpac_core.stationary_mean import NO_MEAN, StationaryMean, aged, mean_slip_deviation
-from trpac_core.vehicle import Vehicle
+from trpac_core.vehicle import EXACT_CAR, CarTolerance, Vehicle
 from trpac_core.vision.classes import Surface
 
 NAN = math.nan
 SMOOTH = Vehicle(rolling_resistance=0.0)
 LOAD_N = SMOOTH.wheel_load(True)
 C_X, RADIUS_M, INERTIA = SMOOTH.longitudinal_stiffness_n, SMOOTH.wheel_radius_m, SMOOTH.wheel_inertia_kg_m2
-UNFILTERED = EstimatorConfig(vehicle=SMOOTH, sensor_filter_s=1e-6, tolerance=EXACT_CAR)
+DIFE = EstimatorConfig(vehicle=SMOOTH, method=Method.DIFE)
+UNFILTERED = replace(DIFE, sensor_filter_s=1e-6, tolerance=EXACT_CAR)
 STEPS_S = [0.001, 0.01, 0.02, 0.05, 0.1]
 
 
@@ -101,43 +99,24 @@ def driven(estimator, sensors, seconds, frame=None):
 
 
 def test_what_was_read_before_a_gap_does_not_speak_for_the_road_behind_it():
-    after_gap, fresh = (TrpacEstimator(EstimatorConfig(vehicle=SMOOTH)) for _ in range(2))
+    after_gap, fresh = (TrpacEstimator(DIFE) for _ in range(2))
     driven(after_gap, sliding(0.5), 1.5)
     driven(after_gap, replace(sliding(0.5), wheel_torque_nm=NAN), 3.0)
     start = after_gap.state()["state"]["fusion"]["theta_hat"]
-    fresh = TrpacEstimator(EstimatorConfig(vehicle=SMOOTH, theta_initial=start))
+    fresh = TrpacEstimator(replace(DIFE, theta_initial=start))
     for part_s in (0.05, 0.05, 0.1):
         found, expected = (driven(one, sliding(0.3), part_s).TRPAC for one in (after_gap, fresh))
         assert found == pytest.approx(expected, abs=0.01)
 
 
-def test_way_without_readings_is_way_unseen():
-    estimator = TrpacEstimator(EstimatorConfig(vehicle=SMOOTH))
-    driven(estimator, sliding(0.3), 1.0)
-    driven(estimator, replace(sliding(0.3), wheel_speed_rad_s=NAN), 5.0)
-    state = estimator.state()["state"]
-    assert state["fusion"]["unseen_m"] == pytest.approx(50.0, rel=1e-6)
-    assert state["dynamics"]["unseen_m"] == pytest.approx(50.0, rel=1e-6)
-
-
-def test_a_single_lost_sample_leaves_the_means_nearly_as_good():
-    long = StationaryMean(0.03, 0.4, 0.0, 5.0)
-    after = aged(long, 0.001)
-    assert after[:3] == long[:3]
-    assert mean_slip_deviation(after, 1e-3, 0.02, 0.0) < 1.01 * mean_slip_deviation(long, 1e-3, 0.02, 0.0)
-    assert aged(long, 0.0) == long
-    assert aged(long, 0.2) == aged(NO_MEAN, 0.001) == NO_MEAN
-
-
 def test_a_step_over_which_nobody_knows_the_way_leaves_nothing_known():
-    estimator = TrpacEstimator(EstimatorConfig(vehicle=SMOOTH))
+    estimator = TrpacEstimator(DIFE)
     sure = driven(estimator, sliding(0.3), 1.5)
     lost = estimator.step(60.0, sliding(0.3))
     assert lost.TRPAC == sure.TRPAC
-    unknown = math.sqrt(unknown_variance(EstimatorConfig().confidence, sure.TRPAC))
-    assert sure.TRPAC_std < 0.5 * unknown
-    assert lost.TRPAC_std == pytest.approx(unknown)
-    assert estimator.state()["state"]["fusion"]["unseen_m"] == NEVER_SEEN_M
+    unknown = TrpacEstimator(DIFE).last.TRPAC_expected_std
+    assert sure.TRPAC_expected_std < 0.8 * unknown
+    assert lost.TRPAC_expected_std == unknown
     assert driven(estimator, Sensors(10.0 / RADIUS_M, 0.0, 10.0), 0.01).TRPAC_std > 0.9 * unknown
 
 
@@ -159,23 +138,3 @@ def test_a_camera_that_pulls_the_estimate_leaves_the_observed_force_alone():
     told = [estimator.step(0.001, steady, RoadClass(Surface.SNOW_ICE, 0.95)) for _ in range(2000)]
     assert told[-1].TRPAC < 0.75
     assert max(abs(said.tyre_force_n - force_n) for said in told) < 0.01
-
-
-def test_a_class_farther_off_than_the_one_before_makes_the_estimate_less_sure():
-    """The road may be another: as after `class_change_m` of way on which nothing was seen."""
-    config = EstimatorConfig(vehicle=SMOOTH, theta_initial=0.75)
-    estimator, cruise = TrpacEstimator(config), Sensors(10.0 / RADIUS_M, 0.0, 10.0)
-    estimator._state.variance = 0.01
-    driven(estimator, cruise, 0.4, RoadClass(Surface.DRY, 0.9))
-    before = estimator.state()["state"]
-    driven(estimator, cruise, 0.25, RoadClass(Surface.SNOW_ICE, 0.9))
-    at_border = estimator.state()["state"]
-    assert at_border["fusion"]["theta_img"] == 0.8, "the wheel is not there yet"
-    after = driven(estimator, cruise, 0.002)
-    model = config.confidence
-    way_m = 10.0 * 0.002 + model.class_change_m
-    expected = drifted_variance(model, at_border["variance"], at_border["fusion"]["theta_hat"], way_m)
-    assert after.TRPAC_image == 0.2
-    assert estimator.state()["state"]["variance"] == pytest.approx(expected, rel=1e-2)
-    assert at_border["variance"] < 0.5 * expected
-    assert before["variance"] < at_border["variance"]

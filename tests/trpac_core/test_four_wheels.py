@@ -11,6 +11,7 @@ import pytest
 from ife_scene import CAMERA, DRY, SNOW, Masks, Middle, split_road
 
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
+from trpac_core.estimator_data import Method
 from trpac_core.four_wheels import CAR, CarSensors, FourWheels, FourWheelsConfig, SideClasses
 from trpac_core.local_speed import local_speeds
 from trpac_core.sensors import Sensors
@@ -21,6 +22,7 @@ from trpac_core.vision.sides import SidesIfe
 
 STEP_S = 0.001
 CAR_DATA = Vehicle()
+DIFE = FourWheelsConfig(EstimatorConfig(method=Method.DIFE))
 ICE, DRY_ROAD = RoadClass(SNOW, 0.9), RoadClass(DRY, 0.9)
 SPLIT = SideClasses(ICE, DRY_ROAD)
 ROLLING = 15.0 / CAR_DATA.wheel_radius_m
@@ -66,7 +68,7 @@ def test_each_wheel_is_estimated_as_by_an_estimator_of_its_own_bit_by_bit():
 
 
 def test_each_wheel_finds_its_own_sides_friction():
-    estimate = driven(FourWheels(FourWheelsConfig()), sliding(), 1.5)
+    estimate = driven(FourWheels(DIFE), sliding(), 1.5)
     assert [wheel.TRPAC for wheel in estimate.wheels] == pytest.approx([0.3, 0.8, 0.3, 0.8], abs=0.01)
     loads = [CAR_DATA.wheel_load(wheel.startswith("f"), 2.0) for wheel in WHEELS]
     expected = (0.3 * loads[0] + 0.8 * loads[1] + 0.3 * (loads[2] + loads[3])) / sum(loads)
@@ -128,7 +130,7 @@ def test_a_broken_sensor_silences_its_own_wheel_alone(name, signal):
 
 
 def test_a_broken_wheel_leaves_the_car_with_its_partners_knowledge():
-    four, good = FourWheels(FourWheelsConfig()), sliding((0.3, 0.3, 0.3, 0.3))
+    four, good = FourWheels(DIFE), sliding((0.3, 0.3, 0.3, 0.3))
     broken = good._replace(wheel_speed_rad_s=(math.nan, *good.wheel_speed_rad_s[1:]))
     estimate = driven(four, broken, 1.5)
     assert estimate.wheels[0].TRPAC == 0.8

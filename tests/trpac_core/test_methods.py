@@ -215,10 +215,9 @@ def test_a_wheel_of_another_radius_is_named_with_its_radius(share, front):
     assert "Adjust wheel_radius_m in vehicle.yaml" in text
 
 
-def test_no_message_comes_before_its_time_and_none_by_another_method():
+def test_no_message_comes_before_its_time_and_none_as_printed():
     assert messages_of(seconds=0.9 * LASTING_S, radius_m=1.02 * CAR.wheel_radius_m, curve=6.5, most=0.1) == {}
-    for method in (Method.AS_PRINTED, Method.DIFE):
-        assert messages_of(method=method, radius_m=1.02 * CAR.wheel_radius_m) == {}
+    assert messages_of(method=Method.AS_PRINTED, radius_m=1.02 * CAR.wheel_radius_m) == {}
 
 
 # Four wheels

@@ -7,14 +7,14 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from quarter_car import LOAD, I, R, driven, magic_formula, pulses, softer_curve, told_curve
-from trpac_core.slip_calibration import CarTolerance
 
 from trpac_core.robust import belief as beliefs
 from trpac_core.robust.belief import Belief, WheelModel, hypotheses
 from trpac_core.robust.interval import Interval, interval
 from trpac_core.robust.roads import NONE, priors
 from trpac_core.robust.tyres import TYRES
-from trpac_core.robust.wheel import RobustState, Sample, begun, point, setup, stepped
+from trpac_core.robust.wheel import RobustState, Sample, begun, claim, point, setup, stepped
+from trpac_core.vehicle import EXACT_CAR, CarTolerance
 
 DRY, WET, SNOW = range(3)
 CLASSES = (0.8, 0.6, 0.2)
@@ -148,26 +148,32 @@ def state_of(tyre, said, stale=False):
 @pytest.mark.parametrize(("told", "share"), [(1.0, 1.0), (0.2, 1.0), (0.125, 0.5), (0.05, 0.0), (0.0, 0.0)])
 def test_the_point_follows_the_observer_as_far_as_the_told_formula_is_believed(told, share):
     state = state_of([0.5 * told, 0.5 * told, 1.0 - told, 0.0], said_of(0.5))
-    assert point(state, 0.4)[0] == pytest.approx(0.5 - 0.1 * share)
-    assert point(state._replace(stale=True), 0.4)[0] == pytest.approx(0.5)
+    assert point(state, 0.4) == pytest.approx(0.5 - 0.1 * share)
+    assert point(state._replace(stale=True), 0.4) == pytest.approx(0.5)
 
 
 def test_the_point_stays_within_the_bounds():
     state = state_of([1.0, 0.0, 0.0, 0.0], said_of(0.5, clip=0.3, high=0.7))
-    assert point(state, 0.1)[0] == 0.3
-    assert point(state, 0.9)[0] == 0.7
-    assert point(state, 0.6)[0] == 0.6
+    assert point(state, 0.1) == 0.3
+    assert point(state, 0.9) == 0.7
+    assert point(state, 0.6) == 0.6
 
 
 def test_the_points_deviation_has_the_distance_from_the_mean_and_four_per_cent():
-    state = state_of([1.0, 0.0, 0.0, 0.0], said_of(0.5, std=0.05))
-    assert point(state, 0.5)[1] == pytest.approx(np.hypot(0.05, 0.02))
-    assert point(state, 0.4)[1] == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.1**2))
+    said = said_of(0.5, std=0.05)
+    assert claim(said, 0.5).deviation == pytest.approx(np.hypot(0.05, 0.02))
+    assert claim(said, 0.4).deviation == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.1**2))
+
+
+@pytest.mark.parametrize(("theta", "low", "high"), [(0.5, 0.4, 0.6), (0.2, 0.2, 0.6), (0.9, 0.4, 0.9)])
+def test_the_interval_of_a_claim_holds_it(theta, low, high):
+    said = said_of(0.5)._replace(low=0.4, high=0.6)
+    assert claim(said, theta)[1:] == (low, high)
 
 
 def test_on_the_told_tyre_the_point_is_the_observers():
     states = on("told", 0.3, 0.3, 230.0)[1]
-    assert point(states[-1]._replace(stale=False), 0.301)[0] == 0.301
+    assert point(states[-1]._replace(stale=False), 0.301) == 0.301
 
 
 # Steps and blocks
@@ -295,7 +301,7 @@ def test_the_set_up_takes_what_is_told():
 
 
 def test_a_car_that_is_exactly_as_told_still_has_a_variance():
-    known = setup(WHEEL, 0.0, 0.0, 0.0, CarTolerance(0.0, 0.0, 0.0, 0.0), CLASSES)
+    known = setup(WHEEL, 0.0, 0.0, 0.0, EXACT_CAR, CLASSES)
     assert known.tyres.offset_variance[0, 0] == pytest.approx(1e-8)
     assert known.tyres.softness_variance[0, 0] == pytest.approx(1e-8)
     drive = driven(pulses(230.0), lambda t: 0.3, 1.0, noise=0.0)
