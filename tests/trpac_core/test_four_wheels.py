@@ -73,7 +73,6 @@ def test_each_wheel_finds_its_own_sides_friction():
     loads = [CAR_DATA.wheel_load(wheel.startswith("f"), 2.0) for wheel in WHEELS]
     expected = (0.3 * loads[0] + 0.8 * loads[1] + 0.3 * (loads[2] + loads[3])) / sum(loads)
     assert estimate.TRPAC == pytest.approx(expected, abs=0.01)
-    assert estimate.TRPAC_std < 0.1
 
 
 def test_classes_go_to_their_side_and_reach_the_rear_a_wheelbase_later():
