@@ -28,7 +28,7 @@ from .translator.types import initialiser
 
 C_FILES = Path(__file__).parent / "c"
 FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
-SOURCES = ("fmi2.c", "wheel.c", "outputs.c", "tables.c", "text.c", "trpac.c")
+SOURCES = ("common.c", "fmi2.c", "frames.c", "outputs.c", "tables.c", "text.c", "trpac.c", "wheel.c")
 """Files that are compiled, also by hosts that compile a unit themselves."""
 OPTIONS = ("-shared", "-s", "-fvisibility=hidden", "-Wall", "-Wextra", "-pedantic", "-Werror")
 NATIVE_UNITS = ("TrpacEstimator",)
