@@ -191,7 +191,6 @@ def test_a_broken_lateral_acceleration_is_told_where_it_would_not_count_too(meas
 
 def test_lateral_acceleration_moves_load_between_the_sides():
     # In a left turn (a_y > 0) the right wheels bear more: m a_y h / track over the whole car.
-    four = FourWheels(FourWheelsConfig())
     given = sensors(lateral_acceleration_m_s2=3.0)
     loads, told = loads_of(given)
     assert loads == told
@@ -205,13 +204,11 @@ def test_lateral_acceleration_moves_load_between_the_sides():
 
 
 def test_without_a_longitudinal_acceleration_a_lateral_one_does_not_count():
-    four = FourWheels(FourWheelsConfig())
     plain = sensors(longitudinal_acceleration_m_s2=None)
     assert loads_of(plain._replace(lateral_acceleration_m_s2=3.0)) == loads_of(plain)
 
 
 def test_a_measured_load_counts_for_its_wheel():
-    four = FourWheels(FourWheelsConfig())
     loads, told = loads_of(sensors(vertical_load_n=(1000.0, None, None, None)))
     assert loads[0] == told[0] == 1000.0
     assert told[1:] == (None, None, None)

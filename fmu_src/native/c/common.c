@@ -1,6 +1,7 @@
 #include "common.h"
 
 #include <math.h>
+#include <string.h>
 
 static const double INITIAL_SLOPE = INITIAL_SLOPE_OF_THE_TYRE;
 
@@ -35,6 +36,37 @@ opt_double optional(double value, bool *connected)
         return (opt_double){true, value};
     *connected = *connected || value != 0.0;
     return *connected ? (opt_double){true, value} : (opt_double){false, 0.0};
+}
+
+void begin_wheel(OneWheel *wheel, const EstimatorConfig *config)
+{
+    memset(wheel, 0, sizeof *wheel);
+    wheel->config = *config;
+    wheel_step_wheel_setup(&wheel->known, config);
+    wheel_step_first_state(&wheel->state, config, &wheel->known);
+    wheel_step_first_estimate(&wheel->last, config, &wheel->known, &wheel->state);
+    Rates_at(&wheel->rates, config, 0.0, 0.0);
+}
+
+Unusable step_wheel(OneWheel *wheel, double step_s, Sensors *sensors, opt_RoadClass road_class, bool failed)
+{
+    const EstimatorConfig *config = &wheel->config;
+    Frame frame = {road_class.has || failed, {false, {Surface_DRY, 0.0, false, 0.0}}};
+    if (road_class.has)
+        frame.seen = (opt_Outcome){true, wheel_step_outcome_of(config, road_class.value, wheel->state.time_s)};
+    const Unusable reason = wheel_step_unusable_input(config, step_s, sensors, road_class);
+    Estimate estimate;
+    if (reason == Unusable_NOTHING) {
+        Rates rates;
+        wheel_step_rates_of(&rates, &wheel->rates, config, step_s, wheel->state.step_s);
+        wheel->rates = rates;
+        wheel_step_stepped(
+            &estimate, &wheel->state, &wheel->last, config, &wheel->known, &wheel->rates, sensors, frame, step_s);
+    } else {
+        wheel_step_held(&estimate, &wheel->state, &wheel->last, config, &wheel->known, sensors, frame, step_s);
+    }
+    wheel->last = estimate;
+    return reason;
 }
 
 bool class_good(Text *why, const char *name, int road_class, const char *confidence_name, double confidence)
@@ -135,12 +167,15 @@ void add_unusable(Text *text, Unusable reason, double step_s, const Sensors *sen
     }
 }
 
-bool add_tyres(Text *text, const RobustState *state, const RobustSetup *known, const char *axle, double load_n)
+bool add_tyres(Text *text, const OneWheel *wheel)
 {
+    const RobustState *state = &wheel->state.robust;
+    const RobustSetup *known = &wheel->known.robust;
+    const double load_n = wheel->known.static_load_n;
     const opt_double learnt_n = messages_learnt_stiffness_n(state, known, load_n);
     if (!learnt_n.has)
         return false;
-    add(text, axle);
+    add(text, wheel->config.front_axle ? "Front" : "Rear");
     add(text, " tyres do not follow the told curve: slip stiffness learnt ");
     add_fixed(text, 1e-3 * learnt_n.value, 0, false);
     add(text, " kN per unit slip at ");
@@ -153,13 +188,15 @@ bool add_tyres(Text *text, const RobustState *state, const RobustSetup *known, c
     return true;
 }
 
-bool add_wheels(Text *text, const RobustState *state, const RobustSetup *known, const char *axle)
+bool add_wheels(Text *text, const OneWheel *wheel)
 {
+    const RobustState *state = &wheel->state.robust;
+    const RobustSetup *known = &wheel->known.robust;
     const double told_m = known->wheel.radius_m;
     const opt_double offset = messages_learnt_offset(state);
     if (!offset.has)
         return false;
-    add(text, axle);
+    add(text, wheel->config.front_axle ? "Front" : "Rear");
     add(text, " wheels do not have the told radius: slip without force learnt ");
     add_fixed(text, 100.0 * offset.value, 1, true);
     add(text, " %, as of a radius of ");

@@ -32,6 +32,19 @@ typedef struct {
     char path[STRING_SIZE];
 } FrameState;
 
+/* The estimator of one wheel. */
+typedef struct {
+    EstimatorConfig config;
+    WheelSetup known;
+    EstimatorState state;
+    Estimate last;
+    Rates rates;
+} OneWheel;
+
+/* Begin with these settings. */
+void begin_wheel(OneWheel *wheel, const EstimatorConfig *config);
+/* A step with a class of the road ahead, if one came, or a frame that failed; what makes its input unusable. */
+Unusable step_wheel(OneWheel *wheel, double step_s, Sensors *sensors, opt_RoadClass road_class, bool failed);
 /* An input that is connected from its first finite value other than 0. */
 opt_double optional(double value, bool *connected);
 /* Whether the parts of the settings fit each other; else the reason. */
@@ -43,8 +56,8 @@ void add_unusable(Text *text, Unusable reason, double step_s, const Sensors *sen
 /* Which readings are no road car's, as bits. */
 unsigned implausible(const Sensors *sensors);
 /* The sentences on a tyre or a wheel that is not as told; false where there is nothing to say. */
-bool add_tyres(Text *text, const RobustState *state, const RobustSetup *known, const char *axle, double load_n);
-bool add_wheels(Text *text, const RobustState *state, const RobustSetup *known, const char *axle);
+bool add_tyres(Text *text, const OneWheel *wheel);
+bool add_wheels(Text *text, const OneWheel *wheel);
 /* Whether no index in a state leads out of its array. */
 bool state_sound(const EstimatorState *state);
 

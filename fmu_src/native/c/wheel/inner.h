@@ -8,11 +8,7 @@
 enum { SUBJECTS = 1, CAR_TEXTS = 2 };
 
 typedef struct {
-    EstimatorConfig config;
-    WheelSetup known;
-    EstimatorState state;
-    Estimate last;
-    Rates rates;
+    OneWheel wheel;
     FrameState frame;
     /* Optional inputs that have been other than 0 once. */
     bool load_connected, acceleration_connected, yaw_connected;

@@ -15,11 +15,7 @@ bool unit_initialise(Unit *unit, Text *problem)
     if (!settings_good(&config, problem))
         return false;
     memset(inner, 0, sizeof *inner);
-    inner->config = config;
-    wheel_step_wheel_setup(&inner->known, &inner->config);
-    wheel_step_first_state(&inner->state, &inner->config, &inner->known);
-    wheel_step_first_estimate(&inner->last, &inner->config, &inner->known, &inner->state);
-    Rates_at(&inner->rates, &inner->config, 0.0, 0.0);
+    begin_wheel(&inner->wheel, &config);
     return true;
 }
 
@@ -30,7 +26,7 @@ void unit_clear_volatile(Memory *memory)
 
 bool unit_sound(const Memory *memory)
 {
-    return !memory->ready || (state_sound(&memory->inner.state) && !memory->inner.frame.path[STRING_SIZE - 1]);
+    return !memory->ready || (state_sound(&memory->inner.wheel.state) && !memory->inner.frame.path[STRING_SIZE - 1]);
 }
 
 /* The inputs as the estimator's sensors; in a curve the speed is that of the wheel's contact. */
@@ -38,7 +34,7 @@ static Sensors sensors_of(Memory *memory)
 {
     const double *real = memory->real;
     Inner *inner = &memory->inner;
-    const EstimatorConfig *config = &inner->config;
+    const EstimatorConfig *config = &inner->wheel.config;
     double speed = real[AT_vehicle_speed];
     const double steering = real[AT_steering_angle];
     const opt_double yaw = optional(real[AT_yaw_rate], &inner->yaw_connected);
@@ -76,16 +72,13 @@ static opt_RoadClass next_class(Unit *unit)
 /* Tell of a car that is not as it is told to be. */
 static void tell_car(Unit *unit)
 {
-    const Inner *inner = &unit->memory.inner;
-    const RobustState *state = &inner->state.robust;
-    const RobustSetup *known = &inner->known.robust;
-    const char *axle = inner->config.front_axle ? "Front" : "Rear";
+    const OneWheel *wheel = &unit->memory.inner.wheel;
     Text tyres, wheels;
     start(&tyres, MODEL ": ");
     start(&wheels, MODEL ": ");
-    if (!unit->told_car[0] && add_tyres(&tyres, state, known, axle, inner->known.static_load_n))
+    if (!unit->told_car[0] && add_tyres(&tyres, wheel))
         tell(unit, &unit->told_car[0], fmi2Warning, tyres.text);
-    if (!unit->told_car[1] && add_wheels(&wheels, state, known, axle))
+    if (!unit->told_car[1] && add_wheels(&wheels, wheel))
         tell(unit, &unit->told_car[1], fmi2Warning, wheels.text);
 }
 
@@ -95,25 +88,12 @@ void unit_step(Unit *unit, double step_s)
     Sensors sensors = sensors_of(&unit->memory);
     const opt_RoadClass road_class = next_class(unit);
     unit_clear_volatile(&unit->memory);
-    Frame frame = {road_class.has || inner->frame.failed, {false, {Surface_DRY, 0.0, false, 0.0}}};
-    if (road_class.has)
-        frame.seen
-            = (opt_Outcome){true, wheel_step_outcome_of(&inner->config, road_class.value, inner->state.time_s)};
-    const Unusable reason = wheel_step_unusable_input(&inner->config, step_s, &sensors, road_class);
-    Estimate estimate;
-    if (reason == Unusable_NOTHING) {
-        Rates rates;
-        wheel_step_rates_of(&rates, &inner->rates, &inner->config, step_s, inner->state.step_s);
-        inner->rates = rates;
-        wheel_step_stepped(&estimate, &inner->state, &inner->last, &inner->config, &inner->known, &inner->rates,
-            &sensors, frame, step_s);
-    } else {
+    const Unusable reason = step_wheel(&inner->wheel, step_s, &sensors, road_class, inner->frame.failed);
+    if (reason != Unusable_NOTHING) {
         Text text;
         start(&text, MODEL ": ");
-        wheel_step_held(&estimate, &inner->state, &inner->last, &inner->config, &inner->known, &sensors, frame, step_s);
         add_unusable(&text, reason, step_s, &sensors);
         tell(unit, told_of(unit, 0, reason, &sensors), fmi2Warning, text.text);
     }
-    inner->last = estimate;
     tell_car(unit);
 }
