@@ -201,18 +201,16 @@ def fusion_step(
         K_v = visual_gain(gains, theta_img, theta_hat)
         by_camera = K_v * (gains.gamma if gains.visual_term is VisualTerm.INSIDE else 1.0)
         rate, pull = rate + by_camera, pull + by_camera * theta_img
-    theta_next, theta_rate = theta_hat, 0.0
-    if rate > 0.0 and step_s > 0.0:
+    theta_next, model_change_n = theta_hat, 0.0
+    if rate > 0.0:
         target = pull / rate
         theta_next = target + (theta_hat - target) * math.exp(-rate * step_s)
         theta_next = min(max(theta_next, LEAST_THETA), GREATEST_THETA)
-        theta_rate = (theta_next - theta_hat) / step_s
-    tyre = tyre_at_slip(slip.size, load_n, C_x)
+        model_change_n = _model_force(theta_next, inputs, wheel) - model_n
     s = advanced_state(
         state.s,
         model_n,
-        slip.direction * load_n * tyre.friction_by_theta(theta_hat),
-        theta_rate,
+        model_change_n,
         inputs.wheel_torque_nm,
         inputs.wheel_speed_ahead_rad_s,
         gains.K,

@@ -62,8 +62,7 @@ def seen_at(x: float) -> float:
 def advanced_state(
     s: float,
     model_force_n: float,
-    force_by_theta_n: float,
-    theta_rate_1_s: float,
+    model_change_n: float,
     wheel_torque_nm: float,
     wheel_speed_rad_s: float,
     gain: float,
@@ -73,24 +72,22 @@ def advanced_state(
 ) -> float:
     """The inner state one step later, Eq. (15), exact for constant inputs over the step. [rad/s^2].
 
-    With Eq. (14) put in, (15) is linear in s with the pole -K; its exact solution is stable for any step size.
+    With Eq. (14) put in, (15) is linear in s with the pole -K; its exact solution is stable for any step size. Its last
+    term, integrated over the step, is what the model's force changes by with theta_hat: it leaves F_hat as it is.
 
     Parameters
     ----------
     s : float
         Inner state now [rad/s^2].
-    model_force_n, force_by_theta_n : float
-        F_z mu sigma and F_z (d mu / d theta) sigma at the estimated theta [N].
-    theta_rate_1_s : float
-        theta_hat' over the step [1/s].
+    model_force_n, model_change_n : float
+        F_z mu sigma at theta_hat, and what theta_hat's way over the step changes it by [N].
     wheel_torque_nm, wheel_speed_rad_s : float
         Where they are `seen_at` of the step [N m], [rad/s]: with those of its start the inertia's share of a wheel that
         gains speed would be counted K dt / (1 - exp(-K dt)) times.
     gain, inertia_kg_m2, radius_m, step_s : float
         K [1/s], I [kg m^2], R [m] and the step [s].
     """
-    drive = (
-        -gain * wheel_torque_nm + radius_m * (gain * model_force_n + force_by_theta_n * theta_rate_1_s)
-    ) / inertia_kg_m2 - gain * gain * wheel_speed_rad_s
+    per_force = radius_m / inertia_kg_m2
+    drive = per_force * model_force_n - wheel_torque_nm / inertia_kg_m2 - gain * wheel_speed_rad_s
     decay = math.exp(-gain * step_s)
-    return s * decay + drive / gain * (1.0 - decay)
+    return s * decay + drive * (1.0 - decay) + per_force * model_change_n

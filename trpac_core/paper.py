@@ -131,12 +131,11 @@ def printed_step(
         target = pull / rate
         theta_next = target + (theta_hat - target) * math.exp(-rate * step_s)
         theta_next = min(max(theta_next, LEAST_THETA), GREATEST_THETA)
-    theta_rate = (theta_next - theta_hat) / step_s if step_s > 0.0 else 0.0
+    model_change_n = sign * load_n * tyre.friction(theta_next) - model_n
     s = advanced_state(
         s,
         model_n,
-        sign * load_n * tyre.friction_by_theta(theta_hat),
-        theta_rate,
+        model_change_n,
         wheel_torque_nm,
         wheel_speed_rad_s,
         K,

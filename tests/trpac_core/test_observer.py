@@ -57,7 +57,7 @@ def simulated_error(theta, theta_hat, gain, step_s, end_s, start_error_n=0.0):
     for t, omega, size, force in zip(times, omegas, slips, forces, strict=True):
         model = tyre.force(theta_hat, size, F_Z, C_X, 1.0)
         errors.append(force - observer.observed_force(model, s, omega, gain, I, R))
-        s = observer.advanced_state(s, model, 0.0, 0.0, torque(t), omega, gain, I, R, step_s)
+        s = observer.advanced_state(s, model, 0.0, torque(t), omega, gain, I, R, step_s)
     return times, np.array(errors), slips
 
 
@@ -89,7 +89,7 @@ def test_any_step_size_is_stable_and_settles_on_the_torque(step_s):
     """A wheel that turns evenly has F = T / R; the observer ends there from a wrong start, with no slip in play."""
     s = 1e4
     for _ in range(2000):
-        s = observer.advanced_state(s, 0.0, 0.0, 0.0, 200.0, 40.0, K, I, R, step_s)
+        s = observer.advanced_state(s, 0.0, 0.0, 200.0, 40.0, K, I, R, step_s)
     assert observer.observed_force(0.0, s, 40.0, K, I, R) == pytest.approx(200.0 / R, rel=1e-9)
 
 
