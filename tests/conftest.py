@@ -121,6 +121,13 @@ def open_native(native_folder: Path) -> Iterator[Callable[..., Unit]]:
     yield from _opener(native_folder)
 
 
+@pytest.fixture
+def open_native_4w(native_file: Path, tmp_path: Path) -> Iterator[Callable[..., Unit]]:
+    """Opens instances of the native unit TrpacEstimator4W."""
+    target = tmp_path / "TrpacEstimator4W_native.fmu"
+    yield from _opener(unpack_unit(build_native(UNITS["TrpacEstimator4W"].info, target, everywhere=False)))
+
+
 @pytest.fixture(params=["python", "native"])
 def open_any(request: pytest.FixtureRequest) -> Iterator[Callable[..., Unit]]:
     """The same for each kind of the unit, with Python and without."""

@@ -15,7 +15,7 @@ from .estimator import Estimate, EstimatorConfig, RoadClass, TrpacEstimator
 from .estimator_data import Source
 from .local_speed import local_speeds, motion_known
 from .sensors import LONGEST_STEP_S, PLAUSIBLE, Sensors
-from .vehicle import WHEELS
+from .vehicle import WHEELS, Vehicle
 from .vision.results import FrameResult
 from .vision.sides import SidesIfe, SidesState
 from .vision.trajectory import Motion
@@ -100,6 +100,181 @@ class CarEstimate(NamedTuple):
     """Who could not be estimated (a wheel's name, or `CAR` where all could not), and why."""
 
 
+class CarSetup(NamedTuple):
+    """What the settings make of the car."""
+
+    static_n: Four
+    """Loads at rest [N]."""
+    front_roll_kg: float
+    rear_roll_kg: float
+    """Load that lateral acceleration moves between the wheels of an axle [kg]."""
+
+
+def car_setup(car: Vehicle) -> CarSetup:
+    """The set-up of a car."""
+    front_n, rear_n = car.wheel_load(True), car.wheel_load(False)
+    per_m_s2 = car.mass_kg * car.cog_height_m / (car.track_m * car.wheelbase_m)
+    return CarSetup(
+        (front_n, front_n, rear_n, rear_n),
+        per_m_s2 * car.cog_to_rear_axle_m,
+        per_m_s2 * car.cog_to_front_axle_m,
+    )
+
+
+def wheel_speeds(car: Vehicle, sensors: CarSensors) -> Four:
+    """Speed of the road under each wheel [m/s]."""
+    speed, yaw = sensors.vehicle_speed_m_s, sensors.yaw_rate_rad_s
+    if sensors.steering_angle_rad != 0.0 or (yaw is not None and yaw != 0.0):
+        return local_speeds(car, speed, sensors.steering_angle_rad, yaw)
+    return (speed, speed, speed, speed)
+
+
+class CarLoads(NamedTuple):
+    """Vertical loads [N]."""
+
+    loads_n: Four
+    """For the car's sum."""
+    given_n: OptionalFour
+    """What the wheels are given of them."""
+
+
+def lateral_plausible(sensors: CarSensors) -> bool:
+    """Whether the lateral acceleration is no reading, or one of a road car."""
+    lateral = sensors.lateral_acceleration_m_s2
+    return lateral is None or abs(lateral) <= _STEEPEST
+
+
+def car_loads(car: Vehicle, known: CarSetup, sensors: CarSensors) -> CarLoads:
+    """Vertical loads.
+
+    A wheel works the load out itself, from the filtered acceleration, unless a sensor or a lateral transfer tells.
+    Where the lateral acceleration is no good reading all are NaN, which no wheel takes, used or not.
+    """
+    loads = known.static_n
+    given, accel = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
+    lateral = sensors.lateral_acceleration_m_s2
+    if not lateral_plausible(sensors):
+        return CarLoads(loads, _known(_NO_LOADS))
+    if accel is not None and abs(accel) <= _STEEPEST:
+        front_n, rear_n = car.wheel_load(True, accel), car.wheel_load(False, accel)
+        loads = (front_n, front_n, rear_n, rear_n)
+        if lateral is not None:
+            loads = _leaning(known, front_n, rear_n, lateral)
+            given = _known(_first_known(given, loads))
+    if _none_known(given):
+        return CarLoads(loads, given)
+    total = _first_known(given, loads)
+    return CarLoads(total if _all_loaded(total) else known.static_n, given)
+
+
+def _leaning(known: CarSetup, front_n: float, rear_n: float, lateral_m_s2: float) -> Four:
+    """Loads under lateral acceleration [N]."""
+    front, rear = known.front_roll_kg * lateral_m_s2, known.rear_roll_kg * lateral_m_s2
+    return (
+        max(front_n - front, LIFTED_N),
+        max(front_n + front, LIFTED_N),
+        max(rear_n - rear, LIFTED_N),
+        max(rear_n + rear, LIFTED_N),
+    )
+
+
+def _all_loaded(loads_n: Four) -> bool:
+    """Whether all loads are finite and above 0."""
+    fl, fr, rl, rr = loads_n
+    return 0.0 < fl < math.inf and 0.0 < fr < math.inf and 0.0 < rl < math.inf and 0.0 < rr < math.inf
+
+
+def _first_known(measured: OptionalFour, other: Four) -> Four:
+    """Each wheel's measured value, or the other one where there is none."""
+    fl, fr, rl, rr = measured
+    other_fl, other_fr, other_rl, other_rr = other
+    return (
+        other_fl if fl is None else fl,
+        other_fr if fr is None else fr,
+        other_rl if rl is None else rl,
+        other_rr if rr is None else rr,
+    )
+
+
+def _none_known(measured: OptionalFour) -> bool:
+    """Whether no wheel's value is there."""
+    fl, fr, rl, rr = measured
+    return fl is None and fr is None and rl is None and rr is None
+
+
+def _known(values: Four) -> OptionalFour:
+    """Values that are there."""
+    fl, fr, rl, rr = values
+    return (fl, fr, rl, rr)
+
+
+class CarClaim(NamedTuple):
+    """The car's part of `CarEstimate`."""
+
+    TRPAC: float
+    TRPAC_std: float
+    TRPAC_low: float
+    TRPAC_high: float
+    TRPAC_expected: float
+    TRPAC_expected_std: float
+    source: Source
+
+
+def car_claim(
+    fl: Estimate, fr: Estimate, rl: Estimate, rr: Estimate, loads_n: Four, axle_deviation: float
+) -> CarClaim:
+    """The car's adhesion from the estimates of its wheels, see `car_friction`."""
+    fused = car_friction(
+        (
+            Friction(fl.TRPAC, fl.TRPAC_std),
+            Friction(fr.TRPAC, fr.TRPAC_std),
+            Friction(rl.TRPAC, rl.TRPAC_std),
+            Friction(rr.TRPAC, rr.TRPAC_std),
+        ),
+        loads_n,
+        axle_deviation,
+    )
+    low = car_friction(
+        (
+            Friction(fl.TRPAC_low, fl.TRPAC_std),
+            Friction(fr.TRPAC_low, fr.TRPAC_std),
+            Friction(rl.TRPAC_low, rl.TRPAC_std),
+            Friction(rr.TRPAC_low, rr.TRPAC_std),
+        ),
+        loads_n,
+        axle_deviation,
+    )
+    high = car_friction(
+        (
+            Friction(fl.TRPAC_high, fl.TRPAC_std),
+            Friction(fr.TRPAC_high, fr.TRPAC_std),
+            Friction(rl.TRPAC_high, rl.TRPAC_std),
+            Friction(rr.TRPAC_high, rr.TRPAC_std),
+        ),
+        loads_n,
+        axle_deviation,
+    )
+    expected = car_friction(
+        (
+            Friction(fl.TRPAC_expected, fl.TRPAC_expected_std),
+            Friction(fr.TRPAC_expected, fr.TRPAC_expected_std),
+            Friction(rl.TRPAC_expected, rl.TRPAC_expected_std),
+            Friction(rr.TRPAC_expected, rr.TRPAC_expected_std),
+        ),
+        loads_n,
+        axle_deviation,
+    )
+    return CarClaim(
+        fused.theta,
+        fused.deviation,
+        low.theta,
+        high.theta,
+        expected.theta,
+        expected.deviation,
+        Source(int(fl.source) | int(fr.source) | int(rl.source) | int(rr.source)),
+    )
+
+
 class FourWheels:
     """Four one-wheel estimators that share a camera; each goes on where another's sensors fail.
 
@@ -123,12 +298,8 @@ class FourWheels:
         self.config = config
         self._ife = ife
         self._wheels = tuple(TrpacEstimator(config.of_wheel(name)) for name in WHEELS)
-        self._car = car = config.wheel.vehicle
-        front_n, rear_n = car.wheel_load(True), car.wheel_load(False)
-        self._static_n = (front_n, front_n, rear_n, rear_n)
-        per_m_s2 = car.mass_kg * car.cog_height_m / (car.track_m * car.wheelbase_m)
-        self._front_roll_kg = per_m_s2 * car.cog_to_rear_axle_m
-        self._rear_roll_kg = per_m_s2 * car.cog_to_front_axle_m
+        self._car = config.wheel.vehicle
+        self._known = car_setup(self._car)
         self.reset()
 
     def reset(self) -> None:
@@ -136,7 +307,7 @@ class FourWheels:
         for wheel in self._wheels:
             wheel.reset()
         self._camera = SidesState()
-        self._last = self._together([wheel.last for wheel in self._wheels], self._static_n, ())
+        self._last = self._together([wheel.last for wheel in self._wheels], self._known.static_n, ())
 
     @property
     def last(self) -> CarEstimate:
@@ -166,11 +337,9 @@ class FourWheels:
         if step_s > LONGEST_STEP_S:
             self._camera = self._camera.elsewhere()
         left, right = (None, None) if frame is None else self._classes(sensors, frame)
-        speed, steering, yaw = sensors.vehicle_speed_m_s, sensors.steering_angle_rad, sensors.yaw_rate_rad_s
-        speeds_m_s = (speed, speed, speed, speed)
-        if steering or yaw:
-            speeds_m_s = local_speeds(self._car, speed, steering, yaw)
-        loads_n, given_n = self._loads(sensors)
+        steering, yaw = sensors.steering_angle_rad, sensors.yaw_rate_rad_s
+        speeds_m_s = wheel_speeds(self._car, sensors)
+        loads_n, given_n = car_loads(self._car, self._known, sensors)
         estimates, problems = [], []
         for name, wheel, side, omega, torque_nm, wheel_m_s, load_n in zip(
             WHEELS,
@@ -196,33 +365,16 @@ class FourWheels:
         self, estimates: list[Estimate], loads_n: Four, problems: tuple[tuple[str, str], ...]
     ) -> CarEstimate:
         """The wheels' estimates and the car's."""
-        axle_deviation = self.config.axle_deviation
-        low, high, fused = (
-            car_friction(_of_each(estimates, value, "TRPAC_std"), loads_n, axle_deviation)
-            for value in ("TRPAC_low", "TRPAC_high", "TRPAC")
-        )
-        expected = car_friction(
-            _of_each(estimates, "TRPAC_expected", "TRPAC_expected_std"), loads_n, axle_deviation
-        )
         fl, fr, rl, rr = estimates
-        return CarEstimate(
-            wheels=(fl, fr, rl, rr),
-            TRPAC=fused.theta,
-            TRPAC_std=fused.deviation,
-            TRPAC_low=low.theta,
-            TRPAC_high=high.theta,
-            TRPAC_expected=expected.theta,
-            TRPAC_expected_std=expected.deviation,
-            source=Source(fl.source | fr.source | rl.source | rr.source),
-            problems=problems,
-        )
+        car = car_claim(fl, fr, rl, rr, loads_n, self.config.axle_deviation)
+        return CarEstimate((fl, fr, rl, rr), *car, problems)
 
     def _by_subject(
         self, sensors: CarSensors, problems: list[tuple[str, str]]
     ) -> tuple[tuple[str, str], ...]:
         """Problems by whom they concern; one that all wheels share is the car's."""
         lateral = sensors.lateral_acceleration_m_s2
-        if lateral is not None and not abs(lateral) <= _STEEPEST:
+        if lateral is not None and not lateral_plausible(sensors):
             expected = f"expected a number within +-{_STEEPEST:g}. Check the signal's source and unit."
             return ((CAR, f"lateral_acceleration_m_s2 is {lateral:g}, {expected}"),)
         texts = {text for _, text in problems}
@@ -256,38 +408,6 @@ class FourWheels:
         """A verdict in the form that a wheel takes: its flag is up where the confidence is above the threshold."""
         return RoadClass(result.surface, result.told_by_bus(self.config.wheel.vision.flag_threshold))
 
-    def _loads(self, sensors: CarSensors) -> tuple[Four, OptionalFour]:
-        """Vertical loads for the car's sum, and what the wheels are given of them [N].
-
-        A wheel works the load out itself, from the filtered acceleration, unless a sensor or a lateral transfer tells.
-        Where the lateral acceleration is no good reading all are NaN, which no wheel takes, used or not.
-        """
-        loads = self._static_n
-        given, accel = sensors.vertical_load_n, sensors.longitudinal_acceleration_m_s2
-        lateral = sensors.lateral_acceleration_m_s2
-        if lateral is not None and not abs(lateral) <= _STEEPEST:
-            return loads, _NO_LOADS
-        if accel is not None and abs(accel) <= _STEEPEST:
-            front_n, rear_n = self._car.wheel_load(True, accel), self._car.wheel_load(False, accel)
-            loads = (front_n, front_n, rear_n, rear_n)
-            if lateral is not None:
-                loads = self._leaning(front_n, rear_n, lateral)
-                given = _first_known(given, loads)
-        if given == _UNKNOWN:
-            return loads, given
-        total = _first_known(given, loads)
-        return (total if all(load > 0.0 and math.isfinite(load) for load in total) else self._static_n), given
-
-    def _leaning(self, front_n: float, rear_n: float, lateral_m_s2: float) -> Four:
-        """Loads under lateral acceleration [N]."""
-        front, rear = self._front_roll_kg * lateral_m_s2, self._rear_roll_kg * lateral_m_s2
-        return (
-            max(front_n - front, LIFTED_N),
-            max(front_n + front, LIFTED_N),
-            max(rear_n - rear, LIFTED_N),
-            max(rear_n + rear, LIFTED_N),
-        )
-
     def messages(self) -> dict[str, str]:
         """Sentences on what the drive shows of a car that is not as told, once per axle and matter."""
         fl, fr, rl, rr = (wheel.messages() for wheel in self._wheels)
@@ -314,17 +434,3 @@ class FourWheels:
         self._last = CarEstimate(
             **{**car, "wheels": (fl, fr, rl, rr), "source": source, "problems": problems}
         )
-
-
-def _of_each(
-    estimates: list[Estimate], value: str, deviation: str
-) -> tuple[Friction, Friction, Friction, Friction]:
-    """One of the wheels' outputs, each with its standard deviation."""
-    fl, fr, rl, rr = (Friction(getattr(one, value), getattr(one, deviation)) for one in estimates)
-    return fl, fr, rl, rr
-
-
-def _first_known(measured: OptionalFour, other: Four) -> Four:
-    """Each wheel's measured value, or the other one where there is none."""
-    fl, fr, rl, rr = (own if own is not None else load for own, load in zip(measured, other, strict=True))
-    return (fl, fr, rl, rr)

@@ -5,19 +5,33 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import fmpy
 
 from trpac_core.estimator_data import Estimate, EstimatorConfig
+from trpac_core.four_wheels import (
+    FourWheelsConfig,
+    car_claim,
+    car_loads,
+    car_setup,
+    lateral_plausible,
+    wheel_speeds,
+)
+from trpac_core.local_speed import local_speeds
+from trpac_core.parameters.variables import Variable
 from trpac_core.sensors import LONGEST_STEP_S, PLAUSIBLE
 from trpac_core.tyre import INITIAL_SLOPE
+from trpac_core.vehicle import WHEELS
 
 from ..contents import CONTENTS_FILE, Contents, sha256_of
 from ..estimate_outputs import FIELDS
 from ..interface import TRPAC_ESTIMATOR
+from ..interface_4w import TRPAC_ESTIMATOR_4W
 from ..model_description import UnitInfo, model_description
 from ..packaging import BuildError, digest_of, licences, write_archive
 from ..signals import NO_ROAD_CLASS
@@ -28,11 +42,74 @@ from .translator.types import initialiser
 
 C_FILES = Path(__file__).parent / "c"
 FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
-SOURCES = ("fmi2.c", "wheel.c", "outputs.c", "tables.c", "text.c", "trpac.c")
-"""Files that are compiled, also by hosts that compile a unit themselves."""
-OPTIONS = ("-shared", "-s", "-fvisibility=hidden", "-Wall", "-Wextra", "-pedantic", "-Werror")
-NATIVE_UNITS = ("TrpacEstimator",)
+
+
+@dataclass(frozen=True)
+class NativeUnit:
+    """A unit that is there in C.
+
+    Parameters
+    ----------
+    variables : sequence of Variable
+        In the order of their value references.
+    folder : str
+        Of its own C files, beside those that all units share.
+    settings : Any
+        Its settings by default; parameters change them.
+    functions : tuple
+        Python functions that its own C files call, besides those of one wheel.
+    outputs : callable
+        What an output is in C, by its name.
+    """
+
+    variables: Sequence[Variable]
+    folder: str
+    settings: Any
+    functions: tuple[Any, ...]
+    outputs: Callable[[str], str]
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the files that are compiled, also by hosts that compile a unit themselves."""
+        return (
+            "common.c",
+            "fmi2.c",
+            "frames.c",
+            "outputs.c",
+            "tables.c",
+            "text.c",
+            "trpac.c",
+            f"{self.folder}.c",
+        )
+
+
+def of_wheel(name: str, wheel: str = "wheel") -> str:
+    """An output of a wheel in C."""
+    field = FIELDS.get(name, name)
+    last = f"unit->memory.inner.{wheel}.last"
+    return f"{last}.{field}" if field in Estimate._fields else f"Estimate_{field}(&{last})"
+
+
+def of_car(name: str) -> str:
+    """An output of the unit of four wheels in C."""
+    output, _, part = name.rpartition(".")
+    if part == "vehicle":
+        return f"unit->memory.inner.car.{FIELDS.get(output, output)}"
+    return of_wheel(output, f"wheel[{WHEELS.index(part)}]")
+
+
+NATIVE_UNITS = {
+    "TrpacEstimator": NativeUnit(TRPAC_ESTIMATOR, "wheel", EstimatorConfig(), (local_speeds,), of_wheel),
+    "TrpacEstimator4W": NativeUnit(
+        TRPAC_ESTIMATOR_4W,
+        "car",
+        FourWheelsConfig(),
+        (car_setup, car_loads, car_claim, lateral_plausible, wheel_speeds),
+        of_car,
+    ),
+}
 """Units that are there in C."""
+OPTIONS = ("-shared", "-s", "-fvisibility=hidden", "-Wall", "-Wextra", "-pedantic", "-Werror")
 TARGETS = {
     "linux64": ("so", "x86_64-linux-gnu.2.17"),
     "win64": ("dll", "x86_64-windows-gnu"),
@@ -43,46 +120,48 @@ TARGETS = {
 
 
 def sources(unit: UnitInfo, guid: str) -> dict[str, str]:
-    """The C of the unit of one wheel, by the names of its files."""
-    program, variables = estimator_program(), TRPAC_ESTIMATOR
-    settings, estimate = (program.types.of(kind, "the unit") for kind in (EstimatorConfig, Estimate))
-    program.require(vars(Estimate)["TRPAC_peak"].fget)
-    note = f"Made of the Python package trpac_core {unit.version}: change that."
-    trpac_header, trpac_code = program.texts("trpac", note)
+    """The C of a unit, by the names of its files."""
+    native, program = NATIVE_UNITS[unit.name], estimator_program()
+    for function in native.functions:
+        program.require(function)
+    settings = program.types.of(type(native.settings), "the settings")
+    header_text, code_text = program.texts(
+        "trpac", f"Made of the Python package trpac_core {unit.version}: change that."
+    )
     constants = {
         "NO_ROAD_CLASS": str(NO_ROAD_CLASS),
         "LONGEST_STEP": repr(LONGEST_STEP_S),
         "INITIAL_SLOPE_OF_THE_TYRE": repr(INITIAL_SLOPE),
         **{f"MOST_{name}": repr(most) for name, most in PLAUSIBLE.items()},
     }
-    default = initialiser(EstimatorConfig(), settings, "the default settings")
-    own = {path.name: path.read_text(encoding="utf-8") for path in sorted(C_FILES.rglob("*.[ch]"))}
+    default = initialiser(native.settings, settings, "the default settings")
+    own = [*sorted(C_FILES.glob("*.[ch]")), *sorted((C_FILES / native.folder).glob("*.[ch]"))]
     fmi = Path(str(fmpy.__file__)).parent / "c-code"
     return {
-        **own,
+        **{path.name: path.read_text(encoding="utf-8") for path in own},
         **{name: (fmi / name).read_text(encoding="utf-8").replace("\r", "") for name in FMI_HEADERS},
-        "trpac.h": trpac_header,
-        "trpac.c": trpac_code,
-        "tables.h": header(unit.name, guid, variables, constants),
-        "tables.c": code(variables),
+        "trpac.h": header_text,
+        "trpac.c": code_text,
+        "tables.h": header(unit.name, guid, native.variables, constants),
+        "tables.c": code(native.variables),
         "outputs.c": "\n".join(
             [
                 "/* Made of the unit's variables: change those. */",
                 '#include "unit.h"',
                 "",
-                "void settings_of(const Memory *memory, EstimatorConfig *settings);",
-                "extern const EstimatorConfig DEFAULT_SETTINGS;",
-                f"const EstimatorConfig DEFAULT_SETTINGS = {default};",
+                f"void settings_of(const Memory *memory, {settings.c} *settings);",
+                f"extern const {settings.c} DEFAULT_SETTINGS;",
+                f"const {settings.c} DEFAULT_SETTINGS = {default};",
                 "",
-                settings_code("settings_of", settings, variables),
-                outputs_code(variables, FIELDS, estimate),
+                settings_code("settings_of", settings, native.variables),
+                outputs_code(native.variables, native.outputs),
             ]
         ),
     }
 
 
 def build_native(unit: UnitInfo, target: Path, *, flat: bool = False, everywhere: bool | None = None) -> Path:
-    """Write the archive of the unit of one wheel in C.
+    """Write the archive of a unit in C.
 
     Parameters
     ----------
@@ -108,21 +187,23 @@ def build_native(unit: UnitInfo, target: Path, *, flat: bool = False, everywhere
     OSError
         The archive cannot be written.
     """
-    variables = TRPAC_ESTIMATOR
+    variables, names = NATIVE_UNITS[unit.name].variables, NATIVE_UNITS[unit.name].sources
     plain = {f"sources/{name}": text.encode() for name, text in sources(unit, "").items()}
-    guid = digest_of(model_description(unit, variables, "", flat=flat, sources=SOURCES), plain)
+    guid = digest_of(model_description(unit, variables, "", flat=flat, sources=names), plain)
     texts = sources(unit, guid)
     content = {f"sources/{name}": text.encode() for name, text in texts.items()} | licences("trpac-fmu")
     everywhere = find_spec("ziglang") is not None if everywhere is None else everywhere
-    content |= libraries(unit.name, texts, everywhere)
-    content["modelDescription.xml"] = model_description(unit, variables, guid, flat=flat, sources=SOURCES)
+    content |= libraries(unit.name, names, texts, everywhere)
+    content["modelDescription.xml"] = model_description(unit, variables, guid, flat=flat, sources=names)
     files = {path: sha256_of(data) for path, data in content.items()}
     record = Contents(unit.name, unit.version, guid, {}, files)
     content[f"resources/{CONTENTS_FILE}"] = record.to_bytes()
     return write_archive(target, content)
 
 
-def libraries(name: str, texts: Mapping[str, str], everywhere: bool) -> dict[str, bytes]:
+def libraries(
+    name: str, files: Sequence[str], texts: Mapping[str, str], everywhere: bool
+) -> dict[str, bytes]:
     """The unit's libraries by their paths in the archive; BuildError where one cannot be made."""
     zig = [sys.executable, "-m", "ziglang", "cc"]
     made = {}
@@ -136,16 +217,16 @@ def libraries(name: str, texts: Mapping[str, str], everywhere: bool) -> dict[str
             except CompilerError as error:
                 raise BuildError(str(error)) from error
             made[f"binaries/{platform}/{name}.{ending}"] = _library(
-                folder, command, f"{name}.{ending}", platform
+                folder, command, files, f"{name}.{ending}", platform
             )
     return made
 
 
-def _library(folder: Path, command: list[str], file: str, platform: str) -> bytes:
+def _library(folder: Path, command: list[str], files: Sequence[str], file: str, platform: str) -> bytes:
     """A library of the sources in a folder."""
     flags = [*FLAGS, *OPTIONS, *([] if platform == "win64" else ["-fPIC"])]
     done = subprocess.run(
-        [*command, *flags, *SOURCES, "-o", file, *([] if platform == "win64" else ["-lm"])],
+        [*command, *flags, *files, "-o", file, *([] if platform == "win64" else ["-lm"])],
         cwd=folder,
         capture_output=True,
         text=True,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from trpac_core.parameters.variables import Kind, Variable
@@ -141,17 +141,18 @@ def c_name(name: str) -> str:
     return name.replace(".", "_")
 
 
-def outputs_code(variables: Sequence[Variable], fields: dict[str, str], estimate: Type) -> str:
-    """The functions that read outputs from the last estimate; `fields` names those that are called otherwise there."""
+def outputs_code(variables: Sequence[Variable], shown: Callable[[str], str]) -> str:
+    """The functions that read outputs from the last estimate; `shown` gives an output in C."""
     kinds = {Kind.REAL: ("double", "0.0"), Kind.INTEGER: ("int", "0"), Kind.BOOLEAN: ("bool", "false")}
     lines: list[str] = []
     for kind, (c, neutral) in kinds.items():
-        lines += [f"{c} unit_{kind.value.lower()}(const Unit *unit, int variable)", "{"]
-        lines += ["    const Estimate *last = &unit->memory.inner.last;", "    switch (variable) {"]
+        lines += [
+            f"{c} unit_{kind.value.lower()}(const Unit *unit, int variable)",
+            "{",
+            "    switch (variable) {",
+        ]
         for v in variables:
             if v.causality == "output" and v.kind is kind:
-                name = fields.get(v.name, v.name)
-                text = f"last->{safe(name)}" if estimate.found(name) else f"{estimate.c}_{name}(last)"
-                lines.append(f"    case VR_{c_name(v.name)}: return {text};")
+                lines.append(f"    case VR_{c_name(v.name)}: return {shown(v.name)};")
         lines += [f"    default: return {neutral};", "    }", "}", ""]
     return "\n".join(lines)

@@ -17,6 +17,7 @@ from road_picture import road_picture
 
 from trpac_core.estimator import EstimatorConfig, RoadClass
 from trpac_core.estimator import TrpacEstimator as Estimator
+from trpac_core.estimator_data import Method
 from trpac_core.sensors import Sensors
 from trpac_core.vision.classes import CLASS_THETA, Surface
 
@@ -36,6 +37,8 @@ REAL_INPUTS = (
 )
 SLIPPERY = {**DRIVING, "road_class": int(Surface.SNOW_ICE), "road_class_confidence": 0.9}
 WARNING, ERROR = 1, 3
+TOLD = {"estimator__method": Method.DIFE.value}
+"""A method that begins with the estimate that it is told."""
 
 
 @pytest.fixture
@@ -82,17 +85,16 @@ def test_unit_and_estimator_agree_bit_by_bit(open_any: Open) -> None:
 
 
 def test_unconnected_it_runs_and_holds_its_start(open_any: Open) -> None:
-    unit = open_any()
+    unit = open_any(**TOLD)
     start = unit.outputs()
     unit.step(count=10)
-    assert unit.outputs()["TRPAC_dynamics"] == start["TRPAC_dynamics"] == 0.8
-    assert unit.outputs()["TRPAC"] == start["TRPAC"]
+    assert unit.outputs()["TRPAC"] == start["TRPAC"] == 0.8
     assert unit.log == []
 
 
 def test_parameters_change_the_run(open_any: Open) -> None:
-    plain, icy = open_any(), open_any(estimator__theta_initial=0.3)
-    assert (plain.get("TRPAC_dynamics"), icy.get("TRPAC_dynamics")) == (0.8, 0.3)
+    plain, icy = open_any(**TOLD), open_any(**TOLD, estimator__theta_initial=0.3)
+    assert (plain.get("TRPAC"), icy.get("TRPAC")) == (0.8, 0.3)
 
 
 def test_optional_inputs_count_from_their_first_value_other_than_zero(open_any: Open) -> None:
@@ -132,13 +134,13 @@ def test_in_a_curve_a_wheel_that_adheres_shows_no_slip(
         own = own * math.cos(steering) + speed / radius_m * car.wheelbase_m * math.sin(steering)
     told = {"steering_angle": steering} if by == "steering_angle" or front else {}
     told |= {"yaw_rate": speed / radius_m} if by == "yaw_rate" else {}
-    unit = open_any(wheel__front=front, wheel__left=left)
+    unit = open_any(wheel__front=front, wheel__left=left, **TOLD)
     unit.step(
         {"wheel_speed": own / car.wheel_radius_m, "wheel_torque": 0.0, "vehicle_speed": speed, **told},
         count=300,
     )
     assert abs(unit.get("slip")) < 1e-6
-    assert unit.get("TRPAC_dynamics") == pytest.approx(0.8)
+    assert unit.get("TRPAC") == pytest.approx(0.8)
 
 
 # Bad input: the unit goes on, flag down, one log line, fmi2OK
@@ -583,10 +585,11 @@ def test_outputs_can_be_read_while_the_host_initialises(open_any: Open) -> None:
     unit.reset()
     unit.slave.setupExperiment(startTime=0.0)
     unit.slave.enterInitializationMode()
+    unit.set({"estimator.method": Method.DIFE.value})
     for initial in (0.5, 0.7):
         unit.set({"estimator.theta_initial": initial})
         early = unit.outputs()
-        assert early["TRPAC_dynamics"] == initial
+        assert early["TRPAC"] == initial
         assert early["frame_age"] == -1.0
     unit.slave.exitInitializationMode()
     assert unit.outputs() == early
@@ -606,12 +609,12 @@ def test_outputs_read_under_parameters_that_cannot_be_are_told_at_the_end_alone(
 
 
 def test_after_an_initialisation_that_failed_the_outputs_are_those_of_before_it(open_any: Open) -> None:
-    unit = open_any(initialise=False)
+    unit = open_any(initialise=False, **TOLD)
     before = unit.outputs()
     unit.slave.setupExperiment(startTime=0.0)
     unit.slave.enterInitializationMode()
     unit.set({"estimator.theta_initial": 0.7})
-    assert unit.get("TRPAC_dynamics") == 0.7
+    assert unit.get("TRPAC") == 0.7
     unit.set({"vehicle.mass": -1.0})
     unit.slave.exitInitializationMode()
     assert unit.outputs() == before
@@ -664,6 +667,6 @@ def test_a_state_restored_while_the_host_initialises_is_what_is_read(open_any: O
     later = unit.outputs()
     unit.step(SLIPPERY, count=50)
     unit.slave.setFMUstate(early)
-    unit.set({"estimator.theta_initial": 0.6})
-    assert unit.get("TRPAC_dynamics") == 0.6
+    unit.set({"estimator.theta_initial": 0.6, "estimator.method": Method.DIFE.value})
+    assert unit.get("TRPAC") == 0.6
     assert later["flag"]

@@ -12,7 +12,15 @@ from ife_scene import CAMERA, DRY, SNOW, Masks, Middle, split_road
 
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.estimator_data import Method
-from trpac_core.four_wheels import CAR, CarSensors, FourWheels, FourWheelsConfig, SideClasses
+from trpac_core.four_wheels import (
+    CAR,
+    CarSensors,
+    FourWheels,
+    FourWheelsConfig,
+    SideClasses,
+    car_loads,
+    car_setup,
+)
 from trpac_core.local_speed import local_speeds
 from trpac_core.sensors import Sensors
 from trpac_core.tyre import force
@@ -26,6 +34,12 @@ DIFE = FourWheelsConfig(EstimatorConfig(method=Method.DIFE))
 ICE, DRY_ROAD = RoadClass(SNOW, 0.9), RoadClass(DRY, 0.9)
 SPLIT = SideClasses(ICE, DRY_ROAD)
 ROLLING = 15.0 / CAR_DATA.wheel_radius_m
+
+
+def loads_of(read):
+    """Loads of the default car for its sum, and what its wheels are given of them."""
+    car = FourWheelsConfig().wheel.vehicle
+    return car_loads(car, car_setup(car), read)
 
 
 def sensors(**changes) -> CarSensors:
@@ -177,28 +191,25 @@ def test_a_broken_lateral_acceleration_is_told_where_it_would_not_count_too(meas
 
 def test_lateral_acceleration_moves_load_between_the_sides():
     # In a left turn (a_y > 0) the right wheels bear more: m a_y h / track over the whole car.
-    four = FourWheels(FourWheelsConfig())
     given = sensors(lateral_acceleration_m_s2=3.0)
-    loads, told = four._loads(given)
+    loads, told = loads_of(given)
     assert loads == told
     whole = CAR_DATA.mass_kg * 3.0 * CAR_DATA.cog_height_m / CAR_DATA.track_m
     assert (loads[1] + loads[3] - loads[0] - loads[2]) / 2.0 == pytest.approx(whole)
     assert sum(loads) == pytest.approx(CAR_DATA.mass_kg * 9.81)
     front_n = CAR_DATA.wheel_load(True)
     rear_n = CAR_DATA.wheel_load(False)
-    straight, _ = four._loads(sensors(longitudinal_acceleration_m_s2=0.0, lateral_acceleration_m_s2=3.0))
+    straight, _ = loads_of(sensors(longitudinal_acceleration_m_s2=0.0, lateral_acceleration_m_s2=3.0))
     assert (straight[1] - straight[0]) / (straight[3] - straight[2]) == pytest.approx(front_n / rear_n)
 
 
 def test_without_a_longitudinal_acceleration_a_lateral_one_does_not_count():
-    four = FourWheels(FourWheelsConfig())
     plain = sensors(longitudinal_acceleration_m_s2=None)
-    assert four._loads(plain._replace(lateral_acceleration_m_s2=3.0)) == four._loads(plain)
+    assert loads_of(plain._replace(lateral_acceleration_m_s2=3.0)) == loads_of(plain)
 
 
 def test_a_measured_load_counts_for_its_wheel():
-    four = FourWheels(FourWheelsConfig())
-    loads, told = four._loads(sensors(vertical_load_n=(1000.0, None, None, None)))
+    loads, told = loads_of(sensors(vertical_load_n=(1000.0, None, None, None)))
     assert loads[0] == told[0] == 1000.0
     assert told[1:] == (None, None, None)
 

@@ -44,6 +44,14 @@ void tell(Unit *unit, bool *told, fmi2Status status, const char *message)
     }
 }
 
+bool *told_of(Unit *unit, int subject, Unusable reason, const Sensors *sensors)
+{
+    enum { LOAD = 1 << 3 };
+    if (reason == Unusable_READING)
+        return &unit->told_readings[subject][implausible(sensors)];
+    return reason == Unusable_LOAD ? &unit->told_readings[subject][LOAD] : &unit->told_reason[subject][reason];
+}
+
 static void begin(Unit *unit)
 {
     memset(&unit->memory, 0, sizeof unit->memory);
@@ -54,7 +62,9 @@ static void begin(Unit *unit)
     unit->time_s = 0.0;
     unit->unknown_count = 0;
     memset(unit->told, 0, sizeof unit->told);
-    memset(unit->told_parts, 0, sizeof unit->told_parts);
+    memset(unit->told_car, 0, sizeof unit->told_car);
+    memset(unit->told_readings, 0, sizeof unit->told_readings);
+    memset(unit->told_reason, 0, sizeof unit->told_reason);
     memset(unit->told_reference, 0, sizeof unit->told_reference);
     memset(unit->told_get, 0, sizeof unit->told_get);
 }
@@ -268,8 +278,9 @@ static int settable(Unit *unit, fmi2ValueReference reference, Kind kind)
 /* Bring the outputs up to date while the host initialises, and tell of references that are no variable. */
 static void before_get(Unit *unit, const fmi2ValueReference references[], size_t n, Kind kind)
 {
-    Text text = {0, ""};
+    Text text;
     if (unit->stale) {
+        start(&text, "");
         unit->stale = unit->computed = false;
         unit->computed = initialised(unit, &text);
     }
@@ -278,8 +289,7 @@ static void before_get(Unit *unit, const fmi2ValueReference references[], size_t
         unknown = unknown || variable_of(references[k], kind) < 0;
     if (!unknown || unit->told_get[kind])
         return;
-    text.length = 0;
-    add(&text, MODEL ": value references [");
+    start(&text, MODEL ": value references [");
     bool first = true;
     for (size_t k = 0; k < n; k++) {
         if (variable_of(references[k], kind) >= 0)

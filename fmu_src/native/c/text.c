@@ -18,6 +18,13 @@ void add(Text *to, const char *text)
     to->text[to->length] = '\0';
 }
 
+void start(Text *text, const char *with)
+{
+    text->length = 0;
+    text->text[0] = '\0';
+    add(text, with);
+}
+
 void add_int(Text *to, long value)
 {
     char text[32];

@@ -13,6 +13,8 @@ typedef struct {
     char text[TEXT_SIZE];
 } Text;
 
+/* Begin a text. */
+void start(Text *text, const char *with);
 /* Append a text. */
 void add(Text *to, const char *text);
 /* Append a whole number. */

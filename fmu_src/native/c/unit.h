@@ -27,7 +27,8 @@ typedef struct {
     bool initialising, stale, computed; /* outputs can be read while the host initialises */
     double time_s;
     /* What has been told already: each sort of message is told once. */
-    bool told[MESSAGES], told_parts[1 << PARTS], told_reference[COUNT], told_get[KINDS];
+    bool told[MESSAGES], told_reference[COUNT], told_get[KINDS], told_car[CAR_TEXTS];
+    bool told_readings[SUBJECTS][1 << PARTS], told_reason[SUBJECTS][REASONS];
     unsigned unknown[UNKNOWN_TOLD];
     int unknown_count;
     bool logging;
@@ -37,6 +38,9 @@ typedef struct {
 
 /* Tell a message of a sort once. */
 void tell(Unit *unit, bool *told, fmi2Status status, const char *message);
+
+/* Where it is noted that a subject's unusable input has been told: by the readings that the message names. */
+bool *told_of(Unit *unit, int subject, Unusable reason, const Sensors *sensors);
 
 /* Of the unit itself: begin anew with the values that were set; false, with the reason, where they cannot be used. */
 bool unit_initialise(Unit *unit, Text *problem);

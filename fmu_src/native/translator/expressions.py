@@ -41,7 +41,13 @@ _MATH = (
     "sqrt exp expm1 log log1p erf sin cos tan atan atan2 floor ceil copysign tanh fabs isinf isnan isfinite"
 )
 MATH = frozenset(_MATH.split())
-BINARY = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT), ast.Div: ("/", PRODUCT)}
+BINARY = {
+    ast.Add: ("+", SUM),
+    ast.Sub: ("-", SUM),
+    ast.Mult: ("*", PRODUCT),
+    ast.Div: ("/", PRODUCT),
+    ast.BitOr: ("|", RELATION),
+}
 COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 MISSING = object()
 
@@ -359,6 +365,8 @@ class Expressions:
         kind = INT if all(k in (INT, BOOL) for k in kinds) else DOUBLE
         if kind == INT and sign == "/":
             raise self.refuse(node, "a division of whole numbers, which C would round.")
+        if kind != INT and sign == "|":
+            raise self.refuse(node, "bits of something else than whole numbers.")
 
         def make(parts: list[Expression]) -> Expression:
             return Expression(f"{parts[0].bound(binds)} {sign} {parts[1].bound(binds + 1)}", kind, binds)

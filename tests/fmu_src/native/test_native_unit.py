@@ -14,7 +14,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from fmu_unit import DRIVING, Unit
-from native_drives import SIGNALS, drive, pedal, rows
+from native_drives import SIGNALS, drive, drive_of_four, pedal, rows
 from plant_drives import SCENARIOS
 
 from fmu_src.native.build import build_native
@@ -44,11 +44,11 @@ ATTRIBUTES = (
 """Of a variable in modelDescription.xml."""
 
 
-def driven(open_one, seed, parameters):
+def driven(open_one, steps, parameters):
     """All outputs of a drive, and the log."""
     unit = open_one(**parameters)
     trace = [unit.outputs()]
-    for values, step_s in drive(seed, STEPS):
+    for values, step_s in steps:
         unit.step(values, step_s=step_s)
         trace.append(unit.outputs())
     return trace, list(unit.log)
@@ -62,13 +62,36 @@ def _bits(outputs):
 @pytest.mark.parametrize(("front", "left"), [(True, True), (False, False)])
 def test_it_gives_and_tells_what_the_unit_with_python_does(open_unit, open_native, method, front, left):
     parameters = {"estimator__method": method.value, "wheel__front": front, "wheel__left": left}
-    expected, expected_log = driven(open_unit, method.value, parameters)
-    trace, log = driven(open_native, method.value, parameters)
+    expected, expected_log = driven(open_unit, drive(method.value, STEPS), parameters)
+    trace, log = driven(open_native, drive(method.value, STEPS), parameters)
     for step, (there, here) in enumerate(zip(expected, trace, strict=True)):
         assert _bits(here) == _bits(there), step
     assert log == expected_log
     assert {line.status for line in log} == {WARNING}
     assert len({values["slip"] for values in trace}) > STEPS / 4
+
+
+def test_the_unit_of_four_wheels_gives_and_tells_what_the_one_with_python_does(open_4w, open_native_4w):
+    for method in Method:
+        parameters = {"estimator__method": method.value}
+        expected, expected_log = driven(open_4w, drive_of_four(method.value, STEPS // 2), parameters)
+        trace, log = driven(open_native_4w, drive_of_four(method.value, STEPS // 2), parameters)
+        for step, (there, here) in enumerate(zip(expected, trace, strict=True)):
+            assert _bits(here) == _bits(there), (method, step)
+        assert log == expected_log != []
+
+
+def test_a_state_of_four_wheels_is_taken_over(open_native_4w):
+    first, second = open_native_4w(), open_native_4w(vehicle__mass=1900.0)
+    steps = list(drive_of_four(1, 300))
+    for values, step_s in steps[:200]:
+        first.step(values, step_s=step_s)
+    saved = bytes(first.slave.serializeFMUstate(first.slave.getFMUstate()))
+    second.slave.setFMUstate(second.slave.deSerializeFMUstate(saved))
+    for values, step_s in steps[200:]:
+        for unit in (first, second):
+            unit.step(values, step_s=step_s)
+        assert _bits(second.outputs()) == _bits(first.outputs())
 
 
 def test_parameters_out_of_bounds_are_told_in_the_same_words(open_unit, open_native, capfd):

@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 from native_calls import bits, build, drawn
 
+from fmu_src.native.build import NATIVE_UNITS
 from fmu_src.native.estimator import estimator_program
 from trpac_core.robust import wheel as robust
 from trpac_core.robust.belief import WheelModel
 from trpac_core.vehicle import CarTolerance, Vehicle
 
 PROGRAM = estimator_program()
+for unit in NATIVE_UNITS.values():
+    for needed in unit.functions:
+        PROGRAM.require(needed)
 CALLS = 60
 REFUSALS = (ArithmeticError, ValueError)
 """What Python raises where C goes on with inf or NaN."""
