@@ -65,8 +65,8 @@ def test_brake_pulses_show_both_parts_and_lock_no_wheel():
 def test_a_run_in_full_is_the_run_that_is_scored(short_sweep, tmp_path):
     plan = plan_run(short_sweep, run_keys(short_sweep)[0])
     full = full_run(plan)
-    tracks = step_all(plan, drive(plan.scenario), believed_config(plan, {}), ["IFE", "DE", "DIFE"])
-    np.testing.assert_array_equal(full.table["TRPAC"], tracks.by_name["DIFE"].TRPAC)
+    tracks = step_all(plan, drive(plan.scenario), believed_config(plan, {}), ["IFE", "DE", "DIFE", "robust"])
+    np.testing.assert_array_equal(full.table["TRPAC"], tracks.by_name["robust"].TRPAC)
     np.testing.assert_array_equal(full.table["excitation_flag"], tracks.excited)
     draw_figure17(full, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")

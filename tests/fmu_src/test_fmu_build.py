@@ -191,13 +191,8 @@ NOT_OFFERED = {
     "vision.use_foresight",
     "vision.use_lines",
     "vision.use_scene",
-    "gains.innovation",
-    "tolerance.coasting",
-    "tolerance.gentle",
-    "tolerance.force_doubt_n",
 }
-"""What the estimator of one wheel does not use, what the method sets, switches for ablation studies, and what
-learning the car rests on."""
+"""What the estimator of one wheel does not use, and switches for ablation studies."""
 
 
 def leaves(owner: object, path: str = "") -> list[str]:
