@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import os
 import shutil
+import struct
 import subprocess
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,7 @@ from fmu_unit import DRIVING, Unit
 from native_drives import SIGNALS, drive, drive_of_four, pedal, rows
 from plant_drives import SCENARIOS
 
-from fmu_src.native.build import build_native, sources
+from fmu_src.native.build import build_native, fat, sources
 from fmu_src.native.library import FLAGS, compiler
 from fmu_src.units import UNITS
 from scenarios.files import load_scenario
@@ -318,3 +320,31 @@ def test_a_car_that_is_not_as_told_is_told_in_the_same_words(open_unit, open_nat
             unit.step(values, step_s=0.01)
         logs.append(unit.log)
     assert logs[0] == logs[1] != []
+
+
+# Libraries of other platforms
+
+
+def test_a_library_for_two_processors_holds_both_where_its_head_says():
+    parts = [
+        struct.pack("<III", 0xFEEDFACF, processor, 3) + bytes([processor & 0xFF]) * size
+        for processor, size in ((0x01000007, 70_000), (0x0100000C, 5))
+    ]
+    made = fat(parts)
+    assert struct.unpack(">II", made[:8]) == (0xCAFEBABE, 2)
+    for number, part in enumerate(parts):
+        processor, _, begin, size, power = struct.unpack(">IIIII", made[8 + 20 * number : 28 + 20 * number])
+        assert made[begin : begin + size] == part
+        assert begin % (1 << power) == 0
+        assert processor == struct.unpack("<I", part[4:8])[0]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang: pip install 'trpac-fmu[native]'")
+def test_the_libraries_of_all_platforms_are_the_same_bytes_each_time(tmp_path):
+    info = UNITS["TrpacEstimator"].info
+    first, second = (
+        build_native(info, tmp_path / name, everywhere=True).read_bytes() for name in ("a.fmu", "b.fmu")
+    )
+    assert first == second
+    assert list(validate_fmu(str(tmp_path / "a.fmu"))) == []
