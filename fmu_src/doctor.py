@@ -25,6 +25,8 @@ from .units import UNITS
 
 RECORD = f"resources/{CONTENTS_FILE}"
 DESCRIPTION = "modelDescription.xml"
+ENTRY = "resources/slavemodule.txt"
+"""File that names the script of a unit with Python."""
 KNOWN_PACKAGES = {module: package for slave in UNITS.values() for module, package in slave.packages.items()}
 """Modules that units of this project need, and their packages; no other module that a file names is imported."""
 PROBE_LIMIT_S, TRIAL_LIMIT_S = 60.0, 300.0
@@ -93,6 +95,8 @@ class Examination:
     python: Python
     ran: bool
     """Whether the unit's code has been run."""
+    native: bool = False
+    """Whether the unit needs no Python."""
 
     @property
     def fine(self) -> bool:
@@ -138,8 +142,12 @@ def examine(
         of_file.append(Finding("record", State.PROBLEM, text, "Build the unit again."))
         findings.append(of_file[-1])
     modules = sorted(named & set(KNOWN_PACKAGES))
+    native = contents is not None and ENTRY not in contents.files
     probed = _probe(python, modules)
-    findings += _python(probed, modules if contents else None)
+    if native:
+        findings.append(Finding("python", State.OK, "it needs none: it is native code"))
+    else:
+        findings += _python(probed, modules if contents else None)
     intact = all(finding.state is not State.PROBLEM for finding in of_file)
     if intact and run:
         notify(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
@@ -148,7 +156,7 @@ def examine(
         why = "the file is not what was built" if run else "as it was asked for"
         findings.append(Finding("trial", State.NOTE, f"not run: {why}"))
     name = contents.unit if contents else path.stem
-    return Examination(quoted(name), tuple(findings), probed, intact and run)
+    return Examination(quoted(name), tuple(findings), probed, intact and run, native)
 
 
 def examine_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:

@@ -16,8 +16,13 @@ class HostNeeds:
     needs: tuple[str, ...]
 
 
-def host_needs(python: Python) -> tuple[HostNeeds, ...]:
-    """Requirements by kind of host; those of Windows and of vendors' tools are from documents, not tested."""
+def host_needs(python: Python, native: bool = False) -> tuple[HostNeeds, ...]:
+    """Requirements by kind of host; those of Windows and of vendors' tools are from documents, not tested.
+
+    A native unit has none, whatever the interpreter.
+    """
+    if native:
+        return (HostNeeds("every host", ("Nothing but the C library of its system.",)),)
     programs = Path(python.command).parent
     return (
         HostNeeds(

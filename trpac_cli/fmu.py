@@ -71,7 +71,7 @@ def doctor(
         examined = examine(file, python, run, lambda text: print(text, file=sys.stderr))
     except UnusableError as error:
         refuse("trpac fmu doctor", error)
-    needs = host_needs(examined.python)
+    needs = host_needs(examined.python, examined.native)
     if as_json:
         print(json.dumps(_json(file, examined, needs), indent=2))
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import subprocess
 import sys
 import tempfile
@@ -9,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from platform import machine
 from typing import Any
 
 import fmpy
@@ -111,12 +113,16 @@ NATIVE_UNITS = {
 """Units that are there in C."""
 OPTIONS = ("-shared", "-s", "-fvisibility=hidden", "-Wall", "-Wextra", "-pedantic", "-Werror")
 TARGETS = {
-    "linux64": ("so", "x86_64-linux-gnu.2.17"),
-    "win64": ("dll", "x86_64-windows-gnu"),
-    "darwin64": ("dylib", "x86_64-macos"),
-    "aarch64-linux": ("so", "aarch64-linux-gnu.2.17"),
+    "linux64": ("so", ("x86_64-linux-gnu.2.17",)),
+    "win64": ("dll", ("x86_64-windows-gnu",)),
+    "darwin64": ("dylib", ("x86_64-macos", "aarch64-macos")),
+    "aarch64-linux": ("so", ("aarch64-linux-gnu.2.17",)),
 }
-"""Folder of a platform in the unit: the ending of its library, and its name for zig's compiler."""
+"""Folder of a platform in the unit: the ending of its library, and its names for zig's compiler."""
+HERE = {"win32": "win64", "darwin": "darwin64"}
+"""Folder of this machine's platform, by Python's name; that of Linux else."""
+FAT_MAGIC, FAT_ALIGNMENT = 0xCAFEBABE, 14
+"""First word of a library for several processors of Apple's, and the power of two at which each part begins."""
 
 
 def sources(unit: UnitInfo, guid: str) -> dict[str, str]:
@@ -205,28 +211,31 @@ def libraries(
     name: str, files: Sequence[str], texts: Mapping[str, str], everywhere: bool
 ) -> dict[str, bytes]:
     """The unit's libraries by their paths in the archive; BuildError where one cannot be made."""
-    zig = [sys.executable, "-m", "ziglang", "cc"]
     made = {}
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for file, text in texts.items():
             (folder / file).write_text(text, encoding="utf-8")
-        for platform, (ending, triple) in TARGETS.items() if everywhere else [("linux64", ("so", ""))]:
+        if not everywhere:
+            platform = HERE.get(sys.platform, "linux64" if machine() == "x86_64" else f"{machine()}-linux")
             try:
-                command = [*zig, "-target", triple] if everywhere else compiler()
+                data = _library(folder, compiler(), files, platform)
             except CompilerError as error:
                 raise BuildError(str(error)) from error
-            made[f"binaries/{platform}/{name}.{ending}"] = _library(
-                folder, command, files, f"{name}.{ending}", platform
-            )
+            return {f"binaries/{platform}/{name}.{TARGETS[platform][0]}": data}
+        for platform, (ending, triples) in TARGETS.items():
+            zig = [sys.executable, "-m", "ziglang", "cc", "-target"]
+            parts = [_library(folder, [*zig, triple], files, platform) for triple in triples]
+            made[f"binaries/{platform}/{name}.{ending}"] = parts[0] if len(parts) == 1 else fat(parts)
     return made
 
 
-def _library(folder: Path, command: list[str], files: Sequence[str], file: str, platform: str) -> bytes:
+def _library(folder: Path, command: list[str], files: Sequence[str], platform: str) -> bytes:
     """A library of the sources in a folder."""
-    flags = [*FLAGS, *OPTIONS, *([] if platform == "win64" else ["-fPIC"])]
+    windows = platform == "win64"
+    flags = [*FLAGS, *OPTIONS, *([] if windows else ["-fPIC"])]
     done = subprocess.run(
-        [*command, *flags, *files, "-o", file, *([] if platform == "win64" else ["-lm"])],
+        [*command, *flags, *files, "-o", "library", *([] if windows else ["-lm"])],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -234,4 +243,14 @@ def _library(folder: Path, command: list[str], files: Sequence[str], file: str, 
     )
     if done.returncode:
         raise BuildError(f"The unit's C does not compile for {platform}:\n{done.stderr}")
-    return (folder / file).read_bytes()
+    return (folder / "library").read_bytes()
+
+
+def fat(parts: Sequence[bytes]) -> bytes:
+    """One library of libraries for several processors of Apple's."""
+    head, body, begin = struct.pack(">II", FAT_MAGIC, len(parts)), b"", 1 << FAT_ALIGNMENT
+    for part in parts:
+        processor, kind = struct.unpack("<II", part[4:12])
+        head += struct.pack(">IIIII", processor, kind, begin + len(body), len(part), FAT_ALIGNMENT)
+        body += part + bytes(-len(part) % begin)
+    return head.ljust(begin, b"\0") + body

@@ -64,17 +64,14 @@ class Library:
         self._library = ctypes.CDLL(str(compiled([files[1]], folder / "trpac.so", *WARNINGS)))
 
     def call(self, python: Any, *arguments: Any) -> Any:
-        """What the C of a function returns for these arguments.
-
-        Arguments that Python changes in place are changed; one that is a value of C, see `kept`, stays one.
-        """
+        """What the C of a function returns for these arguments; those that Python changes in place are changed."""
         function = self.program.require(python)
         called = getattr(self._library, function.c)
         kinds = [kind for _, kind in function.parameters]
         values = [self.to_c(value, kind) for value, kind in zip(arguments, kinds, strict=True)]
         result = self._called(function, called, values, kinds)
         for argument, value, kind in zip(arguments, values, kinds, strict=True):
-            if kind.mutable and argument is not value:
+            if kind.mutable:
                 for f in kind.fields:
                     setattr(argument, f.name, self.to_python(getattr(value, safe(f.name)), f.type))
         return result
@@ -99,14 +96,6 @@ class Library:
             return None
         called.restype = self.kind(function.returns)
         return self.to_python(called(*given), function.returns)
-
-    def kept(self, value: Any) -> Any:
-        """A record as a value of C that calls take, and change in place, without conversion."""
-        return self.to_c(value, self.program.types.of_value(value, "a value"))
-
-    def back(self, kept: Any, like: Any) -> Any:
-        """The Python value of what is kept; `like` is one of its type."""
-        return self.to_python(kept, self.program.types.of_value(like, "a value"))
 
     def kind(self, kind: Type) -> Any:
         """The type of ctypes."""
@@ -134,8 +123,6 @@ class Library:
     def to_c(self, value: Any, kind: Type) -> Any:
         """A Python value in C."""
         made = self.kind(kind)
-        if isinstance(value, ctypes.Structure):
-            return value
         if kind.kind == "enum":
             return made(value.value)
         if kind.kind == "array" and kind.item is not None:

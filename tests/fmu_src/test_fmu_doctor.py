@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import subprocess
 import sys
@@ -254,3 +255,13 @@ def test_within_another_program_the_command_names_a_python(monkeypatch: pytest.M
 
     monkeypatch.setattr(sys, "executable", "/opt/matlab/bin/glnxa64/MATLAB")
     assert Path(interpreter()).name.startswith("python")
+
+
+def test_a_native_unit_needs_nothing_and_is_tried(native_file: Path) -> None:
+    done = command(native_file, "--json")
+    assert done.exit_code == 0, done.output
+    answer = json.loads(done.stdout)
+    assert answer["ran_its_code"]
+    assert [host["host"] for host in answer["hosts"]] == ["every host"]
+    assert "needs none" in findings(done)["python"]["text"]
+    assert findings(done)["trial"]["state"] == "ok"

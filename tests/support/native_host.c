@@ -4,7 +4,7 @@
    threads IN    drives eight instances with the same rows at once; they must give the same
    fuzz SEED N   calls everything with values of no sense, and restores damaged states
    bench IN      the time of a step with set and get
-   Rows are doubles: step size, the eight real inputs, road_class, frame_id. */
+   Rows are doubles: step size, the eight real inputs, road_class, frame_id. With -DFOUR_WHEELS it fuzzes the unit of four wheels. */
 #define _POSIX_C_SOURCE 200809L
 #include "fmi2Functions.h"
 #include "tables.h"
@@ -16,10 +16,16 @@
 #include <string.h>
 #include <time.h>
 
-enum { INPUTS = 8, ROW = INPUTS + 3, MOST = 64, THREADS = 8 };
+enum { INPUTS = 8, ROW = INPUTS + 3, MOST = 128, THREADS = 8 };
+#ifdef FOUR_WHEELS
+static const fmi2ValueReference real_inputs[INPUTS] = {VR_wheel_speed_fl, VR_wheel_torque_rr, VR_vehicle_speed,
+    VR_road_class_confidence_left, VR_vertical_load_fr, VR_steering_angle, VR_lateral_acceleration, VR_yaw_rate};
+static const fmi2ValueReference integer_inputs[2] = {VR_road_class_left, VR_frame_id};
+#else
 static const fmi2ValueReference real_inputs[INPUTS] = {VR_wheel_speed, VR_wheel_torque, VR_vehicle_speed,
     VR_road_class_confidence, VR_vertical_load, VR_steering_angle, VR_longitudinal_acceleration, VR_yaw_rate};
 static const fmi2ValueReference integer_inputs[2] = {VR_road_class, VR_frame_id};
+#endif
 static fmi2ValueReference outputs[MOST];
 static int output_count, told;
 static double *rows;

@@ -416,7 +416,7 @@ class Body(Loops):
                 return
             if e.type != kind:
                 self.put(f"{part_of(target, 'has')} = true;")
-                self.fill(part_of(target, "value_")[:-1], kind.item, node)
+                self.fill(part_of(target, "value"), kind.item, node)
                 return
         e = self.expr(node)
         if e.type != kind:

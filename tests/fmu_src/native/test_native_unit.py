@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import os
 import shutil
+import struct
 import subprocess
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,7 @@ from fmu_unit import DRIVING, Unit
 from native_drives import SIGNALS, drive, drive_of_four, pedal, rows
 from plant_drives import SCENARIOS
 
-from fmu_src.native.build import build_native
+from fmu_src.native.build import build_native, fat, sources
 from fmu_src.native.library import FLAGS, compiler
 from fmu_src.units import UNITS
 from scenarios.files import load_scenario
@@ -261,18 +263,22 @@ def test_eight_threads_do_not_touch_each_other(host, host_folder):
 
 
 def test_no_memory_is_allocated_after_the_instantiation(host_folder):
-    sources = sorted((host_folder / "sources").glob("*.c"))
+    parts = sorted((host_folder / "sources").glob("*.c"))
     options = ("-DCOUNT_ALLOCATIONS", "-Wl,--wrap=malloc,--wrap=calloc")
-    called(compiled_host(host_folder, "counting", sources, *options), "run", host_folder / "rows.bin")
+    called(compiled_host(host_folder, "counting", parts, *options), "run", host_folder / "rows.bin")
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="the sanitizers of gcc")
-def test_values_and_states_of_no_sense_do_no_harm(host_folder):
-    sources = sorted((host_folder / "sources").glob("*.c"))
-    options = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-    sanitized = compiled_host(host_folder, "sanitized", sources, *options)
+@pytest.mark.parametrize(("unit", "more"), [("TrpacEstimator", ()), ("TrpacEstimator4W", ("-DFOUR_WHEELS",))])
+def test_values_and_states_of_no_sense_do_no_harm(tmp_path, unit, more):
+    (tmp_path / "sources").mkdir()
+    for name, text in sources(UNITS[unit].info, "guid").items():
+        (tmp_path / "sources" / name).write_text(text)
+    options = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", *more)
+    parts = sorted((tmp_path / "sources").glob("*.c"))
+    sanitized = compiled_host(tmp_path, "sanitized", parts, *options)
     for seed in range(int(os.environ.get("NATIVE_FUZZ_SEEDS", "3"))):
-        called(sanitized, "fuzz", seed, 4000)
+        called(sanitized, "fuzz", seed, 4000 if unit == "TrpacEstimator" else 1000)
 
 
 # Drives of the plant
@@ -314,3 +320,31 @@ def test_a_car_that_is_not_as_told_is_told_in_the_same_words(open_unit, open_nat
             unit.step(values, step_s=0.01)
         logs.append(unit.log)
     assert logs[0] == logs[1] != []
+
+
+# Libraries of other platforms
+
+
+def test_a_library_for_two_processors_holds_both_where_its_head_says():
+    parts = [
+        struct.pack("<III", 0xFEEDFACF, processor, 3) + bytes([processor & 0xFF]) * size
+        for processor, size in ((0x01000007, 70_000), (0x0100000C, 5))
+    ]
+    made = fat(parts)
+    assert struct.unpack(">II", made[:8]) == (0xCAFEBABE, 2)
+    for number, part in enumerate(parts):
+        processor, _, begin, size, power = struct.unpack(">IIIII", made[8 + 20 * number : 28 + 20 * number])
+        assert made[begin : begin + size] == part
+        assert begin % (1 << power) == 0
+        assert processor == struct.unpack("<I", part[4:8])[0]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang: pip install 'trpac-fmu[native]'")
+def test_the_libraries_of_all_platforms_are_the_same_bytes_each_time(tmp_path):
+    info = UNITS["TrpacEstimator"].info
+    first, second = (
+        build_native(info, tmp_path / name, everywhere=True).read_bytes() for name in ("a.fmu", "b.fmu")
+    )
+    assert first == second
+    assert list(validate_fmu(str(tmp_path / "a.fmu"))) == []
