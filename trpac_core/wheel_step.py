@@ -33,8 +33,8 @@ from .vision.preview import (
     PreviewState,
     add_frame,
     covering,
+    index_of,
     outcome_at,
-    place_of,
     prune,
 )
 
@@ -199,7 +199,7 @@ def stamp(
     if said is None:
         if state.preview.count == 0:
             return
-        newest = outcome_at(state.preview, place_of(state.preview, state.preview.count - 1))
+        newest = outcome_at(state.preview, index_of(state.preview, state.preview.count - 1))
         said = Outcome(newest.surface, Q_v=0.0, flag=False, captured_s=state.time_s)
     prune(state.preview, known.preview, state.position_m)
     add_frame(

@@ -22,7 +22,7 @@ STARTS = {
 
 def header(unit: str, guid: str, variables: Sequence[Variable], constants: dict[str, str]) -> str:
     """Names and numbers of a unit's variables, and other constants."""
-    places = [
+    references = [
         f"AT_{c_name(v.name)} = {index}" for v, index in zip(variables, indices(variables), strict=True)
     ]
     counts = {kind: sum(v.kind is kind for v in variables) for kind in KINDS}
@@ -52,7 +52,7 @@ def header(unit: str, guid: str, variables: Sequence[Variable], constants: dict[
         "/* Value references. */",
         f"enum {{ {', '.join(f'VR_{c_name(v.name)} = {vr}' for vr, v in enumerate(variables))} }};",
         "/* Places among the values of a kind. */",
-        f"enum {{ {', '.join(places)} }};",
+        f"enum {{ {', '.join(references)} }};",
         "",
         "extern const Variable VARIABLES[COUNT];",
         *(f"extern const {STARTS[kind][0]} {kind.name}_STARTS[{max(counts[kind], 1)}];" for kind in STARTS),
@@ -102,17 +102,17 @@ def settings_code(name: str, settings: Type, variables: Sequence[Variable]) -> s
     """
     lines = [f"void {name}(const Memory *memory, {settings.c} *settings)", "{"]
     for v, index in zip(variables, indices(variables), strict=True):
-        place = place_of(settings, v.source) if v.source else None
-        if place is None:
+        member = member_of(settings, v.source) if v.source else None
+        if member is None:
             continue
-        text, kind = place
+        text, kind = member
         value = f"memory->{v.kind.value.lower()}[{index}]"
         value = f"({kind.c}){value}" if kind.kind == "enum" else value
         lines.append(f"    settings->{text} = {value};")
     return "\n".join([*lines, "}", ""])
 
 
-def place_of(kind: Type, path: str) -> tuple[str, Type] | None:
+def member_of(kind: Type, path: str) -> tuple[str, Type] | None:
     """Where a dotted path of fields lies in a record, and its type; None where the record has no such field."""
     text = ""
     for name in path.split("."):
@@ -129,11 +129,11 @@ def place_of(kind: Type, path: str) -> tuple[str, Type] | None:
 def indices(variables: Sequence[Variable]) -> list[int]:
     """Place of each variable among those of its kind."""
     seen: dict[Any, int] = dict.fromkeys(KINDS, -1)
-    places = []
+    references = []
     for v in variables:
         seen[v.kind] += 1
-        places.append(seen[v.kind])
-    return places
+        references.append(seen[v.kind])
+    return references
 
 
 def c_name(name: str) -> str:

@@ -18,7 +18,11 @@ GRIP = {"fl": 0.9, "fr": 0.7, "rl": 0.5, "rr": 0.3}
 @pytest.mark.e2e
 @pytest.mark.parametrize("name", ["TrpacEstimator", "TrpacEstimator4W"])
 def test_what_is_read_of_a_unit_is_what_its_variables_say(name: str, tmp_path: Path) -> None:
-    unit = Unit(build_unit(UNITS[name], tmp_path / f"{name}.fmu"), {"estimator.theta_initial": 0.6, "estimator.method": 1}, "rl")
+    unit = Unit(
+        build_unit(UNITS[name], tmp_path / f"{name}.fmu"),
+        {"estimator.theta_initial": 0.6, "estimator.method": 1},
+        "rl",
+    )
     assert (unit.last.TRPAC_dynamics, unit.last.flag) == (0.6, False), "what warmed it up is forgotten"
     wheels = unit.wiring.wheels
 

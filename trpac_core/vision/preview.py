@@ -126,7 +126,7 @@ class PreviewState:
         """The stamps from the oldest frame to the newest."""
         return tuple(
             Stamp(self.X_lb_m[place], self.X_ub_m[place], outcome_at(self, place))
-            for place in (place_of(self, k) for k in range(self.count))
+            for place in (index_of(self, k) for k in range(self.count))
         )
 
     @classmethod
@@ -158,7 +158,7 @@ class PreviewState:
         return cls.of(stamps, data["captured_at_m"])
 
 
-def place_of(state: PreviewState, k: int) -> int:
+def index_of(state: PreviewState, k: int) -> int:
     """Place in the ring of the k-th stamp, counted from the oldest."""
     place = state.first + k
     return place - MOST_STAMPS if place >= MOST_STAMPS else place
@@ -201,16 +201,16 @@ def add_frame(
     )
     X_ub = X_lb + max(0.0, driven_m)
     begin_m = math.inf
-    newest_m = state.X_lb_m[place_of(state, state.count - 1)] if state.count > 0 else -math.inf
+    newest_m = state.X_lb_m[index_of(state, state.count - 1)] if state.count > 0 else -math.inf
     if not (state.ascending and X_lb - newest_m >= config.resolution_m):
         # Without the stamps that it shares a place with, which it reaches over.
         kept = 0
         for k in range(state.count):
-            place = place_of(state, k)
+            place = index_of(state, k)
             if abs(X_lb - state.X_lb_m[place]) < config.resolution_m:
                 begin_m, X_ub = min(begin_m, state.X_lb_m[place]), max(X_ub, state.X_ub_m[place])
             else:
-                _move(state, place, place_of(state, kept))
+                _move(state, place, index_of(state, kept))
                 kept += 1
         if kept < state.count:
             state.count = kept
@@ -235,11 +235,11 @@ def _move(state: PreviewState, place: int, to: int) -> None:
 def _append(state: PreviewState, X_lb_m: float, X_ub_m: float, outcome: Outcome) -> None:
     """Put a stamp behind the newest one."""
     if state.count == MOST_STAMPS:
-        state.first = place_of(state, 1)
+        state.first = index_of(state, 1)
         state.count -= 1
-    if state.count > 0 and X_lb_m < state.X_lb_m[place_of(state, state.count - 1)]:
+    if state.count > 0 and X_lb_m < state.X_lb_m[index_of(state, state.count - 1)]:
         state.ascending = False
-    place = place_of(state, state.count)
+    place = index_of(state, state.count)
     state.X_lb_m[place] = X_lb_m
     state.X_ub_m[place] = X_ub_m
     state.surface[place] = int(outcome.surface)
@@ -253,7 +253,7 @@ def _ascend(state: PreviewState) -> bool:
     """Whether each stamp begins where the one before it begins, or farther on."""
     ascending = True
     for k in range(1, state.count):
-        before_m, begin_m = state.X_lb_m[place_of(state, k - 1)], state.X_lb_m[place_of(state, k)]
+        before_m, begin_m = state.X_lb_m[index_of(state, k - 1)], state.X_lb_m[index_of(state, k)]
         ascending = ascending and before_m <= begin_m
     return ascending
 
@@ -264,7 +264,7 @@ def covering(state: PreviewState, config: PreviewConfig, position_m: float) -> O
     if state.ascending:
         begun = _begun(state, position_m)
     for back in range(begun):
-        place = place_of(state, begun - 1 - back)
+        place = index_of(state, begun - 1 - back)
         if begun_m < state.X_lb_m[place] <= position_m:
             if position_m < state.X_ub_m[place] + config.hold_m:
                 return outcome_at(state, place)
@@ -280,7 +280,7 @@ def _begun(state: PreviewState, position_m: float) -> int:
     low, high = 0, state.count
     while low < high:
         middle = (low + high) // 2
-        if position_m < state.X_lb_m[place_of(state, middle)]:
+        if position_m < state.X_lb_m[index_of(state, middle)]:
             high = middle
         else:
             low = middle + 1
@@ -294,5 +294,5 @@ def prune(state: PreviewState, config: PreviewConfig, position_m: float) -> None
     """
     rear_m = position_m - config.behind_m
     while state.count > 0 and state.X_ub_m[state.first] + config.hold_m <= rear_m:
-        state.first = place_of(state, 1)
+        state.first = index_of(state, 1)
         state.count -= 1

@@ -170,14 +170,14 @@ class Body(Loops):
             self.unpack(target, value)
         elif isinstance(target, ast.Attribute | ast.Subscript):
             self.flush()
-            place = self.expr(target)
+            slot = self.expr(target)
             base: ast.expr = target
             while isinstance(base, ast.Attribute | ast.Subscript):
                 base = base.value
             kind = self.parameters.get(base.id) if isinstance(base, ast.Name) else None
             if kind is None or not kind.mutable:
                 raise self.refuse(target, "a field is set in what cannot be changed.")
-            self.fill(place.text, place.type, value)
+            self.fill(slot.text, slot.type, value)
             self.flush()
         elif isinstance(target, ast.Name):
             self.name(target.id, value)
@@ -333,13 +333,13 @@ class Body(Loops):
             e = self.coerced(self.expr(node, f.type), f.type, node)
             self.flush()
             later.append((part_of(target, field), f.type, e if simple(node) else self.named(e)))
-        for place, field_type, what in later:
+        for slot, field_type, what in later:
             if isinstance(what, str):
                 self.put(what)
             elif isinstance(what, Expression):
-                self.put(f"{place} = {what.text};")
+                self.put(f"{slot} = {what.text};")
             else:
-                self.fill(place, field_type, what)
+                self.fill(slot, field_type, what)
                 self.flush()
 
     # Places

@@ -671,8 +671,8 @@ class Expressions:
             if self.lazy:
                 raise self.refuse(node, f"{function.c} within a condition: give its result a name before.")
             name = target or self.temporary(returns)
-            place = target or (name if returns.kind == "array" else f"&{name}")
-            self.put(f"{function.c}({', '.join([place, *texts])});")
+            slot = target or (name if returns.kind == "array" else f"&{name}")
+            self.put(f"{function.c}({', '.join([slot, *texts])});")
             return array_at(name, returns) if returns.kind == "array" else Expression(name, returns)
         return Expression(f"{function.c}({', '.join(texts)})", returns)
 

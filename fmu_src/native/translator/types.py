@@ -172,13 +172,13 @@ class Types:
             return self._named(Type(python.__name__, "enum", members, python=python))
         if not (dataclasses.is_dataclass(python) or hasattr(python, "_fields")):
             raise Unsupported(f"{where}: {python.__name__} is no enum, dataclass or NamedTuple.")
-        texts, place = field_texts(python), f"{where}, {python.__name__}"
+        texts, slot = field_texts(python), f"{where}, {python.__name__}"
         hints = get_type_hints(python, include_extras=True)
         names = getattr(python, "_fields", None) or [f.name for f in dataclasses.fields(python)]
         fields, left_out = [], {}
         for name in names:
             try:
-                fields.append(Field(name, self.of(hints[name], f"{place}.{name}"), texts.get(name, "")))
+                fields.append(Field(name, self.of(hints[name], f"{slot}.{name}"), texts.get(name, "")))
             except Unsupported as reason:
                 left_out[name] = str(reason)
         frozen = hasattr(python, "_fields") or python.__dataclass_params__.frozen
