@@ -17,7 +17,7 @@ def estimators(method: Method) -> dict[str, str]:
 
 
 ESTIMATORS = estimators(Method.DIFE)
-"""Those of the unit as it is delivered."""
+"""Those that every sweep runs."""
 CONVERGED_SHARE = 0.05
 """Error within which an estimator has converged, as a share of the step of friction [-]."""
 STEADY_SHARE = 0.3

@@ -68,7 +68,7 @@ def run_scenario(
     frames_folder: Path,
     progress: StageProgress = silent,
     overrides: Mapping[str, float] | None = None,
-    method: Method = Method.DIFE,
+    method: Method = Method.ROBUST,
 ) -> Run:
     """Results of a scenario: plant, pictures, unit and scores.
 
@@ -95,7 +95,7 @@ def run_scenario(
     trajectory = drive(scenario)
     log = make_scenario_log(scenario, trajectory)
     frames = record(scenario, trajectory, frames_folder, lambda d, n: progress("drawing pictures", d, n))
-    chosen = {} if method is Method.DIFE else {"estimator.method": method.value}
+    chosen = {"estimator.method": method.value}
     settings = parameters(scenario) | chosen | dict(overrides or {})
     outputs = run_unit(
         fmu,

@@ -99,7 +99,7 @@ class Estimator:
         *,
         wheel: str = "fl",
         camera: str | Path | None = None,
-        method: str = "dife",
+        method: str = "robust",
     ) -> None:
         if wheel not in WHEELS:
             raise TrpacError(f"wheel is {wheel!r}; expected one of {', '.join(WHEELS)}.")

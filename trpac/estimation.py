@@ -87,7 +87,7 @@ def estimate(
     mapping: Mapping | str | Path | None = None,
     camera: str | Path | None = None,
     peers: bool = False,
-    method: str = "dife",
+    method: str = "robust",
     progress: StageProgress = silent,
 ) -> Estimates:
     """Estimates of the road's adhesion along a recorded drive.

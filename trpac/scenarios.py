@@ -142,7 +142,7 @@ def run(
     seed: int | None = None,
     stiffness_n: float | None = None,
     fmu: str | Path | None = None,
-    method: str = "dife",
+    method: str = "robust",
     progress: StageProgress = silent,
 ) -> ScenarioRun:
     """Results of a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.

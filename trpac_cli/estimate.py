@@ -35,7 +35,7 @@ def estimate(
         bool,
         typer.Option("--peers", help="Also slip-slope and two Kalman filters; takes a few times as long."),
     ] = False,
-    method: MethodOption = "dife",
+    method: MethodOption = "robust",
 ) -> None:
     """Estimate the road's adhesion along a recorded drive.
 

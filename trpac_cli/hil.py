@@ -66,7 +66,7 @@ def hil(
     parameter: Annotated[
         list[str] | None, typer.Option(help="NAME=VALUE of the unit, such as estimator.gamma=10; repeatable.")
     ] = None,
-    method: MethodOption = "dife",
+    method: MethodOption = "robust",
     frames: Annotated[
         Path | None, typer.Option(help="Folder of pictures to play; without it classes come by bus.")
     ] = None,
@@ -201,11 +201,11 @@ def _bus(interface: str, channel: str | None, options: list[str] | None) -> BusS
 
 
 def _method(label: str) -> dict[str, float]:
-    """Parameters of the unit for a method; none for that which units have by default."""
+    """Parameters of the unit for a method."""
     from trpac_core.estimator_data import Method
 
     method = Method.of(label)
-    return {} if method is Method.DIFE else {"estimator.method": method.value}
+    return {"estimator.method": method.value}
 
 
 def _parameters(pairs: list[str] | None) -> dict[str, float]:

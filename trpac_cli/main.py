@@ -65,7 +65,7 @@ def run(
         float | None,
         typer.Option(min=10_000.0, max=1e6, help="C_x in place of the vehicle's, in plant and unit [N]."),
     ] = None,
-    method: MethodOption = "dife",
+    method: MethodOption = "robust",
 ) -> None:
     """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy; write report and scores.
 

@@ -31,7 +31,7 @@ def estimate_log(
     *,
     guessed: bool = False,
     vehicle_path: Path | None = None,
-    method: Method = Method.DIFE,
+    method: Method = Method.ROBUST,
 ) -> tuple[Replay, dict[str, Any]]:
     """Run the estimators along a log.
 

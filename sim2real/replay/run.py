@@ -22,7 +22,7 @@ from trpac_core.vehicle import WHEELS
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-OURS, DYNAMICS = Method.DIFE.title, "DE"
+OURS, DYNAMICS = EstimatorConfig().method.title, "DE"
 TOLD_EVERY = 2000
 """Rows between two reports of progress."""
 
@@ -132,7 +132,7 @@ def replay(
     camera: CameraSide = NO_CAMERA,
     peers: bool = False,
     told: Told = silent,
-    method: Method = Method.DIFE,
+    method: Method = Method.ROBUST,
 ) -> Replay:
     """Run our estimator and DE, and the peers where asked for, on all four wheels.
 

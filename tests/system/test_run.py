@@ -91,11 +91,11 @@ def test_run_writes_report_figure_log_and_scores(scenario_file, unit_file, tmp_p
     assert result.exit_code == 0, result.output
     assert sorted(p.name for p in out.iterdir()) == ["figure17.png", "log.csv", "report.html", "summary.json"]
     summary = json.loads((out / "summary.json").read_text())
-    assert set(summary["estimators"]) == {"IFE", "DE", "DIFE"}
+    assert set(summary["estimators"]) == {"IFE", "DE", "robust"}
     assert {"fmu_sha256", "seed", "versions"} <= set(summary)
     for scores in summary["estimators"].values():
         assert [set(score) for score in scores] == [SCORE_KEYS, SCORE_KEYS]
-    slippery = summary["estimators"]["DIFE"][1]
+    slippery = summary["estimators"]["robust"][1]
     assert slippery["theta"] == 0.3
     assert slippery["steady_state_error"] < 0.02
     log = pd.read_csv(out / "log.csv")
