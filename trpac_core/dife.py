@@ -191,11 +191,10 @@ def fusion_step(
         mean = with_reading(state.mean, slip.size, friction, inputs.slip_rise, inputs.slip_noise, step_s)
         theta_tyre = _theta_tyre(mean, inputs, C_x)
     if theta_tyre is not None:
-        rate = (
-            gains.gamma
-            * gamma_factor(mean, inputs.noise_s)
-            * (1.0 + INNOVATION * abs(theta_tyre - theta_hat))
-        )
+        factor = gamma_factor(mean, inputs.noise_s)
+        # A single reading may be noise: only what has been averaged may hurry.
+        innovation = INNOVATION * (factor - 1.0) * abs(theta_tyre - theta_hat)
+        rate = gains.gamma * factor * (1.0 + innovation)
         pull = rate * theta_tyre
     if excited and theta_img is not None:
         K_v = visual_gain(gains, theta_img, theta_hat)

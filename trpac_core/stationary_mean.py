@@ -17,10 +17,10 @@ RISING_DEVIATIONS = 2.1
 of the difference, whose variance is half the slip's [-]."""
 MEMORY_S = 0.2
 """Longest memory of a mean [s]."""
-SIGNIFICANCE = 1.5
+SIGNIFICANCE = 2.0
 """How many standard deviations of slip must lie between the tyre and one that does not slide at all, for a mean over
 a long time [-]."""
-SHORT_MEAN_SIGNIFICANCE = 1.0
+SHORT_MEAN_SIGNIFICANCE = 0.5
 """How many more for a single reading [-]: a short mean is another one at each step, and one of many is soon far off."""
 CURVE_SHARE = 0.005
 """Standard deviation of the slip at which the tyre's curve has a force, as a share of it, which no mean lessens [-]."""

@@ -31,7 +31,7 @@ from trpac_core.estimator import LOCKED_M_S, EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.sensors import Sensors, filter_share
 from trpac_core.slip import GREATEST_SLIP
-from trpac_core.tyre import tyre_at_slip
+from trpac_core.tyre import sliding_onset_friction, tyre_at_slip
 from trpac_core.vehicle import EXACT_CAR, Vehicle
 
 Array = NDArray[np.float64]
@@ -276,11 +276,9 @@ def _shown(truth: Array, model: Prediction, inputs: Inputs, step_s: float, noise
     for k in np.flatnonzero(able):
         slip, load_n = min(float(model.slip[k, 0]), GREATEST_SLIP), float(model.load_n[k, 0])
         surely = slip - SURELY * float(filtered_m_s / inputs.vehicle_speed_m_s[k])
-        if surely > 0.0:
-            theta = float(truth[k])
-            slides = theta < 2.0 * tyre_at_slip(surely, load_n, stiffness_n).adhering
-            sensitivity = tyre_at_slip(slip, load_n, stiffness_n).friction_by_theta(theta)
-            shown[k] = slides and sensitivity >= LEAST_SENSITIVITY
+        tyre, theta = tyre_at_slip(slip, load_n, stiffness_n), float(truth[k])
+        slides = tyre.friction(theta) < sliding_onset_friction(surely, load_n, stiffness_n)
+        shown[k] = slides and tyre.friction_by_theta(theta) >= LEAST_SENSITIVITY
     return shown
 
 

@@ -58,7 +58,8 @@ def test_it_is_first_order_at_gamma_twice_gamma_and_faster_from_afar():
     trace, _ = run(on_road(0.3), 0.5, 0.5)
     theta, wanted = 0.5, []
     for k in range(500):
-        rate = GAINS.gamma * min(1.0 + (k + 1) * STEP_S / NOISE_S, 2.0) * (1.0 + INNOVATION * (theta - 0.3))
+        factor = min(1.0 + (k + 1) * STEP_S / NOISE_S, 2.0)
+        rate = GAINS.gamma * factor * (1.0 + INNOVATION * (factor - 1.0) * (theta - 0.3))
         theta += STEP_S * rate * (0.3 - theta)
         wanted.append(theta)
     assert trace == pytest.approx(np.array(wanted), abs=2e-3)

@@ -45,14 +45,14 @@ def test_a_mean_is_at_least_as_sure_as_it_says(number: int) -> None:
             # An open gate: what is asked here is what a mean of that length leaves of the noise.
             mean = with_reading(mean, NOISE * value, 0.2, 0.0, 1.0, STEP_S)
         ends.append(mean.slip)
-    significance = 1.5 + math.exp(-mean.duration_s / SHORT_MEAN_S)
+    significance = 2.0 + 0.5 * math.exp(-mean.duration_s / SHORT_MEAN_S)
     stated = doubt(mean._replace(slip=0.0, rise=0.0), NOISE) / significance
     assert 0.75 * stated < np.std(ends) < 1.1 * stated
     assert stated < 0.6 * NOISE
 
 
 @pytest.mark.parametrize(
-    ("duration_s", "deviations"), [(0.0, 2.5), (SHORT_MEAN_S, 1.5 + 1.0 / math.e), (5.0, 1.5)]
+    ("duration_s", "deviations"), [(0.0, 2.5), (SHORT_MEAN_S, 2.0 + 0.5 / math.e), (5.0, 2.0)]
 )
 def test_the_younger_a_mean_the_farther_it_must_be_from_a_tyre_that_does_not_slide(
     duration_s: float, deviations: float
@@ -67,14 +67,14 @@ def test_noise_and_curve_add_in_squares_and_no_mean_lessens_the_curves() -> None
     assert doubt(fresh, NOISE) == pytest.approx(2.5 * math.hypot(NOISE, CURVE_SHARE * 0.03))
     forgetting = long._replace(duration_s=2.0 * MEMORY_S)
     assert doubt(long, NOISE) == pytest.approx(doubt(forgetting, NOISE), rel=0.01)
-    assert doubt(long, NOISE) == pytest.approx(1.5 * math.hypot(NOISE / math.sqrt(21.0), CURVE_SHARE * 0.03))
+    assert doubt(long, NOISE) == pytest.approx(2.0 * math.hypot(NOISE / math.sqrt(21.0), CURVE_SHARE * 0.03))
 
 
 @pytest.mark.parametrize("rise", [1e-3, -1e-3])
 def test_a_mean_of_a_tyre_that_is_being_loaded_or_unloaded_proves_less(rise: float) -> None:
     """Slip's way ahead of its own course counts as a deviation of that size."""
     mean = StationaryMean(0.03, 0.2, rise, 5.0)
-    assert doubt(mean, 0.0) == pytest.approx(1.5 * (1e-3 + CURVE_SHARE * 0.03))
+    assert doubt(mean, 0.0) == pytest.approx(2.0 * (1e-3 + CURVE_SHARE * 0.03))
 
 
 def test_it_begins_anew_where_slip_goes_elsewhere_or_the_tyre_is_being_loaded() -> None:
