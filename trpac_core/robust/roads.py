@@ -31,7 +31,7 @@ def cells() -> Array:
     """Frictions of the cells, shape (cells,) [-]."""
     values = [LEAST_THETA]
     while values[-1] < GREATEST_THETA:
-        values.append(values[-1] + max(CELL, CELL_SHARE * values[-1]))
+        values.append(min(values[-1] + max(CELL, CELL_SHARE * values[-1]), GREATEST_THETA))
     return np.array(values)
 
 

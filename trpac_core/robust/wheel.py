@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..tyre import GREATEST_THETA
 from ..vehicle import CarTolerance
 from .belief import (
     FIRST,
@@ -346,7 +345,7 @@ def _offset_is_strange(belief: Belief, known: RobustSetup, slowness_s_m: float) 
 def point(state: RobustState, observer: float) -> float:
     """TRPAC, with the observer's theta_hat [-]: the belief's mean until the tyre has shown this road."""
     said = state.said
-    return said.mean if state.stale else min(max(observer, said.clip), said.unmoved_high, GREATEST_THETA)
+    return said.mean if state.stale else min(max(observer, said.clip), said.unmoved_high)
 
 
 class Claim(NamedTuple):
