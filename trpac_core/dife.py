@@ -125,20 +125,12 @@ def visual_gain(gains: Gains, theta_img: float, theta_hat: float) -> float:
 
 def settled(state: FusionState, inputs: WheelInputs, wheel: Wheel, gains: Gains) -> FusionState:
     """The state with its observed force balancing the wheel torque, to start from."""
-    model_n, balanced_n = (
-        _model_force(state.theta_hat, inputs, wheel),
-        inputs.wheel_torque_nm / wheel.radius_m,
-    )
+    slip, balanced_n = inputs.slip, inputs.wheel_torque_nm / wheel.radius_m
+    model_n = force(state.theta_hat, slip.size, inputs.load_n, wheel.longitudinal_stiffness_n, slip.direction)
     s = settled_state(
         model_n, balanced_n, inputs.wheel_speed_rad_s, gains.K, wheel.inertia_kg_m2, wheel.radius_m
     )
     return state._replace(s=s)
-
-
-def _model_force(theta_hat: float, inputs: WheelInputs, wheel: Wheel) -> float:
-    """Force of the tyre model [N]."""
-    slip = inputs.slip
-    return force(theta_hat, slip.size, inputs.load_n, wheel.longitudinal_stiffness_n, slip.direction)
 
 
 def _theta_tyre(mean: StationaryMean, inputs: WheelInputs, longitudinal_stiffness_n: float) -> float | None:
@@ -180,7 +172,8 @@ def fusion_step(
     slip, load_n, C_x = inputs.slip, inputs.load_n, wheel.longitudinal_stiffness_n
     theta_hat, inertia, radius_m = state.theta_hat, wheel.inertia_kg_m2, wheel.radius_m
     threshold = onset_slip(onset_theta, load_n, C_x, sensitivity=0.0)
-    model_n = _model_force(theta_hat, inputs, wheel)
+    tyre = tyre_at_slip(slip.size, load_n, C_x)
+    model_n = slip.direction * load_n * tyre.friction(theta_hat)
     if not inputs.torque_known:
         s = settled_state(model_n, model_n, inputs.wheel_speed_rad_s, gains.K, inertia, radius_m)
         return FusionStep(FusionState(theta_hat, s), model_n, None, threshold, excited=False, K_v=0.0)
@@ -205,7 +198,7 @@ def fusion_step(
         target = pull / rate
         theta_next = target + (theta_hat - target) * math.exp(-rate * step_s)
         theta_next = min(max(theta_next, LEAST_THETA), GREATEST_THETA)
-        model_change_n = _model_force(theta_next, inputs, wheel) - model_n
+        model_change_n = slip.direction * load_n * tyre.friction(theta_next) - model_n
     s = advanced_state(
         state.s,
         model_n,

@@ -44,9 +44,9 @@ class Method(Enum):
     AS_PRINTED = 0
     """Eqs. (12) to (19) of the paper as they are printed."""
     DIFE = 1
-    """The paper's, run where the belief about road and tyre says that the tyre slides."""
+    """The paper's, run where the tyre slides with significance."""
     ROBUST = 2
-    """The observer without the camera as far as the belief bears it out, else the belief's mean."""
+    """The observer without the camera, in the belief's bounds, on a road that it has read; else the belief's mean."""
 
     @property
     def label(self) -> str:

@@ -220,47 +220,33 @@ class CarClaim(NamedTuple):
     source: Source
 
 
+def _by_rule(theta: Four, deviation: Four, loads_n: Four, axle_deviation: float) -> Friction:
+    """The car's value of one output of its wheels, each with its standard deviation [-]."""
+    fl, fr, rl, rr = theta
+    of_fl, of_fr, of_rl, of_rr = deviation
+    wheels = (Friction(fl, of_fl), Friction(fr, of_fr), Friction(rl, of_rl), Friction(rr, of_rr))
+    return car_friction(wheels, loads_n, axle_deviation)
+
+
 def car_claim(
     fl: Estimate, fr: Estimate, rl: Estimate, rr: Estimate, loads_n: Four, axle_deviation: float
 ) -> CarClaim:
     """The car's adhesion from the estimates of its wheels, see `car_friction`."""
-    fused = car_friction(
-        (
-            Friction(fl.TRPAC, fl.TRPAC_std),
-            Friction(fr.TRPAC, fr.TRPAC_std),
-            Friction(rl.TRPAC, rl.TRPAC_std),
-            Friction(rr.TRPAC, rr.TRPAC_std),
-        ),
-        loads_n,
-        axle_deviation,
+    std = (fl.TRPAC_std, fr.TRPAC_std, rl.TRPAC_std, rr.TRPAC_std)
+    expected_std = (
+        fl.TRPAC_expected_std,
+        fr.TRPAC_expected_std,
+        rl.TRPAC_expected_std,
+        rr.TRPAC_expected_std,
     )
-    low = car_friction(
-        (
-            Friction(fl.TRPAC_low, fl.TRPAC_std),
-            Friction(fr.TRPAC_low, fr.TRPAC_std),
-            Friction(rl.TRPAC_low, rl.TRPAC_std),
-            Friction(rr.TRPAC_low, rr.TRPAC_std),
-        ),
-        loads_n,
-        axle_deviation,
+    fused = _by_rule((fl.TRPAC, fr.TRPAC, rl.TRPAC, rr.TRPAC), std, loads_n, axle_deviation)
+    low = _by_rule((fl.TRPAC_low, fr.TRPAC_low, rl.TRPAC_low, rr.TRPAC_low), std, loads_n, axle_deviation)
+    high = _by_rule(
+        (fl.TRPAC_high, fr.TRPAC_high, rl.TRPAC_high, rr.TRPAC_high), std, loads_n, axle_deviation
     )
-    high = car_friction(
-        (
-            Friction(fl.TRPAC_high, fl.TRPAC_std),
-            Friction(fr.TRPAC_high, fr.TRPAC_std),
-            Friction(rl.TRPAC_high, rl.TRPAC_std),
-            Friction(rr.TRPAC_high, rr.TRPAC_std),
-        ),
-        loads_n,
-        axle_deviation,
-    )
-    expected = car_friction(
-        (
-            Friction(fl.TRPAC_expected, fl.TRPAC_expected_std),
-            Friction(fr.TRPAC_expected, fr.TRPAC_expected_std),
-            Friction(rl.TRPAC_expected, rl.TRPAC_expected_std),
-            Friction(rr.TRPAC_expected, rr.TRPAC_expected_std),
-        ),
+    expected = _by_rule(
+        (fl.TRPAC_expected, fr.TRPAC_expected, rl.TRPAC_expected, rr.TRPAC_expected),
+        expected_std,
         loads_n,
         axle_deviation,
     )

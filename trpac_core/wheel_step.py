@@ -160,13 +160,15 @@ class Moved(NamedTuple):
     acceleration_m_s2: float
     lagged_speed_m_s: float
     load_n: float
+    settled: bool
+    """Whether the filters went on; not so at the start, and after a gap or a jump of the readings."""
 
 
 def moved(state: EstimatorState, known: WheelSetup, rates: Rates, sensors: Sensors) -> Moved:
     """Acceleration, lagged speed and load as they are now; at the start, and after a gap, unfiltered."""
     measured, lagged = sensors.longitudinal_acceleration_m_s2, state.lagged_speed_m_s
-    follows = state.settled and not jumped(state.readings, sensors, known.wheel.radius_m, rates)
-    if not follows:
+    settled_now = state.settled and not jumped(state.readings, sensors, known.wheel.radius_m, rates)
+    if not settled_now:
         acceleration, lagged = measured or 0.0, sensors.vehicle_speed_m_s
     elif measured is not None:
         acceleration = state.acceleration_m_s2 + rates.sensor_share * (measured - state.acceleration_m_s2)
@@ -179,11 +181,11 @@ def moved(state: EstimatorState, known: WheelSetup, rates: Rates, sensors: Senso
     measured_n = sensors.vertical_load_n
     if measured_n is None:
         load_n = known.static_load_n + known.load_by_acceleration * acceleration
-    elif follows:
+    elif settled_now:
         load_n = state.load_n + rates.sensor_share * (measured_n - state.load_n)
     else:
         load_n = measured_n
-    return Moved(acceleration, lagged, max(load_n, LEAST_LOAD * known.static_load_n))
+    return Moved(acceleration, lagged, max(load_n, LEAST_LOAD * known.static_load_n), settled_now)
 
 
 def stamp(
@@ -245,8 +247,7 @@ def stepped(
         Step [s].
     """
     now = moved(state, known, rates, sensors)
-    if state.settled and jumped(state.readings, sensors, known.wheel.radius_m, rates):
-        state.settled = False
+    state.settled = now.settled
     if frame.came:
         stamp(state, config, known, frame.seen, sensors.vehicle_speed_m_s)
     outcome = _under_wheel(state, known)
@@ -263,9 +264,9 @@ def stepped(
             dynamics = settled(dynamics, inputs, known.wheel, gains)
         onset_theta = state.robust.onset_theta
         fused = alone = fusion_step(dynamics, inputs, known.wheel, gains, None, onset_theta, step_s)
-        if theta_img is not None or fusion != dynamics:
-            # A class has one value wherever it is: beside a tyre that has shown this road it says nothing new.
-            unseen_img = theta_img if state.robust.stale else None
+        # A class has one value wherever it is: beside a tyre that has shown this road it says nothing new.
+        unseen_img = theta_img if state.robust.stale else None
+        if unseen_img is not None or fusion != dynamics:
             fused = fusion_step(fusion, inputs, known.wheel, gains, unseen_img, onset_theta, step_s)
         state.fusion, state.dynamics = fused.state, alone.state
         sample = Sample(
