@@ -254,8 +254,8 @@ def libraries(
         for file, text in texts.items():
             (folder / file).write_text(text, encoding="utf-8")
         for platform in TRIPLES if everywhere else [this_platform()]:
-            place = FOLDERS_2.get(platform, platform) if fmi == 2 else platform
-            path = f"binaries/{place}/{name}.{ENDINGS[platform.partition('-')[2]]}"
+            parent = FOLDERS_2.get(platform, platform) if fmi == 2 else platform
+            path = f"binaries/{parent}/{name}.{ENDINGS[platform.partition('-')[2]]}"
             made.setdefault(path, []).append(
                 _library(folder, _command(platform, everywhere), files, platform)
             )
