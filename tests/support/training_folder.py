@@ -4,10 +4,10 @@ import csv
 
 import cv2
 
-COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height"]
+COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height", "notes"]
 
 
-def row(file, split, label, *, mask="", sequence="", size=(64, 64)):
+def row(file, split, label, *, mask="", sequence="", size=(64, 64), notes=""):
     return {
         "file": file,
         "split": split,
@@ -18,6 +18,7 @@ def row(file, split, label, *, mask="", sequence="", size=(64, 64)):
         "licence": "made up",
         "width": size[0],
         "height": size[1],
+        "notes": notes,
     }
 
 
