@@ -36,4 +36,4 @@ def with_found_roads(pictures: Iterable[Picture], segmenter: RoadSegmenter) -> l
 def found_road(picture: Picture, segmenter: RoadSegmenter) -> FoundRoad:
     """A picture with the road that the segmenter finds, in place of a mask of its own."""
     drivable = segmenter.segment(picture.image()).drivable >= LEAST_DRIVABLE
-    return FoundRoad(**{**vars(picture), "mask": None}, found=drivable.astype(np.uint8))
+    return FoundRoad(**vars(picture) | {"mask": None, "found": drivable.astype(np.uint8)})

@@ -19,7 +19,6 @@ from trpac_core.vision.scene import NUMBERS, SceneHead, scene_numbers
 from .augment import camera_look
 from .data import Image, Picture, family_of, trained_on
 from .keeping import keep_arrays, kept_or_made
-from .night import by_night, night_patches
 from .patches import PatchSet, camera_spreads, draw_weights, judged_patches, training_patches
 from .scene_run import Steps, gather, head_beside, regression
 from .scene_set import AT_ONCE, SceneSet, scenes_of_pictures
@@ -103,7 +102,7 @@ class Towers:
             model.graph.output.append(onnx.helper.make_empty_tensor_value_info(name))
         for array in model.graph.initializer:
             if array.name in (WEIGHT, BIAS):
-                array.CopyFrom(onnx.numpy_helper.from_array(0.0 * arrays[array.name], array.name))
+                array.CopyFrom(onnx.numpy_helper.from_array(np.zeros_like(arrays[array.name]), array.name))
         del model.metadata_props[:]
         content = model.SerializeToString()
         self.name = hashlib.sha256(content).hexdigest()[:12]
@@ -169,18 +168,14 @@ def logits_of(seen: Embedded, head: Linear, scene: SceneHead | None = None) -> N
 def training_set(
     towers: Towers, given: argparse.Namespace, pictures: Sequence[Picture], segmenter: Segmenter, steps: Steps
 ) -> Embedded:
-    """Training patches as other cameras show them: real and rendered in their scenes, in other weather, by night."""
+    """Training patches as other cameras show them: those of `scene_run.gather`, and dry ones in other weather."""
 
     def make() -> Embedded:
         rng = np.random.default_rng(CUTTING_SEED)
         real = trained_on(pictures, given.without)
-        shown = [
-            training_patches(weathered(real, CUTTING_SEED), CUTTING_SEED),
-            night_patches(by_night(real, segmenter, CUTTING_SEED), CUTTING_SEED),
-        ]
-        anew = [towers.embed(_by_other_cameras(rng, part)) for part in shown]
-        beside = gather(given, pictures, steps).by_other_cameras(rng)
-        return together([*anew, towers.embed_in_scenes(beside)])
+        anew = _by_other_cameras(rng, training_patches(weathered(real, CUTTING_SEED), CUTTING_SEED))
+        beside = gather(given, pictures, segmenter, steps).by_other_cameras(rng)
+        return together([towers.embed(anew), towers.embed_in_scenes(beside)])
 
     name = f"embedded-{towers.name}-{given.effort:g}{''.join(f'-without-{s}' for s in sorted(given.without))}.npz"
     return kept_or_made(given.kept, name, load=_load, make=make, save=_save)

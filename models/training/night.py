@@ -14,11 +14,13 @@ import numpy as np
 
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.networks import RoadSegmenter
+from trpac_core.vision.scene import SCENE_HEIGHT_PX, SCENE_WIDTH_PX, scene_of
 
 from .data import Image, Picture
 from .found_roads import FoundRoad, found_road
-from .patches import PatchSet, patch_set, random_patches
-from .weathered import Light, Range, bytes_of, light_of, mirror_of
+from .patches import patch_set, patches_from
+from .scene_set import SceneSet
+from .weathered import REDUCED, Light, Range, bytes_of, light_of, mirror_of
 
 PATCHES = 4
 """Cut from each picture by night."""
@@ -121,10 +123,17 @@ def by_night(pictures: Iterable[Picture], segmenter: RoadSegmenter, seed: int) -
     ]
 
 
-def night_patches(pictures: Iterable[Night], seed: int) -> PatchSet:
-    """Random patches of pictures by night."""
+def night_scenes(pictures: Iterable[Night], seed: int) -> SceneSet:
+    """Random patches of pictures by night, in their scenes."""
     rng = np.random.default_rng(seed)
-    return patch_set((random_patches(rng, p, PATCHES), int(p.surface), p.origin) for p in pictures)
+    groups, scenes = [], []
+    for picture in pictures:
+        image = picture.image()
+        groups.append((patches_from(rng, picture, image, PATCHES), int(picture.surface), picture.origin))
+        scenes.append(scene_of(image))
+    patches = patch_set(groups)
+    shape = (-1, SCENE_HEIGHT_PX, SCENE_WIDTH_PX, 3)
+    return SceneSet(patches, np.array(scenes, np.uint8).reshape(shape)[patches.pictures])
 
 
 def darkened(rng: np.random.Generator, image: Image, road: Light, surface: Surface) -> Image:
@@ -200,8 +209,10 @@ def _lamps(rng: np.random.Generator, horizon: float, height: int, width: int) ->
         radius = max(1, round(_log_uniform(rng, LAMP_SIZE) * width))
         colour = LAMP_COLOURS[rng.integers(len(LAMP_COLOURS))] * _log_uniform(rng, LAMP_LIGHT)
         cv2.circle(lamps, (int(rng.uniform(0, width)), int(row)), radius, colour.tolist(), -1)
-    near, far = (cv2.GaussianBlur(lamps, (0, 0), size * width) for size in HALOS)
-    return lamps + near + np.float32(rng.uniform(*FAINT_HALO)) * far
+    small = cv2.resize(lamps, None, fx=1.0 / REDUCED, fy=1.0 / REDUCED, interpolation=cv2.INTER_AREA)
+    near, far = (cv2.GaussianBlur(small, (0, 0), size * width / REDUCED) for size in HALOS)
+    halo = near + np.float32(rng.uniform(*FAINT_HALO)) * far
+    return lamps + cv2.resize(halo, (width, height), interpolation=cv2.INTER_LINEAR)
 
 
 def _taken(rng: np.random.Generator, light: Light) -> Light:

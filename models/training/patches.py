@@ -130,8 +130,13 @@ def reduced(image: Image, box: tuple[float, float, float, float]) -> Image:
 
 def random_patches(rng: np.random.Generator, picture: Picture, count: int) -> list[Image]:
     """Patches at random places, scales and aspects on the road of one picture, each inside its box or mask."""
+    return patches_from(rng, picture, picture.image(), count)
+
+
+def patches_from(rng: np.random.Generator, picture: Picture, image: Image, count: int) -> list[Image]:
+    """See `random_patches`; `image` is what the picture shows."""
     stretch = rng.uniform(*WEB_STRETCH)
-    image, road = unsquashed(picture, picture.image(), stretch), picture.road()
+    image, road = unsquashed(picture, image, stretch), picture.road()
     if road is not None:
         return _patches_in_mask(rng, image, unsquashed(picture, road, stretch), count, ASPECTS, LEAST_ROADS)
     wide = picture.wide_box

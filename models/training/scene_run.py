@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_softmax, softmax
 
-from trpac_core.vision.networks import SurfaceClassifier
+from trpac_core.vision.networks import RoadSegmenter, Segmenter, SurfaceClassifier
 from trpac_core.vision.scene import SceneHead, scene_numbers, scene_of
 
 from . import calibrate, cards, scores
@@ -24,6 +24,7 @@ from .annotate import annotate, sha256_of
 from .cards import SCENE_BEGIN, SCENE_END
 from .data import Picture, judged_groups, trained_on
 from .keeping import kept_or_made
+from .night import by_night, night_scenes
 from .patches import Drawn, draw_weights, judged_patches, thinned, training_patches
 from .rendered import (
     FIRST_SCENE_WORLD,
@@ -61,7 +62,8 @@ def ship_scene(
     With a `temperature` that was learned elsewhere, that is the calibration.
     """
     alone = patches_alone(file, given.threads)
-    train = gather(given, pictures, steps)
+    segmenter = Segmenter(file.parent / "segmenter.onnx", given.threads)
+    train = gather(given, pictures, segmenter, steps)
     head = learn_head(alone, train, given.seed)
     annotate(file, {"scene": head.to_text()})
     classifier = SurfaceClassifier(file, given.threads)
@@ -87,8 +89,10 @@ def patches_alone(file: Path, threads: int) -> SurfaceClassifier:
         return SurfaceClassifier(bare, threads)
 
 
-def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps) -> SceneSet:
-    """What it learns from: patches of the training pictures, and of worlds that the network has not seen."""
+def gather(
+    given: argparse.Namespace, pictures: Sequence[Picture], segmenter: RoadSegmenter, steps: Steps
+) -> SceneSet:
+    """Patches in their scenes: of the training pictures, by night too, and of worlds that the network has not seen."""
     count = max(6, round(given.effort * WORLDS))
     first = SEED_RANGES["train"].start + FIRST_SCENE_WORLD
 
@@ -108,7 +112,8 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
     cut = training_patches(real, CUTTING_SEED)
     drawn = kept_or_made(given.kept, f"scenes-{count}.npz", load=load_scenes, make=draw, save=save_scenes)
     drawn = SceneSet(drawn.patches, with_roadsides(drawn.scenes, CUTTING_SEED))
-    return all_of([scenes_of_pictures(cut, real), drawn])
+    nights = night_scenes(by_night(real, segmenter, CUTTING_SEED), CUTTING_SEED)
+    return all_of([scenes_of_pictures(cut, real), nights, drawn])
 
 
 def learn_head(classifier: SurfaceClassifier, train: SceneSet, seed: int) -> SceneHead:

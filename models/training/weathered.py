@@ -60,7 +60,7 @@ GRAIN_PX, GRAIN = 3.0, (0.5, 2.0)
 """Blur without which the road's grain is left [px], and its limits [-]. Nothing is sown that the picture has not got: a
 noise of our own would be learned as the mark of water and snow."""
 REDUCED = 4
-"""The mirror is reckoned in a picture this much smaller: it is blurred anyway."""
+"""Mirrors and halos are reckoned in a picture this much smaller: they are blurred anyway."""
 
 
 @dataclass(frozen=True)

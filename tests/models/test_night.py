@@ -9,6 +9,7 @@ from models.training.data import Picture
 from models.training.patches import draw_weights
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.networks import RoadMasks
+from trpac_core.vision.scene import scene_of
 
 HEIGHT, WIDTH = 160, 240
 
@@ -89,7 +90,9 @@ def test_pictures_by_day_are_shown_by_night_with_their_class(tmp_path):
     assert [each.surface for each in nights] == [Surface.DRY, Surface.WET]
     assert all(each.night and each.origin == "night/condition_web" for each in nights)
     assert (nights[0].image() == nights[0].image()).all()
-    cut = night.night_patches(nights, seed=1)
+    seen = night.night_scenes(nights, seed=1)
+    cut = seen.patches
+    np.testing.assert_array_equal(seen.scenes[0], scene_of(nights[0].image()))
     assert len(cut) == 2 * night.PATCHES
     assert set(cut.sources) == {"night/condition_web"}
     assert draw_weights(cut).sum() == pytest.approx(1.0)

@@ -49,7 +49,7 @@ def test_a_problem_is_told_with_its_manifest(streets):
     write_manifest(
         streets / "manifest_more.csv", [row("street_conditions/dry/unknown_1.png", "train", "dry")]
     )
-    with pytest.raises(data.DataFolderError, match="manifest_more.csv, line 2: .*expected one of cws8262"):
+    with pytest.raises(data.DataFolderError, match=r"manifest_more\.csv, line 2: .*expected one of cws8262"):
         data.read_manifest(streets)
 
 
