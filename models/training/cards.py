@@ -277,13 +277,12 @@ def with_head(card: str, head: str, data: str) -> str:
 def head_section(table_left_out: str, *, patches: int, ridge: float, temperature: float, command: str) -> str:
     """What the card of surface.onnx tells of the head."""
     return f"""\
-The linear layer, learned anew with the towers at rest (`{command}`): {patches} patches of the training pictures, of dry
-dash pictures wet and under snow, of day pictures by night (`models/training/night.py`) and of rendered worlds, each as
-another camera would show it; multinomial regression, classes equal, sources within a class by fixed shares, a ridge of
-{ridge:g} nat on half of the square of how far the weights go from the towers' own. T = {temperature:.3f} is learned
-from sources that were left out of the head in turn, each counted alike. Their scores
-(`python -m models.training.left_out --data DIR`), a picture by fixed patches on its road, in their scene; the flag is
-up from the confidence that keeps 2 % wrong on the other sources:
+The linear layer, learned anew with the towers at rest (`{command}`): {patches} patches of the training pictures, of
+those by day also by night (`models/training/night.py`), and of rendered worlds; multinomial regression, classes equal,
+sources within a class by fixed shares, a ridge of {ridge:g} nat on half of the square of how far the weights go from
+the towers' own. T = {temperature:.3f} is learned from sources that were left out of the head in turn, each counted
+alike. Their scores (`python -m models.training.left_out --data DIR`), a picture by fixed patches on its road, in their
+scene; the flag is up from the confidence that keeps 2 % wrong on the other sources:
 
 {table_left_out}
 
@@ -313,10 +312,10 @@ def scene_section(
 A patch is grey, but the road is packed snow where its verge is as grey. {len(NUMBERS)} numbers of the picture around
 a patch (`trpac_core/vision/scene.py`) times a matrix are added to its logits; whoever judges patches without their
 picture leaves it out. Learned last, the rest fixed, by multinomial regression with a ridge: {patches} patches of the
-real training pictures and of rendered worlds that the network had not seen (seeds from
+real training pictures, those by day also by night, and of rendered worlds that the network had not seen (seeds from
 {SEED_RANGES["train"].start + FIRST_SCENE_WORLD}; trees and houses painted beside most of their roads,
-`models/training/roadside.py`), each with its picture as two undisturbed cameras would show both, drawn by the same
-shares (`python -m models.training --only scene` does this again). Logits per standard deviation:
+`models/training/roadside.py`), each with its picture as undisturbed cameras would show both, drawn by the same
+shares. Logits per standard deviation:
 
 {weights}
 

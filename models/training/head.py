@@ -14,23 +14,19 @@ from numpy.typing import NDArray
 
 from trpac_core.vision.networks import Segmenter
 from trpac_core.vision.onnx_runtime import ort
-from trpac_core.vision.scene import NUMBERS, SceneHead, scene_numbers
+from trpac_core.vision.scene import SceneHead, scene_numbers
 
-from .augment import camera_look
-from .data import Image, Picture, family_of, trained_on
+from .data import Picture, family_of
 from .keeping import keep_arrays, kept_or_made
-from .patches import PatchSet, camera_spreads, draw_weights, judged_patches, training_patches
+from .night import SHOWN
+from .patches import draw_weights, judged_patches
 from .scene_run import Steps, gather, head_beside, regression
 from .scene_set import AT_ONCE, SceneSet, scenes_of_pictures
-from .weathered import weathered
 
 WEIGHT, BIAS = "classifier.weight", "classifier.bias"
 """The head's arrays in the network's file: shapes (3, m) and (3,)."""
 RIDGE = 0.06
 """Half of the square of how far the weights go from what they were counts so much in the loss [nat]."""
-CUTTING_SEED = 41
-SHOWN_ANEW = ("weathered/", "night/")
-"""What the origin of pictures shown in other weather or light begins with."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +49,7 @@ class Embedded:
     ----------
     embeddings : float32, shape (n, m)
     softness : float64, shape (n,), factor of the logits of patches that look disturbed [-]
-    numbers : float64, shape (n, 9), of the scenes; NaN where a patch came without its picture
+    numbers : float64, shape (n, 9), of the scenes, see `scene_numbers`
     labels : int64, shape (n,), class index
     sources : str, shape (n,), see `Picture.origin`
     pictures : int64, shape (n,), number of the picture that the patch was cut from
@@ -74,14 +70,7 @@ class Embedded:
     def families(self) -> NDArray[np.str_]:
         """Family of the camera that took each patch, however it is shown, shape (n,)."""
         names, index = np.unique(self.sources, return_inverse=True)
-        return np.array([family_of(taken_by(str(name))) for name in names])[index]
-
-
-def taken_by(origin: str) -> str:
-    """The source of pictures of an origin, however they are shown."""
-    for shown in SHOWN_ANEW:
-        origin = origin.removeprefix(shown)
-    return origin
+        return np.array([family_of(str(name).removeprefix(SHOWN)) for name in names])[index]
 
 
 class Towers:
@@ -111,26 +100,22 @@ class Towers:
         options.intra_op_num_threads = threads
         self._session = ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
 
-    def embed(self, patches: PatchSet, numbers: NDArray[np.float64] | None = None) -> Embedded:
-        """Patches as the towers see them, with the numbers of their scenes where there are some."""
+    def embed(self, seen: SceneSet) -> Embedded:
+        """Patches as the towers see them, with the numbers of their scenes."""
+        patches = seen.patches
         found = [
             self._session.run(self._outputs, {"patches": np.ascontiguousarray(part)})
             for part in np.split(patches.patches, range(AT_ONCE, len(patches), AT_ONCE))
         ]
         embeddings, softness = (np.concatenate(columns) for columns in zip(*found, strict=True))
-        blank = np.full((len(patches), len(NUMBERS)), np.nan)
         return Embedded(
             embeddings,
             softness.reshape(-1).astype(np.float64),
-            blank if numbers is None else numbers,
+            scene_numbers(patches.patches, seen.scenes),
             patches.labels,
             patches.sources,
             patches.pictures,
         )
-
-    def embed_in_scenes(self, seen: SceneSet) -> Embedded:
-        """Patches as the towers see them, with the numbers of their scenes."""
-        return self.embed(seen.patches, scene_numbers(seen.patches.patches, seen.scenes))
 
 
 def with_head(file: Path, head: Linear) -> None:
@@ -154,9 +139,8 @@ def learn(train: Embedded, head: Linear) -> Linear:
 
 
 def learn_scene(train: Embedded, head: Linear) -> SceneHead:
-    """What scenes add to a head's logits, of the patches that came with their pictures."""
-    beside = train.where(~np.isnan(train.numbers[:, 0]))
-    return head_beside(beside.numbers, beside, logits_of(beside, head))
+    """What scenes add to a head's logits."""
+    return head_beside(train.numbers, train, logits_of(train, head))
 
 
 def logits_of(seen: Embedded, head: Linear, scene: SceneHead | None = None) -> NDArray[np.float64]:
@@ -168,14 +152,10 @@ def logits_of(seen: Embedded, head: Linear, scene: SceneHead | None = None) -> N
 def training_set(
     towers: Towers, given: argparse.Namespace, pictures: Sequence[Picture], segmenter: Segmenter, steps: Steps
 ) -> Embedded:
-    """Training patches as other cameras show them: those of `scene_run.gather`, and dry ones in other weather."""
+    """The patches of `scene_run.gather` as they are: seen by other cameras they taught less of a source left out."""
 
     def make() -> Embedded:
-        rng = np.random.default_rng(CUTTING_SEED)
-        real = trained_on(pictures, given.without)
-        anew = _by_other_cameras(rng, training_patches(weathered(real, CUTTING_SEED), CUTTING_SEED))
-        beside = gather(given, pictures, segmenter, steps).by_other_cameras(rng)
-        return together([towers.embed(anew), towers.embed_in_scenes(beside)])
+        return towers.embed(gather(given, pictures, segmenter, steps))
 
     name = f"embedded-{towers.name}-{given.effort:g}{''.join(f'-without-{s}' for s in sorted(given.without))}.npz"
     return kept_or_made(given.kept, name, load=_load, make=make, save=_save)
@@ -188,22 +168,7 @@ def judged_set(towers: Towers, given: argparse.Namespace, pictures: Sequence[Pic
 
 
 def _judged(towers: Towers, pictures: Sequence[Picture]) -> Embedded:
-    return towers.embed_in_scenes(scenes_of_pictures(judged_patches(pictures), pictures))
-
-
-def together(parts: Sequence[Embedded]) -> Embedded:
-    """Several sets as one, picture numbers kept apart."""
-    offsets = np.cumsum([0] + [int(part.pictures.max(initial=-1)) + 1 for part in parts])
-    columns = [np.concatenate(same) for same in zip(*(vars(p).values() for p in parts), strict=True)]
-    shifted = [part.pictures + offset for part, offset in zip(parts, offsets[:-1], strict=True)]
-    return Embedded(*columns[:-1], np.concatenate(shifted))
-
-
-def _by_other_cameras(rng: np.random.Generator, patches: PatchSet) -> PatchSet:
-    looks: list[Image] = [
-        camera_look(rng, *seen) for seen in zip(patches.patches, camera_spreads(patches), strict=True)
-    ]
-    return PatchSet(np.stack(looks), patches.labels, patches.sources, patches.pictures)
+    return towers.embed(scenes_of_pictures(judged_patches(pictures), pictures))
 
 
 def _save(file: Path, embedded: Embedded) -> None:

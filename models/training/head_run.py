@@ -10,9 +10,9 @@ from trpac_core.vision.networks import Segmenter
 
 from . import cards, scores
 from .data import Picture
-from .head import RIDGE, Towers, learn, training_set, with_head
+from .head import RIDGE, Towers, learn, learn_scene, training_set, with_head
 from .left_out import compared
-from .scene_run import Steps, ship_scene
+from .scene_run import Steps, judged_sets, write_scene
 
 
 def ship_head(
@@ -23,7 +23,8 @@ def ship_head(
     segmenter = Segmenter(file.parent / "segmenter.onnx", given.threads)
     train = training_set(towers, given, pictures, segmenter, steps)
     told = compared(file, towers, train, given, pictures)
-    with_head(file, learn(train, towers.head))
+    head = learn(train, towers.head)
+    with_head(file, head)
     card = file.with_suffix(".md")
     section = cards.head_section(
         told.table,
@@ -34,4 +35,5 @@ def ship_head(
     )
     text = cards.with_head(card.read_text(encoding="utf-8"), section, cards.data_table(pictures))
     cards.write_card(card, text)
-    return ship_scene(file, given, pictures, worlds, steps, told.temperature)
+    scene, judged = learn_scene(train, head), judged_sets(given, pictures, worlds, steps)
+    return write_scene(file, scene, told.temperature, len(train.labels), given, judged)

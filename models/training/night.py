@@ -22,6 +22,8 @@ from .patches import patch_set, patches_from
 from .scene_set import SceneSet
 from .weathered import REDUCED, Light, Range, bytes_of, light_of, mirror_of
 
+SHOWN = "night/"
+"""What the origin of a picture shown by night begins with."""
 PATCHES = 4
 """Cut from each picture by night."""
 AS_THEY_ARE = ("seq_extreme",)
@@ -101,7 +103,7 @@ class Night(FoundRoad):
     @property
     def origin(self) -> str:
         """See `Picture.origin`."""
-        return f"night/{self.source}"
+        return f"{SHOWN}{self.source}"
 
     def road(self) -> Image:
         """See `Picture.road`."""

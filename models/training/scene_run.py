@@ -50,24 +50,29 @@ Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 
 def ship_scene(
-    file: Path,
-    given: argparse.Namespace,
-    pictures: Sequence[Picture],
-    worlds: dict[str, int],
-    steps: Steps,
-    temperature: float | None = None,
+    file: Path, given: argparse.Namespace, pictures: Sequence[Picture], worlds: dict[str, int], steps: Steps
 ) -> dict[str, scores.Judged]:
-    """Learn the scene's head of a network file, calibrate it anew, and write both into the file and its card.
-
-    With a `temperature` that was learned elsewhere, that is the calibration.
-    """
-    alone = patches_alone(file, given.threads)
+    """Learn the scene's head of a network file, calibrate it anew, and write both into the file and its card."""
     segmenter = Segmenter(file.parent / "segmenter.onnx", given.threads)
     train = gather(given, pictures, segmenter, steps)
-    head = learn_head(alone, train, given.seed)
+    head = learn_head(patches_alone(file, given.threads), train, given.seed)
+    return write_scene(file, head, None, len(train), given, judged_sets(given, pictures, worlds, steps))
+
+
+def write_scene(
+    file: Path,
+    head: SceneHead,
+    temperature: float | None,
+    patches: int,
+    given: argparse.Namespace,
+    judged: dict[str, SceneSet],
+) -> dict[str, scores.Judged]:
+    """Write a scene's head, learned from so many patches, and T into a network file and its card; scores by set.
+
+    Without a `temperature` it is that of the validation sets.
+    """
     annotate(file, {"scene": head.to_text()})
     classifier = SurfaceClassifier(file, given.threads)
-    judged = judged_sets(given, pictures, worlds, steps)
     temperature, reliabilities = calibrated(classifier, judged, given.seed, temperature)
     annotate(file, {"temperature": f"{temperature:.6f}"})
     calibrate.draw_reliability(
@@ -75,7 +80,7 @@ def ship_scene(
     )
     found = {name: _judge(classifier, part, temperature) for name, part in judged.items()}
     card = file.with_suffix(".md")
-    section = cards.scene_section(found, reliabilities, head, temperature=temperature, patches=len(train))
+    section = cards.scene_section(found, reliabilities, head, temperature=temperature, patches=patches)
     text = card.read_text(encoding="utf-8")
     cards.write_card(card, with_section(text, section, sha256_of(file), temperature))
     return found

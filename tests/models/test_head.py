@@ -7,9 +7,10 @@ from models.training import cards, head, left_out
 from models.training.data import Picture
 from models.training.head import Embedded, Linear
 from models.training.patches import PatchSet
+from models.training.scene_set import SceneSet
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.networks import SurfaceClassifier
-from trpac_core.vision.scene import NUMBERS
+from trpac_core.vision.scene import NUMBERS, scene_numbers
 
 WIDTH = 6
 FAMILIES = [families[0] for families in left_out.SOURCES.values()]
@@ -64,7 +65,7 @@ def test_softness_and_scene_count_as_in_the_network():
 def test_what_is_shown_anew_belongs_to_the_camera_that_took_it():
     seen = embedded(count=12)
     sources = np.array(
-        ["night/cws8262"] * 4 + ["weathered/drivable_camvid/0001"] * 4 + ["seq_wet_extreme/rain"] * 4
+        ["night/cws8262"] * 4 + ["night/drivable_camvid/0001"] * 4 + ["seq_wet_extreme/rain"] * 4
     )
     other = Embedded(*list(vars(seen).values())[:4], sources, seen.pictures)
     assert other.families[::4].tolist() == ["cws8262", "drivable_camvid", "seq_extreme"]
@@ -193,8 +194,10 @@ def test_towers_and_head_give_the_logits_of_the_network_and_another_head_others(
         // np.arange(1, 8, dtype=np.uint8)[:, None, None, None]
     )
     cut = PatchSet(patches, np.zeros(7, np.int64), np.full(7, "a"), np.arange(7))
+    scenes = rng.integers(0, 255, (7, 20, 32, 3)).astype(np.uint8)
     towers = head.Towers(network, threads=1)
-    seen = towers.embed(cut)
+    seen = towers.embed(SceneSet(cut, scenes))
+    np.testing.assert_array_equal(seen.numbers, scene_numbers(patches, scenes))
     told = SurfaceClassifier(network).verdicts(patches)
     np.testing.assert_allclose(head.logits_of(seen, towers.head), told.logits, atol=1e-5)
     new = Linear(rng.normal(size=(3, 3)), rng.normal(size=3))
