@@ -13,11 +13,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from fmu_src.native.build import build_native
 from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios.fmu_client.unpacking import unpack_unit
 
-from .cases import CASES, write_pictures
+from .cases import CASES, Case, write_pictures
 from .clients import CLIENTS
 from .operations import OPERATIONS
 from .outcome import Cell, Outcome
@@ -46,9 +47,15 @@ class Bench(NamedTuple):
 
 def prepare(folder: Path, units: Iterable[str] = CASES) -> Bench:
     """Build and unpack the units, and write the pictures."""
-    archives = {unit: build_unit(UNITS[unit], folder / f"{unit}.fmu") for unit in units}
-    folders = {unit: unpack_unit(archive, folder / unit) for unit, archive in archives.items()}
+    archives = {unit: build(CASES[unit], folder) for unit in units}
+    folders = {unit: unpack_unit(archive, folder / archive.stem) for unit, archive in archives.items()}
     return Bench(archives, folders, write_pictures(folder))
+
+
+def build(case: Case, folder: Path) -> Path:
+    """The archive of a unit; that of the native one has the library of this machine only."""
+    slave, target = UNITS[case.unit], folder / f"{case.title.replace(' ', '_')}.fmu"
+    return build_native(slave.info, target, everywhere=False) if case.native else build_unit(slave, target)
 
 
 def run_cells(bench: Bench, client: str, unit: str, operations: Iterable[str]) -> dict[Place, Cell]:

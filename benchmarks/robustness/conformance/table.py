@@ -25,6 +25,9 @@ libcosim hands over step sizes that are differences of times: it is compared to 
 without `TRPAC_std`, which is renewed block of time by block of time, one step earlier or later there. fmpy's own
 remoting serves units for another platform only (Windows units under wine), so "fmpy, own process" is fmpy behind a
 pipe. The C program is ours, on the FMI headers that fmpy ships.
+
+Units with Python are given a picture, native units the road's class by number, the plant neither. The C program runs
+native units in an empty environment, proxyfmu with nothing but itself and `unzip` on PATH: neither can find a Python.
 """
 
 
