@@ -10,7 +10,7 @@ import pytest
 from foreign_clients import need_client
 from long import beyond
 
-from benchmarks.robustness.conformance.cases import CASES
+from benchmarks.robustness.conformance.cases import TITLES
 from benchmarks.robustness.conformance.clients import CLIENTS
 from benchmarks.robustness.conformance.matrix import Bench, Place, prepare, run_cells
 from benchmarks.robustness.conformance.operations import OPERATIONS
@@ -38,7 +38,7 @@ def benches(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Bench]:
 
     @cache
     def of(unit: str) -> Bench:
-        if CASES[unit].native and shutil.which("cc") is None:
+        if TITLES[unit].native and shutil.which("cc") is None:
             pytest.skip("the native unit needs a C compiler")
         return prepare(tmp_path_factory.mktemp("conformance"), [unit])
 
@@ -47,7 +47,7 @@ def benches(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Bench]:
 
 def test_the_document_has_every_client_unit_and_operation() -> None:
     found = read_cells(DOCUMENT.read_text(encoding="utf-8"))
-    assert set(found) == {Place(c, u, o) for c in CLIENTS for u in CASES for o in OPERATIONS}
+    assert set(found) == {Place(c, u, o) for c in CLIENTS for u in TITLES for o in OPERATIONS}
 
 
 def test_a_document_is_read_as_it_was_written() -> None:
@@ -56,7 +56,7 @@ def test_a_document_is_read_as_it_was_written() -> None:
         Cell(Outcome.NOT_OFFERED, "a reason: of (some) kind"),
         Cell(Outcome.FAILED, "12."),
     )
-    cells = {Place(c, u, o): kinds[len(c + u + o) % 3] for c in CLIENTS for u in CASES for o in OPERATIONS}
+    cells = {Place(c, u, o): kinds[len(c + u + o) % 3] for c in CLIENTS for u in TITLES for o in OPERATIONS}
     read = read_cells(document(cells, {"Python": "3.11"}))
     assert read == cells
 

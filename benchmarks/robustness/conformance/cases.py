@@ -99,7 +99,7 @@ def _each(name: str, *values: float) -> dict[str, float]:
 
 _OF_A_WHEEL = ("TRPAC", "tyre_force", "slip", "TRPAC_dynamics", "image_confidence", "TRPAC_std", "K_v")
 
-_PYTHON_HOSTED = {
+CASES = {
     case.unit: case
     for case in (
         Case(
@@ -150,14 +150,9 @@ _PYTHON_HOSTED = {
         ),
     )
 }
-CASES = {
-    case.title: case
-    for case in (
-        *_PYTHON_HOSTED.values(),
-        *(replace(_PYTHON_HOSTED[unit], native=True) for unit in NATIVE_UNITS),
-    )
-}
-"""By title."""
+"""Units that need Python, by name."""
+TITLES = CASES | {case.title: case for case in (replace(CASES[unit], native=True) for unit in NATIVE_UNITS)}
+"""All units of the matrix, by title."""
 
 
 def write_pictures(folder: Path) -> tuple[Path, Path]:

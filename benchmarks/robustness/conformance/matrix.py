@@ -18,7 +18,7 @@ from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios.fmu_client.unpacking import unpack_unit
 
-from .cases import CASES, Case, write_pictures
+from .cases import TITLES, Case, write_pictures
 from .clients import CLIENTS
 from .operations import OPERATIONS
 from .outcome import Cell, Outcome
@@ -45,9 +45,9 @@ class Bench(NamedTuple):
     pictures: tuple[Path, Path]
 
 
-def prepare(folder: Path, units: Iterable[str] = CASES) -> Bench:
+def prepare(folder: Path, units: Iterable[str] = TITLES) -> Bench:
     """Build and unpack the units, and write the pictures."""
-    archives = {unit: build(CASES[unit], folder) for unit in units}
+    archives = {unit: build(TITLES[unit], folder) for unit in units}
     folders = {unit: unpack_unit(archive, folder / archive.stem) for unit, archive in archives.items()}
     return Bench(archives, folders, write_pictures(folder))
 
@@ -109,7 +109,7 @@ def _wait(child: subprocess.Popen[bytes], said: int) -> int | None:
 
 
 def run(
-    clients: Iterable[str] = CLIENTS, units: Iterable[str] = CASES, operations: Iterable[str] = OPERATIONS
+    clients: Iterable[str] = CLIENTS, units: Iterable[str] = TITLES, operations: Iterable[str] = OPERATIONS
 ) -> dict[Place, Cell]:
     """All cells of these clients, units and operations."""
     units, operations = list(units), list(operations)

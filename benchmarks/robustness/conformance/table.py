@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from .cases import CASES
+from .cases import TITLES
 from .clients import CLIENTS
 from .matrix import Place
 from .operations import OPERATIONS
@@ -51,7 +51,7 @@ def document(cells: Mapping[Place, Cell], versions: Mapping[str, str]) -> str:
     """The whole document."""
     reasons: dict[str, int] = {}
     lines = [HEAD, "Run on " + ", ".join(f"{name} {number}" for name, number in versions.items()) + ".", ""]
-    for unit in CASES:
+    for unit in TITLES:
         lines += [f"## {unit}", "", "| | " + " | ".join(c.title for c in CLIENTS.values()) + " |"]
         lines.append("|---" * (len(CLIENTS) + 1) + "|")
         lines += [_numbered(row, reasons) for row in rows(cells, unit)] + [""]
@@ -74,7 +74,7 @@ def read_cells(text: str) -> dict[Place, Cell]:
     found: dict[Place, Cell] = {}
     for section in text.split("\n## ")[1:]:
         unit, *lines = section.splitlines()
-        if unit not in CASES:
+        if unit not in TITLES:
             continue
         for line in lines:
             title, *cells = [part.strip() for part in line.strip("|").split("|")]
