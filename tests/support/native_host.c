@@ -174,7 +174,7 @@ static long resident_kb(void)
 static void last_long(long steps, long instances)
 {
     double out[MOST];
-    long begun = 0;
+    long begun = resident_kb(); /* which takes a page itself */
     fmi2Component unit = opened(-1);
     for (long k = 0; k < steps; k++) {
         if (k == steps / 10)
