@@ -5,9 +5,13 @@
    fuzz SEED N   calls everything with values of no sense, and restores damaged states
    bench IN      the time of a step with set and get
    long IN S N   S steps of one instance, then N instances of one step; prints the resident memory of both, begin and end [kB]
-   Rows are doubles: step size, the eight real inputs, road_class, frame_id. With -DFOUR_WHEELS it fuzzes the unit of four wheels. */
+   Rows are doubles: step size, the eight real inputs, road_class, frame_id. With -DFOUR_WHEELS it fuzzes the unit of four wheels; with -DFMI_3 it hosts one for FMI 3.0. */
 #define _POSIX_C_SOURCE 200809L
+#ifdef FMI_3
+#include "native_fmi3.h"
+#else
 #include "fmi2Functions.h"
+#endif
 #include "tables.h"
 
 #include <math.h>
