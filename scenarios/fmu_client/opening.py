@@ -48,10 +48,14 @@ def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: 
 
 
 class Instance:
-    """An initialised instance of a unit, with variables by name."""
+    """An initialised instance of a unit, with variables by name.
+
+    `native` tells whether it is a unit in C: it needs no other tool, and has no networks for pictures.
+    """
 
     def __init__(self, slave: FMU2Slave, description: Any, parameters: Mapping[str, float | str]) -> None:
         self.slave, self.variables = slave, description.modelVariables
+        self.native = not description.coSimulation.needsExecutionTool
         self._variables = {v.name: (v.valueReference, v.type) for v in self.variables}
         slave.setupExperiment(startTime=0.0)
         self.set(parameters)
