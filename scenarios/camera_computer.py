@@ -82,7 +82,7 @@ class CameraComputer:
 
 
 class CarMotion:
-    """The car's motion step by step, from readings that are filtered as within the unit.
+    """The car's motion step by step, from readings that are filtered as within the unit; an acceleration of 0 counts.
 
     Parameters
     ----------
