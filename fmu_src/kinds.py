@@ -23,9 +23,15 @@ def known_units(kind: str) -> list[str]:
 
 
 def build(
-    name: str, folder: Path, *, kind: str = PYTHON, flat: bool = False, everywhere: bool | None = None
+    name: str,
+    folder: Path,
+    *,
+    kind: str = PYTHON,
+    fmi: int = 2,
+    flat: bool = False,
+    everywhere: bool | None = None,
 ) -> Path:
-    """Build a unit into a folder; returns its path, NAME.fmu with _native and _flat before the dot.
+    """Build a unit into a folder; returns its path, NAME.fmu with _native, _fmi3 and _flat before the dot.
 
     Parameters
     ----------
@@ -33,6 +39,8 @@ def build(
         One of `known_units(kind)`.
     folder : Path
         Made where it is missing.
+    fmi : int
+        Version of FMI: 2 for 2.0; of a native unit also 3 for 3.0.
     flat : bool
         Names without dots, see `model_description`.
     everywhere : bool, optional
@@ -41,7 +49,7 @@ def build(
     Raises
     ------
     BuildError
-        There is no such unit of this kind, or it cannot be built.
+        There is no such unit of this kind and version of FMI, or it cannot be built.
     OSError
         The archive cannot be written.
     """
@@ -53,7 +61,12 @@ def build(
 
     if name not in (known := known_units(kind)):
         raise BuildError(f"{name!r} is not a {kind} unit; {suggestion(name, known)}")
-    target = folder / f"{name}{'_native' if kind == NATIVE else ''}{'_flat' if flat else ''}.fmu"
+    if fmi not in ((2, 3) if kind == NATIVE else (2,)):
+        raise BuildError(f"fmi is {fmi}; expected 2, or of a native unit also 3.")
+    ending = (
+        f"{'_native' if kind == NATIVE else ''}{'_fmi3' if fmi == 3 else ''}{'_flat' if flat else ''}.fmu"
+    )
+    target = folder / f"{name}{ending}"
     if kind == NATIVE:
-        return build_native(UNITS[name].info, target, flat=flat, everywhere=everywhere)
+        return build_native(UNITS[name].info, target, fmi=fmi, flat=flat, everywhere=everywhere)
     return build_unit(UNITS[name], target, flat=flat)

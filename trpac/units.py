@@ -9,9 +9,14 @@ from trpac_core.errors import TrpacError
 
 
 def build_fmu(
-    folder: str | Path, *, unit: str = "TrpacEstimator", kind: str = "python", flat: bool = False
+    folder: str | Path,
+    *,
+    unit: str = "TrpacEstimator",
+    kind: str = "python",
+    fmi: int = 2,
+    flat: bool = False,
 ) -> Path:
-    """Build a co-simulation unit (FMI 2.0) and validate it; returns its path.
+    """Build a co-simulation unit and validate it; returns its path.
 
     Parameters
     ----------
@@ -21,13 +26,15 @@ def build_fmu(
         TrpacEstimator, TrpacEstimator4W, ReferencePlant or TorquePulses.
     kind : str
         python, or native: TrpacEstimator or TrpacEstimator4W in C, whose host needs no Python (docs/native.md).
+    fmi : int
+        Version of FMI: 2 for 2.0; of a native unit also 3 for 3.0.
     flat : bool
         Whether the names of its variables are without dots.
 
     Raises
     ------
     TrpacError
-        There is no such unit of this kind, or it cannot be built.
+        There is no such unit of this kind and version of FMI, or it cannot be built.
     MissingExtraError
         Without the extra 'fmu'.
     """
@@ -36,7 +43,7 @@ def build_fmu(
 
         from fmu_src.kinds import build
 
-        path = build(unit, Path(folder), kind=kind, flat=flat)
+        path = build(unit, Path(folder), kind=kind, fmi=fmi, flat=flat)
         if problems := validate_fmu(str(path)):
             raise TrpacError("\n".join(f"{path}: {problem}" for problem in problems))
     return path

@@ -9,6 +9,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
+from fmu_src.kinds import NATIVE, build
 from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios.errors import ScenarioError
@@ -242,6 +243,12 @@ NO_FRAMES = pd.DataFrame({"row": [], "path": [], "frame": []})
 def test_another_unit_of_ours_is_said(tmp_path):
     archive = build_unit(UNITS["TrpacEstimator4W"], tmp_path / "other.fmu")
     with pytest.raises(ScenarioError, match=r"other\.fmu: is TrpacEstimator4W; expected TrpacEstimator"):
+        run_unit(archive, {}, ONE_ROW, NO_FRAMES, 0.001)
+
+
+def test_a_unit_for_another_version_of_fmi_is_said(native_file, tmp_path):
+    archive = build("TrpacEstimator", tmp_path, kind=NATIVE, fmi=3, everywhere=False)
+    with pytest.raises(ScenarioError, match=r"_fmi3\.fmu: is for FMI 3\.0; expected a unit for FMI 2\.0"):
         run_unit(archive, {}, ONE_ROW, NO_FRAMES, 0.001)
 
 

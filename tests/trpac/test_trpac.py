@@ -353,10 +353,11 @@ def test_frames_of_a_drive_are_remembered():
 
 
 def test_a_unit_is_built_in_each_kind_and_another_is_refused(native_file, tmp_path):
-    path = trpac.build_fmu(tmp_path, kind="native", flat=True)
-    assert path == tmp_path / "TrpacEstimator_native_flat.fmu"
-    with zipfile.ZipFile(path) as archive:
-        assert "sources/trpac.c" in archive.namelist()
+    for fmi, name in ((2, "TrpacEstimator_native_flat.fmu"), (3, "TrpacEstimator_native_fmi3_flat.fmu")):
+        path = trpac.build_fmu(tmp_path, kind="native", fmi=fmi, flat=True)
+        assert path == tmp_path / name
+        with zipfile.ZipFile(path) as archive:
+            assert f"sources/fmi{fmi}.c" in archive.namelist()
     assert trpac.build_fmu(tmp_path, unit="TorquePulses").name == "TorquePulses.fmu"
     for given, said in (
         ({"kind": "rust"}, "kind is 'rust'; expected one of python, native"),
@@ -364,6 +365,7 @@ def test_a_unit_is_built_in_each_kind_and_another_is_refused(native_file, tmp_pa
             {"unit": "ReferencePlant", "kind": "native"},
             "'ReferencePlant' is not a native unit; Known: TrpacE",
         ),
+        ({"fmi": 3}, "fmi is 3; expected 2, or of a native unit also 3"),
         ({"unit": "TrpacEstimater"}, "did you mean 'TrpacEstimator'"),
     ):
         with pytest.raises(trpac.TrpacError, match=said):
