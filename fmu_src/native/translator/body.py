@@ -237,8 +237,6 @@ class Body(Loops):
             self.aliases[name] = e
             return
         self.fresh(name, e.type)
-        if e.stack:
-            self.store(name)
         self.step(Step(safe(name), e, name))
 
     def large(self, name: str, kind: Type, value: ast.expr) -> None:
@@ -387,6 +385,20 @@ class Body(Loops):
             raise self.refuse(node, f"an array of shape {e.type.shape} where {kind.shape} is needed.")
         self.step(Step(target, e))
 
+    def fill_stacked(self, target: str, kind: Type, node: ast.Call) -> None:
+        """Write rows of records under each other to the arrays of a record."""
+        row = 0
+        for part in [self.expr(rows) for rows in node.args]:
+            name = self.temporary_array(part.type)
+            self.step(Step(name, part, name))
+            rows = self.local_array(name, part.type)
+            for f in kind.fields:
+                column = self.elementwise(
+                    [rows], lambda items, f=f: items[0].member(f.name, DOUBLE), DOUBLE, node
+                )
+                self.step(Step(part_of(target, f.name), column, row=row))
+            row += part.type.shape[0]
+
     def fill_record(self, target: str, kind: Type, node: ast.expr) -> None:
         """Write a record with arrays to a place."""
         address = target[1:] if target.startswith("*") else f"&{target}"
@@ -398,6 +410,9 @@ class Body(Loops):
                 # Those first that can share the loop that waits.
                 for field in sorted(kind.fields, key=lambda f: f.type.shape != self.waiting_shape):
                     self.fill_part(part_of(target, field.name), field.type, values[field.name], node)
+                return
+            if getattr(called, "__name__", "") == "stacked":
+                self.fill_stacked(target, kind, node)
                 return
             if called is not MISSING:
                 self.flush()

@@ -31,10 +31,12 @@ HELPERS = {
 static double greatest(const double *values, int n)
 {
     double most = values[0];
-    for (int j = 1; j < n; j++)
-        if (!(values[j] <= most))
-            most = most != most ? most : values[j];
-    return most;
+    bool odd = most != most;
+    for (int j = 1; j < n; j++) {
+        most = values[j] > most ? values[j] : most;
+        odd |= values[j] != values[j];
+    }
+    return odd ? NAN : most;
 }""",
     "first_greatest": """\
 static int first_greatest(const double *values, int n)
@@ -97,6 +99,8 @@ ELEMENTWISE = {
     "np.maximum": "maximum({}, {})",
 }
 """Functions of every element."""
+APART = ("exp", "log")
+"""Those of the C library: a loop without them works out two numbers at once."""
 ARRAY_FUNCTIONS = frozenset((*HELPERS, *ELEMENTWISE, "total", "over_rows", "stacked"))
 """All that is not translated but known."""
 
@@ -153,14 +157,6 @@ class Loops(Expressions):
 
     def step(self, step: Step) -> None:
         """Put a statement of every element into the loop that waits, or begin another."""
-        if step.value.stack:
-            row = 0
-            for part in step.value.stack:
-                self.step(Step(step.target, part, step.name, row))
-                row += part.type.shape[0]
-            if step.name:
-                self.flush()
-            return
         sums = {s.name for s in self.steps if s.sums}
         if self.steps and (
             step.value.type.shape != self.steps[0].value.type.shape or step.value.names & sums
@@ -279,7 +275,8 @@ class Loops(Expressions):
             def make(items: list[Expression]) -> Expression:
                 return Expression(form.format(*(item.text for item in items)), DOUBLE)
 
-            return self.elementwise([self.operand(v) for v in node.args], make, DOUBLE, node)
+            made = self.elementwise([self.operand(v) for v in node.args], make, DOUBLE, node)
+            return self._apart(made) if name in APART and made.at is not None else made
         if name == "np.where":
             return self._where(node)
         if name == "np.zeros":
@@ -300,6 +297,18 @@ class Loops(Expressions):
                 self._total(parts[0], name) if name in ("total", "over_rows") else self._helper(name, parts)
             )
         return None
+
+    def _apart(self, e: Expression) -> Expression:
+        """An array worked out in a loop of its own, before the one that waits if that makes no part of it."""
+        if any(self.waiting(name) for name in e.names):
+            self.flush()
+        waiting, self.steps = self.steps, []
+        result = self.temporary_array(e.type)
+        self.store(result)
+        self.step(Step(safe(result), e, result))
+        self.flush()
+        self.steps = waiting
+        return self.local_array(result, e.type)
 
     def _where(self, node: ast.Call) -> Expression:
         parts = [self.expr(value, DOUBLE) for value in node.args]

@@ -14,7 +14,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from .source import Unsupported, definition, source_of, summary
-from .types import Type, Types, comment, initialiser, safe
+from .types import ARRAY, Type, Types, comment, initialiser, safe
 
 WIDTH = 110
 
@@ -44,7 +44,8 @@ static inline bool before(double a, double b) { return a < b || (b != b && a == 
 class Function:
     """A function or method of Python's and its form in C.
 
-    `updates` tells that its first argument is changed in place to what it returns.
+    `updates` tells that its first argument is changed in place to what it returns, `inline` that loops call it for each
+    element of an array.
     """
 
     python: Any
@@ -53,11 +54,12 @@ class Function:
     returns: Type
     parameters: tuple[tuple[str, Type], ...]
     updates: bool
+    inline: bool
 
     @property
     def private(self) -> bool:
-        """Whether the name begins with an underscore."""
-        return self.node.name.startswith("_")
+        """Whether only the file itself calls it: its name begins with an underscore, or loops call it."""
+        return self.inline or self.node.name.startswith("_")
 
     @property
     def by_pointer(self) -> bool:
@@ -82,7 +84,7 @@ class Function:
                 listed.append(f"{kind.c} {safe(name)}")
         by_value = not (self.by_pointer or self.updates or self.returns.kind == "nothing")
         returns = self.returns.c if by_value else "void"
-        return f"{'static ' if self.private else ''}{returns} {self.c}({', '.join(listed) or 'void'})"
+        return f"{'static ' * self.private}{'inline ' * self.inline}{returns} {self.c}({', '.join(listed) or 'void'})"
 
 
 class Program:
@@ -135,7 +137,8 @@ class Program:
             and parameters[0][1] == returns
             and _updates(node, parameters[0][0])
         )
-        return Function(python, node, f"{short}_{node.name.lstrip('_')}", returns, tuple(parameters), updates)
+        c = f"{short}_{node.name.lstrip('_')}"
+        return Function(python, node, c, returns, tuple(parameters), updates, ARRAY in hints.values())
 
     def constant(self, module: str, name: str, value: Any) -> tuple[str, Type]:
         """The name in C of a module's constant, and its type."""

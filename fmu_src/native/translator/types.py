@@ -135,7 +135,7 @@ class Types:
         origin, arguments = get_origin(hint), get_args(hint)
         if origin is Annotated and isinstance(hint.__metadata__[0], tuple):
             item = get_args(arguments[0])[0] if get_origin(arguments[0]) is list else arguments[0]
-            return array_of(self.of(item, where), hint.__metadata__[0])
+            return self.array(self.of(item, where), hint.__metadata__[0])
         if origin in (Union, types.UnionType) and len(arguments) == 2 and arguments[1] is type(None):
             return self.optional(self.of(arguments[0], where))
         if origin is tuple and ... not in arguments:
@@ -143,6 +143,15 @@ class Types:
         if isinstance(hint, type):
             return self._class(hint, where)
         raise Unsupported(f"{where}: {hint} has no type in C.")
+
+    def array(self, item: Type, shape: tuple[int, ...]) -> Type:
+        """An array of a shape; of records a record of arrays."""
+        if item.kind != "record":
+            return array_of(item, shape)
+        fields = tuple(Field(f.name, self.array(f.type, shape), f.text) for f in item.fields)
+        return self._named(
+            Type(f"{item.c}_{'x'.join(map(str, shape))}", "record", fields, python=item.python)
+        )
 
     def optional(self, item: Type) -> Type:
         """`T | None`."""
