@@ -38,9 +38,6 @@ class Calls(Arrays):
             if node.func.attr == "_replace":
                 return self._replaced(base, node)
             return self._method(base, node.func.attr, node)
-        if isinstance(node.func, ast.Name) and node.func.id == "cls":
-            python = self.function.python
-            value = python.__globals__[python.__qualname__.rpartition(".")[0]]
         if value in (float, bool, int):
             kind = {float: DOUBLE, int: INT, bool: BOOL}[value]
             e = self.plain(self.expr(node.args[0]))
@@ -63,6 +60,10 @@ class Calls(Arrays):
             kind = self.program.types.of(value, f"{self.source.file}:{node.lineno}")
             if issubclass(value, enum.Enum):
                 return Expression(f"({kind.c}){self.expr(node.args[0]).bound(UNARY)}", kind, UNARY)
+            if kind.big:
+                name = self.temporary(kind)
+                self.fill(name, kind, node)
+                return Expression(name, kind)
             return self.record(kind, self.values_of(kind, node))
         if isinstance(value, FunctionType) or hasattr(value, "__func__"):
             return self.called(self.program.require(value), [], node)
@@ -165,23 +166,15 @@ class Calls(Arrays):
         return given
 
     def record(self, kind: Type, given: dict[str, Any]) -> Expression:
-        """A record of expressions and default values."""
-        if kind.big:
-            name = self.temporary(kind)
-            for f in kind.fields:
-                self.fill(f"{name}.{safe(f.name)}", f.type, given[f.name])
-            return Expression(name, kind)
+        """A record of expressions, of their source, and of default values."""
         parts = []
         for f in kind.fields:
             value = given[f.name]
-            if isinstance(value, ast.expr):
-                e = self.expr(value, f.type)
-                parts.append(e if e.type.kind == "array" else self.coerced(e, f.type))
+            value = self.expr(value, f.type) if isinstance(value, ast.expr) else value
+            if isinstance(value, Expression):
+                parts.append(value if value.type.kind == "array" else self.coerced(value, f.type))
             else:
                 parts.append(Expression(literal(value, f.type, self.source.file), f.type))
-        return self._made(kind, parts)
-
-    def _made(self, kind: Type, parts: list[Expression]) -> Expression:
         form = f"({kind.c}){{{{{', '.join(['{}'] * len(parts))}}}}}"
         return self.each(form, parts, [0] * len(parts), kind)
 
@@ -190,12 +183,7 @@ class Calls(Arrays):
         kind, given = base.type.item if base.type.kind == "array" else base.type, keywords_of(node)
         if kind.kind != "record" or kind.big:
             raise self.refuse(f"{base.type.c} with other fields, in an expression.")
-        values = {f.name: self.expr(given[f.name], f.type) for f in kind.fields if f.name in given}
-        parts = []
-        for f in kind.fields:
-            e = values[f.name] if f.name in values else self.field(base, f.name, f.type)
-            parts.append(e if e.type.kind == "array" else self.coerced(e, f.type))
-        return self._made(kind, parts)
+        return self.record(kind, {f.name: self.field(base, f.name, f.type) for f in kind.fields} | given)
 
     def _tuple(self, node: ast.Tuple, want: Type | None) -> Expression:
         kind = want.item if want is not None and want.kind == "optional" else want

@@ -118,7 +118,9 @@ class Expressions(Loops):
     def known(self, node: ast.expr) -> Any:
         """The value that a name or attribute has in the module; MISSING where it is none."""
         if isinstance(node, ast.Name) and node.id not in self.parameters | self.locals | self.aliases:
-            return self.function.python.__globals__.get(node.id, getattr(builtins, node.id, MISSING))
+            python = self.function.python
+            name = python.__qualname__.rpartition(".")[0] if node.id == "cls" else node.id
+            return python.__globals__.get(name, getattr(builtins, name, MISSING))
         if isinstance(node, ast.Attribute):
             owner = self.known(node.value)
             if isinstance(owner, ModuleType | type):

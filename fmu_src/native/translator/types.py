@@ -169,18 +169,8 @@ class Types:
         return self.named.setdefault(made.c, made)
 
     def definitions(self) -> list[str]:
-        """All types in C, each after those that it holds."""
-        done: dict[str, list[str]] = {}
-
-        def visit(kind: Type) -> None:
-            for inner in [*(f.type for f in kind.fields), kind.item]:
-                if inner is not None and inner.c in self.named:
-                    visit(self.named[inner.c])
-            done.setdefault(kind.c, _definition(kind))
-
-        for kind in self.named.values():
-            visit(kind)
-        return [line for lines in done.values() for line in [*lines, ""]]
+        """All types in C, each after those that it holds, as they were met."""
+        return [line for kind in self.named.values() for line in [*_definition(kind), ""]]
 
 
 def _definition(kind: Type) -> list[str]:
