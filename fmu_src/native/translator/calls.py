@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 import dataclasses
 import enum
+import inspect
 import math
+from collections.abc import Iterable
 from types import FunctionType
 from typing import Any
 
@@ -30,6 +32,11 @@ class Calls(Arrays):
         name = getattr(called, "__name__", "")
         name = f"np.{name}" if getattr(np, name, None) is called else name
         return name if name in ARRAY_FUNCTIONS else ""
+
+    def translated(self, called: Any) -> bool:
+        """Whether a function has to be translated."""
+        is_function = isinstance(called, FunctionType) or hasattr(called, "__func__")
+        return is_function and not self.array_function(called)
 
     def _call(self, node: ast.Call, want: Type | None) -> Expression:
         value = self.known(node.func)
@@ -64,8 +71,8 @@ class Calls(Arrays):
                 name = self.temporary(kind)
                 self.fill(name, kind, node)
                 return Expression(name, kind)
-            return self.record(kind, self.values_of(kind, node))
-        if isinstance(value, FunctionType) or hasattr(value, "__func__"):
+            return self.record(kind, self.given(value, kind.slots, node))
+        if self.translated(value):
             return self.called(self.program.require(value), [], node)
         raise self.refuse(f"{ast.unparse(node.func)} is not known to the translator.")
 
@@ -102,13 +109,15 @@ class Calls(Arrays):
         self, function: Function, before: list[Expression], node: ast.Call | None, target: str = ""
     ) -> Expression:
         """A call; what is large is written to `target`, a pointer, or to a new variable."""
-        parts = self._arguments(function, before, node)
-        returns, kinds = function.returns, [kind for _, kind in function.parameters]
-        spread = [p.type.kind == "array" and k.kind != "array" for p, k in zip(parts, kinds, strict=True)]
-        if any(spread) and not (function.by_pointer or function.updates):
+        returns, slots = function.returns, dict(function.parameters)
+        parts = self.parts_of(slots, self.given(function.python, slots, node, before))
+        pairs = list(zip(parts, slots.values(), strict=True))
+        if any(p.type.kind == "array" and k.kind != "array" for p, k in pairs) and not (
+            function.by_pointer or function.updates
+        ):
             form = f"{function.c}({', '.join(['{}'] * len(parts))})"
             return self.each(form, parts, [0] * len(parts), returns)
-        texts = [self._passed(part, kind) for part, kind in zip(parts, kinds, strict=True)]
+        texts = [self._passed(part, kind) for part, kind in pairs]
         if function.updates:
             if texts[0] != target:
                 raise self.refuse(f"{function.c} changes its first argument: assign what it returns to that.")
@@ -123,24 +132,6 @@ class Calls(Arrays):
         self.put(f"{function.c}({', '.join([slot, *texts])});")
         return array_at(name, returns) if returns.kind == "array" else Expression(name, returns)
 
-    def _arguments(
-        self, function: Function, before: list[Expression], node: ast.Call | None
-    ) -> list[Expression]:
-        names, python = [name for name, _ in function.parameters], function.python
-        given = dict(zip(names[len(before) :], node.args if node else [], strict=False)) | keywords_of(node)
-        defaults = dict(zip(reversed(names), reversed(python.__defaults__ or ()), strict=False))
-        defaults |= python.__kwdefaults__ or {}
-        parts = list(before)
-        for name, kind in function.parameters[len(before) :]:
-            if name in given:
-                e = self.expr(given[name], kind)
-                parts.append(e if "array" in (e.type.kind, kind.kind) else self.coerced(e, kind))
-            elif name in defaults:
-                parts.append(Expression(literal(defaults[name], kind, self.source.file), kind))
-            else:
-                raise self.refuse(f"{function.c} is called without {name}.")
-        return parts
-
     def _passed(self, e: Expression, kind: Type) -> str:
         """An argument as it is passed."""
         if kind.kind == "array":
@@ -149,32 +140,42 @@ class Calls(Arrays):
             return self.placed(e)
         return f"&{e.text}" if kind.big and not e.pointer else e.text
 
-    # Records
-
-    def values_of(self, kind: Type, node: ast.Call) -> dict[str, Any]:
-        """The values of a record's fields: expressions, or Python's defaults."""
-        given: dict[str, Any] = dict(zip((f.name for f in kind.fields), node.args, strict=False))
-        given |= keywords_of(node)
-        for name in given:
-            if kind.found(name) is None:
-                raise self.refuse(f"{kind.c}.{name}: {kind.left_out.get(name, 'is not known')}.")
-        for f in kind.fields:
-            if f.name not in given:
-                given[f.name] = default_of(kind.python, f.name)
-                if given[f.name] is MISSING:
-                    raise self.refuse(f"{kind.c} is made without {f.name}.")
+    def given(
+        self, python: Any, names: Iterable[str], node: ast.Call | None, before: Iterable[Expression] = ()
+    ) -> dict[str, Any]:
+        """What a function or a class is given, by name: expressions, their source, or Python's defaults."""
+        given = dict(zip(names, [*before, *(node.args if node else ())], strict=False)) | keywords_of(node)
+        self.check_names(python.__name__, names, given)
+        for name in names:
+            if name not in given:
+                given[name] = default_of(python, name)
+                if given[name] is inspect.Parameter.empty:
+                    raise self.refuse(f"{python.__name__} without {name}.")
         return given
 
-    def record(self, kind: Type, given: dict[str, Any]) -> Expression:
-        """A record of expressions, of their source, and of default values."""
+    def check_names(self, what: str, names: Iterable[str], given: Iterable[str]) -> None:
+        """Unsupported where something is given that has no name in C."""
+        for name in given:
+            if name not in names:
+                raise self.refuse(f"{what} has no {name} in C.")
+
+    def parts_of(self, slots: dict[str, Type], given: dict[str, Any]) -> list[Expression]:
+        """What is given, each as the type that is needed; an array is taken element by element."""
         parts = []
-        for f in kind.fields:
-            value = given[f.name]
-            value = self.expr(value, f.type) if isinstance(value, ast.expr) else value
-            if isinstance(value, Expression):
-                parts.append(value if value.type.kind == "array" else self.coerced(value, f.type))
-            else:
-                parts.append(Expression(literal(value, f.type, self.source.file), f.type))
+        for name, kind in slots.items():
+            value = given[name]
+            if isinstance(value, ast.expr):
+                value = self.expr(value, kind)
+            elif not isinstance(value, Expression):
+                value = Expression(literal(value, kind, self.source.file), kind)
+            parts.append(value if "array" in (value.type.kind, kind.kind) else self.coerced(value, kind))
+        return parts
+
+    # Records
+
+    def record(self, kind: Type, given: dict[str, Any]) -> Expression:
+        """A record of what its fields are given."""
+        parts = self.parts_of(kind.slots, given)
         form = f"({kind.c}){{{{{', '.join(['{}'] * len(parts))}}}}}"
         return self.each(form, parts, [0] * len(parts), kind)
 
@@ -183,7 +184,10 @@ class Calls(Arrays):
         kind, given = base.type.item if base.type.kind == "array" else base.type, keywords_of(node)
         if kind.kind != "record" or kind.big:
             raise self.refuse(f"{base.type.c} with other fields, in an expression.")
-        return self.record(kind, {f.name: self.field(base, f.name, f.type) for f in kind.fields} | given)
+        self.check_names(kind.c, kind.slots, given)
+        return self.record(
+            kind, {name: self.field(base, name, of) for name, of in kind.slots.items()} | given
+        )
 
     def _tuple(self, node: ast.Tuple, want: Type | None) -> Expression:
         kind = want.item if want is not None and want.kind == "optional" else want
@@ -192,7 +196,7 @@ class Calls(Arrays):
         if kind.kind == "tuple":
             listed = ", ".join(self.as_type(item, DOUBLE).text for item in node.elts)
             return Expression(f"({kind.c}){{{{{listed}}}}}", kind)
-        return self.record(kind, dict(zip((f.name for f in kind.fields), node.elts, strict=True)))
+        return self.record(kind, dict(zip(kind.slots, node.elts, strict=True)))
 
     # Places
 
@@ -200,7 +204,10 @@ class Calls(Arrays):
         """Write an expression or a default value to a place."""
         if not isinstance(value, ast.expr):
             self._fill_default(place, kind, value)
-        elif isinstance(value, ast.IfExp) and (kind.big or kind.kind == "array"):
+        elif not (kind.big or kind.kind == "array"):
+            text = self.as_type(value, kind).text
+            self.put(f"{place} = {text};")
+        elif isinstance(value, ast.IfExp):
             self.flush()
             self.put(f"if ({self.truth(value.test).text}) {{")
             for branch in (value.body, value.orelse):
@@ -209,13 +216,10 @@ class Calls(Arrays):
                 self.flush()
                 self.depth -= 1
                 self.put("} else {" if branch is value.body else "}")
-        elif kind.kind == "array":
-            self._fill_array(place, kind, value)
-        elif kind.big:
-            self._fill_record(place, kind, value)
+        elif isinstance(value, ast.Call):
+            self._fill_called(place, kind, value, self.known(value.func))
         else:
-            text = self.as_type(value, kind).text
-            self.put(f"{place} = {text};")
+            self._fill_large(place, kind, self.expr(value))
 
     def _fill_default(self, place: str, kind: Type, value: Any) -> None:
         if kind.kind == "array":
@@ -223,60 +227,43 @@ class Calls(Arrays):
                 raise self.refuse("an array whose default is not 0 everywhere.")
             self.put(f"memset({place}, 0, sizeof {place});")
         elif kind.big:
-            for f in kind.fields:
-                self.fill(part_of(place, f.name), f.type, getattr(value, f.name))
+            for name, of in kind.slots.items():
+                self.fill(part_of(place, name), of, getattr(value, name))
         else:
             self.put(f"{place} = {literal(value, kind, self.source.file)};")
 
-    def _fill_array(self, place: str, kind: Type, node: ast.expr) -> None:
-        called = self.known(node.func) if isinstance(node, ast.Call) else None
-        if isinstance(node, ast.Call) and called is np.array and isinstance(node.args[0], ast.List):
+    def _fill_large(self, place: str, kind: Type, e: Expression) -> None:
+        if kind.kind == "array":
+            if e.type.kind == "array" and e.type.shape != kind.shape:
+                raise self.refuse(f"an array of shape {e.type.shape} where {kind.shape} is needed.")
+            self.step(Step(place, e))
+        elif e.type != kind:
+            raise self.refuse(f"{e.type.c} where {kind.c} is needed.")
+        elif e.text != place:
+            self.put(f"{place} = {e.value};")
+
+    def _fill_called(self, place: str, kind: Type, node: ast.Call, called: Any) -> None:
+        if isinstance(called, type):
+            values = self.given(called, kind.slots, node)
+            # Those first that can share the loop that waits.
+            for f in sorted(kind.fields, key=lambda f: f.type.shape != self.waiting_shape):
+                self.fill(part_of(place, f.name), f.type, values[f.name])
+        elif isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
+            self.fill(place, kind, node.func.value)
+            self.flush()
+            self.replace_in(place, kind, node)
+        elif getattr(called, "__name__", "") == "stacked":
+            self._fill_stacked(place, kind, node)
+        elif called is np.array and isinstance(node.args[0], ast.List):
             row = array_of(DOUBLE, kind.shape[1:])
             for index, value in enumerate(node.args[0].elts):
                 self.fill(f"{place} + {index * row.size}", row, value)
-            return
-        if (
-            isinstance(node, ast.Call)
-            and isinstance(called, FunctionType)
-            and not self.array_function(called)
-        ):
-            function = self.program.require(called)
-            if function.returns == kind:
-                self.flush()
-                self.called(function, [], node, place)
-                return
-        e = self.expr(node)
-        if e.type.kind == "array" and e.type.shape != kind.shape:
-            raise self.refuse(f"an array of shape {e.type.shape} where {kind.shape} is needed.")
-        self.step(Step(place, e))
-
-    def _fill_record(self, place: str, kind: Type, node: ast.expr) -> None:
-        if isinstance(node, ast.Call):
-            called = self.known(node.func)
-            if getattr(called, "__name__", "") == "stacked":
-                self._fill_stacked(place, kind, node)
-                return
-            if isinstance(called, type):
-                values = self.values_of(kind, node)
-                # Those first that can share the loop that waits.
-                for f in sorted(kind.fields, key=lambda f: f.type.shape != self.waiting_shape):
-                    self.fill(part_of(place, f.name), f.type, values[f.name])
-                return
-            if called is not MISSING:
-                self.flush()
-                address = place[1:] if place.startswith("*") else f"&{place}"
-                self.called(self.program.require(called), [], node, address)
-                return
-            if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
-                self.fill(place, kind, node.func.value)
-                self.flush()
-                self.replace_in(place, kind, node)
-                return
-        e = self.expr(node)
-        if e.type != kind:
-            raise self.refuse(f"{e.type.c} where {kind.c} is needed.")
-        if e.text != place:
-            self.put(f"{place} = {e.value};")
+        elif self.translated(called) and self.program.require(called).returns == kind:
+            self.flush()
+            slot = place if kind.kind == "array" else place[1:] if place.startswith("*") else f"&{place}"
+            self.called(self.program.require(called), [], node, slot)
+        else:
+            self._fill_large(place, kind, self.expr(node))
 
     def _fill_stacked(self, place: str, kind: Type, node: ast.Call) -> None:
         """Write rows of records under each other to the arrays of a record."""
@@ -291,25 +278,23 @@ class Calls(Arrays):
 
     def replace_in(self, place: str, kind: Type, node: ast.Call) -> None:
         """Set fields of a record in place; what they become is worked out before."""
-        later: list[tuple[str, Type, Any]] = []
+        self.check_names(kind.c, kind.slots, keywords_of(node))
+        later: list[tuple[str, Any]] = []
         for name, value in keywords_of(node).items():
-            field, simple = kind.found(name), isinstance(value, ast.Name | ast.Constant)
-            if field is None:
-                raise self.refuse(f"{kind.c} has no field {name}.")
-            slot = part_of(place, name)
-            if not (field.type.big or field.type.kind == "array"):
-                e = self.as_type(value, field.type)
-                self.flush()
-                later.append((slot, field.type, e if simple else self.named(e)))
-            elif simple:
-                later.append((slot, field.type, value))
-            else:
+            of = kind.slots[name]
+            if isinstance(value, ast.Name | ast.Constant):
+                later.append((name, value))
+            elif of.big or of.kind == "array":
                 raise self.refuse(f"{name} is not worked out yet: give it a name before.")
-        for slot, field_type, what in later:
-            if isinstance(what, Expression):
-                self.put(f"{slot} = {what.text};")
             else:
-                self.fill(slot, field_type, what)
+                e = self.as_type(value, of)
+                self.flush()
+                later.append((name, self.named(e)))
+        for name, what in later:
+            if isinstance(what, Expression):
+                self.put(f"{part_of(place, name)} = {what.text};")
+            else:
+                self.fill(part_of(place, name), kind.slots[name], what)
                 self.flush()
 
 
@@ -324,10 +309,8 @@ def part_of(place: str, name: str) -> str:
 
 
 def default_of(python: Any, name: str) -> Any:
-    """A field's default, or MISSING."""
-    if hasattr(python, "_field_defaults"):
-        return python._field_defaults.get(name, MISSING)
-    item = python.__dataclass_fields__[name]
-    if item.default is not dataclasses.MISSING:
-        return item.default
-    return MISSING if item.default_factory is dataclasses.MISSING else item.default_factory()
+    """The default of a function's parameter or of a record's field; `inspect.Parameter.empty` for none."""
+    field = getattr(python, "__dataclass_fields__", {}).get(name)
+    if field is not None and field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return inspect.signature(python).parameters[name].default

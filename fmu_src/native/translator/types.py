@@ -72,6 +72,11 @@ class Type:
         return self.size if self.kind == "tuple" else 1 if self.item is None else 1 + int(self.item.numbers)
 
     @property
+    def slots(self) -> dict[str, Type]:
+        """The types of its fields, by name."""
+        return {f.name: f.type for f in self.fields}
+
+    @property
     def size(self) -> int:
         """Number of elements of an array."""
         return math.prod(self.shape)
