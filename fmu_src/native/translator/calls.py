@@ -81,7 +81,7 @@ class Calls(Arrays):
         if any(part.type.kind == "array" for part in parts):
             raise self.refuse(f"{name} of an array.")
         if name == "abs":
-            return Expression(f"fabs({parts[0].text})", DOUBLE)
+            return Expression(f"fabs({self.coerced(parts[0], DOUBLE).text})", DOUBLE)
         kind = INT if all(part.type == INT for part in parts) else DOUBLE
         call = {"min": "least", "max": "most"}[name] + ("_int" if kind == INT else "_of")
         text = parts[0].text

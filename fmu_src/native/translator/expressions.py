@@ -288,8 +288,10 @@ class Expressions(Loops):
             if left.type.kind in ("record", "optional", "tuple"):
                 equal, other = self._equal(left.type), self.coerced(right, left.type)
                 return Expression(f"{no}{equal}({left.text}, {other.text})", BOOL, UNARY)
-        form, parts = f"{{}} {sign} {{}}", [self.plain(left), self.plain(right)]
-        return self.each(form, parts, [RELATION + 1] * 2, BOOL, RELATION)
+        parts = [self.plain(left), self.plain(right)]
+        if not all((e.type.item or e.type).number or e.type.kind == "enum" for e in parts):
+            raise self.refuse(f"which of {left.type.c} and {right.type.c} is less.")
+        return self.each(f"{{}} {sign} {{}}", parts, [RELATION + 1] * 2, BOOL, RELATION)
 
     def _equal(self, kind: Type) -> str:
         """The name of a function that compares two values as Python does."""
