@@ -248,8 +248,8 @@ class Loops:
 
     def step(self, step: Step) -> None:
         """Put a statement of every element into the loop that waits, or begin another."""
-        sums = {s.name for s in self.steps if s.sums}
-        if self.steps and (step.value.type.shape != self.waiting_shape or step.value.names & sums):
+        first = self.steps[0] if self.steps else step
+        if (step.value.type.shape, step.sums) != (first.value.type.shape, first.sums):
             self.flush()
         self.steps.append(replace(step, remarks=tuple(self.remarks)))
         self.remarks = []
@@ -275,18 +275,19 @@ class Loops:
             self._put_remarks(self.remarks)
             self.remarks = []
             return
-        shape = steps[0].value.type.shape
+        shape, depth = steps[0].value.type.shape, self.depth
         names = ("i", "j")[2 - len(shape) :]
         indices = tuple("0" if size == 1 else name for name, size in zip(names, shape, strict=True))
-        flat, depth = len(shape) == 1, self.depth
-        sums = {s.name: safe(s.name) if flat else f"{s.name}_sum" for s in steps if s.sums}
-        for name, size in zip(names[:-1], shape[:-1], strict=True):
-            self._open(name, size)
-        for text in sums.values():
-            # From -0.0 on, as -0.0 + x is x, also where x is -0.0.
-            self.put(f"{'' if flat else 'double '}{text} = -0.0;")
-        if shape[-1] > 1:
-            self._open("j", shape[-1])
+        loops = [(name, size) for name, size in zip(names, shape, strict=True) if size > 1]
+        sums = {s.name: safe(s.name) + "[i]" * (len(shape) > 1) for s in steps if s.sums}
+        if sums:
+            # From -0.0 on, as -0.0 + x is x, also where x is -0.0. All rows at once: no sum waits for itself.
+            self._open(loops[:-1])
+            for text in sums.values():
+                self.put(f"{text} = -0.0;")
+            self._close(depth)
+            loops.reverse()
+        self._open(loops)
         begun, self.here = len(self.out), set()
         for s in steps:
             text = element(s.value, indices).text
@@ -295,13 +296,7 @@ class Loops:
         self.here = set()
         if any("[k" in line for line in self.out[begun:]):
             self.out.insert(begun, f"{'    ' * self.depth}const int k = {shape[-1]} * i + j;")
-        if shape[-1] > 1:
-            self._close()
-        if not flat:
-            for name, text in sums.items():
-                self.put(f"{safe(name)}[i] = {text};")
-        while self.depth > depth:
-            self._close()
+        self._close(depth)
 
     def _place(self, s: Step, indices: Indices) -> str:
         """What a statement of every element assigns to; with its type where that is a number of the loop."""
@@ -318,10 +313,12 @@ class Loops:
         for text in remarks:
             self.put(text)
 
-    def _open(self, name: str, size: int) -> None:
-        self.put(f"for (int {name} = 0; {name} < {size}; {name}++) {{")
-        self.depth += 1
+    def _open(self, loops: list[tuple[str, int]]) -> None:
+        for name, size in loops:
+            self.put(f"for (int {name} = 0; {name} < {size}; {name}++) {{")
+            self.depth += 1
 
-    def _close(self) -> None:
-        self.depth -= 1
-        self.put("}")
+    def _close(self, depth: int) -> None:
+        while self.depth > depth:
+            self.depth -= 1
+            self.put("}")
