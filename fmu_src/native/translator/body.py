@@ -64,7 +64,7 @@ class Body(Calls):
     def _comments(self, statement: ast.stmt) -> None:
         for line in range(self.last_line + 1, statement.lineno):
             if line in self.source.comments:
-                self.remark(f"/* {self.source.comments[line]} */")
+                self.remarks.append(f"/* {self.source.comments[line]} */")
         self.last_line = max(self.last_line, statement.lineno)
 
     def statement(self, node: ast.stmt) -> None:

@@ -135,15 +135,9 @@ class Loops:
         return Unsupported(f"{self.source.file}:{self.line}: {why}")
 
     def put(self, text: str) -> None:
-        """Write a line."""
-        self.out.append("    " * self.depth + text)
-
-    def remark(self, text: str) -> None:
-        """A comment, before what comes next."""
-        if self.steps:
-            self.remarks.append(text)
-        else:
-            self.put(text)
+        """Write a line, and the comments that wait before it."""
+        lines, self.remarks = [*self.remarks, text], []
+        self.out += ["    " * self.depth + line for line in lines]
 
     # Names
 
@@ -269,12 +263,10 @@ class Loops:
         return result
 
     def flush(self) -> None:
-        """Write the loop that waits."""
-        steps, self.steps = self.steps, []
-        if not steps:
-            self._put_remarks(self.remarks)
-            self.remarks = []
+        """Write the loop that waits; comments that wait belong to what comes after it."""
+        if not self.steps:
             return
+        (steps, self.steps), (remarks, self.remarks) = (self.steps, []), (self.remarks, [])
         shape, depth = steps[0].value.type.shape, self.depth
         names = ("i", "j")[2 - len(shape) :]
         indices = tuple("0" if size == 1 else name for name, size in zip(names, shape, strict=True))
@@ -290,13 +282,13 @@ class Loops:
         self._open(loops)
         begun, self.here = len(self.out), set()
         for s in steps:
-            text = element(s.value, indices).text
-            self._put_remarks(s.remarks)
+            text, self.remarks = element(s.value, indices).text, list(s.remarks)
             self.put(f"{sums[s.name]} += {text};" if s.sums else f"{self._place(s, indices)} = {text};")
         self.here = set()
         if any("[k" in line for line in self.out[begun:]):
             self.out.insert(begun, f"{'    ' * self.depth}const int k = {shape[-1]} * i + j;")
         self._close(depth)
+        self.remarks = remarks
 
     def _place(self, s: Step, indices: Indices) -> str:
         """What a statement of every element assigns to; with its type where that is a number of the loop."""
@@ -308,10 +300,6 @@ class Loops:
             text = f"{s.target}[{flat_index(moved, s.value.type.shape)}]"
         self.here.add(s.name)
         return text
-
-    def _put_remarks(self, remarks: Iterable[str]) -> None:
-        for text in remarks:
-            self.put(text)
 
     def _open(self, loops: list[tuple[str, int]]) -> None:
         for name, size in loops:
