@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -29,6 +30,13 @@ def main(arguments: list[str] | None = None) -> int:
         "the file is NAME_native.fmu (default: %(default)s)",
     )
     parser.add_argument(
+        "--fmi",
+        choices=(2, 3),
+        default=2,
+        type=int,
+        help="version of FMI, 2.0 or 3.0; a native unit for 3.0 is NAME_native_fmi3.fmu (default: %(default)s)",
+    )
+    parser.add_argument(
         "--flat",
         action="store_true",
         help="names with _ for dots, for tools that make structures of dotted names; the file is NAME_flat.fmu",
@@ -37,6 +45,8 @@ def main(arguments: list[str] | None = None) -> int:
         "--out", default=Path("dist"), type=Path, metavar="DIR", help="folder (default: %(default)s)"
     )
     options = parser.parse_args(arguments)
+    if options.fmi == 3 and options.kind != NATIVE:
+        parser.error("--fmi 3 is for native units: add --kind native")
 
     def load() -> Product:
         from fmu_src.native.build import NATIVE_UNITS, build_native
@@ -44,12 +54,13 @@ def main(arguments: list[str] | None = None) -> int:
         from fmu_src.units import UNITS
 
         native = options.kind == NATIVE
-        ending = f"{'_native' if native else ''}{'_flat' if options.flat else ''}.fmu"
+        version = "_fmi3" if options.fmi == 3 else ""
+        ending = f"{'_native' if native else ''}{version}{'_flat' if options.flat else ''}.fmu"
 
         def build(name: str) -> Path:
             target = options.out / f"{name}{ending}"
             if native:
-                return build_native(UNITS[name].info, target, flat=options.flat)
+                return build_native(UNITS[name].info, target, fmi=options.fmi, flat=options.flat)
             return build_unit(UNITS[name], target, flat=options.flat)
 
         known = [name for name in UNITS if name in NATIVE_UNITS or not native]
@@ -67,10 +78,22 @@ def validate(path: Path) -> list[str]:
 
 def smoke_run(path: Path) -> str:
     """Instantiate the unit and step it with rolling wheels; returns how many steps, and the mean time of one."""
+    from fmu_src.doctor import trial_3
     from fmu_src.trial import rolling
     from scenarios.fmu_client.opening import opened
+    from scenarios.fmu_client.unpacking import unpack_unit
 
-    with opened(path, path.stem.removesuffix("_flat").removesuffix("_native"), {}) as unit:
+    name = path.stem.removesuffix("_flat")
+    if name.endswith("_fmi3"):
+        folder = unpack_unit(path)
+        try:
+            outcome = trial_3(folder, SMOKE_STEPS)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+        if not outcome["ran"]:
+            raise RuntimeError(outcome["error"])
+        return f"{SMOKE_STEPS} steps, {outcome['step_us']:.1f} us each"
+    with opened(path, name.removesuffix("_native"), {}) as unit:
         for variable in unit.variables:
             value = rolling(variable.name) if variable.causality == "input" else None
             if value is not None:

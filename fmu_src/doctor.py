@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -20,13 +22,15 @@ from trpac_core.files import parse_json, quoted
 
 from .contents import CONTENTS_FILE, ContentError, Contents, deviations, read_contents
 from .host import LEAST_PYTHON
-from .trial import end_with_parent
+from .trial import STEP_S, STEPS, end_with_parent, rolling
 from .units import UNITS
 
 RECORD = f"resources/{CONTENTS_FILE}"
 DESCRIPTION = "modelDescription.xml"
 ENTRY = "resources/slavemodule.txt"
 """File that names the script of a unit with Python."""
+BUILD_3 = "sources/buildDescription.xml"
+"""File of a unit for FMI 3.0; this project's are all native."""
 KNOWN_PACKAGES = {module: package for slave in UNITS.values() for module, package in slave.packages.items()}
 """Modules that units of this project need, and their packages; no other module that a file names is imported."""
 PROBE_LIMIT_S, TRIAL_LIMIT_S = 60.0, 300.0
@@ -55,6 +59,17 @@ print(json.dumps({{"executable": sys.executable, "version": list(sys.version_inf
                   "libpython": library, "packages": packages}}))
 """
 """Program of the child process: prints the interpreter, and which of the modules in its arguments it can import."""
+
+
+TRIAL_3 = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from pathlib import Path
+from fmu_src.doctor import end_with_parent, trial_3
+end_with_parent()
+print(json.dumps(trial_3(Path(sys.argv[2]))))
+"""
+"""Program of the child process that tries a unit for FMI 3.0: prints the outcome as `trial.py` does."""
 
 
 class State(Enum):
@@ -144,14 +159,16 @@ def examine(
     modules = sorted(named & set(KNOWN_PACKAGES))
     native = contents is not None and ENTRY not in contents.files
     probed = _probe(python, modules)
+    fmi_3 = contents is not None and BUILD_3 in contents.files
     if native:
-        findings.append(Finding("python", State.OK, "it needs none: it is native code"))
+        text = f"it needs none: it is native code for FMI {'3.0' if fmi_3 else '2.0'}"
+        findings.append(Finding("python", State.OK, text))
     else:
         findings += _python(probed, modules if contents else None)
     intact = all(finding.state is not State.PROBLEM for finding in of_file)
     if intact and run:
         notify(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
-        findings.append(_trial(path, python))
+        findings.append(_trial(path, python, fmi_3))
     else:
         why = "the file is not what was built" if run else "as it was asked for"
         findings.append(Finding("trial", State.NOTE, f"not run: {why}"))
@@ -284,7 +301,52 @@ def _python(python: Python, modules: list[str] | None) -> list[Finding]:
     return [found, Finding("packages", State.OK, there)]
 
 
-def _trial(path: Path, python: str) -> Finding:
+def trial_3(folder: Path, steps: int = STEPS) -> dict[str, Any]:
+    """The outcome of instantiating a unit for FMI 3.0 by fmpy, and stepping it with rolling wheels, JSON-able.
+
+    Parameters
+    ----------
+    folder : Path
+        The unpacked unit; its code runs in this process.
+    steps : int
+        Number of steps of `STEP_S`.
+    """
+    from fmpy import read_model_description
+    from fmpy.fmi3 import FMU3Slave
+
+    log: list[str] = []
+    try:
+        description = read_model_description(str(folder))
+        reals = [v for v in description.modelVariables if v.type == "Float64"]
+        unit = FMU3Slave(
+            guid=description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="trial",
+        )
+        unit.instantiate(
+            loggingOn=True, logMessage=lambda *message: log.append(message[-1].decode("utf-8", "replace"))
+        )
+        unit.enterInitializationMode()
+        unit.exitInitializationMode()
+        for variable in reals:
+            value = rolling(variable.name) if variable.causality == "input" else None
+            if value is not None:
+                unit.setFloat64([variable.valueReference], [value])
+        started = time.perf_counter()
+        for step in range(steps):
+            unit.doStep(step * STEP_S, STEP_S)
+        elapsed = time.perf_counter() - started
+        outputs = {v.name: unit.getFloat64([v.valueReference])[0] for v in reals if v.causality == "output"}
+        unit.terminate()
+        unit.freeInstance()
+    except Exception as error:  # noqa: BLE001 - fmpy raises bare Exceptions
+        return {"ran": False, "error": str(error), "log": log}
+    strange = sorted(name for name, value in outputs.items() if not math.isfinite(value))
+    return {"ran": True, "step_us": elapsed / steps * 1e6, "not_finite": strange, "log": log}
+
+
+def _trial(path: Path, python: str, fmi_3: bool) -> Finding:
     """The finding on instantiating and stepping the unit in a child process."""
     temporary = tempfile.gettempdir()
     if not SAFE_PATH.fullmatch(str(Path(temporary).resolve())):
@@ -294,8 +356,11 @@ def _trial(path: Path, python: str) -> Finding:
     folder = None
     try:
         folder = unpack_unit(path)
-        script = str(Path(__file__).with_name("trial.py"))
-        done = _run([python, *ISOLATED, script, str(folder)], TRIAL_LIMIT_S)
+        here = Path(__file__)
+        command = [python, *ISOLATED, str(here.with_name("trial.py"))]
+        if fmi_3:  # native code, for which this interpreter and its fmpy do
+            command = [sys.executable, *ISOLATED, "-c", TRIAL_3, str(here.parents[1])]
+        done = _run([*command, str(folder)], TRIAL_LIMIT_S)
     except subprocess.TimeoutExpired:
         return Finding(
             "trial", State.PROBLEM, f"no answer within {TRIAL_LIMIT_S:g} s", "Report this as a fault."

@@ -28,6 +28,12 @@ UNITS: dict[str, dict[str, int] | None] = {
 }
 """Units by name, as exponents of the SI base units with factor 1; None where FMI cannot express them."""
 
+TIME = Variable("time", Kind.REAL, "independent", "continuous", "Time of the simulation", "s")
+"""The variable that FMI 3.0 has beside those of a unit."""
+
+TYPES_3 = {Kind.REAL: "Float64", Kind.INTEGER: "Int32", Kind.BOOLEAN: "Boolean", Kind.STRING: "String"}
+"""Elements of FMI 3.0."""
+
 CAPABILITIES = {
     "needsExecutionTool": "true",
     "canHandleVariableCommunicationStepSize": "true",
@@ -38,10 +44,24 @@ CAPABILITIES = {
     "canSerializeFMUstate": "true",
 }
 
+CAPABILITIES_3 = {
+    "needsExecutionTool": "false",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "canHandleVariableCommunicationStepSize": "true",
+}
+"""Of a unit of FMI 3.0, which needs no Python."""
+
 OSMP_NAMESPACE = "http://xsd.pmsf.net/OSISensorModelPackaging"
 OSMP_VERSION = "1.6.0"
 IMAGE_TYPE = "application/octet-stream"
 """JPEG, PNG or raw pixels; the convention asks for a valid MIME type, which image/* with its wildcard is not."""
+
+KNOWN_AT_STEPS: dict[str, str] = {"dependencies": ""}
+KNOWN_AT_START: dict[str, str] = {}
+"""On what outputs depend: inputs of earlier steps only; at the start on the parameters, which is the meaning of the
+missing attribute."""
 
 LOG_CATEGORIES = {
     "logStatusWarning": "An unusable input: the last good estimate is held; or a car that is not as told.",
@@ -73,26 +93,85 @@ def model_description(
     With `flat` names consist of letters, digits and underscores, for tools that make structures of dotted names; the
     annotations of binary data are then left out. With `sources` it is a unit of these C files, which needs no Python.
     """
-    root = Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": "2.0",
-            "modelName": unit.name,
-            "guid": guid,
-            "description": unit.description,
-            "author": "The TRPAC-FMU authors",
-            "version": unit.version,
-            "license": "MIT",
-            "generationTool": f"TRPAC-FMU {unit.version}" + ("" if sources else " with PythonFMU"),
-            "variableNamingConvention": "flat" if flat else "structured",
-        },
-    )
+    root = Element("fmiModelDescription", _general(unit, "2.0", "guid", guid, flat))
+    if not sources:
+        root.attrib["generationTool"] += " with PythonFMU"
     needs = {"needsExecutionTool": "false"} if sources else {}
     simulation = SubElement(root, "CoSimulation", {"modelIdentifier": unit.name, **CAPABILITIES, **needs})
     if sources:
         files = SubElement(simulation, "SourceFiles")
         for name in sources:
             SubElement(files, "File", {"name": name})
+    _definitions(root, unit, variables)
+    if any(v.binary for v in variables) and not flat:
+        # Without OSI messages in the buffers the annotation names no version of OSI.
+        _osmp(SubElement(root, "VendorAnnotations"), "osmp", {"version": OSMP_VERSION})
+    listed = SubElement(root, "ModelVariables")
+    for reference, variable in enumerate(variables):
+        _variable(listed, reference, variable, flat)
+    structure = SubElement(root, "ModelStructure")
+    outputs = [index for index, v in enumerate(variables, start=1) if v.causality == "output"]
+    for group, known in (("Outputs", KNOWN_AT_STEPS), ("InitialUnknowns", KNOWN_AT_START)):
+        entries = SubElement(structure, group)
+        for index in outputs:
+            SubElement(entries, "Unknown", {"index": str(index), **known})
+    return _document(root)
+
+
+def model_description_3(
+    unit: UnitInfo, variables: Sequence[Variable], token: str, *, flat: bool = False
+) -> bytes:
+    """The XML text of the description of a unit of C files for FMI 3.0; the same arguments give the same bytes.
+
+    Its variables are those of `model_description`, and `TIME`; without the annotations of binary data, which are a
+    convention for FMI 2.0.
+    """
+    root = Element("fmiModelDescription", _general(unit, "3.0", "instantiationToken", token, flat))
+    SubElement(root, "CoSimulation", {"modelIdentifier": unit.name, **CAPABILITIES_3})
+    _definitions(root, unit, variables)
+    listed = SubElement(root, "ModelVariables")
+    for reference, v in enumerate(variables):
+        attributes = _attributes(reference, v, flat) | _typed(v)
+        start = {"value": attributes.pop("start")} if v.kind is Kind.STRING and v.start is not None else None
+        element = SubElement(listed, TYPES_3[v.kind], attributes)
+        if start:
+            SubElement(element, "Start", start)
+    structure = SubElement(root, "ModelStructure")
+    outputs = [reference for reference, v in enumerate(variables) if v.causality == "output"]
+    for name, known in (("Output", KNOWN_AT_STEPS), ("InitialUnknown", KNOWN_AT_START)):
+        for reference in outputs:
+            SubElement(structure, name, {"valueReference": str(reference), **known})
+    return _document(root)
+
+
+def build_description(name: str, sources: Sequence[str], options: Sequence[str]) -> bytes:
+    """The XML text of buildDescription.xml, by which a host of FMI 3.0 compiles a unit's C files with these options."""
+    root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": name})
+    compiled = {"language": "C99", "compiler": "gcc", "compilerOptions": " ".join(options)}
+    files = SubElement(configuration, "SourceFileSet", compiled)
+    for source in sources:
+        SubElement(files, "SourceFile", {"name": source})
+    SubElement(configuration, "Library", {"name": "m", "external": "true"})
+    return _document(root)
+
+
+def _general(unit: UnitInfo, fmi: str, token: str, value: str, flat: bool) -> dict[str, str]:
+    return {
+        "fmiVersion": fmi,
+        "modelName": unit.name,
+        token: value,
+        "description": unit.description,
+        "author": "The TRPAC-FMU authors",
+        "version": unit.version,
+        "license": "MIT",
+        "generationTool": f"TRPAC-FMU {unit.version}",
+        "variableNamingConvention": "flat" if flat else "structured",
+    }
+
+
+def _definitions(root: Element, unit: UnitInfo, variables: Sequence[Variable]) -> None:
+    """Add units, categories of messages and the default experiment."""
     _units(SubElement(root, "UnitDefinitions"), {v.unit for v in variables if v.unit})
     categories = SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
@@ -102,21 +181,9 @@ def model_description(
         "DefaultExperiment",
         {"startTime": "0", "stopTime": f"{unit.stop_time_s:g}", "stepSize": f"{unit.step_size_s:g}"},
     )
-    if any(v.binary for v in variables) and not flat:
-        # Without OSI messages in the buffers the annotation names no version of OSI.
-        _osmp(SubElement(root, "VendorAnnotations"), "osmp", {"version": OSMP_VERSION})
-    listed = SubElement(root, "ModelVariables")
-    for reference, variable in enumerate(variables):
-        _variable(listed, reference, variable, flat)
-    structure = SubElement(root, "ModelStructure")
-    outputs = [index for index, v in enumerate(variables, start=1) if v.causality == "output"]
-    for group in ("Outputs", "InitialUnknowns"):
-        entries = SubElement(structure, group)
-        # Outputs depend on inputs of earlier steps only. At the start they depend on the parameters, which is the
-        # meaning of the missing attribute.
-        known = {"dependencies": ""} if group == "Outputs" else {}
-        for index in outputs:
-            SubElement(entries, "Unknown", {"index": str(index), **known})
+
+
+def _document(root: Element) -> bytes:
     indent(root)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
 
@@ -133,7 +200,7 @@ def flat_name(name: str) -> str:
     return name.replace(".", "_")
 
 
-def _variable(parent: Element, reference: int, variable: Variable, flat: bool) -> None:
+def _attributes(reference: int, variable: Variable, flat: bool) -> dict[str, str]:
     attributes = {
         "name": flat_name(variable.name) if flat else variable.name,
         "valueReference": str(reference),
@@ -145,9 +212,11 @@ def _variable(parent: Element, reference: int, variable: Variable, flat: bool) -
         attributes["initial"] = "calculated"
     if variable.causality == "parameter":
         attributes["initial"] = "exact"
-    typed: dict[str, str] = {}
-    if variable.kind is Kind.REAL and variable.unit:
-        typed["unit"] = variable.unit
+    return attributes
+
+
+def _typed(variable: Variable) -> dict[str, str]:
+    typed = {"unit": variable.unit} if variable.kind is Kind.REAL and variable.unit else {}
     for name, value in (
         ("min", variable.minimum),
         ("max", variable.maximum),
@@ -156,8 +225,12 @@ def _variable(parent: Element, reference: int, variable: Variable, flat: bool) -
     ):
         if value is not None:
             typed[name] = _text(value)
-    scalar = SubElement(parent, "ScalarVariable", attributes)
-    SubElement(scalar, variable.kind.value, typed)
+    return typed
+
+
+def _variable(parent: Element, reference: int, variable: Variable, flat: bool) -> None:
+    scalar = SubElement(parent, "ScalarVariable", _attributes(reference, variable, flat))
+    SubElement(scalar, variable.kind.value, _typed(variable))
     if variable.binary and not flat:
         role = variable.name.removeprefix(f"{variable.binary}.")
         binary = {"name": variable.binary, "role": role, "mime-type": IMAGE_TYPE}

@@ -121,11 +121,18 @@ def open_native(native_folder: Path) -> Iterator[Callable[..., Unit]]:
     yield from _opener(native_folder)
 
 
+@pytest.fixture(scope="session")
+def native_folder_4w(native_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The native unit TrpacEstimator4W, built and unpacked once per test run; skips where `native_file` does."""
+    target = tmp_path_factory.mktemp("native") / "TrpacEstimator4W_native.fmu"
+    build_native(UNITS["TrpacEstimator4W"].info, target, everywhere=False)
+    return unpack_unit(target, tmp_path_factory.mktemp("unpacked"))
+
+
 @pytest.fixture
-def open_native_4w(native_file: Path, tmp_path: Path) -> Iterator[Callable[..., Unit]]:
+def open_native_4w(native_folder_4w: Path) -> Iterator[Callable[..., Unit]]:
     """Opens instances of the native unit TrpacEstimator4W."""
-    target = tmp_path / "TrpacEstimator4W_native.fmu"
-    yield from _opener(unpack_unit(build_native(UNITS["TrpacEstimator4W"].info, target, everywhere=False)))
+    yield from _opener(native_folder_4w)
 
 
 @pytest.fixture(params=["python", "native"])

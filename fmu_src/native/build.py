@@ -34,7 +34,7 @@ from ..contents import CONTENTS_FILE, Contents, sha256_of
 from ..estimate_outputs import FIELDS
 from ..interface import TRPAC_ESTIMATOR
 from ..interface_4w import TRPAC_ESTIMATOR_4W
-from ..model_description import UnitInfo, model_description
+from ..model_description import TIME, UnitInfo, build_description, model_description, model_description_3
 from ..packaging import BuildError, digest_of, licences, write_archive
 from ..signals import NO_ROAD_CLASS
 from .estimator import estimator_program
@@ -43,7 +43,11 @@ from .tables import code, header, outputs_code, settings_code
 from .translator.types import initialiser
 
 C_FILES = Path(__file__).parent / "c"
-FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
+FMI_HEADERS = {
+    2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
+"""The standard's own files by the version of FMI, 2.0 or 3.0."""
 
 
 @dataclass(frozen=True)
@@ -70,19 +74,23 @@ class NativeUnit:
     functions: tuple[Any, ...]
     outputs: Callable[[str], str]
 
-    @property
-    def sources(self) -> tuple[str, ...]:
+    def sources(self, fmi: int) -> tuple[str, ...]:
         """Names of the files that are compiled, also by hosts that compile a unit themselves."""
         return (
             "common.c",
-            "fmi2.c",
+            f"fmi{fmi}.c",
             "frames.c",
+            "instance.c",
             "outputs.c",
             "tables.c",
             "text.c",
             "trpac.c",
             f"{self.folder}.c",
         )
+
+    def of(self, fmi: int) -> Sequence[Variable]:
+        """The variables of the unit for a version of FMI: 3.0 has the time beside them."""
+        return (*self.variables, TIME) if fmi == 3 else self.variables
 
 
 def of_wheel(name: str, wheel: str = "wheel") -> str:
@@ -112,22 +120,33 @@ NATIVE_UNITS = {
 }
 """Units that are there in C."""
 OPTIONS = ("-shared", "-s", "-fvisibility=hidden", "-Wall", "-Wextra", "-pedantic", "-Werror")
-TARGETS = {
-    "linux64": ("so", ("x86_64-linux-gnu.2.17",)),
-    "win64": ("dll", ("x86_64-windows-gnu",)),
-    "darwin64": ("dylib", ("x86_64-macos", "aarch64-macos")),
-    "aarch64-linux": ("so", ("aarch64-linux-gnu.2.17",)),
+TRIPLES = {
+    "x86_64-linux": "x86_64-linux-gnu.2.17",
+    "x86_64-windows": "x86_64-windows-gnu",
+    "x86_64-darwin": "x86_64-macos",
+    "aarch64-darwin": "aarch64-macos",
+    "aarch64-linux": "aarch64-linux-gnu.2.17",
 }
-"""Folder of a platform in the unit: the ending of its library, and its names for zig's compiler."""
-HERE = {"win32": "win64", "darwin": "darwin64"}
-"""Folder of this machine's platform, by Python's name; that of Linux else."""
+"""Platforms, as FMI 3.0 names their folders, and their names for zig's compiler."""
+FOLDERS_2 = {
+    "x86_64-linux": "linux64",
+    "x86_64-windows": "win64",
+    "x86_64-darwin": "darwin64",
+    "aarch64-darwin": "darwin64",
+}
+"""Folders of platforms in a unit of FMI 2.0; else they are those of FMI 3.0."""
+ENDINGS = {"linux": "so", "windows": "dll", "darwin": "dylib"}
+"""Ending of a library by its system."""
+MACHINES = {"AMD64": "x86_64", "arm64": "aarch64"}
+"""Processors that Python names otherwise than FMI does."""
 FAT_MAGIC, FAT_ALIGNMENT = 0xCAFEBABE, 14
 """First word of a library for several processors of Apple's, and the power of two at which each part begins."""
 
 
-def sources(unit: UnitInfo, guid: str) -> dict[str, str]:
-    """The C of a unit, by the names of its files."""
+def sources(unit: UnitInfo, guid: str, fmi: int = 2) -> dict[str, str]:
+    """The C of a unit for FMI 2.0 or 3.0, by the names of its files."""
     native, program = NATIVE_UNITS[unit.name], estimator_program()
+    variables = native.of(fmi)
     for function in native.functions:
         program.require(function)
     settings = program.types.of(type(native.settings), "the settings")
@@ -141,15 +160,18 @@ def sources(unit: UnitInfo, guid: str) -> dict[str, str]:
         **{f"MOST_{name}": repr(most) for name, most in PLAUSIBLE.items()},
     }
     default = initialiser(native.settings, settings, "the default settings")
-    own = [*sorted(C_FILES.glob("*.[ch]")), *sorted((C_FILES / native.folder).glob("*.[ch]"))]
-    fmi = Path(str(fmpy.__file__)).parent / "c-code"
+    files = [*sorted(C_FILES.glob("*.[ch]")), *sorted((C_FILES / native.folder).glob("*.[ch]"))]
+    own = [path for path in files if path.suffix == ".h" or path.name in native.sources(fmi)]
+    standard = Path(str(fmpy.__file__)).parent / "c-code"
     return {
         **{path.name: path.read_text(encoding="utf-8") for path in own},
-        **{name: (fmi / name).read_text(encoding="utf-8").replace("\r", "") for name in FMI_HEADERS},
+        **{
+            name: (standard / name).read_text(encoding="utf-8").replace("\r", "") for name in FMI_HEADERS[fmi]
+        },
         "trpac.h": header_text,
         "trpac.c": code_text,
-        "tables.h": header(unit.name, guid, native.variables, constants),
-        "tables.c": code(native.variables),
+        "tables.h": header(unit.name, guid, variables, constants),
+        "tables.c": code(variables),
         "outputs.c": "\n".join(
             [
                 "/* Made of the unit's variables: change those. */",
@@ -159,14 +181,16 @@ def sources(unit: UnitInfo, guid: str) -> dict[str, str]:
                 f"extern const {settings.c} DEFAULT_SETTINGS;",
                 f"const {settings.c} DEFAULT_SETTINGS = {default};",
                 "",
-                settings_code("settings_of", settings, native.variables),
-                outputs_code(native.variables, native.outputs),
+                settings_code("settings_of", settings, variables),
+                outputs_code(variables, native.outputs),
             ]
         ),
     }
 
 
-def build_native(unit: UnitInfo, target: Path, *, flat: bool = False, everywhere: bool | None = None) -> Path:
+def build_native(
+    unit: UnitInfo, target: Path, *, fmi: int = 2, flat: bool = False, everywhere: bool | None = None
+) -> Path:
     """Write the archive of a unit in C.
 
     Parameters
@@ -175,6 +199,8 @@ def build_native(unit: UnitInfo, target: Path, *, flat: bool = False, everywhere
         General attributes.
     target : Path
         The archive.
+    fmi : int
+        Version of FMI: 2 for 2.0, 3 for 3.0.
     flat : bool
         Names without dots, see `model_description`.
     everywhere : bool, optional
@@ -193,14 +219,25 @@ def build_native(unit: UnitInfo, target: Path, *, flat: bool = False, everywhere
     OSError
         The archive cannot be written.
     """
-    variables, names = NATIVE_UNITS[unit.name].variables, NATIVE_UNITS[unit.name].sources
-    plain = {f"sources/{name}": text.encode() for name, text in sources(unit, "").items()}
-    guid = digest_of(model_description(unit, variables, "", flat=flat, sources=names), plain)
-    texts = sources(unit, guid)
-    content = {f"sources/{name}": text.encode() for name, text in texts.items()} | licences("trpac-fmu")
+    native = NATIVE_UNITS[unit.name]
+    variables, names = native.of(fmi), native.sources(fmi)
+
+    def described(guid: str) -> bytes:
+        if fmi == 3:
+            return model_description_3(unit, variables, guid, flat=flat)
+        return model_description(unit, variables, guid, flat=flat, sources=names)
+
+    def files_of(texts: Mapping[str, str]) -> dict[str, bytes]:
+        files = {f"sources/{name}": text.encode() for name, text in texts.items()}
+        if fmi == 3:
+            files["sources/buildDescription.xml"] = build_description(unit.name, names, FLAGS)
+        return files
+
+    guid = digest_of(described(""), files_of(sources(unit, "", fmi)))
+    texts = sources(unit, guid, fmi)
     everywhere = find_spec("ziglang") is not None if everywhere is None else everywhere
-    content |= libraries(unit.name, names, texts, everywhere)
-    content["modelDescription.xml"] = model_description(unit, variables, guid, flat=flat, sources=names)
+    content = files_of(texts) | licences("trpac-fmu") | libraries(unit.name, names, texts, everywhere, fmi)
+    content["modelDescription.xml"] = described(guid)
     files = {path: sha256_of(data) for path, data in content.items()}
     record = Contents(unit.name, unit.version, guid, {}, files)
     content[f"resources/{CONTENTS_FILE}"] = record.to_bytes()
@@ -208,31 +245,42 @@ def build_native(unit: UnitInfo, target: Path, *, flat: bool = False, everywhere
 
 
 def libraries(
-    name: str, files: Sequence[str], texts: Mapping[str, str], everywhere: bool
+    name: str, files: Sequence[str], texts: Mapping[str, str], everywhere: bool, fmi: int
 ) -> dict[str, bytes]:
     """The unit's libraries by their paths in the archive; BuildError where one cannot be made."""
-    made = {}
+    made: dict[str, list[bytes]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for file, text in texts.items():
             (folder / file).write_text(text, encoding="utf-8")
-        if not everywhere:
-            platform = HERE.get(sys.platform, "linux64" if machine() == "x86_64" else f"{machine()}-linux")
-            try:
-                data = _library(folder, compiler(), files, platform)
-            except CompilerError as error:
-                raise BuildError(str(error)) from error
-            return {f"binaries/{platform}/{name}.{TARGETS[platform][0]}": data}
-        for platform, (ending, triples) in TARGETS.items():
-            zig = [sys.executable, "-m", "ziglang", "cc", "-target"]
-            parts = [_library(folder, [*zig, triple], files, platform) for triple in triples]
-            made[f"binaries/{platform}/{name}.{ending}"] = parts[0] if len(parts) == 1 else fat(parts)
-    return made
+        for platform in TRIPLES if everywhere else [this_platform()]:
+            parent = FOLDERS_2.get(platform, platform) if fmi == 2 else platform
+            path = f"binaries/{parent}/{name}.{ENDINGS[platform.partition('-')[2]]}"
+            made.setdefault(path, []).append(
+                _library(folder, _command(platform, everywhere), files, platform)
+            )
+    return {path: parts[0] if len(parts) == 1 else fat(parts) for path, parts in made.items()}
+
+
+def this_platform() -> str:
+    """Name of the platform of this machine, as FMI 3.0 names its folder."""
+    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    return f"{MACHINES.get(machine(), machine())}-{system}"
+
+
+def _command(platform: str, everywhere: bool) -> list[str]:
+    """The compiler for a platform: zig's, or this machine's own; BuildError where there is none."""
+    if everywhere:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", TRIPLES[platform]]
+    try:
+        return compiler()
+    except CompilerError as error:
+        raise BuildError(str(error)) from error
 
 
 def _library(folder: Path, command: list[str], files: Sequence[str], platform: str) -> bytes:
     """A library of the sources in a folder."""
-    windows = platform == "win64"
+    windows = platform.endswith("windows")
     flags = [*FLAGS, *OPTIONS, *([] if windows else ["-fPIC"])]
     done = subprocess.run(
         [*command, *flags, *files, "-o", "library", *([] if windows else ["-lm"])],

@@ -18,6 +18,8 @@ STARTS = {
     Kind.BOOLEAN: ("bool", BOOL, False),
 }
 """Type in C, and start value of outputs."""
+TIME = "unit->memory.time_s"
+"""The independent variable in C."""
 
 
 def header(unit: str, guid: str, variables: Sequence[Variable], constants: dict[str, str]) -> str:
@@ -39,7 +41,7 @@ def header(unit: str, guid: str, variables: Sequence[Variable], constants: dict[
         f"enum {{ COUNT = {len(variables)}, STRING_SIZE = {STRING_SIZE} }};",
         f"enum {{ {', '.join(f'{kind.name}S = {count}' for kind, count in counts.items())} }};",
         "typedef enum { REAL, INTEGER, BOOLEAN, STRING, KINDS } Kind;",
-        "typedef enum { INPUT, OUTPUT, PARAMETER } Causality;",
+        "typedef enum { INPUT, OUTPUT, PARAMETER, INDEPENDENT } Causality;",
         "typedef struct {",
         "    const char *name;",
         "    Kind kind;",
@@ -152,7 +154,8 @@ def outputs_code(variables: Sequence[Variable], shown: Callable[[str], str]) -> 
             "    switch (variable) {",
         ]
         for v in variables:
-            if v.causality == "output" and v.kind is kind:
-                lines.append(f"    case VR_{c_name(v.name)}: return {shown(v.name)};")
+            if v.kind is kind and v.causality in ("output", "independent"):
+                value = shown(v.name) if v.causality == "output" else TIME
+                lines.append(f"    case VR_{c_name(v.name)}: return {value};")
         lines += [f"    default: return {neutral};", "    }", "}", ""]
     return "\n".join(lines)

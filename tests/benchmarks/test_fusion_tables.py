@@ -3,18 +3,20 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
 from benchmarks.accuracy import fusion_tables
 from benchmarks.accuracy.full_run import full_run
+from benchmarks.accuracy.oracle import oracle_rows
 from scenarios.figure17 import draw_figure17
 from scenarios.files import load_scenario
 from scenarios.plant.pipeline import drive
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import run_one
 from scenarios.sweep.files import load_sweep
-from scenarios.sweep.run import believed_config, identifiable, step_all
+from scenarios.sweep.run import believed_config, identifiable, run_plan, step_all
 from scenarios.sweep.store import Parts, identity
 from scenarios.sweep.summary import summarise
 
@@ -98,3 +100,23 @@ def test_the_page_is_written_between_its_markers(short_sweep, tmp_path, monkeypa
         if line.startswith("| paper_simulation | DIFE | all")
     ]
     assert shares == [pytest.approx(found, abs=1e-3)]
+
+
+def test_the_oracle_beats_the_estimator_where_the_tyre_shows_the_road():
+    sweep = load_sweep(fusion_tables.SWEEPS / "methods.yaml")
+    plan = plan_run(sweep, run_keys(sweep)[0])
+    told = [row for row in oracle_rows(plan) if row["surface"] != "dry"]
+    ours = [
+        row for row in run_plan(plan, ["DIFE"], {}) if row["surface"] != "dry" and row["estimator"] == "DIFE"
+    ]
+    for best, other in zip(told, ours, strict=True):
+        assert best["steady_state_error"] < 0.003
+        assert best["shown_convergence_time_s"] < other["shown_convergence_time_s"]
+
+
+def test_the_papers_road_stands_beside_the_oracle(monkeypatch):
+    monkeypatch.setattr(fusion_tables, "ORACLE_RUNS", 1)
+    sweep = load_sweep(fusion_tables.SWEEPS / "methods.yaml")
+    rows = run_plan(plan_run(sweep, run_keys(sweep)[0]), ["DE", "robust"], {})
+    table = fusion_tables.papers_road({"table": pd.DataFrame(rows)})
+    assert [line.split(" | ")[0].strip("| ") for line in table.splitlines()[2:]] == ["DE", "robust", "oracle"]

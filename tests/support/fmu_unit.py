@@ -15,6 +15,7 @@ from fmpy.fmi2 import (
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
 )
+from fmpy.fmi3 import FMU3Slave
 from fmpy.logging import addLoggerProxy
 
 STEP_S = 0.001
@@ -36,17 +37,21 @@ class Unit:
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.log: list[LogLine] = []
         self.time_s = 0.0
+        self._identity = {
+            "guid": self.description.guid,
+            "unzipDirectory": str(folder),
+            "modelIdentifier": self.description.coSimulation.modelIdentifier,
+            "instanceName": name,
+        }
+        self._open(logging)
+
+    def _open(self, logging: bool) -> None:
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._on_log)
         self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         addLoggerProxy(byref(self._callbacks))
-        self.slave = FMU2Slave(
-            guid=self.description.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
+        self.slave = FMU2Slave(**self._identity)
         self.slave.instantiate(callbacks=self._callbacks, loggingOn=logging)
 
     def _on_log(self, _: object, __: bytes, status: int, category: bytes, message: bytes) -> None:
@@ -56,6 +61,12 @@ class Unit:
         self.slave.setupExperiment(startTime=0.0)
         self.slave.enterInitializationMode()
         self.slave.exitInitializationMode()
+
+    def saved(self) -> bytes:
+        return bytes(self.slave.serializeFMUstate(self.slave.getFMUstate()))
+
+    def restore(self, saved: bytes) -> None:
+        self.slave.setFMUstate(self.slave.deSerializeFMUstate(saved))
 
     def reset(self) -> None:
         self.slave.reset()
@@ -86,3 +97,24 @@ class Unit:
         if self.slave is not None:
             self.slave.freeInstance()
             self.slave = None
+
+
+class Unit3(Unit):
+    """One instance for FMI 3.0."""
+
+    def _open(self, logging: bool) -> None:
+        self.slave = FMU3Slave(**self._identity)
+        self.slave.instantiate(loggingOn=logging, logMessage=self._on_message)
+
+    def _on_message(self, _: object, status: int, category: bytes, message: bytes) -> None:
+        self.log.append(LogLine(status, category.decode(), message.decode()))
+
+    def initialise(self) -> None:
+        self.slave.enterInitializationMode()
+        self.slave.exitInitializationMode()
+
+    def saved(self) -> bytes:
+        return self.slave.serializeFMUState(self.slave.getFMUState())
+
+    def restore(self, saved: bytes) -> None:
+        self.slave.setFMUState(self.slave.deserializeFMUState(saved))

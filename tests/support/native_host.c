@@ -4,9 +4,13 @@
    threads IN    drives eight instances with the same rows at once; they must give the same
    fuzz SEED N   calls everything with values of no sense, and restores damaged states
    bench IN      the time of a step with set and get
-   Rows are doubles: step size, the eight real inputs, road_class, frame_id. With -DFOUR_WHEELS it fuzzes the unit of four wheels. */
+   Rows are doubles: step size, the eight real inputs, road_class, frame_id. With -DFOUR_WHEELS it fuzzes the unit of four wheels; with -DFMI_3 it hosts one for FMI 3.0. */
 #define _POSIX_C_SOURCE 200809L
+#ifdef FMI_3
+#include "native_fmi3.h"
+#else
 #include "fmi2Functions.h"
+#endif
 #include "tables.h"
 
 #include <math.h>

@@ -13,7 +13,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from .faults import Mutant, every, sample
+from .faults import Mutant, every, files_of, sample
 from .run import Bench
 
 ROOT = Path(__file__).parents[3]
@@ -23,7 +23,7 @@ FOUND = ("killed", "hangs")
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.robustness.mutants", description=__doc__)
-    parser.add_argument("folders", nargs="+", help="folders of the code, from the root")
+    parser.add_argument("folders", nargs="+", help="folders and files of the code, from the root")
     parser.add_argument("--tests", nargs="+", required=True, help="folders and files of the tests")
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
@@ -37,6 +37,10 @@ def main() -> int:
     parser.add_argument("--work", type=Path, help="folder to keep, while neither code nor tests change")
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args()
+    try:
+        files_of(options.root, options.folders)
+    except ValueError as error:
+        parser.error(str(error))
     with tempfile.TemporaryDirectory(prefix="trpac-mutants-") as place:
         work = (options.work or Path(place)).absolute()
         work.mkdir(parents=True, exist_ok=True)
@@ -86,7 +90,7 @@ def _one(bench: Bench, mutant: Mutant, number: int, out: Any) -> dict[str, Any]:
 
 def _tell(folders: list[str], results: list[dict[str, Any]]) -> None:
     for folder in folders:
-        counts = Counter(r["outcome"] for r in results if r["name"].startswith(folder + "/"))
+        counts = Counter(r["outcome"] for r in results if r["name"].startswith(folder))
         found = sum(counts[outcome] for outcome in FOUND)
         print(f"{folder}: {found} of {counts.total()} found ({dict(counts)})")
     for result in results:

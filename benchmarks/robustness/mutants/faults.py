@@ -106,8 +106,15 @@ def every(root: Path, files: Sequence[str]) -> list[Mutant]:
 
 
 def files_of(root: Path, folders: Sequence[str]) -> list[str]:
-    """The folders' Python files, relative to the root."""
-    return [f.relative_to(root).as_posix() for name in folders for f in sorted((root / name).rglob("*.py"))]
+    """The Python files of these folders and files, relative to the root; raises ValueError where one has none."""
+    found = []
+    for name in folders:
+        place = root / name
+        files = [place] if place.is_file() else sorted(place.rglob("*.py"))
+        if not files:
+            raise ValueError(f"{name}: no Python file there; expected a folder or a file, from the root")
+        found += [file.relative_to(root).as_posix() for file in files]
+    return found
 
 
 def _mutant(root: Path, place: Place, fault: str) -> Mutant:

@@ -17,7 +17,7 @@ _UNIT = re.compile(r".*/resources/(\w+)_[0-9a-f]{12}/(.*)")
 
 
 class Lines:
-    """Writes down each line of the folders' files the first time that a test runs it."""
+    """Writes down each line of the chosen files the first time that a test runs it."""
 
     def __init__(self, record: str, root: str, folders: tuple[str, ...]) -> None:
         self._record = os.open(record, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
@@ -56,5 +56,7 @@ class Lines:
 
 lines: Lines | None = None
 if __name__ == "sitecustomize" and "MUTANTS_RECORD" in os.environ:
-    _folders = tuple(f"{name}/" for name in os.environ["MUTANTS_FOLDERS"].split(":"))
+    _folders = tuple(
+        name if name.endswith(".py") else f"{name}/" for name in os.environ["MUTANTS_FOLDERS"].split(":")
+    )
     lines = Lines(os.environ["MUTANTS_RECORD"], os.environ["MUTANTS_ROOT"], _folders)

@@ -18,7 +18,7 @@ FrameSource new_frame(Unit *unit, FrameState *seen, bool by_bus)
         if (memory->boolean[AT_image_buffers_enabled])
             source = FROM_BUFFER;
         else
-            tell(unit, &unit->told[BUFFERS_OFF], fmi2Warning,
+            tell(unit, &unit->told[BUFFERS_OFF], WARNING,
                 MODEL ": the inputs image.* point to a picture in memory, which is not read: the parameter "
                       "image.buffers_enabled is false. Set it to true before the initialisation ends, or give pictures "
                       "by image_path.");
@@ -48,7 +48,7 @@ FrameSource new_frame(Unit *unit, FrameState *seen, bool by_bus)
     if (by_path)
         memcpy(seen->path, path, STRING_SIZE);
     if (source != FROM_BUS)
-        tell(unit, &unit->told[FRAME_PICTURE], fmi2Warning,
+        tell(unit, &unit->told[FRAME_PICTURE], WARNING,
             MODEL ": it reads no pictures, as it needs nothing of its host: give the class of the road by road_class and "
                   "road_class_confidence, or take the unit with the networks in it.");
     return source;

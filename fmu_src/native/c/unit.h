@@ -2,7 +2,6 @@
 #ifndef UNIT_H
 #define UNIT_H
 
-#include "fmi2Functions.h"
 #include "inner.h"
 #include "tables.h"
 #include "text.h"
@@ -11,9 +10,13 @@
 
 enum { LONGEST_LOG = 1000, UNKNOWN_TOLD = 32 };
 
+/* What a call comes to, by the numbers of FMI 2.0 and FMI 3.0. */
+typedef enum { OK, WARNING, DISCARD, ERROR } Status;
+
 /* All that a state of the unit holds. */
 typedef struct {
     bool ready, initialised;
+    double time_s;
     double real[REALS + 1];
     int integer[INTEGERS + 1];
     bool boolean[BOOLEANS + 1];
@@ -22,22 +25,21 @@ typedef struct {
 } Memory;
 
 /* An instance. */
-typedef struct {
+typedef struct Unit Unit;
+struct Unit {
     Memory memory;
     bool initialising, stale, computed; /* outputs can be read while the host initialises */
-    double time_s;
     /* What has been told already: each sort of message is told once. */
     bool told[MESSAGES], told_reference[COUNT], told_get[KINDS], told_car[CAR_TEXTS];
     bool told_readings[SUBJECTS][1 << PARTS], told_reason[SUBJECTS][REASONS];
     unsigned unknown[UNKNOWN_TOLD];
     int unknown_count;
     bool logging;
-    fmi2CallbackFunctions callbacks;
-    char name[256];
-} Unit;
+    void (*log)(const Unit *unit, Status status, const char *category, const char *message);
+};
 
 /* Tell a message of a sort once. */
-void tell(Unit *unit, bool *told, fmi2Status status, const char *message);
+void tell(Unit *unit, bool *told, Status status, const char *message);
 
 /* Where it is noted that a subject's unusable input has been told: by the readings that the message names. */
 bool *told_of(Unit *unit, int subject, Unusable reason, const Sensors *sensors);

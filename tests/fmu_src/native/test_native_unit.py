@@ -6,7 +6,6 @@ import math
 import os
 import shutil
 import struct
-import subprocess
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,10 +16,10 @@ from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from fmu_unit import DRIVING, Unit
 from native_drives import SIGNALS, drive, drive_of_four, pedal, rows
+from native_units import ATTRIBUTES, bits, called, compiled_host, driven
 from plant_drives import SCENARIOS
 
 from fmu_src.native.build import build_native, fat, sources
-from fmu_src.native.library import FLAGS, compiler
 from fmu_src.units import UNITS
 from scenarios.files import load_scenario
 from scenarios.plant.pipeline import drive as drive_of
@@ -28,36 +27,8 @@ from trpac_core.estimator_data import Method
 
 pytestmark = pytest.mark.e2e
 
-HOST = Path(__file__).parents[2] / "support" / "native_host.c"
 WARNING, ERROR = 1, 3
 STEPS = 1200
-ATTRIBUTES = (
-    "name",
-    "valueReference",
-    "type",
-    "causality",
-    "variability",
-    "initial",
-    "start",
-    "min",
-    "max",
-    "unit",
-)
-"""Of a variable in modelDescription.xml."""
-
-
-def driven(open_one, steps, parameters):
-    """All outputs of a drive, and the log."""
-    unit = open_one(**parameters)
-    trace = [unit.outputs()]
-    for values, step_s in steps:
-        unit.step(values, step_s=step_s)
-        trace.append(unit.outputs())
-    return trace, list(unit.log)
-
-
-def _bits(outputs):
-    return {name: value if math.isfinite(value) else str(value) for name, value in outputs.items()}
 
 
 @pytest.mark.parametrize("method", list(Method), ids=lambda method: method.label)
@@ -67,7 +38,7 @@ def test_it_gives_and_tells_what_the_unit_with_python_does(open_unit, open_nativ
     expected, expected_log = driven(open_unit, drive(method.value, STEPS), parameters)
     trace, log = driven(open_native, drive(method.value, STEPS), parameters)
     for step, (there, here) in enumerate(zip(expected, trace, strict=True)):
-        assert _bits(here) == _bits(there), step
+        assert bits(here) == bits(there), step
     assert log == expected_log
     assert {line.status for line in log} == {WARNING}
     assert len({values["slip"] for values in trace}) > STEPS / 4
@@ -79,7 +50,7 @@ def test_the_unit_of_four_wheels_gives_and_tells_what_the_one_with_python_does(o
         expected, expected_log = driven(open_4w, drive_of_four(method.value, STEPS // 2), parameters)
         trace, log = driven(open_native_4w, drive_of_four(method.value, STEPS // 2), parameters)
         for step, (there, here) in enumerate(zip(expected, trace, strict=True)):
-            assert _bits(here) == _bits(there), (method, step)
+            assert bits(here) == bits(there), (method, step)
         assert log == expected_log != []
 
 
@@ -93,7 +64,7 @@ def test_a_state_of_four_wheels_is_taken_over(open_native_4w):
     for values, step_s in steps[200:]:
         for unit in (first, second):
             unit.step(values, step_s=step_s)
-        assert _bits(second.outputs()) == _bits(first.outputs())
+        assert bits(second.outputs()) == bits(first.outputs())
 
 
 def test_parameters_out_of_bounds_are_told_in_the_same_words(open_unit, open_native, capfd):
@@ -203,40 +174,10 @@ def host_folder(native_file, tmp_path_factory) -> Path:
     return folder
 
 
-def compiled_host(folder: Path, name: str, parts: list[Path], *options: str) -> Path:
-    """The host with a library of the unit, or with its sources."""
-    command = [
-        *compiler(),
-        *FLAGS,
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-pedantic",
-        *options,
-        f"-I{folder / 'sources'}",
-    ]
-    files = [str(path) for path in (HOST, *parts)]
-    subprocess.run([*command, *files, "-o", str(folder / name), "-lm", "-lpthread"], check=True)
-    return folder / name
-
-
 @pytest.fixture(scope="module")
 def host(host_folder) -> Path:
     library = host_folder / "binaries" / "linux64" / "TrpacEstimator.so"
     return compiled_host(host_folder, "host", [library, host_folder / "sources" / "tables.c"])
-
-
-def called(host: Path, *arguments: object) -> str:
-    """What the host prints in an environment that has no Python; it must end well."""
-    done = subprocess.run(
-        [str(host), *map(str, arguments)],
-        env={"PATH": "/usr/bin"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    return done.stdout
 
 
 @pytest.mark.parametrize("method", list(Method), ids=lambda method: method.label)

@@ -99,7 +99,7 @@ static void next_classes(Unit *unit, opt_RoadClass classes[SIDES])
     start(&text, MODEL ": ");
     add(&text, why.text);
     add(&text, ".");
-    tell(unit, &unit->told[FRAME_CLASS], fmi2Warning, text.text);
+    tell(unit, &unit->told[FRAME_CLASS], WARNING, text.text);
 }
 
 static void tell_subject(Unit *unit, bool *told, int subject, const char *sentence)
@@ -109,7 +109,7 @@ static void tell_subject(Unit *unit, bool *told, int subject, const char *senten
     add(&text, NAMES[subject]);
     add(&text, ": ");
     add(&text, sentence);
-    tell(unit, told, fmi2Warning, text.text);
+    tell(unit, told, WARNING, text.text);
 }
 
 /* Tell of unusable readings, by whom they concern; what all wheels share is the car's. */
@@ -157,7 +157,7 @@ static void tell_car(Unit *unit)
                 continue;
             start(&text, MODEL ": ");
             if (about[k](&text, left) || about[k](&text, right))
-                tell(unit, told, fmi2Warning, text.text);
+                tell(unit, told, WARNING, text.text);
         }
     }
 }

@@ -65,7 +65,7 @@ static opt_RoadClass next_class(Unit *unit)
     start(&text, MODEL ": ");
     add(&text, why.text);
     add(&text, ".");
-    tell(unit, &unit->told[FRAME_CLASS], fmi2Warning, text.text);
+    tell(unit, &unit->told[FRAME_CLASS], WARNING, text.text);
     return none;
 }
 
@@ -77,9 +77,9 @@ static void tell_car(Unit *unit)
     start(&tyres, MODEL ": ");
     start(&wheels, MODEL ": ");
     if (!unit->told_car[0] && add_tyres(&tyres, wheel))
-        tell(unit, &unit->told_car[0], fmi2Warning, tyres.text);
+        tell(unit, &unit->told_car[0], WARNING, tyres.text);
     if (!unit->told_car[1] && add_wheels(&wheels, wheel))
-        tell(unit, &unit->told_car[1], fmi2Warning, wheels.text);
+        tell(unit, &unit->told_car[1], WARNING, wheels.text);
 }
 
 void unit_step(Unit *unit, double step_s)
@@ -93,7 +93,7 @@ void unit_step(Unit *unit, double step_s)
         Text text;
         start(&text, MODEL ": ");
         add_unusable(&text, reason, step_s, &sensors);
-        tell(unit, told_of(unit, 0, reason, &sensors), fmi2Warning, text.text);
+        tell(unit, told_of(unit, 0, reason, &sensors), WARNING, text.text);
     }
     tell_car(unit);
 }
