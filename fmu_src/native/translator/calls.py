@@ -191,12 +191,15 @@ class Calls(Arrays):
 
     def _tuple(self, node: ast.Tuple, want: Type | None) -> Expression:
         kind = want.item if want is not None and want.kind == "optional" else want
+        items: list[Any] = list(node.elts)
         if kind is None or kind.kind not in ("tuple", "record"):
-            kind = self.program.types.tuple_of([self.expr(item).type for item in node.elts])
-        if kind.kind == "tuple":
-            listed = ", ".join(self.as_type(item, DOUBLE).text for item in node.elts)
-            return Expression(f"({kind.c}){{{{{listed}}}}}", kind)
-        return self.record(kind, dict(zip(kind.slots, node.elts, strict=True)))
+            items = [self.expr(item) for item in items]
+            kind = self.program.types.tuple_of([item.type for item in items])
+        if kind.kind == "record":
+            return self.record(kind, dict(zip(kind.slots, items, strict=True)))
+        slots = {str(place): DOUBLE for place in range(kind.size)}
+        parts = self.parts_of(slots, dict(zip(slots, items, strict=True)))
+        return Expression(f"({kind.c}){{{{{', '.join(part.text for part in parts)}}}}}", kind)
 
     # Places
 
