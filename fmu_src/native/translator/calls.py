@@ -25,7 +25,7 @@ TESTS = (math.isnan, math.isinf)
 
 
 class Calls(Arrays):
-    """Calls and records. A place is what would be assigned to, `*name` for what a pointer points to."""
+    """Calls and records. A `target` is what is assigned to, `*name` for what a pointer points to."""
 
     def array_function(self, called: Any) -> str:
         """The name of a function of arrays; empty for all else."""
@@ -197,78 +197,78 @@ class Calls(Arrays):
             kind = self.program.types.tuple_of([item.type for item in items])
         if kind.kind == "record":
             return self.record(kind, dict(zip(kind.slots, items, strict=True)))
-        slots = {str(place): DOUBLE for place in range(kind.size)}
+        slots = {str(index): DOUBLE for index in range(kind.size)}
         parts = self.parts_of(slots, dict(zip(slots, items, strict=True)))
         return Expression(f"({kind.c}){{{{{', '.join(part.text for part in parts)}}}}}", kind)
 
-    # Places
+    # Large values
 
-    def fill(self, place: str, kind: Type, value: Any) -> None:
-        """Write an expression or a default value to a place."""
+    def fill(self, target: str, kind: Type, value: Any) -> None:
+        """Write an expression or a default value to a target."""
         if not isinstance(value, ast.expr):
-            self._fill_default(place, kind, value)
+            self._fill_default(target, kind, value)
         elif not (kind.big or kind.kind == "array"):
             text = self.as_type(value, kind).text
-            self.put(f"{place} = {text};")
+            self.put(f"{target} = {text};")
         elif isinstance(value, ast.IfExp):
             self.flush()
             self.put(f"if ({self.truth(value.test).text}) {{")
             for branch in (value.body, value.orelse):
                 self.depth += 1
-                self.fill(place, kind, branch)
+                self.fill(target, kind, branch)
                 self.flush()
                 self.depth -= 1
                 self.put("} else {" if branch is value.body else "}")
         elif isinstance(value, ast.Call):
-            self._fill_called(place, kind, value, self.known(value.func))
+            self._fill_called(target, kind, value, self.known(value.func))
         else:
-            self._fill_large(place, kind, self.expr(value))
+            self._fill_large(target, kind, self.expr(value))
 
-    def _fill_default(self, place: str, kind: Type, value: Any) -> None:
+    def _fill_default(self, target: str, kind: Type, value: Any) -> None:
         if kind.kind == "array":
             if any(value):
                 raise self.refuse("an array whose default is not 0 everywhere.")
-            self.put(f"memset({place}, 0, sizeof {place});")
+            self.put(f"memset({target}, 0, sizeof {target});")
         elif kind.big:
             for name, of in kind.slots.items():
-                self.fill(part_of(place, name), of, getattr(value, name))
+                self.fill(part_of(target, name), of, getattr(value, name))
         else:
-            self.put(f"{place} = {literal(value, kind, self.source.file)};")
+            self.put(f"{target} = {literal(value, kind, self.source.file)};")
 
-    def _fill_large(self, place: str, kind: Type, e: Expression) -> None:
+    def _fill_large(self, target: str, kind: Type, e: Expression) -> None:
         if kind.kind == "array":
             if e.type.kind == "array" and e.type.shape != kind.shape:
                 raise self.refuse(f"an array of shape {e.type.shape} where {kind.shape} is needed.")
-            self.step(Step(place, e))
+            self.step(Step(target, e))
         elif e.type != kind:
             raise self.refuse(f"{e.type.c} where {kind.c} is needed.")
-        elif e.text != place:
-            self.put(f"{place} = {e.value};")
+        elif e.text != target:
+            self.put(f"{target} = {e.value};")
 
-    def _fill_called(self, place: str, kind: Type, node: ast.Call, called: Any) -> None:
+    def _fill_called(self, target: str, kind: Type, node: ast.Call, called: Any) -> None:
         if isinstance(called, type):
             values = self.given(called, kind.slots, node)
             # Those first that can share the loop that waits.
             for f in sorted(kind.fields, key=lambda f: f.type.shape != self.waiting_shape):
-                self.fill(part_of(place, f.name), f.type, values[f.name])
+                self.fill(part_of(target, f.name), f.type, values[f.name])
         elif isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
-            self.fill(place, kind, node.func.value)
+            self.fill(target, kind, node.func.value)
             self.flush()
-            self.replace_in(place, kind, node)
+            self.replace_in(target, kind, node)
         elif getattr(called, "__name__", "") == "stacked":
-            self._fill_stacked(place, kind, node)
+            self._fill_stacked(target, kind, node)
         elif called is np.array and isinstance(node.args[0], ast.List):
             row = array_of(DOUBLE, kind.shape[1:])
             for index, value in enumerate(node.args[0].elts):
-                self.fill(f"{place} + {index * row.size}", row, value)
+                self.fill(f"{target} + {index * row.size}", row, value)
         elif self.translated(called) and self.program.require(called).returns == kind:
             self.flush()
-            slot = place if kind.kind == "array" else place[1:] if place.startswith("*") else f"&{place}"
+            slot = target if kind.kind == "array" else target[1:] if target.startswith("*") else f"&{target}"
             self.called(self.program.require(called), [], node, slot)
         else:
-            self._fill_large(place, kind, self.expr(node))
+            self._fill_large(target, kind, self.expr(node))
 
-    def _fill_stacked(self, place: str, kind: Type, node: ast.Call) -> None:
+    def _fill_stacked(self, target: str, kind: Type, node: ast.Call) -> None:
         """Write rows of records under each other to the arrays of a record."""
         row = 0
         for part in [self.expr(argument) for argument in node.args]:
@@ -276,11 +276,11 @@ class Calls(Arrays):
             self.step(Step(name, part, name))
             rows = self.local_array(name, part.type)
             for f in kind.fields:
-                self.step(Step(part_of(place, f.name), self.field(rows, f.name, f.type.item), row=row))
+                self.step(Step(part_of(target, f.name), self.field(rows, f.name, f.type.item), row=row))
             row += part.type.shape[0]
 
-    def replace_in(self, place: str, kind: Type, node: ast.Call) -> None:
-        """Set fields of a record in place; what they become is worked out before."""
+    def replace_in(self, target: str, kind: Type, node: ast.Call) -> None:
+        """Set fields of a record; what they become is worked out before."""
         self.check_names(kind.c, kind.slots, keywords_of(node))
         later: list[tuple[str, Any]] = []
         for name, value in keywords_of(node).items():
@@ -295,9 +295,9 @@ class Calls(Arrays):
                 later.append((name, self.named(e)))
         for name, what in later:
             if isinstance(what, Expression):
-                self.put(f"{part_of(place, name)} = {what.text};")
+                self.put(f"{part_of(target, name)} = {what.text};")
             else:
-                self.fill(part_of(place, name), kind.slots[name], what)
+                self.fill(part_of(target, name), kind.slots[name], what)
                 self.flush()
 
 
@@ -306,9 +306,9 @@ def keywords_of(node: ast.Call | None) -> dict[str, ast.expr]:
     return {str(keyword.arg): keyword.value for keyword in node.keywords} if node else {}
 
 
-def part_of(place: str, name: str) -> str:
-    """A field of a place."""
-    return f"{place[1:]}->{safe(name)}" if place.startswith("*") else f"{place}.{safe(name)}"
+def part_of(target: str, name: str) -> str:
+    """A field of a target."""
+    return f"{target[1:]}->{safe(name)}" if target.startswith("*") else f"{target}.{safe(name)}"
 
 
 def default_of(python: Any, name: str) -> Any:

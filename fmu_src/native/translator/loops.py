@@ -283,14 +283,14 @@ class Loops:
         begun, self.here = len(self.out), set()
         for s in steps:
             text, self.remarks = element(s.value, indices).text, list(s.remarks)
-            self.put(f"{sums[s.name]} += {text};" if s.sums else f"{self._place(s, indices)} = {text};")
+            self.put(f"{sums[s.name]} += {text};" if s.sums else f"{self._target(s, indices)} = {text};")
         self.here = set()
         if any("[k" in line for line in self.out[begun:]):
             self.out.insert(begun, f"{'    ' * self.depth}const int k = {shape[-1]} * i + j;")
         self._close(depth)
         self.remarks = remarks
 
-    def _place(self, s: Step, indices: Indices) -> str:
+    def _target(self, s: Step, indices: Indices) -> str:
         """What a statement of every element assigns to; with its type where that is a number of the loop."""
         if s.name and (s.name not in self.stored or s.value.type.size == 1):
             new = s.name not in self.stored | self.here
