@@ -191,7 +191,7 @@ def sources(unit: UnitInfo, guid: str, fmi: int = 2) -> dict[str, str]:
 def build_native(
     unit: UnitInfo, target: Path, *, fmi: int = 2, flat: bool = False, everywhere: bool | None = None
 ) -> Path:
-    """Write the archive of a unit in C.
+    """Write the archive of a unit in C; returns `target`; errors as of `fmu_src.kinds.build`.
 
     Parameters
     ----------
@@ -199,25 +199,11 @@ def build_native(
         General attributes.
     target : Path
         The archive.
-    fmi : int
-        Version of FMI: 2 for 2.0, 3 for 3.0.
-    flat : bool
-        Names without dots, see `model_description`.
+    fmi, flat
+        As of `fmu_src.kinds.build`.
     everywhere : bool, optional
         Libraries for all platforms, by zig's compiler, and the same bytes from the same sources; else one for this
         machine by its own. By default for all where zig is installed.
-
-    Returns
-    -------
-    Path
-        `target`.
-
-    Raises
-    ------
-    BuildError
-        There is no compiler, or it refuses the code.
-    OSError
-        The archive cannot be written.
     """
     native = NATIVE_UNITS[unit.name]
     variables, names = native.of(fmi), native.sources(fmi)
