@@ -7,8 +7,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from build_fmu import KINDS, NATIVE, PYTHON
 from fmu_src.build_command import EPILOG, Product, run_build
+from fmu_src.kinds import KINDS, NATIVE, PYTHON, known_units
+from fmu_src.kinds import build as build_unit
 
 RUN_S = 0.5
 """How long the package is run after it is built [s]."""
@@ -35,27 +36,20 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
 
     def load() -> Product:
-        from fmu_src.native.build import NATIVE_UNITS, build_native
-        from fmu_src.packaging import build_unit
         from fmu_src.ssp import SYSTEMS, build_package
         from fmu_src.ssp_client import problems, simulate
-        from fmu_src.units import UNITS
 
-        native = options.kind == NATIVE
-
-        def unit_of(name: str, target: Path) -> Path:
-            if native and name in NATIVE_UNITS:
-                return build_native(UNITS[name].info, target)
-            return build_unit(UNITS[name], target)
+        of_kind = known_units(options.kind)
 
         def build(name: str) -> Path:
             wiring = SYSTEMS[name]
             with tempfile.TemporaryDirectory(prefix="trpac_ssp_") as scratch:
                 units = {
-                    unit: unit_of(unit, Path(scratch) / f"{unit}.fmu") for unit in wiring.elements.values()
+                    unit: build_unit(unit, Path(scratch), kind=options.kind if unit in of_kind else PYTHON)
+                    for unit in wiring.elements.values()
                 }
-                target = options.out / f"{wiring.name}{'_native' if native else ''}.ssp"
-                return build_package(wiring, units, target)
+                ending = "_native" if options.kind == NATIVE else ""
+                return build_package(wiring, units, options.out / f"{wiring.name}{ending}.ssp")
 
         def run(path: Path) -> str:
             simulate(path, RUN_S)

@@ -13,9 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from fmu_src.native.build import build_native
-from fmu_src.packaging import build_unit
-from fmu_src.units import UNITS
+from fmu_src.kinds import NATIVE, PYTHON, build
 from scenarios.fmu_client.unpacking import unpack_unit
 
 from .cases import TITLES, Case, write_pictures
@@ -47,15 +45,14 @@ class Bench(NamedTuple):
 
 def prepare(folder: Path, units: Iterable[str] = TITLES) -> Bench:
     """Build and unpack the units, and write the pictures."""
-    archives = {unit: build(TITLES[unit], folder) for unit in units}
+    archives = {unit: built(TITLES[unit], folder) for unit in units}
     folders = {unit: unpack_unit(archive, folder / archive.stem) for unit, archive in archives.items()}
     return Bench(archives, folders, write_pictures(folder))
 
 
-def build(case: Case, folder: Path) -> Path:
+def built(case: Case, folder: Path) -> Path:
     """The archive of a unit; that of the native one has the library of this machine only."""
-    slave, target = UNITS[case.unit], folder / f"{case.title.replace(' ', '_')}.fmu"
-    return build_native(slave.info, target, everywhere=False) if case.native else build_unit(slave, target)
+    return build(case.unit, folder, kind=NATIVE if case.native else PYTHON, everywhere=False)
 
 
 def run_cells(bench: Bench, client: str, unit: str, operations: Iterable[str]) -> dict[Place, Cell]:
