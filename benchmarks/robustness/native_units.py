@@ -200,8 +200,8 @@ def platforms(bench: Bench) -> Iterator[Row]:
             host = compiled(
                 [*zig, triple], bench.folder / name, bench.source, HOST, *bench.linked(platform, ending)
             )
-            if ending == "dll":  # it was linked under the name that it was compiled to
-                shutil.copy(bench.linked(platform, ending)[1], bench.folder / "library.dll")
+            if ending == "dll":  # Windows looks for it beside the program
+                shutil.copy(bench.linked(platform, ending)[1], bench.folder)
             own = {"WINEPREFIX": str(bench.folder / "wine"), "WINEDEBUG": "-all", "PATH": "/usr/bin"}
             yield what, bench.against(bench.traces(emulator, *options, host, **own))
 
