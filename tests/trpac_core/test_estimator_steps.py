@@ -166,10 +166,14 @@ def test_a_tyre_that_goes_with_its_load_is_told_its_stiffness_at_the_mean_load_o
 def test_a_frame_is_as_old_as_the_time_since_it_was_taken():
     estimator = TrpacEstimator(EstimatorConfig())
     at = Sensors(10.0 / RADIUS_M, 0.0, 10.0)
-    estimator.step(0.01, at, RoadClass(Surface.WET, 0.9))
-    said = [estimator.step(0.01, at) for _ in range(40)]
-    ages = [one.frame_age_s for one in said if one.frame_age_s >= 0.0]
-    assert ages == pytest.approx([0.42 - 0.01 * k for k in range(len(ages), 0, -1)], abs=1e-9)
+    ages = []
+    for step in range(60):
+        taken = RoadClass(Surface.WET, 0.9) if step == 10 else None
+        said = estimator.step(0.01, at, taken)
+        if said.frame_age_s >= 0.0:
+            ages.append((said.frame_age_s, 0.01 * (step + 1) - 0.01 * 10))
+    assert len(ages) > 10
+    assert [age for age, _ in ages] == pytest.approx([passed for _, passed in ages], abs=1e-9)
 
 
 def test_behind_a_locked_wheel_the_torque_counts_once_the_filter_has_forgotten_it():
