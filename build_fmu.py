@@ -6,12 +6,12 @@ import argparse
 import shutil
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 from fmu_src.build_command import EPILOG, Product, run_build
+from fmu_src.kinds import KINDS, NATIVE, PYTHON, build, known_units
 
-PYTHON, NATIVE = KINDS = ("python", "native")
-"""Kinds of a unit."""
 SMOKE_STEPS, SMOKE_STEP_S = 100, 0.001
 """Steps of the smoke run, and their length [s]."""
 
@@ -49,22 +49,10 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error("--fmi 3 is for native units: add --kind native")
 
     def load() -> Product:
-        from fmu_src.native.build import NATIVE_UNITS, build_native
-        from fmu_src.packaging import build_unit
-        from fmu_src.units import UNITS
-
-        native = options.kind == NATIVE
-        version = "_fmi3" if options.fmi == 3 else ""
-        ending = f"{'_native' if native else ''}{version}{'_flat' if options.flat else ''}.fmu"
-
-        def build(name: str) -> Path:
-            target = options.out / f"{name}{ending}"
-            if native:
-                return build_native(UNITS[name].info, target, fmi=options.fmi, flat=options.flat)
-            return build_unit(UNITS[name], target, flat=options.flat)
-
-        known = [name for name in UNITS if name in NATIVE_UNITS or not native]
-        return Product("unit", f"{options.kind} unit", known, build, validate, "no problems found", smoke_run)
+        known = known_units(options.kind)
+        chosen = {"kind": options.kind, "fmi": options.fmi, "flat": options.flat}
+        make = partial(build, folder=options.out, **chosen)
+        return Product("unit", f"{options.kind} unit", known, make, validate, "no problems found", smoke_run)
 
     return run_build("build_fmu.py", load, options.slave)
 

@@ -8,6 +8,8 @@ import tempfile
 from pathlib import Path
 
 from fmu_src.build_command import EPILOG, Product, run_build
+from fmu_src.kinds import KINDS, NATIVE, PYTHON, known_units
+from fmu_src.kinds import build as build_unit
 
 RUN_S = 0.5
 """How long the package is run after it is built [s]."""
@@ -23,24 +25,31 @@ def main(arguments: list[str] | None = None) -> int:
         help="four_wheels (TrpacEstimator4W) or one_wheel (TrpacEstimator); default: %(default)s",
     )
     parser.add_argument(
+        "--kind",
+        choices=KINDS,
+        default=PYTHON,
+        help="of the estimator, see build_fmu.py; with native the file is NAME_native.ssp (default: %(default)s)",
+    )
+    parser.add_argument(
         "--out", default=Path("dist"), type=Path, metavar="DIR", help="folder (default: %(default)s)"
     )
     options = parser.parse_args(arguments)
 
     def load() -> Product:
-        from fmu_src.packaging import build_unit
         from fmu_src.ssp import SYSTEMS, build_package
         from fmu_src.ssp_client import problems, simulate
-        from fmu_src.units import UNITS
+
+        of_kind = known_units(options.kind)
 
         def build(name: str) -> Path:
             wiring = SYSTEMS[name]
             with tempfile.TemporaryDirectory(prefix="trpac_ssp_") as scratch:
                 units = {
-                    unit: build_unit(UNITS[unit], Path(scratch) / f"{unit}.fmu")
+                    unit: build_unit(unit, Path(scratch), kind=options.kind if unit in of_kind else PYTHON)
                     for unit in wiring.elements.values()
                 }
-                return build_package(wiring, units, options.out / f"{wiring.name}.ssp")
+                ending = "_native" if options.kind == NATIVE else ""
+                return build_package(wiring, units, options.out / f"{wiring.name}{ending}.ssp")
 
         def run(path: Path) -> str:
             simulate(path, RUN_S)

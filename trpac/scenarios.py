@@ -142,6 +142,7 @@ def run(
     seed: int | None = None,
     stiffness_n: float | None = None,
     fmu: str | Path | None = None,
+    kind: str = "python",
     method: str = "robust",
     progress: StageProgress = silent,
 ) -> ScenarioRun:
@@ -155,6 +156,8 @@ def run(
         Replace the scenario's seed, and the vehicle's C_x [N].
     fmu : path, optional
         The unit; by default one is built.
+    kind : str
+        Kind of the unit that is built: python or native (docs/native.md).
     method : str
         Estimator of the unit: as_printed, dife or robust (docs/methods.md).
     progress : callable
@@ -176,10 +179,13 @@ def run(
         car["tyre"]["longitudinal_stiffness_n"] = stiffness_n
         chosen = replace(chosen, vehicle=Vehicle(**car))
     scratch = tempfile.TemporaryDirectory(prefix="trpac_")
+    folder = Path(scratch.name)
     with extras("run", "fmu"):
+        from fmu_src.kinds import build
+        from scenarios.fmu_client.estimator import UNIT
         from scenarios.runner import run_scenario
-        from trpac.units import build_fmu, require_unit
+        from trpac.units import require_unit
 
-        unit = build_fmu(scratch.name) if fmu is None else require_unit(fmu)
-        finished = run_scenario(chosen, unit, Path(scratch.name) / "frames", progress, method=which)
+        unit = require_unit(fmu) if fmu is not None else build(UNIT, folder, kind=kind, everywhere=False)
+        finished = run_scenario(chosen, unit, folder / "frames", progress, method=which)
     return ScenarioRun(finished.table, finished.summary, finished, scratch)

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scenarios.errors import suggestion
 from trpac.extras import extras
 from trpac_core.errors import TrpacError
 
 
-def build_fmu(folder: str | Path, *, unit: str = "TrpacEstimator", flat: bool = False) -> Path:
-    """Build a co-simulation unit (FMI 2.0) and validate it; returns its path.
+def build_fmu(
+    folder: str | Path,
+    *,
+    unit: str = "TrpacEstimator",
+    kind: str = "python",
+    fmi: int = 2,
+    flat: bool = False,
+) -> Path:
+    """Build a co-simulation unit and validate it; returns its path.
 
     Parameters
     ----------
@@ -18,26 +24,26 @@ def build_fmu(folder: str | Path, *, unit: str = "TrpacEstimator", flat: bool = 
         Folder of the archive, which is made where it is missing.
     unit : str
         TrpacEstimator, TrpacEstimator4W, ReferencePlant or TorquePulses.
+    kind : str
+        python, or native: TrpacEstimator or TrpacEstimator4W in C, whose host needs no Python (docs/native.md).
+    fmi : int
+        Version of FMI: 2 for 2.0; of a native unit also 3 for 3.0.
     flat : bool
         Whether the names of its variables are without dots.
 
     Raises
     ------
     TrpacError
-        An unknown unit, or one that cannot be built.
+        There is no such unit of this kind and version of FMI, or it cannot be built.
     MissingExtraError
         Without the extra 'fmu'.
     """
     with extras("build_fmu", "fmu"):
         from fmpy.validation import validate_fmu
 
-        from fmu_src.packaging import build_unit
-        from fmu_src.units import UNITS
+        from fmu_src.kinds import build
 
-        if unit not in UNITS:
-            raise TrpacError(f"unit is {unit!r}; {suggestion(unit, UNITS)}")
-        name = f"{unit}_flat.fmu" if flat else f"{unit}.fmu"
-        path = build_unit(UNITS[unit], Path(folder) / name, flat=flat)
+        path = build(unit, Path(folder), kind=kind, fmi=fmi, flat=flat)
         if problems := validate_fmu(str(path)):
             raise TrpacError("\n".join(f"{path}: {problem}" for problem in problems))
     return path

@@ -22,6 +22,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from fmu_src.kinds import KINDS, PYTHON
 from scenarios.progress import StageProgress
 from trpac_core.files import quoted
 
@@ -37,6 +38,16 @@ MethodOption = Annotated[
         "--method",
         help="Estimator:\n\nas_printed: the paper's equations, and nothing else.\n\ndife: they, guarded against noise "
         "and wrong classes.\n\nrobust: an interval, where the tyre's curve is not known.",
+    ),
+]
+
+UnitOption = Annotated[
+    str | None,
+    typer.Option(
+        "--unit",
+        metavar="|".join(KINDS),
+        help="Kind of the unit that is built where --fmu names none:\n\npython: with the networks in it; the default."
+        "\n\nnative: in C, without Python; pictures are classified beside it, and it is told class and confidence.",
     ),
 ]
 
@@ -82,6 +93,15 @@ def require_folder(command: str, out: Path) -> None:
         refuse(command, f"{there}: a file. Expected a folder to write into.")
     if not os.access(there, os.W_OK | os.X_OK):
         refuse(command, f"{there}: no permission to write there. Expected a folder of your own.")
+
+
+def kind_to_build(command: str, fmu: Path | None, unit: str | None) -> str:
+    """Kind of the unit to build; another word, and both options at once, are refused."""
+    if unit not in (None, *KINDS):
+        refuse(command, f"--unit {unit}: expected {' or '.join(KINDS)}.")
+    if fmu is not None and unit is not None:
+        refuse(command, "--unit is for a unit that is built, and --fmu names one: leave one of them out.")
+    return unit or PYTHON
 
 
 def refuse(command: str, problem: str | Exception) -> NoReturn:

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from trpac_cli.console import MethodOption, Terminal, complain, refuse, require_folder
+from trpac_cli.console import (
+    MethodOption,
+    Terminal,
+    UnitOption,
+    complain,
+    kind_to_build,
+    refuse,
+    require_folder,
+)
 
 if TYPE_CHECKING:
     from trpac_hil.bus import BusSettings
@@ -51,8 +59,12 @@ ScenarioOption = Annotated[
 def hil(
     out: Annotated[Path, typer.Option(help="Folder for log.mf4 and summary.json.")],
     fmu: Annotated[
-        Path | None, typer.Option(help="TrpacEstimator.fmu or TrpacEstimator4W.fmu; without it one is built.")
+        Path | None,
+        typer.Option(
+            help="TrpacEstimator.fmu or TrpacEstimator4W.fmu, of either kind; without it one is built."
+        ),
     ] = None,
+    unit: UnitOption = None,
     interface: Interface = "virtual",
     channel: Channel = None,
     bus_option: Options = None,
@@ -117,6 +129,7 @@ def hil(
         settings = HilSettings(
             out=out,
             fmu=fmu,
+            kind=kind_to_build(COMMAND, fmu, unit),
             bus=bus,
             dbc=dbc or DBC_FILE,
             rate_hz=rate_hz,

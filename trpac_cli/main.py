@@ -11,7 +11,7 @@ from rich.table import Table
 
 from trpac_cli import fmu as fmu_commands
 from trpac_cli import gap, vision
-from trpac_cli.console import MethodOption, Terminal, bars, refuse, require_folder
+from trpac_cli.console import MethodOption, Terminal, UnitOption, bars, kind_to_build, refuse, require_folder
 from trpac_cli.estimate import estimate
 from trpac_cli.hil import hil, hil_plant
 from trpac_cli.sweep import sweep
@@ -60,6 +60,7 @@ def run(
     fmu: Annotated[
         Path | None, typer.Option(help="Unit to run; without it one is built from the sources.")
     ] = None,
+    unit: UnitOption = None,
     seed: Annotated[int | None, typer.Option(min=0, help="In place of the scenario's seed.")] = None,
     stiffness_n: Annotated[
         float | None,
@@ -76,10 +77,17 @@ def run(
     import trpac
 
     require_folder("trpac run", out)
+    kind = kind_to_build("trpac run", fmu, unit)
     try:
         with bars() as progress:
             finished = trpac.run(
-                scenario, seed=seed, stiffness_n=stiffness_n, fmu=fmu, method=method, progress=progress
+                scenario,
+                seed=seed,
+                stiffness_n=stiffness_n,
+                fmu=fmu,
+                kind=kind,
+                method=method,
+                progress=progress,
             )
             finished.write(out, progress)
     except (TrpacError, OSError) as error:

@@ -22,7 +22,7 @@ from .sensors import (
     filter_share,
 )
 from .stationary_mean import StationaryMean
-from .tyre import GREATEST_THETA, peak_friction
+from .tyre import peak_friction
 from .vehicle import CarTolerance, Vehicle
 from .vision.classes import CLASS_THETA, Surface
 from .vision.ife import IfeState
@@ -185,15 +185,15 @@ class Estimate(NamedTuple):
     """Vertical load that all this rests on [N]."""
     longitudinal_stiffness_n: float
     """Told C_x [N]."""
-    TRPAC_low: float = 0.0
+    TRPAC_low: float
     """Lower bound of the interval that holds the road's TRPAC with 95 % [-]."""
-    TRPAC_high: float = GREATEST_THETA
+    TRPAC_high: float
     """Its upper bound [-]."""
-    TRPAC_expected: float = math.nan
+    TRPAC_expected: float
     """Expected friction, whatever the tyre shows now [-]."""
-    TRPAC_expected_std: float = math.nan
+    TRPAC_expected_std: float
     """Its standard deviation [-]."""
-    source: Source = Source.NONE
+    source: Source
     problem: str | None = None
     """One sentence where the input was unusable and the last good estimate is held."""
 
@@ -226,11 +226,6 @@ OUTPUTS = (
 """What of an estimate a table or a bus shows."""
 
 
-def nothing_printed() -> Printed:
-    """The state of the estimator as printed before it begins."""
-    return Printed(0.0, math.nan)
-
-
 @dataclass(slots=True)
 class EstimatorState:
     """All that the estimator remembers; brought up to date in place, once all of a step is worked out."""
@@ -239,6 +234,9 @@ class EstimatorState:
     dynamics: FusionState
     readings: FilteredReadings
     robust: RobustState
+    printed: Printed
+    printed_alone: Printed
+    """Of the estimator as printed, with the camera and without."""
     locked_s: float = math.inf
     """Time since the wheel was last locked [s]."""
     time_s: float = 0.0
@@ -257,9 +255,6 @@ class EstimatorState:
     frame_failed: bool = False
     ife: IfeState = field(default_factory=IfeState)
     preview: PreviewState = field(default_factory=PreviewState)
-    printed: Printed = field(default_factory=nothing_printed)
-    printed_alone: Printed = field(default_factory=nothing_printed)
-    """Of the estimator as printed, with the camera and without."""
 
     def to_json(self) -> dict[str, Any]:
         """The state as JSON-able values, exact."""

@@ -95,14 +95,9 @@ def wheel_setup(config: EstimatorConfig) -> WheelSetup:
 
 def first_state(config: EstimatorConfig, known: WheelSetup) -> EstimatorState:
     """The state before the first step."""
-    start = FusionState(config.theta_initial, 0.0)
+    start, printed = FusionState(config.theta_initial, 0.0), paper.begun(config.theta_initial)
     return EstimatorState(
-        start,
-        start,
-        FilteredReadings(0.0, 0.0, 0.0),
-        wheel.begun(known.robust),
-        printed=paper.begun(config.theta_initial),
-        printed_alone=paper.begun(config.theta_initial),
+        start, start, FilteredReadings(0.0, 0.0, 0.0), wheel.begun(known.robust), printed, printed
     )
 
 
@@ -130,6 +125,7 @@ def first_estimate(config: EstimatorConfig, known: WheelSetup, state: EstimatorS
         TRPAC_high=of_belief.high,
         TRPAC_expected=said.mean,
         TRPAC_expected_std=said.std,
+        source=Source.NONE,
     )
 
 

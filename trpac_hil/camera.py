@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.library import networks_folder
-from trpac_core.vision.ife import Ife, IfeState
+from scenarios.camera_computer import CameraComputer
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError, decode_image
-from trpac_core.vision.networks import ModelError, Segmenter, SurfaceClassifier
-from trpac_core.vision.results import FrameResult
-from trpac_core.vision.sides import SidesIfe, SidesState
+from trpac_core.vision.networks import ModelError
 from trpac_core.vision.trajectory import Motion
 from trpac_hil.deadlines import Deadlines, SystemClock
 from trpac_hil.helper import Control, helper
@@ -78,34 +74,6 @@ class CameraJob:
     core: int | None = None
 
 
-@dataclass
-class ImageEstimator:
-    """The image estimator of one side or of both, with its memory."""
-
-    job: CameraJob
-    state: Any = field(init=False)
-    _ife: Any = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Load the networks; raises ModelError."""
-        job = self.job
-        networks = (
-            Segmenter(networks_folder() / "segmenter.onnx", job.threads),
-            SurfaceClassifier(networks_folder() / "surface.onnx", job.threads),
-        )
-        config = replace(job.vision, groups_looked_at=1)
-        if len(job.sides) == 2:
-            self._ife, self.state = SidesIfe(config, *networks), SidesState()
-        else:
-            side: Any = job.sides[0]
-            self._ife, self.state = Ife(replace(config, side=side), *networks), IfeState()
-
-    def process(self, image: NDArray[np.uint8], motion: Motion) -> Sequence[FrameResult]:
-        """Results of a picture, one per side; where ImageError or ModelError is raised the state is unchanged."""
-        self.state, *results = self._ife.process(self.state, image, motion)
-        return results
-
-
 def motion_of(numbers: Sequence[float]) -> Motion:
     """The motion that the numbers `MOTION` describe."""
     speed, acceleration, steering, yaw, way = numbers
@@ -117,21 +85,18 @@ def run_camera(job: CameraJob, motion: Numbers, results: Ring, control: Control)
     with helper(job.core):
         cv2.setNumThreads(1)
         try:
-            estimator = ImageEstimator(job)
-            first = job.source.picture(0)
-            estimator.process(first, Motion(10.0))
+            computer = CameraComputer(job.vision, job.sides, job.threads)
+            computer.classes(job.source.picture(0), Motion(10.0))
         except (ModelError, ImageError) as error:
             control.refuse(str(error))
             return
-        estimator.state = type(estimator.state)()
+        computer.forget()
         control.ready()
         if control.wait_for_start():
-            _play(job, estimator, motion, results, control)
+            _play(job, computer, motion, results, control)
 
 
-def _play(
-    job: CameraJob, estimator: ImageEstimator, motion: Numbers, results: Ring, control: Control
-) -> None:
+def _play(job: CameraJob, computer: CameraComputer, motion: Numbers, results: Ring, control: Control) -> None:
     clock = SystemClock()
     deadlines = Deadlines(control.start_ns, round(1e9 / job.fps))
     done, left_out = -1, 0
@@ -145,23 +110,19 @@ def _play(
         number = deadlines.next_slot(done, now_ns)
         left_out += number - done - 1
         done = number
-        classes = _classes(job, estimator, number, motion, control)
+        classes = _classes(job, computer, number, motion, control)
         ready_ns = clock.now_ns()
         work_ms = (ready_ns - now_ns) * 1e-6
         results.write([number, deadlines.due_ns(number), ready_ns, left_out, work_ms, *classes])
 
 
 def _classes(
-    job: CameraJob, estimator: ImageEstimator, number: int, motion: Numbers, control: Control
+    job: CameraJob, computer: CameraComputer, number: int, motion: Numbers, control: Control
 ) -> list[float]:
     moving = motion_of(motion.get())
     try:
-        seen = estimator.process(job.source.picture(number), moving)
+        seen = computer.classes(job.source.picture(number), moving)
     except (ImageError, ModelError) as error:
         control.send("picture", f"A picture could not be used: {error}")
         return [FAILED, 0.0] * len(job.sides)
-    return [
-        number
-        for result in seen
-        for number in (float(result.surface), result.told_by_bus(job.vision.flag_threshold))
-    ]
+    return [number for road in seen for number in (float(road.surface), road.confidence)]

@@ -16,16 +16,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fmu_src.packaging import build_unit
-from fmu_src.units import UNITS
+from fmu_src.kinds import build
 from scenarios.camera.files import load_camera
+from scenarios.camera_computer import unit_settings
 from scenarios.files import load_scenario, load_vehicle
-from scenarios.fmu_client.estimator import car_parameters
+from scenarios.fmu_client.estimator import UNIT, car_parameters
 from scenarios.whole_files import write_whole
-from trpac_core.estimator import EstimatorConfig
-from trpac_core.parameters.configuration import configuration
-from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
-from trpac_core.parameters.variables import Kind
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.ife_config import IfeConfig
@@ -239,7 +235,7 @@ def _archive(settings: HilSettings, stack: ExitStack) -> Path:
     if settings.fmu is not None:
         return settings.fmu
     scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="trpac_")))
-    return build_unit(UNITS["TrpacEstimator"], scratch / "TrpacEstimator.fmu")
+    return build(UNIT, scratch, kind=settings.kind, everywhere=False)
 
 
 def _vehicle(settings: HilSettings) -> Vehicle:
@@ -293,14 +289,7 @@ def _camera_job(settings: HilSettings, unit: Unit) -> CameraJob:
 
 def _vision(settings: HilSettings, camera: Camera) -> IfeConfig:
     """Settings of the image estimator by the unit's parameters, which the unit has accepted before."""
-    given = _parameters(settings)
-    variables = [v for v in ESTIMATOR_PARAMETERS if v.name.startswith("image.")]
-    kinds = {Kind.INTEGER: int, Kind.BOOLEAN: bool, Kind.REAL: float}
-    values = {v.name: kinds[v.kind](given.get(v.name, v.start)) for v in variables}
-    vision = configuration(variables, values, EstimatorConfig()).vision
-    return replace(
-        vision, camera=camera, track_m=given["vehicle.track"], wheelbase_m=given["vehicle.wheelbase"]
-    )
+    return replace(unit_settings(_parameters(settings)).image_settings, camera=camera)
 
 
 def _plant(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fmu_src.kinds import PYTHON
 from trpac_hil.bus import BusSettings
 from trpac_hil.codec import DBC_FILE
 from trpac_hil.deadlines import SPIN_NS
@@ -22,6 +23,8 @@ class HilSettings:
         Folder for log.mf4 and summary.json.
     fmu : Path or None
         The unit; None builds TrpacEstimator from the sources.
+    kind : str
+        Kind of the unit that is built: python or native.
     bus : BusSettings
         Interface and channel.
     dbc : Path
@@ -54,6 +57,7 @@ class HilSettings:
 
     out: Path
     fmu: Path | None = None
+    kind: str = PYTHON
     bus: BusSettings = field(default_factory=BusSettings)
     dbc: Path = DBC_FILE
     rate_hz: float = 1000.0

@@ -27,7 +27,7 @@ from scenarios.sweep.summary import distribution, shown_enough, slippery, summar
 ROOT = Path(__file__).resolve().parents[2]
 SWEEPS = ROOT / "scenarios" / "sweeps"
 PAGE, PICTURES = ROOT / "docs" / "fusion.md", ROOT / "docs" / "fusion"
-NAMES = ("methods", "paper_simulation", "peers", "road_test", "road_test_brakes", "degradation", "rendered")
+NAMES = ("methods", "paper_simulation", "peers", "road_test", "road_test_brakes", "degradation")
 DASH = "–"
 LEAST_RUNS = 5
 """Levels with fewer runs are left out of tables and pictures."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -191,7 +193,7 @@ def sources(unit: UnitInfo, guid: str, fmi: int = 2) -> dict[str, str]:
 def build_native(
     unit: UnitInfo, target: Path, *, fmi: int = 2, flat: bool = False, everywhere: bool | None = None
 ) -> Path:
-    """Write the archive of a unit in C.
+    """Write the archive of a unit in C; returns `target`; errors as of `fmu_src.kinds.build`.
 
     Parameters
     ----------
@@ -199,25 +201,11 @@ def build_native(
         General attributes.
     target : Path
         The archive.
-    fmi : int
-        Version of FMI: 2 for 2.0, 3 for 3.0.
-    flat : bool
-        Names without dots, see `model_description`.
+    fmi, flat
+        As of `fmu_src.kinds.build`.
     everywhere : bool, optional
         Libraries for all platforms, by zig's compiler, and the same bytes from the same sources; else one for this
         machine by its own. By default for all where zig is installed.
-
-    Returns
-    -------
-    Path
-        `target`.
-
-    Raises
-    ------
-    BuildError
-        There is no compiler, or it refuses the code.
-    OSError
-        The archive cannot be written.
     """
     native = NATIVE_UNITS[unit.name]
     variables, names = native.of(fmi), native.sources(fmi)
@@ -249,17 +237,23 @@ def libraries(
 ) -> dict[str, bytes]:
     """The unit's libraries by their paths in the archive; BuildError where one cannot be made."""
     made: dict[str, list[bytes]] = {}
-    with tempfile.TemporaryDirectory() as temporary:
+    platforms = list(TRIPLES) if everywhere else [this_platform()]
+    with tempfile.TemporaryDirectory() as temporary, ThreadPoolExecutor(os.cpu_count()) as side_by_side:
         folder = Path(temporary)
         for file, text in texts.items():
             (folder / file).write_text(text, encoding="utf-8")
-        for platform in TRIPLES if everywhere else [this_platform()]:
+
+        def compiled(platform: str) -> bytes:
+            return _library(folder, _command(platform, everywhere), files, platform, name)
+
+        for platform, data in zip(platforms, side_by_side.map(compiled, platforms), strict=True):
             parent = FOLDERS_2.get(platform, platform) if fmi == 2 else platform
-            path = f"binaries/{parent}/{name}.{ENDINGS[platform.partition('-')[2]]}"
-            made.setdefault(path, []).append(
-                _library(folder, _command(platform, everywhere), files, platform)
-            )
+            made.setdefault(f"binaries/{parent}/{name}.{_ending(platform)}", []).append(data)
     return {path: parts[0] if len(parts) == 1 else fat(parts) for path, parts in made.items()}
+
+
+def _ending(platform: str) -> str:
+    return ENDINGS[platform.partition("-")[2]]
 
 
 def this_platform() -> str:
@@ -278,20 +272,29 @@ def _command(platform: str, everywhere: bool) -> list[str]:
         raise BuildError(str(error)) from error
 
 
-def _library(folder: Path, command: list[str], files: Sequence[str], platform: str) -> bytes:
-    """A library of the sources in a folder."""
+def _library(folder: Path, command: list[str], files: Sequence[str], platform: str, name: str) -> bytes:
+    """A library of the sources in a folder; a library for Windows holds its own file's name."""
     windows = platform.endswith("windows")
     flags = [*FLAGS, *OPTIONS, *([] if windows else ["-fPIC"])]
+    library = folder / platform / f"{name}.{_ending(platform)}"
+    library.parent.mkdir()
     done = subprocess.run(
-        [*command, *flags, *files, "-o", "library", *([] if windows else ["-lm"])],
-        cwd=folder,
+        [
+            *command,
+            *flags,
+            *(f"../{file}" for file in files),
+            "-o",
+            library.name,
+            *([] if windows else ["-lm"]),
+        ],
+        cwd=library.parent,
         capture_output=True,
         text=True,
         check=False,
     )
     if done.returncode:
         raise BuildError(f"The unit's C does not compile for {platform}:\n{done.stderr}")
-    return (folder / "library").read_bytes()
+    return library.read_bytes()
 
 
 def fat(parts: Sequence[bytes]) -> bytes:

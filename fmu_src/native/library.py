@@ -17,9 +17,19 @@ from trpac_core.errors import TrpacError
 from .translator.program import Function, Program
 from .translator.types import Type, safe
 
-FLAGS = ("-O2", "-std=c99", "-ffp-contract=off")
-"""How the C is compiled everywhere; fast math would change the results, and the code refuses it."""
+FLAGS = ("-O3", "-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+"""How the C is compiled everywhere: loops over two numbers at once, as nobody reads errno or the processor's flags.
+Fast math would change the results, and the code refuses it."""
 WARNINGS = ("-Wall", "-Wextra", "-pedantic", "-Werror")
+
+SIMPLE = {
+    "double": ctypes.c_double,
+    "int": ctypes.c_int,
+    "bool": ctypes.c_bool,
+    "enum": ctypes.c_int,
+    "nothing": ctypes.c_int,
+}
+"""The types of ctypes of those that are no record; of nothing any."""
 
 
 class CompilerError(TrpacError):
@@ -77,46 +87,28 @@ class Library:
         return result
 
     def _called(self, function: Function, called: Any, values: list[Any], kinds: list[Type]) -> Any:
+        by_value = not (function.updates or function.by_pointer or function.returns.kind == "nothing")
+        called.restype = self.kind(function.returns) if by_value else None
         given = [
             ctypes.byref(value) if kind.big or kind.kind == "array" else value
             for value, kind in zip(values, kinds, strict=True)
         ]
-        if function.updates:
-            called.restype = None
-            called(*given)
-            return self.to_python(values[0], function.returns)
-        if function.by_pointer:
-            called.restype = None
-            result = self.kind(function.returns)()
-            called(ctypes.byref(result), *given)
-            return self.to_python(result, function.returns)
-        if function.returns.kind == "nothing":
-            called.restype = None
-            called(*given)
-            return None
-        called.restype = self.kind(function.returns)
-        return self.to_python(called(*given), function.returns)
+        result = values[0] if function.updates else self.kind(function.returns)()
+        returned = called(ctypes.byref(result), *given) if function.by_pointer else called(*given)
+        return self.to_python(returned if by_value else result, function.returns)
 
     def kind(self, kind: Type) -> Any:
         """The type of ctypes."""
-        if kind.kind in ("double", "int", "bool", "enum"):
-            simple = {
-                "double": ctypes.c_double,
-                "int": ctypes.c_int,
-                "bool": ctypes.c_bool,
-                "enum": ctypes.c_int,
-            }
-            return simple[kind.kind]
-        if kind.kind == "array" and kind.item is not None:
+        if kind.kind == "array":
             return self.kind(kind.item) * kind.size
+        if kind.kind in SIMPLE:
+            return SIMPLE[kind.kind]
         if kind.c not in self._kinds:
-            fields: list[tuple[str, Any]]
+            fields = [(safe(f.name), self.kind(f.type)) for f in kind.fields]
             if kind.kind == "tuple":
                 fields = [("at", ctypes.c_double * kind.size)]
-            elif kind.kind == "optional" and kind.item is not None:
+            if kind.kind == "optional":
                 fields = [("has", ctypes.c_bool), ("value", self.kind(kind.item))]
-            else:
-                fields = [(safe(f.name), self.kind(f.type)) for f in kind.fields]
             self._kinds[kind.c] = type(kind.c, (ctypes.Structure,), {"_fields_": fields})
         return self._kinds[kind.c]
 
@@ -125,16 +117,11 @@ class Library:
         made = self.kind(kind)
         if kind.kind == "enum":
             return made(value.value)
-        if kind.kind == "array" and kind.item is not None:
-            if kind.item.kind == "record":
-                rows = zip(
-                    *(np.ravel(getattr(value, f.name)).tolist() for f in kind.item.fields), strict=True
-                )
-                return made(*(self.kind(kind.item)(*row) for row in rows))
+        if kind.kind == "array":
             return made(*np.ravel(value).tolist())
         if kind.kind == "tuple":
             return made((ctypes.c_double * kind.size)(*value))
-        if kind.kind == "optional" and kind.item is not None:
+        if kind.kind == "optional":
             return made() if value is None else made(True, self.to_c(value, kind.item))
         if kind.kind == "record":
             parts = value if type(value) is tuple else [getattr(value, f.name) for f in kind.fields]
@@ -143,16 +130,15 @@ class Library:
 
     def to_python(self, value: Any, kind: Type) -> Any:
         """A value of C in Python."""
+        if kind.kind == "nothing":
+            return None
         if kind.kind == "enum":
             return kind.python(value)
-        if kind.kind == "array" and kind.item is not None:
-            if kind.item.kind == "record":
-                columns = [[getattr(item, safe(f.name)) for item in value] for f in kind.item.fields]
-                return kind.item.python(*(np.array(column).reshape(kind.shape) for column in columns))
+        if kind.kind == "array":
             return np.array(value[:]).reshape(kind.shape)
         if kind.kind == "tuple":
             return tuple(value.at)
-        if kind.kind == "optional" and kind.item is not None:
+        if kind.kind == "optional":
             return self.to_python(value.value, kind.item) if value.has else None
         if kind.kind == "record":
             parts = {f.name: self.to_python(getattr(value, safe(f.name)), f.type) for f in kind.fields}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import pandas as pd
 from fmpy.fmi1 import FMICallException
 
 from scenarios.camera.files import load_camera
+from scenarios.camera_computer import CameraComputer, CarMotion, unit_settings
 from scenarios.files import Scenario, ScenarioError
 from scenarios.fmu_client.archives import UnitFileError
 from scenarios.fmu_client.opening import Instance, opened
@@ -17,8 +18,11 @@ from scenarios.pictures import frame_steps
 from scenarios.progress import Progress, silent
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.camera import Camera
+from trpac_core.vision.images import decode_image
 
 UNIT = "TrpacEstimator"
+Values = dict[str, float | str]
+"""Values by variable name."""
 INPUTS = ("wheel_speed", "wheel_torque", "vehicle_speed", "longitudinal_acceleration")
 
 
@@ -92,7 +96,8 @@ def run_unit(
     signals : DataFrame
         One row per step with the columns `INPUTS`, in the unit's units.
     frames : DataFrame
-        row and path of each picture, which is set with that row's signals.
+        row, frame and path of each picture, which is set with that row's signals; a native unit is given its class and
+        confidence, which are found here.
     step_s : float
         Communication step [s].
     progress : callable
@@ -108,10 +113,14 @@ def run_unit(
     ScenarioError
         If the archive is damaged, holds another unit, or cannot be unpacked or instantiated here, and if the unit
         refuses a setting or a step.
+    ImageError, ModelError
+        If a picture, or a network, cannot be used beside a native unit.
     """
     try:
         with opened(fmu, UNIT, settings) as unit:
-            table = _step_all(unit, signals, frames, step_s, progress)
+            by_class = unit.native and len(frames) > 0
+            pictures = _classes(settings, signals, frames, step_s) if by_class else _paths(signals, frames)
+            table = _step_all(unit, signals, pictures, step_s, progress)
             unit.slave.terminate()
     except UnitFileError as error:
         raise ScenarioError(str(error)) from error
@@ -123,24 +132,54 @@ def run_unit(
     return table
 
 
+def _paths(signals: pd.DataFrame, frames: pd.DataFrame) -> Iterator[Values]:
+    """What each row sets for a unit that reads pictures."""
+    pictures = _by_row(frames)
+    for row in range(len(signals)):
+        if row in pictures:
+            path, number = pictures[row]
+            yield {"image_path": path, "frame_id": number}
+        else:
+            yield {}
+
+
+def _classes(
+    settings: Mapping[str, float | int | bool], signals: pd.DataFrame, frames: pd.DataFrame, step_s: float
+) -> Iterator[Values]:
+    """What each row sets for a unit that takes classes: those of the pictures."""
+    config, pictures = unit_settings(settings), _by_row(frames)
+    vision = config.image_settings
+    computer, motion = CameraComputer(vision, (vision.side,)), CarMotion(step_s, config.sensor_filter_s)
+    readings = signals[["vehicle_speed", "longitudinal_acceleration"]].to_numpy(dtype=float).tolist()
+    for row, (speed_m_s, acceleration_m_s2) in enumerate(readings):
+        moving = motion.next(speed_m_s, acceleration_m_s2)
+        if row in pictures:
+            path, number = pictures[row]
+            (road,) = computer.classes(decode_image(path), moving)
+            found = {"road_class": int(road.surface), "road_class_confidence": road.confidence}
+            yield {**found, "frame_id": number}
+        else:
+            yield {}
+
+
+def _by_row(frames: pd.DataFrame) -> dict[int, tuple[str, int]]:
+    """Path and number of each picture, by its row."""
+    return {int(row): (str(path), int(frame)) for row, path, frame in frames[["row", "path", "frame"]].values}
+
+
 def _step_all(
-    unit: Instance, signals: pd.DataFrame, frames: pd.DataFrame, step_s: float, progress: Progress
+    unit: Instance, signals: pd.DataFrame, pictures: Iterator[Values], step_s: float, progress: Progress
 ) -> pd.DataFrame:
     real_names, whole_names, flag_names = (
         [v.name for v in unit.variables if v.causality == "output" and v.type == kind]
         for kind in ("Real", "Integer", "Boolean")
     )
     inputs, reals, whole, flags = map(unit.references, (INPUTS, real_names, whole_names, flag_names))
-    slave, picture, number = unit.slave, unit.references(["image_path"]), unit.references(["frame_id"])
-    pictures = {
-        int(row): (str(file), int(frame)) for row, file, frame in frames[["row", "path", "frame"]].values
-    }
+    slave = unit.slave
     values = signals[list(INPUTS)].to_numpy(dtype=float)
     results = np.empty((len(values), len(reals) + len(whole) + len(flags)))
-    for row, readings in enumerate(values):
-        if row in pictures:
-            slave.setString(picture, [pictures[row][0]])
-            slave.setInteger(number, [pictures[row][1]])
+    for row, (readings, given) in enumerate(zip(values, pictures, strict=True)):
+        unit.set(given)
         slave.setReal(inputs, readings)
         slave.doStep(currentCommunicationPoint=row * step_s, communicationStepSize=step_s)
         results[row] = [*slave.getReal(reals), *slave.getInteger(whole), *slave.getBoolean(flags)]

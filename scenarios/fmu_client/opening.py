@@ -28,7 +28,7 @@ def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: 
     Raises
     ------
     UnitFileError
-        If the description cannot be read or is of another unit, or the unit cannot be instantiated here.
+        If the description cannot be read or is of another unit or of FMI 3.0, or the unit cannot be instantiated here.
     """
     try:
         description = read_model_description(str(folder))
@@ -37,6 +37,10 @@ def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: 
         raise UnitFileError(f"{quoted(archive)}: not a co-simulation unit ({quoted(error)}).") from error
     if name not in expected:
         raise UnitFileError(f"{quoted(archive)}: is {quoted(name)}; expected {' or '.join(expected)}.")
+    if description.fmiVersion != "2.0":
+        raise UnitFileError(
+            f"{quoted(archive)}: is for FMI {quoted(description.fmiVersion)}; expected a unit for FMI 2.0."
+        )
     unit = FMU2Slave(
         guid=description.guid, unzipDirectory=str(folder), modelIdentifier=name, instanceName=instance
     )
@@ -48,10 +52,14 @@ def opened_unit(archive: Path, folder: Path, expected: Sequence[str], instance: 
 
 
 class Instance:
-    """An initialised instance of a unit, with variables by name."""
+    """An initialised instance of a unit, with variables by name.
+
+    `native` tells whether it is a unit in C: it needs no other tool, and has no networks for pictures.
+    """
 
     def __init__(self, slave: FMU2Slave, description: Any, parameters: Mapping[str, float | str]) -> None:
         self.slave, self.variables = slave, description.modelVariables
+        self.native = not description.coSimulation.needsExecutionTool
         self._variables = {v.name: (v.valueReference, v.type) for v in self.variables}
         slave.setupExperiment(startTime=0.0)
         self.set(parameters)

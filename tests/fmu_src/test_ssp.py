@@ -8,12 +8,14 @@ import zipfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fmu_unit import STEP_S, Unit
 from foreign_clients import need_client
+from long import beyond
 
 import build_ssp
 from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
@@ -265,6 +267,46 @@ def test_other_tools_run_the_package_to_the_same_end(
 
 
 @pytest.mark.e2e
+def test_with_the_native_estimator_the_package_runs_to_the_same_bits(
+    units: dict[str, Path], native_file: Path, tmp_path: Path
+) -> None:
+    wiring = onto_ice(SYSTEMS["one_wheel"])
+    both = [
+        build_package(wiring, units | chosen, tmp_path / name)
+        for name, chosen in (("python.ssp", {}), ("native.ssp", {"TrpacEstimator": native_file}))
+    ]
+    assert problems(both[1]) == []
+    expected, result = (simulate(package, RUN_S) for package in both)
+    assert expected.dtype == result.dtype
+    assert all(np.array_equal(expected[name], result[name]) for name in expected.dtype.names)
+    assert result[f"{ESTIMATOR}.TRPAC"][-1] == pytest.approx(0.3, abs=0.05), (
+        "the estimate came down to the ice"
+    )
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize(("client", "code"), beyond(1, [("ecospy", ECOS), ("libcosimpy", LIBCOSIM)]))
+def test_in_other_tools_the_native_estimator_gives_the_same_bits(
+    units: dict[str, Path], native_file: Path, tmp_path: Path, client: str, code: str
+) -> None:
+    need_client(client)
+    watch = [f"{ESTIMATOR}.{name}" for name in ("TRPAC", "tyre_force", "slip", "K_v")]
+    ends = []
+    for name, chosen in (("python.ssp", {}), ("native.ssp", {"TrpacEstimator": native_file})):
+        package = build_package(SYSTEMS["one_wheel"], units | chosen, tmp_path / name)
+        done = subprocess.run(
+            [sys.executable, "-c", code, package, "700", *watch],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=300,
+        )
+        ends.append(done.stdout.splitlines()[-1])
+    assert ends[1] == ends[0]
+    assert float(ends[1].split()[1]) > 100.0, "the estimator has been given the car's signals"
+
+
+@pytest.mark.e2e
 def test_command_line_builds_validates_runs_and_prints_the_hash(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -277,3 +319,16 @@ def test_command_line_builds_validates_runs_and_prints_the_hash(
     assert "four_wheels, one_wheel" in capsys.readouterr().err
     (tmp_path / "file").write_text("")
     assert build_ssp.main(["--out", str(tmp_path / "file")]) == EXIT_BUILD
+
+
+@pytest.mark.e2e
+@pytest.mark.skipif(find_spec("ziglang") is not None, reason="builds for all platforms, which takes minutes")
+def test_command_line_builds_with_the_native_estimator(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, native_file: Path
+) -> None:
+    monkeypatch.setattr(build_ssp, "RUN_S", 0.005)
+    assert build_ssp.main(["--system", "one_wheel", "--kind", "native", "--out", str(tmp_path)]) == 0
+    package = tmp_path / "trpac_one_wheel_native.ssp"
+    assert file_sha256(package) in capsys.readouterr().out
+    with zipfile.ZipFile(package) as archive:
+        assert archive.read("resources/TrpacEstimator.fmu") == native_file.read_bytes()

@@ -2,6 +2,7 @@
 
 import math
 import random
+from functools import partial
 
 import numpy as np
 
@@ -18,32 +19,47 @@ SIGNALS = (
 )
 
 
-def drive(seed, steps):
+WHEELS, SIDES = (".fl", ".fr", ".rl", ".rr"), (".left", ".right")
+"""Ends of names of the unit of four wheels."""
+
+
+def drive(seed, steps, wheels=("",), sides=("",)):
     """Inputs and size of each step: driving, braking, backing, classes, and now and then something of no sense."""
     rng, speed = random.Random(seed), 12.0
+    of_car = ["steering_angle", "longitudinal_acceleration", "yaw_rate", "lateral_acceleration"][
+        : 3 + (wheels == WHEELS)
+    ]
+    sudden = ["vehicle_speed", *of_car, *(f"road_class_confidence{side}" for side in sides)]
+    sudden += [
+        f"{name}{wheel}" for name in ("wheel_speed", "wheel_torque", "vertical_load") for wheel in wheels
+    ]
     for step in range(steps):
-        torque = 400.0 * math.sin(0.006 * step) + rng.gauss(0.0, 3.0)
-        speed = max(speed + 1e-5 * torque - 0.006 * (step > 0.8 * steps), -2.0)
-        omega = speed * (1.0 + torque / 20000.0) / 0.29 + rng.gauss(0.0, 0.02)
-        values = {
-            "wheel_speed": omega,
-            "wheel_torque": torque,
-            "vehicle_speed": speed + rng.gauss(0.0, 0.005),
-        }
-        if step > 200 and step % 40 == 0:
-            values["road_class"] = rng.choice([0, 1, 2, 2, -1])
-            values["road_class_confidence"] = rng.choice([0.9, 0.9, 0.3])
+        values = {}
+        for wheel in wheels:
+            torque = 400.0 * math.sin(0.006 * step) + rng.gauss(0.0, 3.0)
+            values[f"wheel_torque{wheel}"] = torque
+            values[f"wheel_speed{wheel}"] = speed * (1.0 + torque / 20000.0) / 0.29 + rng.gauss(0.0, 0.02)
+        stopping = 18.0 / (0.2 * steps) if step > 0.8 * steps else 0.0
+        speed = max(speed + 4e-3 * math.sin(0.006 * step) - stopping, -2.0)
+        values["vehicle_speed"] = speed + rng.gauss(0.0, 0.005)
+        if step > steps // 6 and step % 40 == 0:
+            for side in sides:
+                values[f"road_class{side}"] = rng.choice([0, 1, 2, 2, -1])
+                values[f"road_class_confidence{side}"] = rng.choice([0.9, 0.9, 0.3])
             values["frame_id"] = rng.choice([0, step])
-        if rng.random() < 0.005:
-            values[rng.choice(SIGNALS)] = rng.choice(SUDDEN)
+        if rng.random() < 0.01:
+            values[rng.choice(sudden)] = rng.choice(SUDDEN)
         if rng.random() < 0.02:
-            values |= {"steering_angle": rng.gauss(0.0, 0.1), "yaw_rate": rng.gauss(0.0, 0.1)}
-            values |= {"vertical_load": rng.gauss(2900.0, 100.0)}
-            values |= {"longitudinal_acceleration": rng.gauss(0.0, 1.0)}
+            values |= {name: rng.gauss(0.0, 1.0 if "acceleration" in name else 0.1) for name in of_car}
+        if rng.random() < 0.02:
+            values |= {f"vertical_load{wheel}": rng.gauss(3000.0, 150.0) for wheel in wheels}
         if rng.random() < 0.004:
-            values["road_class"] = rng.choice([7, -5])
-        odd = rng.random() < 0.02
+            values[f"road_class{sides[-1]}"] = rng.choice([7, -5])
+        odd = rng.random() < 0.01
         yield values, rng.choice([0.0, 0.01, 1e-4, -1.0, math.nan, 1e9, 11.0]) if odd else 0.001
+
+
+drive_of_four = partial(drive, wheels=WHEELS, sides=SIDES)
 
 
 def rows(steps, seed=1):
@@ -71,41 +87,3 @@ def pedal(steps, radius_m):
             "vehicle_speed": float(12.0 + 0.003 * rng.standard_normal()),
             "vertical_load": 3400.0,
         }
-
-
-WHEELS = ("fl", "fr", "rl", "rr")
-CAR_SIGNALS = (
-    *(f"{name}.{wheel}" for name in ("wheel_speed", "wheel_torque", "vertical_load") for wheel in WHEELS),
-    *("vehicle_speed", "steering_angle", "longitudinal_acceleration", "lateral_acceleration", "yaw_rate"),
-    *("road_class_confidence.left", "road_class_confidence.right"),
-)
-
-
-def drive_of_four(seed, steps):
-    """The same as `drive` for the unit of four wheels."""
-    rng, speed = random.Random(seed), 12.0
-    for step in range(steps):
-        values = {}
-        for wheel in WHEELS:
-            torque = 300.0 * math.sin(0.006 * step) + rng.gauss(0.0, 3.0)
-            values[f"wheel_torque.{wheel}"] = torque
-            values[f"wheel_speed.{wheel}"] = speed * (1.0 + torque / 20000.0) / 0.29 + rng.gauss(0.0, 0.02)
-        speed = max(speed + 3e-3 * math.sin(0.006 * step) - 0.008 * (step > 0.8 * steps), -2.0)
-        values["vehicle_speed"] = speed + rng.gauss(0.0, 0.005)
-        if step > 100 and step % 40 == 0:
-            for side in ("left", "right"):
-                values[f"road_class.{side}"] = rng.choice([0, 1, 2, 2, -1])
-                values[f"road_class_confidence.{side}"] = rng.choice([0.9, 0.9, 0.3])
-            values["frame_id"] = rng.choice([0, step])
-        if rng.random() < 0.015:
-            values[rng.choice(CAR_SIGNALS)] = rng.choice(SUDDEN)
-        if rng.random() < 0.03:
-            values |= {"steering_angle": rng.gauss(0.0, 0.1), "yaw_rate": rng.gauss(0.0, 0.1)}
-            values |= {"lateral_acceleration": rng.gauss(0.0, 2.0)}
-            values |= {"longitudinal_acceleration": rng.gauss(0.0, 1.0)}
-        if rng.random() < 0.01:
-            values |= {f"vertical_load.{wheel}": rng.gauss(3000.0, 200.0) for wheel in WHEELS}
-        if rng.random() < 0.005:
-            values["road_class.right"] = rng.choice([7, -5])
-        odd = rng.random() < 0.02
-        yield values, rng.choice([0.0, 0.01, 1e-4, -1.0, math.nan, 1e9, 11.0]) if odd else 0.001

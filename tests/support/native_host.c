@@ -4,6 +4,7 @@
    threads IN    drives eight instances with the same rows at once; they must give the same
    fuzz SEED N   calls everything with values of no sense, and restores damaged states
    bench IN      the time of a step with set and get
+   long IN S N   S steps of one instance, then N instances of one step; prints the resident memory of both, begin and end [kB]
    Rows are doubles: step size, the eight real inputs, road_class, frame_id. With -DFOUR_WHEELS it fuzzes the unit of four wheels; with -DFMI_3 it hosts one for FMI 3.0. */
 #define _POSIX_C_SOURCE 200809L
 #ifdef FMI_3
@@ -14,11 +15,14 @@
 #include "tables.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#ifndef _WIN32
+#include <pthread.h>
+#include <unistd.h>
+#endif
 
 enum { INPUTS = 8, ROW = INPUTS + 3, MOST = 128, THREADS = 8 };
 #ifdef FOUR_WHEELS
@@ -139,6 +143,7 @@ static void run(const char *path, int method)
     fmi2FreeInstance(unit);
 }
 
+#ifndef _WIN32
 static void *driven(void *result)
 {
     fmi2Component unit = opened(-1);
@@ -159,6 +164,39 @@ static void threads(void)
     for (int k = 1; k < THREADS; k++)
         check(memcmp(results[k], results[0], (size_t)output_count * sizeof(double)) == 0, "threads differ");
 }
+
+static long resident_kb(void)
+{
+    long pages = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    check(file && fscanf(file, "%*d %ld", &pages) == 1, "no /proc/self/statm");
+    fclose(file);
+    return pages * (sysconf(_SC_PAGESIZE) / 1024);
+}
+
+/* The first tenth of both warms up. */
+static void last_long(long steps, long instances)
+{
+    double out[MOST];
+    long begun = resident_kb(); /* which takes a page itself */
+    fmi2Component unit = opened(-1);
+    for (long k = 0; k < steps; k++) {
+        if (k == steps / 10)
+            begun = resident_kb();
+        step(unit, rows + ((size_t)k % row_count) * ROW, out);
+    }
+    printf("%ld %ld", begun, resident_kb());
+    fmi2FreeInstance(unit);
+    for (long k = 0; k < instances; k++) {
+        if (k == instances / 10)
+            begun = resident_kb();
+        unit = opened(-1);
+        step(unit, rows, out);
+        fmi2FreeInstance(unit);
+    }
+    printf(" %ld %ld\n", begun, resident_kb());
+}
+#endif
 
 static unsigned long long state_of_random;
 
@@ -236,6 +274,7 @@ static void fuzz(unsigned seed, int calls)
     fmi2FreeInstance(unit);
 }
 
+#ifndef _WIN32
 static double seconds(void)
 {
     struct timespec now;
@@ -267,6 +306,7 @@ static void bench(int method)
     free(all);
     fmi2FreeInstance(unit);
 }
+#endif
 
 int main(int argc, char **argv)
 {
@@ -292,11 +332,15 @@ int main(int argc, char **argv)
     check(allocations == before + 10000, "an instance is one piece of memory");
     return 0;
 #endif
+#ifndef _WIN32
     if (strcmp(argv[1], "threads") == 0)
         threads();
-    else if (strcmp(argv[1], "bench") == 0)
+    if (strcmp(argv[1], "bench") == 0)
         bench(argc > 3 ? atoi(argv[3]) : -1);
-    else
+    if (strcmp(argv[1], "long") == 0)
+        last_long(atol(argv[3]), atol(argv[4]));
+#endif
+    if (strcmp(argv[1], "run") == 0)
         run(argv[3], argc > 4 ? atoi(argv[4]) : -1);
     return 0;
 }

@@ -54,10 +54,10 @@ def compiled_host(folder: Path, name: str, parts: list[Path], *options: str) -> 
 
 
 def called(host: Path, *arguments: object) -> str:
-    """What the host prints in an environment that has no Python; it must end well."""
+    """What the host prints in an empty environment, in which it can find no Python; it must end well."""
     done = subprocess.run(
         [str(host), *map(str, arguments)],
-        env={"PATH": "/usr/bin"},
+        env={},
         capture_output=True,
         text=True,
         check=False,

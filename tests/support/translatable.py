@@ -90,13 +90,13 @@ def held(value: float | None) -> float:
     return -1.0 if value is None else value * 2.0
 
 
-def swapped(a: float, b: float) -> tuple[float, float]:
-    a, b = b, a
-    return a, b
+def unpacked(pair: Pair, other: Pair) -> float:
+    """What comes of two pairs.
 
-
-def nested(pair: Pair, other: Pair) -> float:
-    (a, b), c = (pair, other.gap)
+    More of it.
+    """
+    (a, b), c = pair, other.gap
+    # The second one counts.
     return a - b * c
 
 
@@ -106,15 +106,14 @@ def changed(named: Named, by: float) -> Named:
 
 
 def is_red(named: Named) -> bool:
-    return named.colour is Colour.RED or named.count in (1, 2)
+    return named.colour is Colour.RED or named.count not in (1, 2)
 
 
 def looped(start: float, n: int) -> float:
     value = start
     for index in range(n):
-        if value > 1e6:
-            break
-        value += index * value
+        if value <= 1e6:
+            value += index * value
     while 10.0 < value < 1e9:
         value /= 2.0
     return value
@@ -142,8 +141,8 @@ def softened(rows: ROWS, by: COLUMN, line: LINE, scale: float) -> ROWS:
 
 
 def columns(rows: ROWS) -> LINE:
-    most = greatest(rows)
-    return over_rows(rows[:, :]) / most + cumulated(over_rows(rows))
+    most, summed = greatest(rows), over_rows(rows)
+    return over_rows(rows[:, :]) / most + cumulated(summed)
 
 
 def row_of(rows: ROWS, index: int) -> LINE:
@@ -156,7 +155,8 @@ def halves(rows: ROWS) -> float:
 
 
 def places(line: LINE, value: float) -> tuple[int, int]:
-    up_to = cumulated(np.abs(line))
+    size = np.abs(line)
+    up_to = cumulated(size)
     return count_below(up_to, value), count_up_to(up_to, value)
 
 
@@ -172,14 +172,16 @@ def all_shaped(rows: ROWS, slope: float) -> ROWS:
 
 
 def kept(state: Kept, by: float) -> Kept:
-    state = state._replace(level=state.level + by, rows=state.rows * state.level)
+    rows = state.rows * state.level
+    state = state._replace(level=state.level + by, rows=rows)
     if by < 0.0:
         return _lower(state, by)
     return state._replace(level=by)
 
 
 def _lower(state: Kept, by: float) -> Kept:
-    return state._replace(rows=state.rows + by)
+    rows = state.rows + by
+    return state._replace(rows=rows)
 
 
 def remembered(memory: Memory, by: float) -> float:

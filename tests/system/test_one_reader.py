@@ -43,7 +43,6 @@ OPENED = {
 """What reads files of others, and by which calls."""
 OWN = {
     "fmu_src/native/build.py": {"read_bytes", "read_text"},  # sources into a unit
-    "fmu_src/native/translator/body.py": {"parse"},  # this project's Python
     "fmu_src/native/translator/source.py": {"parse", "read_text"},  # likewise
     "fmu_src/packaging.py": {"ZipFile", "read_bytes"},  # sources into a unit
     "fmu_src/ssp.py": {"read_bytes"},  # units into a package

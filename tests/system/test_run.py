@@ -9,6 +9,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
+from fmu_src.kinds import NATIVE, build
 from fmu_src.packaging import build_unit
 from fmu_src.units import UNITS
 from scenarios.errors import ScenarioError
@@ -18,6 +19,7 @@ from scenarios.pictures import frame_name, record
 from scenarios.plant.pipeline import drive
 from scenarios.runner import run_scenario
 from trpac_cli.main import app
+from trpac_core.errors import TrpacError
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.sensors import Sensors
@@ -153,6 +155,30 @@ def test_another_method_is_that_of_the_unit_and_of_the_report(scenario_file, uni
     assert last["TRPAC_source"] == estimate.source
 
 
+@pytest.mark.e2e
+def test_pictures_are_classified_beside_a_native_unit_whose_outputs_are_the_same_bits(
+    scenario_file, unit_file, native_file, tmp_path
+):
+    """All but the confidence where the flag is down: by bus it is then no more than the threshold."""
+    scenario = load_scenario(scenario_file)
+    python, native = (run_scenario(scenario, unit, tmp_path / "frames") for unit in (unit_file, native_file))
+    down = ~python.table["flag"]
+    kept = python.table["image_confidence"].mask(down, np.minimum(python.table["image_confidence"], 0.5))
+    expected = python.table.assign(image_confidence=kept)
+    pd.testing.assert_frame_equal(native.table, expected, check_exact=True)
+    assert set(python.table["flag"]) == {False, True}
+    assert python.table["TRPAC_image"].nunique() > 1
+
+
+@pytest.mark.e2e
+def test_a_wrong_setting_or_picture_of_a_native_unit_is_said(native_file, tmp_path):
+    frames = pd.DataFrame({"row": [0], "path": [str(tmp_path / "none.jpg")], "frame": [1]})
+    with pytest.raises(TrpacError, match=r"none\.jpg"):
+        run_unit(native_file, {}, ONE_ROW, frames, 0.001)
+    with pytest.raises(TrpacError, match=r"camera\.fx"):
+        run_unit(native_file, {"camera.fx": -1.0}, ONE_ROW, frames, 0.001)
+
+
 @pytest.mark.long
 @pytest.mark.e2e
 def test_a_run_repeats_bit_by_bit(scenario_file, unit_file, tmp_path):
@@ -217,6 +243,12 @@ NO_FRAMES = pd.DataFrame({"row": [], "path": [], "frame": []})
 def test_another_unit_of_ours_is_said(tmp_path):
     archive = build_unit(UNITS["TrpacEstimator4W"], tmp_path / "other.fmu")
     with pytest.raises(ScenarioError, match=r"other\.fmu: is TrpacEstimator4W; expected TrpacEstimator"):
+        run_unit(archive, {}, ONE_ROW, NO_FRAMES, 0.001)
+
+
+def test_a_unit_for_another_version_of_fmi_is_said(native_file, tmp_path):
+    archive = build("TrpacEstimator", tmp_path, kind=NATIVE, fmi=3, everywhere=False)
+    with pytest.raises(ScenarioError, match=r"_fmi3\.fmu: is for FMI 3\.0; expected a unit for FMI 2\.0"):
         run_unit(archive, {}, ONE_ROW, NO_FRAMES, 0.001)
 
 

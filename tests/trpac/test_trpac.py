@@ -3,6 +3,7 @@
 import logging
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -349,3 +350,23 @@ def test_frames_of_a_drive_are_remembered():
     seen = [eye.step(road_picture(480, 300), t, speed=10.0) for t in (0.0, 0.1)]
     assert seen[0].surface in ("dry", "wet", "snow_ice")
     assert eye._way_m == pytest.approx(1.0)
+
+
+def test_a_unit_is_built_in_each_kind_and_another_is_refused(native_file, tmp_path):
+    for fmi, name in ((2, "TrpacEstimator_native_flat.fmu"), (3, "TrpacEstimator_native_fmi3_flat.fmu")):
+        path = trpac.build_fmu(tmp_path, kind="native", fmi=fmi, flat=True)
+        assert path == tmp_path / name
+        with zipfile.ZipFile(path) as archive:
+            assert f"sources/fmi{fmi}.c" in archive.namelist()
+    assert trpac.build_fmu(tmp_path, unit="TorquePulses").name == "TorquePulses.fmu"
+    for given, said in (
+        ({"kind": "rust"}, "kind is 'rust'; expected one of python, native"),
+        (
+            {"unit": "ReferencePlant", "kind": "native"},
+            "'ReferencePlant' is not a native unit; Known: TrpacE",
+        ),
+        ({"fmi": 3}, "fmi is 3; expected 2, or of a native unit also 3"),
+        ({"unit": "TrpacEstimater"}, "did you mean 'TrpacEstimator'"),
+    ):
+        with pytest.raises(trpac.TrpacError, match=said):
+            trpac.build_fmu(tmp_path, **given)

@@ -12,6 +12,7 @@ import typer
 from rich.text import Text
 from typer.testing import CliRunner
 
+from fmu_src.kinds import KINDS
 from trpac_cli.main import app
 from trpac_core.estimator_data import Method
 
@@ -58,6 +59,24 @@ def test_each_command_explains_the_methods_and_refuses_another(command, tmp_path
         f"trpac {command}: estimator method is 'printed'; expected one of as_printed, dife, robust."
     )
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("command", "given"), [("run", ["paper_simulation"]), ("hil", [])])
+def test_the_kinds_of_the_unit_are_explained_and_another_or_a_file_beside_it_is_refused(
+    command, given, tmp_path
+):
+    runner = CliRunner(env={"COLUMNS": "200", "TERM": "dumb"})
+    text = " ".join(runner.invoke(app, [command, "--help"]).output.split())
+    for kind in KINDS:
+        assert f"{kind}: " in text
+    for more, words in (
+        (["--unit", "rust"], "--unit rust: expected python or native."),
+        (["--unit", "native", "--fmu", "any.fmu"], "--unit is for a unit that is built, and --fmu names one"),
+    ):
+        done = runner.invoke(app, [command, *given, *more, "--out", str(tmp_path / "out")])
+        assert done.exit_code == 2
+        assert words in done.stderr
+        assert not (tmp_path / "out").exists()
 
 
 def test_the_version_is_told():

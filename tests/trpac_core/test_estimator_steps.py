@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from trpac_core import tyre
+from trpac_core import tyre, wheel_step
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
-from trpac_core.estimator_data import Method
+from trpac_core.estimator_data import EstimatorState, Method, Rates
 from trpac_core.observer import seen_at
+from trpac_core.preprocessing import RELEASED, preprocess
 from trpac_core.sensors import Sensors
+from trpac_core.stationary_mean import NO_MEAN, StationaryMean
 from trpac_core.vehicle import EXACT_CAR, CarTolerance, Vehicle
 from trpac_core.vision.classes import Surface
 
@@ -138,3 +140,95 @@ def test_a_camera_that_pulls_the_estimate_leaves_the_observed_force_alone():
     told = [estimator.step(0.001, steady, RoadClass(Surface.SNOW_ICE, 0.95)) for _ in range(2000)]
     assert told[-1].TRPAC < 0.75
     assert max(abs(said.tyre_force_n - force_n) for said in told) < 1e-6
+
+
+@pytest.mark.parametrize("front", [True, False])
+def test_braking_loads_the_front_axle_and_relieves_the_rear(front):
+    car, a_m_s2 = Vehicle(), -5.0
+    estimator = TrpacEstimator(EstimatorConfig(vehicle=car, front_axle=front))
+    at = Sensors(10.0 / car.wheel_radius_m, 0.0, 10.0, longitudinal_acceleration_m_s2=a_m_s2)
+    said = [estimator.step(0.01, at) for _ in range(100)][-1]
+    lever_m = car.cog_to_rear_axle_m if front else car.cog_to_front_axle_m
+    share = 1.0 if front else -1.0
+    moment_nm = car.mass_kg * (9.81 * lever_m - share * a_m_s2 * car.cog_height_m)
+    assert said.load_n == pytest.approx(moment_nm / (2.0 * car.wheelbase_m), rel=1e-6)
+
+
+def test_a_tyre_that_goes_with_its_load_is_told_its_stiffness_at_the_mean_load_of_the_car():
+    """Both axles of a car have the same tyres, of C_x at a quarter of its weight."""
+    car = Vehicle()
+    for front in (True, False):
+        config = EstimatorConfig(vehicle=car, front_axle=front)
+        known = wheel_step.wheel_setup(config)
+        assert known.robust.wheel.mean_load_n == pytest.approx(car.mass_kg * 9.81 / 4.0)
+
+
+def test_a_frame_is_as_old_as_the_time_since_it_was_taken():
+    estimator = TrpacEstimator(EstimatorConfig())
+    at = Sensors(10.0 / RADIUS_M, 0.0, 10.0)
+    ages = []
+    for step in range(60):
+        taken = RoadClass(Surface.WET, 0.9) if step == 10 else None
+        said = estimator.step(0.01, at, taken)
+        if said.frame_age_s >= 0.0:
+            ages.append((said.frame_age_s, 0.01 * (step + 1) - 0.01 * 10))
+    assert len(ages) > 10
+    assert [age for age, _ in ages] == pytest.approx([passed for _, passed in ages], abs=1e-9)
+
+
+def test_behind_a_locked_wheel_the_torque_counts_once_the_filter_has_forgotten_it():
+    config = EstimatorConfig()
+    state = first(config)
+    known_torque = []
+    for omega in (0.0, *[10.0 / RADIUS_M] * 100):
+        rates = Rates.at(config, 0.001, state.step_s)
+        prepared = preprocess(config, rates, state, Sensors(omega, 0.0, 10.0), 0.001, LOAD_N)
+        state.locked_s, state.step_s = prepared.locked_s, 0.001
+        known_torque.append(prepared.inputs.torque_known)
+    forgotten = RELEASED * config.sensor_filter_s
+    assert known_torque.index(True) * 0.001 == pytest.approx(forgotten, abs=0.0015)
+    assert all(known_torque[known_torque.index(True) :])
+
+
+def test_a_wheel_counts_as_locked_by_its_rim_not_by_its_turns():
+    config = EstimatorConfig()
+    state, rates = first(config), Rates.at(config, 0.001, 0.001)
+    for rim_m_s, locked in ((0.4, True), (0.6, False)):
+        omega = rim_m_s / config.vehicle.wheel_radius_m
+        prepared = preprocess(config, rates, state, Sensors(omega, -500.0, 10.0), 0.001, LOAD_N)
+        assert (prepared.locked_s == 0.0) == locked
+
+
+def test_slip_that_rises_is_seen_by_its_distance_from_its_filter():
+    config = EstimatorConfig()
+    state, rates = first(config), Rates.at(config, 0.001, 0.001)
+    rises = []
+    for slip in np.linspace(0.0, 0.1, 100):
+        omega = 10.0 / RADIUS_M / (1.0 - slip)
+        prepared = preprocess(config, rates, state, Sensors(omega, 0.0, 10.0), 0.001, LOAD_N)
+        state.readings, state.lagged_slip, state.settled = prepared.readings, prepared.lagged_slip, True
+        rises.append(prepared.inputs.slip_rise)
+    # An even rise lags by its slope times the filter's time.
+    slope_1_s = 0.1 / 0.099
+    assert rises[-1] == pytest.approx(slope_1_s * config.sensor_filter_s, rel=0.1)
+
+
+@pytest.mark.parametrize("step_s", [-1.0, 20.0])
+def test_readings_before_a_step_of_no_use_do_not_stay_in_the_means(step_s):
+    estimator = TrpacEstimator(EstimatorConfig())
+    for _ in range(300):
+        estimator.step(0.001, Sensors(10.2 / RADIUS_M, 300.0, 10.0))
+    assert means(estimator)["dynamics"].duration_s > 0.1
+    estimator.step(step_s, Sensors(10.2 / RADIUS_M, 300.0, 10.0))
+    assert set(means(estimator).values()) == {NO_MEAN}
+
+
+def means(estimator: TrpacEstimator) -> dict[str, StationaryMean]:
+    """Means of both observers, by the field of the state."""
+    state = EstimatorState.from_json(estimator.state()["state"])
+    return {"dynamics": state.dynamics.mean, "fusion": state.fusion.mean}
+
+
+def first(config: EstimatorConfig) -> EstimatorState:
+    """The state before the first step."""
+    return wheel_step.first_state(config, wheel_step.wheel_setup(config))

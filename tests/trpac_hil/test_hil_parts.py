@@ -636,7 +636,9 @@ def test_pictures_are_judged_by_the_units_parameters(tmp_path):
     vision = _vision(settings, camera)
     assert (vision.least_mass, vision.b[0], vision.flag_threshold) == (0.9, 6, 0.4)
     assert (vision.track_m, vision.camera) == (1.7, camera)
-    assert _vision(replace(settings, parameters={}), camera) == IfeConfig(camera=camera)
+    assert _vision(replace(settings, parameters={}), camera) == IfeConfig(
+        camera=camera, groups_looked_at=1, side="left"
+    )
 
 
 def test_the_recorder_is_given_the_time_that_a_long_log_takes():

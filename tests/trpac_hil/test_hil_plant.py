@@ -12,7 +12,9 @@ import pytest
 from hil_fakes import MS, FakeClock
 
 from scenarios.files import load_scenario
+from trpac_core.estimator import RoadClass
 from trpac_core.vision.classes import Surface
+from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError
 from trpac_hil import camera
 from trpac_hil.bus import BusSettings
@@ -196,12 +198,12 @@ def test_each_picture_is_taken_when_it_is_due_and_where_that_is_too_fast_the_new
     monkeypatch.setattr(camera, "SystemClock", lambda: clock)
     start_ns, taken = clock.now_ns() + 10 * MS, []
 
-    def process(image: int, motion: Any) -> list[Any]:
+    def classes_of(image: int, motion: Any) -> list[RoadClass]:
         taken.append((image, motion.speed_m_s))
         clock.time_ns += work_ms * MS
         if image == 2:
             raise ImageError("torn")
-        return [SimpleNamespace(surface=Surface.WET, told_by_bus=lambda threshold: threshold)]
+        return [RoadClass(Surface.WET, 0.4)]
 
     told: list[str] = []
 
@@ -211,10 +213,10 @@ def test_each_picture_is_taken_when_it_is_due_and_where_that_is_too_fast_the_new
 
     control = Told()
     control.start_ns = start_ns  # type: ignore[attr-defined]
-    job = CameraJob(SimpleNamespace(picture=lambda number: number), SimpleNamespace(flag_threshold=0.4), 10.0)  # type: ignore[arg-type]
+    job = CameraJob(SimpleNamespace(picture=lambda number: number), IfeConfig(), 10.0)  # type: ignore[arg-type]
     motion, results = Numbers(5), Ring(result_columns(1), 64)
     motion.set([12.0, 0.0, 0.0, 0.0, 0.0])
-    camera._play(job, SimpleNamespace(process=process), motion, results, control)  # type: ignore[arg-type]
+    camera._play(job, SimpleNamespace(classes=classes_of), motion, results, control)  # type: ignore[arg-type]
     rows = results.read()
     assert taken == [(number, 12.0) for number in numbers]
     assert rows[:, 0].tolist() == numbers

@@ -21,6 +21,7 @@ from fmu_unit import Unit as Client
 from long import long
 from typer.testing import CliRunner
 
+from fmu_src.kinds import KINDS, PYTHON
 from scenarios.fmu_client.unpacking import unpack_unit
 from trpac_cli.main import app
 from trpac_core.estimator import EstimatorConfig
@@ -106,14 +107,19 @@ def replayed(archive: Path, parameters: dict[str, object], log: dict[str, np.nda
     return np.array(results)
 
 
-def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(unit_file: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(
+    kind: str, unit_file: Path, tmp_path: Path
+) -> None:
+    """Also where the rig builds a native unit: its outputs are those of the unit with Python."""
     from scenarios.fmu_client.estimator import car_parameters
     from trpac_hil.rig import _vehicle
 
-    bus = BusSettings("virtual", "test-whole")
+    bus = BusSettings("virtual", f"test-whole-{kind}")
     settings = HilSettings(
         out=tmp_path / "out",
-        fmu=unit_file,
+        fmu=unit_file if kind == PYTHON else None,
+        kind=kind,
         bus=bus,
         rate_hz=200.0,
         duration_s=4.0,

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fmu_src.packaging import build_unit
-from fmu_src.units import UNITS
+from fmu_src.kinds import KINDS, build
 from trpac_hil.errors import HilError
 from trpac_hil.unit import Unit
 
@@ -16,10 +15,11 @@ GRIP = {"fl": 0.9, "fr": 0.7, "rl": 0.5, "rr": 0.3}
 
 
 @pytest.mark.e2e
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", ["TrpacEstimator", "TrpacEstimator4W"])
-def test_what_is_read_of_a_unit_is_what_its_variables_say(name: str, tmp_path: Path) -> None:
+def test_what_is_read_of_a_unit_is_what_its_variables_say(name: str, kind: str, tmp_path: Path) -> None:
     unit = Unit(
-        build_unit(UNITS[name], tmp_path / f"{name}.fmu"),
+        build(name, tmp_path, kind=kind, everywhere=False),
         {"estimator.theta_initial": 0.6, "estimator.method": 1},
         "rl",
     )

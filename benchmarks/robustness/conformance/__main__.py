@@ -8,7 +8,7 @@ import sys
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from .cases import CASES
+from .cases import TITLES
 from .clients import CLIENTS
 from .matrix import run
 from .outcome import Outcome
@@ -29,10 +29,10 @@ def versions() -> dict[str, str]:
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.robustness.conformance", description=__doc__)
     parser.add_argument("--client", action="append", choices=list(CLIENTS), help="only this one; repeatable")
-    parser.add_argument("--unit", action="append", choices=list(CASES), help="only this one; repeatable")
+    parser.add_argument("--unit", action="append", choices=list(TITLES), help="only this one; repeatable")
     parser.add_argument("--out", type=Path, default=DOCUMENT, help="what is not run now stays as it is there")
     options = parser.parse_args()
-    cells = run(options.client or CLIENTS, options.unit or CASES)
+    cells = run(options.client or CLIENTS, options.unit or TITLES)
     for place, cell in cells.items():
         if cell.outcome is Outcome.FAILED:
             print(f"{place.client}, {place.unit}, {place.operation}: {cell.reason}", file=sys.stderr)

@@ -7,7 +7,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,12 @@ import numpy as np
 
 from fmu_src.contents import CONTENTS_FILE, Contents, sha256_of
 from fmu_src.guarded_slave import GuardedSlave
+from fmu_src.native.build import NATIVE_UNITS
 from fmu_src.units import ROOT
 from scenarios.library import networks_folder
 from trpac_core.vehicle import WHEELS
+
+from .outcome import NotOfferedError
 
 STEP_S = 0.001
 STEPS = 200
@@ -49,6 +52,10 @@ class Case:
         The variable that names a file, and whether it is a parameter.
     watched : tuple of str
         Real outputs that are compared bit for bit.
+    classes : mapping
+        The road's class by number, for the native unit, which takes no pictures.
+    native : bool
+        Whether it is the native unit.
     """
 
     unit: str
@@ -61,15 +68,29 @@ class Case:
     parameter: tuple[str, float]
     missing: tuple[str, bool]
     watched: tuple[str, ...]
+    classes: Values = field(default_factory=dict)
+    native: bool = False
+
+    @property
+    def title(self) -> str:
+        """Its name in the matrix."""
+        return f"{self.unit} native" if self.native else self.unit
 
     @property
     def takes_pictures(self) -> bool:
         """Whether pictures are among its inputs."""
-        return self.missing[0] == "image_path"
+        return self.missing[0] == "image_path" and not self.native
+
+    def missing_file(self) -> tuple[str, bool]:
+        """The variable that names a file, and whether it is a parameter; NotOfferedError where the unit opens none."""
+        if self.native:
+            raise NotOfferedError("the unit opens no files")
+        return self.missing
 
     def inputs(self, picture: Path) -> dict[str, Any]:
-        """What it is driven with, a picture included where it takes any."""
-        return {**self.drive, **({"image_path": str(picture)} if self.takes_pictures else {})}
+        """What it is driven with: a picture, or the class by number where the native unit stands."""
+        seen = {"image_path": str(picture)} if self.takes_pictures else self.classes if self.native else {}
+        return {**self.drive, **seen}
 
 
 def _each(name: str, *values: float) -> dict[str, float]:
@@ -92,6 +113,7 @@ CASES = {
             ("estimator.theta_initial", 0.3),
             ("image_path", False),
             _OF_A_WHEEL,
+            {"road_class": 1, "road_class_confidence": 0.9},
         ),
         Case(
             "TrpacEstimator4W",
@@ -108,6 +130,11 @@ CASES = {
             ("estimator.theta_initial", 0.3),
             ("image_path", False),
             (*(f"{name}.{wheel}" for name in _OF_A_WHEEL for wheel in WHEELS), "TRPAC.vehicle"),
+            {
+                f"road_class{part}.{side}": value
+                for side in ("left", "right")
+                for part, value in (("", 1), ("_confidence", 0.9))
+            },
         ),
         Case(
             "ReferencePlant",
@@ -123,6 +150,9 @@ CASES = {
         ),
     )
 }
+"""Units that need Python, by name."""
+TITLES = CASES | {case.title: case for case in (replace(CASES[unit], native=True) for unit in NATIVE_UNITS)}
+"""All units of the matrix, by title."""
 
 
 def write_pictures(folder: Path) -> tuple[Path, Path]:
@@ -162,7 +192,7 @@ def _slave(case: Case) -> GuardedSlave:
     from fmu_src.trpac_estimator_4w import TrpacEstimator4W
 
     classes = {c.__name__: c for c in (TrpacEstimator, TrpacEstimator4W, ReferencePlant)}
-    resources = _networks() if case.takes_pictures else ROOT / "scenarios" / "roads"
+    resources = _networks() if case.missing[0] == "image_path" else ROOT / "scenarios" / "roads"
     return classes[case.unit](instance_name="direct", resources=str(resources), visible=False)
 
 

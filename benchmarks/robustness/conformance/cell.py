@@ -10,7 +10,7 @@ import os
 import sys
 from pathlib import Path
 
-from .cases import CASES
+from .cases import TITLES
 from .clients import CLIENTS
 from .outcome import Cell, NotOfferedError, Outcome
 
@@ -28,7 +28,7 @@ def outcome_of(work: object, operation: str) -> Cell:
 
 def main() -> None:
     client, unit, archive, folder, first, second, *operations = sys.argv[1:]
-    case, pictures = CASES[unit], (Path(first), Path(second))
+    case, pictures = TITLES[unit], (Path(first), Path(second))
     # The clients and the units may write to standard output; the answers go to a copy of it.
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)

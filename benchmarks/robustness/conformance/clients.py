@@ -33,7 +33,11 @@ CLIENTS = {
     "fmpy_apart": Client(
         "fmpy, own process", "fmpy", lambda c, _, f, p: Host(transports.fmpy_apart, c, f, p)
     ),
-    "c": Client("C program", "fmpy", lambda c, _, f, p: Host(transports.c_program, c, f, p)),
+    "c": Client(
+        "C program",
+        "fmpy",
+        lambda c, _, f, p: Host(transports.c_alone if c.native else transports.c_program, c, f, p),
+    ),
     "libcosimpy": Client("libcosimpy", "libcosimpy", lambda c, a, _, p: Cosim(c, a, p)),
     "ecospy": Client("ecospy", "ecospy", lambda c, a, _, p: Ecos(c, a, p)),
     "proxyfmu": Client("ecospy, proxyfmu", "ecospy", lambda c, a, _, p: Ecos(c, a, p, apart=True)),

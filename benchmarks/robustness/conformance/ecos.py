@@ -28,10 +28,14 @@ def need() -> Path:
 
 
 def proxy() -> Path:
-    """A folder with `proxyfmu` that can be run: the wheel brings it without that permission."""
+    """A folder with `proxyfmu`, made executable, which it is not in the wheel, and `unzip`, which ecos calls."""
     folder = Path(tempfile.mkdtemp(prefix="trpac-ecos-"))
     program = Path(shutil.copy(need() / "proxyfmu", folder))
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    unzip = shutil.which("unzip")
+    if unzip is None:
+        raise NotOfferedError("needs the program unzip")
+    (folder / "unzip").symlink_to(unzip)
     return folder
 
 
@@ -87,7 +91,11 @@ class Ecos(Engine):
     def __init__(self, case: Case, archive: Path, pictures: tuple[Path, Path], apart: bool = False) -> None:
         super().__init__(case, archive, pictures)
         self._uri = f"proxyfmu://localhost?file={archive}" if apart else str(archive)
-        if apart:
+        if apart and case.native:
+            for name in [name for name in os.environ if name.startswith(("PYTHON", "LD_"))]:
+                del os.environ[name]
+            os.environ["PATH"] = str(proxy())
+        elif apart:
             os.environ["PATH"] = os.pathsep.join([str(proxy()), with_python()["PATH"]])
             os.environ["LD_PRELOAD"] = with_python()["LD_PRELOAD"]
         else:

@@ -122,7 +122,7 @@ class Engine(TypedValues):
             self._steps()
 
     def _missing(self) -> None:
-        name, is_parameter = self._case.missing
+        name, is_parameter = self._case.missing_file()
         gone = {name: str(self._pictures[0].with_name("no such file"))}
         if is_parameter:
             return self._missing_parameter(gone)

@@ -13,11 +13,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from fmu_src.packaging import build_unit
-from fmu_src.units import UNITS
+from fmu_src.kinds import NATIVE, PYTHON, build
 from scenarios.fmu_client.unpacking import unpack_unit
 
-from .cases import CASES, write_pictures
+from .cases import TITLES, Case, write_pictures
 from .clients import CLIENTS
 from .operations import OPERATIONS
 from .outcome import Cell, Outcome
@@ -44,11 +43,16 @@ class Bench(NamedTuple):
     pictures: tuple[Path, Path]
 
 
-def prepare(folder: Path, units: Iterable[str] = CASES) -> Bench:
+def prepare(folder: Path, units: Iterable[str] = TITLES) -> Bench:
     """Build and unpack the units, and write the pictures."""
-    archives = {unit: build_unit(UNITS[unit], folder / f"{unit}.fmu") for unit in units}
-    folders = {unit: unpack_unit(archive, folder / unit) for unit, archive in archives.items()}
+    archives = {unit: built(TITLES[unit], folder) for unit in units}
+    folders = {unit: unpack_unit(archive, folder / archive.stem) for unit, archive in archives.items()}
     return Bench(archives, folders, write_pictures(folder))
+
+
+def built(case: Case, folder: Path) -> Path:
+    """The archive of a unit; that of the native one has the library of this machine only."""
+    return build(case.unit, folder, kind=NATIVE if case.native else PYTHON, everywhere=False)
 
 
 def run_cells(bench: Bench, client: str, unit: str, operations: Iterable[str]) -> dict[Place, Cell]:
@@ -102,7 +106,7 @@ def _wait(child: subprocess.Popen[bytes], said: int) -> int | None:
 
 
 def run(
-    clients: Iterable[str] = CLIENTS, units: Iterable[str] = CASES, operations: Iterable[str] = OPERATIONS
+    clients: Iterable[str] = CLIENTS, units: Iterable[str] = TITLES, operations: Iterable[str] = OPERATIONS
 ) -> dict[Place, Cell]:
     """All cells of these clients, units and operations."""
     units, operations = list(units), list(operations)

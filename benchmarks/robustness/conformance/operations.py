@@ -25,7 +25,7 @@ OPERATIONS = {
     "boolean": "set and get Boolean",
     "text": "set and get String",
     "initialise": "a parameter, then initialise",
-    "steps": f"{STEPS} steps with a picture",
+    "steps": f"{STEPS} steps",
     "reset": "reset and run again",
     "two": "two instances",
     "state": "save and restore in mid-run",
@@ -265,7 +265,7 @@ class Host(TypedValues):
                 expect(len(told) == int(logging), f"{name} out of range: {len(told)} warnings: {unit.log}")
 
     def _missing(self) -> None:
-        name, is_parameter = self._case.missing
+        name, is_parameter = self._case.missing_file()
         gone = {name: str(self._pictures[0].with_name("no such file"))}
         with self._unit(initialise=not is_parameter) as unit:
             unit.set(gone)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from .cases import CASES
+from .cases import TITLES
 from .clients import CLIENTS
 from .matrix import Place
 from .operations import OPERATIONS
@@ -25,6 +25,9 @@ libcosim hands over step sizes that are differences of times: it is compared to 
 without `TRPAC_std`, which is renewed block of time by block of time, one step earlier or later there. fmpy's own
 remoting serves units for another platform only (Windows units under wine), so "fmpy, own process" is fmpy behind a
 pipe. The C program is ours, on the FMI headers that fmpy ships.
+
+Units with Python are given a picture, native units the road's class by number, the plant neither. The C program runs
+native units in an empty environment, proxyfmu with nothing but itself and `unzip` on PATH: neither can find a Python.
 """
 
 
@@ -48,7 +51,7 @@ def document(cells: Mapping[Place, Cell], versions: Mapping[str, str]) -> str:
     """The whole document."""
     reasons: dict[str, int] = {}
     lines = [HEAD, "Run on " + ", ".join(f"{name} {number}" for name, number in versions.items()) + ".", ""]
-    for unit in CASES:
+    for unit in TITLES:
         lines += [f"## {unit}", "", "| | " + " | ".join(c.title for c in CLIENTS.values()) + " |"]
         lines.append("|---" * (len(CLIENTS) + 1) + "|")
         lines += [_numbered(row, reasons) for row in rows(cells, unit)] + [""]
@@ -71,7 +74,7 @@ def read_cells(text: str) -> dict[Place, Cell]:
     found: dict[Place, Cell] = {}
     for section in text.split("\n## ")[1:]:
         unit, *lines = section.splitlines()
-        if unit not in CASES:
+        if unit not in TITLES:
             continue
         for line in lines:
             title, *cells = [part.strip() for part in line.strip("|").split("|")]

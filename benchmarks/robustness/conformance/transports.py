@@ -196,6 +196,11 @@ def c_program(folder: Path) -> Piped:
     return Piped([str(_compiled())], with_python())
 
 
+def c_alone(folder: Path) -> Piped:
+    """The C host in an empty environment."""
+    return Piped([str(_compiled())], {})
+
+
 _PROGRAM: list[Path] = []
 
 

@@ -1,7 +1,9 @@
 """Typed Python functions of numbers, records and small arrays, written as C99.
 
 `types` maps Python's types to C's, `source` finds the text of functions and classes, `program` collects what is needed
-and writes the files, `expressions`, `loops` and `body` translate one function.
+and writes the files. One class translates a function, in layers: `loops` writes lines and loops over arrays,
+`expressions` values, `arrays` calls of the functions of arrays, `calls` all others, records and large values, `body`
+statements.
 
 The results are those of CPython bit by bit, on the same C library and with -ffp-contract=off:
 

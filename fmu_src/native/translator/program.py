@@ -6,7 +6,7 @@ import ast
 import inspect
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import FunctionType
 from typing import Any, get_type_hints
@@ -14,7 +14,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from .source import Unsupported, definition, source_of, summary
-from .types import Type, Types, comment, initialiser, safe
+from .types import ARRAY, Type, Types, comment, initialiser, safe
 
 WIDTH = 110
 
@@ -44,7 +44,8 @@ static inline bool before(double a, double b) { return a < b || (b != b && a == 
 class Function:
     """A function or method of Python's and its form in C.
 
-    `updates` tells that its first argument is changed in place to what it returns.
+    `updates` tells that its first argument is changed in place to what it returns, `inline` that loops call it for each
+    element of an array.
     """
 
     python: Any
@@ -53,11 +54,12 @@ class Function:
     returns: Type
     parameters: tuple[tuple[str, Type], ...]
     updates: bool
+    inline: bool
 
     @property
     def private(self) -> bool:
-        """Whether the name begins with an underscore."""
-        return self.node.name.startswith("_")
+        """Whether only the file itself calls it: its name begins with an underscore, or loops call it."""
+        return self.inline or self.node.name.startswith("_")
 
     @property
     def by_pointer(self) -> bool:
@@ -71,18 +73,17 @@ class Function:
 
     def head(self) -> str:
         """Its declaration without a semicolon."""
-        listed = []
-        if self.by_pointer:
-            listed.append(f"{self.returns.c} *restrict result")
+        listed = [f"{self.returns.c} *restrict result"] if self.by_pointer else []
         for index, (name, kind) in enumerate(self.parameters):
-            if kind.kind == "array" or kind.big:
-                constant = "" if kind.mutable or (self.updates and index == 0) else "const "
-                listed.append(f"{constant}{kind.c} *{safe(name)}")
-            else:
-                listed.append(f"{kind.c} {safe(name)}")
+            by_pointer, changed = (
+                kind.kind == "array" or kind.big,
+                kind.mutable or (self.updates and not index),
+            )
+            constant = "const " if by_pointer and not changed else ""
+            listed.append(f"{constant}{kind.c} {'*' * by_pointer}{safe(name)}")
         by_value = not (self.by_pointer or self.updates or self.returns.kind == "nothing")
-        returns = self.returns.c if by_value else "void"
-        return f"{'static ' if self.private else ''}{returns} {self.c}({', '.join(listed) or 'void'})"
+        words = "static " * self.private + "inline " * self.inline + (self.returns.c if by_value else "void")
+        return f"{words} {self.c}({', '.join(listed) or 'void'})"
 
 
 class Program:
@@ -105,10 +106,9 @@ class Program:
         if not isinstance(python, FunctionType):
             raise Unsupported(f"{python!r} is no function in Python.")
         function = self._function(python)
-        same = [f for f in self.functions.values() if f.c == function.c]
-        if same:
-            raise Unsupported(f"{function.file}: {same[0].file} would have the same name in C, {function.c}.")
-        self.functions[python] = function
+        if function.c in self.bodies:
+            raise Unsupported(f"{function.file}: another function has the same name in C, {function.c}.")
+        self.functions[python], self.bodies[function.c] = function, []
         self.bodies[function.c] = self._translate(self, function)
         return function
 
@@ -119,34 +119,27 @@ class Program:
             raise Unsupported(f"{where}: {node.name} takes any number of arguments.")
         hints = get_type_hints(python, include_extras=True)
         owner = python.__qualname__.rpartition(".")[0]
-        parameters = []
-        for name in inspect.signature(python).parameters:
-            if name == "self":
-                parameters.append((name, self.types.of(getattr(_module(python), owner), where)))
-            elif name != "cls":
-                if name not in hints:
-                    raise Unsupported(f"{where}: {name} has no type.")
-                parameters.append((name, self.types.of(hints[name], where)))
+        if owner:
+            hints["self"] = getattr(sys.modules[python.__module__], owner)
+        names = [name for name in inspect.signature(python).parameters if name != "cls"]
+        for name in names:
+            if name not in hints:
+                raise Unsupported(f"{where}: {name} has no type.")
+        parameters = tuple((name, self.types.of(hints[name], where)) for name in names)
         returns = self.types.of(hints.get("return"), where)
-        short = owner or python.__module__.rpartition(".")[2]
-        updates = (
-            returns.big
-            and bool(parameters)
-            and parameters[0][1] == returns
-            and _updates(node, parameters[0][0])
-        )
-        return Function(python, node, f"{short}_{node.name.lstrip('_')}", returns, tuple(parameters), updates)
+        c = f"{owner or python.__module__.rpartition('.')[2]}_{node.name.lstrip('_')}"
+        updates = returns.big and bool(names) and parameters[0][1] == returns and _updates(node, names[0])
+        return Function(python, node, c, returns, parameters, updates, ARRAY in hints.values())
 
     def constant(self, module: str, name: str, value: Any) -> tuple[str, Type]:
         """The name in C of a module's constant, and its type."""
         where = f"{source_of(module).file}: {name}"
         kind, c = self.types.of_value(value, where), name.lstrip("_")
-        if self._values.setdefault(c, value) is not value and not np.array_equal(self._values[c], value):
+        first = self._values.setdefault(c, value)
+        if first is not value and not np.array_equal(first, value):
             c = f"{module.rpartition('.')[2].upper()}_{c}"
-            self._values[c] = value
-        text = initialiser(value, kind, where)
         size = f"[{kind.size}]" if kind.kind == "array" else ""
-        self.constants[c] = f"static const {kind.c} {c}{size} = {text};"
+        self.constants[c] = f"static const {kind.c} {c}{size} = {initialiser(value, kind, where)};"
         return c, kind
 
     def texts(self, name: str, note: str) -> tuple[str, str]:
@@ -165,14 +158,7 @@ class Program:
         ]  # fmt: skip
         for f in functions:
             code += [comment(f"{summary(f.node)} ({f.file})"), f.head(), *self.bodies[f.c], ""]
-        return tuple(  # type: ignore[return-value]
-            "\n".join(part for line in lines for whole in line.split("\n") for part in wrapped(whole))
-            for lines in (header, code)
-        )
-
-
-def _module(python: FunctionType) -> Any:
-    return sys.modules[python.__module__]
+        return _file(header), _file(code)
 
 
 def _updates(node: ast.FunctionDef, first: str) -> bool:
@@ -191,17 +177,19 @@ def _updates(node: ast.FunctionDef, first: str) -> bool:
     return bool(returned) and all(is_first(value) for value in returned)
 
 
-def wrapped(line: str) -> Sequence[str]:
-    """A line broken where it is too wide, after a comma or before an operator."""
+def _file(parts: list[str]) -> str:
+    return "\n".join(part for line in "\n".join(parts).split("\n") for part in wrapped(line))
+
+
+def wrapped(line: str) -> list[str]:
+    """A line broken where it is too wide, after a comma or before an operator; a comment where a word ends."""
     lines: list[str] = []
-    while len(line) > WIDTH and not line.startswith("#"):
+    while len(line) > WIDTH and " " in line[24:WIDTH] and not line.startswith("#"):
         inside = line.find("/*")
         marks = (", ", " && ", " || ", " ? ", " : ", " + ", " - ", " * ", " = ")
         cut = max(line.rfind(mark, 24, WIDTH) + (2 if mark == ", " else 1) for mark in marks)
         if cut < 24 or 0 <= inside < cut:
             cut = line.rfind(" ", 24, WIDTH) + 1
-        if cut < 24:
-            break
         lines.append(line[:cut].rstrip())
         indent = re.match(r" *", lines[0]).group()  # type: ignore[union-attr]
         line = f"{indent}{'   ' if 0 <= inside < cut else '    '}{line[cut:].lstrip()}"

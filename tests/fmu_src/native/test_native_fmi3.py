@@ -346,7 +346,8 @@ def test_the_build_command_makes_it_beside_the_one_for_fmi_2(file_3, tmp_path, m
 
     monkeypatch.setattr(build, "build_native", build_instead)
     assert build_fmu.main(["--kind", "native", "--fmi", "3", "--out", str(tmp_path)]) == 0
-    assert asked == [("TrpacEstimator", "TrpacEstimator_native_fmi3.fmu", {"fmi": 3, "flat": False})]
+    options = {"fmi": 3, "flat": False, "everywhere": None}
+    assert asked == [("TrpacEstimator", "TrpacEstimator_native_fmi3.fmu", options)]
     assert "100 steps" in capsys.readouterr().out
     with pytest.raises(SystemExit):
         build_fmu.main(["--fmi", "3"])
