@@ -3,12 +3,12 @@
 import cv2
 import numpy as np
 import pytest
+from training_folder import LowerHalf
 
 from models.training import night
 from models.training.data import Picture
 from models.training.patches import draw_weights
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.networks import RoadMasks
 from trpac_core.vision.scene import scene_of
 
 HEIGHT, WIDTH = 160, 240
@@ -25,15 +25,6 @@ def street(sky=200, asphalt=90):
 def shown(surface, sky=200):
     image, road = street(sky)
     return [night.darkened(np.random.default_rng(s), image, road, surface).astype(float) for s in range(20)]
-
-
-class LowerHalf:
-    """Finds road in the lower half of any picture."""
-
-    def segment(self, image):
-        drivable = np.zeros((160, 256), np.float32)
-        drivable[80:] = 0.9
-        return RoadMasks(drivable, np.zeros_like(drivable))
 
 
 def picture(folder, surface=Surface.DRY, source="condition_web", dark=False):

@@ -6,8 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from test_night import LowerHalf
-from training_folder import COLUMNS, row, write_folder
+from training_folder import COLUMNS, LowerHalf, row, write_folder
 
 from models.training import data, patches
 from models.training.found_roads import with_found_roads

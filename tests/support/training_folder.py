@@ -1,8 +1,11 @@
-"""A folder of training pictures with its manifest."""
+"""A folder of training pictures with its manifest, and a segmenter that needs no network."""
 
 import csv
 
 import cv2
+import numpy as np
+
+from trpac_core.vision.networks import RoadMasks
 
 COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height", "notes"]
 
@@ -31,3 +34,12 @@ def write_folder(folder, rows, pictures):
         writer.writeheader()
         writer.writerows(rows)
     return folder
+
+
+class LowerHalf:
+    """Finds road in the lower half of any picture."""
+
+    def segment(self, image):
+        drivable = np.zeros((160, 256), np.float32)
+        drivable[80:] = 0.9
+        return RoadMasks(drivable, np.zeros_like(drivable))
