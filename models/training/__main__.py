@@ -7,6 +7,8 @@ import importlib.util
 import sys
 from pathlib import Path
 
+from trpac_core.vision.networks import ModelError
+
 from .data import DataFolderError
 
 LEFT_OUT = ("drivable_camvid", "drivable_lums", "seq_dry_yolop", "seq_extreme")
@@ -33,9 +35,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="seed of every random choice (default: 1)")
     parser.add_argument(
         "--only",
-        choices=("segmenter", "surface", "scene", "picture"),
-        help="train one network, the other files stay; scene: only what a scene adds to the surface network that lies "
-        "with its card in --out; picture: the picture network, beside the two others in --out",
+        choices=("segmenter", "surface", "head", "scene", "picture"),
+        help="train one network, the other files stay; head: only the linear head of the surface network that lies "
+        "with its card and the segmenter in --out, and what a scene adds; scene: the latter alone; picture: the "
+        "picture network, beside the two others in --out",
     )
     parser.add_argument(
         "--effort", type=float, default=1.0, help="share of the usual steps and rendered worlds (default: 1)"
@@ -72,7 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
 
     try:
         train_all(given, sys.argv[1:] if arguments is None else arguments)
-    except DataFolderError as error:
+    except (DataFolderError, ModelError) as error:
         print(f"models.training: {error}", file=sys.stderr)
         return 2
     return 0

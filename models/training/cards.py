@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -35,7 +36,7 @@ LICENCE_TEXT = """\
 Most of the real pictures are non-commercial or carry no licence at all. None of them is part of this project, whole
 or in part; only weights learned from them are. A product should retrain on pictures that its maker owns. That is one
 command: `python -m models.training --data DIR`, where `DIR` holds the pictures and a `manifest.csv` with the columns
-file, split, task, label, mask, sequence_id, licence, width and height."""
+file, split, task, label, mask, sequence_id, licence, width, height and notes."""
 
 
 @dataclass
@@ -249,6 +250,45 @@ are used only where no text, path dots or bonnet cover the road.
 """
 
 
+HEAD, BEFORE_HEAD, DATA = "The head", "Readable road", "Data"
+ALONE = ("Scores on pictures, patches alone", "Scores on single patches, alone", HEAD)
+"""Parts of the card that a head learned anew takes the place of."""
+DATA_TABLE = r"\| source \| class (?s:.*?)\n\n"
+
+
+def with_head(card: str, head: str, data: str) -> str:
+    """A card with what is told of the head that was learned anew in place of the scores of the one before."""
+    first, *parts = re.split(r"^## ", card, flags=re.MULTILINE)
+    told = {}
+    for part in parts:
+        title, _, text = part.partition("\n")
+        told[title] = text
+    told["Calibration"] = told["Calibration"].partition("\n\nOf patches alone")[0].rstrip() + "\n\n"
+    told[DATA] = re.sub(DATA_TABLE, lambda _: f"{data}\n\n", told[DATA])
+    for title in ALONE:
+        told.pop(title, None)
+    written = []
+    for title, text in told.items():
+        written += [f"{HEAD}\n\n{head}\n\n"] if title == BEFORE_HEAD else []
+        written.append(f"{title}\n{text}")
+    return "".join([first, *(f"## {part}" for part in written)])
+
+
+def head_section(table_left_out: str, *, patches: int, ridge: float, temperature: float, command: str) -> str:
+    """What the card of surface.onnx tells of the head."""
+    return f"""\
+The linear layer, learned anew with the towers at rest (`{command}`): {patches} patches of the training pictures, of
+those by day also by night (`models/training/night.py`), and of rendered worlds; multinomial regression, classes equal,
+sources within a class by fixed shares, a ridge of {ridge:g} nat on half of the square of how far the weights go from
+the towers' own. T = {temperature:.3f} is learned from sources that were left out of the head in turn, each counted
+alike. Their scores (`python -m models.training.left_out --data DIR`), a picture by fixed patches on its road, in their
+scene; the flag is up from the confidence that keeps 2 % wrong on the other sources:
+
+{table_left_out}
+
+The towers have seen web, CamVid, LUMS and the clips; cws8262, BDD and the other cameras not."""
+
+
 def scene_section(
     judged: Mapping[str, Judged],
     reliabilities: Mapping[str, tuple[Reliability, Reliability]],
@@ -272,10 +312,10 @@ def scene_section(
 A patch is grey, but the road is packed snow where its verge is as grey. {len(NUMBERS)} numbers of the picture around
 a patch (`trpac_core/vision/scene.py`) times a matrix are added to its logits; whoever judges patches without their
 picture leaves it out. Learned last, the rest fixed, by multinomial regression with a ridge: {patches} patches of the
-real training pictures and of rendered worlds that the network had not seen (seeds from
+real training pictures, those by day also by night, and of rendered worlds that the network had not seen (seeds from
 {SEED_RANGES["train"].start + FIRST_SCENE_WORLD}; trees and houses painted beside most of their roads,
-`models/training/roadside.py`), each with its picture as two undisturbed cameras would show both, drawn by the same
-shares (`python -m models.training --only scene` does this again). Logits per standard deviation:
+`models/training/roadside.py`), each with its picture as undisturbed cameras would show both, drawn by the same
+shares. Logits per standard deviation:
 
 {weights}
 
@@ -283,8 +323,8 @@ A picture's class as above:
 
 {table([*header, "confusion, rows true"], rows)}
 
-In the scene, T = {temperature:.3f}, learned like that of patches alone, and the one in the metadata; scene and patch
-are disturbed alike. The diagram `reliability.png` is the validation set's, undisturbed and disturbed together.
+In the scene, T = {temperature:.3f}, the one in the metadata; scene and patch are disturbed alike. The diagram
+`reliability.png` is the validation set's, undisturbed and disturbed together.
 
 {calibration_table(reliabilities, temperature)}"""
 

@@ -16,12 +16,22 @@ from trpac_core.vision.classes import Surface
 Image = NDArray[np.uint8]
 Box = tuple[float, float, float, float]
 
-MANIFEST = "manifest.csv"
-COLUMNS = ("file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height")
+MANIFEST, FURTHER_MANIFESTS = "manifest.csv", "manifest_*.csv"
+COLUMNS = ("file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height", "notes")
 SPLITS = ("train", "val", "test", "gap")
 LABELS = {"dry": Surface.DRY, "wet": Surface.WET, "snow": Surface.SNOW_ICE}
 IGNORE = 255
 """Mask value of pixels whose label is unknown."""
+
+STREETS = "street_conditions/"
+"""Folder of street pictures, sorted by class: which source one is of stands in its file's name."""
+STREET_SOURCES = {"cws8262": ("cws8262", "cws8262"), "sidhardha36": ("bdd_day", "bdd_night")}
+"""Source by day and by night of a street picture, by the first word of its file's name."""
+ROAD_IS_FOUND = frozenset(name for names in STREET_SOURCES.values() for name in names)
+"""Families whose patches are cut where the segmenter finds road, of all classes alike: of cws8262 only wet and snowy
+pictures have a mask, so that masks would tell the class."""
+SQUASHED = ("condition_web", "cws8262")
+"""Sources that have squeezed their pictures to squares."""
 
 ROAD_BOXES: dict[str, tuple[Box, ...]] = {
     "condition_web": ((0.20, 0.60, 0.80, 0.95),),
@@ -83,6 +93,7 @@ class Picture:
     source: str
     sequence: str
     licence: str
+    night: bool = False
 
     def image(self) -> Image:
         """The picture, BGR uint8 of shape (height, width, 3)."""
@@ -99,6 +110,10 @@ class Picture:
         if mask is None:
             raise DataFolderError(f"{self.mask}: not a readable mask; fetch the data folder again")
         return np.asarray(mask, dtype=np.uint8)
+
+    def road(self) -> Image | None:
+        """The mask that patches are cut by, as of `road_mask`; None where they are cut in `boxes`."""
+        return None if self.mask is None else self.road_mask()
 
     @property
     def origin(self) -> str:
@@ -133,9 +148,11 @@ class Picture:
         return boxes
 
 
-def source_of(file: str) -> str:
-    """Camera or clip of a file of the manifest: its folder; all web stills are one source."""
-    folder = file.rpartition("/")[0]
+def source_of(file: str, night: bool = False) -> str:
+    """Camera or clip of a file of the manifest: its folder; web stills are one source, street pictures by name."""
+    folder, _, name = file.rpartition("/")
+    if file.startswith(STREETS):
+        return STREET_SOURCES[name.partition("_")[0]][night]
     return "condition_web" if folder.startswith("condition_web/") else folder
 
 
@@ -146,47 +163,55 @@ def family_of(source: str) -> str:
 
 
 def read_manifest(folder: Path) -> list[Picture]:
-    """All pictures of a data folder, in the manifest's order.
+    """All pictures of a data folder, in the order of its manifests.
 
     Raises
     ------
     DataFolderError
-        If the manifest or files that it names are missing or a row is malformed; all problems in one message.
+        If a manifest or files that it names are missing or a row is malformed; all problems in one message.
     """
     manifest = folder / MANIFEST
     if not manifest.is_file():
         raise DataFolderError(
             f"{manifest}: not found; --data must name the folder of road pictures that holds it"
         )
+    problems: list[str] = []
+    pictures: list[Picture] = []
+    for each in (manifest, *sorted(folder.glob(FURTHER_MANIFESTS))):
+        for line, row in enumerate(_rows(each), start=2):
+            found = list(_row_problems(folder, row))
+            problems += [f"{each.name}, line {line}: {problem}" for problem in found]
+            if not found:
+                pictures.append(_picture(folder, row))
+    problems += _shared_sequences(pictures)
+    if problems:
+        shown = "\n  ".join(problems[:20])
+        more = f"\n  and {len(problems) - 20} more" if len(problems) > 20 else ""
+        raise DataFolderError(f"{folder}: {len(problems)} problem(s)\n  {shown}{more}")
+    return pictures
+
+
+def _rows(manifest: Path) -> list[dict[str, str]]:
     with manifest.open(newline="", encoding="utf-8") as stream:
         reader = csv.DictReader(stream)
         missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
         if missing:
             raise DataFolderError(f"{manifest}: columns missing: {', '.join(missing)}")
-        rows = list(reader)
-    problems: list[str] = []
-    pictures: list[Picture] = []
-    for line, row in enumerate(rows, start=2):
-        found = list(_row_problems(folder, row))
-        problems += [f"line {line}: {problem}" for problem in found]
-        if not found:
-            pictures.append(
-                Picture(
-                    path=folder / row["file"],
-                    split=row["split"],
-                    surface=LABELS[row["label"]],
-                    mask=folder / row["mask"] if row["task"] == "seg" else None,
-                    source=source_of(row["file"]),
-                    sequence=row["sequence_id"],
-                    licence=row["licence"],
-                )
-            )
-    problems += _shared_sequences(pictures)
-    if problems:
-        shown = "\n  ".join(problems[:20])
-        more = f"\n  and {len(problems) - 20} more" if len(problems) > 20 else ""
-        raise DataFolderError(f"{manifest}: {len(problems)} problem(s)\n  {shown}{more}")
-    return pictures
+        return list(reader)
+
+
+def _picture(folder: Path, row: dict[str, str]) -> Picture:
+    night = "night" in row["notes"]
+    return Picture(
+        path=folder / row["file"],
+        split=row["split"],
+        surface=LABELS[row["label"]],
+        mask=folder / row["mask"] if row["task"] == "seg" else None,
+        source=source_of(row["file"], night),
+        sequence=row["sequence_id"],
+        licence=row["licence"],
+        night=night,
+    )
 
 
 def _row_problems(folder: Path, row: dict[str, str]) -> Iterator[str]:
@@ -196,6 +221,8 @@ def _row_problems(folder: Path, row: dict[str, str]) -> Iterator[str]:
         yield f"label is '{row['label']}', expected one of {', '.join(LABELS)}"
     if row["task"] not in ("cls", "seg"):
         yield f"task is '{row['task']}', expected cls or seg"
+    if row["file"].startswith(STREETS) and Path(row["file"]).name.partition("_")[0] not in STREET_SOURCES:
+        yield f"file {row['file']} begins with the name of no source, expected one of {', '.join(STREET_SOURCES)}"
     if not (folder / row["file"]).is_file():
         yield f"file {row['file']} is not in the folder"
     if row["task"] == "seg" and not (row["mask"] and (folder / row["mask"]).is_file()):
@@ -264,7 +291,8 @@ def check_trainable(pictures: list[Picture]) -> None:
             count = sum(picture.surface == surface for picture in of_split(pictures, split))
             if count < MIN_EACH_CLASS:
                 lacking.append(f"split {split} holds no picture labelled {label}")
-    unmasked = sorted({picture.source for picture in pictures if not picture.mask and picture.split != "gap"})
+    boxed = (p for p in pictures if not p.mask and p.split != "gap" and p.family not in ROAD_IS_FOUND)
+    unmasked = sorted({picture.source for picture in boxed})
     lacking += [_no_road_box(source) for source in unmasked if _road_boxes(source) is None]
     if lacking:
         raise DataFolderError("the data folder lacks what training needs:\n  " + "\n  ".join(lacking))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from trpac_core.vision.roi_sampling import LEAST_ROAD, MOST_ASPECT, ROI_ASPECT, cut_box, cut_patch
 
-from .data import Image, Picture, family_of, pixel_box
+from .data import SQUASHED, Image, Picture, family_of, pixel_box
 
 CALIBRATION_PER_SOURCE = 240
 """Most validation patches that one source gives to the calibration, lest one drive decide T."""
@@ -35,6 +36,9 @@ PATCHES_PER_PICTURE = {
     "seq_dry_extreme/Critical_Driving1": 20,
     "seq_wet_extreme/rain": 20,
     "seq_snow_extreme/snow1": 20,
+    "cws8262": 8,
+    "bdd_day": 8,
+    "bdd_night": 8,
 }
 """Training patches cut from each picture of a source; others give OTHER_SOURCES."""
 OTHER_SOURCES = 2
@@ -48,6 +52,10 @@ SOURCE_SHARES = {
     "seq_dry_yolop": 0.3,
     "dry_udacity": 0.4,
     "weathered": 1.5,
+    "cws8262": 3.0,
+    "bdd_day": 2.0,
+    "bdd_night": 2.0,
+    "night": 5.0,
 }
 """Relative share of each source among the drawn patches of a class.
 
@@ -65,7 +73,7 @@ CAMERA_SPREAD, RENDERED_SPREAD = 0.4, 0.2
 theirs already: what brightness tells of snow and asphalt is not to be washed out twice."""
 
 WEB_STRETCH = (1.2, 1.5)
-"""Width over height that the squared web stills had before, roughly [-]."""
+"""Width over height that squared pictures had before, roughly [-]."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +115,8 @@ def joined(sets: Sequence[PatchSet]) -> PatchSet:
 
 
 def unsquashed(picture: Picture, image: Image, stretch: float) -> Image:
-    """A web still at its likely former aspect; other pictures as they are."""
-    if picture.source != "condition_web":
+    """A squared picture at its likely former aspect; other pictures as they are."""
+    if picture.source not in SQUASHED:
         return image
     height, width = image.shape[:2]
     return np.asarray(cv2.resize(image, (round(stretch * width), height)), np.uint8)
@@ -122,9 +130,15 @@ def reduced(image: Image, box: tuple[float, float, float, float]) -> Image:
 
 def random_patches(rng: np.random.Generator, picture: Picture, count: int) -> list[Image]:
     """Patches at random places, scales and aspects on the road of one picture, each inside its box or mask."""
-    image = unsquashed(picture, picture.image(), rng.uniform(*WEB_STRETCH))
-    if picture.mask is not None:
-        return _patches_in_mask(rng, image, picture.road_mask(), count, ASPECTS, LEAST_ROADS)
+    return patches_from(rng, picture, picture.image(), count)
+
+
+def patches_from(rng: np.random.Generator, picture: Picture, image: Image, count: int) -> list[Image]:
+    """See `random_patches`; `image` is what the picture shows."""
+    stretch = rng.uniform(*WEB_STRETCH)
+    image, road = unsquashed(picture, image, stretch), picture.road()
+    if road is not None:
+        return _patches_in_mask(rng, image, unsquashed(picture, road, stretch), count, ASPECTS, LEAST_ROADS)
     wide = picture.wide_box
     patches = []
     for _ in range(count):
@@ -172,10 +186,11 @@ def _patches_in_mask(
 
 def fixed_patches(picture: Picture) -> list[Image]:
     """The patches on which a picture is judged: each road box whole, the wide one too, and four parts of each."""
-    image = unsquashed(picture, picture.image(), float(np.mean(WEB_STRETCH)))
-    if picture.mask is not None:
-        rng = np.random.default_rng(0)
-        return _patches_in_mask(rng, image, picture.road_mask(), 4, (ROI_ASPECT,) * 2, LEAST_ROADS[:1] * 2)
+    stretch = float(np.mean(WEB_STRETCH))
+    image, road = unsquashed(picture, picture.image(), stretch), picture.road()
+    if road is not None:
+        mask, rng = unsquashed(picture, road, stretch), np.random.default_rng(0)
+        return _patches_in_mask(rng, image, mask, 4, (ROI_ASPECT,) * 2, LEAST_ROADS[:1] * 2)
     wide = picture.wide_box
     patches = [] if wide is None else [reduced(image, pixel_box(wide, image))]
     for box in picture.boxes:
@@ -230,10 +245,24 @@ def thinned(count: int, seed: int) -> NDArray[np.bool_]:
     return keep
 
 
-def draw_weights(patches: PatchSet) -> NDArray[np.float64]:
+class Drawn(Protocol):
+    """What is drawn by class and source: `labels` int64 (n,), `sources` str (n,)."""
+
+    @property
+    def labels(self) -> NDArray[np.int64]:
+        """Class indices, shape (n,)."""
+        ...
+
+    @property
+    def sources(self) -> NDArray[np.str_]:
+        """Cameras or clips, shape (n,)."""
+        ...
+
+
+def draw_weights(patches: Drawn) -> NDArray[np.float64]:
     """Probability of each patch to be drawn: classes equal, sources within a class by SOURCE_SHARES."""
     groups = np.array([family_of(str(source)) for source in patches.sources])
-    weights = np.zeros(len(patches))
+    weights = np.zeros(len(patches.labels))
     for label in np.unique(patches.labels):
         of_class = patches.labels == label
         for group in np.unique(groups[of_class]):

@@ -19,6 +19,9 @@ LOOKS_PER_PICTURE = {
     "dry_udacity": 8,
     "seq_dry_yolop": 4,
     "seq_extreme": 12,
+    "cws8262": 8,
+    "bdd_day": 8,
+    "bdd_night": 8,
 }
 """Training looks at each picture of a family."""
 OTHER_LOOKS = 4

@@ -5,30 +5,26 @@ from __future__ import annotations
 import argparse
 import ctypes
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import torch
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress
+
+from trpac_core.vision.networks import Segmenter
 
 from . import cards
 from .annotate import sha256_of
-from .data import Picture, check_trainable, of_split, read_manifest
+from .data import ROAD_IS_FOUND, Picture, check_trainable, of_split, read_manifest
 from .export import export_segmenter
+from .found_roads import with_found_roads
+from .head_run import ship_head
 from .keeping import kept_or_made
 from .patches import PatchSet, joined
 from .picture_run import ship_picture
+from .progress import bars, steps_of
 from .rendered import (
     OPEN_LAND,
     PATCHES_PER_VIEW,
@@ -74,11 +70,11 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
     torch.use_deterministic_algorithms(mode=given.device == "cpu")
     # Filling what is about to be written would take a fifth of the time of a step.
     torch.utils.deterministic.fill_uninitialized_memory = False
-    with _progress() as progress:
+    with bars() as progress:
         worlds = {split: max(3, round(given.effort * count)) for split, count in WORLDS.items()}
-        steps = partial(_steps, progress)
-        if given.only == "scene":
-            _scene(progress, given, pictures, worlds, steps)
+        steps = partial(steps_of, progress)
+        if given.only in ("head", "scene"):
+            _head(progress, given, _seen(given, pictures), worlds, steps)
             return
         given.out.mkdir(parents=True, exist_ok=True)
         if given.only != "picture":
@@ -114,6 +110,7 @@ def _patch_networks(
     if given.only in (None, "segmenter"):
         _segmenter(progress, given, facts, rendered)
     if given.only in (None, "surface"):
+        facts.pictures = _seen(given, pictures)
         streets = _render_streets(progress, worlds["train"], given)
         draw = partial(_render_further, progress, worlds["train"], further, given)
         roads = {
@@ -121,18 +118,24 @@ def _patch_networks(
             IN_STREETS: lambda: joined([streets, draw(STREETS)]),
         }
         train_and_ship(given, facts, patches | {"train": streets}, roads, progress, steps)
-        _scene(progress, given, pictures, worlds, steps)
+        _head(progress, given, facts.pictures, worlds, steps)
 
 
-def _scene(
+def _seen(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[Picture]:
+    """The pictures with the roads that the segmenter in the folder finds."""
+    return with_found_roads(pictures, Segmenter(given.out / "segmenter.onnx", given.threads))
+
+
+def _head(
     progress: Progress,
     given: argparse.Namespace,
     pictures: Sequence[Picture],
     worlds: dict[str, int],
     steps: Steps,
 ) -> None:
-    """What the scene adds, into the surface network and the card that lie in the folder."""
-    found = ship_scene(given.out / "surface.onnx", given, pictures, worlds, steps)
+    """Head and scene, or the scene alone, into the surface network and the card that lie in the folder."""
+    ship = ship_scene if given.only == "scene" else ship_head
+    found = ship(given.out / "surface.onnx", given, pictures, worlds, steps)
     shown = {name: both.in_scene for name, both in found.items()}
     progress.console.print(cards.class_table(shown), markup=False)
 
@@ -218,9 +221,13 @@ def _segmenter(
     for picture in of_split(facts.pictures, "train", masked=True):
         sample = masked_sample(picture)
         pools[sample.kind].append(sample)
-    pools["weak"] = [weak_sample(picture) for picture in of_split(facts.pictures, "train", masked=False)]
+    pools["weak"] = [
+        weak_sample(picture)
+        for picture in of_split(facts.pictures, "train", masked=False)
+        if picture.family not in ROAD_IS_FOUND
+    ]
     steps = max(2, round(given.effort * SEGMENTER_STEPS))
-    with _steps(progress, "training the segmenter", steps) as report:
+    with steps_of(progress, "training the segmenter", steps) as report:
         net = train_segmenter(pools, steps=steps, seed=given.seed, report=report)
     train_s = time.monotonic() - start
     real = [masked_sample(picture) for picture in of_split(facts.pictures, "val", masked=True)]
@@ -244,27 +251,3 @@ def _segmenter(
     )
     cards.write_card(path.with_suffix(".md"), text)
     progress.console.print(cards.segmentation_table(found), markup=False)
-
-
-def _progress() -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-    )
-
-
-@contextmanager
-def _steps(progress: Progress, description: str, steps: int) -> Iterator:
-    task = progress.add_task(description, total=steps, note="")
-    smooth: list[float] = []
-
-    def report(step: int, loss: float) -> None:
-        smooth.append(loss)
-        note = f"loss {np.mean(smooth[-50:]):.3f}" if np.isfinite(loss) else ""
-        progress.update(task, completed=step, note=note)
-
-    yield report

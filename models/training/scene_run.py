@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_softmax, softmax
 
-from trpac_core.vision.networks import SurfaceClassifier
+from trpac_core.vision.networks import RoadSegmenter, Segmenter, SurfaceClassifier
 from trpac_core.vision.scene import SceneHead, scene_numbers, scene_of
 
 from . import calibrate, cards, scores
@@ -24,7 +24,8 @@ from .annotate import annotate, sha256_of
 from .cards import SCENE_BEGIN, SCENE_END
 from .data import Picture, judged_groups, trained_on
 from .keeping import kept_or_made
-from .patches import draw_weights, judged_patches, thinned, training_patches
+from .night import by_night, night_scenes
+from .patches import Drawn, draw_weights, judged_patches, thinned, training_patches
 from .rendered import (
     FIRST_SCENE_WORLD,
     PATCHES_PER_VIEW,
@@ -52,20 +53,34 @@ def ship_scene(
     file: Path, given: argparse.Namespace, pictures: Sequence[Picture], worlds: dict[str, int], steps: Steps
 ) -> dict[str, scores.Judged]:
     """Learn the scene's head of a network file, calibrate it anew, and write both into the file and its card."""
-    alone = patches_alone(file, given.threads)
-    train = gather(given, pictures, steps)
-    head = learn_head(alone, train, given.seed)
+    segmenter = Segmenter(file.parent / "segmenter.onnx", given.threads)
+    train = gather(given, pictures, segmenter, steps)
+    head = learn_head(patches_alone(file, given.threads), train, given.seed)
+    return write_scene(file, head, None, len(train), given, judged_sets(given, pictures, worlds, steps))
+
+
+def write_scene(
+    file: Path,
+    head: SceneHead,
+    temperature: float | None,
+    patches: int,
+    given: argparse.Namespace,
+    judged: dict[str, SceneSet],
+) -> dict[str, scores.Judged]:
+    """Write a scene's head, learned from so many patches, and T into a network file and its card; scores by set.
+
+    Without a `temperature` it is that of the validation sets.
+    """
     annotate(file, {"scene": head.to_text()})
     classifier = SurfaceClassifier(file, given.threads)
-    judged = judged_sets(given, pictures, worlds, steps)
-    temperature, reliabilities = calibrated(classifier, judged, given.seed)
+    temperature, reliabilities = calibrated(classifier, judged, given.seed, temperature)
     annotate(file, {"temperature": f"{temperature:.6f}"})
     calibrate.draw_reliability(
         *reliabilities["validation, both"], temperature, file.parent / "reliability.png"
     )
     found = {name: _judge(classifier, part, temperature) for name, part in judged.items()}
     card = file.with_suffix(".md")
-    section = cards.scene_section(found, reliabilities, head, temperature=temperature, patches=len(train))
+    section = cards.scene_section(found, reliabilities, head, temperature=temperature, patches=patches)
     text = card.read_text(encoding="utf-8")
     cards.write_card(card, with_section(text, section, sha256_of(file), temperature))
     return found
@@ -79,8 +94,10 @@ def patches_alone(file: Path, threads: int) -> SurfaceClassifier:
         return SurfaceClassifier(bare, threads)
 
 
-def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps) -> SceneSet:
-    """What it learns from: patches of the training pictures, and of worlds that the network has not seen."""
+def gather(
+    given: argparse.Namespace, pictures: Sequence[Picture], segmenter: RoadSegmenter, steps: Steps
+) -> SceneSet:
+    """Patches in their scenes: of the training pictures, by night too, and of worlds that the network has not seen."""
     count = max(6, round(given.effort * WORLDS))
     first = SEED_RANGES["train"].start + FIRST_SCENE_WORLD
 
@@ -100,7 +117,8 @@ def gather(given: argparse.Namespace, pictures: Sequence[Picture], steps: Steps)
     cut = training_patches(real, CUTTING_SEED)
     drawn = kept_or_made(given.kept, f"scenes-{count}.npz", load=load_scenes, make=draw, save=save_scenes)
     drawn = SceneSet(drawn.patches, with_roadsides(drawn.scenes, CUTTING_SEED))
-    return all_of([scenes_of_pictures(cut, real), drawn])
+    nights = night_scenes(by_night(real, segmenter, CUTTING_SEED), CUTTING_SEED)
+    return all_of([scenes_of_pictures(cut, real), nights, drawn])
 
 
 def learn_head(classifier: SurfaceClassifier, train: SceneSet, seed: int) -> SceneHead:
@@ -108,33 +126,38 @@ def learn_head(classifier: SurfaceClassifier, train: SceneSet, seed: int) -> Sce
     rng = np.random.default_rng(seed)
     seen = all_of([train.by_other_cameras(rng) for _ in range(LOOKS)])
     numbers = scene_numbers(seen.patches.patches, seen.scenes)
+    return head_beside(numbers, seen.patches, seen.logits(classifier, alone=True))
+
+
+def head_beside(numbers: NDArray[np.float64], drawn: Drawn, logits: NDArray[np.float64]) -> SceneHead:
+    """The head that `numbers` of scenes, shape (n, 9), give beside the logits (n, 3) of patches alone."""
     blank = np.zeros((numbers.shape[1], 3))
     head = SceneHead(numbers.mean(axis=0), numbers.std(axis=0), blank, np.zeros(3))
-    weights, bias = regression(
-        head.standardised(numbers),
-        seen.patches.labels,
-        draw_weights(seen.patches),
-        seen.logits(classifier, alone=True),
-    )
+    weights, bias = regression(head.standardised(numbers), drawn.labels, draw_weights(drawn), logits)
     return SceneHead(head.mean, head.deviation, weights, bias)
 
 
 def regression(
-    x: NDArray[np.float64],
+    x: NDArray[np.floating],
     labels: NDArray[np.int64],
     shares: NDArray[np.float64],
     logits: NDArray[np.float64],
+    ridge: float = RIDGE,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weights (m, k) and bias (k,) that, added to the logits, make the labels likeliest, each sample by its share."""
+    """Weights (m, k) and bias (k,) that, added to the logits, make the labels likeliest, each sample by its share.
+
+    `ridge` is what half of the square of the weights counts in the loss [nat].
+    """
     m, k = x.shape[1], logits.shape[1]
     true = np.eye(k)[labels]
 
     def loss(flat: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         weights, bias = flat[: m * k].reshape(m, k), flat[m * k :]
-        z = logits + x @ weights + bias
+        z = logits + x @ weights.astype(x.dtype) + bias
         off = shares[:, None] * (softmax(z, axis=1) - true)
-        value = -np.sum(shares[:, None] * true * log_softmax(z, axis=1)) + 0.5 * RIDGE * np.sum(weights**2)
-        return float(value), np.concatenate([(x.T @ off + RIDGE * weights).ravel(), off.sum(axis=0)])
+        value = -np.sum(shares[:, None] * true * log_softmax(z, axis=1)) + 0.5 * ridge * np.sum(weights**2)
+        slope = x.T @ off.astype(x.dtype) + ridge * weights
+        return float(value), np.concatenate([slope.ravel(), off.sum(axis=0)])
 
     found = minimize(loss, np.zeros((m + 1) * k), jac=True, method="L-BFGS-B").x
     return found[: m * k].reshape(m, k), found[m * k :]
@@ -166,9 +189,12 @@ def _rendered_set(split: str, count: int, steps: Steps) -> SceneSet:
 
 
 def calibrated(
-    classifier: SurfaceClassifier, judged: dict[str, SceneSet], seed: int
+    classifier: SurfaceClassifier, judged: dict[str, SceneSet], seed: int, temperature: float | None = None
 ) -> tuple[float, dict[str, tuple[calibrate.Reliability, calibrate.Reliability]]]:
-    """T for patches in their scenes, of the validation sets, undisturbed and disturbed; reliabilities at 1 and at T."""
+    """T for patches in their scenes, and reliabilities at 1 and at T of the validation sets, undisturbed and disturbed.
+
+    Without a `temperature` it is that of these sets.
+    """
     validation = all_of([s.where(thinned(len(s), seed)) for name, s in judged.items() if " val" in name])
     sets = {"validation, undisturbed": validation, "validation, disturbed": validation.disturbed(seed)}
     for name, part in judged.items():
@@ -179,7 +205,8 @@ def calibrated(
     both = list(sets)[:2]
     logits = {"validation, both": np.concatenate([logits[name] for name in both])} | logits
     labels["validation, both"] = np.concatenate([labels[name] for name in both])
-    temperature = calibrate.learn_temperature(logits["validation, both"], labels["validation, both"])
+    if temperature is None:
+        temperature = calibrate.learn_temperature(logits["validation, both"], labels["validation, both"])
     return temperature, {
         name: (
             calibrate.reliability(found, labels[name]),

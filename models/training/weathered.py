@@ -60,7 +60,7 @@ GRAIN_PX, GRAIN = 3.0, (0.5, 2.0)
 """Blur without which the road's grain is left [px], and its limits [-]. Nothing is sown that the picture has not got: a
 noise of our own would be learned as the mark of water and snow."""
 REDUCED = 4
-"""The mirror is reckoned in a picture this much smaller: it is blurred anyway."""
+"""Mirrors and halos are reckoned in a picture this much smaller: they are blurred anyway."""
 
 
 @dataclass(frozen=True)
@@ -139,35 +139,37 @@ def wetted(rng: np.random.Generator, image: Image, road: Light, seen: Standpoint
     seen : Standpoint
         The camera's.
     """
-    light = _light(image)
+    light = light_of(image)
     shine = _shine(_below_px(image, seen) / np.float32(seen.focal_px))[:, None, None]
     water = _on_ground(rng, image, seen, rng.uniform(*PUDDLES))
-    film, sharp = (_mirrored(light, seen.horizon_px, rng.uniform(*blur)) for blur in BLURS)
+    film, sharp = (mirror_of(light, seen.horizon_px, rng.uniform(*blur)) for blur in BLURS)
     film = rng.uniform(*FILM) * _grain(light) ** np.float32(rng.uniform(*GLINTS)) * film
     mirrored = (water * sharp + (1.0 - water) * film) * rng.uniform(*SKY_GAIN)
     scattered = rng.uniform(*DARKENING) * (1.0 - SUNK * water) * light ** np.float32(rng.uniform(*DEEPENING))
     light = light + road[..., None] * ((1.0 - shine) * scattered + shine * mirrored - light)
     grey = light.mean(axis=2, keepdims=True)
-    return _bytes((light + rng.uniform(*GREYING) * (grey - light)) * rng.uniform(*WET_EXPOSURE))
+    return bytes_of((light + rng.uniform(*GREYING) * (grey - light)) * rng.uniform(*WET_EXPOSURE))
 
 
 def snowed(rng: np.random.Generator, image: Image, road: Light, seen: Standpoint) -> Image:
     """A picture of a dry road as it would look under packed snow, in the same light; parameters as of `wetted`."""
-    light = _light(image)
+    light = light_of(image)
     cover = _on_ground(rng, image, seen, rng.uniform(*COVER))
     lumps = _on_ground(rng, image, seen, 0.5) - np.float32(0.5)
     uneven = (1.0 + rng.uniform(*LUMPS) * lumps) * _grain(light) ** np.float32(rng.uniform(*RELIEF))
     tint = 1.0 + rng.uniform(*TINT) * np.array([1.0, 0.0, -1.0], np.float32)
     snow = rng.uniform(*SNOW_ALBEDO) * _shade(rng, light, road)[..., None] * uneven * tint
     light = light + road[..., None] * cover * (snow - light)
-    return _bytes(light * rng.uniform(*SNOW_EXPOSURE))
+    return bytes_of(light * rng.uniform(*SNOW_EXPOSURE))
 
 
-def _light(image: Image) -> Light:
+def light_of(image: Image) -> Light:
+    """Linear light of a picture, 1 at white [-]."""
     return ((np.arange(256, dtype=np.float32) / 255.0) ** np.float32(DISPLAY_GAMMA))[image]
 
 
-def _bytes(light: Light) -> Image:
+def bytes_of(light: Light) -> Image:
+    """A picture of linear light; what is brighter than white is white."""
     return (255.0 * np.clip(light, 0.0, 1.0) ** np.float32(1.0 / DISPLAY_GAMMA) + 0.5).astype(np.uint8)
 
 
@@ -181,13 +183,13 @@ def _shine(slope: Light) -> Light:
     return fresnel_reflectance(slope / np.sqrt(1.0 + slope * slope)).astype(np.float32)
 
 
-def _mirrored(light: Light, horizon_px: float, blur: float) -> Light:
+def mirror_of(light: Light, horizon_px: float, blur: float, squeeze: float = SQUEEZE) -> Light:
     """The picture upside down about its horizon, blurred mostly along the look."""
     height, width = light.shape[:2]
     rows = np.clip(np.round(2.0 * horizon_px - np.arange(height)), 0, height - 1).astype(int)
     small = cv2.resize(light[rows], None, fx=1.0 / REDUCED, fy=1.0 / REDUCED, interpolation=cv2.INTER_AREA)
     sigma = max(blur * height / REDUCED, 0.3)
-    soft = cv2.GaussianBlur(small, (0, 0), sigmaX=max(SQUEEZE * sigma, 0.3), sigmaY=sigma)
+    soft = cv2.GaussianBlur(small, (0, 0), sigmaX=max(squeeze * sigma, 0.3), sigmaY=sigma)
     return np.asarray(cv2.resize(soft, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
 

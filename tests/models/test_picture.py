@@ -67,7 +67,7 @@ def test_files_that_do_not_fit_are_named(tmp_path):
 
 
 def test_every_source_is_looked_at():
-    assert set(picture_looks.LOOKS_PER_PICTURE) | {"rendered", "weathered"} == set(SOURCE_SHARES)
+    assert set(picture_looks.LOOKS_PER_PICTURE) | {"rendered", "weathered", "night"} == set(SOURCE_SHARES)
 
 
 def test_training_looks_leave_out_what_is_written_into_a_clip(tmp_path):

@@ -91,7 +91,7 @@ def test_roadsides_are_painted_beside_rendered_roads_alone(monkeypatch):
     monkeypatch.setattr(scene_run, "scenes_of_pictures", lambda patches, pictures: real)
     monkeypatch.setattr(scene_run, "kept_or_made", lambda *given, **ways: drawn)
     given = argparse.Namespace(without=(), effort=1.0, kept=None, threads=1)
-    seen = scene_run.gather(given, [], None)
+    seen = scene_run.gather(given, [], None, None)
     assert np.array_equal(seen.scenes[:40], real.scenes)
     changed = (seen.scenes[40:] != drawn.scenes).any(axis=(1, 2, 3))
     assert changed.mean() == pytest.approx(roadside.OVERGROWN, abs=0.2)

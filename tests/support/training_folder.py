@@ -1,13 +1,16 @@
-"""A folder of training pictures with its manifest."""
+"""A folder of training pictures with its manifest, and a segmenter that needs no network."""
 
 import csv
 
 import cv2
+import numpy as np
 
-COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height"]
+from trpac_core.vision.networks import RoadMasks
+
+COLUMNS = ["file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height", "notes"]
 
 
-def row(file, split, label, *, mask="", sequence="", size=(64, 64)):
+def row(file, split, label, *, mask="", sequence="", size=(64, 64), notes=""):
     return {
         "file": file,
         "split": split,
@@ -18,6 +21,7 @@ def row(file, split, label, *, mask="", sequence="", size=(64, 64)):
         "licence": "made up",
         "width": size[0],
         "height": size[1],
+        "notes": notes,
     }
 
 
@@ -30,3 +34,12 @@ def write_folder(folder, rows, pictures):
         writer.writeheader()
         writer.writerows(rows)
     return folder
+
+
+class LowerHalf:
+    """Finds road in the lower half of any picture."""
+
+    def segment(self, image):
+        drivable = np.zeros((160, 256), np.float32)
+        drivable[80:] = 0.9
+        return RoadMasks(drivable, np.zeros_like(drivable))

@@ -1,0 +1,42 @@
+"""Progress bars of the training run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+
+def bars() -> Progress:
+    """Bars of what is being done, each with what it says of itself."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+    )
+
+
+@contextmanager
+def steps_of(progress: Progress, description: str, steps: int) -> Iterator[Callable[[int, float], None]]:
+    """A bar of a number of steps; what it gives is told the step and the loss, which may be NaN."""
+    task = progress.add_task(description, total=steps, note="")
+    smooth: list[float] = []
+
+    def report(step: int, loss: float) -> None:
+        smooth.append(loss)
+        note = f"loss {np.mean(smooth[-50:]):.3f}" if np.isfinite(loss) else ""
+        progress.update(task, completed=step, note=note)
+
+    yield report
