@@ -133,8 +133,8 @@ def _head(
     worlds: dict[str, int],
     steps: Steps,
 ) -> None:
-    """Head and scene, or the scene alone, into the surface network and the card that lie in the folder."""
-    ship = ship_scene if given.only == "scene" else ship_head
+    """What the scene adds, or the linear head and it, into the surface network and the card in the folder."""
+    ship = ship_head if given.only == "head" else ship_scene
     found = ship(given.out / "surface.onnx", given, pictures, worlds, steps)
     shown = {name: both.in_scene for name, both in found.items()}
     progress.console.print(cards.class_table(shown), markup=False)
