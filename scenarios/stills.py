@@ -88,8 +88,10 @@ def counting_order(path: Path) -> tuple[list[tuple[int, int, str]], str]:
     return [(0, int(digits), "") if digits else (1, 0, text) for digits, text in parts], path.name
 
 
-def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tuple[pd.DataFrame, list[str]]:
-    """Table of the surface in each picture, and problems.
+def classify_pictures(
+    files: Sequence[Path], progress: Progress = silent, bits: int | None = None
+) -> tuple[pd.DataFrame, list[str]]:
+    """Table of the surface in each picture, and problems; `bits` are those that files of 16 bits use.
 
     Returns
     -------
@@ -105,7 +107,7 @@ def classify_pictures(files: Sequence[Path], progress: Progress = silent) -> tup
     rows, problems = [], []
     for done, file in enumerate(files, start=1):
         try:
-            probabilities = networks.probabilities(decode_image(file, upright=True), quoted(file))
+            probabilities = networks.probabilities(decode_image(file, upright=True, bits=bits), quoted(file))
             surface = Surface(int(probabilities.argmax()))
             rows.append((cell_of(file), surface.label, float(probabilities.max()), *probabilities.tolist()))
         except ImageError as error:

@@ -18,7 +18,7 @@ from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.ife import Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
-from trpac_core.vision.images import check_size, decode_image
+from trpac_core.vision.images import check_size, decode_image, eight_bits
 from trpac_core.vision.trajectory import Motion
 
 Order = Literal["bgr", "rgb"]
@@ -46,15 +46,19 @@ class PictureClass:
     flag: bool
 
 
-def picture_of(image: str | Path | NDArray[np.uint8], order: Order, upright: bool) -> NDArray[np.uint8]:
+def picture_of(
+    image: str | Path | NDArray[np.generic], order: Order, bits: int | None, upright: bool
+) -> NDArray[np.uint8]:
     """A picture as BGR of 8 bits, shape (height, width, 3); raises TrpacError."""
     if isinstance(image, (str, Path)):
-        return decode_image(image, upright=upright)
+        return decode_image(image, upright=upright, bits=bits)
     array = np.asarray(image)
-    if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:
+    if array.ndim != 3 or array.shape[2] != 3:
         raise TrpacError(
-            f"image is an array of {array.dtype} and shape {array.shape}; expected uint8 and (height, width, 3)."
+            f"image is an array of shape {array.shape}; expected (height, width, 3): repeat a grey one, and leave out "
+            "alpha."
         )
+    array = eight_bits(array, bits=bits)
     if order not in ("bgr", "rgb"):
         raise TrpacError(f"order is {order!r}; expected 'bgr' or 'rgb'.")
     check_size(array.shape[1], array.shape[0], "image")
@@ -66,15 +70,19 @@ def _networks() -> StillNetworks:
     return StillNetworks.load(networks_folder())
 
 
-def classify(image: str | Path | NDArray[np.uint8], *, order: Order = "bgr") -> PictureClass:
+def classify(
+    image: str | Path | NDArray[np.generic], *, order: Order = "bgr", bits: int | None = None
+) -> PictureClass:
     """The surface of the road in a single picture, of any camera.
 
     Parameters
     ----------
-    image : path, or array of uint8, shape (height, width, 3)
+    image : path, or array of uint8, uint16 or floats from 0 to 1, shape (height, width, 3)
         JPEG or PNG, or its pixels.
     order : {'bgr', 'rgb'}
         Channel order of an array.
+    bits : int, optional
+        How many bits a picture of 16 uses; by default 12 where all values are below 4096.
 
     Raises
     ------
@@ -82,7 +90,7 @@ def classify(image: str | Path | NDArray[np.uint8], *, order: Order = "bgr") -> 
         A picture that cannot be read, or without usable road.
     """
     name = str(image) if isinstance(image, (str, Path)) else "image"
-    shares = _networks().probabilities(picture_of(image, order, upright=True), name)
+    shares = _networks().probabilities(picture_of(image, order, bits, upright=True), name)
     best = int(shares.argmax())
     probabilities = {surface.label: float(shares[surface]) for surface in Surface}
     return PictureClass(Surface(best).label, float(shares[best]), probabilities, bool(shares[best] > 0.5))
@@ -109,25 +117,26 @@ class VisionEstimator:
 
     def step(
         self,
-        image: str | Path | NDArray[np.uint8],
+        image: str | Path | NDArray[np.generic],
         t: float,
         *,
         speed: float,
         steering: float = 0.0,
         order: Order = "bgr",
+        bits: int | None = None,
     ) -> PictureClass:
         """The surface of the road ahead of the wheels in the next frame.
 
         Parameters
         ----------
-        image : path, or array of uint8, shape (height, width, 3)
-            The frame.
+        image : path, or array, shape (height, width, 3)
+            The frame, as of `classify`.
         t : float
             Time at which it was taken [s].
         speed, steering : float
             Speed of the car [m/s], and steering angle of the front wheels, positive to the left [rad].
-        order : {'bgr', 'rgb'}
-            Channel order of an array.
+        order, bits
+            As of `classify`.
 
         Raises
         ------
@@ -136,7 +145,7 @@ class VisionEstimator:
         """
         way_m = self._way_m + max(0.0, t - self._time_s) * speed * (self._state.frame_count > 0)
         motion = Motion(speed, steering_angle_rad=steering, way_m=way_m)
-        state, seen = self._ife.process(self._state, picture_of(image, order, upright=False), motion)
+        state, seen = self._ife.process(self._state, picture_of(image, order, bits, upright=False), motion)
         self._state, self._time_s, self._way_m = state, t, way_m
         probabilities = {s.label: float(p) for s, p in zip(Surface, seen.near.probabilities, strict=True)}
         return PictureClass(seen.surface.label, float(seen.Q_v), probabilities, bool(seen.flag))

@@ -70,14 +70,17 @@ class Frames:
         Pictures in their order; empty for a video.
     count : int
         Number of frames; of a video that in its header, which may be wrong or 0.
+    bits : int or None
+        How many bits pictures of 16 use, see `trpac_core.vision.images.eight_bits`.
     """
 
     path: Path
     files: tuple[Path, ...]
     count: int
+    bits: int | None = None
 
     @classmethod
-    def find(cls, path: Path) -> Frames:
+    def find(cls, path: Path, bits: int | None = None) -> Frames:
         """The frames at a path; raises ScenarioError."""
         if path.is_dir():
             files = tuple(pictures_in(path))
@@ -85,7 +88,7 @@ class Frames:
                 raise ScenarioError(
                     f"{path}: no pictures in this folder. Expected JPEG or PNG files, one per frame."
                 )
-            return cls(path, files, len(files))
+            return cls(path, files, len(files), bits)
         if path.suffix.lower() in PICTURE_ENDINGS:
             raise ScenarioError(
                 f"{path}: a single picture. Expected a folder of frames or a video; for single pictures: "
@@ -101,7 +104,7 @@ class Frames:
         if self.files:
             for file in self.files:
                 try:
-                    yield cell_of(file.name), decode_image(file)
+                    yield cell_of(file.name), decode_image(file, bits=self.bits)
                 except ImageError as error:
                     yield cell_of(file.name), error
             return

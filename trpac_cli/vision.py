@@ -25,6 +25,15 @@ LONGEST_PROBLEM = 400
 MOST_NAMED = 20
 """Unusable pictures that are named; further ones are counted."""
 
+Bits = Annotated[
+    int | None,
+    typer.Option(
+        min=8,
+        max=16,
+        help="How many bits a picture of 16 uses; by default 12 where all its values are below 4096, else 16.",
+    ),
+]
+
 app = typer.Typer(help="The camera side alone: road surface from pictures.", no_args_is_help=True)
 
 
@@ -32,6 +41,7 @@ app = typer.Typer(help="The camera side alone: road surface from pictures.", no_
 def classify(
     paths: Annotated[list[Path], typer.Argument(help="Pictures (JPEG, PNG), or folders of them.")],
     out: Annotated[Path, typer.Option(help="CSV file to write.")],
+    bits: Bits = None,
 ) -> None:
     """Tell the surface of road pictures of any camera: dry, wet, or snow and ice.
 
@@ -53,7 +63,7 @@ def classify(
         if os.path.realpath(out) in {os.path.realpath(file) for file in files}:
             refuse(command, f"{out}: one of the pictures. Expected the name of a CSV file to write.")
         with bars() as progress:
-            table, unusable = classify_pictures(files, partial(progress, "pictures"))
+            table, unusable = classify_pictures(files, partial(progress, "pictures"), bits)
         problems += unusable
         if table.empty:
             refuse(command, _listed("nothing to classify", problems))
@@ -75,6 +85,7 @@ def run(
     out: Annotated[
         Path, typer.Option(help="Folder for frames.csv, annotated.mp4, strip.jpg and summary.json.")
     ],
+    bits: Bits = None,
 ) -> None:
     """Run the image estimator and the voting baseline over the frames of one drive.
 
@@ -89,7 +100,7 @@ def run(
     command = "trpac vision run"
     require_folder(command, out)
     try:
-        found = Frames.find(frames)
+        found = Frames.find(frames, bits)
         with bars() as progress:
             drive = run_frames(found, camera, speed_m_s, fps, out, partial(progress, "frames"))
     except (ScenarioError, ModelError, OSError) as error:

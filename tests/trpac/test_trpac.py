@@ -327,6 +327,8 @@ def test_rgb_is_asked_for_by_name(tmp_path):
     of_file = trpac.classify(tmp_path / "road.png")
     assert trpac.classify(picture) == of_file
     assert trpac.classify(picture[..., ::-1], order="rgb") == of_file
+    assert trpac.classify(picture.astype(np.uint16) << 4) == of_file
+    assert trpac.classify(picture / 255.0) == of_file
     assert sum(of_file.probabilities.values()) == pytest.approx(1.0)
     assert of_file.confidence == of_file.probabilities[of_file.surface]
 
@@ -335,7 +337,7 @@ def test_rgb_is_asked_for_by_name(tmp_path):
     "image",
     [
         np.zeros((480, 640)),
-        np.zeros((480, 640, 3)),
+        np.full((480, 640, 3), 2.0),
         np.zeros((480, 640, 4), np.uint8),
         np.zeros((3, 3, 3), np.uint8),
     ],

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from trpac_core.vision.images import ImageError, decode_image, raw_bgr_image
+from trpac_core.vision.images import ImageError, decode_image, eight_bits, raw_bgr_image
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (80, 128, 3), dtype=np.uint8)
 
@@ -42,6 +42,43 @@ def test_grey_alpha_and_16_bit_become_8_bit_bgr():
     deep = decode_image(encoded(".png", PICTURE.astype(np.uint16) * 257))
     assert deep.dtype == np.uint8
     assert np.abs(deep.astype(int) - PICTURE).max() <= 1
+
+
+@pytest.mark.parametrize("bits", [9, 10, 12, 14, 16])
+def test_the_bits_that_a_picture_of_16_uses_may_be_stated(bits):
+    raw = PICTURE.astype(np.uint16) << (bits - 8) | (1 << (bits - 8)) - 1
+    assert (decode_image(encoded(".png", raw), bits=bits) == PICTURE).all()
+    assert (eight_bits(raw, bits=bits) == PICTURE).all()
+
+
+def test_12_bits_in_16_are_found_by_their_range():
+    """As cameras write raw values: their upper 8 bits alone would be a black picture."""
+    raw = PICTURE.astype(np.uint16) << 4
+    assert (decode_image(encoded(".png", raw)) == PICTURE).all()
+    dark = raw.copy()
+    dark[0, 0] = 4096
+    assert (decode_image(encoded(".png", dark)) == dark >> 8).all()
+    assert (decode_image(encoded(".png", raw), bits=16) == raw >> 8).all()
+
+
+def test_floats_from_0_to_1_are_scaled():
+    assert (eight_bits(PICTURE / 255.0) == PICTURE).all()
+    assert (eight_bits((PICTURE / 255.0).astype(np.float32)) == PICTURE).all()
+
+
+@pytest.mark.parametrize(
+    ("image", "bits", "said"),
+    [
+        (PICTURE.astype(float), None, "floats beyond 0 to 1"),
+        (np.full((2, 2, 3), np.nan), None, "floats beyond 0 to 1"),
+        (PICTURE.astype(np.int32), None, "values of int32"),
+        (PICTURE.astype(np.uint16) << 8, 12, "expected less than 4096 with 12 bits"),
+        (PICTURE, 7, "bits is 7; expected 8 to 16"),
+    ],
+)
+def test_values_of_no_picture_are_refused(image, bits, said):
+    with pytest.raises(ImageError, match=said):
+        eight_bits(image, "frame", bits)
 
 
 def test_exif_turn_is_not_applied():

@@ -23,6 +23,9 @@ MOST_FILE_BYTES = 3 * MOST_PIXELS
 MOST_SCANNED_PIXELS = 1_000_000_000
 """Pixels of a JPEG times its scans, each of which is a pass over all of them: 15 passes over the largest picture."""
 
+RAW_BITS = 12
+"""Bits of a camera's raw values, which it writes into 16."""
+
 _JPEG_START = b"\xff\xd8\xff"
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
@@ -41,11 +44,16 @@ class ImageError(TrpacError):
 
 
 def decode_image(
-    source: str | Path | bytes | bytearray | memoryview, name: str = "image", *, upright: bool = False
+    source: str | Path | bytes | bytearray | memoryview,
+    name: str = "image",
+    *,
+    upright: bool = False,
+    bits: int | None = None,
 ) -> NDArray[np.uint8]:
     """Read a JPEG or PNG as 8-bit BGR.
 
-    Grey pictures get three equal channels, 16-bit ones their upper 8 bits, and an alpha channel is dropped.
+    Grey pictures get three equal channels, those of 16 bits the upper 8 of what is used, and an alpha channel is
+    dropped.
 
     Parameters
     ----------
@@ -56,6 +64,8 @@ def decode_image(
     upright : bool
         Whether a turn noted in the file's EXIF data is applied, as a viewer does; not by default, since a camera
         file describes the pixels as they are stored.
+    bits : int, optional
+        How many bits a file of 16 uses, see `eight_bits`.
 
     Returns
     -------
@@ -82,24 +92,65 @@ def decode_image(
     elif data.startswith(_PNG_START):
         width, height = _check_png(data, name)
         check_size(width, height, name)
-        image = _decoded(data, name)
+        image = _decoded(data, name, bits=bits)
     else:
         raise ImageError(
             f"{name}: neither JPEG nor PNG (starts with {data[:8].hex(' ')}). Convert the picture."
         )
-    return _decoded(data, name, cv2.IMREAD_COLOR_BGR) if upright and _turned(data) else image
+    return _decoded(data, name, cv2.IMREAD_COLOR_BGR, bits) if upright and _turned(data) else image
+
+
+def eight_bits(image: NDArray[np.generic], name: str = "image", bits: int | None = None) -> NDArray[np.uint8]:
+    """A picture's values as 8 bits, shape as given.
+
+    Parameters
+    ----------
+    image : array of uint8, uint16 or float
+        Floats lie within 0 and 1.
+    name : str
+        What error messages call it.
+    bits : int, optional
+        How many of 16 bits are used, 8 to 16. By default 12 where all values are below 4096, as cameras of 12 bits
+        write them, else 16; state 16 for a picture of 16 bits that is nearly black.
+
+    Raises
+    ------
+    ImageError
+        If the values are of another type or range.
+    """
+    if bits is not None and not 8 <= bits <= 16:
+        raise ImageError(f"{name}: bits is {bits}; expected 8 to 16.")
+    if image.dtype == np.uint8:
+        return image.astype(np.uint8, copy=False)
+    if image.dtype == np.uint16:
+        most = int(image.max(initial=0))
+        used = bits or (RAW_BITS if most < 1 << RAW_BITS else 16)
+        if most >= 1 << used:
+            raise ImageError(f"{name}: a value of {most}; expected less than {1 << used} with {used} bits.")
+        return (image.astype(np.uint16, copy=False) >> (used - 8)).astype(np.uint8)
+    if np.issubdtype(image.dtype, np.floating):
+        shares = image.astype(np.float64, copy=False)
+        if not ((shares >= 0.0) & (shares <= 1.0)).all():
+            raise ImageError(
+                f"{name}: floats beyond 0 to 1; expected shares of full white. Divide by the greatest value, or give uint8."
+            )
+        return np.rint(shares * 255.0).astype(np.uint8)
+    raise ImageError(f"{name}: values of {image.dtype}; expected uint8, uint16, or floats from 0 to 1.")
 
 
 def _decoded(
-    data: bytes, name: str, how: int = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_IGNORE_ORIENTATION
+    data: bytes,
+    name: str,
+    how: int = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_IGNORE_ORIENTATION,
+    bits: int | None = None,
 ) -> NDArray[np.uint8]:
     try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), how)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), how | cv2.IMREAD_ANYDEPTH)
     except cv2.error as error:
         raise ImageError(f"{name}: damaged; the picture cannot be decoded ({error.err}).") from error
     if image is None:
         raise ImageError(f"{name}: damaged; the picture cannot be decoded. Copy or record it again.")
-    return image.astype(np.uint8, copy=False)
+    return eight_bits(image, name, bits)
 
 
 def _turned(data: bytes) -> bool:
