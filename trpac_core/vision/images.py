@@ -132,7 +132,7 @@ def eight_bits(image: NDArray[np.generic], name: str = "image", bits: int | None
         shares = image.astype(np.float64, copy=False)
         if not ((shares >= 0.0) & (shares <= 1.0)).all():
             raise ImageError(
-                f"{name}: floats beyond 0 to 1; expected shares of full white. Divide by the greatest value, or give uint8."
+                f"{name}: floats beyond 0 to 1; expected shares of white. Divide by the greatest value."
             )
         return np.rint(shares * 255.0).astype(np.uint8)
     raise ImageError(f"{name}: values of {image.dtype}; expected uint8, uint16, or floats from 0 to 1.")
