@@ -36,7 +36,7 @@ LICENCE_TEXT = """\
 Most of the real pictures are non-commercial or carry no licence at all. None of them is part of this project, whole
 or in part; only weights learned from them are. A product should retrain on pictures that its maker owns. That is one
 command: `python -m models.training --data DIR`, where `DIR` holds the pictures and a `manifest.csv` with the columns
-file, split, task, label, mask, sequence_id, licence, width, height and notes."""
+file, split, task, label, mask, sequence_id, licence, width and height, and in notes, if there are any, "night"."""
 
 
 @dataclass

@@ -17,7 +17,7 @@ Image = NDArray[np.uint8]
 Box = tuple[float, float, float, float]
 
 MANIFEST, FURTHER_MANIFESTS = "manifest.csv", "manifest_*.csv"
-COLUMNS = ("file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height", "notes")
+COLUMNS = ("file", "split", "task", "label", "mask", "sequence_id", "licence", "width", "height")
 SPLITS = ("train", "val", "test", "gap")
 LABELS = {"dry": Surface.DRY, "wet": Surface.WET, "snow": Surface.SNOW_ICE}
 IGNORE = 255
@@ -201,7 +201,7 @@ def _rows(manifest: Path) -> list[dict[str, str]]:
 
 
 def _picture(folder: Path, row: dict[str, str]) -> Picture:
-    night = "night" in row["notes"]
+    night = "night" in (row.get("notes") or "")
     return Picture(
         path=folder / row["file"],
         split=row["split"],
