@@ -66,8 +66,7 @@ def validate(path: Path) -> list[str]:
 
 def smoke_run(path: Path) -> str:
     """Instantiate the unit and step it with rolling wheels; returns how many steps, and the mean time of one."""
-    from fmu_src.doctor import trial_3
-    from fmu_src.trial import rolling
+    from fmu_src.trial import rolling, run
     from scenarios.fmu_client.opening import opened
     from scenarios.fmu_client.unpacking import unpack_unit
 
@@ -75,7 +74,7 @@ def smoke_run(path: Path) -> str:
     if name.endswith("_fmi3"):
         folder = unpack_unit(path)
         try:
-            outcome = trial_3(folder, SMOKE_STEPS)
+            outcome = run(folder, SMOKE_STEPS)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
         if not outcome["ran"]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -22,7 +20,7 @@ from trpac_core.files import parse_json, quoted
 
 from .contents import CONTENTS_FILE, ContentError, Contents, deviations, read_contents
 from .host import LEAST_PYTHON
-from .trial import STEP_S, STEPS, end_with_parent, rolling
+from .trial import end_with_parent
 from .units import UNITS
 
 RECORD = f"resources/{CONTENTS_FILE}"
@@ -59,17 +57,6 @@ print(json.dumps({{"executable": sys.executable, "version": list(sys.version_inf
                   "libpython": library, "packages": packages}}))
 """
 """Program of the child process: prints the interpreter, and which of the modules in its arguments it can import."""
-
-
-TRIAL_3 = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-from pathlib import Path
-from fmu_src.doctor import end_with_parent, trial_3
-end_with_parent()
-print(json.dumps(trial_3(Path(sys.argv[2]))))
-"""
-"""Program of the child process that tries a unit for FMI 3.0: prints the outcome as `trial.py` does."""
 
 
 class State(Enum):
@@ -168,7 +155,7 @@ def examine(
     intact = all(finding.state is not State.PROBLEM for finding in of_file)
     if intact and run:
         notify(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
-        findings.append(_trial(path, python, fmi_3))
+        findings.append(_trial(path, python))
     else:
         why = "the file is not what was built" if run else "as it was asked for"
         findings.append(Finding("trial", State.NOTE, f"not run: {why}"))
@@ -301,52 +288,7 @@ def _python(python: Python, modules: list[str] | None) -> list[Finding]:
     return [found, Finding("packages", State.OK, there)]
 
 
-def trial_3(folder: Path, steps: int = STEPS) -> dict[str, Any]:
-    """The outcome of instantiating a unit for FMI 3.0 by fmpy, and stepping it with rolling wheels, JSON-able.
-
-    Parameters
-    ----------
-    folder : Path
-        The unpacked unit; its code runs in this process.
-    steps : int
-        Number of steps of `STEP_S`.
-    """
-    from fmpy import read_model_description
-    from fmpy.fmi3 import FMU3Slave
-
-    log: list[str] = []
-    try:
-        description = read_model_description(str(folder))
-        reals = [v for v in description.modelVariables if v.type == "Float64"]
-        unit = FMU3Slave(
-            guid=description.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="trial",
-        )
-        unit.instantiate(
-            loggingOn=True, logMessage=lambda *message: log.append(message[-1].decode("utf-8", "replace"))
-        )
-        unit.enterInitializationMode()
-        unit.exitInitializationMode()
-        for variable in reals:
-            value = rolling(variable.name) if variable.causality == "input" else None
-            if value is not None:
-                unit.setFloat64([variable.valueReference], [value])
-        started = time.perf_counter()
-        for step in range(steps):
-            unit.doStep(step * STEP_S, STEP_S)
-        elapsed = time.perf_counter() - started
-        outputs = {v.name: unit.getFloat64([v.valueReference])[0] for v in reals if v.causality == "output"}
-        unit.terminate()
-        unit.freeInstance()
-    except Exception as error:  # noqa: BLE001 - fmpy raises bare Exceptions
-        return {"ran": False, "error": str(error), "log": log}
-    strange = sorted(name for name, value in outputs.items() if not math.isfinite(value))
-    return {"ran": True, "step_us": elapsed / steps * 1e6, "not_finite": strange, "log": log}
-
-
-def _trial(path: Path, python: str, fmi_3: bool) -> Finding:
+def _trial(path: Path, python: str) -> Finding:
     """The finding on instantiating and stepping the unit in a child process."""
     temporary = tempfile.gettempdir()
     if not SAFE_PATH.fullmatch(str(Path(temporary).resolve())):
@@ -356,11 +298,8 @@ def _trial(path: Path, python: str, fmi_3: bool) -> Finding:
     folder = None
     try:
         folder = unpack_unit(path)
-        here = Path(__file__)
-        command = [python, *ISOLATED, str(here.with_name("trial.py"))]
-        if fmi_3:  # native code, for which this interpreter and its fmpy do
-            command = [sys.executable, *ISOLATED, "-c", TRIAL_3, str(here.parents[1])]
-        done = _run([*command, str(folder)], TRIAL_LIMIT_S)
+        script = str(Path(__file__).with_name("trial.py"))
+        done = _run([python, *ISOLATED, script, str(folder)], TRIAL_LIMIT_S)
     except subprocess.TimeoutExpired:
         return Finding(
             "trial", State.PROBLEM, f"no answer within {TRIAL_LIMIT_S:g} s", "Report this as a fault."

@@ -13,6 +13,7 @@ import numpy as np
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.sweep.draw import RunPlan
 from scenarios.sweep.run import Array, Track, Tracks, identifiable, rows_of, signals_of
+from trpac_core.estimator_data import EstimatorConfig
 from trpac_core.robust.blocks import Means, reading
 from trpac_core.robust.tyres import dugoff
 from trpac_core.vehicle import WHEELS
@@ -43,7 +44,7 @@ def over(plan: RunPlan, trajectory: PlantTrajectory) -> Array:
     car, noise = scenario.vehicle.to_core(), scenario.sensors
     omega, torque, speed, _ = (np.array(signal) for signal in signals_of(plan, trajectory))
     radius_m, inertia = car.wheel_radius_m, car.wheel_inertia_kg_m2
-    said, likely, friction = np.full(len(truth), 0.8), np.zeros(len(GRID)), 0.0
+    said, likely, friction = np.full(len(truth), EstimatorConfig().theta_initial), np.zeros(len(GRID)), 0.0
     before: Means | None = None
     for start in range(0, len(truth) - BLOCK, BLOCK):
         rows = slice(start, start + BLOCK)

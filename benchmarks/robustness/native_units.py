@@ -24,7 +24,7 @@ from fmpy.build import build_platform_binary
 from numpy.typing import NDArray
 
 from benchmarks.report import markdown
-from fmu_src.native.build import NATIVE_UNITS, build_native, sources
+from fmu_src.native.build import NATIVE_UNITS, TRIPLES, build_native, sources
 from fmu_src.native.library import FLAGS, compiler
 from fmu_src.units import ROOT, UNITS
 from scenarios.files import load_scenario
@@ -187,8 +187,8 @@ def platforms(bench: Bench) -> Iterator[Row]:
     zig = [sys.executable, "-m", "ziglang", "cc", "-target"]
     has = {path.name for path in (bench.folder / "binaries").iterdir()}
     emulators = (
-        ("aarch64-linux", "so", "aarch64-linux-gnu.2.17", "host_arm", "qemu-aarch64", ("-L", SYSROOT)),
-        ("win64", "dll", "x86_64-windows-gnu", "host.exe", WINE[0], ()),
+        ("aarch64-linux", "so", TRIPLES["aarch64-linux"], "host_arm", "qemu-aarch64", ("-L", SYSROOT)),
+        ("win64", "dll", TRIPLES["x86_64-windows"], "host.exe", WINE[0], ()),
     )
     for platform, ending, triple, name, emulator, options in emulators:
         what = f"{platform} by {Path(emulator).name}"

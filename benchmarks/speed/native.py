@@ -4,7 +4,6 @@ The host is the tests': each step sets ten inputs and reads all real outputs. `c
 tenth of the steps: those that end a block of the belief.
 """
 
-import subprocess
 import tempfile
 import time
 import zipfile
@@ -13,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.accuracy.random_drives import STEP_S, CarError, make_drive
+from benchmarks.robustness.native_units import HOST, compiled, run
 from fmu_src.native.build import build_native
-from fmu_src.native.library import FLAGS, compiler
-from fmu_src.units import ROOT, UNITS
+from fmu_src.native.library import compiler
+from fmu_src.units import UNITS
 from trpac_core.estimator import EstimatorConfig, RoadClass, Sensors, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.vision.classes import Surface
 
-HOST = ROOT / "tests" / "support" / "native_host.c"
 SEED, CONFIDENCE = 1, 0.9
 
 
@@ -57,13 +56,10 @@ def measure() -> dict[str, dict[str, float]]:
         with zipfile.ZipFile(unit) as archive:
             archive.extractall(folder)
         parts = [folder / "binaries" / "linux64" / "TrpacEstimator.so", folder / "sources" / "tables.c"]
-        command = [*compiler(), *FLAGS, f"-I{folder / 'sources'}", str(HOST), *map(str, parts)]
-        subprocess.run([*command, "-o", str(folder / "host"), "-lm", "-lpthread"], check=True)
+        host = compiled(compiler(), folder / "host", folder / "sources", HOST, *parts)
         given.tofile(folder / "rows.bin")
         for method in Method:
-            arguments = [str(folder / "host"), "bench", str(folder / "rows.bin"), str(method.value)]
-            printed = subprocess.run(arguments, capture_output=True, text=True, check=True).stdout
-            mean, block = map(float, printed.split())
+            mean, block = map(float, run(host, "bench", folder / "rows.bin", method.value).split())
             found[method.label] = {
                 "c_mean_ns": mean,
                 "c_block_ns": block,

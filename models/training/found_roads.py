@@ -24,7 +24,11 @@ class FoundRoad(Picture):
 
     def road(self) -> Image:
         """See `Picture.road`."""
-        height, width = self.image().shape[:2]
+        return self.road_in(self.image())
+
+    def road_in(self, image: Image) -> Image:
+        """The road at the size of an image that the picture gives."""
+        height, width = image.shape[:2]
         return np.asarray(cv2.resize(self.found, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
 
 

@@ -107,12 +107,12 @@ class Night(FoundRoad):
 
     def road(self) -> Image:
         """See `Picture.road`."""
-        return _as_large(self.found, super().image())
+        return self.road_in(super().image())
 
     def image(self) -> Image:
         """The picture by night."""
         day = super().image()
-        road = cv2.GaussianBlur(_as_large(self.found, day).astype(np.float32), (0, 0), 2.0)
+        road = cv2.GaussianBlur(self.road_in(day).astype(np.float32), (0, 0), 2.0)
         return darkened(np.random.default_rng(self.seed), day, np.asarray(road, np.float32), self.surface)
 
 
@@ -167,11 +167,6 @@ def darkened(rng: np.random.Generator, image: Image, road: Light, surface: Surfa
         light += on_road * rng.uniform(*gains) * np.clip(1.0 - below, 0.1, 1.0)[:, None, None] * mirrored
     light += lamps * (1.0 - on_road * (below > 0.0)[:, None, None])
     return bytes_of(_taken(rng, light))
-
-
-def _as_large(found: Image, image: Image) -> Image:
-    height, width = image.shape[:2]
-    return np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
 def _albedo(rng: np.random.Generator, image: Image) -> Light:

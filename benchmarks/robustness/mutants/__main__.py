@@ -13,7 +13,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from .faults import Mutant, every, files_of, sample
+from .faults import Mutant, every, files_of, prefix_of, sample
 from .run import Bench
 
 ROOT = Path(__file__).parents[3]
@@ -90,7 +90,7 @@ def _one(bench: Bench, mutant: Mutant, number: int, out: Any) -> dict[str, Any]:
 
 def _tell(folders: list[str], results: list[dict[str, Any]]) -> None:
     for folder in folders:
-        counts = Counter(r["outcome"] for r in results if r["name"].startswith(folder))
+        counts = Counter(r["outcome"] for r in results if r["name"].startswith(prefix_of(folder)))
         found = sum(counts[outcome] for outcome in FOUND)
         print(f"{folder}: {found} of {counts.total()} found ({dict(counts)})")
     for result in results:

@@ -117,6 +117,11 @@ def files_of(root: Path, folders: Sequence[str]) -> list[str]:
     return found
 
 
+def prefix_of(name: str) -> str:
+    """What paths of a folder's files, or the path of a file, begin with."""
+    return name if name.endswith(".py") else f"{name}/"
+
+
 def _mutant(root: Path, place: Place, fault: str) -> Mutant:
     return Mutant(place, (root / place.file).read_bytes()[place.start : place.end].decode(), fault)
 

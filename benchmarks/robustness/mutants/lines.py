@@ -56,7 +56,5 @@ class Lines:
 
 lines: Lines | None = None
 if __name__ == "sitecustomize" and "MUTANTS_RECORD" in os.environ:
-    _folders = tuple(
-        name if name.endswith(".py") else f"{name}/" for name in os.environ["MUTANTS_FOLDERS"].split(":")
-    )
+    _folders = tuple(os.environ["MUTANTS_FOLDERS"].split(":"))
     lines = Lines(os.environ["MUTANTS_RECORD"], os.environ["MUTANTS_ROOT"], _folders)

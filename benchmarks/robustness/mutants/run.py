@@ -19,7 +19,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from .faults import Mutant
+from .faults import Mutant, prefix_of
 
 POLL_S = 0.02
 MOST_PLAIN = 40
@@ -69,7 +69,7 @@ class Bench:
             environment = self._environment | {
                 "MUTANTS_RECORD": str(record),
                 "MUTANTS_ROOT": str(self.copy),
-                "MUTANTS_FOLDERS": ":".join(self._folders),
+                "MUTANTS_FOLDERS": ":".join(map(prefix_of, self._folders)),
                 "MUTANTS_TOLD": str(told),
             }
             command = [sys.executable, "-m", "pytest", "-p", "mutants_plugin", *self._options()]
