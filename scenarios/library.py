@@ -22,7 +22,7 @@ PAPER_VEHICLE = "four_in_wheel_motor_ev"
 
 
 def networks_folder() -> Path:
-    """The folder of the trained networks: segmenter.onnx, surface.onnx, picture.onnx."""
+    """The folder of the trained networks: segmenter.onnx and surface.onnx."""
     return Path(str(files("models")))
 
 

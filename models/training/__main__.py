@@ -24,7 +24,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one clear line when the surroundings or the data folder lack something."""
     parser = argparse.ArgumentParser(
         prog="python -m models.training",
-        description="Trains the segmenter and both classifiers, exports them as ONNX and writes their cards.",
+        description="Trains the segmenter and the classifier of patches, exports them as ONNX and writes their cards.",
     )
     parser.add_argument(
         "--data", type=Path, required=True, help="folder of road pictures with its manifest.csv"
@@ -35,10 +35,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="seed of every random choice (default: 1)")
     parser.add_argument(
         "--only",
-        choices=("segmenter", "surface", "head", "scene", "picture"),
-        help="train one network, the other files stay; head: only the linear head of the surface network that lies "
-        "with its card and the segmenter in --out, and what a scene adds; scene: the latter alone; picture: the "
-        "picture network, beside the two others in --out",
+        choices=("segmenter", "surface"),
+        help="train one network, the other file stays; surface: with the segmenter that lies in --out",
     )
     parser.add_argument(
         "--effort", type=float, default=1.0, help="share of the usual steps and rendered worlds (default: 1)"
@@ -47,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--device",
         default="cpu",
-        help="where the classifiers are trained: cpu, or cuda, which does not repeat to the last bit (default: cpu)",
+        help="where the classifier is trained: cpu, or cuda, which does not repeat to the last bit (default: cpu)",
     )
     parser.add_argument(
         "--kept",

@@ -123,3 +123,25 @@ def disturbed_look(rng: np.random.Generator, image: Image) -> Image:
         contrast, shift = rng.uniform(0.6, 1.4), rng.uniform(-40, 40)
         image = np.clip(128 + contrast * (image.astype(np.float32) - 128) + shift, 0, 255).astype(np.uint8)
     return image
+
+
+BONNET_TOP, BONNET_BULGE = (0.72, 0.97), (0.0, 0.12)
+"""Row where a bonnet or dashboard begins, and how much higher its middle is, over the picture's height [-]."""
+BONNET_LEVELS, BONNET_TINT, BONNET_GLOSS = (6.0, 200.0), 0.25, (0.0, 0.6)
+"""Its paint, log-uniform, its channels apart, and the share of it that mirrors the picture [8-bit levels], [-], [-]."""
+
+
+def bonnet(rng: np.random.Generator, image: Image) -> tuple[Image, NDArray[np.bool_]]:
+    """A picture over the bonnet or the dashboard of the car that takes it, and where that hides it."""
+    height, width = image.shape[:2]
+    across = np.linspace(-1.0, 1.0, width) - rng.uniform(-0.4, 0.4)
+    arch = 1.0 - across**2 * rng.uniform(0.3, 1.2)
+    top = (rng.uniform(*BONNET_TOP) - rng.uniform(*BONNET_BULGE) * arch) * height
+    depth = np.clip((np.arange(height)[:, None] - top) / rng.uniform(1.0, 3.0) + 0.5, 0.0, 1.0)
+    paint = np.exp(rng.uniform(*np.log(BONNET_LEVELS)) + rng.uniform(-BONNET_TINT, BONNET_TINT, 3))
+    shade = np.linspace(rng.uniform(0.6, 1.6), rng.uniform(0.6, 1.4), height)[:, None, None]
+    mirrored = cv2.GaussianBlur(np.ascontiguousarray(image[::-1]), (0, 0), rng.uniform(1.0, 8.0))
+    gloss = rng.uniform(*BONNET_GLOSS)
+    body = (1.0 - gloss) * paint * shade + gloss * mirrored
+    seen = image + depth[..., None] * (body - image)
+    return np.clip(seen + 0.5, 0, 255).astype(np.uint8), depth > 0.5

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,23 +11,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.scene import NUMBERS, SceneHead
 
 from .data import Picture
 from .patches import CAMERA_SPREAD, RENDERED_SPREAD
-from .rendered import FIRST_SCENE_WORLD, SEED_RANGES, STREETS
-from .scores import ClassScore, Judged, wilson_interval
+from .rendered import STREETS
+from .scores import ClassScore, wilson_interval
 
 if TYPE_CHECKING:
     from .calibrate import Reliability
     from .outcomes import Outcome, Stage
+    from .road_run import Road
     from .train_segmenter import SegmentationScore
 
 CLASSES = [surface.label for surface in Surface]
 PACKAGES = ("torch", "onnx", "onnxruntime", "numpy", "opencv-python-headless", "albumentations")
-
-SCENE_BEGIN, SCENE_END = "<!-- scene: begin -->", "<!-- scene: end -->"
-"""Between them the card tells of the scene."""
 
 LICENCE_TEXT = """\
 ## Licences of the pictures
@@ -171,8 +167,8 @@ means and deviations between their own and another patch's (Zhou et al. 2021, Do
 - Input `patches`: uint8 (N, 64, 96, 3), BGR; normalisation is in the graph.
 - Output `logits`: float32 (N, 3), classes dry, wet, snow_ice. Probabilities are softmax(logits / T).
 - Output `readable`: float32 (N,), probability that a patch shows road that can be read at all.
-- Metadata: `temperature` = {temperature:.6f}, `classes` = dry,wet,snow_ice, `scene`: what the picture around a patch
-  adds to its logits, [below](#the-scene).
+- Metadata: `temperature` = {temperature:.6f}, `classes` = dry,wet,snow_ice.
+  The large arrays are kept in half precision.
 
 ## Training
 
@@ -222,12 +218,6 @@ worst bin however few patches it holds.
 
 {calibration}
 
-## The scene
-
-{SCENE_BEGIN}
-
-{SCENE_END}
-
 ## Limits
 
 - The validation and test stills come from the same kind of web search as the training stills; other cameras are the
@@ -250,85 +240,6 @@ are used only where no text, path dots or bonnet cover the road.
 """
 
 
-HEAD, BEFORE_HEAD, DATA = "The head", "Readable road", "Data"
-ALONE = ("Scores on pictures, patches alone", "Scores on single patches, alone", HEAD)
-"""Parts of the card that a head learned anew takes the place of."""
-DATA_TABLE = r"\| source \| class (?s:.*?)\n\n"
-
-
-def with_head(card: str, head: str, data: str) -> str:
-    """A card with what is told of the head that was learned anew in place of the scores of the one before."""
-    first, *parts = re.split(r"^## ", card, flags=re.MULTILINE)
-    told = {}
-    for part in parts:
-        title, _, text = part.partition("\n")
-        told[title] = text
-    told["Calibration"] = told["Calibration"].partition("\n\nOf patches alone")[0].rstrip() + "\n\n"
-    told[DATA] = re.sub(DATA_TABLE, lambda _: f"{data}\n\n", told[DATA])
-    for title in ALONE:
-        told.pop(title, None)
-    written = []
-    for title, text in told.items():
-        written += [f"{HEAD}\n\n{head}\n\n"] if title == BEFORE_HEAD else []
-        written.append(f"{title}\n{text}")
-    return "".join([first, *(f"## {part}" for part in written)])
-
-
-def head_section(table_left_out: str, *, patches: int, ridge: float, temperature: float, command: str) -> str:
-    """What the card of surface.onnx tells of the head."""
-    return f"""\
-The linear layer, learned anew with the towers at rest (`{command}`): {patches} patches of the training pictures, of
-those by day also by night (`models/training/night.py`), and of rendered worlds; multinomial regression, classes equal,
-sources within a class by fixed shares, a ridge of {ridge:g} nat on half of the square of how far the weights go from
-the towers' own. T = {temperature:.3f} is learned from sources that were left out of the head in turn, each counted
-alike. Their scores (`python -m models.training.left_out --data DIR`), a picture by fixed patches on its road, in their
-scene; the flag is up from the confidence that keeps 2 % wrong on the other sources:
-
-{table_left_out}
-
-The towers have seen web, CamVid, LUMS and the clips; cws8262, BDD and the other cameras not."""
-
-
-def scene_section(
-    judged: Mapping[str, Judged],
-    reliabilities: Mapping[str, tuple[Reliability, Reliability]],
-    head: SceneHead,
-    *,
-    temperature: float,
-    patches: int,
-) -> str:
-    """What the card of surface.onnx tells of the scene."""
-    weights = table(
-        ["number", *(f"{name} [logit]" for name in CLASSES)],
-        [[name, *(f"{w:+.2f}" for w in row)] for name, row in zip(NUMBERS, head.weights, strict=True)],
-    )
-    rows = [
-        [name, *class_rows(kind, score)]
-        for name, both in judged.items()
-        for kind, score in (("alone", both.alone), ("in its scene", both.in_scene))
-    ]
-    header = ["set", "patches", "n", "accuracy [95 %]", *(f"recall {name} (n)" for name in CLASSES)]
-    return f"""\
-A patch is grey, but the road is packed snow where its verge is as grey. {len(NUMBERS)} numbers of the picture around
-a patch (`trpac_core/vision/scene.py`) times a matrix are added to its logits; whoever judges patches without their
-picture leaves it out. Learned last, the rest fixed, by multinomial regression with a ridge: {patches} patches of the
-real training pictures, those by day also by night, and of rendered worlds that the network had not seen (seeds from
-{SEED_RANGES["train"].start + FIRST_SCENE_WORLD}; trees and houses painted beside most of their roads,
-`models/training/roadside.py`), each with its picture as undisturbed cameras would show both, drawn by the same
-shares. Logits per standard deviation:
-
-{weights}
-
-A picture's class as above:
-
-{table([*header, "confusion, rows true"], rows)}
-
-In the scene, T = {temperature:.3f}, the one in the metadata; scene and patch are disturbed alike. The diagram
-`reliability.png` is the validation set's, undisturbed and disturbed together.
-
-{calibration_table(reliabilities, temperature)}"""
-
-
 def segmentation_table(scores: dict[str, dict[str, SegmentationScore]]) -> str:
     """IoU and pixel accuracy per set and task."""
     rows = []
@@ -340,39 +251,61 @@ def segmentation_table(scores: dict[str, dict[str, SegmentationScore]]) -> str:
 
 def segmenter_card(
     facts: RunFacts,
+    road: Road,
     *,
     sha256: str,
-    parameters: int,
     train_s: float,
-    pools: dict[str, int],
     scores: dict[str, dict[str, SegmentationScore]],
+    left_out: str,
 ) -> str:
     """Card of segmenter.onnx."""
-    kinds = ", ".join(f"{kind} {count}" for kind, count in pools.items())
+    parameters = sum(parameter.numel() for parameter in road.net.parameters())
+    views = Counter(view.kind for view in road.material.training.views)
+    kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(views.items()))
+    kind = road.net.trunk.kind
     return f"""\
 # segmenter.onnx
 
 sha256: `{sha256}`
 
-Multi-task network after section 3.1 of Tian et al. 2022: one encoder (depthwise separable), two decoders of the same
-form, {parameters} parameters, trained from nothing in our own code.
+One network for a whole picture: where the road is, where shadow lies on it, and what its surface is.
+The encoder is the first {kind.blocks} blocks of {kind.name}, which has learned to see from other pictures (ImageNet
+weights, Apache-2.0) and stays as it is: what it sees holds on streets that nothing here has seen. Two decoders
+(section 3.1 of Tian et al. 2022) and a linear layer are learned. {parameters} parameters, the large ones kept in half
+precision.
 
 - Input `image`: uint8 (1, 160, 256, 3), BGR, the whole frame reduced by area averaging; normalisation is in the graph.
 - Outputs `drivable` and `shadow`: float32 (1, 160, 256), probabilities. `shadow` means shadow on the road; off the
   drivable area it says nothing.
+- Output `surface`: float32 (1, 3), logits of dry, wet, snow_ice: of mean and deviation of the encoder's maps on the
+  road that was found, and of their mean beside it. The class of the picture as a whole, not of a place in it.
 
 ## Training
 
-Pictures by kind: {kinds}.
-*masked* and *campus* are real pictures with road masks, *weak* real pictures of all three surfaces without one: only
-the middle of the road box counts as road and the sky of stills as not road. The brighter half of a real road, and all
-of a wet one, counts as free of shadow, the darker half as unknown.
-Shadows are painted over most of these; *rendered* have exact labels of both tasks. Random crops, mirror, gain, gamma,
+{len(road.material.training.views)} views by kind of picture: {kinds}.
+*masked*, *campus* and some of *street* are real pictures with road masks, *weak* real pictures of all three surfaces
+without one: only the middle of the road box counts as road and the sky of stills as not road; of other *street*
+pictures no more is known than that their sky is no road. The brighter half of a real road, and all
+of a wet one, counts as free of shadow, the darker half as unknown. Shadows are painted over most of these, and on some
+a bonnet or dashboard, which is no road; *night* are pictures by day shown by night (`models/training/night.py`);
+*rendered* have exact labels of both tasks. Random crops, mirror, gain, gamma,
 white balance, and on some pictures blur, noise, contrast. Cross-entropy and Dice, AdamW.
+
+The surface is learned last, by multinomial regression with a ridge: {len(road.surfaces.labels)} whole pictures, by day
+and by night, of training sources and rendered; classes alike, sources within a class by fixed shares. Its logits are
+times {road.scale:.3f}, which makes the true classes of sources left out likeliest.
 {time_text(facts, train_s)}
 {versions_text(facts)}
 
-## Scores
+## The surface, on sources left out
+
+Each source is judged by a surface that was learned without it; by the road that the masks find, which know it. The flag
+is up from the confidence at which no other source is wrong in more than 2 %. `python -m models.training.left_out --data
+DIR` writes this table and that of masks left out.
+
+{left_out}
+
+## The masks
 
 At probability 0.5, whole pictures; unknown pixels are left out.
 
@@ -384,13 +317,15 @@ training was widened for it, so its score is no test score. Real drivable masks 
 
 ## Limits
 
+- Damp, matt asphalt without reflections is often taken for dry: most of the wet streets that are missed look so.
+- Snow by night is hardly in the data, and not told.
+- A picture as a whole tells of weather and place as much as of the road: where a wet road lies under a blue sky, or
+  snow is cleared, patches know better.
 - No real picture has a shadow label. On real pictures the shadow task learns from painted shadows and that the
   brighter half of a road and wet roads have none; the darker half stays unknown, lest unlabelled real shadows teach "no
   shadow". How well it finds real shadows is seen by eye only; dark asphalt and dusk still pass for shadow at times.
 - On rendered pictures much of the shadow is missed, see its IoU; what is called shadow is mostly right.
-- No wet or snowy real picture has a road mask. There the drivable task rests on rendered pictures and weak labels,
-  and the edge between a snowy road and a snowy verge is a guess.
-- Kerbs, parked cars and pavements are known from one town (CamVid) and one campus. The rendered roads are straight.
+- The edge between a snowy road and a snowy verge is a guess.
 
 ## Data
 

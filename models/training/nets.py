@@ -1,4 +1,4 @@
-"""The networks: a two-task segmenter, and a surface classifier of patches or of whole pictures.
+"""The networks: one of whole pictures, and a surface classifier of patches.
 
 Both take BGR uint8 pictures with channels last; normalisation is part of the graph.
 """
@@ -14,15 +14,7 @@ from torch.nn import functional
 
 from trpac_core.vision.classes import Surface
 
-from .trunk import Depthwise, Kind, Trunk
-
-PIXEL_MEAN, PIXEL_DEVIATION = 110.0, 60.0
-"""Round figures for road pictures; the same for the three channels, so that grey stays grey."""
-
-
-def normalise(images: Tensor) -> Tensor:
-    """Uint8 pictures (n, h, w, 3) to float planes (n, 3, h, w) around zero."""
-    return (images.permute(0, 3, 1, 2).float() - PIXEL_MEAN) / PIXEL_DEVIATION
+from .trunk import AT_REST, Depthwise, Kind, Trunk
 
 
 class ConvUnit(nn.Sequential):
@@ -55,62 +47,102 @@ class SeparableUnit(nn.Module):
 
 
 class Decoder(nn.Module):
-    """One task's decoder: from stride 16 up to stride 2, with the encoder's maps added in."""
+    """One task's decoder: from stride 16 up to stride 4, with the encoder's maps added in."""
 
-    def __init__(self, widths: tuple[int, int, int, int], width: int = 32):
+    def __init__(self, channels: Sequence[int], width: int = 32):
         super().__init__()
-        self.lateral = nn.ModuleList([nn.Conv2d(channels, width, 1) for channels in widths])
-        self.smooth = nn.ModuleList([SeparableUnit(width, width) for _ in widths])
+        self.lateral = nn.ModuleList([nn.Conv2d(each, width, 1) for each in channels])
+        self.smooth = nn.ModuleList([SeparableUnit(width, width) for _ in channels])
         self.head = nn.Conv2d(width, 1, 1)
 
-    def forward(self, maps: list[Tensor]) -> Tensor:
-        """Logits of one task at twice the finest map's size, shape (n, h, w)."""
+    def forward(self, maps: Sequence[Tensor]) -> Tensor:
+        """Logits of one task at the size of the finest map, shape (n, h, w)."""
         x = self.smooth[-1](self.lateral[-1](maps[-1]))
         for level in range(len(maps) - 2, -1, -1):
-            x = functional.interpolate(x, scale_factor=2.0, mode="nearest")
+            x = functional.interpolate(x, scale_factor=2.0, mode="bilinear", align_corners=False)
             x = self.smooth[level](x + self.lateral[level](maps[level]))
-        logits = functional.interpolate(self.head(x), scale_factor=2.0, mode="bilinear", align_corners=False)
-        return logits[:, 0]
+        return self.head(x)[:, 0]
 
 
-class Segmenter(nn.Module):
-    """One encoder, two decoders: drivable area and road shadow (section 3.1 of Tian et al. 2022)."""
+class RoadNet(nn.Module):
+    """Drivable area, road shadow (section 3.1 of Tian et al. 2022) and the road's surface in a whole picture.
 
-    def __init__(self) -> None:
+    One pretrained encoder at rest, two decoders, and a linear layer on what the encoder makes of the road and of the
+    rest of the picture. General features hold on streets that nothing here has seen.
+    """
+
+    WIDTH, DILATIONS = 128, (1, 2, 4)
+    """Of the coarsest maps that the decoders begin from, and of the units that look around in them."""
+    DROPOUT = 0.1
+    """Share of the encoder's coarsest maps that a step of training leaves out [-]."""
+    LEAST_WEIGHT = 0.02
+    """Weight of the lower centre beside the road that was found: where none was, it stands for it [-]."""
+    LOWER_CENTRE = (0.6, 0.2, 0.8)
+    """Row from which, and columns between which, the road lies in most pictures [of the size]."""
+    LIMIT = 5.0
+    """A feature counts up to so many standard deviations of the training pictures' [-]."""
+
+    def __init__(self, *, pretrained: bool = False):
         super().__init__()
-        widths = (16, 32, 64, 128)
-        self.stem = ConvUnit(3, widths[0], stride=2)
-        self.stages = nn.ModuleList(
-            [
-                nn.Sequential(SeparableUnit(widths[0], widths[0])),
-                nn.Sequential(SeparableUnit(widths[0], widths[1], 2), SeparableUnit(widths[1], widths[1])),
-                nn.Sequential(
-                    SeparableUnit(widths[1], widths[2], 2),
-                    SeparableUnit(widths[2], widths[2]),
-                    SeparableUnit(widths[2], widths[2]),
-                ),
-                nn.Sequential(
-                    SeparableUnit(widths[2], widths[3], 2),
-                    SeparableUnit(widths[3], widths[3], dilation=2),
-                    SeparableUnit(widths[3], widths[3], dilation=4),
-                    SeparableUnit(widths[3], widths[3]),
-                ),
-            ]
+        self.trunk = Trunk(AT_REST, pretrained=pretrained)
+        first, second, *coarse = AT_REST.channels
+        self.enter = ConvUnit(sum(coarse) + 2, self.WIDTH, kernel=1)
+        self.around = nn.Sequential(
+            *(SeparableUnit(self.WIDTH, self.WIDTH, dilation=dilation) for dilation in self.DILATIONS)
         )
-        self.context = nn.Linear(widths[3], widths[3])
-        self.drivable = Decoder(widths)
-        self.shadow = Decoder(widths)
+        self.context = nn.Linear(self.WIDTH, self.WIDTH)
+        self.drivable = Decoder((first, second, self.WIDTH))
+        self.shadow = Decoder((first, second, self.WIDTH))
+        self.features = 3 * sum(AT_REST.channels[1:])
+        self.register_buffer("mean", torch.zeros(self.features))
+        self.register_buffer("deviation", torch.ones(self.features))
+        self.surface = nn.Linear(self.features, len(Surface))
 
-    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits of drivable and of shadow, each (n, h, w), for uint8 pictures (n, h, w, 3)."""
-        x = self.stem(normalise(images))
-        maps = []
-        for stage in self.stages:
-            x = stage(x)
-            maps.append(x)
-        gate = torch.sigmoid(self.context(x.mean(dim=(2, 3))))
-        maps[-1] = x * gate[:, :, None, None]
-        return self.drivable(maps), self.shadow(maps)
+    def masks(self, maps: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+        """Logits of drivable and of shadow, each (n, 40, 64): a quarter of the picture's size; of the trunk's maps."""
+        first, second, *coarse = maps
+        x = functional.dropout2d(torch.cat(coarse, dim=1), self.DROPOUT, self.training)
+        rows, columns = x.shape[2:]
+        height = torch.linspace(-1.0, 1.0, rows)[:, None].expand(rows, columns)
+        aside = torch.linspace(-1.0, 1.0, columns).abs().expand(rows, columns)
+        place = torch.stack((height, aside)).expand(len(x), 2, rows, columns)
+        x = self.around(self.enter(torch.cat((x, place), dim=1)))
+        x = x * torch.sigmoid(self.context(x.mean(dim=(2, 3))))[:, :, None, None]
+        return self.drivable((first, second, x)), self.shadow((first, second, x))
+
+    def pooled(self, maps: Sequence[Tensor], drivable: Tensor) -> Tensor:
+        """Mean and deviation of the maps on the road, and their mean beside it, shape (n, features)."""
+        found = torch.sigmoid(drivable)[:, None]
+        rows, columns = found.shape[2:]
+        top, left, right = self.LOWER_CENTRE
+        centre = torch.zeros(rows, columns)
+        centre[round(top * rows) :, round(left * columns) : round(right * columns)] = self.LEAST_WEIGHT
+        columns_of = []
+        for level, each in enumerate(maps[1:]):
+            factor = 2 if level == 0 else 4
+            on, beside = (functional.avg_pool2d(w, factor) for w in (found + centre, 1.0 - found))
+            mean = (each * on).sum(dim=(2, 3)) / on.sum(dim=(2, 3))
+            spread = ((each - mean[:, :, None, None]).square() * on).sum(dim=(2, 3)) / on.sum(dim=(2, 3))
+            around = (each * beside).sum(dim=(2, 3)) / (beside.sum(dim=(2, 3)) + 1e-6)
+            columns_of += [mean, torch.sqrt(spread + 1e-6), around]
+        return torch.cat(columns_of, dim=1)
+
+    def classes(self, pooled: Tensor) -> Tensor:
+        """Logits of the surface, shape (n, classes), of pooled features."""
+        return self.surface(((pooled - self.mean) / self.deviation).clamp(-self.LIMIT, self.LIMIT))
+
+    def forward(self, images: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Logits of drivable and of shadow, each (n, h, w), and of the surface, of uint8 pictures (n, h, w, 3)."""
+        maps = self.trunk(images)
+        drivable, shadow = self.masks(maps)
+        return enlarged(drivable), enlarged(shadow), self.classes(self.pooled(maps, drivable))
+
+
+def enlarged(logits: Tensor) -> Tensor:
+    """Logits (n, h, w) of a quarter of a picture's size at its size."""
+    return functional.interpolate(logits[:, None], scale_factor=4.0, mode="bilinear", align_corners=False)[
+        :, 0
+    ]
 
 
 class ShuffleUnit(nn.Module):

@@ -6,28 +6,16 @@ spots on a dark road are water. Shown dry, wet and snowy roads under the same la
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-
 import cv2
 import numpy as np
 
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.networks import RoadSegmenter
-from trpac_core.vision.scene import SCENE_HEIGHT_PX, SCENE_WIDTH_PX, scene_of
 
-from .data import Image, Picture
-from .found_roads import FoundRoad, found_road
-from .patches import patch_set, patches_from
-from .scene_set import SceneSet
+from .data import Image
 from .weathered import REDUCED, Light, Range, bytes_of, light_of, mirror_of
 
 SHOWN = "night/"
 """What the origin of a picture shown by night begins with."""
-PATCHES = 4
-"""Cut from each picture by night."""
-AS_THEY_ARE = ("seq_extreme",)
-"""Families not shown by night: text and paths are drawn over the road."""
 
 DAY_QUANTILE, DAY_LEVEL, DIMMEST = 0.9, 0.5, 0.05
 """The picture's light is brought to a level at a quantile, and its gain there is limited: albedo, roughly [-]."""
@@ -92,50 +80,6 @@ SHOT_NOISE, READ_NOISE = (0.0, 4e-4), (1e-6, 4e-5)
 """Variance of the noise over light, and that without light, of white squared [-]."""
 BLURRED_SHARE, BLUR_PX = 0.4, (0.4, 1.4)
 """Share of pictures out of focus or moved, and by how much [px]."""
-
-
-@dataclass(frozen=True)
-class Night(FoundRoad):
-    """A picture by day shown by night; what is drawn hangs on `seed`."""
-
-    seed: tuple[int, ...] = field(kw_only=True)
-
-    @property
-    def origin(self) -> str:
-        """See `Picture.origin`."""
-        return f"{SHOWN}{self.source}"
-
-    def road(self) -> Image:
-        """See `Picture.road`."""
-        return self.road_in(super().image())
-
-    def image(self) -> Image:
-        """The picture by night."""
-        day = super().image()
-        road = cv2.GaussianBlur(self.road_in(day).astype(np.float32), (0, 0), 2.0)
-        return darkened(np.random.default_rng(self.seed), day, np.asarray(road, np.float32), self.surface)
-
-
-def by_night(pictures: Iterable[Picture], segmenter: RoadSegmenter, seed: int) -> list[Night]:
-    """The pictures by day among these, but for the families in `AS_THEY_ARE`, each by night."""
-    days = [p for p in pictures if not p.night and p.family not in AS_THEY_ARE]
-    return [
-        Night(**vars(found_road(day, segmenter)) | {"night": True, "seed": (seed, number)})
-        for number, day in enumerate(days)
-    ]
-
-
-def night_scenes(pictures: Iterable[Night], seed: int) -> SceneSet:
-    """Random patches of pictures by night, in their scenes."""
-    rng = np.random.default_rng(seed)
-    groups, scenes = [], []
-    for picture in pictures:
-        image = picture.image()
-        groups.append((patches_from(rng, picture, image, PATCHES), int(picture.surface), picture.origin))
-        scenes.append(scene_of(image))
-    patches = patch_set(groups)
-    shape = (-1, SCENE_HEIGHT_PX, SCENE_WIDTH_PX, 3)
-    return SceneSet(patches, np.array(scenes, np.uint8).reshape(shape)[patches.pictures])
 
 
 def darkened(rng: np.random.Generator, image: Image, road: Light, surface: Surface) -> Image:

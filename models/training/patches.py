@@ -55,7 +55,6 @@ SOURCE_SHARES = {
     "cws8262": 3.0,
     "bdd_day": 2.0,
     "bdd_night": 2.0,
-    "night": 5.0,
 }
 """Relative share of each source among the drawn patches of a class.
 

@@ -18,7 +18,6 @@ from scenarios.camera.scene import RenderedFrame, Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.roi_sampling import roi_box, roi_width_px
-from trpac_core.vision.scene import scene_of
 
 from .data import IGNORE, Image
 from .keeping import keep_arrays
@@ -33,10 +32,6 @@ SEED_RANGES = {
 """Seeds of the looks of each split: disjoint, so no world is seen in two splits."""
 
 PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
-
-FIRST_SCENE_WORLD = 500_000
-"""From this one of the training range on worlds teach what a scene adds: the network has not seen them, it is too sure
-of those that it has."""
 
 STORED_WIDTH_PX = 384
 """Width at which whole pictures are kept for the segmenter [px]."""
@@ -54,6 +49,9 @@ NEAREST_M, FARTHEST_M = 2.5, 15.0
 ROI_WIDTHS_M = (0.7, 4.5)
 PURE_SHARE = 0.97
 """Least share of a patch that is lit road of one surface [-]; the classifier learns undisturbed looks only."""
+
+ONE_SURFACE = 0.9
+"""Least share of one surface on the road of a picture that is told to be of it [-]."""
 
 WORLDS_PER_CAMERA = 6
 """Further worlds that share a camera: to know where its pixels look takes half of the time that a world takes."""
@@ -168,9 +166,9 @@ def draw_further_worlds(
     processes: int,
     report: Callable[[], None],
     streets: float,
-) -> list[tuple[Image, Cut]]:
-    """Scene and patches of each view of further worlds, see `seen_in_worlds`."""
-    see = partial(_scene_and_patches, count=patches_per_view)
+) -> list[Cut]:
+    """Patches of each view of further worlds, see `seen_in_worlds`."""
+    see = partial(_further_patches, count=patches_per_view)
     return seen_in_worlds(seeds, see, processes, report, streets)
 
 
@@ -199,10 +197,10 @@ def _by_one_camera(seeds: Sequence[int], see: Callable[[View], Seen], streets: f
     return [see(view) for seed in seeds for view in world_views(seed, REDUCED_SCALE, camera, streets)]
 
 
-def _scene_and_patches(view: View, count: int) -> tuple[Image, Cut]:
-    """A view's scene, and patches of which most are cut as a driving car does."""
+def _further_patches(view: View, count: int) -> Cut:
+    """Patches of a view of which most are cut as a driving car does."""
     driven = round(DRIVEN_SHARE * count)
-    return scene_of(view.frame.image), driven_patches(view, driven) + view_patches(view, count - driven)
+    return driven_patches(view, driven) + view_patches(view, count - driven)
 
 
 def view_sample(view: View) -> Sample:
@@ -215,7 +213,13 @@ def view_sample(view: View) -> Sample:
         for mask in (view.frame.drivable, view.frame.shadow)
     )
     shadow[drivable == 0] = IGNORE
-    return Sample(image, drivable, shadow, "rendered")
+    return Sample(image, drivable, shadow, "rendered", one_surface(view.frame), "rendered")
+
+
+def one_surface(frame: RenderedFrame) -> int:
+    """Class index of the road in a frame, -1 where it is of several."""
+    counts = np.bincount(frame.surface[frame.surface >= 0], minlength=len(Surface))
+    return int(counts.argmax()) if counts.max() >= ONE_SURFACE * max(counts.sum(), 1) else -1
 
 
 def view_patches(view: View, count: int) -> Cut:
@@ -303,7 +307,7 @@ def save_worlds(file: Path, worlds: tuple[list[Sample], PatchSet]) -> None:
     samples, patches = worlds
     planes = {
         name: np.stack([getattr(sample, name) for sample in samples])
-        for name in ("image", "drivable", "shadow")
+        for name in ("image", "drivable", "shadow", "surface")
     }
     keep_arrays(file, **planes, **vars(patches))
 
@@ -311,6 +315,9 @@ def save_worlds(file: Path, worlds: tuple[list[Sample], PatchSet]) -> None:
 def load_worlds(file: Path) -> tuple[list[Sample], PatchSet]:
     """Worlds kept by `save_worlds`."""
     with np.load(file) as kept:
-        planes = zip(kept["image"], kept["drivable"], kept["shadow"], strict=True)
-        samples = [Sample(image, drivable, shadow, "rendered") for image, drivable, shadow in planes]
+        planes = zip(*(kept[name] for name in ("image", "drivable", "shadow", "surface")), strict=True)
+        samples = [
+            Sample(image, drivable, shadow, "rendered", int(surface), "rendered")
+            for image, drivable, shadow, surface in planes
+        ]
         return samples, patches_in(kept)

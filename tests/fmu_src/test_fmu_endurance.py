@@ -51,7 +51,6 @@ DAMAGED = {
     "unit_fmu": 400,
     "unit_examined": 200,
     "surface_onnx": 60,
-    "picture_onnx": 60,
     "state_TrpacEstimator": 60,
 }
 """Damaged files of each kind, 12,000 in all: many of those that are read in a millisecond, few of those that a process

@@ -11,7 +11,6 @@ import pytest
 from long import long
 
 from models.training import data, patches, scores
-from models.training.picture_looks import rendered_looks
 from models.training.rendered import SEED_RANGES, draw_worlds
 from models.training.segmenter_data import masked_sample, painted_views, plain_view
 from scenarios.stills import classify_pictures
@@ -78,8 +77,11 @@ def test_segmenter_contract(segmenter):
     (image,) = segmenter.get_inputs()
     assert (image.name, image.type, image.shape) == ("image", "tensor(uint8)", [1, 160, 256, 3])
     outputs = {output.name: (output.type, output.shape) for output in segmenter.get_outputs()}
-    assert outputs == dict.fromkeys(("drivable", "shadow"), ("tensor(float)", [1, 160, 256]))
+    masks = dict.fromkeys(("drivable", "shadow"), ("tensor(float)", [1, 160, 256]))
+    assert outputs == masks | {"surface": ("tensor(float)", [1, 3])}
+    assert segmenter.get_modelmeta().custom_metadata_map["classes"] == "dry,wet,snow_ice"
     for picture in (np.zeros((160, 256, 3), np.uint8), np.full((160, 256, 3), 255, np.uint8)):
+        assert np.isfinite(segmenter.run(["surface"], {"image": picture[None]})[0]).all()
         for plane in road_and_shadow(segmenter, picture):
             assert np.isfinite(plane).all()
             assert plane.min() >= 0.0
@@ -102,34 +104,6 @@ def test_surface_contract(surface):
         readable = readings_of(surface, random_patches(count))
         assert readable.shape == (count,)
         assert ((readable >= 0.0) & (readable <= 1.0)).all()
-
-
-def test_picture_contract():
-    picture = session("picture")
-    (batch,) = picture.get_inputs()
-    assert (batch.name, batch.type, batch.shape[1:]) == ("looks", "tensor(uint8)", [128, 192, 3])
-    assert not isinstance(batch.shape[0], int)
-    assert {output.name: output.shape[1:] for output in picture.get_outputs()} == {"logits": [3]}
-    assert picture.get_modelmeta().custom_metadata_map["classes"] == "dry,wet,snow_ice"
-    images = np.stack([cv2.resize(patch, (192, 128)) for patch in random_patches(7)])
-    together, alone = (
-        np.concatenate([picture.run(["logits"], {"looks": part})[0] for part in parts])
-        for parts in ([images], images[:, None])
-    )
-    assert np.isfinite(together).all()
-    assert together == pytest.approx(alone, abs=1e-4)
-
-
-@pytest.mark.long
-def test_pictures_of_worlds_never_seen_are_classified():
-    """The card of the surface network has what patches reach; a picture as a whole must not fall below chance by far.
-
-    Floor 0.7: 0.9 less three standard errors of 18 views of 9 worlds, which are alike.
-    """
-    looks = rendered_looks(SEED_RANGES["test"][:9], 1, lambda: None)
-    found = session("picture").run(["logits"], {"looks": looks.patches})[0]
-    assert set(looks.labels) == {0, 1, 2}
-    assert np.mean(found.argmax(axis=1) == looks.labels) >= 0.7
 
 
 @pytest.mark.long
@@ -170,21 +144,20 @@ def test_temperature_keeps_the_class_and_makes_probabilities(surface):
     assert (calibrated.argmax(axis=1) == logits.argmax(axis=1)).all()
 
 
-@pytest.mark.parametrize("name", ["segmenter", "surface", "picture"])
+@pytest.mark.parametrize("name", ["segmenter", "surface"])
 def test_card_belongs_to_the_file(name):
     found = hashlib.sha256((MODELS / f"{name}.onnx").read_bytes()).hexdigest()
     card = (MODELS / f"{name}.md").read_text(encoding="utf-8")
     assert f"sha256: `{found}`" in card
 
 
-@pytest.mark.parametrize("name", ["surface", "picture"])
-def test_card_tells_the_temperature(name):
-    card = (MODELS / f"{name}.md").read_text(encoding="utf-8")
+def test_card_tells_the_temperature(surface):
+    card = (MODELS / "surface.md").read_text(encoding="utf-8")
     (told,) = re.findall(r"`temperature` = ([0-9.]+)", card)
-    assert float(told) == pytest.approx(temperature_of(session(name)), abs=1e-6)
+    assert float(told) == pytest.approx(temperature_of(surface), abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["segmenter", "surface", "picture"])
+@pytest.mark.parametrize("name", ["segmenter", "surface"])
 def test_files_name_no_place_of_their_making(name):
     content = (MODELS / f"{name}.onnx").read_bytes()
     for trace in (b"/work", b"/tmp", b"/home", b".py"):
@@ -312,7 +285,7 @@ def test_shuffle_deals_each_group_to_all_groups():
 
 def test_export_computes_what_was_trained(tmp_path):
     torch = pytest.importorskip("torch", reason="the training extra is not installed")
-    from models.training.export import export_picture, export_surface
+    from models.training.export import export_surface
     from models.training.nets import SurfaceNet, together
     from models.training.surface_run import TOWERS
 
@@ -323,12 +296,5 @@ def test_export_computes_what_was_trained(tmp_path):
     images = random_patches(5)
     with torch.no_grad():
         expected = net(torch.from_numpy(images))[0].numpy()
-    assert logits_of(network, images) == pytest.approx(expected, abs=1e-4)
+    assert logits_of(network, images) == pytest.approx(expected, abs=0.02), "weights in half precision"
     assert temperature_of(network) == 1.25
-    export_picture(net, 1.75, tmp_path / "picture.onnx")
-    network = ort.InferenceSession(str(tmp_path / "picture.onnx"))
-    looks = np.stack([cv2.resize(patch, (192, 128)) for patch in images])
-    with torch.no_grad():
-        expected = net.classifier(net.embed(torch.from_numpy(looks))).numpy()
-    assert network.run(["logits"], {"looks": looks})[0] == pytest.approx(expected, abs=1e-4)
-    assert temperature_of(network) == 1.75

@@ -1,15 +1,10 @@
-"""Roads by day shown by night: what the dark changes, what wet roads mirror, and where the pictures come from."""
+"""Roads by day shown by night: what the dark changes, and what wet roads mirror."""
 
-import cv2
 import numpy as np
 import pytest
-from training_folder import LowerHalf
 
 from models.training import night
-from models.training.data import Picture
-from models.training.patches import draw_weights
 from trpac_core.vision.classes import Surface
-from trpac_core.vision.scene import scene_of
 
 HEIGHT, WIDTH = 160, 240
 
@@ -25,12 +20,6 @@ def street(sky=200, asphalt=90):
 def shown(surface, sky=200):
     image, road = street(sky)
     return [night.darkened(np.random.default_rng(s), image, road, surface).astype(float) for s in range(20)]
-
-
-def picture(folder, surface=Surface.DRY, source="condition_web", dark=False):
-    file = folder / f"{source}-{surface}-{dark}.png"
-    cv2.imwrite(str(file), street()[0])
-    return Picture(file, "train", surface, None, source, "one", "made up", dark)
 
 
 @pytest.mark.parametrize("surface", Surface)
@@ -68,22 +57,3 @@ def test_lamps_shine_on_dry_and_snowy_roads_and_less_on_wet_ones(monkeypatch):
         for surface in (Surface.WET, Surface.DRY)
     )
     assert wet < 0.8 * dry
-
-
-def test_pictures_by_day_are_shown_by_night_with_their_class(tmp_path):
-    days = [
-        picture(tmp_path),
-        picture(tmp_path, Surface.WET),
-        picture(tmp_path, source="bdd_night", dark=True),
-    ]
-    days.append(picture(tmp_path, source="seq_wet_extreme/rain", surface=Surface.WET))
-    nights = night.by_night(days, LowerHalf(), seed=3)
-    assert [each.surface for each in nights] == [Surface.DRY, Surface.WET]
-    assert all(each.night and each.origin == "night/condition_web" for each in nights)
-    assert (nights[0].image() == nights[0].image()).all()
-    seen = night.night_scenes(nights, seed=1)
-    cut = seen.patches
-    np.testing.assert_array_equal(seen.scenes[0], scene_of(nights[0].image()))
-    assert len(cut) == 2 * night.PATCHES
-    assert set(cut.sources) == {"night/condition_web"}
-    assert draw_weights(cut).sum() == pytest.approx(1.0)

@@ -20,7 +20,6 @@ from models.training import (
     keeping,
     outliers,
     patches,
-    picture_looks,
     rendered,
     scores,
     segmenter_data,
@@ -385,7 +384,7 @@ def test_unknown_source_is_refused_with_what_to_do(tmp_path):
         data.check_trainable([picture])
 
 
-def test_pictures_of_ones_own_need_no_share_and_no_number_of_looks(tmp_path, monkeypatch):
+def test_pictures_of_ones_own_need_no_share(tmp_path, monkeypatch):
     monkeypatch.setitem(data.ROAD_BOXES, "mine", ((0.2, 0.5, 0.8, 0.9),))
     picture = np.full((240, 320, 3), 90, np.uint8)
     (mine,) = data.read_manifest(
@@ -393,7 +392,6 @@ def test_pictures_of_ones_own_need_no_share_and_no_number_of_looks(tmp_path, mon
     )
     cut = patches.training_patches([mine], seed=0)
     assert patches.draw_weights(cut).sum() == pytest.approx(1.0)
-    assert len(picture_looks.training_looks([mine], seed=0)) == picture_looks.OTHER_LOOKS
 
 
 def test_command_needs_the_training_extra_or_a_manifest(tmp_path, capsys):

@@ -18,8 +18,8 @@ NONE = np.zeros((160, 256), np.float32)
 class Masks:
     """A segmenter that knows."""
 
-    def __init__(self, drivable=ALL_ROAD, shadow=NONE):
-        self.masks = RoadMasks(drivable, shadow)
+    def __init__(self, drivable=ALL_ROAD, shadow=NONE, surface=(0.0, 0.0, 0.0)):
+        self.masks = RoadMasks(drivable, shadow, np.array(surface))
         self.calls = 0
 
     def segment(self, image):
@@ -32,10 +32,10 @@ class Middle:
 
     def __init__(self, temperature=1.0, certainty=3.0):
         self.temperature, self.certainty = temperature, certainty
-        self.patches, self.scene = np.empty((0, 64, 96, 3), np.uint8), None
+        self.patches = np.empty((0, 64, 96, 3), np.uint8)
 
-    def verdicts(self, patches, scene=None):
-        self.patches, self.scene = patches, scene
+    def verdicts(self, patches):
+        self.patches = patches
         grey = patches[:, 30:34, 46:50].mean(axis=(1, 2, 3))
         logits = self.certainty * np.eye(3)[np.abs(grey[:, None] - PAINT).argmin(axis=1)]
         return PatchVerdicts(logits, self.readable(grey))

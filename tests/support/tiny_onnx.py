@@ -84,25 +84,21 @@ def write_classifier(
 def write_segmenter(
     path: Path, *, outputs: tuple[str, str] = ("drivable", "shadow"), drivable_by: str = "Sigmoid"
 ) -> Path:
-    """Drivable is the sigmoid of the mean colour: above 0.99 where anything is lit; shadow its mean, unscaled."""
+    """Drivable is the sigmoid of the mean colour: above 0.99 where anything is lit; shadow its mean, unscaled.
+
+    The surface's logits are the mean blue, green and red of the picture.
+    """
     drivable, shadow = outputs
     mask = [1, 160, 256]
     return _write(
         path,
-        [_cast("image"), _mean(shadow, [3]), _node(drivable_by, shadow, drivable)],
+        [
+            _cast("image"),
+            _mean(shadow, [3]),
+            _node(drivable_by, shadow, drivable),
+            _mean("surface", [1, 2]),
+        ],
         [_tensor("image", UINT8, [1, 160, 256, 3])],
-        [_tensor(drivable, FLOAT, mask), _tensor(shadow, FLOAT, mask)],
+        [_tensor(drivable, FLOAT, mask), _tensor(shadow, FLOAT, mask), _tensor("surface", FLOAT, [1, 3])],
         {},
-    )
-
-
-def write_picture_classifier(path: Path, *, metadata: dict | None = None) -> Path:
-    """Logits are the mean blue, green and red of each look."""
-    calibration = {"temperature": "3.5", "classes": "dry,wet,snow_ice"} if metadata is None else metadata
-    return _write(
-        path,
-        [_cast("looks"), _mean("logits", [1, 2])],
-        [_tensor("looks", UINT8, ["n", 128, 192, 3])],
-        [_tensor("logits", FLOAT, ["n", 3])],
-        calibration,
     )

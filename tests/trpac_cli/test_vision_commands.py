@@ -88,7 +88,7 @@ class ByColour:
 
     temperature = 2.0
 
-    def verdicts(self, patches, scene=None):
+    def verdicts(self, patches):
         return PatchVerdicts(patches.astype(np.float64).mean(axis=(1, 2)) / 100.0, np.ones(len(patches)))
 
 
@@ -97,7 +97,7 @@ class Certain:
 
     temperature = 1.5
 
-    def verdicts(self, patches, scene=None):
+    def verdicts(self, patches):
         return PatchVerdicts(np.tile([2.0, 0.5, -1.0], (len(patches), 1)), np.ones(len(patches)))
 
 
@@ -281,7 +281,7 @@ class Blind(Certain):
     def __init__(self, limit):
         self.limit = limit
 
-    def verdicts(self, patches, scene=None):
+    def verdicts(self, patches):
         grey = patches.mean(axis=(1, 2, 3))
         return PatchVerdicts(
             np.where(grey[:, None] > 150, [0.0, 0.0, 3.0], [3.0, 0.0, 0.0]), (grey > self.limit) * 1.0

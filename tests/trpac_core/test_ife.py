@@ -34,12 +34,11 @@ from scenarios.camera.scene import Scene, SurfaceSegment
 from trpac_core.vision.camera import Camera
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.evidence import EvidenceState, WeightLaw
-from trpac_core.vision.ife import Ife, IfeState
+from trpac_core.vision.ife import PICTURE_SAY, Ife, IfeState
 from trpac_core.vision.ife_config import IfeConfig
 from trpac_core.vision.images import ImageError
 from trpac_core.vision.networks import RoadMasks, Segmenter, SurfaceClassifier
 from trpac_core.vision.roi_sampling import road_shares
-from trpac_core.vision.scene import scene_of
 from trpac_core.vision.trajectory import Motion
 from trpac_core.vision.voting import Voting, VotingConfig
 
@@ -325,13 +324,16 @@ def test_wrong_settings_are_reported_together():
             IfeConfig(weight_law=law)
 
 
-def test_patches_are_judged_in_the_scene_of_their_picture_unless_left_out():
-    picture, classifier = plain(WET), Middle()
-    for config, seen in ((IfeConfig(), scene_of(picture)), (IfeConfig(use_scene=False), None)):
-        Ife(config, Masks(), classifier).process(IfeState(), picture, Motion(5.0))
-        assert np.array_equal(classifier.scene, seen)
-    Voting(VotingConfig(), Masks(), classifier).process(0, picture)
-    assert np.array_equal(classifier.scene, scene_of(picture))
+def test_the_picture_as_a_whole_has_its_say_in_every_patch_unless_left_out():
+    """A unit of the picture's logits is as good as PICTURE_SAY of a patch's."""
+    picture = plain(WET)
+    for certainty, found in ((PICTURE_SAY + 0.01, WET), (PICTURE_SAY - 0.01, SNOW)):
+        seen = Masks(surface=(0.0, 0.0, 1.0)), Middle(certainty=certainty)
+        _, result = Ife(IfeConfig(), *seen).process(IfeState(), picture, Motion(5.0))
+        assert result.surface == found
+        assert Voting(VotingConfig(), *seen).process(0, picture).surface == found
+        _, alone = Ife(IfeConfig(use_scene=False), *seen).process(IfeState(), picture, Motion(5.0))
+        assert alone.surface == WET
 
 
 def test_vote_counts_the_whole_drivable_area_with_its_shadow():

@@ -81,8 +81,8 @@ def test_a_patch_counts_where_its_middle_shows_the_road_though_the_picture_ends_
 class Grazing(Middle):
     """Takes wet road for dry where a patch comes from the four of the near group, as a network may."""
 
-    def verdicts(self, patches, scene=None):
-        found = super().verdicts(patches, scene)
+    def verdicts(self, patches):
+        found = super().verdicts(patches)
         logits = found.logits.copy()
         near = np.arange(len(logits)) < 4
         logits[near & (logits.argmax(axis=1) == int(WET))] = (0.6, 0.4, 0.0)
@@ -104,8 +104,8 @@ class Fickle(Middle):
         super().__init__()
         self.fooled = iter(fooled)
 
-    def verdicts(self, patches, scene=None):
-        found = super().verdicts(patches, scene)
+    def verdicts(self, patches):
+        found = super().verdicts(patches)
         return replace(found, logits=found.logits * 0 + (1.0, 2.0, 0.0)) if next(self.fooled) else found
 
 

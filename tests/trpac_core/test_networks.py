@@ -25,11 +25,12 @@ def test_classifier_takes_any_number_of_patches_in_one_run(tmp_path):
 def test_segmenter_reduces_the_picture_and_keeps_its_layout(tmp_path):
     segmenter = Segmenter(write_segmenter(tmp_path / "segmenter.onnx"), threads=1)
     image = np.zeros((1200, 1920, 3), np.uint8)
-    image[600:, :960] = 200
+    image[600:, :960] = (100, 200, 200)
     masks = segmenter.segment(image)
     assert masks.drivable.shape == masks.shadow.shape == (160, 256)
     assert (masks.drivable[80:, :128] > 0.99).all()
-    assert masks.shadow[100, 10] == pytest.approx(200.0)
+    assert masks.shadow[100, 10] == pytest.approx(500.0 / 3.0)
+    assert masks.surface == pytest.approx([25.0, 50.0, 50.0])
     assert (masks.drivable[:80] == 0.5).all()
     assert (masks.drivable[80:, 128:] == 0.5).all()
 
@@ -64,7 +65,7 @@ def test_swapped_files_are_named_with_what_was_expected(tmp_path):
 def test_wrong_patch_size_and_wrong_outputs(tmp_path):
     with pytest.raises(ModelError, match=r"\['n', 64, 96, 3\].*32, 96"):
         SurfaceClassifier(write_classifier(tmp_path / "small.onnx", height=32))
-    with pytest.raises(ModelError, match=r"expected outputs \['drivable', 'shadow'\]"):
+    with pytest.raises(ModelError, match=r"expected outputs \['drivable', 'shadow', 'surface'\]"):
         Segmenter(write_segmenter(tmp_path / "other.onnx", outputs=("road", "shade")))
 
 

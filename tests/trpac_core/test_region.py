@@ -28,7 +28,7 @@ ROAD = np.ones((160, 256), bool)
 class Whole(Middle):
     """A classifier that reads the paint of the whole patch: half dry, half snow looks wet."""
 
-    def verdicts(self, patches, scene=None):
+    def verdicts(self, patches):
         grey = patches.mean(axis=(1, 2, 3))
         logits = self.certainty * np.eye(3)[np.abs(grey[:, None] - PAINT).argmin(axis=1)]
         return PatchVerdicts(logits, np.ones(len(grey)))

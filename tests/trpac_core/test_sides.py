@@ -20,9 +20,9 @@ class Counting(Middle):
 
     runs = 0
 
-    def verdicts(self, patches, scene=None):
+    def verdicts(self, patches):
         self.runs += 1
-        return super().verdicts(patches, scene)
+        return super().verdicts(patches)
 
 
 def test_each_side_gets_its_own_surface_from_one_segmentation_and_one_run():

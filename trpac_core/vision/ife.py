@@ -37,7 +37,6 @@ from .roi_sampling import (
     sample,
     sample_across,
 )
-from .scene import scene_of
 from .surface_edges import KNOWN_WITHIN_M, ends_m, lines_across
 from .surface_hmm import Passed, among_neighbours
 from .trajectory import Ellipses, Motion, path_curvature, reckon
@@ -51,6 +50,9 @@ LEAST_READABLE = 0.5
 BEFORE_NEAR_M, HIDDEN_M = 0.5, 0.3
 """Road before the near group on which lines are looked for, and road of its own up to which the picture's end may hide
 one that was seen before [m]."""
+
+PICTURE_SAY = 0.5
+"""How much the logits of the picture as a whole count beside those of a patch in it [-]."""
 
 PATCHES_AHEAD = 6
 """Patches of a look that is remembered [-]."""
@@ -144,7 +146,7 @@ class Ife:
         masks = self._segmenter.segment(image) if masks is None else masks
         usable = usable_road(masks, self.config.remove_shadow)
         regions = self.look(state, image, motion, camera, masks, usable)
-        regions = self.classify(regions, image)
+        regions = self.classify(regions, masks)
         state, result = self.judge(state, motion, regions)
         if with_view:
             curvature, wheelbase_m = path_curvature(motion, self.config.wheelbase_m), self.config.wheelbase_m
@@ -328,18 +330,20 @@ class Ife:
             for sign in SIDES[config.side]
         ]
 
-    def classify(self, regions: list[Region], image: NDArray[np.uint8]) -> list[Region]:
+    def classify(self, regions: list[Region], masks: RoadMasks) -> list[Region]:
         """The regions with what their readable patches show, all in one run of the network; others are left out.
 
-        `image` is the picture that they were cut from.
+        `masks` are those of the picture that they were cut from.
         """
         patches = [patch for region in regions for patch in region.patches]
         if not patches:
             return regions
         temperature = self._classifier.temperature if self.config.calibrate else 1.0
-        scene = scene_of(image) if self.config.use_scene else None
-        verdicts = self._classifier.verdicts(np.stack(patches), scene)
-        probabilities = calibrated_probabilities(verdicts.logits, temperature)
+        verdicts = self._classifier.verdicts(np.stack(patches))
+        logits = verdicts.logits / temperature
+        if self.config.use_scene:
+            logits = logits + PICTURE_SAY * masks.surface
+        probabilities = calibrated_probabilities(logits, 1.0)
         readable = verdicts.readable >= LEAST_READABLE
         ends = np.cumsum([len(region.patches) for region in regions])[:-1]
         return [

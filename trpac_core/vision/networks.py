@@ -1,8 +1,8 @@
-"""The networks behind the camera side: road and shadow masks, surface of patches, surface of a whole picture."""
+"""The networks behind the camera side: the road in a picture and what it looks like, and the surface of patches."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,9 +14,7 @@ from trpac_core.errors import TrpacError
 
 from .classes import Surface
 from .onnx_runtime import ort, ort_errors
-from .picture import LOOK_HEIGHT_PX, LOOK_WIDTH_PX, picture_looks
 from .roi_sampling import PATCH_HEIGHT_PX, PATCH_WIDTH_PX
-from .scene import SceneHead
 
 MASK_WIDTH_PX = 256
 MASK_HEIGHT_PX = 160
@@ -24,8 +22,8 @@ HALVED_FROM = 4
 """Times the masks' size from which on a picture is halved first [-]."""
 MASKS = ("drivable", "shadow")
 VERDICTS = ("logits", "readable")
-PICTURE_VERDICTS = ("logits",)
-"""Outputs of the networks."""
+"""Outputs of the networks; the segmenter's further one is SURFACE."""
+SURFACE = "surface"
 _ROUNDING = 1e-5
 """By how much the runtime's sigmoid may leave [0, 1]."""
 
@@ -49,10 +47,20 @@ class ModelError(TrpacError):
 
 @dataclass(frozen=True)
 class RoadMasks:
-    """Probabilities over the whole picture at the network's resolution, both of shape (160, 256) [-]."""
+    """Where the road is in a picture, and what it looks like as a whole.
+
+    Attributes
+    ----------
+    drivable, shadow : float32, shape (160, 256)
+        Probabilities at the network's resolution [-].
+    surface : float64, shape (3,)
+        Logits of dry, wet, snow and ice, of the road in its surroundings: what patches leave out. All alike where
+        nothing is known.
+    """
 
     drivable: NDArray[np.float32]
     shadow: NDArray[np.float32]
+    surface: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(Surface)))
 
 
 @dataclass(frozen=True)
@@ -72,10 +80,10 @@ class PatchVerdicts:
 
 
 class RoadSegmenter(Protocol):
-    """Finds drivable road and shadow in a picture."""
+    """Finds drivable road and shadow in a picture, and says what the road looks like."""
 
     def segment(self, image: NDArray[np.uint8]) -> RoadMasks:
-        """Masks of a BGR picture of any size."""
+        """Masks and surface of a BGR picture of any size."""
         ...
 
 
@@ -87,8 +95,8 @@ class PatchClassifier(Protocol):
         """T of the temperature scaling [-]."""
         ...
 
-    def verdicts(self, patches: NDArray[np.uint8], scene: NDArray[np.uint8] | None = None) -> PatchVerdicts:
-        """What BGR patches (n, 64, 96, 3) show, alone or in the scene that they were cut from, see `scene_of`."""
+    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
+        """What BGR patches (n, 64, 96, 3) show by themselves."""
         ...
 
 
@@ -116,27 +124,28 @@ def reduced(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 class Segmenter:
-    """The multi-task network for drivable road and shadow (section 3.1)."""
+    """The multi-task network for drivable road and shadow (section 3.1), and for the surface of the road as a whole."""
 
     def __init__(self, path: str | Path, threads: int = 2) -> None:
         """Load and check the file; raises ModelError."""
         self._session = _load(path, threads)
         self._path = path
         _check_input(self._session, path, "image", [1, MASK_HEIGHT_PX, MASK_WIDTH_PX, 3])
-        _check_outputs(self._session, path, MASKS)
+        _check_outputs(self._session, path, (*MASKS, SURFACE))
 
     def segment(self, image: NDArray[np.uint8]) -> RoadMasks:
-        """Masks of a BGR picture of any size, reduced by area averaging; raises ModelError if they are none."""
+        """Masks and surface of a BGR picture of any size, reduced by area averaging; raises ModelError."""
         shape = (MASK_HEIGHT_PX, MASK_WIDTH_PX)
-        masks = _run(self._session, self._path, MASKS, {"image": reduced(image)[None]})
+        *masks, logits = _run(self._session, self._path, (*MASKS, SURFACE), {"image": reduced(image)[None]})
         for name, mask in zip(MASKS, masks, strict=True):
             if mask.size != MASK_HEIGHT_PX * MASK_WIDTH_PX or not np.isfinite(mask).all():
                 raise ModelError(
                     f"{self._path}: expected {name!r} finite and of {MASK_HEIGHT_PX} x {MASK_WIDTH_PX}, got shape "
                     f"{mask.shape}. Export or train the network again."
                 )
+        _check_logits(logits, 1, self._path)
         drivable, shadow = (mask.reshape(shape) for mask in masks)
-        return RoadMasks(drivable, shadow)
+        return RoadMasks(drivable, shadow, logits[0].astype(np.float64))
 
 
 class SurfaceClassifier:
@@ -149,28 +158,14 @@ class SurfaceClassifier:
         _check_input(self._session, path, "patches", [None, PATCH_HEIGHT_PX, PATCH_WIDTH_PX, 3])
         _check_outputs(self._session, path, VERDICTS)
         self._temperature = _read_temperature(self._session, path)
-        self._head = _read_scene_head(self._session, path)
 
     @property
     def temperature(self) -> float:
         """T of the temperature scaling [-]."""
         return self._temperature
 
-    @property
-    def scene_head(self) -> SceneHead | None:
-        """What a scene adds to the logits; None where the file knows patches alone."""
-        return self._head
-
-    def verdicts(self, patches: NDArray[np.uint8], scene: NDArray[np.uint8] | None = None) -> PatchVerdicts:
-        """Verdicts on BGR patches in one run; raises ModelError if they are not finite.
-
-        Parameters
-        ----------
-        patches : uint8, shape (n, 64, 96, 3)
-            BGR.
-        scene : uint8, shape (20, 32, 3) or (n, 20, 32, 3), optional
-            The picture that they were cut from, or the picture of each, by `scene_of`; None judges patches alone.
-        """
+    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
+        """Verdicts on BGR patches (n, 64, 96, 3) in one run; raises ModelError if they are not finite."""
         logits, readable = _run(self._session, self._path, VERDICTS, {"patches": patches})
         _check_logits(logits, len(patches), self._path)
         if readable.shape != (len(patches),) or not (np.abs(readable - 0.5) <= 0.5 + _ROUNDING).all():
@@ -178,34 +173,7 @@ class SurfaceClassifier:
                 f"{self._path}: expected 'readable' of shape {(len(patches),)} within [0, 1], got shape "
                 f"{readable.shape}. Export or train the network again."
             )
-        seen = logits.astype(np.float64)
-        if scene is not None and self._head is not None:
-            seen = seen + self._head.logits(patches, scene)
-        return PatchVerdicts(seen, readable.astype(np.float64).clip(0.0, 1.0))
-
-
-class PictureClassifier:
-    """The classifier of a picture as a whole, for stills: it goes with the surface classifier of the same training."""
-
-    def __init__(self, path: str | Path, threads: int = 2) -> None:
-        """Load and check the file; raises ModelError."""
-        self._session = _load(path, threads)
-        self._path = path
-        _check_input(self._session, path, "looks", [None, LOOK_HEIGHT_PX, LOOK_WIDTH_PX, 3])
-        _check_outputs(self._session, path, PICTURE_VERDICTS)
-        self._temperature = _read_temperature(self._session, path)
-
-    @property
-    def temperature(self) -> float:
-        """T of the temperature scaling, learned beside the log probabilities of the patches [-]."""
-        return self._temperature
-
-    def logits(self, image: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Mean logits of the looks at a BGR picture, shape (3,); raises ModelError if they are not finite."""
-        looks = picture_looks(image)
-        (logits,) = _run(self._session, self._path, PICTURE_VERDICTS, {"looks": looks})
-        _check_logits(logits, len(looks), self._path)
-        return np.asarray(logits.mean(axis=0, dtype=np.float64))
+        return PatchVerdicts(logits.astype(np.float64), readable.astype(np.float64).clip(0.0, 1.0))
 
 
 def _load(path: str | Path, threads: int) -> ort.InferenceSession:
@@ -292,16 +260,3 @@ def _read_temperature(session: ort.InferenceSession, path: str | Path) -> float:
             f"{path}: wrong metadata: {'; '.join(problems)}. Export the network with its calibration."
         )
     return temperature
-
-
-def _read_scene_head(session: ort.InferenceSession, path: str | Path) -> SceneHead | None:
-    """The head of a file that holds one."""
-    text = session.get_modelmeta().custom_metadata_map.get("scene")
-    if text is None:
-        return None
-    try:
-        return SceneHead.from_text(text)
-    except ValueError as error:
-        raise ModelError(
-            f"{path}: wrong metadata 'scene': {error}. Export the network with its calibration."
-        ) from error

@@ -81,7 +81,7 @@ class SidesIfe:
         lines = self._left.lines(state.left, image, motion, camera)
         left = self._left.look(state.left, image, motion, camera, masks, usable, lines)
         right = self._right.look(state.right, image, motion, camera, masks, usable, lines)
-        read = self._left.classify([*left, *right], image)
+        read = self._left.classify([*left, *right], masks)
         after_left, seen_left = self._left.judge(state.left, motion, read[: len(left)])
         after_right, seen_right = self._right.judge(state.right, motion, read[len(left) :])
         return SidesState(after_left, after_right), seen_left, seen_right

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from .camera import Camera
 from .classes import Surface
-from .ife import MASK_THRESHOLD, fit_camera
+from .ife import MASK_THRESHOLD, PICTURE_SAY, fit_camera
 from .networks import PatchClassifier, RoadMasks, RoadSegmenter
 from .roi_sampling import cut_patch, roi_widths_px
-from .scene import scene_of
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,8 @@ class Voting:
         drawn = generator.choice(len(pixels), min(self.config.n_roi, len(pixels)), replace=False)
         widths = roi_widths_px(camera, ground_m[drawn], self.config.roi_width_m)
         patches = [cut_patch(image, pixel, width) for pixel, width in zip(pixels[drawn], widths, strict=True)]
-        classes = self._classifier.verdicts(np.stack(patches), scene_of(image)).logits.argmax(axis=1)
+        logits = self._classifier.verdicts(np.stack(patches)).logits / self._classifier.temperature
+        classes = (logits + PICTURE_SAY * masks.surface).argmax(axis=1)
         votes = np.bincount(classes, minlength=len(Surface))
         return VotingResult(Surface(int(votes.argmax())), float(votes.max() / votes.sum()), int(votes.sum()))
 

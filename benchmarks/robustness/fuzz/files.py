@@ -214,12 +214,6 @@ def _classify(path: Path) -> Any:
     return SurfaceClassifier(path, 1).verdicts(np.full((1, 64, 96, 3), 90, np.uint8)).logits
 
 
-def _classify_whole(path: Path) -> Any:
-    from trpac_core.vision.networks import PictureClassifier
-
-    return PictureClassifier(path, 1).logits(np.full((160, 256, 3), 90, np.uint8))
-
-
 def _network_errors() -> tuple[type[Exception], ...]:
     from trpac_core.vision.networks import ModelError
 
@@ -304,7 +298,6 @@ KINDS = {
     ),
     "segmenter_onnx": Kind(_network("segmenter.onnx"), _segment, _network_errors),
     "surface_onnx": Kind(_network("surface.onnx"), _classify, _network_errors),
-    "picture_onnx": Kind(_network("picture.onnx"), _classify_whole, _network_errors),
     "unit_fmu": Kind(_unit, _read_unit, lambda: (ValueError, OSError), exact=True),
     "unit_examined": Kind(_unit, _examine, lambda: (ProblemFoundError, UnusableError), exact=True),
 }

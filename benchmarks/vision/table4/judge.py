@@ -46,17 +46,16 @@ class Kept:
     classifier: SurfaceClassifier
 
     def __post_init__(self) -> None:
-        self._asked = (np.empty(0, np.uint8), np.empty(0, np.uint8))
+        self._asked = np.empty(0, np.uint8)
         self._verdicts = PatchVerdicts(np.empty((0, 3)), np.empty(0))
 
     @property
     def temperature(self) -> float:
         return self.classifier.temperature
 
-    def verdicts(self, patches: NDArray[np.uint8], scene: NDArray[np.uint8] | None = None) -> PatchVerdicts:
-        asked = (patches, np.empty(0, np.uint8) if scene is None else scene)
-        if not all(map(np.array_equal, asked, self._asked)):
-            self._asked, self._verdicts = asked, self.classifier.verdicts(patches, scene)
+    def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
+        if not np.array_equal(patches, self._asked):
+            self._asked, self._verdicts = patches, self.classifier.verdicts(patches)
         return self._verdicts
 
 
@@ -165,4 +164,4 @@ def within(masks: RoadMasks, sequence: Sequence) -> RoadMasks:
         allowed[round(top * rows) : round(bottom * rows), round(left * columns) : round(right * columns)] = (
             True
         )
-    return RoadMasks(np.where(allowed, masks.drivable, np.float32(0.0)), masks.shadow)
+    return replace(masks, drivable=np.where(allowed, masks.drivable, np.float32(0.0)))
