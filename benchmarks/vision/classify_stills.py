@@ -24,6 +24,8 @@ SETS = {
     "web stills, validation": ("condition_web", "val"),
     "web stills, test": ("condition_web", "test"),
     "other cameras, test": ("other_cameras/", "test"),
+    "dash cameras by day, validation": ("bdd_day", "val"),
+    "dash cameras by night, validation": ("bdd_night", "val"),
 }
 """What the sources of each set begin with, and its split."""
 CONFIDENCES = (0.0, 0.6, 0.75, 0.9, 1.0)

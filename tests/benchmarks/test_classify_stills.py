@@ -14,7 +14,7 @@ from scenarios.stills import classify_pictures
 
 @pytest.fixture
 def folder(tmp_path):
-    """One road in three sets, called what the command calls it in the first two, and a covered lens."""
+    """One road in all sets, called what the command calls it but in one, and a covered lens."""
     road, covered = road_picture(960, 600, colour=True), np.full((600, 960, 3), 70, np.uint8)
     cv2.imwrite(str(tmp_path / "road.png"), road)
     found = classify_pictures([tmp_path / "road.png"])[0]["class"][0]
@@ -25,6 +25,8 @@ def folder(tmp_path):
         "condition_web/test.png": ("test", name, road),
         "condition_web/covered.png": ("test", other, covered),
         "other_cameras/one/test.png": ("test", other, road),
+        "street_conditions/dry/sidhardha36_day.png": ("val", name, road),
+        "street_conditions/dry/sidhardha36_night.png": ("val", name, road),
     }
     rows = []
     for file, (split, label, picture) in files.items():
@@ -40,10 +42,11 @@ def folder(tmp_path):
                 "sequence_id": file,
                 "width": 960,
                 "height": 600,
+                "notes": "night" if "night" in file else "",
             }
         )
     with (tmp_path / MANIFEST).open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, COLUMNS, restval="", extrasaction="ignore")
+        writer = csv.DictWriter(stream, (*COLUMNS, "notes"), restval="", extrasaction="ignore")
         writer.writeheader()
         writer.writerows(rows)
     return tmp_path
@@ -59,8 +62,10 @@ def test_a_refused_picture_counts_as_wrong(folder, capsys):
     assert shares["web stills, test"][:2] == ["2", "0.500"]
     assert sorted(shares["web stills, test"][2:]) == ["-", "0.000", "1.000"]
     assert shares["other cameras, test"][:2] == ["1", "0.000"]
+    for hour in ("day", "night"):
+        assert shares[f"dash cameras by {hour}, validation"][:2] == ["1", "1.000"]
     by_confidence = [line for line in lines if line and line[0].startswith("above")]
-    assert sum(int(line[1]) for line in by_confidence) == 3
+    assert sum(int(line[1]) for line in by_confidence) == 5
 
 
 def test_a_folder_without_one_of_the_sets_is_refused_by_name(folder):

@@ -295,7 +295,14 @@ def test_kept_worlds_come_back_as_they_were(tmp_path):
     rng = np.random.default_rng(2)
     planes = rng.integers(0, 2, (2, 2, 24, 40)).astype(np.uint8)
     samples = [
-        segmenter_data.Sample(np.full((24, 40, 3), 7 + i, np.uint8), planes[i, 0], planes[i, 1], "rendered")
+        segmenter_data.Sample(
+            np.full((24, 40, 3), 7 + i, np.uint8),
+            planes[i, 0],
+            planes[i, 1],
+            "rendered",
+            2 * i - 1,
+            "rendered",
+        )
         for i in range(2)
     ]
     cut = rendered.rendered_patches(
@@ -307,6 +314,7 @@ def test_kept_worlds_come_back_as_they_were(tmp_path):
         assert all(
             (getattr(sample, name) == getattr(again, name)).all() for name in ("image", "drivable", "shadow")
         )
+        assert (sample.surface, sample.source) == (again.surface, again.source)
     assert kept_cut.labels.tolist() == [2, 0]
     assert (kept_cut.patches == cut.patches).all()
     assert kept_cut.sources.tolist() == ["rendered", "rendered"]

@@ -3,6 +3,7 @@
 import json
 import os
 import struct
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import log_softmax, softmax
 from typer.testing import CliRunner
 
 from scenarios import overlay_video, stills
@@ -234,27 +236,19 @@ def test_agreeing_patches_do_not_grow_more_certain_than_one():
 
 
 class Road:
-    """All is road out of the shadow."""
+    """All is road out of the shadow, and every picture as a whole has the same logits."""
 
     def segment(self, image):
-        return masks(np.ones((160, 256), bool))
+        return replace(masks(np.ones((160, 256), bool)), surface=np.array([-1.0, 3.0, 0.5]))
 
 
-class Whole:
-    """Every picture as a whole has the same logits."""
-
-    temperature = 4.0
-
-    def logits(self, image):
-        return np.array([-1.0, 3.0, 0.5])
-
-
-def test_the_picture_as_a_whole_counts_beside_its_patches_by_its_own_temperature():
-    """Their probabilities are multiplied: exponents add up, each over its T."""
-    networks = StillNetworks(Road(), Certain(), Whole())
-    expected = np.exp(np.array([2.0, 0.5, -1.0]) / 1.5 + np.array([-1.0, 3.0, 0.5]) / 4.0)
+def test_the_picture_as_a_whole_counts_beside_its_patches():
+    """Exponents add up, each by its say."""
+    networks = StillNetworks(Road(), Certain())
+    patch_logs = log_softmax(np.array([2.0, 0.5, -1.0]) / 1.5)
+    expected = softmax(stills.PATCHES_SAY * patch_logs + stills.WHOLE_SAY * np.array([-1.0, 3.0, 0.5]))
     found = networks.probabilities(noisy((100, 100, 100), 400, 640))
-    np.testing.assert_allclose(found, expected / expected.sum())
+    np.testing.assert_allclose(found, expected)
 
 
 def test_one_even_colour_is_refused():
