@@ -164,7 +164,7 @@ def _render_further(
             lambda: progress.advance(task),
             streets,
         )
-        return rendered_patches([cut for _, cut in seen])
+        return rendered_patches(seen)
 
     name = f"further-{first}-{count}{'-streets' if streets else ''}.npz"
     return kept_or_made(given.kept, name, load=load_patches, make=draw, save=save_patches)

@@ -65,7 +65,7 @@ class Encoded:
 
     def where(self, chosen: NDArray[np.bool_]) -> Encoded:
         """Some of the views."""
-        some = [self.views[number] for number in np.flatnonzero(chosen)]
+        some = [view for view, kept in zip(self.views, chosen, strict=True) if kept]
         return Encoded(some, tuple(each[chosen] for each in self.maps))
 
     def of(self, name: str) -> NDArray:

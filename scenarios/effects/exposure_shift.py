@@ -12,8 +12,9 @@ from scenarios.effects.frames import Frames
 TOLERATED_STOPS = 4.3
 """Exposure error that leaves 1/e of the right classes [stops].
 
-By ``benchmarks/vision/measure_camera_laws.py``: the shipped networks are right on 0.96, 0.80, 0.49 of what they are
-right on undisturbed, at 1, 2, 3 stops to either side (60 rendered roads; 0.95, 0.81, 0.61 by this law).
+By ``benchmarks/vision/measure_camera_laws.py``: networks before were right on 0.96, 0.80, 0.49 of what they are right
+on undisturbed, at 1, 2, 3 stops to either side (60 rendered roads; 0.95, 0.81, 0.61 by this law), the shipped ones are
+on 0.99, 0.89, 0.76: a camera lies between.
 """
 
 
