@@ -45,7 +45,7 @@ LEAST_ROAD = 0.05
 """Least probability of readable road of the best crop: the lowest of validation stills was 0.08 [-]."""
 LEAST_CROPS = 2
 """Least number of crops on usable road; with fewer, all readable crops are used."""
-WHOLE_SAY, PATCHES_SAY = 0.6, 0.3
+PICTURE_WEIGHT, PATCHES_WEIGHT = 0.6, 0.3
 """How much the logits of the picture as a whole count, and the mean log probability of its patches [-].
 
 Of 1152 pictures of three sources that neither network had learned from, fitted on two to judge the third, 0.50 to 0.76
@@ -177,7 +177,7 @@ class StillNetworks:
         """
         masks = self.segmenter.segment(image)
         logs = patch_logs(image, masks, self.classifier, name)
-        return calibrated_probabilities((WHOLE_SAY * masks.surface + PATCHES_SAY * logs)[None], 1.0)[0]
+        return calibrated_probabilities((PICTURE_WEIGHT * masks.surface + PATCHES_WEIGHT * logs)[None], 1.0)[0]
 
 
 def _crops(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:
