@@ -177,7 +177,8 @@ class StillNetworks:
         """
         masks = self.segmenter.segment(image)
         logs = patch_logs(image, masks, self.classifier, name)
-        return calibrated_probabilities((PICTURE_WEIGHT * masks.surface + PATCHES_WEIGHT * logs)[None], 1.0)[0]
+        both = PICTURE_WEIGHT * masks.surface + PATCHES_WEIGHT * logs
+        return calibrated_probabilities(both[None], 1.0)[0]
 
 
 def _crops(width_px: int, height_px: int) -> list[tuple[int, int, int, int]]:

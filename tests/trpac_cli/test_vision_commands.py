@@ -246,7 +246,9 @@ def test_the_picture_as_a_whole_counts_beside_its_patches():
     """Exponents add up, each by its say."""
     networks = StillNetworks(Road(), Certain())
     patch_logs = log_softmax(np.array([2.0, 0.5, -1.0]) / 1.5)
-    expected = softmax(stills.PATCHES_WEIGHT * patch_logs + stills.PICTURE_WEIGHT * np.array([-1.0, 3.0, 0.5]))
+    expected = softmax(
+        stills.PATCHES_WEIGHT * patch_logs + stills.PICTURE_WEIGHT * np.array([-1.0, 3.0, 0.5])
+    )
     found = networks.probabilities(noisy((100, 100, 100), 400, 640))
     np.testing.assert_allclose(found, expected)
 
