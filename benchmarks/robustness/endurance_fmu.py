@@ -38,7 +38,7 @@ from trpac_core.files import file_sha256
 RESULTS = Path("out") / "endurance.jsonl"
 ROOT = Path(__file__).parents[2]
 MOST_STEP_GROWTH_MB, MOST_INSTANCE_GROWTH_MB = 5.0, 20.0
-WARM_UP = 0.1
+WARM_UP = 0.25
 """Part of the run after which memory must stand still."""
 STEPS_PER_SAMPLE = 1000
 """Memory is read, and estimators get a new picture, this often."""
