@@ -19,14 +19,15 @@ from scipy.special import log_softmax
 
 from . import calibrate
 from .cards import CLASSES, table
-from .data import DataFolderError, Picture, family_of, read_manifest
+from .data import DataFolderError, Picture, read_manifest
 from .nets import RoadNet
-from .progress import bars, steps_of
-from .rendered import PATCHES_PER_VIEW, draw_worlds
-from .road_run import MASK_STEPS, SOURCES, Road, Steps, trained
+from .night import shown_family
+from .progress import Steps, bars, steps_of
+from .rendered import PATCHES_PER_VIEW, WORLDS, draw_worlds
+from .road_run import SOURCES, Road, teach_masks, trained
 from .scores import wilson_interval
 from .segmenter_data import masked_sample
-from .train_segmenter import learn_masks, score_segmenter
+from .train_segmenter import score_segmenter
 
 SURE = 0.9
 """Confidence from which a wrong verdict misleads [-]."""
@@ -34,23 +35,20 @@ FLAG_ERROR = 0.02
 """Share of wrong pictures that is allowed where a flag is up [-]."""
 LEAST = 6
 """Pictures of a source by day, or by night, that are judged apart [-]."""
-WORLDS = 480
 
 
 @dataclass(frozen=True)
 class Verdicts:
-    """Judged pictures, aligned: class, log probabilities, night.
+    """Judged pictures, aligned.
 
     Attributes
     ----------
     labels : int64, shape (n,), class index
     logs : array, shape (n, 3), log probabilities
-    night : bool, shape (n,), whether the picture was taken by night
     """
 
     labels: NDArray[np.int64]
     logs: NDArray[np.float64]
-    night: NDArray[np.bool_]
 
     @property
     def right(self) -> NDArray[np.bool_]:
@@ -61,10 +59,6 @@ class Verdicts:
     def confidence(self) -> NDArray[np.float64]:
         """Probability of the likeliest class, shape (n,) [-]."""
         return np.exp(self.logs.max(axis=1))
-
-    def where(self, chosen: NDArray[np.bool_]) -> Verdicts:
-        """The chosen pictures alone."""
-        return Verdicts(self.labels[chosen], self.logs[chosen], self.night[chosen])
 
 
 def judged(road: Road) -> dict[str, Verdicts]:
@@ -77,7 +71,7 @@ def judged(road: Road) -> dict[str, Verdicts]:
         for part, when in ((name, ~night), (f"{name}, night", night)):
             chosen = np.isin(families, own) & when
             if chosen.sum() >= LEAST:
-                found[part] = Verdicts(labels[chosen], logs[chosen], night[chosen])
+                found[part] = Verdicts(labels[chosen], logs[chosen])
     return found
 
 
@@ -136,8 +130,7 @@ def _row(own: Verdicts, flag: NDArray[np.bool_]) -> list[str]:
 def masks_table(road: Road, pictures: Sequence[Picture], given: argparse.Namespace, steps: Steps) -> str:
     """IoU of the masks of each source that has some, from decoders that were taught without the source."""
     training = road.material.training
-    families = np.array([family_of(view.source.rpartition("night/")[2]) for view in training.views])
-    count = max(2, round(given.effort * MASK_STEPS))
+    families = np.array([shown_family(view.source) for view in training.views])
     rows = []
     for name, own in SOURCES.items():
         masked = [masked_sample(p) for p in pictures if p.family in own and p.mask is not None]
@@ -145,9 +138,8 @@ def masks_table(road: Road, pictures: Sequence[Picture], given: argparse.Namespa
             continue
         torch.manual_seed(given.seed)
         net = RoadNet(pretrained=True)
-        with steps(f"training masks without {name}", count) as report:
-            kept = training.where(~np.isin(families, own))
-            learn_masks(net, kept, steps=count, seed=given.seed, report=report)
+        kept = training.where(~np.isin(families, own))
+        teach_masks(net, kept, given, steps, f"training masks without {name}")
         score = score_segmenter(net, masked, "drivable")
         rows.append([name, str(score.pictures), f"{score.iou:.3f}"])
     return table(["source left out", "pictures with a mask", "IoU of drivable area"], rows)
@@ -170,7 +162,7 @@ def main(arguments: list[str] | None = None) -> int:
         pictures = read_manifest(given.data)
         with bars() as progress:
             steps = partial(steps_of, progress)
-            count = max(3, round(given.effort * WORLDS))
+            count = max(3, round(given.effort * WORLDS["train"]))
             with steps("rendering worlds", count) as report:
                 done = iter(range(1, count + 1))
                 rendered, _ = draw_worlds(

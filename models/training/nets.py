@@ -18,32 +18,30 @@ from .trunk import AT_REST, Depthwise, Kind, Trunk
 
 
 class ConvUnit(nn.Sequential):
-    """Convolution, batch norm, ReLU."""
+    """Pointwise convolution, batch norm, ReLU."""
 
-    def __init__(self, channels_in: int, channels_out: int, kernel: int = 3, stride: int = 1):
+    def __init__(self, channels_in: int, channels_out: int):
         super().__init__(
-            nn.Conv2d(channels_in, channels_out, kernel, stride, kernel // 2, bias=False),
+            nn.Conv2d(channels_in, channels_out, 1, bias=False),
             nn.BatchNorm2d(channels_out),
             nn.ReLU(inplace=True),
         )
 
 
 class SeparableUnit(nn.Module):
-    """Depthwise then pointwise convolution, with a residual path where the shapes allow it."""
+    """Depthwise then pointwise convolution, with a residual path."""
 
-    def __init__(self, channels_in: int, channels_out: int, stride: int = 1, dilation: int = 1):
+    def __init__(self, channels: int, dilation: int = 1):
         super().__init__()
         self.depthwise = nn.Conv2d(
-            channels_in, channels_in, 3, stride, dilation, dilation, groups=channels_in, bias=False
+            channels, channels, 3, padding=dilation, dilation=dilation, groups=channels, bias=False
         )
-        self.norm = nn.BatchNorm2d(channels_in)
-        self.pointwise = ConvUnit(channels_in, channels_out, kernel=1)
-        self.residual = stride == 1 and channels_in == channels_out
+        self.norm = nn.BatchNorm2d(channels)
+        self.pointwise = ConvUnit(channels, channels)
 
     def forward(self, x: Tensor) -> Tensor:
         """Feature maps in, feature maps out."""
-        y = self.pointwise(functional.relu(self.norm(self.depthwise(x))))
-        return x + y if self.residual else y
+        return x + self.pointwise(functional.relu(self.norm(self.depthwise(x))))
 
 
 class Decoder(nn.Module):
@@ -52,7 +50,7 @@ class Decoder(nn.Module):
     def __init__(self, channels: Sequence[int], width: int = 32):
         super().__init__()
         self.lateral = nn.ModuleList([nn.Conv2d(each, width, 1) for each in channels])
-        self.smooth = nn.ModuleList([SeparableUnit(width, width) for _ in channels])
+        self.smooth = nn.ModuleList([SeparableUnit(width) for _ in channels])
         self.head = nn.Conv2d(width, 1, 1)
 
     def forward(self, maps: Sequence[Tensor]) -> Tensor:
@@ -86,10 +84,8 @@ class RoadNet(nn.Module):
         super().__init__()
         self.trunk = Trunk(AT_REST, pretrained=pretrained)
         first, second, *coarse = AT_REST.channels
-        self.enter = ConvUnit(sum(coarse) + 2, self.WIDTH, kernel=1)
-        self.around = nn.Sequential(
-            *(SeparableUnit(self.WIDTH, self.WIDTH, dilation=dilation) for dilation in self.DILATIONS)
-        )
+        self.enter = ConvUnit(sum(coarse) + 2, self.WIDTH)
+        self.around = nn.Sequential(*(SeparableUnit(self.WIDTH, dilation) for dilation in self.DILATIONS))
         self.context = nn.Linear(self.WIDTH, self.WIDTH)
         self.drivable = Decoder((first, second, self.WIDTH))
         self.shadow = Decoder((first, second, self.WIDTH))

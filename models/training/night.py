@@ -11,7 +11,7 @@ import numpy as np
 
 from trpac_core.vision.classes import Surface
 
-from .data import Image
+from .data import Image, family_of
 from .weathered import REDUCED, Light, Range, bytes_of, light_of, mirror_of
 
 SHOWN = "night/"
@@ -80,6 +80,11 @@ SHOT_NOISE, READ_NOISE = (0.0, 4e-4), (1e-6, 4e-5)
 """Variance of the noise over light, and that without light, of white squared [-]."""
 BLURRED_SHARE, BLUR_PX = 0.4, (0.4, 1.4)
 """Share of pictures out of focus or moved, and by how much [px]."""
+
+
+def shown_family(source: str) -> str:
+    """Family of an origin, whether the picture is shown by night or as it is."""
+    return family_of(source.removeprefix(SHOWN))
 
 
 def darkened(rng: np.random.Generator, image: Image, road: Light, surface: Surface) -> Image:

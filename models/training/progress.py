@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 import numpy as np
 from rich.progress import (
@@ -14,6 +14,11 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+
+Report = Callable[[int, float], None]
+"""Is told the step and the loss, which may be NaN."""
+Steps = Callable[[str, int], AbstractContextManager[Report]]
+"""Opens a bar of so many steps."""
 
 
 def bars() -> Progress:
@@ -29,7 +34,7 @@ def bars() -> Progress:
 
 
 @contextmanager
-def steps_of(progress: Progress, description: str, steps: int) -> Iterator[Callable[[int, float], None]]:
+def steps_of(progress: Progress, description: str, steps: int) -> Iterator[Report]:
     """A bar of a number of steps; what it gives is told the step and the loss, which may be NaN."""
     task = progress.add_task(description, total=steps, note="")
     smooth: list[float] = []

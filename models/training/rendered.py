@@ -31,6 +31,8 @@ SEED_RANGES = {
 }
 """Seeds of the looks of each split: disjoint, so no world is seen in two splits."""
 
+WORLDS = {"train": 480, "val": 36, "test": 60}
+"""Worlds of each split, three views each."""
 PATCHES_PER_VIEW = {"train": 12, "val": 8, "test": 8}
 
 STORED_WIDTH_PX = 384

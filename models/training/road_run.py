@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -16,11 +15,12 @@ from scipy.special import log_softmax
 
 from .data import CLEAR_PARTS, Image, Picture, family_of
 from .nets import RoadNet, enlarged
+from .night import shown_family
+from .progress import Steps
 from .segmenter_data import Sample, night_view, plain_views, sample_of, training_views
 from .train_segmenter import (
     Encoded,
     Encoder,
-    Report,
     SurfaceHead,
     learn_masks,
     learn_surface,
@@ -43,8 +43,6 @@ SOURCES: dict[str, tuple[str, ...]] = {
     "other cameras": ("other_cameras",),
 }
 """What is left out together, and its families."""
-
-Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ class Surfaces:
 
     def head(self, without: Sequence[str] = ()) -> SurfaceHead:
         """The head that is learned from all but some families."""
-        families = np.array([family_of(source.rpartition("night/")[2]) for source in self.sources.tolist()])
+        families = np.array([shown_family(source) for source in self.sources.tolist()])
         kept = ~np.isin(families, without)
         return learn_surface(self.features[kept], self.labels[kept], self.sources[kept])
 
@@ -96,20 +94,20 @@ class Surfaces:
 
 
 def gather(
-    encoder: Encoder, pictures: Sequence[Picture], rendered: Sequence[Sample], steps: Steps
+    encoder: Encoder, shown: Sequence[Picture], rendered: Sequence[Sample], steps: Steps
 ) -> RoadMaterial:
     """Views of the pictures, and what the trunk makes of them."""
-    shown = [picture for picture in pictures if picture.split != "gap"]
     views: list[Sample] = []
     plain: list[Sample] = []
     numbers: list[int] = []
     with steps("drawing views of pictures", len(shown)) as report:
         for number, picture in enumerate(shown):
-            own = plain_views(picture)
+            sample = sample_of(picture)
+            own = plain_views(picture, sample)
             plain += own
             numbers += [number] * len(own)
             if picture.split == "train":
-                views += training_views([sample_of(picture)], VIEW_SEED + number)
+                views += training_views([sample], VIEW_SEED + number)
             report(number + 1, np.nan)
     views += training_views(rendered, VIEW_SEED)
     with steps("seeing training views", len(views)) as report:
@@ -122,10 +120,12 @@ def gather(
 
 
 def surfaces(
-    net: RoadNet, encoder: Encoder, material: RoadMaterial, pictures: Sequence[Picture], steps: Steps
+    net: RoadNet, encoder: Encoder, material: RoadMaterial, shown: Sequence[Picture], steps: Steps
 ) -> Surfaces:
-    """What the surface is read from: training pictures by day and by night, rendered ones, and all plain ones."""
-    shown = [picture for picture in pictures if picture.split != "gap"]
+    """What the surface is read from: training pictures by day and by night, rendered ones, and all plain ones.
+
+    `shown` are the pictures that the material was gathered from.
+    """
     plain, training = material.plain, material.training
     features = pooled_features(net, plain)
     days = [
@@ -201,6 +201,13 @@ class Road:
     scale: float
 
 
+def teach_masks(net: RoadNet, seen: Encoded, given: argparse.Namespace, steps: Steps, what: str) -> None:
+    """Teach the decoders for the share of `MASK_STEPS` that the command line asks for."""
+    count = max(2, round(given.effort * MASK_STEPS))
+    with steps(what, count) as report:
+        learn_masks(net, seen, steps=count, seed=given.seed, report=report)
+
+
 def trained(
     given: argparse.Namespace,
     pictures: Sequence[Picture],
@@ -211,11 +218,10 @@ def trained(
     torch.manual_seed(given.seed)
     net = RoadNet(pretrained=True).eval()
     encoder = Encoder(net, given.threads)
-    material = gather(encoder, pictures, rendered, steps)
-    count = max(2, round(given.effort * MASK_STEPS))
-    with steps("training the masks", count) as report:
-        learn_masks(net, material.training, steps=count, seed=given.seed, report=report)
-    seen = surfaces(net, encoder, material, pictures, steps)
+    shown = [picture for picture in pictures if picture.split != "gap"]
+    material = gather(encoder, shown, rendered, steps)
+    teach_masks(net, material.training, given, steps, "training the masks")
+    seen = surfaces(net, encoder, material, shown, steps)
     left_out = seen.left_out()
     scale = scale_of(left_out, seen.plain_labels, seen.plain_families)
     seen.head().times(scale).into(net)

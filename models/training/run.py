@@ -23,12 +23,13 @@ from .found_roads import with_found_roads
 from .keeping import kept_or_made
 from .left_out import left_out_table
 from .patches import PatchSet, joined
-from .progress import bars, steps_of
+from .progress import Steps, bars, steps_of
 from .rendered import (
     OPEN_LAND,
     PATCHES_PER_VIEW,
     SEED_RANGES,
     STREETS,
+    WORLDS,
     draw_further_worlds,
     draw_worlds,
     load_patches,
@@ -39,10 +40,9 @@ from .rendered import (
 )
 from .road_run import trained
 from .segmenter_data import Sample, masked_sample, painted_views
-from .surface_run import IN_OPEN_LAND, IN_STREETS, Steps, train_and_ship
+from .surface_run import IN_OPEN_LAND, IN_STREETS, train_and_ship
 from .train_segmenter import score_segmenter
 
-WORLDS = {"train": 480, "val": 36, "test": 60}
 FURTHER_WORLDS, FURTHER_PATCHES_PER_VIEW = 3078, 6
 """Worlds after the first training ones, for the surface classifier alone: many looks, few patches of each."""
 

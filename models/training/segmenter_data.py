@@ -19,7 +19,7 @@ from .augment import (
     shadow_depth,
     shadow_label,
 )
-from .data import IGNORE, ROAD_IS_FOUND, Image, Picture, pixel_box
+from .data import CLEAR_PARTS, IGNORE, ROAD_IS_FOUND, Image, Picture, pixel_box
 from .night import SHOWN, darkened
 
 SIZE = (256, 160)
@@ -178,11 +178,11 @@ def plain_view(sample: Sample) -> Sample:
     return replace(sample, image=image, drivable=drivable, shadow=shadow)
 
 
-def plain_views(picture: Picture) -> list[Sample]:
-    """The whole picture as at run time, or the parts of it without what an instrument has written into it."""
-    sample, parts = sample_of(picture), picture.clear_parts()
-    if len(parts) == 1:
+def plain_views(picture: Picture, sample: Sample) -> list[Sample]:
+    """The picture's sample as at run time, or the parts of it without what an instrument has written into it."""
+    if picture.family not in CLEAR_PARTS:
         return [plain_view(sample)]
+    parts = picture.clear_parts()
     unknown = [np.full(part.shape[:2], IGNORE, np.uint8) for part in parts]
     return [
         plain_view(replace(sample, image=part, drivable=road, shadow=road))

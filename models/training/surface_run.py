@@ -6,7 +6,6 @@ import argparse
 import functools
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,8 +23,8 @@ from .nets import SurfaceNet, mean_of, together
 from .outcomes import Outcome, Stage
 from .outliers import outlier_patches
 from .patches import PatchSet, joined, judged_patches, thinned, training_patches
+from .progress import Steps
 from .train_surface import (
-    Report,
     learn_classes,
     learn_disturbed,
     learn_reading,
@@ -57,8 +56,6 @@ OUTLIERS = {"train": 12000, "val": 1600}
 LOOKS, READ_LOOKS = {"": 1500}, {"": 1500, "condition_web": 7500, "rendered": 5500}
 """Most patches of each source ("" stands for all others) for the head that tells disturbed patches, and for the one
 that tells readable road, which must know many roads."""
-
-Steps = Callable[[str, int], AbstractContextManager[Report]]
 
 
 @dataclass(frozen=True)

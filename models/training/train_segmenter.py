@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,10 +18,11 @@ from torch.nn import functional
 from trpac_core.vision.classes import Surface
 from trpac_core.vision.onnx_runtime import ort
 
-from .data import IGNORE, family_of
+from .data import IGNORE
 from .export import export_trunk
 from .nets import RoadNet, enlarged
-from .night import SHOWN
+from .night import SHOWN, shown_family
+from .progress import Report
 from .segmenter_data import Sample, plain_view
 
 BATCH = 32
@@ -46,10 +47,6 @@ SURFACE_SHARES = {
 night a family counts as much again."""
 RIDGE = 0.01
 """Half of the square of the weights, of features of unit length, counts so much in the loss [nat]."""
-
-
-Report = Callable[[int, float], None]
-"""Is told the step and the loss, which may be NaN."""
 
 
 @dataclass(frozen=True)
@@ -92,12 +89,6 @@ class Encoder:
             found.append([each.astype(np.float16) for each in self._session.run(None, {"images": images})])
             report(at + len(images), np.nan)
         return Encoded(views, tuple(np.concatenate(each) for each in zip(*found, strict=True)))
-
-
-def together(parts: Sequence[Encoded]) -> Encoded:
-    """Several sets as one."""
-    maps = zip(*(part.maps for part in parts), strict=True)
-    return Encoded([view for part in parts for view in part.views], tuple(map(np.concatenate, maps)))
 
 
 @dataclass(frozen=True)
@@ -213,7 +204,7 @@ def _standardised(
 
 def surface_weights(labels: NDArray[np.int64], sources: NDArray[np.str_]) -> NDArray[np.float64]:
     """What each view counts, shape (n,) [-]: classes alike, families within a class by `SURFACE_SHARES`."""
-    families = np.array([family_of(str(source).removeprefix(SHOWN)) for source in sources])
+    families = np.array([shown_family(source) for source in sources.tolist()])
     shown = np.char.startswith(sources, SHOWN)
     weights = np.zeros(len(labels))
     for label in np.unique(labels):

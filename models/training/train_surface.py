@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -16,6 +14,7 @@ from .data import Image
 from .looks import seen_anew
 from .nets import SurfaceNet
 from .patches import PatchSet, camera_spreads, draw_weights
+from .progress import Report
 from .trunk import LITE0, Kind, MixedStyle
 
 BATCH = 256
@@ -28,8 +27,6 @@ AVERAGING = 0.998
 READING_RATE = 2e-3
 DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3, 0.5, 0.5
 """The head that tells disturbed patches must hold on roads never seen, so it is kept weak."""
-
-Report = Callable[[int, float], None]
 
 
 def new_net(seed: int, kind: Kind = LITE0, *, styled: bool = False) -> SurfaceNet:

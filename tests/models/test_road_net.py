@@ -199,14 +199,14 @@ def test_the_scale_makes_probabilities_true():
 def test_the_flag_is_as_high_as_the_worst_source_needs():
     """One source whose surest is wrong, one that is always right."""
     logs = log_softmax(np.linspace(0.1, 6.0, 100)[:, None] * np.array([1.0, 0.0, 0.0]), axis=1)
-    right = left_out.Verdicts(np.zeros(100, np.int64), logs, np.zeros(100, np.bool_))
+    right = left_out.Verdicts(np.zeros(100, np.int64), logs)
     some = right.labels.copy()
     some[:10] = 1
-    half = left_out.Verdicts(some, logs, right.night)
+    half = left_out.Verdicts(some, logs)
     assert left_out.flag_threshold([right]) == pytest.approx(right.confidence.min())
     least = left_out.flag_threshold([right, half])
     sure = half.confidence >= least
     assert np.mean(~half.right[sure]) <= left_out.FLAG_ERROR
     assert 85 <= sure.sum() <= 92
-    wrong = left_out.Verdicts(np.ones(100, np.int64), logs, right.night)
+    wrong = left_out.Verdicts(np.ones(100, np.int64), logs)
     assert left_out.flag_threshold([right, wrong]) == 1.0
