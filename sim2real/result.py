@@ -16,6 +16,7 @@ class Verdict(StrEnum):
     """The outcome in a word; `MEANING` has the sentence."""
 
     IDENTIFIED = "identified"
+    PARTIAL = "partial"
     AMBIGUOUS = "ambiguous"
     COMPOUND = "compound"
     UNKNOWN = "unknown"
@@ -24,6 +25,7 @@ class Verdict(StrEnum):
 
 MEANING = {
     Verdict.IDENTIFIED: "One effect explains the gap down to the noise, and no other does as well.",
+    Verdict.PARTIAL: "One effect explains a part of the gap; the rest is a difference between the models.",
     Verdict.AMBIGUOUS: "The data cannot tell some effects apart; the next manoeuvre would.",
     Verdict.COMPOUND: "Two or more effects are needed together.",
     Verdict.UNKNOWN: "There is a gap, and no effect of the library explains it.",
@@ -225,6 +227,28 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
+class Budget:
+    """Shares of the squared gap on the hold-out; they sum to 1.
+
+    Attributes
+    ----------
+    shares : dict
+        "effect:" and its id for each effect that the verdict adds, "structure" for the difference between the models
+        that no effect takes, "noise" for the sensors: share with its 95 % interval [-].
+    """
+
+    shares: dict[str, Interval]
+
+    def to_json(self) -> dict[str, float]:
+        """The shares alone."""
+        return {name: share.value for name, share in self.shares.items()}
+
+    def intervals(self) -> dict[str, list[float]]:
+        """Low and high of each share."""
+        return {name: [share.low, share.high] for name, share in self.shares.items()}
+
+
+@dataclass(frozen=True)
 class RmsError:
     """Root mean square error of the estimator's TRPAC on the hold-out, excited time only [-].
 
@@ -252,7 +276,7 @@ class Trace:
     """Standard deviation of its noise."""
 
 
-NEEDED = {Verdict.IDENTIFIED: 1, Verdict.COMPOUND: 2}
+NEEDED = {Verdict.IDENTIFIED: 1, Verdict.PARTIAL: 1, Verdict.COMPOUND: 2}
 """How many of the first causes a verdict says to model."""
 ADDED = {**NEEDED, Verdict.AMBIGUOUS: 1}
 """How many of the first causes the gap after is measured with."""
@@ -277,6 +301,9 @@ class Diagnosis:
     cannot_rule_out: tuple[str, ...] = ()
     next_manoeuvre: NextManoeuvre | None = None
     unexplained: Unexplained | None = None
+    """What is left where no effect explains the gap (`unknown`), or beside the effect (`partial`)."""
+    budget: Budget | None = None
+    """None where there is no gap to share out."""
     trpac: RmsError | None = None
     rating: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     """ISO/TS 18571 rating per signal, before and after; None where it is not defined."""
@@ -307,6 +334,8 @@ class Diagnosis:
             "cannot_rule_out": list(self.cannot_rule_out),
             "next_manoeuvre": _profile(self.next_manoeuvre),
             "unexplained": _term(self.unexplained),
+            "budget": None if self.budget is None else self.budget.to_json(),
+            "budget_intervals": None if self.budget is None else self.budget.intervals(),
             "trpac": None if self.trpac is None else asdict(self.trpac),
             "rating": {k: {"before": b, "after": a} for k, (b, a) in self.rating.items()},
             "warnings": list(self.warnings),

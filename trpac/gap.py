@@ -39,7 +39,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """The outcome: identified, ambiguous, compound, unknown or no_gap."""
+        """The outcome: identified, partial, ambiguous, compound, unknown or no_gap."""
         return self.result.verdict
 
     @property

@@ -22,6 +22,7 @@ MOST_CAUSES = 5
 """Greatest number of causes in the summary."""
 COLOURS = {
     "identified": "cyan",
+    "partial": "cyan",
     "compound": "cyan",
     "ambiguous": "yellow",
     "unknown": "red",

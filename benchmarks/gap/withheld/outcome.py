@@ -12,7 +12,7 @@ from typing import Any
 from .generator.table import Group
 
 NONE = "none of these"
-BLAMES = ("identified", "ambiguous", "compound")
+BLAMES = ("identified", "partial", "ambiguous", "compound")
 
 
 class ResultError(ValueError):
