@@ -112,7 +112,9 @@ def score(outcomes: Sequence[Outcome], limits: dict[str, Any], pending: Sequence
         if k in o.parameters
     ]
     shrinks = [
-        abs(o.predicted_shrink - o.achieved_shrink) for o in rich if o.verdict in ("identified", "partial", "ambiguous")
+        abs(o.predicted_shrink - o.achieved_shrink)
+        for o in rich
+        if o.verdict in ("identified", "partial", "ambiguous")
     ]
     timed = [o for o in outcomes if o.group is Group.TIMING]
 
