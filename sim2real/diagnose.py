@@ -11,6 +11,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
+from sim2real.discrepancy.verdict import beside_another_build
 from sim2real.how_far.gap import measure
 from sim2real.how_far.trpac_error import trpac_error
 from sim2real.merge import merge
@@ -155,11 +156,12 @@ def find(
     fit: Sequence[Drive],
     holdout: Drive,
     *,
+    baseline: Sequence[Drive] = (),
     exclude: Collection[str] = (),
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Findings:
-    """Hold the contest and decide it."""
+    """Hold the contest and decide it; `baseline` are drives of the same car without the suspected fault."""
     lattice = None if model.has(COUNTER) else common_lattice([d.lattice for d in (*fit, holdout)])
     base = model.with_effects(lattice.effect()) if lattice else model
     order, (*fit, holdout) = without_order(base, [*fit, holdout])
@@ -188,6 +190,11 @@ def find(
     decision = closing(held_to_curves(decision, contest, base, fit_to, held, jobs), base, held)
     if decision.left_open:
         decision = nothing_but_wandering(decision, contest, base, fit_to, held)
+    if contest.singles and (decision.verdict is Verdict.UNKNOWN or baseline):
+        faultless = gather(base, baseline) if baseline else None
+        contest, decision = beside_another_build(
+            decision, contest, base, fit_to, held, faultless, jobs, progress
+        )
     return Findings(base, fit_to, held, contest, decision, lattice, order)
 
 

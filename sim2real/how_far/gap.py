@@ -58,7 +58,8 @@ def noise_floor(model: Simulation, evidence: Evidence, seed: int) -> float:
 
 def shrink(evidence: Evidence, before: Sequence[Array], after: Sequence[Array], seed: int) -> Interval:
     """Shrink of the total gap with a 95 % interval, by resampling blocks of the drives [%]."""
-    weights_before, weights_after, counts = _block_squares(evidence, before, after)
+    weights_before, counts = block_squares(evidence, before)
+    weights_after, _ = block_squares(evidence, after)
     blocks = len(counts)
     generator = np.random.default_rng(seed)
     values = []
@@ -76,18 +77,13 @@ def _shrink(before: Array, after: Array, counts: Array) -> float:
     return float(100.0 * (1.0 - np.sqrt(new / old)))
 
 
-def _block_squares(
-    evidence: Evidence, before: Sequence[Array], after: Sequence[Array]
-) -> tuple[Array, Array, Array]:
-    """Per block and signal: sums of squares before and after, and how many samples stand behind them."""
-    rows_before, rows_after, rows_count = [], [], []
-    for drive, noise, old, new in zip(evidence.drives, evidence.noises, before, after, strict=True):
-        length = drive.rows_in(BLOCK_S)
-        z_old, z_new = noise.scaled(old), noise.scaled(new)
+def block_squares(evidence: Evidence, rests: Sequence[Array]) -> tuple[Array, Array]:
+    """Per block and signal, shape (blocks, signals): sums of squares in units of the noise, and how many samples."""
+    squares, counts = [], []
+    for drive, noise, rest in zip(evidence.drives, evidence.noises, rests, strict=True):
+        z, length = noise.scaled(rest), drive.rows_in(BLOCK_S)
         for at in range(0, len(drive), length):
-            cut = slice(at, at + length)
-            parts = [(z_old[cut, GROUPS[g]], z_new[cut, GROUPS[g]]) for g in GAP_SIGNALS]
-            rows_before.append([np.nansum(a**2) for a, _ in parts])
-            rows_after.append([np.nansum(b**2) for _, b in parts])
-            rows_count.append([np.isfinite(a).sum() for a, _ in parts])
-    return np.array(rows_before), np.array(rows_after), np.array(rows_count, dtype=np.float64)
+            parts = [z[at : at + length, GROUPS[name]] for name in GAP_SIGNALS]
+            squares.append([np.nansum(part**2) for part in parts])
+            counts.append([np.isfinite(part).sum() for part in parts])
+    return np.array(squares), np.array(counts, dtype=np.float64)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS, Effect
+from sim2real.how_far.budget import budget
 from sim2real.how_far.gap import measure, noise_floor, shrink
 from sim2real.next_manoeuvre import propose
 from sim2real.observing.drive import CHANNELS
@@ -105,11 +106,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         progress("equations", 0, 1)
         terms, unexplained, suspect = _terms(found, held, jobs)
         progress("equations", 1, 1)
-        if unexplained:
+        if unexplained and decision.verdict is Verdict.UNKNOWN:
             unexplained = _most_telling(found, unexplained, swing)
             unexplained = unexplained if suspect else seen_alone(unexplained, gap.before)
         missing = _missing(found, held, before)
-        if unexplained or not missing:
+        if not missing:
             likeliest = subsystem_of(terms[0]) if terms else ""
             missing = {unexplained.subsystem if unexplained else likeliest: before}
         places, heat = _where(found, held, before, after, terms, missing)
@@ -137,6 +138,9 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         cannot_rule_out=tuple(c.effect for c in causes if not c.excited),
         next_manoeuvre=_next(found, progress),
         unexplained=unexplained,
+        budget=None
+        if decision.verdict is Verdict.NO_GAP
+        else budget(held, found.added(), found.model, gap.noise_floor, seed),
         traces=_traces(found, held, added),
         provenance={"seed": seed},
     )
@@ -145,6 +149,10 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
 def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unexplained | None, bool]:
     """Free terms, best first, what they say of a gap that no effect explains, and whether one sensor is suspected."""
     decision = found.decision
+    if decision.verdict is Verdict.PARTIAL:
+        added = found.model.with_effects(*found.added())
+        terms = fit_terms(added, *all_logs(found.fit_to, held), jobs)
+        return terms, characterise(terms), False
     if decision.verdict is not Verdict.UNKNOWN:
         return (
             fit_terms(
@@ -196,7 +204,9 @@ def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int)
     """All single candidates, ranked; a compound's members first, with their joint parameters."""
     winner = found.decision.winner
     compound = found.decision.verdict is Verdict.COMPOUND
-    together = joint(winner, found.fit_to) if compound or found.structure() else {}
+    together = dict(found.decision.intervals)
+    if not together and (compound or found.structure()):
+        together = joint(winner, found.fit_to)
     out = [_cause(found, entry, held, before, seed, together) for entry in found.contest.singles]
     first = winner.ids if compound else ()
     return tuple(sorted(out, key=lambda c: (c.effect not in first, -c.probability, c.gap_after)))

@@ -47,6 +47,11 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: St
     if decision.verdict is Verdict.AMBIGUOUS:
         return f"The gap of {size} is {top.effect}{_rivals(decision)}: these logs cannot tell which."
     values = ", ".join(f"{name} {_number(v.value, v.unit)}" for name, v in top.parameters.items())
+    if decision.verdict is Verdict.PARTIAL:
+        return (
+            f"A part of the gap of {size} is {top.effect} ({values}): {cut}. What is left is a difference between the "
+            "models that no effect has the form of."
+        )
     together = ", together with what stands beside it" if structure else ""
     return f"The gap of {size} is {top.effect} ({values}): {cut}{together}."
 

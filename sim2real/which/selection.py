@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.observing.evidence import Evidence
-from sim2real.result import Verdict
+from sim2real.result import Interval, Verdict
 from sim2real.which.contest import Contest, Entry, Varied
 from sim2real.which.goodness import Fitness, fitness, inflation, loss_beyond_noise, noise_margin
 from sim2real.which.quiet import NO_GAP_MISFIT, is_noise, rare_share
@@ -133,6 +134,10 @@ class Decision:
         What was found and is not blamed, as every log's residual is at its noise floor.
     wandering : tuple of str
         Signals whose sensors wander by themselves, where that is all the gap there is, see `sim2real.which.wander`.
+    intervals : dict
+        Effect id and parameter to its interval, where the car's build was free beside the effects.
+    build : dict
+        How the car's build differs then, see `sim2real.discrepancy`; empty where it does not.
     """
 
     verdict: Verdict
@@ -149,6 +154,8 @@ class Decision:
     fast: bool = False
     slight: str = ""
     wandering: tuple[str, ...] = ()
+    intervals: Mapping[tuple[str, str], Interval] = field(default_factory=dict)
+    build: Mapping[str, float] = field(default_factory=dict)
 
 
 def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:

@@ -1,0 +1,1 @@
+"""What a car's whole build makes of the residuals beside any effect: the model discrepancy, and the decision with it."""
