@@ -16,7 +16,7 @@ from sim2real.how_far.gap import measure
 from sim2real.how_far.trpac_error import trpac_error
 from sim2real.merge import merge
 from sim2real.observing.drive import WHEEL, Drive
-from sim2real.observing.evidence import Evidence, drift_of, gather, residuals
+from sim2real.observing.evidence import drift_of, gather, residuals
 from sim2real.observing.lattice import common_lattice
 from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
@@ -26,19 +26,9 @@ from sim2real.result import Diagnosis, Measure, RmsError, Verdict, added
 from sim2real.sides import camera_side, counter_side
 from sim2real.sources import Source, Sources, read_source, read_sources
 from sim2real.telling.findings import Findings, describe
-from sim2real.which.closure import at_the_floor, closing, loud
-from sim2real.which.contest import COUNTER, Contest, Progress, first_round, hold_contest, silent
-from sim2real.which.faint_counter import beside_a_counter, for_a_delay, traced
-from sim2real.which.fitting import Fit
-from sim2real.which.law import held_to_curves, held_to_itself
-from sim2real.which.pairs import add_pairs, add_partners, add_twins, deepened
-from sim2real.which.quiet import is_noise
-from sim2real.which.selection import Decision, decide, needs_pairs
-from sim2real.which.sluggish import impostor
-from sim2real.which.structure import add_structure
-from sim2real.which.suspect import unlike_wheels
-from sim2real.which.varying import add_varied
-from sim2real.which.wander import effect_beside_wandering, nothing_but_wandering
+from sim2real.which.contest import COUNTER, Progress, first_round, hold_contest, silent
+from sim2real.which.pairs import add_pairs
+from sim2real.which.selection import decide
 from trpac_core.files import file_sha256
 
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
@@ -166,76 +156,27 @@ def find(
     base = model.with_effects(lattice.effect()) if lattice else model
     order, (*fit, holdout) = without_order(base, [*fit, holdout])
 
-    def first_look(car: Simulation) -> tuple[Evidence, Evidence, list[Fit]]:
-        fit_to, held = gather(car, fit), gather(car, [holdout])
-        return fit_to, held, first_round(car, fit_to, exclude, jobs, progress)
-
-    fit_to, held, first = first_look(base)
-    if not base.has(COUNTER) and (lattice := traced((*fit, holdout), first)):
-        base = model.with_effects(lattice.effect())
-        fit_to, held, first = first_look(base)
+    fit_to, held = gather(base, fit), gather(base, [holdout])
+    first = first_round(base, fit_to, exclude, jobs, progress)
     if first:
         best = first[0].candidate.model(first[0].x)
         fit_to, held = fit_to.sharpened(best), held.sharpened(best)
         drift = drift_of(best, fit_to, held)
         fit_to, held = fit_to.drifting(best, drift), held.drifting(best, drift)
     contest = hold_contest(base, fit_to, held, first, jobs, progress)
-    if contest.singles and not is_noise(contest, fit_to, held):
-        contest = _widened(contest, base, fit_to, held, exclude, jobs, progress)
-    contest, decision = _decided(contest, base, fit_to, held, exclude, jobs, progress)
+    decision = decide(contest, fit_to, held)
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)
-    decision = held_to_itself(loud(decision, base, fit_to, held), contest, fit_to, held)
-    decision = closing(held_to_curves(decision, contest, base, fit_to, held, jobs), base, held)
-    if decision.left_open:
-        decision = nothing_but_wandering(decision, contest, base, fit_to, held)
+    if contest.singles and decision.verdict is Verdict.UNKNOWN:
+        contest = add_pairs(contest, base, fit_to, held, jobs, progress)
+        decision = decide(contest, fit_to, held)
     if contest.singles and (decision.verdict is Verdict.UNKNOWN or baseline):
         faultless = gather(base, baseline) if baseline else None
         contest, decision = beside_another_build(
             decision, contest, base, fit_to, held, faultless, jobs, progress
         )
     return Findings(base, fit_to, held, contest, decision, lattice, order)
-
-
-def _widened(
-    contest: Contest,
-    model: Simulation,
-    fit_to: Evidence,
-    held: Evidence,
-    exclude: Collection[str],
-    jobs: int,
-    progress: Progress,
-) -> Contest:
-    """The contest with all that may stand beside the single effects, or in their place."""
-    passes = impostor(contest, model, fit_to, held)
-    contest = replace(contest, impostor=passes, lone=passes.loss if passes else contest.lone)
-    contest = add_partners(contest, fit_to, jobs, progress)
-    if not needs_pairs(contest, fit_to, held):
-        return add_twins(contest, model, fit_to, held, jobs, progress)
-    contest = add_pairs(contest, model, fit_to, held, jobs, progress)
-    contest = add_structure(contest, model, fit_to, held, exclude, jobs, progress)
-    contest = deepened(contest, fit_to, held)
-    return replace(contest, lone=min(contest.lone, unlike_wheels(model, fit_to, held, jobs)))
-
-
-def _decided(
-    contest: Contest,
-    model: Simulation,
-    fit_to: Evidence,
-    held: Evidence,
-    exclude: Collection[str],
-    jobs: int,
-    progress: Progress,
-) -> tuple[Contest, Decision]:
-    """The decision, with what had to be added to the contest for it."""
-    decision = nothing_but_wandering(decide(contest, fit_to, held), contest, model, fit_to, held)
-    if decision.verdict is Verdict.UNKNOWN:
-        contest = add_varied(contest, model, fit_to, held, jobs, progress)
-        decision = effect_beside_wandering(decide(contest, fit_to, held), contest, fit_to, held)
-    elif for_a_delay(decision) and not model.has(COUNTER) and COUNTER not in exclude:
-        contest, decision = beside_a_counter(contest, decision, model, fit_to, held)
-    return contest, at_the_floor(decision, contest, model, fit_to, held)
 
 
 def without_order(model: Simulation, drives: Sequence[Drive]) -> tuple[Order | None, list[Drive]]:

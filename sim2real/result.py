@@ -128,44 +128,6 @@ class Cause:
 
 
 @dataclass(frozen=True)
-class Structure:
-    """A difference between the models that stands beside the cause and is nobody's fault, as another tyre formula.
-
-    Attributes
-    ----------
-    effect : str
-        Its id.
-    parameters : dict
-        Parameter name to its estimate.
-    gap_after : float
-        Gap that is left on the hold-out with the cause and with it [noise floors].
-    """
-
-    effect: str
-    parameters: dict[str, Interval]
-    gap_after: float
-
-
-@dataclass(frozen=True)
-class Variation:
-    """A cause that is not the same everywhere: its parameters are means.
-
-    Attributes
-    ----------
-    effect : str
-        Its id.
-    over : str
-        What it varies over, "time" or "position".
-    spread : dict
-        Parameter name to the standard deviation along the logs, in the parameter's unit.
-    """
-
-    effect: str
-    over: str
-    spread: dict[str, float]
-
-
-@dataclass(frozen=True)
 class NextManoeuvre:
     """What to drive next, and which pair of effects it would tell apart.
 
@@ -296,8 +258,6 @@ class Diagnosis:
     together: tuple[str, ...] = ()
     """Effects of a compound that are needed together, where it is of more than the car's motion alone."""
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
-    structure: Structure | None = None
-    variation: Variation | None = None
     cannot_rule_out: tuple[str, ...] = ()
     next_manoeuvre: NextManoeuvre | None = None
     unexplained: Unexplained | None = None
@@ -329,8 +289,6 @@ class Diagnosis:
             "causes": [_cause(cause) for cause in self.causes],
             "together": list(self.together),
             "ambiguous_with": [list(group) for group in self.ambiguous_with],
-            "structure": None if self.structure is None else asdict(self.structure),
-            "variation": None if self.variation is None else asdict(self.variation),
             "cannot_rule_out": list(self.cannot_rule_out),
             "next_manoeuvre": _profile(self.next_manoeuvre),
             "unexplained": _term(self.unexplained),

@@ -24,8 +24,7 @@ from sim2real.observing.drive import (
     make_drive,
     untold_torque,
 )
-from sim2real.observing.lattice import fast_spread
-from sim2real.observing.lattice_trace import find_counter
+from sim2real.observing.lattice import find_lattice
 from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
@@ -219,8 +218,7 @@ def on_grid(log: Log) -> tuple[Array, dict[str, Array]]:
 def drive_of(log: Log, road: RoadFile, grid: tuple[Array, dict[str, Array]]) -> Drive:
     """All of a log `on_grid`, with what its wheel speeds tell of a counter at their own rate."""
     wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
-    lattice, trace = find_counter(log.time_s, wheels)
-    return make_drive(log.name, road, *grid, log.derived, lattice, trace, fast_spread(log.time_s, wheels))
+    return make_drive(log.name, road, *grid, log.derived, find_lattice(log.time_s, wheels))
 
 
 def split(text: str, road: Path | None) -> tuple[Path, Path]:

@@ -27,7 +27,7 @@ from sim2real.observing.observer import Simulation
 from sim2real.observing.robust import loss
 from sim2real.result import Interval, Verdict
 from sim2real.which.contest import Contest, Entry, Progress, silent
-from sim2real.which.fitting import Candidate, Fit, slopes
+from sim2real.which.fitting import Fit, slopes
 from sim2real.which.goodness import fitness
 from sim2real.which.selection import LIBRARY_BELIEF, Decision
 
@@ -60,10 +60,9 @@ def beside_another_build(
     baseline : Evidence, optional
         Logs of the same car without the suspected fault.
     """
-    plain = [e for e in (*contest.singles, *contest.forms) if _is_plain(e)]
     stack = stack_of(model, fit_to, holdout, baseline)
     scale = scale_of_build(stack)
-    singles = hypotheses(stack, plain, scale, jobs, progress)
+    singles = hypotheses(stack, contest.singles, scale, jobs, progress)
     stack = with_tyre(stack, singles)
     found = judge(
         stack,
@@ -97,12 +96,6 @@ def beside_another_build(
         intervals={name: interval for _, of_one in told for name, interval in of_one.items()},
         build=dict(found.structure),
     )
-
-
-def _is_plain(entry: Entry) -> bool:
-    """Whether an entry is an effect of the library in its first form."""
-    candidate = entry.fitted.candidate
-    return type(candidate) is Candidate and set(candidate.forms or (0,)) == {0}
 
 
 def _told(stack: Stack, scale: Scale, h: Hypothesis) -> tuple[Hypothesis, dict[tuple[str, str], Interval]]:

@@ -12,7 +12,6 @@ from scenarios.files import RoadFile
 from sim2real.logs.errors import LogError
 from sim2real.logs.resampling import SLOWEST_S
 from sim2real.observing.lattice import Lattice
-from sim2real.observing.lattice_trace import Trace
 from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
@@ -63,11 +62,6 @@ class Drive:
         Channels that are evidence: measured, and not computed from others.
     lattice : Lattice or None
         What a pulse-counting sensor left in the wheel speeds, as logged.
-    trace : Trace or None
-        What is left of such a lattice where noise hides it.
-    spread_rad_s : float
-        What in the wheel speeds as logged is faster than the motion, as a standard deviation; NaN where that is not
-        known [rad/s].
     swing : array, shape (n, 7), or None
         What was taken off `measured` since it repeats with the wheels' angle, see `sim2real.observing.orders`.
     """
@@ -80,8 +74,6 @@ class Drive:
     moving: NDArray[np.bool_]
     counted: NDArray[np.bool_]
     lattice: Lattice | None = None
-    trace: Trace | None = None
-    spread_rad_s: float = np.nan
     swing: Array | None = None
 
     @property
@@ -112,8 +104,6 @@ def make_drive(
     columns: dict[str, Array],
     without: frozenset[str] = frozenset(),
     lattice: Lattice | None = None,
-    trace: Trace | None = None,
-    spread_rad_s: float = np.nan,
 ) -> Drive:
     """Channels of a log that is on a uniform grid.
 
@@ -127,10 +117,8 @@ def make_drive(
         The contract's columns, shape (n,) each, NaN where lost.
     without : frozenset of str
         Columns that are not evidence of their own (computed from others); they still tell where on the road the car is.
-    lattice, trace : Lattice, Trace, optional
+    lattice : Lattice, optional
         Found in the wheel speeds at the log's own rate.
-    spread_rad_s : float
-        Of what is fast in them there [rad/s].
     """
     measured = np.column_stack([columns[name] for name in CHANNELS]).astype(np.float64)
     torque = np.column_stack([columns[f"wheel_torque_{w}_nm"] for w in WHEELS]).astype(np.float64)
@@ -147,7 +135,7 @@ def make_drive(
     moving = np.nan_to_num(speed, nan=np.inf) > LEAST_SPEED_M_S
     moving &= ~(backward(time_s, measured[:, WHEEL]) | untold)
     counted = np.isfinite(measured).any(axis=0) & np.array([name not in without for name in CHANNELS])
-    return Drive(name, road, time_s, torque, measured, moving, counted, lattice, trace, spread_rad_s)
+    return Drive(name, road, time_s, torque, measured, moving, counted, lattice)
 
 
 def backward(time_s: Array, wheels: Array) -> NDArray[np.bool_]:

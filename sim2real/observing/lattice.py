@@ -62,8 +62,6 @@ JITTER = 0.03
 """Scatter of the log's steps from which on its rows are not regular [steps]."""
 UNSEEN = 0.1
 """A window that the log is too slow for may be as short as this share of the log's step [-]."""
-AGE_RANGE = 1.2
-"""A window that only the wheels' age tells may be so much longer or shorter [-]."""
 FEWEST_SAMPLES, MOST_SAMPLES = 100, 1200
 SEARCH = 3000
 
@@ -75,7 +73,6 @@ class Reading(StrEnum):
     RUNNING = "counts over the last"
     UNSEEN = "changes at any row, and counts over less than"
     ROUNDED = "is rounded at any row, over a window that does not show; taken for"
-    AGED = "is as old on average as a count over"
 
 
 @dataclass(frozen=True)
@@ -92,11 +89,6 @@ class SmoothCounter(WheelSpeedQuantisation):
     def step_rad_s(self) -> float:
         """What one pulse more makes of the speed [rad/s]."""
         return 2.0 * np.pi / (self.teeth * self.window_s) if self.window_s > 0.0 else 0.0
-
-    @property
-    def age_s(self) -> float:
-        """Mean age of what is read [s]."""
-        return (0.5 + self.held) * self.window_s
 
     def sense(self, time_s: Array, signals: Signals) -> Signals:
         """Each wheel's mean speed over a window, half a window old."""
@@ -161,8 +153,6 @@ class Lattice:
         """What the window may be [s]."""
         if self.reading is Reading.ROUNDED:
             return UNSEEN * self.step_s, LONGEST_WINDOW_S
-        if self.reading is Reading.AGED:
-            return self.window_s / AGE_RANGE, self.window_s * AGE_RANGE
         seen = self.reading is not Reading.UNSEEN
         least = self.window_s - 0.5 * self.step_s if seen else UNSEEN * self.step_s
         return least, self.window_s + 0.5 * self.step_s
@@ -170,9 +160,8 @@ class Lattice:
     @property
     def sentence(self) -> str:
         """What it is, in words."""
-        near = "lie nearer than chance to" if self.reading is Reading.AGED else "are"
         return (
-            f"All wheel speeds {near} multiples of {self.quantum_rad_s:.4g} rad/s, and each {self.reading} "
+            f"All wheel speeds are multiples of {self.quantum_rad_s:.4g} rad/s, and each {self.reading} "
             f"{1e3 * self.window_s:.4g} ms."
         )
 
@@ -214,12 +203,6 @@ def read_wheels(time_s: Array, wheels: Sequence[Array]) -> Wheels | None:
     motion = [uniform_filter1d(v, length) for v in values]
     spread = 1.4826 * float(np.median(np.abs(np.concatenate(values) - np.concatenate(motion))))
     return Wheels(values, motion, step_s, spread) if spread > 0.0 else None
-
-
-def fast_spread(time_s: Array, wheels: Sequence[Array]) -> float:
-    """Standard deviation of what in logged wheel speeds is faster than the motion [rad/s]; NaN of too few."""
-    read = read_wheels(time_s, wheels)
-    return np.nan if read is None else read.spread_rad_s
 
 
 def find_lattice(time_s: Array, wheels: Sequence[Array]) -> Lattice | None:

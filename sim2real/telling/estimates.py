@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.robust import robust_weight
 from sim2real.result import Interval
-from sim2real.which.contest import Contest, Entry, Varied
+from sim2real.which.contest import Entry
 from sim2real.which.fitting import Fit
-from sim2real.which.goodness import noise_margin
-from sim2real.which.varying import KNOT_S
 
 Array = NDArray[np.float64]
 
@@ -22,8 +18,6 @@ AT_BOUND = 1e-3
 EXCITED_SHARE = 4.0 / 3.0
 """An effect is seen when the half width of its first parameter is below this many noticeable changes of it, or leaves
 its absence out [-]."""
-STRETCH_S = 4.0 * KNOT_S
-"""Time after which a varying value has forgotten itself [s]."""
 INTERVAL_FACTOR = 5.0
 """Intervals are wider than the sandwich by this, since forms differ: with 3, 140 of 166 withheld parameters lay within,
 with 4 76 of 98 of harder forms."""
@@ -83,39 +77,6 @@ def joint(entry: Entry, fit_to: Evidence) -> dict[tuple[str, str], Interval]:
         (key, p.name): Interval(*triple, unit=p.unit)
         for (key, p), triple in zip(entry.fitted.candidate.parameters, triples, strict=True)
     }
-
-
-def over_forms(
-    entry: Entry, contest: Contest, fit_to: Evidence, holdout: Evidence
-) -> dict[tuple[str, str], Interval]:
-    """Intervals of a single effect, as wide as those of all its forms that leave about as little: nature has one."""
-    others = [e for e in contest.forms if e.ids == entry.ids]
-    margin = noise_margin(entry, fit_to, holdout) if others else 0.0
-    out = joint(entry, fit_to)
-    for other in others:
-        if other.loss - entry.loss < margin:
-            for name, told in joint(other, fit_to).items():
-                if name in out:
-                    low, high = min(out[name].low, told.low), max(out[name].high, told.high)
-                    out[name] = replace(out[name], low=low, high=high)
-    return out
-
-
-def as_means(values: dict[str, Interval], varied: Varied, found: Fit, effect: str) -> dict[str, Interval]:
-    """Intervals of an effect that varies along the logs, as of means of finitely many stretches."""
-    low, high = found.candidate.bounds
-    out = dict(values)
-    for (key, p), least, most in zip(found.candidate.parameters, low, high, strict=True):
-        if key != effect:
-            continue
-        value, spread = values[p.name], varied.spread.get((key, p.name), 0.0)
-        half = np.hypot(
-            0.5 * (value.high - value.low), 1.96 * spread / np.sqrt(max(varied.seconds / STRETCH_S, 1.0))
-        )
-        out[p.name] = replace(
-            value, low=float(max(value.value - half, least)), high=float(min(value.value + half, most))
-        )
-    return out
 
 
 def is_excited(entry: Entry, stands: Entry) -> bool:

@@ -26,24 +26,21 @@ from sim2real.result import (
     Interval,
     NextManoeuvre,
     Place,
-    Structure,
     Trace,
     Unexplained,
-    Variation,
     Verdict,
     at_bound_in_words,
 )
 from sim2real.telling import sentences
-from sim2real.telling.estimates import as_means, at_bound, is_excited, joint, over_forms
+from sim2real.telling.estimates import at_bound, is_excited, joint
 from sim2real.where import localise
 from sim2real.where.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
+from sim2real.where.sensor_isolation import lone_sensor
 from sim2real.where.terms import Term, finer, fit_terms, with_refined
 from sim2real.where.unknown import characterise, seen_alone, subsystem_of
-from sim2real.which import sluggish
 from sim2real.which.contest import Contest, Entry, Progress
 from sim2real.which.goodness import fitness
 from sim2real.which.selection import Decision
-from sim2real.which.suspect import lone_sensor
 
 Array = NDArray[np.float64]
 
@@ -73,13 +70,6 @@ class Findings:
 
     def added(self) -> tuple[Effect, ...]:
         """What the verdict blames, to be added to the model."""
-        return tuple(effect for effect in self._of_winner() if not effect.structural)
-
-    def structure(self) -> tuple[Effect, ...]:
-        """What stands beside it and is not blamed."""
-        return tuple(effect for effect in self._of_winner() if effect.structural)
-
-    def _of_winner(self) -> tuple[Effect, ...]:
         entry = self.decision.winner
         if entry.fit is None or self.decision.verdict is Verdict.UNKNOWN:
             return ()
@@ -93,10 +83,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     before = held.residuals(found.model)
     added = found.model.with_effects(*found.added())
     after = held.residuals(added)
-    whole = added.with_effects(*found.structure())
-    gap = Gap(measure(held, before), measure(held, after), noise_floor(whole, held, seed))
-    structure = _structure(found, held, whole)
-    variation = _variation(decision)
+    gap = Gap(measure(held, before), measure(held, after), noise_floor(added, held, seed))
     causes = _causes(found, held, before, seed)
     swing = _swinging(found) if found.order else None
     terms, unexplained = list[Term](), None
@@ -119,11 +106,9 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         sentence=" ".join(
             part
             for part in (
-                sentences.verdict(decision, gap, causes, structure),
+                sentences.verdict(decision, gap, causes),
                 unexplained.sentence if unexplained else "",
                 "" if found.only_order else sentences.nearest(decision, found.contest),
-                sentences.beside(structure),
-                sentences.uneven(variation),
                 swing.sentence if swing and unexplained is not swing else "",
             )
             if part
@@ -133,8 +118,6 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         heat_map=heat,
         causes=causes,
         ambiguous_with=_ambiguous(decision),
-        structure=structure,
-        variation=variation,
         cannot_rule_out=tuple(c.effect for c in causes if not c.excited),
         next_manoeuvre=_next(found, progress),
         unexplained=unexplained,
@@ -162,11 +145,7 @@ def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unex
             False,
         )
     drives, noises = all_logs(found.fit_to, held)
-    suspect = None
-    if decision.left_open:  # the gap lies where the rows are doubtful
-        noises = tuple(replace(n, widening=np.ones_like(n.widening)) for n in noises)
-    else:
-        suspect = lone_sensor(found.model, found.fit_to, held)
+    suspect = lone_sensor(found.model, found.fit_to, held)
     if suspect and "time" not in suspect.quantities:  # a sensor may fail for a while
         suspect = replace(suspect, quantities=(*suspect.quantities, "time"))
     terms = fit_terms(found.model, drives, noises, jobs, equations=(suspect,) if suspect else EQUATIONS)
@@ -177,11 +156,10 @@ def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unex
 
 
 def _most_telling(found: Findings, term: Unexplained, swing: Unexplained | None) -> Unexplained:
-    """Of a free term, what repeats with the wheels' angle and the impostor: what takes most of the gap."""
-    if swing and found.only_order:
+    """Of a free term and what repeats with the wheels' angle: what takes most of the gap."""
+    if swing and (found.only_order or swing.share > term.share):
         return swing
-    said = (term, swing, sluggish.characterise(found.contest))
-    return max((each for each in said if each), key=lambda each: each.share)
+    return term
 
 
 def _swinging(found: Findings) -> Unexplained:
@@ -197,7 +175,7 @@ def _final_noise(found: Findings) -> Evidence:
     """The hold-out with its noise read anew from what the winner leaves: a gap may have looked like noise."""
     if not found.added():
         return found.holdout
-    return found.holdout.sharpened(found.model.with_effects(*found.added(), *found.structure()))
+    return found.holdout.sharpened(found.model.with_effects(*found.added()))
 
 
 def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int) -> tuple[Cause, ...]:
@@ -205,7 +183,7 @@ def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int)
     winner = found.decision.winner
     compound = found.decision.verdict is Verdict.COMPOUND
     together = dict(found.decision.intervals)
-    if not together and (compound or found.structure()):
+    if not together and compound:
         together = joint(winner, found.fit_to)
     out = [_cause(found, entry, held, before, seed, together) for entry in found.contest.singles]
     first = winner.ids if compound else ()
@@ -221,17 +199,14 @@ def _cause(
     together: dict[tuple[str, str], Interval],
 ) -> Cause:
     key, best = entry.ids[0], entry.fitted
-    blamed = [e for e in found.added() if e.id == key] if found.structure() else []
-    after = held.residuals(found.model.with_effects(*blamed) if blamed else best.candidate.model(best.x))
+    after = held.residuals(best.candidate.model(best.x))
     size = measure(held, after).total
-    alone = over_forms(entry, found.contest, found.fit_to, found.holdout)
+    alone = joint(entry, found.fit_to)
     values = {name: value for (effect, name), value in together.items() if effect == key}
-    told = found.decision.winner if values else entry  # a pair's member may have another form there
+    told = found.decision.winner if values and key in found.decision.winner.ids else entry
     values = values or {name: value for (_, name), value in alone.items()}
-    if found.decision.varied and key in found.decision.winner.ids:
-        values = as_means(values, found.decision.varied, told.fitted, key)
     excited = is_excited(entry, _stands(found))
-    fit_ok = found.decision.after if blamed else fitness(entry, found.fit_to, found.holdout)
+    fit_ok = fitness(entry, found.fit_to, found.holdout)
     worst = max(fit_ok.signals, key=lambda name: fit_ok.signals[name])
     shrunk = shrink(held, before, after, seed)
     pro, contra = [], []
@@ -241,18 +216,6 @@ def _cause(
         pro.append("What it leaves averages out like noise.")
     else:
         contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
-    winner = found.decision.winner
-    if entry is winner and found.decision.left_open:
-        contra.append(
-            f"Leaves {100.0 * found.decision.left_open:.0f} % of the gap on the hold-out, as energy."
-        )
-    if found.decision.curve and key in winner.ids:
-        work = "the work of both" if "+" in winner.name else "its work"
-        contra.append(
-            f"A free curve ({found.decision.curve}) does {work} as well, and one beside it finds more."
-        )
-    if entry is winner and found.decision.further:
-        contra.append(f"Only what its form adds ({best.candidate.kinds[0].form}) is needed, not what it is.")
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
     for name in at_bound(best):
@@ -274,25 +237,11 @@ def _cause(
 
 
 def _stands(found: Findings) -> Entry:
-    """The account that stands: the winner, varying where it does, or the model as it is."""
+    """The account that stands: the winner, or the model as it is."""
     decision = found.decision
     if decision.verdict is Verdict.UNKNOWN or decision.winner.fit is None:
         return found.contest.null
-    return decision.varied.entry if decision.varied else decision.winner
-
-
-def _variation(decision: Decision) -> Variation | None:
-    """How the cause varies, where it does; of two, the one that varies more against its size."""
-    varied = decision.varied
-    if varied is None:
-        return None
-    found = varied.entry.fitted
-    sizes = np.maximum(np.abs(found.x - found.candidate.neutral), 1e-9)
-    size = {(key, p.name): s for (key, p), s in zip(found.candidate.parameters, sizes, strict=True)}
-    most, _ = max(varied.spread, key=lambda name: varied.spread[name] / size[name])
-    return Variation(
-        most, varied.over, {name: value for (key, name), value in varied.spread.items() if key == most}
-    )
+    return decision.winner
 
 
 def _missing(found: Findings, held: Evidence, before: Sequence[Array]) -> dict[str, Sequence[Array]]:
@@ -336,20 +285,11 @@ def _where(
     return places, localise.heat_map(parts, shares)
 
 
-def _structure(found: Findings, held: Evidence, whole: Simulation) -> Structure | None:
-    """What stands beside the cause, with its estimates and the gap that both leave."""
-    for effect in found.structure():
-        told = joint(found.decision.winner, found.fit_to)
-        values = {name: value for (key, name), value in told.items() if key == effect.id}
-        return Structure(effect.id, values, measure(held, held.residuals(whole)).total)
-    return None
-
-
 def _ambiguous(decision: Decision) -> tuple[tuple[str, ...], ...]:
     if not decision.rivals:
         return ()
     members = [decision.winner, *decision.rivals]
-    return (tuple(dict.fromkeys(key for entry in members for key in entry.blamed)),)
+    return (tuple(dict.fromkeys(key for entry in members for key in entry.ids)),)
 
 
 def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:

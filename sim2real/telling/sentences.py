@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenarios.effects import EFFECTS
-from sim2real.observing.drive import BLOCK_S
-from sim2real.result import Cause, Gap, Structure, Variation, Verdict
+from sim2real.result import Cause, Gap, Verdict
 from sim2real.which.contest import Contest
 from sim2real.which.goodness import loss_beyond_noise
 from sim2real.which.selection import Decision
@@ -20,28 +18,16 @@ SHOWN = 3
 """How many effects a sentence lists; the report and the JSON have all."""
 
 
-def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: Structure | None = None) -> str:
-    """The verdict itself; what a structural difference beside the cause takes is told with it."""
+def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
+    """The verdict itself."""
     size = f"{gap.before.total:.1f} times the noise floor"
     if decision.verdict is Verdict.NO_GAP:
-        slight = decision.slight.replace("+", " with ")
-        traced = f" On the average something slighter than any row's noise is left, most like {slight}."
-        agree = "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
-        wanders = "wander" if len(decision.wandering) > 1 else "wanders"
-        alone = f" {' and '.join(decision.wandering)} {wanders} beyond that, as sensors do by themselves."
-        return agree + (traced if slight else "") + (alone if decision.wandering else "")
-    if decision.verdict is Verdict.UNKNOWN and decision.rare:
-        return (
-            f"On the whole the gap is lost in the noise, but {100.0 * decision.rare:.0f} % of the logs' time lies far "
-            "beyond it, and no effect of the library explains that."
-        )
+        return "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
     if decision.verdict is Verdict.UNKNOWN:
-        fast = f": it averages out within {BLOCK_S:g} s, as knocks and vibrations do" if decision.fast else ""
-        return f"There is a gap of {size}, and no effect of the library explains it{fast}."
+        return f"There is a gap of {size}, and no effect of the library explains it."
     top = causes[0]
-    after = structure.gap_after if structure else gap.after.total
     digits = 1 if gap.before.total > 1.1 else 2
-    cut = f"it takes the gap from {gap.before.total:.{digits}f} to {after:.{digits}f} times the noise floor"
+    cut = f"it takes the gap from {gap.before.total:.{digits}f} to {gap.after.total:.{digits}f} times the noise floor"
     if decision.verdict is Verdict.COMPOUND:
         return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
     if decision.verdict is Verdict.AMBIGUOUS:
@@ -52,8 +38,7 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause], structure: St
             f"A part of the gap of {size} is {top.effect} ({values}): {cut}. What is left is a difference between the "
             "models that no effect has the form of."
         )
-    together = ", together with what stands beside it" if structure else ""
-    return f"The gap of {size} is {top.effect} ({values}): {cut}{together}."
+    return f"The gap of {size} is {top.effect} ({values}): {cut}."
 
 
 def _rivals(decision: Decision) -> str:
@@ -72,44 +57,22 @@ def _some(names: Sequence[str]) -> str:
 
 def nearest(decision: Decision, contest: Contest) -> str:
     """What comes nearest where nothing explains the gap, if that is near."""
-    entries = [*contest.singles, *contest.structured, *contest.pairs]
+    entries = [*contest.singles, *contest.pairs]
     if decision.verdict is not Verdict.UNKNOWN or not entries:
         return ""
     best, null = min(entries, key=lambda e: e.loss), contest.null
     if loss_beyond_noise(best) > (1.0 - NEAR) * loss_beyond_noise(null):
         return ""
     share = 1.0 - best.loss / max(null.loss, 1e-12)
-    curve = " beside another curve of the tyres" if best in contest.structured else ""
     found = best.fitted
     values = ", ".join(
         f"{p.name} {_number(value, p.unit)}"
-        for (key, p), value in zip(found.candidate.parameters, found.x, strict=True)
-        if not EFFECTS[key].structural
+        for (_, p), value in zip(found.candidate.parameters, found.x, strict=True)
     )
     return (
-        f"Nearest comes {best.name.replace('+', ' with ')} ({values}){curve}: it takes {100.0 * share:.0f} % of the "
-        "misfit, and what it leaves or how says that it is not all, or not it."
+        f"Nearest comes {best.name.replace('+', ' with ')} ({values}): it takes {100.0 * share:.0f} % of the misfit, "
+        "and what it leaves or how says that it is not all, or not it."
     )
-
-
-def beside(structure: Structure | None) -> str:
-    """The structural part."""
-    if structure is None:
-        return ""
-    values = ", ".join(f"{name} {v.value:+.3g}" for name, v in structure.parameters.items())
-    return (
-        f"Beside it the tyres' curve is another one than the simulation's ({structure.effect}: {values}): "
-        "a difference of the models, not a fault."
-    )
-
-
-def uneven(variation: Variation | None) -> str:
-    """How the cause varies."""
-    if variation is None:
-        return ""
-    values = ", ".join(f"{name} by {spread:.2g}" for name, spread in variation.spread.items())
-    along = "time" if variation.over == "time" else "the road"
-    return f"It is not the same everywhere: along {along} it varies ({values}, standard deviation)."
 
 
 def _number(value: float, unit: str) -> str:

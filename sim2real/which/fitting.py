@@ -90,18 +90,6 @@ class Candidate:
         return self.base.with_effects(*self.effects(x))
 
 
-@dataclass(frozen=True)
-class OutsideCandidate(Candidate):
-    """A candidate whose class stands in no library, in the place of an effect that does."""
-
-    kind: type[Effect] = Effect
-
-    @cached_property
-    def kinds(self) -> tuple[type[Effect], ...]:
-        """The one class."""
-        return (self.kind,)
-
-
 def _scale(starts: Sequence[float], neutral: float) -> float:
     spread = [abs(value - neutral) for value in starts if value != neutral and np.isfinite(value)]
     return min(spread) if spread else max(abs(neutral), 1.0)

@@ -20,8 +20,6 @@ LONG_BLOCK_S = 1.0
 """Blocks over which the residuals' sums are taken to see how correlated they are [s]."""
 GROSS = 8.0
 """A block's sum beyond this many standard deviations is no noise [-]."""
-FURTHER_GAIN = 100.0
-"""With more than this to gain from a further effect, in units of what noise leaves, an entry may not be all [-]."""
 
 
 @dataclass(frozen=True)
@@ -49,14 +47,6 @@ def fitness(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Fitness:
         if len(found := sums[:, channels][sums[:, channels] != 0.0])
     }
     return Fitness(float(np.sqrt(np.mean(np.square(list(signals.values()))))), signals)
-
-
-def block_squares(entry: Entry, fit_to: Evidence, holdout: Evidence) -> Array:
-    """Mean squares of the blocks' sums of what an entry leaves, 1 where white noise is alone, shape (7,) [-]."""
-    sums = np.concatenate(
-        [block_sums(rows, drive.rows_in(BLOCK_S)) for rows, drive, _ in _logs(entry, fit_to, holdout)]
-    )
-    return np.array([np.mean(column[column != 0.0] ** 2) if column.any() else 1.0 for column in sums.T])
 
 
 def gross_share(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
@@ -102,11 +92,6 @@ def inflation(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
     size = max(entry.loss / max(_count(entry), 1), 1.0)
     memory = max(float(np.mean(every[every != 0.0] ** 2)) / size, 1.0) if np.any(every) else 1.0
     return size * memory
-
-
-def noise_margin(entry: Entry, fit_to: Evidence, holdout: Evidence) -> float:
-    """Loss that noise alone may take off an entry, or put on it, when something is added or changed [-]."""
-    return FURTHER_GAIN * inflation(entry, fit_to, holdout)
 
 
 def loss_beyond_noise(entry: Entry) -> float:

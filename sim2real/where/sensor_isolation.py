@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.observing.drive import SPEED, WHEEL
-from sim2real.observing.evidence import SETTLING_S, Evidence, all_logs
+from sim2real.observing.evidence import SETTLING_S, Evidence
 from sim2real.observing.observer import Simulation
-from sim2real.where.equations import EQUATIONS, OF_THE_MOTION, UNLIKE, Equation
-from sim2real.where.terms import best_of_each, fit_terms, refined
+from sim2real.where.equations import EQUATIONS, Equation
 from sim2real.which.contest import as_it_is
 from sim2real.which.goodness import fitness
 
@@ -40,14 +39,6 @@ def lone_sensor(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Equat
     left = [_misfit_without(e.channel, model, fit_to, holdout) for e in candidates if e.channel is not None]
     best = int(np.argmin(left))
     return candidates[best] if left[best] <= CLEARED else None
-
-
-def unlike_wheels(model: Simulation, fit_to: Evidence, holdout: Evidence, jobs: int = 1) -> float:
-    """Least loss that a free term at one wheel, its motor or its sensor, or between the axles leaves."""
-    drives, noises = all_logs(fit_to, holdout)
-    terms = fit_terms(model, drives, noises, jobs, equations=UNLIKE, quantities=OF_THE_MOTION)
-    best = min(best_of_each(terms), key=lambda term: term.loss)
-    return min(best.loss, refined(model, drives, noises, best).loss)
 
 
 def _misfit(model: Simulation, fit_to: Evidence, holdout: Evidence) -> float:

@@ -6,8 +6,6 @@ import numpy as np
 
 from sim2real.observing.drive import BLOCK_S
 from sim2real.observing.evidence import Evidence
-from sim2real.observing.hum import without_hum
-from sim2real.observing.robust import loss
 from sim2real.which.contest import Contest, Entry
 from sim2real.which.goodness import fitness, gross_share
 
@@ -19,9 +17,6 @@ QUIET_MISFIT, QUIET_GAIN = 1.0, 0.12
 """And four times as much where the misfit is no more than noise alone gives: noise that was read too large, as of a
 signal that is held, or of sensors that are next to ideal, leaves room for small ages, and for air of another density
 [-]."""
-LONE_MISFIT, LONE_GAIN = 1.6, 0.015
-"""And up to this misfit where no effect takes even this share: sensors that wander by themselves, for nothing of the
-library moves with them [-]."""
 NEGLIGIBLE = 0.02
 """An effect of no more than this share of a noticeable change is none, whatever it takes: no interval is much narrower
 [-]."""
@@ -36,22 +31,10 @@ def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     """Whether the model as it is leaves nothing but noise: neither its blocks nor any effect say otherwise."""
     null = contest.null
     misfit = fitness(null, fit_to, holdout).misfit
-    if misfit > LONE_MISFIT or rare_share(null, fit_to, holdout):
+    if misfit > NO_GAP_MISFIT or gross_share(null, fit_to, holdout) > GROSS_BLOCKS:
         return False
-    if misfit > NO_GAP_MISFIT:
-        return none_takes(LONE_GAIN, contest, fit_to, holdout)
     most = (QUIET_GAIN if misfit <= QUIET_MISFIT else NO_GAP_GAIN) + DRIFT_GAIN * _drifting(fit_to, holdout)
-    return none_takes(most, contest, fit_to, holdout)
-
-
-def none_takes(most: float, contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
-    """Whether no effect takes more than this share off the loss, or takes it off a hum of the wheels' sensors alone."""
-    null = contest.null
-    gaining = [e for e in _not_negligible(contest) if e.loss < (1.0 - most) * null.loss]
-    if not gaining:
-        return True
-    floor = (1.0 - most) * _quiet_loss(null, null, fit_to, holdout)
-    return all(_quiet_loss(e, null, fit_to, holdout) >= floor for e in gaining)
+    return all(e.loss >= (1.0 - most) * null.loss for e in _not_negligible(contest))
 
 
 def _not_negligible(contest: Contest) -> list[Entry]:
@@ -63,19 +46,6 @@ def _negligible(entry: Entry) -> bool:
     candidate = entry.fitted.candidate
     off = np.abs(entry.fitted.x - candidate.neutral) / candidate.scale
     return bool(np.all(off < NEGLIGIBLE))
-
-
-def rare_share(null: Entry, fit_to: Evidence, holdout: Evidence) -> float:
-    """Share of the blocks that are far beyond noise, 0 where so few are that it may be chance [-]."""
-    share = gross_share(null, fit_to, holdout)
-    return share if share > GROSS_BLOCKS else 0.0
-
-
-def _quiet_loss(entry: Entry, null: Entry, fit_to: Evidence, holdout: Evidence) -> float:
-    """Loss on all logs without a hum of the wheels' sensors."""
-    return loss(without_hum(entry.z_fit, null.z_fit, fit_to)) + loss(
-        without_hum(entry.z_hold, null.z_hold, holdout)
-    )
 
 
 def _drifting(*evidence: Evidence) -> float:
