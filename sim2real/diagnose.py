@@ -168,9 +168,6 @@ def find(
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)
-    if contest.singles and decision.verdict is Verdict.UNKNOWN:
-        contest = add_pairs(contest, base, fit_to, held, jobs, progress)
-        decision = decide(contest, fit_to, held)
     if contest.singles and (decision.verdict is Verdict.UNKNOWN or baseline):
         faultless = gather(base, baseline) if baseline else None
         contest, decision = beside_another_build(

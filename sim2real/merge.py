@@ -9,6 +9,7 @@ import numpy as np
 
 from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.result import (
+    Budget,
     Cause,
     Diagnosis,
     Gap,
@@ -69,6 +70,7 @@ def merge(main: Diagnosis, side: Side) -> Diagnosis:
         where=main.where if side_quiet else _where(main, side),
         heat_map=main.heat_map if side_quiet else _heat_map(main, side),
         causes=causes,
+        budget=main.budget if side_quiet else _budget(main, side),
         together=_together(main, side) if verdict is Verdict.COMPOUND else (),
         next_manoeuvre=main.next_manoeuvre or side.next_manoeuvre,
         ambiguous_with=(*main.ambiguous_with, *side.ambiguous_with),
@@ -100,8 +102,14 @@ def _verdict(main: Diagnosis, side: Side) -> Verdict:
         return main.verdict
     if main.verdict is Verdict.NO_GAP:
         return side.verdict
-    if Verdict.UNKNOWN in (main.verdict, side.verdict):
+    if main.verdict is side.verdict is Verdict.UNKNOWN:
         return Verdict.UNKNOWN
+    if Verdict.UNKNOWN in (
+        main.verdict,
+        side.verdict,
+    ):  # what one names stands, with something unknown beside it
+        known = side.verdict if main.verdict is Verdict.UNKNOWN else main.verdict
+        return Verdict.PARTIAL if known is Verdict.IDENTIFIED else known
     if main.causes and side.named == (main.causes[0].effect,):  # seen twice, still one effect
         return main.verdict
     return Verdict.COMPOUND
@@ -127,6 +135,27 @@ def _ranked(
 def _together(main: Diagnosis, side: Side) -> tuple[str, ...]:
     """Effects that either stands by."""
     return tuple(dict.fromkeys((*(c.effect for c in added(main)), *side.named)))
+
+
+def _budget(main: Diagnosis, side: Side) -> Budget:
+    """Shares of both halves' squared gap: each half has as much as its signals make of the whole."""
+    own, other = side.before, {k: g for k, g in main.gap.before.signals.items() if k not in side.before}
+    squares = {"side": sum(g * g for g in own.values()), "main": sum(g * g for g in other.values())}
+    whole = max(sum(squares.values()), 1e-12)
+    of_main = main.budget.shares if main.budget else {"noise": Interval(1.0, 1.0, 1.0)}
+    weight = squares["main"] / whole
+    shares = {
+        name: replace(s, value=weight * s.value, low=weight * s.low, high=weight * s.high)
+        for name, s in of_main.items()
+    }
+    left = sum(g * g for g in side.after.values())
+    noise = min(left, float(len(own)))
+    parts = {"structure": (left - noise) / whole, "noise": noise / whole}
+    parts |= {f"effect:{key}": (squares["side"] - left) / whole / len(side.named) for key in side.named}
+    for name, value in parts.items():
+        old = shares.get(name, Interval(0.0, 0.0, 0.0))
+        shares[name] = Interval(old.value + value, old.low + value, old.high + value)
+    return Budget(dict(sorted(shares.items(), key=lambda item: not item[0].startswith("effect:"))))
 
 
 def _where(main: Diagnosis, side: Side) -> tuple[Place, ...]:
