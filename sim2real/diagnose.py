@@ -11,6 +11,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
+from sim2real.adequacy import require_adequate
 from sim2real.how_far.gap import measure
 from sim2real.how_far.trpac_error import trpac_error
 from sim2real.merge import merge
@@ -95,6 +96,7 @@ def diagnose_sources(
 ) -> Diagnosis:
     """Diagnose logs that have been read; see `diagnose_files`."""
     provenance = _provenance(sources)  # now: the files may be others when the fits are done
+    inadequate = require_adequate(sources)
     drives = [s.drive for s in sources.all]
     model = Simulation(sources.vehicle)
     findings = find(model, drives[:-1], drives[-1], exclude=exclude, jobs=jobs, progress=progress)
@@ -113,7 +115,11 @@ def diagnose_sources(
     return replace(
         said,
         trpac=_estimate(findings, sources),
-        warnings=(*(f"{s.log.name}: {text}" for s in sources.all for text in s.log.warnings), *said.warnings),
+        warnings=(
+            *inadequate,
+            *(f"{s.log.name}: {text}" for s in sources.all for text in s.log.warnings),
+            *said.warnings,
+        ),
         provenance={**provenance, **said.provenance},
     )
 
