@@ -11,6 +11,7 @@ import numpy as np
 
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
+from sim2real.adequacy import require_adequate
 from sim2real.discrepancy.verdict import beside_another_build
 from sim2real.how_far.gap import measure
 from sim2real.how_far.trpac_error import trpac_error
@@ -86,6 +87,7 @@ def diagnose_sources(
 ) -> Diagnosis:
     """Diagnose logs that have been read; see `diagnose_files`."""
     provenance = _provenance(sources)  # now: the files may be others when the fits are done
+    inadequate = require_adequate(sources)
     drives = [s.drive for s in sources.all]
     model = Simulation(sources.vehicle)
     findings = find(model, drives[:-1], drives[-1], exclude=exclude, jobs=jobs, progress=progress)
@@ -104,7 +106,11 @@ def diagnose_sources(
     return replace(
         said,
         trpac=_estimate(findings, sources),
-        warnings=(*(f"{s.log.name}: {text}" for s in sources.all for text in s.log.warnings), *said.warnings),
+        warnings=(
+            *inadequate,
+            *(f"{s.log.name}: {text}" for s in sources.all for text in s.log.warnings),
+            *said.warnings,
+        ),
         provenance={**provenance, **said.provenance},
     )
 
@@ -168,6 +174,9 @@ def find(
     if order is not None and decision.verdict is Verdict.NO_GAP:
         decision = replace(decision, verdict=Verdict.UNKNOWN)
         return Findings(base, fit_to, held, contest, decision, lattice, order, only_order=True)
+    if contest.singles and decision.verdict is Verdict.UNKNOWN:
+        contest = add_pairs(contest, base, fit_to, held, jobs, progress)
+        decision = decide(contest, fit_to, held)
     if contest.singles and (decision.verdict is Verdict.UNKNOWN or baseline):
         faultless = gather(base, baseline) if baseline else None
         contest, decision = beside_another_build(

@@ -57,17 +57,25 @@ class Diagnosis:
         """Location of the gap: signal, subsystem, regime and time."""
         return self.result.where
 
-    def apply_to(self, vehicle: VehicleFile) -> Vehicle:
-        """The car with the identified effects, for `simulate`; unchanged without any."""
-        car = Vehicle(**vehicle.model_dump(by_alias=True))
-        from scenarios.effects import form_of
+    def apply_to(self, vehicle: VehicleFile, effect: str | None = None) -> Vehicle:
+        """The car with the effects that the verdict names, for `simulate`; unchanged where it names none.
 
-        return car.with_effects(
-            [
-                form_of(c.effect, c.form)(**{name: v.value for name, v in c.parameters.items()})
-                for c in needed(self.result)
-            ]
-        )
+        Parameters
+        ----------
+        vehicle : Vehicle
+            The car that was diagnosed.
+        effect : str, optional
+            The one effect to add; an ambiguous verdict needs it, its effects are in `result.ambiguous_with`.
+
+        Raises
+        ------
+        TrpacError
+            An effect that the diagnosis does not name.
+        """
+        from sim2real.apply import chosen, with_causes
+
+        causes = needed(self.result) if effect is None else chosen(self.result, effect)
+        return with_causes(vehicle, causes)
 
     def to_json(self) -> dict[str, Any]:
         """The content of diagnosis.json."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,8 +16,10 @@ from rich.text import Text
 from trpac_cli.console import Terminal, bars, refuse, require_folder
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from sim2real.demo import Case, Truth
-    from sim2real.result import Diagnosis
+    from sim2real.result import Cause, Diagnosis
 
 MOST_CAUSES = 5
 """Greatest number of causes in the summary."""
@@ -106,7 +109,81 @@ def diagnose(
         refuse(command, error)
     console = Terminal()
     _summarise(console, diagnosis)
+    if put := _how_to_apply(diagnosis, vehicle, written[0]):
+        console.print(put, soft_wrap=True)
     console.print("  ".join(str(path) for path in written), soft_wrap=True)
+
+
+@app.command()
+def apply(
+    diagnosis: Annotated[Path, typer.Argument(help="The diagnosis.json of trpac gap diagnose.")],
+    vehicle: Annotated[Path, typer.Option(help="The vehicle.yaml that the diagnosis was made with.")],
+    out: Annotated[Path, typer.Option(help="Vehicle file to write, with what was found.")],
+    effect: Annotated[
+        str | None,
+        typer.Option(metavar="ID", help="The effect to put in, where the verdict is ambiguous."),
+    ] = None,
+) -> None:
+    """Put what a diagnosis found into the car: a vehicle.yaml that is ready to simulate.
+
+    Effects take the place of those of the same name in the file; all else
+    stays, comments are lost. The old file is not changed.
+
+    Example: trpac gap apply out/gap/diagnosis.json --vehicle car.yaml
+    --out car_with_effect.yaml
+
+    Exit codes: 0 written; 2 unusable input, a verdict that names no effect,
+    or another vehicle file than the diagnosis was made with.
+    """
+    from sim2real.apply import apply_file, load_diagnosis
+    from trpac_core.errors import TrpacError
+
+    command = "trpac gap apply"
+    try:
+        found = load_diagnosis(diagnosis)
+        causes = apply_file(found, vehicle, out, effect)
+    except (TrpacError, OSError) as error:
+        refuse(command, error)
+    console = Terminal()
+    for line in _applied(found, causes, out):
+        console.print(line, soft_wrap=True)
+
+
+def _applied(diagnosis: Diagnosis, causes: tuple[Cause, ...], out: Path) -> Iterator[str]:
+    """Lines on what was put into the car, the gap that is left, and how to go on."""
+    from scenarios.effects import EFFECTS
+    from sim2real.apply import gap_left
+
+    gap, names = diagnosis.gap, " and ".join(cause.effect for cause in causes)
+    for cause in causes:
+        form = f", {cause.form}" if cause.form else ""
+        values = ", ".join(f"{name} {estimate.value:.4g}" for name, estimate in cause.parameters.items())
+        yield f"{cause.effect}{form}: {values}"
+    yield (
+        f"Gap on the hold-out: {gap.before.total:.2f} before, {gap_left(diagnosis, causes):.2f} with {names}; "
+        f"noise alone {gap.noise_floor:.2f}."
+    )
+    variation = diagnosis.variation
+    if variation is not None and variation.effect in {cause.effect for cause in causes}:
+        yield f"{variation.effect} varies over {variation.over}: the values are means."
+    if diagnosis.structure is not None:
+        yield (
+            f"{diagnosis.structure.effect}, a difference between the models and no fault, is not put in: with it the "
+            f"gap would be {diagnosis.structure.gap_after:.2f}."
+        )
+    for cause in causes:
+        if EFFECTS[cause.effect].stage == "perception":
+            yield (
+                f"{cause.effect} acts in the camera chain: a diagnosis takes it from the vehicle file, the simulated "
+                "motion does not change, and trpac run renders pictures as its scenario says."
+            )
+    if not (diagnosis.provenance.get("vehicle") or {}).get("sha256"):
+        yield "The diagnosis does not say which vehicle file it was made with: that was not checked."
+    yield (
+        f"Simulate: `vehicle: {out}` in a scenario and trpac run SCENARIO.yaml --out DIR, or trpac.simulate in Python. "
+        f"What is left: trpac gap diagnose --vehicle {out} with the same logs."
+    )
+    yield str(out)
 
 
 @app.command()
@@ -250,6 +327,20 @@ def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
         console.print(f"To tell them apart: {diagnosis.next_manoeuvre.sentence}")
     for warning in diagnosis.warnings:
         console.print(warning, style="yellow")
+
+
+def _how_to_apply(diagnosis: Diagnosis, vehicle: Path, written: Path) -> str:
+    """The command that puts what was found into the car; empty where nothing is named."""
+    from sim2real.apply import choices
+    from sim2real.result import Verdict
+
+    known = choices(diagnosis)
+    if not known:
+        return ""
+    new = vehicle.with_name(f"{vehicle.stem}_with_effect.yaml")
+    words = ["trpac", "gap", "apply", str(written), "--vehicle", str(vehicle), "--out", str(new)]
+    pick = f" --effect {'|'.join(known)}" if diagnosis.verdict is Verdict.AMBIGUOUS else ""
+    return f"To put it into the simulation: {shlex.join(words)}{pick}"
 
 
 def _cause_table(diagnosis: Diagnosis) -> Table:

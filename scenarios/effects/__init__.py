@@ -25,6 +25,7 @@ ORDER = (
     "driveline_compliance",
     "load_transfer",
     "tyre_stiffness_offset",
+    "tyre_load_stiffness",
     "tyre_relaxation",
     "friction_falloff",
     "tyre_shape",

@@ -255,6 +255,18 @@ def steady_tyre(
 
 
 @inlined
+def stiffening(load_n: float, more_load: float, p: DynamicsParameters) -> float:
+    """Tyre stiffness under a load over the vehicle file's [-]; more_load: the load over the mean static load less 1.
+
+    C_x (1 + by_load (F_z / F_z0 - 1)) or C_x (F_z / F_z0)^exponent; ch. 4 of [3]_.
+    """
+    share = max(1.0 + p.stiffness_by_load * more_load, LEAST_STIFFNESS)
+    if p.stiffness_exponent != 0.0:
+        share *= max((load_n / p.reference_load_n) ** p.stiffness_exponent, LEAST_STIFFNESS)
+    return share
+
+
+@inlined
 def adhesion_left(sliding_m_s: float, p: DynamicsParameters) -> float:
     """Share of the adhesion at a sliding speed [-]: exponential after [4]_, or hyperbolic."""
     if p.falloff_s_m <= 0.0:
@@ -387,8 +399,7 @@ def forces(y: NDArray, accel: float, p: DynamicsParameters, wheels: Wheels) -> f
             if slip_lags:
                 wheels.work[_STEADY, i] = acting
                 acting = min(max(y[FORCE + i], -1.0), 1.0)
-            softening = max(1.0 + p.stiffness_by_load * more_load, LEAST_STIFFNESS)
-            stiffness_n = p.longitudinal_stiffness_n[i] * softening
+            stiffness_n = p.longitudinal_stiffness_n[i] * stiffening(load_n, more_load, p)
             force, by_slip, by_load = steady_tyre(theta, abs(acting), load_n, stiffness_n, p)
             force, by_load = np.copysign(force, acting), np.copysign(by_load, acting)
             # The falling branch is not in the Jacobian: it is not stiff, and the method keeps its order.

@@ -47,6 +47,8 @@ class DynamicsParameters(NamedTuple):
     """Distance from the centre of gravity forward to the front axle [m]."""
     cog_to_rear_axle_m: float
     """Distance from the centre of gravity back to the rear axle [m]."""
+    reference_load_n: float
+    """Load F_z0 for which the vehicle file's stiffness holds: the mean static one of its car, without payload [N]."""
     transfer_height_m: float = 0.0
     """Height through which acceleration moves load between the axles; 0: static loads [m]."""
     drag_kg_m: float = 0.0
@@ -85,6 +87,8 @@ class DynamicsParameters(NamedTuple):
     """Torsional damping of each shaft [N m s/rad]."""
     stiffness_by_load: float = 0.0
     """Relative growth of the tyre stiffness per relative excess of the load over the mean static load [-]."""
+    stiffness_exponent: float = 0.0
+    """Power of the load over `reference_load_n` that the tyre stiffness goes with [-]."""
     motor_inertia_kg_m2: float = 0.0
     """Part of wheel_inertia_kg_m2 that turns with the motor, behind the shaft; 0: no shaft [kg m^2]."""
 

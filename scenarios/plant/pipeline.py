@@ -14,6 +14,7 @@ from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, Scenario, VehicleFile
 from scenarios.plant import dynamics
 from scenarios.plant.parameters import FORCE, POSITION, SPEED, WHEEL, DynamicsParameters, RoadTable, Wheels
+from trpac_core.vehicle import GRAVITY_M_S2
 
 Array = NDArray[Any]
 
@@ -111,6 +112,7 @@ def make_setup(vehicle: VehicleFile, road: RoadFile) -> PlantSetup:
         mass_kg=float(vehicle.mass_kg),
         cog_to_front_axle_m=float(vehicle.wheelbase_m - vehicle.cog_to_rear_axle_m),
         cog_to_rear_axle_m=float(vehicle.cog_to_rear_axle_m),
+        reference_load_n=0.25 * float(vehicle.mass_kg) * GRAVITY_M_S2,
         wheel_radius_m=of_each_wheel(vehicle.wheel_radius_m),
         lever_m=of_each_wheel(vehicle.wheel_radius_m),
         wheel_inertia_kg_m2=of_each_wheel(vehicle.wheel_inertia_kg_m2),

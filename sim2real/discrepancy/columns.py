@@ -85,6 +85,11 @@ class _Tyres:
         n = len(self.drive)
         return Push(np.zeros((n, 4)), np.zeros(n), False, np.zeros((n, len(CHANNELS))))
 
+    def turned(self, torque_nm: Array) -> Push:
+        """A torque at the wheels, shape (n, 4)."""
+        none = self.nothing()
+        return Push(torque_nm, none.accel_m_s2, False, none.offset)
+
     def forced(self, accel_m_s2: Array) -> Push:
         """A force on the body, as an acceleration."""
         none = self.nothing()
@@ -108,7 +113,7 @@ def _slip(tyres: _Tyres) -> Iterator[Column]:
 
 
 def _smaller(tyres: _Tyres) -> Iterator[Column]:
-    """Columns per unit: load exponent [-], relaxation [m], share of acceleration [-], m/s^2, share of radius [-]."""
+    """Columns per unit: load exponent [-], relaxation [m], resistance [m/s^2]; of all else a share [-]."""
     car, drive, accel = tyres.car, tyres.drive, tyres.accel
     rear = car.cog_to_rear_axle_m
     front, shift = car.wheelbase_m - rear, accel * car.cog_height_m / GRAVITY_M_S2
@@ -123,6 +128,8 @@ def _smaller(tyres: _Tyres) -> Iterator[Column]:
     yield "share of acceleration", tyres.forced(accel)
     yield "share of braking", tyres.forced(np.minimum(accel, 0.0))
     turning = tyres.states[:, WHEEL]
+    rate = np.gradient(uniform_filter1d(turning, drive.rows_in(SMOOTHING_S), axis=0), drive.step_s, axis=0)
+    yield "inertia", tyres.turned(-car.wheel_inertia_kg_m2 * rate)
     yield "radius", tyres.reads(turning, *ALL_WHEELS)
     yield "radius, front against rear", tyres.reads(turning * np.array([1.0, 1.0, -1.0, -1.0]), *ALL_WHEELS)
 
@@ -149,21 +156,17 @@ def of_other_faults(model: Simulation, drive: Drive, log: int) -> list[Column]:
     tyres, torque = _Tyres(model, drive, said), np.asarray(drive.torque_nm)
     turning, braking = tyres.states[:, WHEEL], np.minimum(torque, 0.0)
 
-    def turned(torque_nm: Array) -> Push:
-        none = tyres.nothing()
-        return Push(torque_nm, none.accel_m_s2, False, none.offset)
-
     columns: list[Column] = []
     for i, wheel in enumerate(WHEELS):
         only = np.eye(4)[i]
         columns += [
-            (f"torque {wheel}", turned(0.1 * torque * only)),
-            (f"brake {wheel}", turned(0.1 * braking * only)),
-            (f"drag {wheel}", turned(-10.0 * (turning > 1.0) * only)),
+            (f"torque {wheel}", tyres.turned(0.1 * torque * only)),
+            (f"brake {wheel}", tyres.turned(0.1 * braking * only)),
+            (f"drag {wheel}", tyres.turned(-10.0 * (turning > 1.0) * only)),
             (f"radius {wheel}", tyres.reads(0.01 * turning[:, i], 2 + i)),
         ]
     heat = np.cumsum(-braking * turning, axis=0) * drive.step_s / 1e5
-    columns.append(("fading brakes", turned(0.1 * braking * heat)))
+    columns.append(("fading brakes", tyres.turned(0.1 * braking * heat)))
     knots = np.arange(drive.time_s[0], drive.time_s[-1] + FORCE_KNOT_S, FORCE_KNOT_S)
     for j, hat in enumerate(np.eye(len(knots))):
         force = FORCE_M_S2 * np.interp(drive.time_s, knots, hat)

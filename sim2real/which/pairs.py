@@ -6,7 +6,7 @@ effect take off what a first one leaves?
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
@@ -23,10 +23,8 @@ from sim2real.which.fitting import FULL_STEPS, Candidate
 
 Array = NDArray[np.float64]
 
-PARTNERS, LINEAR_PAIRS = 3, 6
+PARTNERS, LINEAR_PAIRS = 4, 4
 """Pairs that are fitted: the best effect with its most promising partners, and any two by their slopes."""
-SWAPS = 2
-"""Partners that are tried anew for each member of the best pair."""
 
 
 def add_pairs(
@@ -43,17 +41,12 @@ def add_pairs(
     if not others:
         return contest
 
-    def fit_pairs(wanted: Sequence[tuple[str, ...]], stage: str) -> list[Entry]:
-        work = [_fit_of_pair(pair, entries, model, fit_to, holdout) for pair in wanted]
-        return run_all(work, jobs, progress, stage)
-
     found = best.fitted
     partners = beside(found.candidate, found.x, found.jacobian, others, fit_to, jobs, progress)
     wanted = [_ordered(best.ids[0], key) for _, key in partners[:PARTNERS]]
-    pairs = fit_pairs(list(dict.fromkeys([*wanted, *_by_slopes(contest)])), "pairs")
-    first = min(pairs, key=lambda e: e.loss)
-    again = _swapped_pairs(contest, first, {e.ids for e in pairs}, model, fit_to, jobs, progress)
-    pairs += fit_pairs(again, "pairs, swapped")
+    wanted = list(dict.fromkeys([*wanted, *_by_slopes(contest)]))
+    work = [_fit_of_pair(pair, entries, model, fit_to, holdout) for pair in wanted]
+    pairs = run_all(work, jobs, progress, "pairs")
     return replace(contest, pairs=tuple(sorted(pairs, key=lambda e: e.loss)))
 
 
@@ -115,28 +108,6 @@ def _starts(entries: dict[str, Entry], pair: tuple[str, ...]) -> Array:
     points += [(a.x, values) for values in b.candidate.starts]
     points += [(values, b.x) for values in a.candidate.starts]
     return np.array([np.concatenate(point) for point in points])
-
-
-def _swapped_pairs(
-    contest: Contest,
-    best: Entry,
-    tried: Collection[tuple[str, ...]],
-    model: Simulation,
-    fit_to: Evidence,
-    jobs: int,
-    progress: Progress,
-) -> list[tuple[str, ...]]:
-    """Pairs that keep one member of the best pair, at its value in the pair, and look for another partner."""
-    chosen = []
-    found = best.fitted
-    others = [e for e in contest.singles if e.ids[0] not in best.ids]
-    for at, keep in enumerate(best.ids):
-        mine = [i for i, (key, _) in enumerate(found.candidate.parameters) if key == keep]
-        alone = Candidate(model, (keep,), (found.candidate.forms[at],))
-        ranked = beside(alone, found.x[mine], found.jacobian[:, mine], others, fit_to, jobs, progress)
-        pairs = [_ordered(keep, key) for _, key in ranked]
-        chosen += [pair for pair in pairs if pair not in tried][:SWAPS]
-    return list(dict.fromkeys(chosen))
 
 
 def _ordered(a: str, b: str) -> tuple[str, ...]:

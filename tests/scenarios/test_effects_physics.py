@@ -236,6 +236,43 @@ def test_stiffness_goes_with_each_wheels_load(by_load):
         )
 
 
+@pytest.mark.parametrize("exponent", [0.8, 1.0])
+def test_stiffness_goes_with_a_power_of_each_wheels_load(exponent):
+    """A payload loads the tyres beyond F_z0, the mean static load of the car in the file; load transfer shifts it."""
+    values = {
+        "mass_offset": {"mass_kg": 300.0},
+        "load_transfer": {"cog_height_m": 0.6},
+        "tyre_load_stiffness": {"exponent": exponent},
+    }
+    run = drive(car_with(**values), 150.0, 0.5, 10.0)
+    for wheel in (0, 3):
+        slip, load = run.slip[-1, wheel], run.vertical_load_n[-1, wheel]
+        assert load > 1.05 * 0.25 * MASS * G
+        stiffness_n = STIFFNESS * (load / (0.25 * MASS * G)) ** exponent
+        assert run.tyre_force_n[-1, wheel] == pytest.approx(
+            tyre_force(0.9, slip, load, stiffness_n, 1.0), rel=1e-9
+        )
+
+
+def test_stiffness_that_goes_with_the_load_makes_the_slip_of_a_payload_that_of_the_empty_car():
+    """With an exponent of 1 a force in proportion to the load takes the same slip, whatever the load."""
+    payload, by_load = {"mass_kg": 400.0}, {"exponent": 1.0}
+    torque_nm = 150.0 * (MASS + 400.0) / MASS
+    empty = drive(car_with(tyre_load_stiffness=by_load), 150.0, 0.5, 10.0)
+    loaded = drive(car_with(tyre_load_stiffness=by_load, mass_offset=payload), torque_nm, 0.5, 10.0)
+    constant = drive(car_with(mass_offset=payload), torque_nm, 0.5, 10.0)
+    assert loaded.slip[-1] == pytest.approx(empty.slip[-1], rel=0.02)
+    assert constant.slip[-1, 0] > 1.2 * empty.slip[-1, 0]
+
+
+def test_a_wheel_that_load_leaves_keeps_a_finite_stiffness():
+    values = {"load_transfer": {"cog_height_m": 1.5}, "tyre_load_stiffness": {"exponent": 1.5}}
+    run = drive(car_with(**values), -1200.0, 1.0, 15.0)
+    assert run.vertical_load_n[:, 3].min() < 0.12 * 0.25 * MASS * G
+    assert all(np.isfinite(getattr(run, name)).all() for name in ("tyre_force_n", "speed_m_s", "slip"))
+    assert (np.abs(run.tyre_force_n) <= 1.28 * 0.9 * run.vertical_load_n + 1e-9).all()
+
+
 def test_each_tyre_has_a_stiffness_of_its_own():
     values = {"stiffness_n": 50_000.0, "unlike": 0.1, "front_sides": 0.2, "rear_sides": -0.3}
     form = {"tyre_stiffness_offset": "each wheel its own"}

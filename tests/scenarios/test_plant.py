@@ -257,6 +257,13 @@ CASES = {
         10.0,
         0.0,
     ),
+    "stiffness with load, and load transfer": (
+        {"load_transfer": {"cog_height_m": 0.54}, "tyre_load_stiffness": {"exponent": 0.9}},
+        DRIVE_COAST_BRAKE,
+        [(0.0, 0.9, 0.9), (8.0, 0.3, 0.4)],
+        7.0,
+        0.0,
+    ),
     "everything at once": (
         EVERYTHING,
         DRIVE_COAST_BRAKE,
@@ -285,6 +292,7 @@ def oracle_car(effects):
         "falloff": value("friction_falloff", "falloff_s_m"),
         "falloff_floor": value("friction_falloff", "floor", 1.0),
         "relaxation": value("tyre_relaxation", "length_m"),
+        "stiffness_exponent": value("tyre_load_stiffness", "exponent"),
         "shaft_stiffness": value("driveline_compliance", "stiffness_nm_rad"),
         "shaft_damping": value("driveline_compliance", "damping_nm_s_rad"),
         "motor_inertia": value("driveline_compliance", "motor_inertia_kg_m2"),

@@ -155,7 +155,7 @@ def test_every_effect_has_the_place_that_is_documented():
     }
     assert {key for key, words in found.items() if not words} == {
         "aero_drag", "road_grade", "driveline_compliance", "tyre_relaxation", "friction_falloff", "friction_offset",
-        "mu_split", "tyre_shape", "tyre_formula",
+        "mu_split", "tyre_shape", "tyre_formula", "tyre_load_stiffness",
     }  # fmt: skip
 
 

@@ -54,9 +54,9 @@ def pulses(duration_s):
     return trace(*points, duration_s=duration_s)
 
 
-def clean(torque_nm, speed_m_s, road=DRY, effects=None, commanded_nm=None):
+def clean(torque_nm, speed_m_s, road=DRY, effects=None, commanded_nm=None, car=BARE):
     """A drive without noise; where `commanded_nm` is given, the log tells of that torque."""
-    car = VehicleFile.model_validate({**BARE.model_dump(by_alias=True), "effects": effects or {}})
+    car = VehicleFile.model_validate({**car.model_dump(by_alias=True), "effects": effects or {}})
     run = simulate(car, road, torque_nm, STEP_S, speed_m_s, 0.0)
     signals = (run.position_m, run.speed_m_s, *run.wheel_speed_rad_s.T, run.accel_x_m_s2)
     columns = dict(zip(CHANNELS, signals, strict=True))

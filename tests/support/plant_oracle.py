@@ -36,6 +36,7 @@ OPTIONS = {
     "grade": 0.0,
     "falloff": 0.0,
     "falloff_floor": 1.0,
+    "stiffness_exponent": 0.0,  # power of load over mean static load that stiffness goes with
     "relaxation": 0.0,
     "slip_lags": False,
     "relaxation_by_slope": False,
@@ -81,7 +82,8 @@ def reference(car, road, torque_at, corners_s, time_s, speed=0.0, position=0.0, 
             fallen = car["falloff_floor"] + (1.0 - car["falloff_floor"]) * np.exp(
                 -car["falloff"] * abs(rim - v)
             )
-            out.append(np.sign(slip) * friction_force(mu * fallen, abs(slip), load, car["stiffness"]))
+            stiffness = car["stiffness"] * (4.0 * load / (car["m"] * G)) ** car["stiffness_exponent"]
+            out.append(np.sign(slip) * friction_force(mu * fallen, abs(slip), load, stiffness))
         return np.array(out), loads
 
     def rates(t, reduced, theta, guess):

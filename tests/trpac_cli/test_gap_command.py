@@ -12,7 +12,7 @@ import made_up_diagnosis as made_up
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
+from command_line import run, words
 
 from scenarios.effects import EFFECTS
 from scenarios.errors import ScenarioError
@@ -22,18 +22,8 @@ from sim2real import demo
 from sim2real.logs import read_log
 from sim2real.result import Interval
 from trpac_cli import gap
-from trpac_cli.main import app
 
 DIAGNOSE = ["gap", "diagnose", "--vehicle", "car.yaml", "--road", "road.yaml", "--fit", "a.csv"]
-
-
-def run(*arguments):
-    """The command in this process; wide, so that nothing wraps."""
-    return CliRunner(env={"COLUMNS": "250", "TERM": "dumb"}).invoke(app, [str(a) for a in arguments])
-
-
-def words(text):
-    return " ".join(re.sub(r"[│─╭╮╰╯┃┏┓┗┛━┡┩┳┻╇┴┬]", " ", text).split())
 
 
 @pytest.fixture

@@ -37,6 +37,7 @@ WIDTH = {
     "resistance over speed squared": 0.02,
     "share of acceleration": 0.01,
     "share of braking": 0.01,
+    "inertia": 0.1,
     "radius": 0.002,
     "radius, front against rear": 0.002,
     "friction": 0.12,
