@@ -19,13 +19,12 @@ from scenarios.whole_files import written_whole
 from scenarios.yaml_text import parse_yaml, to_yaml
 from sim2real.result import (
     MEANING,
+    Budget,
     Cause,
     Diagnosis,
     Gap,
     Interval,
     Measure,
-    Structure,
-    Variation,
     Verdict,
     added,
     needed,
@@ -67,27 +66,6 @@ class _SavedCause(BaseModel):
         )
 
 
-class _SavedStructure(BaseModel):
-    effect: str
-    parameters: dict[str, _Estimate]
-    gap_after: float
-
-    def structure(self) -> Structure:
-        """The difference between the models."""
-        return Structure(self.effect, _intervals(self.parameters), self.gap_after)
-
-
-class _SavedVariation(BaseModel):
-    effect: str
-    over: str
-    spread: dict[str, float | None]
-
-    def variation(self) -> Variation:
-        """What an effect varies over."""
-        spread = {name: math.nan if value is None else value for name, value in self.spread.items()}
-        return Variation(self.effect, self.over, spread)
-
-
 class _SavedMeasure(BaseModel):
     total: float
 
@@ -108,13 +86,13 @@ class _SavedDiagnosis(BaseModel):
     causes: tuple[_SavedCause, ...]
     together: tuple[str, ...] = ()
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
-    structure: _SavedStructure | None = None
-    variation: _SavedVariation | None = None
+    budget: dict[str, float] | None = None
+    budget_intervals: dict[str, tuple[float, float]] | None = None
     provenance: dict[str, Any] = Field(default_factory=dict)
 
     def diagnosis(self) -> Diagnosis:
         """The diagnosis without places, pictures and what is unexplained."""
-        gap, structure, variation = self.gap, self.structure, self.variation
+        gap = self.gap
         return Diagnosis(
             verdict=self.verdict,
             sentence=self.sentence,
@@ -124,14 +102,19 @@ class _SavedDiagnosis(BaseModel):
             causes=tuple(cause.cause() for cause in self.causes),
             together=self.together,
             ambiguous_with=self.ambiguous_with,
-            structure=None if structure is None else structure.structure(),
-            variation=None if variation is None else variation.variation(),
+            budget=_budget(self.budget or {}, self.budget_intervals or {}),
             provenance=self.provenance,
         )
 
 
 def _intervals(estimates: dict[str, _Estimate]) -> dict[str, Interval]:
     return {name: estimate.interval() for name, estimate in estimates.items()}
+
+
+def _budget(shares: dict[str, float], intervals: dict[str, tuple[float, float]]) -> Budget | None:
+    """The gap budget; None where the file holds none."""
+    told = {name: Interval(value, *intervals.get(name, (value, value))) for name, value in shares.items()}
+    return Budget(told) if told else None
 
 
 def load_diagnosis(path: str | Path) -> Diagnosis:

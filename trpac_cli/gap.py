@@ -163,13 +163,11 @@ def _applied(diagnosis: Diagnosis, causes: tuple[Cause, ...], out: Path) -> Iter
         f"Gap on the hold-out: {gap.before.total:.2f} before, {gap_left(diagnosis, causes):.2f} with {names}; "
         f"noise alone {gap.noise_floor:.2f}."
     )
-    variation = diagnosis.variation
-    if variation is not None and variation.effect in {cause.effect for cause in causes}:
-        yield f"{variation.effect} varies over {variation.over}: the values are means."
-    if diagnosis.structure is not None:
+    budget = diagnosis.budget.shares if diagnosis.budget else {}
+    if "structure" in budget and diagnosis.verdict == "partial":
         yield (
-            f"{diagnosis.structure.effect}, a difference between the models and no fault, is not put in: with it the "
-            f"gap would be {diagnosis.structure.gap_after:.2f}."
+            f"{100.0 * budget['structure'].value:.0f} % of the squared gap is a difference between the models and no "
+            "fault: it is not put in."
         )
     for cause in causes:
         if EFFECTS[cause.effect].stage == "perception":

@@ -63,6 +63,11 @@ class Answer:
         return self.within(1) or (self.verdict == "ambiguous" and self.effects[0] in self.named)
 
     @property
+    def names_both(self) -> bool:
+        """Whether effects are blamed, and all that are there stand among the first three."""
+        return self.names and set(self.effects) <= set(self.ranked[:3])
+
+    @property
     def surely_wrong(self) -> bool:
         """Whether one effect is named without a doubt, and it is not there."""
         return self.verdict in SURE and self.ranked[0] not in self.effects
@@ -106,7 +111,7 @@ def score(answers: Iterable[Answer]) -> list[tuple[str, int, int, str]]:
         ("surely wrong", sum(a.surely_wrong for a in every), len(every), "<= 5 %"),
         ("no fault: an effect blamed", sum(a.names for a in calm), len(calm), "none"),
         ("outside the library: blamed surely", blamed, len(outside), "<= 10 %"),
-        ("two effects: both named", sum(set(a.effects) <= set(a.ranked[:3]) and a.names for a in pairs), len(pairs), ""),
+        ("two effects: both in the first three", sum(a.names_both for a in pairs), len(pairs), ""),
         ("told with 0.9 and more: right", sum(a.ranked[0] in a.effects for a in sure), len(sure), ">= 90 %"),
     ]  # fmt: skip
 

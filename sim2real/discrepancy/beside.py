@@ -61,8 +61,6 @@ class Stack:
         Whitened residuals of the model, 0 where nothing counts.
     changes : array, shape (n, 7, k)
         What another build's changes leave, each per unit.
-    mix : array, shape (k, k)
-        Root of their prior covariance: mix @ independent unit normals is a draw of the changes.
     names : tuple of str
         Of the changes.
     limit : array of bool, shape (n,)
@@ -75,10 +73,14 @@ class Stack:
     logs: tuple[tuple[Drive, Noise], ...]
     z: Array
     changes: Array
-    mix: Array
     names: tuple[str, ...]
     limit: NDArray[np.bool_]
     faultless: int = 0
+
+    @cached_property
+    def mix(self) -> Array:
+        """Root of the changes' prior covariance: mix @ independent unit normals is a draw of them, shape (k, k)."""
+        return prior_root(self.names)
 
     @cached_property
     def build(self) -> Array:
@@ -88,7 +90,7 @@ class Stack:
     @property
     def one(self) -> Array:
         """Precisions of the build's coefficients, shape (k,)."""
-        return np.ones(len(self.mix))
+        return np.ones(len(self.names))
 
     def of_fit_logs(self, count: int) -> Stack:
         """The first logs, `count` of them, and those of the car without the fault."""
@@ -173,7 +175,7 @@ def stack_of(
     limit = np.concatenate([_any_of(near, drive) for (_, near), (drive, _) in zip(found, logs, strict=True)])
     tyres = of_tyres(model)
     names = (*dict.fromkeys(name for columns, _ in found for name, _ in columns), *tyres)
-    bare = Stack(model, logs, z, np.zeros((*z.shape, 0)), np.zeros((0, 0)), names, limit)
+    bare = Stack(model, logs, z, np.zeros((*z.shape, 0)), names, limit)
     every = [(log, name, push) for log, (columns, _) in enumerate(found) for name, push in columns]
     made = bare.pushed([(log, push) for log, _, push in every])
     build = np.zeros((*z.shape, len(names)))
@@ -182,9 +184,7 @@ def stack_of(
     for name, (size, other) in tyres.items():
         moved = [block_means(noise.whitened(_rest(other, drive)), drive) for drive, noise in logs]
         build[..., names.index(name)] = (np.concatenate(moved) - z) / size
-    return replace(
-        bare, changes=build, mix=prior_root(names), faultless=len(faultless.drives) if faultless else 0
-    )
+    return replace(bare, changes=build, faultless=len(faultless.drives) if faultless else 0)
 
 
 def with_tyre(stack: Stack, singles: Sequence[Hypothesis]) -> Stack:
@@ -201,7 +201,7 @@ def _any_of(rows: NDArray[np.bool_], drive: Drive) -> NDArray[np.bool_]:
     """Blocks that hold any of these rows."""
     length = drive.rows_in(BLOCK_S)
     count = len(rows) // length
-    return rows[: count * length].reshape(count, length).any(axis=1)
+    return np.asarray(rows[: count * length].reshape(count, length).any(axis=1))
 
 
 def other_faults(stack: Stack) -> dict[str, Array]:

@@ -135,7 +135,7 @@ def _smaller(tyres: _Tyres) -> Iterator[Column]:
 
 
 def of_tyres(model: Simulation) -> dict[str, tuple[float, Simulation]]:
-    """Models with another tyre, and how large the change is [-]: of peak friction, and of its fall over sliding speed."""
+    """Models with another tyre, and the size of the change [-]: peak friction, and its fall over sliding speed."""
     changed: dict[str, tuple[float, Effect]] = {
         "friction": (-0.1, FrictionOffset(1.0 - 0.1)),
         "fall": (0.2, FrictionFalloff(0.3, 1.0 - 0.2)),

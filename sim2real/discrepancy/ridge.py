@@ -63,18 +63,19 @@ def solve(z: Array, columns: Array, size: Array, temper: float, precision: Array
     precision : array, shape (k,)
         Inverse variances of the coefficients' priors about 0.
     """
-    rest = scaled = (z / size).ravel()
+    scaled = np.asarray((z / size).ravel())
+    rest = scaled
     design = (columns / size[..., None]).reshape(len(scaled), -1)
     found = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
         weighed = design * (1.0 / (temper * np.maximum(1.0, np.abs(rest) / HUBER)))[:, None]
         found = np.linalg.solve(design.T @ weighed + np.diag(precision), -(weighed.T @ scaled))
-        rest = scaled + design @ found
+        rest = np.asarray(scaled + design @ found)
     return float(huber(rest).sum() / temper + (precision * found * found).sum()), found
 
 
 def read_scale(rest: Array, live: NDArray[np.bool_], limit: NDArray[np.bool_]) -> Scale:
-    """Size of a remainder, shape (n, 7), per group of channels near the tyres' limit and away from it, and its memory."""
+    """Size of a remainder, shape (n, 7), per group of channels near the tyres' limit and away from it; its memory."""
     size = np.ones(rest.shape)
     for group in CHANNEL_GROUPS:
         for near in (False, True):

@@ -47,7 +47,7 @@ def beside_another_build(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> tuple[Contest, Decision]:
-    """Contest and decision where the car may be built otherwise than its simulation; as they are where nothing is blamed.
+    """Contest and decision with the car's build free; as they are where nothing is blamed then.
 
     Parameters
     ----------
@@ -59,6 +59,8 @@ def beside_another_build(
         The logs.
     baseline : Evidence, optional
         Logs of the same car without the suspected fault.
+    jobs, progress : int, callable
+        Threads; told the stage and how much of how much is done.
     """
     stack = stack_of(model, fit_to, holdout, baseline)
     scale = scale_of_build(stack)

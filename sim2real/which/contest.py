@@ -136,9 +136,7 @@ def first_round(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> list[Fit]:
-    """Every effect that acts on the car's motion or its sensors, in each form of no more parameters than its first one,
-    fitted roughly to one log, best first.
-    """
+    """Effects of motion and sensors, in forms of no more parameters than the first, fitted roughly to one log."""
     one_log = _telling(model, fit_to)
     candidates = [
         Candidate(model, (key,), (form,))

@@ -14,7 +14,7 @@ from plant_drives import SCENARIOS
 import trpac
 from scenarios.files import load_vehicle
 from sim2real.apply import load_diagnosis
-from sim2real.result import Cause, Interval, Structure, Variation, Verdict
+from sim2real.result import Budget, Cause, Interval, Verdict
 from sim2real.telling.report import write_diagnosis
 from trpac_core.files import file_sha256
 
@@ -24,11 +24,17 @@ TORQUE = np.repeat(
 )
 
 
+def _share(value):
+    return Interval(value, value, value)
+
+
 def partial():
     return replace(
         made_up.identified(),
         verdict=Verdict.PARTIAL,
-        structure=Structure("tyre_shape", {"knee": Interval(0.1, 0, 0.2)}, 1.05),
+        budget=Budget(
+            {"effect:tyre_relaxation": _share(0.6), "structure": _share(0.3), "noise": _share(0.1)}
+        ),
     )
 
 
@@ -125,13 +131,11 @@ class TestApplied:
             effect="camera_latency",
             parameters={"delay_s": Interval(0.1, 0.0, 0.2)},
         )
-        varies = Variation("camera_latency", "time", {"delay_s": 0.02})
-        said = replace(partial(), causes=(cause,), variation=varies)
+        said = replace(partial(), causes=(cause,))
         path = saved(tmp_path, said, car)
         changed(path, provenance={})
         text = words(run("gap", "apply", path, "--vehicle", car, "--out", out).stdout)
-        assert "camera_latency varies over time: the values are means." in text
-        assert "tyre_shape, a difference between the models and no fault, is not put in" in text
+        assert "30 % of the squared gap is a difference between the models and no fault" in text
         assert "camera_latency acts in the camera chain" in text
         assert "does not say which vehicle file" in text
         assert load_vehicle(out).effects["camera_latency"] == {"delay_s": 0.1}
@@ -151,10 +155,10 @@ class TestApplied:
             trpac.Diagnosis(made_up.ambiguous()).apply_to(load_vehicle(car), "mas_offset")
 
     def test_a_diagnosis_is_read_back(self, tmp_path):
-        found = replace(partial(), variation=Variation("tyre_relaxation", "time", {"length_m": 0.1}))
+        found = partial()
         read = load_diagnosis(saved(tmp_path, found, car_of(tmp_path)))
-        assert (read.verdict, read.gap.after.total, read.structure, read.variation) == (
-            found.verdict, found.gap.after.total, found.structure, found.variation,
+        assert (read.verdict, read.gap.after.total, read.budget) == (
+            found.verdict, found.gap.after.total, found.budget,
         )  # fmt: skip
         assert [(c.effect, c.form, c.probability, c.gap_after) for c in read.causes] == [
             (c.effect, c.form, c.probability, c.gap_after) for c in found.causes

@@ -42,7 +42,7 @@ class Build:
 
 @dataclass(frozen=True)
 class Fault:
-    """An effect of the library, or none where `effect` is empty; `lacking` where the simulation forgets what is true."""
+    """An effect of the library; `lacking` where the simulation forgets what is true of every such car."""
 
     effect: str
     values: Values
@@ -194,7 +194,7 @@ def draw_road(rng: np.random.Generator, course: str) -> RoadFile:
 def draw_torque(
     rng: np.random.Generator, course: str, car: VehicleFile, road: RoadFile, duration_s: float
 ) -> tuple[float, Array]:
-    """Speed at the start [m/s] and the torque per wheel over time, shape (n, 4) [N m], by a driver who forecasts speed."""
+    """Speed at the start [m/s] and torques, shape (n, 4) [N m], by a driver who only forecasts the speed."""
     n = round(duration_s / FINE_S)
     wanted = np.zeros(n)
     speed = float(rng.uniform(19.0, 26.0) if course == "long" else rng.uniform(8.0, 15.0))
