@@ -25,7 +25,7 @@ Ito, which the colour-blind can tell apart."""
 BEFORE_STYLE = (0, (4, 1.5))
 """Dashes, so that before and after differ in grey too."""
 WHEEL_LINES = ((AFTER, "-"), (BEFORE, BEFORE_STYLE), ("#009e73", "-."), ("#cc79a7", ":"))
-WIDTH_IN, NARROW_IN = 9.6, 5.0
+WIDTH_IN, NARROW_IN = 9.6, 4.4
 """Width of a picture, and of one that is to be read on a phone [in]."""
 DPI = 150
 STYLE: dict[Any, Any] = {
@@ -124,7 +124,13 @@ def _curves(axis: Axes, shown: Trace, added: str) -> None:
     axis.plot(shown.time_s, shown.measured, color=MEASURED, lw=1.6, alpha=0.55, label="measured")
     axis.plot(shown.time_s, shown.before, color=BEFORE, ls=BEFORE_STYLE, lw=1.2, label="simulated")
     if not _same(shown):
-        axis.plot(shown.time_s, shown.after, color=AFTER, lw=1.0, label=f"simulated with {added}")
+        axis.plot(
+            shown.time_s,
+            shown.after,
+            color=AFTER,
+            lw=1.0,
+            label=f"simulated with {added}".replace(" and ", "\nand "),
+        )
 
 
 def _residuals(axis: Axes, shown: Trace) -> None:
@@ -215,7 +221,7 @@ def profile(manoeuvre: NextManoeuvre) -> bytes:
         axis.set_xlim(manoeuvre.time_s[0], manoeuvre.time_s[-1])
         axis.set_xlabel("time [s]")
         axis.set_ylabel("torque per wheel [N m]")
-        axis.legend(loc="upper right", fontsize=8, ncols=4)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=4)
     return buffer.getvalue()
 
 
