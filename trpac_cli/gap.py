@@ -295,7 +295,7 @@ def judge(hidden: str, diagnosis: Diagnosis) -> str:
         return "The diagnosis did [red]not[/red] try it."
     rank = ranked.index(hidden) + 1
     probability = diagnosis.causes[rank - 1].probability
-    if rank == 1 and diagnosis.verdict == "identified":
+    if rank == 1 and diagnosis.verdict in ("identified", "partial"):
         return f"The diagnosis is [green]right[/green], with a probability of {percent(probability)}."
     if any(hidden in group for group in diagnosis.ambiguous_with):
         return "The diagnosis has it among those that it [yellow]cannot tell apart[/yellow]."
@@ -308,13 +308,18 @@ def judge(hidden: str, diagnosis: Diagnosis) -> str:
 def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
     """Print outcome, gap and first causes."""
     from sim2real.result import added
-    from sim2real.telling.report import leading
+    from sim2real.telling.report import budget_parts, leading, percent
 
     gap = diagnosis.gap
     sizes = f"gap {gap.before.total:.2f}"
     if added(diagnosis):
         sizes += f", with {' and '.join(c.effect for c in added(diagnosis))} {gap.after.total:.2f}"
-    text = Text.assemble(diagnosis.sentence, "\n", (f"{sizes}; noise alone {gap.noise_floor:.2f}", "dim"))
+    sizes += f"; noise alone {gap.noise_floor:.2f}"
+    if parts := budget_parts(diagnosis):
+        sizes += (
+            f"\nof the squared gap: {', '.join(f'{part.name} {percent(part.share.value)}' for part in parts)}"
+        )
+    text = Text.assemble(diagnosis.sentence, "\n", (sizes, "dim"))
     colour = COLOURS[diagnosis.verdict]
     console.print(
         Panel(text, title=diagnosis.verdict.replace("_", " "), title_align="left", border_style=colour)

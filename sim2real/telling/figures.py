@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
@@ -10,20 +10,23 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sim2real.result import Gap, NextManoeuvre, Trace, Unexplained
+from sim2real.result import NextManoeuvre, Trace, Unexplained
 from sim2real.where.equations import QUANTITIES, TWO_SIDED
 from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
 
-MEASURED, BEFORE, AFTER, FLOOR = "#30343b", "#d1622b", "#1f7a8c", "#8a8f98"
-"""One colour per thing, in all pictures and in the report's own bars."""
-HEAT = LinearSegmentedColormap.from_list("heat", ["#f7f5f2", "#f3c9a5", BEFORE, "#7a2e0e"])
-WIDTH_IN = 9.6
+MEASURED, BEFORE, AFTER, FLOOR = "#30343b", "#d55e00", "#0072b2", "#8a8f98"
+"""One colour per thing, in all pictures and in the report's own bars: before and after are of the palette of Okabe and
+Ito, which the colour-blind can tell apart."""
+BEFORE_STYLE = (0, (4, 1.5))
+"""Dashes, so that before and after differ in grey too."""
+WHEEL_LINES = ((AFTER, "-"), (BEFORE, BEFORE_STYLE), ("#009e73", "-."), ("#cc79a7", ":"))
+WIDTH_IN, NARROW_IN = 9.6, 4.4
+"""Width of a picture, and of one that is to be read on a phone [in]."""
 DPI = 150
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -52,80 +55,42 @@ BAND_SIGMA = 2.0
 
 @contextmanager
 def _sheet(
-    rows: int, columns: int, height_in: float, **options: Any
+    rows: int, columns: int, height_in: float, width_in: float = WIDTH_IN, **options: Any
 ) -> Iterator[tuple[Figure, Array, BytesIO]]:
-    """A figure, its axes, and the buffer that holds its PNG afterwards."""
+    """A figure, its axes, and the buffer that holds its PNG afterwards, whose width in pixels is always the same."""
     buffer = BytesIO()
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
             rows,
             columns,
-            figsize=(WIDTH_IN, height_in),
+            figsize=(width_in, height_in),
             squeeze=False,
             layout="constrained",
             **options,
         )
         try:
             yield figure, axes, buffer
-            figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+            figure.savefig(buffer, format="png", dpi=DPI * WIDTH_IN / width_in, metadata={"Software": None})
         finally:
             plt.close(figure)
 
 
-def heat_map(shares: Mapping[str, Mapping[str, float]]) -> bytes:
-    """Share of the gap over subsystem (rows, largest first) and regime of driving."""
-    regimes = list(dict.fromkeys(r for row in shares.values() for r in row))
-    systems = sorted(shares, key=lambda s: -sum(shares[s].values()))
-    table = np.array([[shares[s].get(r, np.nan) for r in regimes] for s in systems])
-    top = max(float(np.nanmax(table)), 1e-9)
-    with _sheet(1, 1, 0.75 + 0.38 * len(systems)) as (_, axes, buffer):
+def largest_gap(shown: Trace, added: str) -> bytes:
+    """One signal in the window in which the simulation is furthest off; `added` names the effects of its after."""
+    start, end = worst_window(shown)
+    with _sheet(1, 1, 2.9, NARROW_IN) as (_, axes, buffer):
         axis: Axes = axes[0, 0]
-        axis.imshow(table, cmap=HEAT, vmin=0.0, vmax=top, aspect="auto")
-        for (i, j), share in np.ndenumerate(table):
-            text = "–" if np.isnan(share) else f"{100.0 * share:.0f} %"
-            axis.text(j, i, text, ha="center", va="center", color="white" if share > 0.55 * top else MEASURED)
-        axis.set_xticks(range(len(regimes)), regimes)
-        axis.set_yticks(range(len(systems)), [words(s) for s in systems])
-        axis.xaxis.tick_top()
-        axis.tick_params(length=0)
-        axis.grid(visible=False)
-        axis.spines[:].set_visible(False)
-        axis.set_xticks(np.arange(0.5, len(regimes) - 1.0), minor=True)
-        axis.set_yticks(np.arange(0.5, len(systems) - 1.0), minor=True)
-        axis.grid(which="minor", color="white", lw=3.0)
-        axis.tick_params(which="minor", length=0)
+        _curves(axis, shown, added)
+        axis.set_xlim(start, end)
+        _fit_to_window(axis, shown, start, end)
+        axis.set_xlabel("time [s]")
+        axis.set_ylabel(label_of(shown.signal))
+        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=8)
     return buffer.getvalue()
 
 
-def gap_bars(gap: Gap) -> bytes:
-    """Gap per signal before and after, against what noise alone leaves."""
-    names = ["total", *gap.before.signals]
-    before = [gap.before.total, *gap.before.signals.values()]
-    after = [gap.after.total, *(gap.after.signals.get(n, np.nan) for n in gap.before.signals)]
-    bars = [(0.0, before, BEFORE, "gap")]
-    if gap.after != gap.before:
-        bars = [(-0.2, before, BEFORE, "before"), (0.2, after, AFTER, "after")]
-    place = np.arange(len(names))
-    with _sheet(1, 1, 1.1 + 0.2 * len(names) * (1 + len(bars))) as (_, axes, buffer):
-        axis: Axes = axes[0, 0]
-        for offset, values, colour, label in bars:
-            drawn = axis.barh(place + offset, values, 0.36, color=colour, label=label)
-            texts = ["" if np.isnan(v) else f"{v:.2f}" for v in values]
-            axis.bar_label(drawn, texts, padding=3, fontsize=8, color="#5c626b")
-        axis.axvline(gap.noise_floor, color=MEASURED, lw=1.0, ls=(0, (4, 3)), label="noise alone")
-        axis.set_yticks(place, [words(n) for n in names])
-        axis.get_yticklabels()[0].set_fontweight("bold")
-        axis.invert_yaxis()
-        axis.grid(visible=False, axis="y")
-        axis.tick_params(axis="y", length=0)
-        axis.set_xlabel("root mean square residual in units of the sensor's noise")
-        axis.set_xlim(0.0, 1.08 * max(np.nanmax(before), np.nanmax(after), gap.noise_floor))
-        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
-    return buffer.getvalue()
-
-
-def trace(shown: Trace) -> bytes:
-    """One signal over the hold-out, its residuals, and both again in the worst window."""
+def trace(shown: Trace, added: str) -> bytes:
+    """One signal over the hold-out, its residuals, and both again in the worst window; `added` as in `largest_gap`."""
     start, end = worst_window(shown)
     with _sheet(2, 2, 3.5, sharex="col", width_ratios=[2.2, 1.0], height_ratios=[1.35, 1.0]) as (
         _,
@@ -133,7 +98,7 @@ def trace(shown: Trace) -> bytes:
         buffer,
     ):
         for column in (0, 1):
-            _curves(axes[0, column], shown)
+            _curves(axes[0, column], shown, added)
             _residuals(axes[1, column], shown)
             axes[1, column].set_xlabel("time [s]")
         axes[0, 0].set_xlim(shown.time_s[0], shown.time_s[-1])
@@ -155,22 +120,27 @@ def _same(shown: Trace) -> bool:
     return bool(np.array_equal(shown.before, shown.after, equal_nan=True))
 
 
-def _curves(axis: Axes, shown: Trace) -> None:
-    label = "simulation" if _same(shown) else "simulation before"
+def _curves(axis: Axes, shown: Trace, added: str) -> None:
     axis.plot(shown.time_s, shown.measured, color=MEASURED, lw=1.6, alpha=0.55, label="measured")
-    axis.plot(shown.time_s, shown.before, color=BEFORE, lw=1.0, label=label)
+    axis.plot(shown.time_s, shown.before, color=BEFORE, ls=BEFORE_STYLE, lw=1.2, label="simulated")
     if not _same(shown):
-        axis.plot(shown.time_s, shown.after, color=AFTER, lw=1.0, label="after")
+        axis.plot(
+            shown.time_s,
+            shown.after,
+            color=AFTER,
+            lw=1.0,
+            label=f"simulated with {added}".replace(" and ", "\nand "),
+        )
 
 
 def _residuals(axis: Axes, shown: Trace) -> None:
     band = BAND_SIGMA * shown.noise
     axis.axhspan(-band, band, color="#e9ebee", lw=0)
-    models = [(shown.before, BEFORE)] if _same(shown) else [(shown.before, BEFORE), (shown.after, AFTER)]
-    for model, colour in models:
+    models = [(shown.before, BEFORE, BEFORE_STYLE), (shown.after, AFTER, "-")]
+    for model, colour, style in models[: 1 if _same(shown) else 2]:
         rest = shown.measured - model
         axis.plot(shown.time_s, rest, color=colour, lw=0.5, alpha=0.45)
-        axis.plot(shown.time_s, _running_mean(shown.time_s, rest), color=colour, lw=1.3)
+        axis.plot(shown.time_s, _running_mean(shown.time_s, rest), color=colour, ls=style, lw=1.3)
 
 
 def _running_mean(time_s: Array, values: Array) -> Array:
@@ -211,8 +181,8 @@ def worst_window(shown: Trace, length_s: float = ZOOM_S) -> tuple[float, float]:
 
 
 def missing_term(term: Unexplained) -> bytes:
-    """The shape of a term that no effect of the library has."""
-    with _sheet(1, 1, 2.9) as (_, axes, buffer):
+    """The curve of a term that no effect of the library has."""
+    with _sheet(1, 1, 2.9, NARROW_IN) as (_, axes, buffer):
         axis: Axes = axes[0, 0]
         axis.axhline(0.0, color=FLOOR, lw=0.8)
         begins = np.diff(term.x) < 0.0  # one curve per log where the quantity is time
@@ -221,15 +191,19 @@ def missing_term(term: Unexplained) -> bytes:
         starts = np.flatnonzero(begins) + 1
         for x, y in zip(np.split(term.x, starts), np.split(term.y, starts), strict=True):
             axis.plot(x, y, color=BEFORE, lw=1.6, alpha=0.8, marker="o", ms=3.0)
-        axis.set_xlabel(_quantity_label(term.depends_on))
-        axis.set_ylabel(f"missing term in\n{words(term.subsystem)} [{pretty_unit(term.unit)}]")
+        sides = ",\nnegative where it brakes" if term.depends_on in TWO_SIDED else ""
+        axis.set_xlabel(quantity_label(term.depends_on) + sides)
+        axis.set_ylabel(f"further term, {words(term.subsystem)} [{pretty_unit(term.unit)}]")
     return buffer.getvalue()
 
 
-def _quantity_label(quantity: str) -> str:
-    """Axis label of what a missing term depends on."""
-    unit = f" [{pretty_unit(QUANTITIES[quantity][0])}]" if quantity in QUANTITIES else ""
-    return f"{words(quantity)}{unit}" + (", negative where it brakes" if quantity in TWO_SIDED else "")
+def quantity_label(quantity: str) -> str:
+    """What a missing term depends on, with its unit."""
+    return (
+        f"{quantity} [{pretty_unit(QUANTITIES[quantity][0])}]"
+        if quantity in QUANTITIES
+        else label_of(quantity)
+    )
 
 
 def profile(manoeuvre: NextManoeuvre) -> bytes:
@@ -240,14 +214,14 @@ def profile(manoeuvre: NextManoeuvre) -> bytes:
     with _sheet(1, 1, 2.7) as (_, axes, buffer):
         axis: Axes = axes[0, 0]
         axis.axhline(0.0, color=FLOOR, lw=0.8)
-        for colour, wheels in zip((AFTER, BEFORE, "#7a5195", "#7f8c3a"), lines.values(), strict=False):
+        for (colour, style), wheels in zip(WHEEL_LINES, lines.values(), strict=False):
             torque = manoeuvre.wheel_torque_nm[:, WHEELS.index(wheels[0])]
             label = "all wheels" if len(wheels) == len(WHEELS) else ", ".join(wheels)
-            axis.plot(manoeuvre.time_s, torque, color=colour, lw=1.6, label=label)
+            axis.plot(manoeuvre.time_s, torque, color=colour, ls=style, lw=1.6, label=label)
         axis.set_xlim(manoeuvre.time_s[0], manoeuvre.time_s[-1])
         axis.set_xlabel("time [s]")
         axis.set_ylabel("torque per wheel [N m]")
-        axis.legend(loc="upper right", fontsize=8, ncols=4)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=4)
     return buffer.getvalue()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,9 +18,9 @@ from scenarios.html_page import data_address, page
 from scenarios.whole_files import written_whole
 from sim2real.how_far.rating import rate
 from sim2real.result import (
-    MEANING,
     Cause,
     Diagnosis,
+    Gap,
     Interval,
     NextManoeuvre,
     Trace,
@@ -37,6 +38,10 @@ DASH = "–"
 LEADING_FROM = 0.02
 """Probability from which a cause gets a card of its own [-]."""
 MOST_LEADING = 5
+SHOWN_FROM = 0.001
+"""Share of the gap from which a part of the car has a row in the heat map [-]."""
+CAUSE_PATTERNS = 3
+"""How many patterns the template has for causes in the budget's bar."""
 
 
 def write_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> tuple[Path, Path]:
@@ -88,6 +93,18 @@ class Picture:
     alt: str
 
 
+@dataclass(frozen=True)
+class Part:
+    """A part of the gap budget, as the bar and its table show it."""
+
+    name: str
+    share: Interval
+    width: float
+    """In the bar [%]."""
+    pattern: str
+    """Its class in the template."""
+
+
 def render(diagnosis: Diagnosis) -> str:
     """The report as one HTML page that needs nothing beside it."""
     filters: dict[str, Callable[..., str | bool]] = {
@@ -98,26 +115,52 @@ def render(diagnosis: Diagnosis) -> str:
         "words": figures.words,
         "unit": figures.pretty_unit,
         "label": figures.label_of,
+        "quantity": figures.quantity_label,
     }
+    traces = shown_traces(diagnosis)
+    names = " and ".join(cause.effect for cause in added(diagnosis))
     return page(
         TEMPLATE,
         filters,
         d=diagnosis,
-        meaning=MEANING[diagnosis.verdict],
         colours=figures,
         effects=EFFECTS,
         needed=needed(diagnosis),
-        added=added(diagnosis),
+        added=names,
+        budget=budget_parts(diagnosis),
         leading=leading(diagnosis),
         none_of_these=max(0.0, 1.0 - sum(c.probability for c in diagnosis.causes)),
         shrink=shrink(diagnosis),
         possible=possible_shrink(diagnosis),
-        snippet=vehicle_snippet(needed(diagnosis)),
+        command=apply_command(diagnosis),
+        signals=signal_rows(diagnosis.gap),
+        heat=heat_rows(diagnosis),
+        regimes=list(dict.fromkeys(regime for row in diagnosis.heat_map.values() for regime in row)),
         provenance=provenance_rows(diagnosis.provenance),
-        pictures=_pictures(diagnosis),
-        traces=[(t, _picture(figures.trace(t), f"{t.signal} over time")) for t in shown_traces(diagnosis)],
+        pictures=_pictures(diagnosis, traces[:1], names),
+        traces=[(t, _picture(figures.trace(t, names), f"{t.signal} over time")) for t in traces],
         profile=None if diagnosis.next_manoeuvre is None else profile_csv(diagnosis.next_manoeuvre),
     )
+
+
+def budget_parts(diagnosis: Diagnosis) -> list[Part]:
+    """The gap budget's parts, causes first; none where nothing may be blamed.
+
+    What makes the gap larger has a share below 0, and no width.
+    """
+    if diagnosis.budget is None or diagnosis.verdict is Verdict.NO_GAP:
+        return []
+    shares = diagnosis.budget.shares
+    whole = sum(max(share.value, 0.0) for share in shares.values())
+    return [
+        Part(
+            name.removeprefix("effect:"),
+            share,
+            100.0 * max(share.value, 0.0) / whole,
+            f"cause{i % CAUSE_PATTERNS}" if name.startswith("effect:") else name,
+        )
+        for i, (name, share) in enumerate(shares.items())
+    ]
 
 
 def leading(diagnosis: Diagnosis) -> tuple[Cause, ...]:
@@ -140,17 +183,35 @@ def possible_shrink(diagnosis: Diagnosis) -> float:
     return max(0.0, 100.0 * (1.0 - diagnosis.gap.noise_floor / diagnosis.gap.before.total))
 
 
-def vehicle_snippet(causes: tuple[Cause, ...]) -> str | None:
-    """Lines of vehicle.yaml that put the causes into the simulation."""
-    if not causes:
-        return None
-    lines = ["effects:"]
-    for cause in causes:
-        values = ", ".join(f"{name}: {interval.value:.4g}" for name, interval in cause.parameters.items())
-        lines.append(f"  {cause.effect}: {{{values}}}")
-    forms = [f"  {cause.effect}: {cause.form}" for cause in causes if cause.form]
-    lines += ["forms:", *forms] if forms else []
-    return "\n".join(lines)
+def heat_rows(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
+    """The heat map's parts that have a share worth showing, largest first."""
+    sizes = {part: sum(row.values()) for part, row in diagnosis.heat_map.items()}
+    shown = sorted((part for part in sizes if sizes[part] >= SHOWN_FROM), key=lambda part: -sizes[part])
+    return {part: diagnosis.heat_map[part] for part in shown}
+
+
+def apply_command(diagnosis: Diagnosis) -> str:
+    """The command that puts the named effects into the vehicle file."""
+    path = Path((diagnosis.provenance.get("vehicle") or {}).get("path") or "car.yaml")
+    lines = (
+        ["trpac", "gap", "apply", JSON_NAME],
+        ["--vehicle", str(path)],
+        ["--out", f"{path.stem}_with_effect.yaml"],
+    )
+    return " \\\n  ".join(shlex.join(line) for line in lines)
+
+
+def signal_rows(gap: Gap) -> list[tuple[str, float, float | None, str, float | None, float | None]]:
+    """Per signal and of all: its name, gap before and after [noise floors], its unit, the same two in that unit."""
+    rows: list[tuple[str, float, float | None, str, float | None, float | None]] = [
+        ("all", gap.before.total, gap.after.total, "", None, None)
+    ]
+    for name, before in gap.before.signals.items():
+        plain = next((key for key in gap.before.si if key.startswith(f"{name} [")), "")
+        unit = plain[len(name) + 2 : -1]
+        si = gap.before.si.get(plain), gap.after.si.get(plain)
+        rows.append((name, before, gap.after.signals.get(name), unit, *si))
+    return rows
 
 
 def shown_traces(diagnosis: Diagnosis) -> list[Trace]:
@@ -194,16 +255,14 @@ def provenance_rows(value: Any, label: str = "") -> list[tuple[str, str, str]]:
     return [(label, f"{value:g}" if isinstance(value, float) else str(value), "")]
 
 
-def _pictures(diagnosis: Diagnosis) -> dict[str, Picture]:
-    """The pictures that this diagnosis has."""
-    made = {
-        "gap": _picture(
-            figures.gap_bars(diagnosis.gap), "Gap per signal before and after, and the noise floor"
-        )
-    }
-    if diagnosis.heat_map:
-        heat = figures.heat_map(diagnosis.heat_map)
-        made["heat"] = _picture(heat, "Share of the gap by subsystem and regime of driving")
+def _pictures(diagnosis: Diagnosis, worst: list[Trace], names: str) -> dict[str, Picture]:
+    """The pictures that this diagnosis has; `worst` is the trace furthest off, if any, `names` the added effects'."""
+    made = {}
+    if diagnosis.verdict is not Verdict.NO_GAP:
+        for shown in worst:
+            made["largest"] = _picture(
+                figures.largest_gap(shown, names), f"{shown.signal} where it is furthest off"
+            )
     if diagnosis.unexplained is not None and len(diagnosis.unexplained.x):
         term = diagnosis.unexplained
         made["term"] = _picture(figures.missing_term(term), f"The missing term over {term.depends_on}")

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import shlex
 from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -13,17 +14,13 @@ import cv2
 import made_up_diagnosis as made_up
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.effects import make_effect
-from scenarios.files import VehicleFile, load_vehicle
-from sim2real.demo import VEHICLE
 from sim2real.how_far.rating import LEAST_SAMPLES, MOST_SAMPLES, rating
 from sim2real.result import Interval, Measure, Trace, Verdict
 from sim2real.telling import figures, report
-from sim2real.telling.report import estimate, jsonable, percent, render, vehicle_snippet, write_diagnosis
+from sim2real.telling.report import estimate, jsonable, percent, render, write_diagnosis
 
 DIAGNOSES = {name: make() for name, make in made_up.ALL.items()}
 BRIEF = {name: replace(diagnosis, traces=()) for name, diagnosis in DIAGNOSES.items()}
@@ -31,18 +28,20 @@ BRIEF = {name: replace(diagnosis, traces=()) for name, diagnosis in DIAGNOSES.it
 
 
 class Page(HTMLParser):
-    """A page's visible words, addresses, and whether its tags are closed in order."""
+    """A page's visible words, addresses, widths of its budget's parts, and whether its tags are closed in order."""
 
     VOID = ("meta", "img", "link", "br", "input")
 
     def __init__(self, html):
         super().__init__()
-        self.addresses, self.words, self.open, self.classes = [], [], [], []
+        self.addresses, self.words, self.open, self.classes, self.budget = [], [], [], [], []
         self.feed(html)
 
     def handle_starttag(self, tag, attributes):
         if tag not in self.VOID:
             self.open.append(tag)
+        if tag == "i" and {"class", "style"} <= set(dict(attributes)):
+            self.budget.append(float(dict(attributes)["style"].removeprefix("width: ").removesuffix("%")))
         for key, value in attributes:
             if key in ("src", "href"):
                 self.addresses.append(value)
@@ -124,6 +123,19 @@ def test_a_cause_shows_its_estimate_shrink_and_reasons(pages):
     assert all(reason in text for reason in DIAGNOSES["identified"].causes[1].evidence_against)
 
 
+def test_a_regime_that_was_never_driven_is_not_shown_as_zero():
+    shares = {"tyre": {"brake": 0.5}, "vehicle": {"brake": 0.3, "coast": 0.2}, "wheel": {"coast": 1e-5}}
+    text = Page(render(replace(BRIEF["identified"], heat_map=shares))).text
+    assert "brake coast tyre 50 % – vehicle 30 % 20 % signal" in text
+
+
+def test_the_gap_of_each_signal_is_told_with_its_unit(pages):
+    assert "wheel speed 6.80 1.20 0.340 – rad/s vehicle speed" in pages["identified"].text
+    assert (
+        "signal gap root mean square residual all 4.10 wheel speed 6.80 0.340 rad/s" in pages["unknown"].text
+    )
+
+
 def test_where_and_warnings_and_provenance_are_told(pages):
     text = pages["identified"].text
     assert "wheel_speed_fl tyre drive, low speed fit_1.csv 1.20 1.90 31 %" in text
@@ -136,7 +148,7 @@ def test_where_and_warnings_and_provenance_are_told(pages):
 
 def test_only_what_the_verdict_names_is_marked(pages):
     marked = {name: sum(c == "cause needed" for c in page.classes) for name, page in pages.items()}
-    assert marked == {"identified": 1, "compound": 2, "ambiguous": 0, "unknown": 0, "no_gap": 0}
+    assert marked == {"identified": 1, "partial": 1, "compound": 2, "ambiguous": 0, "unknown": 0, "no_gap": 0}
 
 
 def test_without_a_gap_nothing_is_blamed(pages):
@@ -188,19 +200,91 @@ def test_traces_come_worst_first():
     assert shown[-1].signal == "position_m"
 
 
-def test_the_snippet_is_what_vehicle_yaml_takes():
-    snippet = yaml.safe_load(vehicle_snippet(DIAGNOSES["compound"].causes[:2]))
-    assert list(snippet["effects"]) == ["tyre_relaxation", "aero_drag"]
-    for effect, values in snippet["effects"].items():
-        assert make_effect(effect, values, load_vehicle(VEHICLE)).id == effect
+class TestFirstScreen:
+    @staticmethod
+    def first(pages, name):
+        return pages[name].text.partition("Where the gap lies")[0]
+
+    @pytest.mark.parametrize("name", DIAGNOSES)
+    def test_the_budget_s_bar_is_whole(self, pages, name):
+        widths = pages[name].budget
+        assert sum(widths) == pytest.approx(0.0 if name == "no_gap" else 100.0, abs=0.01)
+        assert len(widths) == (0 if name == "no_gap" else len(DIAGNOSES[name].budget.shares))
+
+    def test_the_budget_s_table_has_shares_and_intervals(self, pages):
+        text = self.first(pages, "partial")
+        assert "mass_offset 62 % 56 % to 68 %" in text
+        assert "structure: what no effect of the library takes 34 % 31 % to 38 %" in text
+        assert "noise of the sensors 4 % 3 % to 4 %" in text
+
+    def test_each_part_has_its_own_pattern(self):
+        parts = report.budget_parts(DIAGNOSES["compound"])
+        assert [part.pattern for part in parts] == ["cause0", "cause1", "structure", "noise"]
+        page = render(BRIEF["compound"])
+        assert all(f".{part.pattern} {{ background: " in page for part in parts)
+
+    def test_an_effect_that_makes_the_gap_larger_has_no_width(self):
+        worse = replace(BRIEF["partial"], budget=made_up.budget(mass_offset=-0.1))
+        widths = [part.width for part in report.budget_parts(worse)]
+        assert widths == pytest.approx([0.0, 90.0, 10.0])
+        assert "mass_offset -10 %" in Page(render(worse)).text
+
+    @pytest.mark.parametrize(
+        ("name", "step"),
+        [
+            ("identified", "A gap of 1.10 is left then."),
+            ("partial", "A gap of 2.50 is left then; “What is left beside mass_offset” below"),
+            ("compound", "Put tyre_relaxation and aero_drag into the vehicle file"),
+            ("ambiguous", "Add that log with --fit"),
+            (
+                "unknown",
+                "Look at the vehicle: what is left shows most in accel x and depends on vehicle speed [m/s].",
+            ),
+            ("no_gap", "Nothing: what is left is noise."),
+        ],
+    )
+    def test_the_next_step(self, pages, name, step):
+        text = self.first(pages, name)
+        assert step in text
+        assert ("trpac gap apply" in text) == (name in ("identified", "partial", "compound"))
+        assert ("--paired" in text) == (name == "unknown")
+
+    def test_the_command_names_the_vehicle_file(self):
+        hostile = {"vehicle": {"path": "my cars/<b>.yaml", "sha256": "0"}}
+        command = report.apply_command(replace(DIAGNOSES["partial"], provenance=hostile))
+        assert shlex.split(command.replace("\\\n", "")) == [
+            *("trpac", "gap", "apply", "diagnosis.json"),
+            *("--vehicle", "my cars/<b>.yaml", "--out", "<b>_with_effect.yaml"),
+        ]
+        assert "--vehicle car.yaml" in report.apply_command(replace(DIAGNOSES["partial"], provenance={}))
+
+    def test_without_a_signal_a_sentence_stands_for_the_picture(self):
+        assert "No signal of the hold-out has a sample" in Page(render(BRIEF["partial"])).text
 
 
-def test_the_snippet_names_the_form_where_there_are_several():
-    cause = replace(DIAGNOSES["compound"].causes[0], form="the slip lags")
-    snippet = yaml.safe_load(vehicle_snippet((cause, DIAGNOSES["compound"].causes[1])))
-    assert snippet["forms"] == {"tyre_relaxation": "the slip lags"}
-    car = load_vehicle(VEHICLE).model_dump(by_alias=True) | snippet
-    assert type(VehicleFile.model_validate(car).make_effects()[1]).form == "the slip lags"
+class TestRemainder:
+    def test_of_a_partial_verdict_it_is_told_beside_the_effect(self, pages):
+        _, _, told = pages["partial"].text.rpartition("What is left beside mass_offset")
+        assert told.strip().startswith(DIAGNOSES["partial"].unexplained.sentence)
+        assert "depends on acceleration [m/s²] sign and shape changes sign; is a straight line" in told
+        assert "share of the remainder 50 %" in told
+
+    @pytest.mark.parametrize("name", ["partial", "unknown"])
+    def test_without_a_form_it_is_a_sentence(self, name):
+        assert "It has no form" in Page(render(replace(BRIEF[name], unexplained=None))).text
+
+    def test_without_a_curve_nothing_is_drawn(self):
+        none = np.array([])
+        term = replace(DIAGNOSES["partial"].unexplained, x=none, y=none, share=math.nan)
+        page = Page(render(replace(BRIEF["partial"], unexplained=term)))
+        assert page.addresses == []
+        assert "share of the remainder" not in page.text
+
+    def test_hostile_words_are_text(self):
+        term = replace(DIAGNOSES["partial"].unexplained, sentence="<script>x</script>", depends_on="<b>")
+        page = render(replace(BRIEF["partial"], unexplained=term, sentence="<i>a</i>. <u>b</u>"))
+        assert not any(tag in page for tag in ("<script>", "<b>&", "<i>a", "<u>"))
+        assert "&lt;script&gt;x" in page
 
 
 class TestWriting:
@@ -214,9 +298,9 @@ class TestWriting:
         assert [p.name for p in folder.parent.iterdir()] == ["out"]
 
     def test_a_failure_leaves_nothing(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(figures, "gap_bars", lambda gap: 1 / 0)
+        monkeypatch.setattr(figures, "missing_term", lambda term: 1 / 0)
         with pytest.raises(ZeroDivisionError):
-            write_diagnosis(BRIEF["identified"], tmp_path / "out")
+            write_diagnosis(BRIEF["unknown"], tmp_path / "out")
         assert list(tmp_path.iterdir()) == []
 
     def test_a_full_disk_leaves_the_old_result(self, tmp_path, monkeypatch):
@@ -318,18 +402,6 @@ class TestFigures:
         start, end = figures.worst_window(Trace("s", "-", time, time, time, time, 0.1))
         assert (start, end) == (time[0], time[-1])
 
-    def test_after_is_drawn_only_where_something_was_added(self):
-        gap = DIAGNOSES["identified"].gap
-        alone = figures.gap_bars(replace(gap, after=gap.before))
-        assert _has_colour(figures.gap_bars(gap), figures.AFTER)
-        assert not _has_colour(alone, figures.AFTER)
-        assert _has_colour(alone, figures.BEFORE)
-
-    def test_a_cell_that_was_never_driven_is_not_shown_as_zero(self):
-        full = {"tyre": {"brake": 0.5, "coast": 0.0}, "vehicle": {"brake": 0.5, "coast": 0.0}}
-        part = {"tyre": {"brake": 0.5}, "vehicle": {"brake": 0.5, "coast": 0.0}}
-        assert figures.heat_map(full) != figures.heat_map(part)
-
     @pytest.mark.parametrize(
         ("name", "label"),
         [
@@ -342,12 +414,6 @@ class TestFigures:
     )
     def test_names_become_labels(self, name, label):
         assert figures.label_of(name) == label
-
-
-def _has_colour(png, colour):
-    pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
-    bgr = [int(colour[i : i + 2], 16) for i in (5, 3, 1)]
-    return bool((np.abs(pixels.astype(int) - bgr).max(axis=2) <= 2).sum() > 1000)
 
 
 class TestRating:

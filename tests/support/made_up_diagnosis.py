@@ -8,6 +8,7 @@ import numpy as np
 
 from sim2real.result import (
     MEANING,
+    Budget,
     Cause,
     Diagnosis,
     Gap,
@@ -110,6 +111,14 @@ OTHERS = (
 )
 
 
+def budget(**effects: float) -> Budget:
+    """Shares of effects; of what they leave a tenth is noise."""
+    rest = 1.0 - sum(effects.values())
+    shares = {f"effect:{name}": share for name, share in effects.items()}
+    shares |= {"structure": 0.9 * rest, "noise": 0.1 * rest}
+    return Budget({name: Interval(value, 0.9 * value, 1.1 * value) for name, value in shares.items()})
+
+
 def identified() -> Diagnosis:
     """One effect: tyre relaxation."""
     shown = traces(0.9, 0.97)
@@ -130,6 +139,7 @@ def identified() -> Diagnosis:
         heat_map=HEAT_MAP,
         causes=_causes(("tyre_relaxation", 0.93, {"length_m": LENGTH}, 1.1, 73.0), *OTHERS),
         cannot_rule_out=("camera_pitch",),
+        budget=budget(tyre_relaxation=0.93),
         trpac=RmsError(
             0.081, 0.034, "road.yaml's friction", "The estimator's own tyre model has no place for a lag."
         ),
@@ -141,6 +151,37 @@ def identified() -> Diagnosis:
         traces=shown,
         warnings=("fit_1.csv: 4 lost samples of vehicle_speed_m_s are bridged.",),
         provenance=PROVENANCE,
+    )
+
+
+def partial() -> Diagnosis:
+    """A payload on a car whose tyres are another make than the simulation's."""
+    x = np.linspace(-3.0, 3.0, 12)
+    return replace(
+        identified(),
+        verdict=Verdict.PARTIAL,
+        sentence="A part of the gap of 4.1 times the noise floor is mass_offset (mass_kg 180 kg): it takes the gap "
+        "from 4.1 to 2.5 times the noise floor.",
+        gap=replace(
+            identified().gap, after=Measure(2.5, {"wheel_speed": 4.0, "vehicle_speed": 1.0, "accel_x": 1.1})
+        ),
+        causes=_causes(
+            ("mass_offset", 0.91, {"mass_kg": Interval(180.0, 150.0, 211.0, "kg")}, 2.5, 39.0), *OTHERS[:2]
+        ),
+        traces=traces(0.9, 0.4),
+        budget=budget(mass_offset=0.62),
+        unexplained=Unexplained(
+            "tyre",
+            "wheel_speed",
+            "acceleration",
+            "-",
+            "changes sign",
+            "is a straight line",
+            0.5,
+            x,
+            0.001 * x,
+            "The tyre's slip is larger than the model's by 0.001 per m/s^2.",
+        ),
     )
 
 
@@ -158,6 +199,7 @@ def ambiguous() -> Diagnosis:
             ("torque_gain", 0.46, {"factor": Interval(0.88, 0.85, 0.91, "-")}, 1.15, 72.0),
             *OTHERS[1:],
         ),
+        budget=budget(mass_offset=0.93),
         ambiguous_with=(("mass_offset", "torque_gain"),),
         next_manoeuvre=NextManoeuvre(
             "From 8 m/s, accelerate with full torque for 3 s, then brake to the grip limit; repeat once.",
@@ -182,6 +224,7 @@ def compound() -> Diagnosis:
             ("aero_drag", 0.45, {"drag_area_m2": Interval(0.65, 0.6, 0.7, "m^2")}, 3.0, 27.0),
             *OTHERS[:3],
         ),
+        budget=budget(tyre_relaxation=0.6, aero_drag=0.33),
     )
 
 
@@ -200,6 +243,7 @@ def unknown() -> Diagnosis:
             ("aero_drag", 0.05, {"drag_area_m2": Interval(0.9, 0.8, 1.0, "m^2")}, 2.9, 29.0), *OTHERS[:2]
         ),
         traces=shown,
+        budget=budget(),
         rating={},
         trpac=None,
         unexplained=Unexplained(
@@ -230,6 +274,7 @@ def no_gap() -> Diagnosis:
         heat_map={},
         causes=_causes(*OTHERS[:3]),
         cannot_rule_out=("friction_offset",),
+        budget=None,
         trpac=None,
         rating={},
         traces=traces(0.0, 0.0),
@@ -239,6 +284,7 @@ def no_gap() -> Diagnosis:
 
 ALL = {
     "identified": identified,
+    "partial": partial,
     "ambiguous": ambiguous,
     "compound": compound,
     "unknown": unknown,

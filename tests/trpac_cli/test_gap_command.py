@@ -92,6 +92,9 @@ class TestDiagnose:
         assert f"gap {said.gap.before.total:.2f}" in text
         assert (said.causes[0].effect in text) == (name != "no_gap")
         assert (name == "ambiguous") == ("To tell them apart" in text)
+        assert ("of the squared gap: " in text) == (name != "no_gap")
+        if name == "partial":
+            assert "of the squared gap: mass_offset 62 %, structure 34 %, noise 4 %" in text
         assert str(tmp_path / "out" / "report.html") in result.stdout
 
     def test_square_brackets_in_a_sentence_are_no_markup(self, fake, tmp_path):
@@ -294,6 +297,7 @@ class TestDemo:
             ("torque_lag", "identified", "[red]not right"),
             ("torque_gain", "ambiguous", "cannot tell apart"),
             ("tyre_relaxation", "unknown", "not[/red] try it"),
+            ("mass_offset", "partial", "[green]right"),
             ("torque_lag", "no_gap", "says 'no_gap' and ranks the hidden effect 1 of 3"),
         ],
     )
