@@ -4,21 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, SIGMA, clean, noisy, pulses, remeasured
+from gap_drives import MODEL, clean, noisy, pulses
+from sim2real.which.closure import at_the_floor
+from sim2real.which.quiet import is_noise
 
-from scenarios.effects.wheel_speed_quantisation import WheelSpeedQuantisation
-from sim2real.observing.drive import ACCEL
 from sim2real.observing.evidence import gather
-from sim2real.result import Gap, Measure, Verdict
-from sim2real.telling.sentences import verdict
-from sim2real.which.closure import at_the_floor, loud
+from sim2real.result import Verdict
 from sim2real.which.contest import Contest, Entry
 from sim2real.which.fitting import Candidate, fit
 from sim2real.which.goodness import Fitness, fitness
-from sim2real.which.quiet import is_noise, rare_share
-from sim2real.which.selection import NO_GAP_DOUBT, Decision
-
-KEY = "torque_gain"
+from sim2real.which.selection import Decision
 
 
 def evidence(bias_m_s2, seed):
@@ -40,32 +35,6 @@ def decided(fit_to, held, verdict=Verdict.IDENTIFIED):
     fits = Fitness(1.3, {}), Fitness(1.0, {})
     said = Decision(verdict, entry, (), {"accelerometer_bias": 0.9}, *fits)
     return said, Contest(null, (entry,), ())
-
-
-def test_what_every_row_of_every_log_hides_is_not_blamed():
-    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
-    decision, contest = decided(fit_to, held)
-    said = at_the_floor(decision, contest, MODEL, fit_to, held)
-    assert said.verdict is Verdict.NO_GAP
-    assert said.winner is contest.null
-    assert said.probability == {"accelerometer_bias": pytest.approx(0.9 * NO_GAP_DOUBT)}
-    assert said.slight == "accelerometer_bias"
-
-
-def test_what_nothing_explains_may_have_been_read_as_noise():
-    fit_to, held = evidence(0.004, 1), evidence(0.004, 5)
-    decision, contest = decided(fit_to, held, Verdict.UNKNOWN)
-    assert at_the_floor(decision, contest, MODEL, fit_to, held) is decision
-
-
-def test_a_gap_of_one_log_is_a_gap():
-    """One of 1.1 floors, no block of which is beyond all noise."""
-    fit_to, held = evidence(0.004, 1), evidence(0.07, 5)
-    decision, contest = decided(held, fit_to)
-    assert rare_share(contest.null, held, fit_to) == 0.0
-    assert at_the_floor(decision, contest, MODEL, held, fit_to) is decision
-    decision, contest = decided(fit_to, held)
-    assert at_the_floor(decision, contest, MODEL, fit_to, held) is decision
 
 
 def test_a_log_that_is_far_beyond_noise_now_and_then_has_a_gap():
@@ -125,47 +94,3 @@ def test_an_effect_that_is_next_to_none_may_take_what_it_will(slight):
     candidate = entry.fit.candidate
     none = replace(entry, fit=replace(entry.fit, x=candidate.neutral + 0.01 * candidate.scale))
     assert is_noise(replace(contest, singles=(none,)), fit_to, held)
-
-
-def knocking(part, size_sigmas):
-    """The same logs with an accelerometer that rings for a tenth of a second, every second."""
-    drives = []
-    for drive in part.drives:
-        measured = drive.measured.copy()
-        ringing = drive.time_s % 1.0 < 0.1
-        swings = np.where(np.arange(ringing.sum()) % 2, 1.0, -1.0)
-        measured[ringing, ACCEL] += size_sigmas * SIGMA[ACCEL] * swings
-        drives.append(remeasured(drive, measured))
-    return gather(MODEL, drives)
-
-
-def test_knocks_that_average_out_are_a_gap_where_every_log_has_them():
-    calm = evidence(0.0, 1), evidence(0.0, 5)
-    loud_ones = [knocking(part, 14.0) for part in calm]
-    found, contest = decided(*calm)
-    quiet = replace(found, verdict=Verdict.NO_GAP, winner=contest.null)
-    said = loud(quiet, MODEL, *loud_ones)
-    assert (said.verdict, said.fast) == (Verdict.UNKNOWN, True)
-    gap = Gap(Measure(2.4, {}, {}), Measure(2.4, {}, {}), 1.0)
-    assert "2.4 times" in verdict(said, gap, ())
-    assert "averages out within 0.2 s" in verdict(said, gap, ())
-    assert loud(quiet, MODEL, loud_ones[0], calm[1]) is quiet
-    assert loud(quiet, MODEL, *calm) is quiet
-    assert loud(found, MODEL, *loud_ones) is found
-
-
-def test_flanks_of_a_counter_are_no_knocks():
-    calm = evidence(0.0, 1), evidence(0.0, 5)
-    decision, contest = decided(*calm)
-    quiet = replace(decision, verdict=Verdict.NO_GAP, winner=contest.null)
-    counted = MODEL.with_effects(WheelSpeedQuantisation(48.0, 0.02))
-    assert loud(quiet, counted, *(knocking(part, 14.0) for part in calm)) is quiet
-
-
-def test_a_slight_effect_is_told_beside_no_gap():
-    gap = Gap(Measure(0.99, {}, {}), Measure(0.99, {}, {}), 1.01)
-    fits = Fitness(1.0, {}), Fitness(1.0, {})
-    null = Entry((), None, np.zeros(7), np.zeros(7))
-    quiet = Decision(Verdict.NO_GAP, null, (), {}, *fits)
-    assert verdict(quiet, gap, ()).endswith("nothing may be blamed.")
-    assert verdict(replace(quiet, slight=KEY), gap, ()).endswith(f"most like {KEY}.")

@@ -1,136 +1,36 @@
 """Forms of an effect, noise read anew, partners of the best effect, a sensor that stands alone."""
 
-from dataclasses import replace
-from functools import reduce
-
 import numpy as np
 import pytest
 from gap_drives import (
-    BARE,
     MODEL,
     SIGMA,
-    STEP_S,
     clean,
     noisy,
     pulses,
     random_drives,
     remeasured,
-    road_of,
-    trace,
 )
-from long import beyond
+from sim2real.which.quiet import is_noise
+from sim2real.which.suspect import lone_sensor
 
-from scenarios.effects import EFFECTS, FORMS, form_of
-from scenarios.effects.driveline_compliance import DrivelineComplianceOfWheels
-from scenarios.effects.mass_offset import MassOffset, MassOffsetPlaced
-from scenarios.effects.rolling_resistance import RollingResistanceForce
-from scenarios.effects.tyre_relaxation import TyreRelaxationOfSlip, TyreRelaxationOfWheels
-from scenarios.effects.tyre_stiffness_offset import TyreStiffnessOffset, TyreStiffnessOffsetOfWheels
-from scenarios.effects.wheel_radius_offset import WheelRadiusOffsetOfWheels
-from scenarios.plant import dynamics
-from scenarios.plant.pipeline import make_setup
+from scenarios.effects import EFFECTS, FORMS
 from sim2real.diagnose import diagnose, find
 from sim2real.observing.drive import ACCEL, SPEED, WHEEL
 from sim2real.observing.evidence import Evidence, gather
 from sim2real.observing.noise import Noise
 from sim2real.result import Verdict
-from sim2real.telling.estimates import joint
-from sim2real.telling.findings import Findings, describe
-from sim2real.which.contest import first_round, hold_contest, silent, wheel_by_wheel
+from sim2real.which.contest import first_round, hold_contest
 from sim2real.which.fitting import Candidate, fit
 from sim2real.which.pairs import add_pairs, add_partners
-from sim2real.which.quiet import is_noise
 from sim2real.which.selection import decide, needs_pairs
-from sim2real.which.suspect import lone_sensor
-from sim2real.which.varying import vary
 
 
 def only(*keys):
     return set(EFFECTS) - set(keys)
 
 
-SLIPPERY = road_of(0.9, 0.35, 0.9, 0.35, 0.9, 0.35)
-
-
-def driven_by(effects, torque_nm, speed_m_s, seed=0):
-    """A drive of a car with effects in forms of theirs, over ice where its wheels slide."""
-    setup = make_setup(BARE, SLIPPERY)
-    p = reduce(lambda p, effect: effect.dynamics(p), effects, setup.parameters)
-    y = dynamics.initial_y(speed_m_s, 0.0, p)
-    states, accel, *_ = dynamics.run(y, torque_nm, STEP_S, p, setup.road)
-    measured = np.column_stack([states[:, :6], accel])
-    return noisy(remeasured(clean(torque_nm, speed_m_s, SLIPPERY), measured), seed)
-
-
 # --- forms
-
-
-@pytest.mark.parametrize("effect", [RollingResistanceForce(0.03), TyreRelaxationOfSlip(0.5)])
-def test_the_form_that_the_car_has_is_the_one_that_is_told(effect):
-    logs = [driven_by([effect], pulses(8.0) * 1.4, v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
-    found = find(MODEL, logs[:1], logs[1], exclude=only(effect.id, "mass_offset", "road_grade"))
-    assert found.decision.winner.ids == (effect.id,)
-    candidate, x = found.decision.winner.fit.candidate, found.decision.winner.fit.x
-    assert candidate.kinds == (type(effect),)
-    (name,) = (p.name for p in effect.parameters())
-    assert x[0] == pytest.approx(getattr(effect, name), rel=0.1)
-    assert type(found.added()[0]) is type(effect)
-
-
-@pytest.mark.parametrize(
-    ("shares", "verdict"),
-    [
-        ((0.012, 0.020, 0.008, 0.016), Verdict.IDENTIFIED),
-        ((0.0, 0.0, 0.02, 0.0), Verdict.UNKNOWN),
-    ],
-)
-def test_wheels_of_a_size_each_are_found_and_one_wrong_wheel_is_no_car_on_other_wheels(shares, verdict):
-    radius_m = MODEL.vehicle.wheel_radius_m
-    fl, fr, rl, rr = (1.0 + share for share in shares)
-    mean = (fl + fr + rl + rr) / 4.0
-    sides = ((fl + fr - 2.0 * mean) / (2.0 * mean), (fl - fr) / (2.0 * mean), (rl - rr) / (2.0 * mean))
-    effect = WheelRadiusOffsetOfWheels(radius_m * mean, *sides)
-    logs = [driven_by([effect], pulses(8.0), v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
-    found = find(MODEL, logs[:1], logs[1], exclude=only(effect.id, "vehicle_speed_scale", "mass_offset"))
-    assert found.decision.verdict is verdict
-    if verdict is Verdict.IDENTIFIED:
-        (told,) = found.added()
-        radii_m = (each.per_wheel(each.radius_m) for each in (told, effect))
-        np.testing.assert_allclose(*radii_m, rtol=5e-4)
-
-
-@pytest.mark.parametrize(
-    ("effect", "among"),
-    beyond(
-        1,
-        [
-            (TyreRelaxationOfWheels(0.5, 0.0, 0.2, -0.2), ("torque_lag", "torque_delay")),
-            (TyreRelaxationOfWheels(0.5, 0.15, -0.15, 0.05), ("torque_lag", "torque_delay")),
-            (
-                DrivelineComplianceOfWheels(1500.0, 2.0, 0.3, 0.1, 0.1, -0.15),
-                ("tyre_relaxation", "torque_lag"),
-            ),
-            (TyreStiffnessOffsetOfWheels(35_000.0, 0.0, 0.15, -0.15), ("friction_offset", "mass_offset")),
-        ],
-    ),
-)
-def test_each_wheels_own_lag_or_stiffness_is_found(effect, among):
-    """Wheels that ring at frequencies of their own are out of step after a few periods."""
-    logs = [driven_by([effect], pulses(8.0) * 2.0, v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
-    found = find(MODEL, logs[:1], logs[1], exclude=only(effect.id, *among))
-    assert found.decision.verdict is Verdict.IDENTIFIED
-    (told,) = found.added()
-    assert isinstance(told, type(effect))
-    np.testing.assert_allclose(*((e.unlike, e.front_sides, e.rear_sides) for e in (told, effect)), atol=0.03)
-
-
-def test_wheels_that_ring_are_started_from_what_suits_each_of_them():
-    """About a mean that one wheel's ringing alone has fixed, all shares at once are out of a fit's reach."""
-    effect = TyreRelaxationOfWheels(0.4, 0.1, 0.15, -0.2)
-    log = driven_by([effect], pulses(8.0) * 2.0, 8.0)
-    candidate = Candidate(MODEL, (effect.id,), (FORMS[effect.id].index(type(effect)),))
-    start = wheel_by_wheel(candidate, np.array([0.46]), gather(MODEL, [log]))
-    np.testing.assert_allclose(start, [0.4, 0.1, 0.15, -0.2], atol=0.07)
 
 
 def test_each_effect_enters_the_contest_once():
@@ -144,28 +44,6 @@ def test_each_effect_enters_the_contest_once():
     ]
     tried = len({(f.candidate.ids, f.candidate.forms) for f in first})
     assert len(contest.singles) + len(contest.forms) == tried
-
-
-def test_an_interval_holds_those_of_all_forms_that_do_as_well():
-    """A hard stop tells the fall's two shapes apart; a log that does not is made of one's residuals for both."""
-    fall = {"friction_falloff": {"falloff_s_m": 0.15, "floor": 0.5}}
-    torque = trace((0.0, -1200.0), (0.4, 0.0), (1.0, -1500.0), (1.5, 0.0), duration_s=3.0)
-    logs = [noisy(clean(torque, v0, SLIPPERY, effects=fall), seed) for seed, v0 in enumerate((12.0, 14.0))]
-    found = find(MODEL, logs[:1], logs[1], exclude=only("friction_falloff"))
-    (best,), (other,) = found.contest.singles, found.contest.forms
-    assert best.fitted.candidate.kinds[0].form == "exponential"
-
-    def told(contest):
-        return describe(replace(found, contest=contest), seed=0, jobs=1, progress=silent).causes[0].parameters
-
-    alone, there = ({name: said for (_, name), said in joint(e, found.fit_to).items()} for e in (best, other))
-    assert told(found.contest) == alone
-    alike = told(replace(found.contest, forms=(replace(other, z_fit=best.z_fit, z_hold=best.z_hold),)))
-    for name, said in alike.items():
-        assert said.value == alone[name].value
-        assert said.low == min(alone[name].low, there[name].low)
-        assert said.high == max(alone[name].high, there[name].high)
-    assert alike != alone
 
 
 def test_forms_differ_in_name_and_share_id_and_begin_with_the_same_parameters():
@@ -278,58 +156,6 @@ def test_a_pair_leaves_no_more_than_its_members(two_causes):
     for pair in paired.pairs:
         assert pair.loss_fit <= 1.001 * min(single[key] for key in pair.ids)
     assert decide(paired, fit_to, held).winner.ids == ("aero_drag", "wheel_inertia_offset")
-
-
-@pytest.fixture(scope="module")
-def a_load_behind_and_soft_tyres():
-    """Contest of two effects, one of which entered it in a form that it does not have, its evidence and the truth."""
-    stiffness_n = 0.8 * MODEL.vehicle.to_core().longitudinal_stiffness_n
-    car = [MassOffsetPlaced(250.0, 1.2), TyreStiffnessOffset(stiffness_n)]
-    logs = [driven_by(car, pulses(8.0) * 2.0, v0, seed) for seed, v0 in enumerate((8.0, 14.0))]
-    fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
-    few = only("mass_offset", "tyre_stiffness_offset", "aero_drag")
-    contest = hold_contest(MODEL, fit_to, held, first_round(MODEL, fit_to, few))
-    every = (*contest.singles, *contest.forms)
-    plain = next(e for e in every if e.fitted.candidate.kinds == (MassOffset,))
-    bent = tuple(plain if e.ids == plain.ids else e for e in contest.singles)
-    paired = add_pairs(add_partners(replace(contest, singles=bent), fit_to), MODEL, fit_to, held)
-    return paired, fit_to, held, {"mass_kg": 250.0, "behind_m": 1.2, "stiffness_n": stiffness_n}
-
-
-def test_a_pair_is_found_in_the_forms_that_it_does_best_in(a_load_behind_and_soft_tyres):
-    paired, _, _, truth = a_load_behind_and_soft_tyres
-    assert paired.pairs[0].fitted.candidate.kinds == (MassOffsetPlaced, TyreStiffnessOffset)
-    assert paired.pairs[0].fitted.x == pytest.approx(list(truth.values()), rel=0.03)
-    assert len({pair.ids for pair in paired.pairs}) == len(paired.pairs)
-
-
-@pytest.mark.parametrize("verdict", [Verdict.COMPOUND, Verdict.UNKNOWN])
-@pytest.mark.parametrize("varies", beyond(1, [False, True]))
-def test_causes_are_told_with_the_parameters_of_their_form(a_load_behind_and_soft_tyres, verdict, varies):
-    """Together a pair's in its forms; where it is not blamed each cause in the one that it does best in alone."""
-    paired, fit_to, held, truth = a_load_behind_and_soft_tyres
-    decision = decide(paired, fit_to, held)
-    assert decision.winner is paired.pairs[0]
-    decision = replace(decision, verdict=verdict)
-    if varies:
-        decision = replace(decision, varied=vary(decision.winner, fit_to, held, "time"))
-    said = describe(Findings(MODEL, fit_to, held, paired, decision), seed=0, jobs=1, progress=silent)
-    for cause in said.causes:
-        assert list(cause.parameters) == [p.name for p in form_of(cause.effect, cause.form).parameters()]
-    told = {name: value for cause in said.causes[:2] for name, value in cause.parameters.items()}
-    if verdict is Verdict.COMPOUND:
-        assert all(told[name].low <= value <= told[name].high for name, value in truth.items())
-
-
-def test_one_effect_beside_which_much_is_left_is_ambiguous():
-    """Of two causes the small one is too small for a compound, but large enough that the great one is not all."""
-    effects = {"mass_offset": {"mass_kg": 200.0}, "torque_lag": {"time_constant_s": 0.0016}}
-    logs = random_drives(effects, count=2, seed=7, duration_s=8.0)
-    found = find(MODEL, logs[:1], logs[1], exclude=only("mass_offset", "torque_lag", "aero_drag"))
-    assert found.decision.verdict is Verdict.AMBIGUOUS
-    assert found.decision.winner.ids == ("mass_offset",)
-    assert [e.ids for e in found.decision.rivals] == [("torque_lag", "mass_offset")]
-    assert found.decision.probability["mass_offset"] < 0.85
 
 
 # --- a sensor that stands alone

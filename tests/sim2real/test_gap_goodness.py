@@ -11,18 +11,9 @@ from sim2real.observing.evidence import gather
 from sim2real.observing.lattice import Lattice
 from sim2real.which.contest import Contest, Entry
 from sim2real.which.fitting import ROBUST_FROM, Candidate, fit
-from sim2real.which.goodness import Fitness, fitness, gross_share, inflation
+from sim2real.which.goodness import fitness, gross_share, inflation
 from sim2real.which.selection import (
-    EXPLAINED_MISFIT,
-    EXPLAINED_MOST,
-    EXPLAINED_SHARE,
-    PAIR_MISFIT,
-    PAIR_MOST,
-    PAIR_SHARE,
-    explains,
-    pair_explains,
     probabilities,
-    takes_two,
 )
 
 COUNTER = Lattice(quantum_rad_s=0.1, window_s=0.02, sigma_rad_s=0.01, step_s=STEP_S)
@@ -87,49 +78,6 @@ def test_fitness_is_one_for_noise_and_grows_with_what_noise_would_average_out(ti
     assert flat.misfit == pytest.approx(1.0, abs=0.25)
     assert moved.signals["vehicle_speed"] == pytest.approx(5.1, abs=0.6)  # 1 sigma over 25 rows, and noise
     assert moved.signals["accel_x"] == flat.signals["accel_x"]
-
-
-def test_a_small_rest_of_a_large_gap_counts_as_explained():
-    def fit_as(value):
-        return Fitness(value, {})
-
-    assert explains(fit_as(EXPLAINED_MISFIT), fit_as(3.0))
-    assert not explains(fit_as(1.01 * EXPLAINED_MISFIT), fit_as(3.0))
-    assert explains(fit_as(0.9 * EXPLAINED_SHARE * 20.0), fit_as(20.0))
-    assert not explains(fit_as(1.1 * EXPLAINED_SHARE * 20.0), fit_as(20.0))
-    assert not explains(fit_as(1.01 * EXPLAINED_MOST), fit_as(500.0))
-
-
-def test_two_effects_explain_less_easily_than_one():
-    def fit_as(value):
-        return Fitness(value, {})
-
-    for before in (2.0, 50.0, 500.0):
-        most = max(PAIR_MISFIT, min(PAIR_SHARE * before, PAIR_MOST))
-        assert pair_explains(fit_as(0.99 * most), fit_as(before))
-        assert not pair_explains(fit_as(1.01 * most), fit_as(before))
-    assert explains(fit_as(2.4), fit_as(20.0))
-    assert not pair_explains(fit_as(2.4), fit_as(20.0))
-
-
-@pytest.mark.parametrize(
-    ("loss", "misfit", "explained", "taken"),
-    [
-        (0.90, 0.45, False, True),  # halves the misfit
-        (0.90, 0.45, True, False),  # which may be how the first differs from its form
-        (0.65, 0.45, True, True),
-        (0.65, 0.60, True, False),
-        (0.52, 0.60, True, True),  # less than half of what is more than noise
-        (0.65, 0.60, False, True),  # less of a loss that is noise in part
-        (0.75, 0.60, False, False),
-        (0.55, 0.60, False, True),
-    ],
-)
-def test_two_take_the_place_of_one_by_what_they_take_off(loss, misfit, explained, taken):
-    """Of a single effect that leaves ten times the noise's loss: shares of its loss, and of its misfit."""
-    best, pair = (made_up(share * 1e4, share * 1e4, 0) for share in (1.0, loss))
-    fits = (Fitness(2.0, {}), Fitness(2.0 * misfit, {}))
-    assert takes_two(best, pair, *fits, explained) is taken
 
 
 @pytest.mark.parametrize(("channel", "counted"), [(WHEEL, 0.0), (SPEED, 0.2)])

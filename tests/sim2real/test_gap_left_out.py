@@ -7,16 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from gap_drives import DRY, MODEL, clean, noisy, pulses
+from gap_drives import DRY, clean, noisy, pulses
 from gap_files import write_log, write_road
 
 from sim2real.demo import VEHICLE
 from sim2real.observing.drive import RECOVERY_S, WHEEL, backward
-from sim2real.observing.evidence import gather
 from sim2real.sources import read_sources
-from sim2real.which.contest import Contest, as_it_is, enter
-from sim2real.which.fitting import FULL_STEPS, Candidate
-from sim2real.which.pairs import deepened
 
 
 @pytest.fixture(scope="module")
@@ -61,21 +57,3 @@ def test_noise_of_a_locked_wheel_is_no_wheel_that_turns_back():
     one = np.zeros((1000, 4))
     one[500] = -20.0  # a sample that is wrong
     assert not backward(time_s, one).any()
-
-
-def test_an_effect_is_fitted_again_from_where_a_pair_has_it():
-    """Its own fit has stopped far off; a pair that holds it stands at its best."""
-    logs = [noisy(clean(pulses(9.0), 13.0, effects={"mass_offset": {"mass_kg": 120.0}}), s) for s in range(2)]
-    fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
-    mass = enter(Candidate(MODEL, ("mass_offset",)), fit_to, held, np.array([60.0]), FULL_STEPS)
-    off = np.array([60.0])
-    z = fit_to.whitened(fit_to.residuals(mass.fitted.candidate.model(off)))
-    z_hold = held.whitened(held.residuals(mass.fitted.candidate.model(off)))
-    stuck = replace(mass, fit=replace(mass.fitted, x=off, z=z), z_fit=z, z_hold=z_hold)
-    both = Candidate(MODEL, ("aero_drag", "mass_offset"))
-    pair = enter(both, fit_to, held, np.array([0.01, 119.0]), FULL_STEPS)
-    contest = Contest(as_it_is(MODEL, fit_to, held), (stuck,), pairs=(pair,))
-    (better,) = deepened(contest, fit_to, held).singles
-    assert better.fitted.x == pytest.approx([120.0], abs=5.0)
-    assert better.loss < stuck.loss
-    assert deepened(replace(contest, singles=(mass,), pairs=()), fit_to, held).singles == (mass,)

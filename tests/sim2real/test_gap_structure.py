@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from gap_drives import MODEL, clean, noisy, road_of, trace
 
-from scenarios.effects import EFFECTS, FORMS
+from scenarios.effects import EFFECTS
 from scenarios.effects.mu_split import MuSplit
 from scenarios.plant import dynamics
 from scenarios.plant.pipeline import make_setup
 from sim2real.diagnose import diagnose, find
 from sim2real.observing.evidence import gather
 from sim2real.result import Verdict
-from sim2real.which.contest import first_round, hold_contest, is_proper, priced
+from sim2real.which.contest import first_round, hold_contest, is_proper
 
 SHAPE = {"knee": -0.08, "crest": 0.06, "sliding": -0.1}
 FORMULA = {"share": 1.0, "shape": 1.5, "curvature": -0.8}
@@ -182,12 +182,3 @@ def test_sides_of_one_friction_are_no_split():
     contest = hold_contest(MODEL, fit_to, held, first)
     assert [e.ids for e in contest.singles] == [("mass_offset",)]
     assert all(is_proper(e) for e in contest.singles)
-
-
-def test_every_form_of_an_effect_reaches_the_contest_and_the_best_one_stays():
-    logs = [noisy(clean(hard_driving(6.0), 10.0, ROAD), 3)]
-    first = first_round(MODEL, gather(MODEL, logs), only("rolling_resistance"))
-    assert len(first) == len(FORMS["rolling_resistance"])
-    contest = hold_contest(MODEL, gather(MODEL, logs), gather(MODEL, logs), first)
-    assert len(contest.singles) == 1
-    assert contest.singles[0] is min((*contest.singles, *contest.forms), key=priced)

@@ -16,8 +16,6 @@ from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import sense
 from sim2real.observing.drive import CHANNELS, Drive, grid_step, make_drive
-from sim2real.observing.lattice import fast_spread
-from sim2real.observing.lattice_trace import find_counter
 
 Array = NDArray[np.float64]
 CAR = load_vehicle(Path(__file__).parents[2] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml")
@@ -155,12 +153,11 @@ def _drive(case: Case, car: VehicleFile, rng: np.random.Generator, name: str) ->
         **{f"wheel_torque_{w}_nm": commanded[:, i] for i, w in enumerate(("fl", "fr", "rl", "rr"))},
     }
     wheels = [table[f"wheel_speed_{w}_rad_s"] for w in ("fl", "fr", "rl", "rr")]
-    lattice, trace = find_counter(time, wheels)
-    spread = fast_spread(time, wheels)
+    lattice = find_lattice(time, wheels)
     factor = max(round(grid_step(case.rate_hz) * case.rate_hz), 1)
     n = len(time) // factor
     time, table = _means(time, n, factor), {key: _means(values, n, factor) for key, values in table.items()}
-    return make_drive(name, road, time, table, lattice=lattice, trace=trace, spread_rad_s=spread)
+    return make_drive(name, road, time, table, lattice=lattice)
 
 
 def _means(values: Array, n: int, factor: int) -> Array:
