@@ -66,6 +66,7 @@ def beside_another_build(
     scale = scale_of_build(stack)
     singles = hypotheses(stack, contest.singles, scale, jobs, progress)
     stack = with_tyre(stack, singles)
+    singles = [h for h in singles if h.candidate.is_proper(h.x)]
     found = judge(
         stack,
         scale,

@@ -125,7 +125,8 @@ def hold_contest(
     ]
     best: dict[tuple[str, ...], Entry] = {}
     for entry in sorted(run_all(work, jobs, progress, "effects"), key=lambda e: e.loss):
-        best.setdefault(entry.ids, entry)
+        if entry.fitted.candidate.is_proper(entry.fitted.x):
+            best.setdefault(entry.ids, entry)
     return Contest(null, tuple(best.values()))
 
 

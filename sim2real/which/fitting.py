@@ -89,6 +89,11 @@ class Candidate:
         """The base model with the effects at x."""
         return self.base.with_effects(*self.effects(x))
 
+    def is_proper(self, x: Array) -> bool:
+        """Whether every effect is itself at x, see `Effect.is_itself`."""
+        car = self.base.vehicle.to_core()
+        return all(effect.is_itself(car) for effect in self.effects(x))
+
 
 def _scale(starts: Sequence[float], neutral: float) -> float:
     spread = [abs(value - neutral) for value in starts if value != neutral and np.isfinite(value)]

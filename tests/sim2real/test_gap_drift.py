@@ -15,7 +15,7 @@ from sim2real.observing.noise import Noise
 from sim2real.result import Verdict
 from sim2real.which.contest import Entry
 from sim2real.which.goodness import fitness
-from sim2real.which.quiet import NO_GAP_MISFIT
+from sim2real.which.no_gap import NO_GAP_MISFIT
 
 DURATION_S = 30.0
 SHARE = 0.4

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_drives import MODEL, clean, noisy, pulses
-from sim2real.which.closure import at_the_floor
-from sim2real.which.quiet import is_noise
 
 from sim2real.observing.evidence import gather
 from sim2real.result import Verdict
 from sim2real.which.contest import Contest, Entry
 from sim2real.which.fitting import Candidate, fit
 from sim2real.which.goodness import Fitness, fitness
+from sim2real.which.no_gap import is_noise
 from sim2real.which.selection import Decision
 
 

@@ -11,8 +11,6 @@ from gap_drives import (
     random_drives,
     remeasured,
 )
-from sim2real.which.quiet import is_noise
-from sim2real.which.suspect import lone_sensor
 
 from scenarios.effects import EFFECTS, FORMS
 from sim2real.diagnose import diagnose, find
@@ -20,8 +18,10 @@ from sim2real.observing.drive import ACCEL, SPEED, WHEEL
 from sim2real.observing.evidence import Evidence, gather
 from sim2real.observing.noise import Noise
 from sim2real.result import Verdict
+from sim2real.where.sensor_isolation import lone_sensor
 from sim2real.which.contest import first_round, hold_contest
 from sim2real.which.fitting import Candidate, fit
+from sim2real.which.no_gap import is_noise
 from sim2real.which.pairs import add_pairs, add_partners
 from sim2real.which.selection import decide, needs_pairs
 

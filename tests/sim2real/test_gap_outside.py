@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_drives import MODEL, clean, noisy, pulses, remeasured, trace
-from sim2real.which.quiet import NO_GAP_MISFIT
 
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import find
@@ -14,6 +13,7 @@ from sim2real.result import Verdict
 from sim2real.telling.findings import describe
 from sim2real.telling.sentences import verdict as verdict_of
 from sim2real.which.contest import silent
+from sim2real.which.no_gap import NO_GAP_MISFIT
 
 DURATION_S = 16.0
 

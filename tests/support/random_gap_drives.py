@@ -16,6 +16,7 @@ from scenarios.files import RoadFile, VehicleFile, load_vehicle
 from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import sense
 from sim2real.observing.drive import CHANNELS, Drive, grid_step, make_drive
+from sim2real.observing.lattice import find_lattice
 
 Array = NDArray[np.float64]
 CAR = load_vehicle(Path(__file__).parents[2] / "scenarios" / "vehicles" / "four_in_wheel_motor_ev.yaml")
