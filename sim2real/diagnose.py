@@ -20,10 +20,11 @@ from sim2real.observing.lattice import common_lattice
 from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order, counts, read_order, without_swing
+from sim2real.observing.reference import By
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.result import Diagnosis, Measure, RmsError, Verdict, added
 from sim2real.sides import camera_side, counter_side
-from sim2real.sources import Source, Sources, read_source, read_sources
+from sim2real.sources import Source, Sources, pairing_of, read_source, read_sources
 from sim2real.telling.findings import Findings, describe
 from sim2real.which.closure import at_the_floor, closing, loud
 from sim2real.which.contest import COUNTER, Contest, Progress, first_round, hold_contest, silent
@@ -50,6 +51,9 @@ def diagnose_files(
     holdout: str,
     *,
     mapping: Path | None = None,
+    paired: Sequence[str] = (),
+    simulated: Sequence[str] = (),
+    by: By = "time",
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
@@ -65,6 +69,13 @@ def diagnose_files(
         Logs that parameters are fitted to, and the one that the gap is measured on; `log.csv` or `log.csv@road.yaml`.
     mapping : Path, optional
         How the logs' columns become the contract's.
+    paired : sequence of str
+        Reference logs: the same manoeuvres without the fault, one for each fit log and, last, the hold-out's. What the
+        simulation leaves of them is no gap.
+    simulated : sequence of str
+        The same of the user's own simulation over each log's inputs, in place of `paired`.
+    by : "time" or "position"
+        What says that rows of a log and of its reference are the same point of the manoeuvre.
     seed : int
         Of the resampling behind the intervals; the same seed gives the same diagnosis.
     exclude : collection of str
@@ -80,7 +91,8 @@ def diagnose_files(
         Unusable input, with everything that is wrong with it.
     """
     progress("reading", 0, 1)
-    sources = read_sources(vehicle, road, fit, holdout, mapping)
+    pairing = pairing_of(paired, simulated, by)
+    sources = read_sources(vehicle, road, fit, holdout, mapping, pairing)
     progress("reading", 1, 1)
     return diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
 
@@ -267,7 +279,10 @@ def _provenance(sources: Sources) -> dict[str, object]:
 
 def _origin(source: Source) -> dict[str, object]:
     log = {"path": str(source.log.path), "sha256": source.log.sha256}
-    return {**log, "road": _file(source.road_path), "rate_hz": source.log.rate_hz}
+    origin = {**log, "road": _file(source.road_path), "rate_hz": source.log.rate_hz}
+    if source.reference is None:
+        return origin
+    return {**origin, "reference": {"path": str(source.reference.path), "sha256": source.reference.sha256}}
 
 
 def _file(path: Path | None) -> dict[str, str | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
 
@@ -96,6 +96,9 @@ def diagnose(
     fit: Sequence[AnyLog],
     holdout: AnyLog,
     mapping: Mapping | str | Path | None = None,
+    paired: Sequence[AnyLog] = (),
+    simulated: Sequence[AnyLog] = (),
+    by: Literal["time", "position"] = "time",
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
@@ -111,6 +114,13 @@ def diagnose(
         DataFrames or paths: logs for the fit of parameters, and the log on which the gap is measured.
     mapping : path, optional
         Columns of the logs in the log format.
+    paired : sequence of logs
+        The same manoeuvres without the fault, one for each fit log and, last, the hold-out's: what the simulation
+        leaves of them is no gap.
+    simulated : sequence of logs
+        Logs of your own simulation over each log's inputs, in place of `paired`.
+    by : "time" or "position"
+        Equal `time_s` or equal `position_m` are the same point of the manoeuvre in a log and its reference.
     seed : int
         Seed of the resampling for the intervals.
     exclude : collection of str
@@ -131,7 +141,17 @@ def diagnose(
     logs = [read_log(log, mapping=mapping) for log in (*fit, holdout)]
     with extras("diagnose", "gap"):
         from sim2real.diagnose import diagnose_sources
-        from sim2real.sources import make_source, put_together
+        from sim2real.sources import make_source, pairing_of, put_together
 
-        sources = put_together(car, None, [make_source(log, course) for log in logs])
+        pairing = pairing_of(paired, simulated, by)
+        if pairing:
+            pairing.require(len(logs))
+        references = [read_log(log, mapping=mapping) for log in pairing.logs] if pairing else []
+        sources = put_together(
+            car,
+            None,
+            [make_source(log, course) for log in logs],
+            [make_source(log, course) for log in references],
+            by,
+        )
         return Diagnosis(diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress))
