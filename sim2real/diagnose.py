@@ -21,6 +21,8 @@ from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order, counts, read_order, without_swing
 from sim2real.observing.reference import By
+from sim2real.own_model.study import Study, before_fits
+from sim2real.own_sources import require_alone, studied
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.result import Diagnosis, Measure, RmsError, Verdict, added
 from sim2real.sides import camera_side, counter_side
@@ -54,6 +56,8 @@ def diagnose_files(
     paired: Sequence[str] = (),
     simulated: Sequence[str] = (),
     by: By = "time",
+    model: Path | None = None,
+    signals: Path | None = None,
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
@@ -76,6 +80,9 @@ def diagnose_files(
         The same of the user's own simulation over each log's inputs, in place of `paired`.
     by : "time" or "position"
         What says that rows of a log and of its reference are the same point of the manoeuvre.
+    model, signals : Path, optional
+        The user's own plant as a co-simulation unit, and the file that says which of its variables is which signal: its
+        runs over the logs' torques are their references.
     seed : int
         Of the resampling behind the intervals; the same seed gives the same diagnosis.
     exclude : collection of str
@@ -92,25 +99,33 @@ def diagnose_files(
     """
     progress("reading", 0, 1)
     pairing = pairing_of(paired, simulated, by)
+    require_alone(model, signals, pairing)
     sources = read_sources(vehicle, road, fit, holdout, mapping, pairing)
     progress("reading", 1, 1)
-    return diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
+    if model is None or signals is None:
+        return diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
+    with studied(sources, model, signals, jobs, progress) as (held, own):
+        return diagnose_sources(held, own=own, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
 
 
 def diagnose_sources(
     sources: Sources,
     *,
+    own: Study | None = None,
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Diagnose logs that have been read; see `diagnose_files`."""
+    """Diagnose logs that have been read, `own` with the user's model as their reference; see `diagnose_files`."""
     provenance = _provenance(sources)  # now: the files may be others when the fits are done
     drives = [s.drive for s in sources.all]
     model = Simulation(sources.vehicle)
+    warned = before_fits(own, model, drives[:-1]) if own else ()
     findings = find(model, drives[:-1], drives[-1], exclude=exclude, jobs=jobs, progress=progress)
     said = _told(findings, exclude, seed, jobs, progress)
+    if own:
+        said = replace(_with_own(said, own, findings), warnings=(*warned, *said.warnings))
     camera = diagnose_perception(
         [s.log for s in sources.fit],
         sources.holdout.log,
@@ -128,6 +143,15 @@ def diagnose_sources(
         warnings=(*(f"{s.log.name}: {text}" for s in sources.all for text in s.log.warnings), *said.warnings),
         provenance={**provenance, **said.provenance},
     )
+
+
+def _with_own(said: Diagnosis, own: Study, findings: Findings) -> Diagnosis:
+    """The diagnosis with what the user's own model says of it."""
+    first = said.causes[0].effect if said.causes else ""
+    entry = next((e for e in findings.contest.singles if e.ids[0] == first), None)
+    effect = entry.fitted.candidate.effects(entry.fitted.x)[0] if entry else None
+    found = own.judge(findings.model, findings.fit_to, findings.holdout, effect)
+    return replace(said, own_model=found, sentence=f"{said.sentence} {found.sentence}".strip())
 
 
 def _estimate(findings: Findings, sources: Sources) -> RmsError | None:

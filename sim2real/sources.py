@@ -190,7 +190,7 @@ def put_together(
     named = told_apart(found)
     if references:
         model = Simulation(car)
-        named = [with_reference(s, r, model, by) for s, r in zip(named, references, strict=True)]
+        named = [paired_with(s, r, model, by) for s, r in zip(named, references, strict=True)]
     *fitted, held = (with_turns_told(source, car) for source in named)
     if any(s.log.sha256 == held.log.sha256 for s in fitted):
         told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
@@ -198,25 +198,32 @@ def put_together(
     return Sources(car, vehicle_path, tuple(fitted), held)
 
 
-def with_reference(source: Source, reference: Source, model: Simulation, by: By = "time") -> Source:
+def paired_with(source: Source, reference: Source, model: Simulation, by: By = "time") -> Source:
     """The source held against a reference log, with warnings of what that does not cover or was driven otherwise.
 
     Raises LogError where the two have too little in common.
     """
     drive = held_against(model, source.drive, reference.drive, by)
+    apart = other_torque(drive, reference.drive, by)
+    found = with_reference(source, drive, reference.log)
+    if apart <= OTHER_TORQUE:
+        return found
+    told = (
+        f"the torque of {reference.log.name} differs by {100.0 * apart:.0f} % of this log's (root mean square): what "
+        "both have in common cancels only where they were driven alike. Match by position, or drive it again."
+    )
+    return replace(found, log=found.log.warned(told))
+
+
+def with_reference(source: Source, drive: Drive, reference: Log) -> Source:
+    """The source with a drive that has a reference, with a warning of what that does not cover."""
     assert drive.reference is not None
-    log = source.log
     counts = drive.moving & (drive.time_s >= drive.time_s[0] + SETTLING_S)
     without_s = (1.0 - covered(drive.reference, counts)) * float(counts.sum()) * drive.step_s
+    log = source.log
     if without_s > LEAST_UNCOVERED_S:
-        log = log.warned(f"{without_s:.3g} s are left out: {reference.log.name} is no reference there.")
-    apart = other_torque(drive, reference.drive, by)
-    if apart > OTHER_TORQUE:
-        log = log.warned(
-            f"the torque of {reference.log.name} differs by {100.0 * apart:.0f} % of this log's (root mean square): "
-            "what both have in common cancels only where they were driven alike. Match by position, or drive it again."
-        )
-    return replace(source, log=log, drive=drive, reference=reference.log)
+        log = log.warned(f"{without_s:.3g} s are left out: {reference.name} is no reference there.")
+    return replace(source, log=log, drive=drive, reference=reference)
 
 
 def with_turns_told(source: Source, vehicle: VehicleFile) -> Source:

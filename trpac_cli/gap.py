@@ -82,6 +82,15 @@ def diagnose(
             help="Rows of a log and its --paired log are the same point at equal time_s or position_m."
         ),
     ] = By.TIME,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            help="Your own plant as an FMU for co-simulation: it is run over the logs, in place of --simulated."
+        ),
+    ] = None,
+    signals: Annotated[
+        Path | None, typer.Option(help="Which variable of --model is which signal of the logs: signals.yaml.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same diagnosis.")] = 0,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Fits at a time; without it one per processor.")
@@ -111,6 +120,15 @@ def diagnose(
     --simulated sim_1.csv --simulated sim_2.csv. The logs' time_s has to
     count from the same point; where it does not, --by position.
 
+    Your own plant as an FMU does the same, is tuned, and needs a file of
+    signals, such as this one; docs/gap_own_model.md has all of it:
+    schema: 1; inputs: {motor.fl: {signal: wheel_torque_fl_nm}, ...};
+    outputs: {vehicle_speed_m_s: {column: v, unit: km/h}, ...};
+    initial: {v0: {signal: vehicle_speed_m_s}};
+    parameters: {car.m: {unit: kg, low: 1200, high: 1900,
+    effect: mass_offset.mass_kg}}.
+    Then: --model plant.fmu --signals signals.yaml
+
     No logs at hand? trpac gap demo --out out/gap_demo makes some.
 
     Exit codes: 0 with a diagnosis, 2 unusable input.
@@ -134,6 +152,8 @@ def diagnose(
                 paired=paired or (),
                 simulated=simulated or (),
                 by=by.value,
+                model=model,
+                signals=signals,
                 seed=seed,
                 jobs=jobs or cpu_count(),
                 progress=progress,

@@ -12,12 +12,13 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from sim2real.logs.errors import LogError
 from sim2real.observing.drive import CHANNELS, POSITION, Drive
@@ -32,6 +33,9 @@ LEAST_COVERED = 0.5
 """Share of a log's rows that its reference has to cover at least; the others are no evidence [-]."""
 SMOOTHED_S = 0.2
 """Positions are averaged over this time before rows are matched by them: they have noise of centimetres [s]."""
+FORGOTTEN_S = 0.3
+"""Before and after rows at which the two cars are on different roads, the reference says nothing for so long: three
+times the observer's memory of the wheels [s]."""
 OTHER_TORQUE = 0.25
 """Root mean square of the torques' difference over that of the torque from which on a pair was driven otherwise [-]."""
 
@@ -53,12 +57,41 @@ def held_against(model: Simulation, drive: Drive, reference: Drive, by: By = "ti
     LogError
         The reference covers less than `LEAST_COVERED` of the log, or a position is needed and not known.
     """
-    at = _matched(reference, residuals(_with_counter(model, reference), reference), drive, by)
-    counts = drive.moving & (drive.time_s >= drive.time_s[0] + SETTLING_S)
-    share = covered(at, counts)
+    at = _left_of(model, drive, reference, by)
+    share = _share(drive, at)
     if share < LEAST_COVERED:
         raise LogError(_too_little(drive, reference, by, share))
     return replace(drive, reference=at)
+
+
+def held_against_stretches(
+    model: Simulation, drive: Drive, stretches: Sequence[tuple[float, Drive]]
+) -> Drive:
+    """The same with a reference in stretches, matched by time: each from its time on [s], to the next one's."""
+    whole = np.full(drive.measured.shape, np.nan)
+    for from_s, stretch in stretches:
+        rows = drive.time_s >= from_s - 1e-9
+        whole[rows] = _left_of(model, drive, stretch, "time")[rows]
+    share = _share(drive, whole)
+    if share < LEAST_COVERED:
+        raise LogError(
+            f"{drive.name}: {stretches[0][1].name} moves where the log does, on the same friction by road.yaml, in "
+            f"{100.0 * share:.0f} % of its rows; expected at least {100.0 * LEAST_COVERED:.0f} %. Does the unit "
+            "begin with the log's speed and position, and get all of its torque?"
+        )
+    return replace(drive, reference=whole)
+
+
+def _left_of(model: Simulation, drive: Drive, reference: Drive, by: By) -> Array:
+    """What the model leaves of a reference, at the drive's rows, shape (n, 7)."""
+    at = _matched(reference, residuals(_with_counter(model, reference), reference), drive, by)
+    if by == "time":
+        at[_on_another_road(model, drive, reference)] = np.nan
+    return at
+
+
+def _share(drive: Drive, at: Array) -> float:
+    return covered(at, drive.moving & (drive.time_s >= drive.time_s[0] + SETTLING_S))
 
 
 def _too_little(drive: Drive, reference: Drive, by: By, share: float) -> str:
@@ -98,6 +131,26 @@ def _matched(reference: Drive, values: Array, drive: Drive, by: By) -> Array:
     onward = np.concatenate(([True], np.diff(x) > 0.0))
     columns = [np.interp(at, x[onward], column[onward], np.nan, np.nan) for column in values.T]
     return np.column_stack(columns)
+
+
+def _on_another_road(model: Simulation, drive: Drive, reference: Drive) -> NDArray[np.bool_]:
+    """Rows at which an axle of the two cars has another friction by road.yaml, or had it just before, shape (n,)."""
+    if not all(np.isfinite(d.measured[:, POSITION]).any() for d in (drive, reference)):
+        return np.zeros(len(drive), dtype=bool)
+    own, other = way(drive), _matched(reference, way(reference)[:, None], drive, "time")[:, 0]
+    known = np.isfinite(other)
+    starts = [s.start_m for s in drive.road.segments]
+    theta = np.array([(s.mu_left, s.mu_right) for s in drive.road.segments])
+    front_m = model.vehicle.wheelbase_m - model.vehicle.cog_to_rear_axle_m
+    apart = np.zeros(len(drive), dtype=bool)
+    for ahead_m in (front_m, -model.vehicle.cog_to_rear_axle_m):
+        here, there = (
+            theta[np.maximum(np.searchsorted(starts, x + ahead_m, side="right") - 1, 0)]
+            for x in (own, np.where(known, other, own))
+        )
+        apart |= (here != there).any(axis=1)
+    rows = drive.rows_in(FORGOTTEN_S)
+    return np.asarray(maximum_filter1d(apart, 2 * rows + 1))
 
 
 def way(drive: Drive) -> Array:
