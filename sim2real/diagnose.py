@@ -149,9 +149,9 @@ def _with_own(said: Diagnosis, own: Study, findings: Findings) -> Diagnosis:
     """The diagnosis with what the user's own model says of it."""
     first = said.causes[0].effect if said.causes else ""
     entry = next((e for e in findings.contest.singles if e.ids[0] == first), None)
-    effect = entry.fitted.candidate.effects(entry.fitted.x)[0] if entry else None
-    found = own.judge(findings.model, findings.fit_to, findings.holdout, effect)
-    return replace(said, own_model=found, sentence=f"{said.sentence} {found.sentence}".strip())
+    found = own.judge(findings.model, findings.fit_to, findings.holdout, entry)
+    told = "" if said.verdict is Verdict.NO_GAP else found.sentence
+    return replace(said, own_model=found, sentence=f"{said.sentence} {told}".strip())
 
 
 def _estimate(findings: Findings, sources: Sources) -> RmsError | None:

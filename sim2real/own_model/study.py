@@ -128,7 +128,7 @@ class Study:
                 )
         return tuple(told)
 
-    def judge(self, model: Simulation, fit_to: Evidence, held: Evidence, first: Effect | None) -> OwnFinding:
+    def judge(self, model: Simulation, fit_to: Evidence, held: Evidence, best: Entry | None) -> OwnFinding:
         """What tuning each parameter takes off the gap, and what the first effect leaves when the unit is run with it.
 
         Parameters
@@ -137,18 +137,21 @@ class Study:
             The nominal model.
         fit_to, held : Evidence
             Fit logs and hold-out, with the unit's run as reference.
-        first : Effect, optional
-            The best effect of the library.
+        best : Entry, optional
+            The best effect of the library, fitted.
         """
+        first = None if best is None else best.fitted.candidate.effects(best.fitted.x)[0]
         z, z_held = (e.whitened(e.residuals(model)) for e in (fit_to, held))
-        factor = inflation(Entry((), None, z, z_held), fit_to, held)
-        floor = float(np.count_nonzero(z))
-        fits = sorted((self._fit(r, fit_to, z, factor) for r in self.responses), key=lambda f: f[1])
+        whole = loss(z)
+        beyond = max(whole - float(np.count_nonzero(z)), 1e-9)
+        fits = sorted((self._fit(r, fit_to, z) for r in self.responses), key=lambda f: f[1])
         found = []
-        for number, (r, left, x, sd) in enumerate(fits):
+        for number, (r, left, x, curvature) in enumerate(fits):
+            moved = [(x - r.nominal) * _whitened(e, r, last) for e, last in ((fit_to, False), (held, True))]
+            rest = Entry((), None, z - moved[0], z_held - moved[1])
+            sd = float(np.sqrt(inflation(rest, fit_to, held) / curvature))
             after, at = self._confirmed(model, fit_to, held, r, x) if number == 0 else (None, x)
             tunable = self.own.signals.parameters[r.name]
-            beyond = max(loss(z) - floor, 1e-9)
             found.append(
                 OwnParameter(
                     r.name,
@@ -157,7 +160,7 @@ class Study:
                     ),
                     r.nominal,
                     tunable.effect or "",
-                    float(np.clip((loss(z) - left) / beyond, 0.0, 1.0)),
+                    float(np.clip((whole - left) / beyond, 0.0, 1.0)),
                     after,
                 )
             )
@@ -168,13 +171,11 @@ class Study:
             tuple(found),
             "" if exact is None or first is None else first.id,
             exact,
-            _sentence(found, first, exact),
+            _sentence(found, first, exact, 0.0 if best is None else (whole - best.loss_fit) / beyond),
         )
 
-    def _fit(
-        self, r: Response, evidence: Evidence, z: Array, factor: float
-    ) -> tuple[Response, float, float, float]:
-        """A parameter fitted alone: what it leaves of the loss, its value, and its standard deviation."""
+    def _fit(self, r: Response, evidence: Evidence, z: Array) -> tuple[Response, float, float, float]:
+        """A parameter fitted alone: what it leaves of the loss, its value, and the curvature of half the loss there."""
         column = _whitened(evidence, r)
         change = 0.0
         low, high = r.low - r.nominal, r.high - r.nominal
@@ -183,7 +184,7 @@ class Study:
             weight = robust_weight(z - change * column)
             curvature = max(float(weight @ column**2), 1e-12)
             change = float(np.clip((weight * column) @ z / curvature, low, high))
-        return r, loss(z - change * column), r.nominal + change, float(np.sqrt(factor / curvature))
+        return r, loss(z - change * column), r.nominal + change, curvature
 
     def _confirmed(
         self, model: Simulation, fit_to: Evidence, held: Evidence, r: Response, x: float
@@ -199,7 +200,7 @@ class Study:
                 break
             best = (loss(z), size, x)
             again = replace(r, nominal=x)
-            moved = self._fit(again, tried, z, 1.0)[2]
+            moved = self._fit(again, tried, z)[2]
             if abs(moved - x) < 0.02 * abs(x - r.nominal):
                 break
             x = moved
@@ -241,10 +242,11 @@ def before_fits(study: Study, model: Simulation, drives: Sequence[Drive]) -> tup
     return study.identifiability(gather(model, drives)) if study.responses else ()
 
 
-def _whitened(evidence: Evidence, r: Response) -> Array:
-    """A response in standard deviations of the noise, 0 where nothing counts."""
+def _whitened(evidence: Evidence, r: Response, last: bool = False) -> Array:
+    """A response in standard deviations of the noise, 0 where nothing counts; of the fit logs, or of the last one."""
     parts = []
-    for drive, noise, change in zip(evidence.drives, evidence.noises, r.change, strict=False):
+    changes = r.change[-1:] if last else r.change[:-1]
+    for drive, noise, change in zip(evidence.drives, evidence.noises, changes, strict=True):
         rows = np.where(drive.moving[:, None] & drive.counted[None, :], change, np.nan)
         parts.append(np.nan_to_num(noise.whitened(rows)).ravel())
     return np.concatenate(parts)
@@ -256,15 +258,19 @@ def _with(evidence: Evidence, references: Sequence[Array]) -> Evidence:
     return replace(evidence, drives=tuple(drives))
 
 
-def _sentence(found: Sequence[OwnParameter], first: Effect | None, exact: float | None) -> str:
-    """What was found, for a reader."""
+def _sentence(found: Sequence[OwnParameter], first: Effect | None, exact: float | None, taken: float) -> str:
+    """What was found, for a reader; `taken` is the share of the loss beyond noise that the first effect takes."""
     parts = []
     if exact is not None and first is not None:
         parts.append(f"Your model, run with {first.id}, leaves a gap of {exact:.2f} on the hold-out.")
     for best in found[:1]:
         value = best.estimate
+        beside = (
+            "" if first is None else f" ({first.id} of the library: {100.0 * np.clip(taken, 0.0, 1.0):.0f} %)"
+        )
         parts.append(
-            f"Of your model's own parameters {best.name} takes most: {100.0 * best.share:.0f} % of what is no noise, "
-            f"at {value.value:.4g} {value.unit} in place of {best.nominal:.4g}; run so, it leaves {best.gap_after:.2f}."
+            f"Of your model's own parameters {best.name} takes most: {100.0 * best.share:.0f} % of what is no noise"
+            f"{beside}, at {value.value:.4g} {value.unit} in place of {best.nominal:.4g}; run so, it leaves "
+            f"{best.gap_after:.2f}."
         )
     return " ".join(parts)
