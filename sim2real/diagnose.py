@@ -43,6 +43,9 @@ from sim2real.which.varying import add_varied
 from sim2real.which.wander import effect_beside_wandering, nothing_but_wandering
 from trpac_core.files import file_sha256
 
+AS_LITTLE = 1.05
+"""A parameter of the user's model that leaves this many times what the first effect leaves on the hold-out, or less, is
+not told apart from it: an interval of that gap is as wide [-]."""
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
 
 
@@ -150,8 +153,36 @@ def _with_own(said: Diagnosis, own: Study, findings: Findings) -> Diagnosis:
     first = said.causes[0].effect if said.causes else ""
     entry = next((e for e in findings.contest.singles if e.ids[0] == first), None)
     found = own.judge(findings.model, findings.fit_to, findings.holdout, entry)
-    told = "" if said.verdict is Verdict.NO_GAP else found.sentence
-    return replace(said, own_model=found, sentence=f"{said.sentence} {told}".strip())
+    if said.verdict is Verdict.NO_GAP:
+        return replace(said, own_model=found)
+    said = replace(said, own_model=found, sentence=f"{said.sentence} {found.sentence}".strip())
+    return _beside_own(said)
+
+
+def _beside_own(said: Diagnosis) -> Diagnosis:
+    """The diagnosis with the effect that the best own parameter stands for among those that it cannot tell apart.
+
+    It belongs there where the user's model, run with it, leaves as little as with the first effect.
+    """
+    found = said.own_model
+    if found is None or not found.parameters or said.verdict not in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS):
+        return said
+    best, first = found.parameters[0], said.causes[0]
+    effect = best.effect.partition(".")[0]
+    left = first.gap_after if found.gap_after is None else found.gap_after
+    groups = [g for g in said.ambiguous_with if first.effect in g]
+    known = {first.effect, *(e for g in groups for e in g)}
+    if not effect or effect in known or best.gap_after is None or best.gap_after > AS_LITTLE * left:
+        return said
+    group = tuple(dict.fromkeys((first.effect, effect, *(e for g in groups for e in g))))
+    others = tuple(g for g in said.ambiguous_with if g not in groups)
+    told = f"So {effect} and {first.effect} are not told apart."
+    return replace(
+        said,
+        verdict=Verdict.AMBIGUOUS,
+        ambiguous_with=(group, *others),
+        sentence=f"{said.sentence} {told}",
+    )
 
 
 def _estimate(findings: Findings, sources: Sources) -> RmsError | None:

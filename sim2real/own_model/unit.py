@@ -16,7 +16,7 @@ from scenarios.fmu_client.unpacking import unpack_unit
 from sim2real.own_model.signals import Signals
 from trpac_core.files import file_sha256, quoted
 
-NUMBERS = ("Real", "Integer", "Boolean", "Float64", "Float32", "Int64", "Int32", "Int16", "Int8", "Boolean")
+NUMBERS = ("Real", "Integer", "Boolean", "Float64", "Float32", "Int64", "Int32", "Int16", "Int8")
 """Types of variables, of FMI 2.0 and 3.0, that a signal can be read from."""
 REALS = ("Real", "Float64", "Float32")
 """Types of variables that a signal can be written to."""

@@ -34,7 +34,7 @@ from sim2real.result import Verdict
 from sim2real.sources import Sources, make_source
 from sim2real.which.contest import silent
 
-FEW = ("mass_offset", "torque_lag", "brake_drag", "accelerometer_bias", "road_grade")
+FEW = ("mass_offset", "torque_gain", "torque_lag", "brake_drag", "accelerometer_bias", "road_grade")
 EXCLUDE = set(EFFECTS) - set(FEW)
 
 
@@ -241,6 +241,8 @@ def test_a_payload_is_found_by_the_units_own_mass(folder, car, unit):
     assert best.estimate.value == pytest.approx(1500.0, abs=15.0)
     assert best.gap_after <= 1.2 * said.gap.noise_floor
     assert "m takes most" in said.sentence
+    named = {said.causes[0].effect, *(e for group in said.ambiguous_with for e in group)}
+    assert "mass_offset" in named
     assert said.to_json()["own_model"]["parameters"][0]["name"] == "m"
 
 
@@ -283,7 +285,7 @@ def test_our_plant_as_their_model(tmp_path):
         str(tmp_path / "hold.csv"),
         model=archive,
         signals=tmp_path / "signals.yaml",
-        exclude=EXCLUDE - {"torque_gain"},
+        exclude=EXCLUDE,
     )
     assert said.causes[0].effect == "torque_gain"
     assert said.causes[0].parameters["factor"].value == pytest.approx(0.88, abs=0.01)
