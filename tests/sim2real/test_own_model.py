@@ -97,6 +97,13 @@ def test_a_signals_file_is_read_strictly(tmp_path, parts, message):
         load_signals(written(tmp_path, changed(**parts)))
 
 
+def test_the_file_in_the_docs_is_one(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "gap_own_model.md").read_text(encoding="utf-8")
+    path = tmp_path / "signals.yaml"
+    path.write_text(page.partition("```yaml\n")[2].partition("```")[0], encoding="utf-8")
+    assert set(load_signals(path).parameters) == {"car.m", "body.h"}
+
+
 def test_a_text_that_names_a_file_beside_it_is_its_path(tmp_path):
     (tmp_path / "car.yaml").touch()
     signals = load_signals(written(tmp_path, changed(start={"a": "car.yaml", "b": "other", "c": 2.0})))
