@@ -22,16 +22,22 @@ from sim2real.observing.lattice import common_lattice
 from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order, counts, read_order, without_swing
+from sim2real.observing.reference import By
+from sim2real.own_model.study import Study, before_fits
+from sim2real.own_sources import require_alone, studied
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
 from sim2real.result import Diagnosis, Measure, RmsError, Verdict, added
 from sim2real.sides import camera_side, counter_side
-from sim2real.sources import Source, Sources, read_source, read_sources
+from sim2real.sources import Source, Sources, pairing_of, read_source, read_sources
 from sim2real.telling.findings import Findings, describe
 from sim2real.which.contest import COUNTER, Progress, first_round, hold_contest, silent
 from sim2real.which.pairs import add_pairs
 from sim2real.which.selection import decide
 from trpac_core.files import file_sha256
 
+AS_LITTLE = 1.05
+"""A parameter of the user's model that leaves this many times what the first effect leaves on the hold-out, or less, is
+not told apart from it: an interval of that gap is as wide [-]."""
 PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy", "pandas")
 
 
@@ -42,6 +48,11 @@ def diagnose_files(
     holdout: str,
     *,
     mapping: Path | None = None,
+    paired: Sequence[str] = (),
+    simulated: Sequence[str] = (),
+    by: By = "time",
+    model: Path | None = None,
+    signals: Path | None = None,
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
@@ -57,6 +68,16 @@ def diagnose_files(
         Logs that parameters are fitted to, and the one that the gap is measured on; `log.csv` or `log.csv@road.yaml`.
     mapping : Path, optional
         How the logs' columns become the contract's.
+    paired : sequence of str
+        Reference logs: the same manoeuvres without the fault, one for each fit log and, last, the hold-out's. What the
+        simulation leaves of them is no gap.
+    simulated : sequence of str
+        The same of the user's own simulation over each log's inputs, in place of `paired`.
+    by : "time" or "position"
+        What says that rows of a log and of its reference are the same point of the manoeuvre.
+    model, signals : Path, optional
+        The user's own plant as a co-simulation unit, and the file that says which of its variables is which signal: its
+        runs over the logs' torques are their references.
     seed : int
         Of the resampling behind the intervals; the same seed gives the same diagnosis.
     exclude : collection of str
@@ -72,26 +93,35 @@ def diagnose_files(
         Unusable input, with everything that is wrong with it.
     """
     progress("reading", 0, 1)
-    sources = read_sources(vehicle, road, fit, holdout, mapping)
+    pairing = pairing_of(paired, simulated, by)
+    require_alone(model, signals, pairing)
+    sources = read_sources(vehicle, road, fit, holdout, mapping, pairing)
     progress("reading", 1, 1)
-    return diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
+    if model is None or signals is None:
+        return diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
+    with studied(sources, model, signals, jobs, progress) as (held, own):
+        return diagnose_sources(held, own=own, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
 
 
 def diagnose_sources(
     sources: Sources,
     *,
+    own: Study | None = None,
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Diagnose logs that have been read; see `diagnose_files`."""
+    """Diagnose logs that have been read, `own` with the user's model as their reference; see `diagnose_files`."""
     provenance = _provenance(sources)  # now: the files may be others when the fits are done
     inadequate = require_adequate(sources)
     drives = [s.drive for s in sources.all]
     model = Simulation(sources.vehicle)
+    warned = before_fits(own, model, drives[:-1]) if own else ()
     findings = find(model, drives[:-1], drives[-1], exclude=exclude, jobs=jobs, progress=progress)
     said = _told(findings, exclude, seed, jobs, progress)
+    if own:
+        said = replace(_with_own(said, own, findings), warnings=(*warned, *said.warnings))
     camera = diagnose_perception(
         [s.log for s in sources.fit],
         sources.holdout.log,
@@ -112,6 +142,43 @@ def diagnose_sources(
             *said.warnings,
         ),
         provenance={**provenance, **said.provenance},
+    )
+
+
+def _with_own(said: Diagnosis, own: Study, findings: Findings) -> Diagnosis:
+    """The diagnosis with what the user's own model says of it."""
+    first = said.causes[0].effect if said.causes else ""
+    entry = next((e for e in findings.contest.singles if e.ids[0] == first), None)
+    found = own.judge(findings.model, findings.fit_to, findings.holdout, entry)
+    if said.verdict is Verdict.NO_GAP:
+        return replace(said, own_model=found)
+    said = replace(said, own_model=found, sentence=f"{said.sentence} {found.sentence}".strip())
+    return _beside_own(said)
+
+
+def _beside_own(said: Diagnosis) -> Diagnosis:
+    """The diagnosis with the effect that the best own parameter stands for among those that it cannot tell apart.
+
+    It belongs there where the user's model, run with it, leaves as little as with the first effect.
+    """
+    found = said.own_model
+    if found is None or not found.parameters or said.verdict not in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS):
+        return said
+    best, first = found.parameters[0], said.causes[0]
+    effect = best.effect.partition(".")[0]
+    left = first.gap_after if found.gap_after is None else found.gap_after
+    groups = [g for g in said.ambiguous_with if first.effect in g]
+    known = {first.effect, *(e for g in groups for e in g)}
+    if not effect or effect in known or best.gap_after is None or best.gap_after > AS_LITTLE * left:
+        return said
+    group = tuple(dict.fromkeys((first.effect, effect, *(e for g in groups for e in g))))
+    others = tuple(g for g in said.ambiguous_with if g not in groups)
+    told = f"So {effect} and {first.effect} are not told apart."
+    return replace(
+        said,
+        verdict=Verdict.AMBIGUOUS,
+        ambiguous_with=(group, *others),
+        sentence=f"{said.sentence} {told}",
     )
 
 
@@ -221,7 +288,10 @@ def _provenance(sources: Sources) -> dict[str, object]:
 
 def _origin(source: Source) -> dict[str, object]:
     log = {"path": str(source.log.path), "sha256": source.log.sha256}
-    return {**log, "road": _file(source.road_path), "rate_hz": source.log.rate_hz}
+    origin = {**log, "road": _file(source.road_path), "rate_hz": source.log.rate_hz}
+    if source.reference is None:
+        return origin
+    return {**origin, "reference": {"path": str(source.reference.path), "sha256": source.reference.sha256}}
 
 
 def _file(path: Path | None) -> dict[str, str | None]:

@@ -211,6 +211,62 @@ class Budget:
 
 
 @dataclass(frozen=True)
+class OwnParameter:
+    """A tunable parameter of the user's own model, fitted alone.
+
+    Attributes
+    ----------
+    name : str
+        The unit's variable.
+    estimate : Interval
+        Its value.
+    nominal : float
+        What it was [the estimate's unit].
+    effect : str
+        The library's parameter that it stands for, `effect.parameter`; empty where it stands for none.
+    share : float
+        What it takes of the fit logs' loss beyond noise, by its linear response [-].
+    gap_after : float or None
+        Gap on the hold-out with the unit run at the estimate [noise floors]; None where it was not run.
+    """
+
+    name: str
+    estimate: Interval
+    nominal: float
+    effect: str
+    share: float
+    gap_after: float | None
+
+
+@dataclass(frozen=True)
+class OwnFinding:
+    """What the user's own model says of the gap.
+
+    Attributes
+    ----------
+    model : str
+        Name of its file.
+    runs : int
+        How often it was run over a log.
+    parameters : tuple of OwnParameter
+        Its tunable parameters, the one that takes most first.
+    effect : str
+        The library's effect that it was run with; empty where nothing of it stands for the best one.
+    gap_after : float or None
+        Gap on the hold-out with that effect [noise floors].
+    sentence : str
+        All this in words.
+    """
+
+    model: str
+    runs: int
+    parameters: tuple[OwnParameter, ...]
+    effect: str
+    gap_after: float | None
+    sentence: str
+
+
+@dataclass(frozen=True)
 class RmsError:
     """Root mean square error of the estimator's TRPAC on the hold-out, excited time only [-].
 
@@ -265,6 +321,8 @@ class Diagnosis:
     budget: Budget | None = None
     """None where there is no gap to share out."""
     trpac: RmsError | None = None
+    own_model: OwnFinding | None = None
+    """None where the nominal model stands for itself."""
     rating: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     """ISO/TS 18571 rating per signal, before and after; None where it is not defined."""
     traces: tuple[Trace, ...] = ()
@@ -295,6 +353,7 @@ class Diagnosis:
             "budget": None if self.budget is None else self.budget.to_json(),
             "budget_intervals": None if self.budget is None else self.budget.intervals(),
             "trpac": None if self.trpac is None else asdict(self.trpac),
+            "own_model": None if self.own_model is None else asdict(self.own_model),
             "rating": {k: {"before": b, "after": a} for k, (b, a) in self.rating.items()},
             "warnings": list(self.warnings),
             "provenance": self.provenance,

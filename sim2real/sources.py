@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,10 @@ from sim2real.observing.drive import (
     make_drive,
     untold_torque,
 )
+from sim2real.observing.evidence import SETTLING_S
 from sim2real.observing.lattice import find_lattice
+from sim2real.observing.observer import Simulation
+from sim2real.observing.reference import OTHER_TORQUE, By, covered, held_against, other_torque
 from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
@@ -34,6 +38,8 @@ TURNS, LEAST_TURNING_S = 0.005, 1.0
 [-], and for how long in all that is told [s]."""
 LEAST_APART_M_S = 0.02
 """Less is the noise of a slow car's yaw rate [m/s]."""
+LEAST_UNCOVERED_S = 0.1
+"""From so much time without a reference on it is told [s]."""
 YAML = (".yaml", ".yml")
 """How the name of a log's own road ends."""
 
@@ -46,6 +52,8 @@ class Source:
     road: RoadFile
     road_path: Path | None
     drive: Drive
+    reference: Log | None = None
+    """What the drive's residuals are held against, see `sim2real.observing.reference`."""
 
     def on_rows(self, signal: str) -> Array:
         """A signal of the log on the drive's rows: the last ones, where the drive begins as its sensors wake."""
@@ -67,8 +75,56 @@ class Sources:
         return (*self.fit, self.holdout)
 
 
+@dataclass(frozen=True)
+class Pairing:
+    """Reference logs, one for each log of a diagnosis: the fit logs' in their order, the hold-out's last.
+
+    Attributes
+    ----------
+    logs : tuple
+        The same manoeuvres without the fault, or the user's own simulation of them, as logs are given.
+    by : "time" or "position"
+        What says that rows of a log and of its reference are the same point of the manoeuvre.
+    option : str
+        Where they were given, for messages.
+    """
+
+    logs: tuple[Any, ...]
+    by: By = "time"
+    option: str = "paired"
+
+    def require(self, count: int) -> None:
+        """Raise ScenarioError where there are not as many references as logs."""
+        if len(self.logs) != count:
+            raise ScenarioError(
+                f"{self.option}: {len(self.logs)} reference logs for {count} logs; expected one for each, those of the "
+                "fit logs in their order and the hold-out's last. Without one for the hold-out, cut a pair in two, and "
+                "fit to the first part alone."
+            )
+
+
+def pairing_of(paired: Sequence[Any], simulated: Sequence[Any], by: By = "time") -> Pairing | None:
+    """The reference logs of the options `paired` and `simulated`, of which one may be used; None without any."""
+    if paired and simulated:
+        raise ScenarioError(
+            "paired and simulated are both given; expected one of them: a log has one reference. Leave one out."
+        )
+    if simulated and by != "time":
+        raise ScenarioError(
+            "simulated logs are matched by time, since their inputs are the log's; leave `by` out."
+        )
+    if paired:
+        return Pairing(tuple(paired), by)
+    return Pairing(tuple(simulated), "time", "simulated") if simulated else None
+
+
 def read_sources(
-    vehicle: Path, road: Path | None, fit: Sequence[str], holdout: str, mapping: Path | None = None
+    vehicle: Path,
+    road: Path | None,
+    fit: Sequence[str],
+    holdout: str,
+    mapping: Path | None = None,
+    pairing: Pairing | None = None,
 ) -> Sources:
     """Read everything, all problems of all files in one error.
 
@@ -80,6 +136,8 @@ def read_sources(
         Logs, each `log.csv` or `log.csv@road.yaml`.
     mapping : Path, optional
         How the logs' columns become the contract's.
+    pairing : Pairing, optional
+        Reference logs; on the road of their log where they name none.
 
     Raises
     ------
@@ -97,25 +155,74 @@ def read_sources(
     except ScenarioError as error:
         problems.append(str(error))
     found: list[Source] = []
+    references: list[Source] = []
     if not fit:
         problems.append("No log to fit to; expected at least one --fit LOG.")
+    try:
+        if pairing:
+            pairing.require(len(fit) + 1)
+    except ScenarioError as error:
+        problems.append(str(error))
     for text in (*fit, holdout):
         try:
             found.append(read_source(text, road, columns))
         except ScenarioError as error:
             problems.append(str(error))
+    for text, log in zip(pairing.logs if pairing else (), (*fit, holdout), strict=False):
+        try:
+            references.append(read_source(text, _road_of(log, road), columns))
+        except ScenarioError as error:
+            problems.append(str(error))
     if problems or car is None:
         raise ScenarioError("\n".join(dict.fromkeys(problems)))
-    return put_together(car, vehicle, found)
+    return put_together(car, vehicle, found, references, pairing.by if pairing else "time")
 
 
-def put_together(car: VehicleFile, vehicle_path: Path | None, found: Sequence[Source]) -> Sources:
-    """A diagnosis' sources: those that are fitted to and, the last one, the hold-out."""
-    *fitted, held = (with_turns_told(source, car) for source in told_apart(found))
+def put_together(
+    car: VehicleFile,
+    vehicle_path: Path | None,
+    found: Sequence[Source],
+    references: Sequence[Source] = (),
+    by: By = "time",
+) -> Sources:
+    """A diagnosis' sources: the fit logs and, the last one, the hold-out; each with a reference, or none."""
+    named = told_apart(found)
+    if references:
+        model = Simulation(car)
+        named = [paired_with(s, r, model, by) for s, r in zip(named, references, strict=True)]
+    *fitted, held = (with_turns_told(source, car) for source in named)
     if any(s.log.sha256 == held.log.sha256 for s in fitted):
         told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
         held = replace(held, log=held.log.warned(told))
     return Sources(car, vehicle_path, tuple(fitted), held)
+
+
+def paired_with(source: Source, reference: Source, model: Simulation, by: By = "time") -> Source:
+    """The source held against a reference log, with warnings of what that does not cover or was driven otherwise.
+
+    Raises LogError where the two have too little in common.
+    """
+    drive = held_against(model, source.drive, reference.drive, by)
+    apart = other_torque(drive, reference.drive, by)
+    found = with_reference(source, drive, reference.log)
+    if apart <= OTHER_TORQUE:
+        return found
+    told = (
+        f"the torque of {reference.log.name} differs by {100.0 * apart:.0f} % of this log's (root mean square): what "
+        "both have in common cancels only where they were driven alike. Match by position, or drive it again."
+    )
+    return replace(found, log=found.log.warned(told))
+
+
+def with_reference(source: Source, drive: Drive, reference: Log) -> Source:
+    """The source with a drive that has a reference, with a warning of what that does not cover."""
+    assert drive.reference is not None
+    counts = drive.moving & (drive.time_s >= drive.time_s[0] + SETTLING_S)
+    without_s = (1.0 - covered(drive.reference, counts)) * float(counts.sum()) * drive.step_s
+    log = source.log
+    if without_s > LEAST_UNCOVERED_S:
+        log = log.warned(f"{without_s:.3g} s are left out: {reference.name} is no reference there.")
+    return replace(source, log=log, drive=drive, reference=reference)
 
 
 def with_turns_told(source: Source, vehicle: VehicleFile) -> Source:
@@ -219,6 +326,11 @@ def drive_of(log: Log, road: RoadFile, grid: tuple[Array, dict[str, Array]]) -> 
     """All of a log `on_grid`, with what its wheel speeds tell of a counter at their own rate."""
     wheels = [log.signals[f"wheel_speed_{w}_rad_s"] for w in WHEELS]
     return make_drive(log.name, road, *grid, log.derived, find_lattice(log.time_s, wheels))
+
+
+def _road_of(text: str, road: Path | None) -> Path | None:
+    """The road that a log's reference is on where it names none: the log's."""
+    return split(text, road)[1] if road is not None or "@" in text else None
 
 
 def split(text: str, road: Path | None) -> tuple[Path, Path]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
 
@@ -104,6 +105,11 @@ def diagnose(
     fit: Sequence[AnyLog],
     holdout: AnyLog,
     mapping: Mapping | str | Path | None = None,
+    paired: Sequence[AnyLog] = (),
+    simulated: Sequence[AnyLog] = (),
+    by: Literal["time", "position"] = "time",
+    model: str | Path | None = None,
+    signals: str | Path | None = None,
     seed: int = 0,
     exclude: Collection[str] = (),
     jobs: int = 1,
@@ -119,6 +125,16 @@ def diagnose(
         DataFrames or paths: logs for the fit of parameters, and the log on which the gap is measured.
     mapping : path, optional
         Columns of the logs in the log format.
+    paired : sequence of logs
+        The same manoeuvres without the fault, one for each fit log and, last, the hold-out's: what the simulation
+        leaves of them is no gap.
+    simulated : sequence of logs
+        Logs of your own simulation over each log's inputs, in place of `paired`.
+    by : "time" or "position"
+        Equal `time_s` or equal `position_m` are the same point of the manoeuvre in a log and its reference.
+    model, signals : path, optional
+        Your own plant as a co-simulation unit, and the file that says which of its variables is which signal, in place
+        of `simulated`.
     seed : int
         Seed of the resampling for the intervals.
     exclude : collection of str
@@ -139,7 +155,23 @@ def diagnose(
     logs = [read_log(log, mapping=mapping) for log in (*fit, holdout)]
     with extras("diagnose", "gap"):
         from sim2real.diagnose import diagnose_sources
-        from sim2real.sources import make_source, put_together
+        from sim2real.own_sources import require_alone, studied
+        from sim2real.sources import make_source, pairing_of, put_together
 
-        sources = put_together(car, None, [make_source(log, course) for log in logs])
-        return Diagnosis(diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress))
+        pairing = pairing_of(paired, simulated, by)
+        require_alone(model, signals, pairing)
+        if pairing:
+            pairing.require(len(logs))
+        references = [read_log(log, mapping=mapping) for log in pairing.logs] if pairing else []
+        sources = put_together(
+            car,
+            None,
+            [make_source(log, course) for log in logs],
+            [make_source(log, course) for log in references],
+            by,
+        )
+        asked = partial(diagnose_sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
+        if model is None or signals is None:
+            return Diagnosis(asked(sources))
+        with studied(sources, Path(model), Path(signals), jobs, progress) as (held, own):
+            return Diagnosis(asked(held, own=own))

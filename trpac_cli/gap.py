@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,6 +33,14 @@ COLOURS = {
     "no_gap": "green",
 }
 
+
+class By(StrEnum):
+    """What says that rows of two logs are the same point of the manoeuvre."""
+
+    TIME = "time"
+    POSITION = "position"
+
+
 app = typer.Typer(
     help="The sim-to-real gap: where it lies, which effect causes it, how far it shrinks.",
     no_args_is_help=True,
@@ -57,6 +66,34 @@ def diagnose(
         Path | None,
         typer.Option("--map", help="How the logs' columns and units become the contract's: mapping.yaml."),
     ] = None,
+    paired: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Log of the same manoeuvre without the fault, one for each --fit in their order and, last, the "
+            "--holdout's; LOG or LOG@ROAD.yaml."
+        ),
+    ] = None,
+    simulated: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Log of your own simulation over a log's torques; as many as --paired, in its place."
+        ),
+    ] = None,
+    by: Annotated[
+        By,
+        typer.Option(
+            help="Rows of a log and its --paired log are the same point at equal time_s or position_m."
+        ),
+    ] = By.TIME,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            help="Your own plant as an FMU for co-simulation: it is run over the logs, in place of --simulated."
+        ),
+    ] = None,
+    signals: Annotated[
+        Path | None, typer.Option(help="Which variable of --model is which signal of the logs: signals.yaml.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same diagnosis.")] = 0,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Fits at a time; without it one per processor.")
@@ -78,6 +115,23 @@ def diagnose(
     vehicle_speed_m_s: {column: VehSpd, unit: km/h}. Ready-made ones lie in
     sim2real/mappings, all that they can say is in docs/logs.md.
 
+    A car that is built otherwise than the simulated one leaves a gap without
+    any fault. A second log of the same manoeuvre, recorded before the fault,
+    takes it off:
+    --fit after_1.csv --holdout after_2.csv --paired before_1.csv
+    --paired before_2.csv. So does your own simulation of the same drive:
+    --simulated sim_1.csv --simulated sim_2.csv. The logs' time_s has to
+    count from the same point; where it does not, --by position.
+
+    Your own plant as an FMU does the same, is tuned, and needs a file of
+    signals, such as this one; docs/gap_own_model.md has all of it:
+    schema: 1; inputs: {motor.fl: {signal: wheel_torque_fl_nm}, ...};
+    outputs: {vehicle_speed_m_s: {column: v, unit: km/h}, ...};
+    initial: {v0: {signal: vehicle_speed_m_s}};
+    parameters: {car.m: {unit: kg, low: 1200, high: 1900,
+    effect: mass_offset.mass_kg}}.
+    Then: --model plant.fmu --signals signals.yaml
+
     No logs at hand? trpac gap demo --out out/gap_demo makes some.
 
     Exit codes: 0 with a diagnosis, 2 unusable input.
@@ -98,6 +152,11 @@ def diagnose(
                 fit,
                 holdout,
                 mapping=mapping,
+                paired=paired or (),
+                simulated=simulated or (),
+                by=by.value,
+                model=model,
+                signals=signals,
                 seed=seed,
                 jobs=jobs or cpu_count(),
                 progress=progress,

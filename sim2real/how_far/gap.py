@@ -51,7 +51,8 @@ def noise_floor(model: Simulation, evidence: Evidence, seed: int) -> float:
         clean = model.predict(replace(drive, measured=begun)).channels
         lost = ~np.isfinite(drive.measured)
         noisy = np.where(lost, np.nan, clean + noise.draw(len(drive), generator))
-        again = replace(drive, measured=noisy)
+        silent = None if drive.reference is None else 0.0 * drive.reference  # its noise is in `noise` already
+        again = replace(drive, measured=noisy, reference=silent)
         rests.append(residuals(model, again))
     return measure(evidence, rests).total
 

@@ -146,7 +146,7 @@ class _MappingBase(_Strict):
 
     @model_validator(mode="after")
     def _check(self) -> _MappingBase:
-        specs = _specs(self)
+        specs = specs_of(self)
         problems = [text for name, spec in specs.items() for text in _problems(name, spec, specs)]
         if not specs:
             problems.append(
@@ -157,8 +157,8 @@ class _MappingBase(_Strict):
         return self
 
 
-_MappingFile = create_model(
-    "_MappingFile",
+MappingFile = create_model(
+    "MappingFile",
     __base__=_MappingBase,
     schema_=(Literal[1], Field(default=1, alias="schema")),
     **{name: (Spec, Field(default=None)) for name in COLUMNS},  # type: ignore[call-overload]
@@ -168,15 +168,16 @@ _MappingFile = create_model(
 def load_mapping(path: str | Path) -> Mapping:
     """Read a mapping file; all of its problems in one LogError."""
     try:
-        file = load_strict(path, _MappingFile)
+        file = load_strict(path, MappingFile)
     except LogError:
         raise
     except ValueError as error:
         raise LogError(str(error)) from error
-    return Mapping(Path(path), _specs(file))
+    return Mapping(Path(path), specs_of(file))
 
 
-def _specs(file: BaseModel) -> dict[str, Spec]:
+def specs_of(file: BaseModel) -> dict[str, Spec]:
+    """Column of the log format to its source, of a `MappingFile`."""
     return {name: getattr(file, name) for name in COLUMNS if name in file.model_fields_set}
 
 

@@ -64,6 +64,10 @@ class Drive:
         What a pulse-counting sensor left in the wheel speeds, as logged.
     swing : array, shape (n, 7), or None
         What was taken off `measured` since it repeats with the wheels' angle, see `sim2real.observing.orders`.
+    reference : array, shape (n, 7), or None
+        What the nominal model leaves of a reference log at the same points of the manoeuvre, in each channel's unit; it
+        is subtracted from what any model leaves of this log. NaN where the reference says nothing; see
+        `sim2real.observing.reference`.
     """
 
     name: str
@@ -75,6 +79,7 @@ class Drive:
     counted: NDArray[np.bool_]
     lattice: Lattice | None = None
     swing: Array | None = None
+    reference: Array | None = None
 
     @property
     def step_s(self) -> float:

@@ -75,13 +75,21 @@ def residuals(model: Simulation, drive: Drive) -> Array:
 
 
 def rest_of(drive: Drive, channels: Array) -> Array:
-    """Measured minus given channels, shape (n, 7); NaN where a sample is lost or does not count, see also `ASTRAY`."""
+    """Measured minus given channels, shape (n, 7); NaN where a sample is lost or does not count, see also `ASTRAY`.
+
+    Of a drive with a reference, less what the nominal model leaves of that.
+    """
     astray = np.isfinite(drive.measured) & ~np.isfinite(channels)
-    rest = np.where(astray, ASTRAY, drive.measured - channels)
+    rest = np.where(astray, ASTRAY, drive.measured - expected(drive, channels))
     rest[~drive.moving] = np.nan
     rest[:, ~drive.counted] = np.nan
     rest[drive.time_s < drive.time_s[0] + SETTLING_S] = np.nan
     return rest
+
+
+def expected(drive: Drive, channels: Array) -> Array:
+    """What the log should read where a model predicts these channels, shape (n, 7): with the reference's residuals."""
+    return channels if drive.reference is None else channels + drive.reference
 
 
 def gather(model: Simulation, drives: Sequence[Drive]) -> Evidence:

@@ -13,7 +13,7 @@ from sim2real.how_far.budget import budget
 from sim2real.how_far.gap import measure, noise_floor, shrink
 from sim2real.next_manoeuvre import propose
 from sim2real.observing.drive import CHANNELS
-from sim2real.observing.evidence import Evidence, all_logs
+from sim2real.observing.evidence import Evidence, all_logs, expected
 from sim2real.observing.lattice import Lattice
 from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order
@@ -304,7 +304,7 @@ def _next(found: Findings, progress: Progress) -> NextManoeuvre | None:
 
 def _traces(found: Findings, held: Evidence, added: Simulation) -> tuple[Trace, ...]:
     drive, noise = held.drives[0], held.noises[0]
-    before, after = found.model.predict(drive).channels, added.predict(drive).channels
+    before, after = (expected(drive, m.predict(drive).channels) for m in (found.model, added))
     return tuple(
         Trace(
             name, unit, drive.time_s, drive.measured[:, i], before[:, i], after[:, i], float(noise.sigma[i])

@@ -1,0 +1,1 @@
+"""The diagnosis on cars that another simulator drives."""
