@@ -51,6 +51,7 @@ def diagnose_files(
     paired: Sequence[str] = (),
     simulated: Sequence[str] = (),
     by: By = "time",
+    baseline: Sequence[str] = (),
     model: Path | None = None,
     signals: Path | None = None,
     seed: int = 0,
@@ -75,6 +76,9 @@ def diagnose_files(
         The same of the user's own simulation over each log's inputs, in place of `paired`.
     by : "time" or "position"
         What says that rows of a log and of its reference are the same point of the manoeuvre.
+    baseline : sequence of str
+        Logs of the same car without the suspected fault, of any manoeuvre: how it is built otherwise than simulated is
+        learnt from them, too.
     model, signals : Path, optional
         The user's own plant as a co-simulation unit, and the file that says which of its variables is which signal: its
         runs over the logs' torques are their references.
@@ -95,7 +99,7 @@ def diagnose_files(
     progress("reading", 0, 1)
     pairing = pairing_of(paired, simulated, by)
     require_alone(model, signals, pairing)
-    sources = read_sources(vehicle, road, fit, holdout, mapping, pairing)
+    sources = read_sources(vehicle, road, fit, holdout, mapping, pairing, baseline)
     progress("reading", 1, 1)
     if model is None or signals is None:
         return diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
@@ -118,7 +122,15 @@ def diagnose_sources(
     drives = [s.drive for s in sources.all]
     model = Simulation(sources.vehicle)
     warned = before_fits(own, model, drives[:-1]) if own else ()
-    findings = find(model, drives[:-1], drives[-1], exclude=exclude, jobs=jobs, progress=progress)
+    findings = find(
+        model,
+        drives[:-1],
+        drives[-1],
+        baseline=[s.drive for s in sources.baseline],
+        exclude=exclude,
+        jobs=jobs,
+        progress=progress,
+    )
     said = _told(findings, exclude, seed, jobs, progress)
     if own:
         said = replace(_with_own(said, own, findings), warnings=(*warned, *said.warnings))
@@ -281,6 +293,7 @@ def _provenance(sources: Sources) -> dict[str, object]:
     return {
         "vehicle": _file(sources.vehicle_path),
         "fit": [_origin(source) for source in sources.fit],
+        "baseline": [_origin(source) for source in sources.baseline],
         "holdout": _origin(sources.holdout),
         "versions": {name: version(name) for name in PACKAGES},
     }

@@ -68,6 +68,8 @@ class Sources:
     vehicle_path: Path | None
     fit: tuple[Source, ...]
     holdout: Source
+    baseline: tuple[Source, ...] = ()
+    """Logs of the same car without the suspected fault, of any manoeuvre."""
 
     @property
     def all(self) -> tuple[Source, ...]:
@@ -125,6 +127,7 @@ def read_sources(
     holdout: str,
     mapping: Path | None = None,
     pairing: Pairing | None = None,
+    baseline: Sequence[str] = (),
 ) -> Sources:
     """Read everything, all problems of all files in one error.
 
@@ -138,6 +141,8 @@ def read_sources(
         How the logs' columns become the contract's.
     pairing : Pairing, optional
         Reference logs; on the road of their log where they name none.
+    baseline : sequence of str
+        Logs of the same car without the suspected fault.
 
     Raises
     ------
@@ -163,9 +168,11 @@ def read_sources(
             pairing.require(len(fit) + 1)
     except ScenarioError as error:
         problems.append(str(error))
-    for text in (*fit, holdout):
+    faultless: list[Source] = []
+    wanted = [*((text, found) for text in (*fit, holdout)), *((text, faultless) for text in baseline)]
+    for text, into in wanted:
         try:
-            found.append(read_source(text, road, columns))
+            into.append(read_source(text, road, columns))
         except ScenarioError as error:
             problems.append(str(error))
     for text, log in zip(pairing.logs if pairing else (), (*fit, holdout), strict=False):
@@ -175,7 +182,8 @@ def read_sources(
             problems.append(str(error))
     if problems or car is None:
         raise ScenarioError("\n".join(dict.fromkeys(problems)))
-    return put_together(car, vehicle, found, references, pairing.by if pairing else "time")
+    sources = put_together(car, vehicle, found, references, pairing.by if pairing else "time")
+    return replace(sources, baseline=tuple(faultless))
 
 
 def put_together(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -105,6 +105,7 @@ def diagnose(
     fit: Sequence[AnyLog],
     holdout: AnyLog,
     mapping: Mapping | str | Path | None = None,
+    baseline: Sequence[AnyLog] = (),
     paired: Sequence[AnyLog] = (),
     simulated: Sequence[AnyLog] = (),
     by: Literal["time", "position"] = "time",
@@ -125,6 +126,8 @@ def diagnose(
         DataFrames or paths: logs for the fit of parameters, and the log on which the gap is measured.
     mapping : path, optional
         Columns of the logs in the log format.
+    baseline : sequence of logs
+        Logs of the same car without the suspected fault, of any manoeuvre.
     paired : sequence of logs
         The same manoeuvres without the fault, one for each fit log and, last, the hold-out's: what the simulation
         leaves of them is no gap.
@@ -163,6 +166,7 @@ def diagnose(
         if pairing:
             pairing.require(len(logs))
         references = [read_log(log, mapping=mapping) for log in pairing.logs] if pairing else []
+        faultless = [make_source(read_log(log, mapping=mapping), course) for log in baseline]
         sources = put_together(
             car,
             None,
@@ -170,6 +174,7 @@ def diagnose(
             [make_source(log, course) for log in references],
             by,
         )
+        sources = replace(sources, baseline=tuple(faultless))
         asked = partial(diagnose_sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)
         if model is None or signals is None:
             return Diagnosis(asked(sources))

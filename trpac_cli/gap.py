@@ -66,6 +66,12 @@ def diagnose(
         Path | None,
         typer.Option("--map", help="How the logs' columns and units become the contract's: mapping.yaml."),
     ] = None,
+    baseline: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Log of the same car without the suspected fault, any manoeuvre; LOG or LOG@ROAD.yaml; may be repeated."
+        ),
+    ] = None,
     paired: Annotated[
         list[str] | None,
         typer.Option(
@@ -116,7 +122,8 @@ def diagnose(
     sim2real/mappings, all that they can say is in docs/logs.md.
 
     A car that is built otherwise than the simulated one leaves a gap without
-    any fault. A second log of the same manoeuvre, recorded before the fault,
+    any fault. --baseline before.csv, any drive before the fault, tells how
+    it is built. A second log of the same manoeuvre, recorded before the fault,
     takes it off:
     --fit after_1.csv --holdout after_2.csv --paired before_1.csv
     --paired before_2.csv. So does your own simulation of the same drive:
@@ -152,6 +159,7 @@ def diagnose(
                 fit,
                 holdout,
                 mapping=mapping,
+                baseline=baseline or (),
                 paired=paired or (),
                 simulated=simulated or (),
                 by=by.value,
