@@ -69,7 +69,7 @@ def diagnose(
     baseline: Annotated[
         list[str] | None,
         typer.Option(
-            help="Log of the same car without the suspected fault, any manoeuvre; LOG or LOG@ROAD.yaml; may be repeated."
+            help="Log of the same car without the suspected fault, any manoeuvre; may be repeated."
         ),
     ] = None,
     paired: Annotated[

@@ -64,7 +64,7 @@ def solve(z: Array, columns: Array, size: Array, temper: float, precision: Array
         Inverse variances of the coefficients' priors about 0.
     """
     scaled = np.asarray((z / size).ravel())
-    rest = scaled
+    rest: Array = scaled
     design = (columns / size[..., None]).reshape(len(scaled), -1)
     found = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
