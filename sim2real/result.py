@@ -318,6 +318,8 @@ class Diagnosis:
     next_manoeuvre: NextManoeuvre | None = None
     unexplained: Unexplained | None = None
     """What is left where no effect explains the gap (`unknown`), or beside the effect (`partial`)."""
+    build: dict[str, float] = field(default_factory=dict)
+    """How the car's build differs from the simulated one beside the effect: change to its size, see docs/gap.md."""
     budget: Budget | None = None
     """None where there is no gap to share out."""
     trpac: RmsError | None = None
@@ -350,6 +352,7 @@ class Diagnosis:
             "cannot_rule_out": list(self.cannot_rule_out),
             "next_manoeuvre": _profile(self.next_manoeuvre),
             "unexplained": _term(self.unexplained),
+            "build": self.build,
             "budget": None if self.budget is None else self.budget.to_json(),
             "budget_intervals": None if self.budget is None else self.budget.intervals(),
             "trpac": None if self.trpac is None else asdict(self.trpac),

@@ -42,6 +42,8 @@ SECOND, SECOND_SHARE = 20.0, 0.10
 """What a second effect adds to the drop at least, and as a share of both [-]."""
 ALONE = 0.4
 """Share of both effects' drop that the better one takes alone, or they only bend to what neither is [-]."""
+OF_TYRE = ("friction_offset", "mu_split", "friction_falloff", "tyre_stiffness_offset")
+"""What a foreign tyre looks like beside a fault: never the second of two."""
 LOOSE = 1e-4
 """Precision of coefficients without a prior [-]."""
 
@@ -63,7 +65,7 @@ class Judged:
     outside : dict
         Drops of faults that no effect has the form of, where they were asked [-].
     structure : dict
-        The build's coefficients beside what is named, each in its unit.
+        How the build differs beside what is named, each change in its unit, the least expected ones first.
     """
 
     verdict: Verdict
@@ -152,7 +154,9 @@ def judge(
 
     def said(verdict: Verdict, keys: Sequence[str], outside: Mapping[str, float], build: Array) -> Judged:
         named = tuple(replace(of[key], x=best[key].x) for key in keys)
-        told = dict(zip(stack.names, map(float, stack.mix @ build), strict=True))
+        values, widths = stack.mix @ build, np.sqrt((stack.mix**2).sum(axis=1))
+        order = np.argsort(-np.abs(values / widths))
+        told = {stack.names[i]: float(values[i]) for i in order}
         return Judged(verdict, named, drops, probability, outside, told)
 
     if top <= BLAMED:
@@ -164,6 +168,9 @@ def judge(
     if max(outside.values(), default=0.0) > max(top + OUTSIDE, two[0][0] if two else 0.0):
         return said(Verdict.UNKNOWN, (), outside, null.build)
     for drop, h in two:
+        lesser = min(h.ids, key=lambda key: drops[key])
+        if lesser in OF_TYRE:
+            continue
         if drop - top > max(SECOND, SECOND_SHARE * drop):
             if max(drops[key] for key in h.ids) < ALONE * drop:
                 return said(Verdict.UNKNOWN, (), outside, null.build)

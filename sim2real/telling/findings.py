@@ -121,6 +121,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         cannot_rule_out=tuple(c.effect for c in causes if not c.excited),
         next_manoeuvre=_next(found, progress),
         unexplained=unexplained,
+        build=dict(decision.build),
         budget=None
         if decision.verdict is Verdict.NO_GAP
         else budget(held, found.added(), found.model, gap.noise_floor, seed),

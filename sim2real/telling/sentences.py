@@ -36,7 +36,7 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     if decision.verdict is Verdict.PARTIAL:
         return (
             f"A part of the gap of {size} is {top.effect} ({values}): {cut}. What is left is a difference between the "
-            "models that no effect has the form of."
+            f"models that no effect has the form of{_build(decision)}."
         )
     return f"The gap of {size} is {top.effect} ({values}): {cut}."
 
@@ -53,6 +53,12 @@ def _rivals(decision: Decision) -> str:
 def _some(names: Sequence[str]) -> str:
     more = len(names) - SHOWN
     return " or ".join([*names[:SHOWN], *([f"one of {more} more"] if more > 0 else [])])
+
+
+def _build(decision: Decision) -> str:
+    """The least expected changes of the car's build."""
+    told = [f"{name} {value:+.2g}" for name, value in list(decision.build.items())[:SHOWN]]
+    return f" (the car's build: {', '.join(told)})" if told else ""
 
 
 def nearest(decision: Decision, contest: Contest) -> str:
