@@ -66,11 +66,12 @@ def solve(z: Array, columns: Array, size: Array, temper: float, precision: Array
     scaled = np.asarray((z / size).ravel())
     rest: Array = scaled
     design = (columns / size[..., None]).reshape(len(scaled), -1)
-    found = np.zeros(design.shape[1])
+    found: Array = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
         weighed = design * (1.0 / (temper * np.maximum(1.0, np.abs(rest) / HUBER)))[:, None]
-        found = np.linalg.solve(design.T @ weighed + np.diag(precision), -(weighed.T @ scaled))
-        rest = np.asarray(scaled + design @ found)
+        inner = design.T @ weighed + np.diag(precision)
+        found = np.asarray(np.linalg.solve(inner, -(weighed.T @ scaled)), dtype=np.float64)
+        rest = np.asarray(scaled + design @ found, dtype=np.float64)
     return float(huber(rest).sum() / temper + (precision * found * found).sum()), found
 
 
