@@ -68,9 +68,7 @@ def diagnose(
     ] = None,
     baseline: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Log of the same car without the suspected fault, any manoeuvre; may be repeated."
-        ),
+        typer.Option(help="Log of the same car without the suspected fault, any manoeuvre; may be repeated."),
     ] = None,
     paired: Annotated[
         list[str] | None,

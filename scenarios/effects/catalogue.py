@@ -71,7 +71,8 @@ def _section(effect: type[Effect]) -> str:
 def _form(other: type[Effect]) -> str:
     further = other.parameters()[len(EFFECTS[other.id].parameters()) :]
     added = "".join(map(_further, further))
-    return f"\n- Another form, which `forms` in vehicle.yaml switches on, is {other.form}: `{other.equation}`. {getdoc(other)}{added}"
+    said = f"{other.form}: `{other.equation}`. {getdoc(other)}{added}"
+    return f"\n- Another form, which `forms` in vehicle.yaml switches on, is {said}"
 
 
 def _further(p: Parameter) -> str:

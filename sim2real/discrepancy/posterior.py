@@ -32,8 +32,9 @@ LEAST_SIZE = 0.25
 """An effect that is smaller is none [noticeable changes]."""
 PRICE = 2.0
 """Price of a parameter, as Akaike's [-]."""
-BLAMED = 16.0
-"""Drop of the cost from which on an effect is blamed [-]."""
+BLAMED = 30.0
+"""Drop of the cost from which on an effect is blamed: drawn cars and others without a fault reach 8, faults outside the
+library 27, effects that are there 37 and more [-]."""
 LIKE, LIKE_SHARE = 8.0, 0.08
 """Effects whose drops differ by less than this, or by this share of the best one, are not told apart [-]."""
 OUTSIDE = 6.0

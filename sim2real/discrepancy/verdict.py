@@ -80,6 +80,9 @@ def beside_another_build(
     own_scale = scale_of_build(fit_logs)
     told = [_told(fit_logs, own_scale, h) for h in found.named]
     entries = [_entry(h, fit_to, holdout) for h, _ in told]
+    after = fitness(entries[0], fit_to, holdout)
+    if after.misfit >= decision.before.misfit:  # it only bends what the build does
+        return contest, decision
     names = {entry.ids for entry in entries}
     others = tuple(e for e in contest.singles if e.ids not in names)
     alone = tuple(e for e in entries if len(e.ids) == 1)
@@ -95,7 +98,7 @@ def beside_another_build(
         tuple(entries[1:]),
         share,
         decision.before,
-        fitness(entries[0], fit_to, holdout),
+        after,
         intervals={name: interval for _, of_one in told for name, interval in of_one.items()},
         build=dict(found.structure),
     )
