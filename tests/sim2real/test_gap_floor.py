@@ -36,17 +36,6 @@ def decided(fit_to, held, verdict=Verdict.IDENTIFIED):
     return said, Contest(null, (entry,), ())
 
 
-def test_a_log_that_is_far_beyond_noise_now_and_then_has_a_gap():
-    """Rows that hardly move the whole still count."""
-    fit_to, held = evidence(0.0, 1), evidence(0.0, 5)
-    decision, contest = decided(fit_to, held)
-    far = contest.null.z_hold.copy()
-    far[: len(far) // 25] += 9.0
-    rare = replace(contest, null=replace(contest.null, z_hold=far))
-    assert at_the_floor(decision, contest, MODEL, fit_to, held).verdict is Verdict.NO_GAP
-    assert at_the_floor(decision, rare, MODEL, fit_to, held) is decision
-
-
 @pytest.fixture(scope="module")
 def slight():
     """Logs with a slight gap, and their contest."""
