@@ -391,6 +391,30 @@ def test_of_two_pairs_that_explain_alike_the_one_with_fewer_parameters_wins():
     assert decision.winner.ids == ("friction_offset", "accelerometer_bias")
 
 
+@pytest.mark.long
+def test_two_resistances_stand_as_what_they_are():
+    """From walking pace to 20 m/s and down again."""
+    effects = {"aero_drag": {"drag_area_m2": 0.5}, "rolling_resistance": {"coefficient": 0.012}}
+    torque = trace(
+        (0.5, 0),
+        (0.8, 200),
+        (9, 200),
+        (9.3, 0),
+        (13, 0),
+        (13.3, -200),
+        (18, -200),
+        (18.3, 0),
+        duration_s=20.0,
+    )
+    logs = [
+        noisy(clean(f * torque, v0, effects=effects), seed)
+        for seed, (f, v0) in enumerate(((1.0, 3.0), (1.2, 5.0), (0.9, 4.0)))
+    ]
+    decision = find(MODEL, logs[:2], logs[2], exclude=only(*effects)).decision
+    assert decision.verdict is Verdict.COMPOUND
+    assert decision.winner.ids == tuple(effects)
+
+
 @pytest.mark.parametrize(
     ("effect", "others"),
     beyond(

@@ -1,4 +1,4 @@
-"""Tyres of another curve: the plant's force and slopes, and an effect that is found beside them."""
+"""Tyres of another curve: the plant's force and slopes, and that alone they are no effect of the library."""
 
 import numpy as np
 import pytest
