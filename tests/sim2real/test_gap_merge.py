@@ -494,7 +494,9 @@ def test_an_effect_that_may_as_well_be_none_is_asked_about():
     assert "cannot tell exposure_shift from a car without it." in render(told)
 
 
-@pytest.mark.parametrize("verdict", [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.COMPOUND])
+@pytest.mark.parametrize(
+    "verdict", [Verdict.IDENTIFIED, Verdict.PARTIAL, Verdict.AMBIGUOUS, Verdict.COMPOUND]
+)
 def test_beside_a_gap_of_the_car_a_question_is_a_warning(verdict):
     main = main_of(verdict)
     told = merge(main, camera_side(ASKED))
