@@ -69,7 +69,8 @@ def solve(z: Array, columns: Array, size: Array, temper: float, precision: Array
     found = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
         weighed = design * (1.0 / (temper * np.maximum(1.0, np.abs(rest) / HUBER)))[:, None]
-        found = np.linalg.solve(design.T @ weighed + np.diag(precision), -(weighed.T @ scaled))
+        curvature = design.T @ weighed + np.diag(precision)
+        found = np.asarray(np.linalg.solve(curvature, -(weighed.T @ scaled)), dtype=np.float64)
         rest = np.asarray(scaled + design @ found)
     return float(huber(rest).sum() / temper + (precision * found * found).sum()), found
 
