@@ -67,6 +67,8 @@ def beside_another_build(
     singles = hypotheses(stack, contest.singles, scale, jobs, progress)
     stack = with_tyre(stack, singles)
     singles = [h for h in singles if h.candidate.is_proper(h.x)]
+    if not singles:
+        return contest, decision
     found = judge(
         stack,
         scale,

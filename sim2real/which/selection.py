@@ -87,7 +87,7 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
     """The verdict on effects that explain the gap to the noise by themselves; `unknown` where none does."""
     before = fitness(contest.null, fit_to, holdout)
     singles = list(contest.singles)
-    weight = probabilities(contest, singles, fit_to, holdout)[1:]
+    none, *weight = probabilities(contest, singles, fit_to, holdout)
     share = dict(zip((e.ids[0] for e in singles), weight, strict=True))
     if is_noise(contest, fit_to, holdout):
         return Decision(Verdict.NO_GAP, contest.null, (), _scaled(share, NO_GAP_DOUBT), before, before)
@@ -95,7 +95,7 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         return Decision(Verdict.UNKNOWN, contest.null, (), {}, before, before)
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
-    if after.misfit <= EXPLAINED_MISFIT:
+    if after.misfit <= EXPLAINED_MISFIT and share[best.ids[0]] > none:  # what is rare hardly moves the misfit
         rivals = tuple(
             e for e in singles if e is not best and share[e.ids[0]] > RIVAL_ALONE * share[best.ids[0]]
         )

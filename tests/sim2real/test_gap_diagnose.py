@@ -3,6 +3,7 @@
 import ast
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from scenarios.effects import EFFECTS, FORMS
 from scenarios.errors import ScenarioError
 from sim2real.demo import VEHICLE
 from sim2real.diagnose import diagnose, diagnose_files, shrink_on
-from sim2real.observing.drive import CHANNELS, make_drive
+from sim2real.observing.drive import CHANNELS, RECOVERY_S, WHEEL, backward, make_drive
 from sim2real.result import Diagnosis, Verdict
 from sim2real.sources import read_sources, split
 from sim2real.telling.report import jsonable
@@ -121,7 +122,7 @@ def test_provenance_names_the_files_and_their_hashes(said, folder):
 def test_the_json_is_the_contracts(said):
     data = json.loads(json.dumps(jsonable(said[0].to_json()), allow_nan=False))
     assert data["schema"] == 1
-    assert data["verdict"] in {"identified", "ambiguous", "compound", "unknown", "no_gap"}
+    assert data["verdict"] in {"identified", "partial", "ambiguous", "compound", "unknown", "no_gap"}
     assert set(data["gap"]) >= {"before", "after", "noise_floor", "measured_on"}
     assert set(data["gap"]["before"]) >= {"total", "signals"}
     assert set(data["gap"]["before"]["signals"]) >= {"wheel_speed", "vehicle_speed", "accel_x"}
@@ -135,6 +136,10 @@ def test_the_json_is_the_contracts(said):
         ]
         for value in (*row["parameters"].values(), row["shrink_percent"]):
             assert value["low"] <= value["value"] <= value["high"]
+    assert list(data["budget"]) == ["effect:mass_offset", "structure", "noise"]
+    assert sum(data["budget"].values()) == pytest.approx(1.0)
+    assert data["budget"]["effect:mass_offset"] > 0.7 > 0.05 > data["budget"]["structure"]
+    assert all(low <= data["budget"][key] <= high for key, (low, high) in data["budget_intervals"].items())
     assert data["ambiguous_with"] == []
     assert data["next_manoeuvre"] is None
     assert data["unexplained"] is None
@@ -435,6 +440,42 @@ def test_a_car_that_never_moves_is_refused(folder, tmp_path):
         read_sources(
             folder / "vehicle.yaml", folder / "dry.yaml", [f"{folder}/fit_1.csv"], f"{tmp_path}/parked.csv"
         )
+
+
+# --- what is left out and said
+
+
+def test_a_hold_out_that_is_a_fit_log_is_said(folder):
+    files = [f"{folder}/fit_1.csv", f"{folder}/fit_2.csv"]
+    same = read_sources(folder / "vehicle.yaml", folder / "dry.yaml", files, files[1])
+    assert any("is a fit log, too" in text for text in same.holdout.log.warnings)
+    other = read_sources(folder / "vehicle.yaml", folder / "dry.yaml", files[:1], files[1])
+    assert not other.holdout.log.warnings
+
+
+def test_wheels_that_turn_back_are_left_out_and_said(folder, tmp_path):
+    drive = noisy(clean(pulses(9.0), 13.0), 3)
+    measured = drive.measured.copy()
+    back = (drive.time_s > 3.0) & (drive.time_s < 3.4)
+    measured[back, WHEEL.start] = -8.0
+    write_log(replace(drive, measured=measured), tmp_path / "back.csv")
+    found = read_sources(
+        folder / "vehicle.yaml", folder / "dry.yaml", [f"{tmp_path}/back.csv"], f"{folder}/fit_1.csv"
+    )
+    time_s, moving = found.fit[0].drive.time_s, found.fit[0].drive.moving
+    assert not moving[(time_s > 3.05) & (time_s < 3.35 + RECOVERY_S)].any()
+    assert moving[(time_s < 2.9) | (time_s > 3.5 + RECOVERY_S)].all()
+    assert any("a wheel turns back" in text for text in found.fit[0].log.warnings)
+    assert not any("turns back" in text for text in found.holdout.log.warnings)
+
+
+def test_noise_of_a_locked_wheel_is_no_wheel_that_turns_back():
+    rng = np.random.default_rng(0)
+    time_s = np.arange(1000) / 125.0
+    assert not backward(time_s, 0.4 * rng.standard_normal((1000, 4))).any()
+    one = np.zeros((1000, 4))
+    one[500] = -20.0  # a sample that is wrong
+    assert not backward(time_s, one).any()
 
 
 # --- the folder

@@ -1,20 +1,22 @@
-"""How well an entry does, and what that makes of one effect or two: on made-up residuals."""
+"""How well an entry does on made-up residuals, and what is no more than noise."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_drives import MODEL, STEP_S, clean, noisy, pulses
+from gap_drives import MODEL, STEP_S, clean, noisy, pulses, remeasured
 
+from scenarios.effects import EFFECTS
+from sim2real.diagnose import find
 from sim2real.observing.drive import SPEED, WHEEL
 from sim2real.observing.evidence import gather
 from sim2real.observing.lattice import Lattice
-from sim2real.which.contest import Contest, Entry
+from sim2real.result import Verdict
+from sim2real.which.contest import Contest, Entry, as_it_is
 from sim2real.which.fitting import ROBUST_FROM, Candidate, fit
 from sim2real.which.goodness import fitness, gross_share, inflation
-from sim2real.which.selection import (
-    probabilities,
-)
+from sim2real.which.no_gap import NO_GAP_MISFIT, is_noise
+from sim2real.which.selection import probabilities
 
 COUNTER = Lattice(quantum_rad_s=0.1, window_s=0.02, sigma_rad_s=0.01, step_s=STEP_S)
 
@@ -88,3 +90,77 @@ def test_a_counters_flanks_are_no_rare_gap_and_what_other_sensors_have_is_one(ti
     pulse_counted = replace(tiny, drives=(replace(tiny.drives[0], lattice=COUNTER),))
     assert gross_share(entry, tiny, tiny) == pytest.approx(0.2, abs=0.05)
     assert gross_share(entry, pulse_counted, pulse_counted) == pytest.approx(counted, abs=0.05)
+
+
+# --- what is no more than noise
+
+
+@pytest.fixture(scope="module")
+def slight():
+    """Logs with a slight gap, and their contest."""
+    car = {"accelerometer_bias": {"bias_m_s2": 0.004}}
+    drives = [clean(pulses(24.0), v0, effects=car) for v0 in (10.0, 16.0)]
+    fit_to, held = (
+        gather(MODEL, [noisy(drive, seed + i) for i, drive in enumerate(drives)]) for seed in (1, 5)
+    )
+    found = fit(Candidate(MODEL, ("accelerometer_bias",)), fit_to, steps=3)
+    best = found.candidate.model(found.x)
+    entry = Entry(("accelerometer_bias",), found, found.z, held.whitened(held.residuals(best)))
+    return fit_to, held, Contest(as_it_is(MODEL, fit_to, held), (entry,))
+
+
+def leaving(misfit, taken, fit_to, held, contest):
+    """The contest if its model as it is had this misfit, and its only effect took this share off the loss."""
+    [entry] = contest.singles
+    louder = misfit / fitness(contest.null, fit_to, held).misfit
+    z_fit, z_hold = louder * contest.null.z_fit, louder * contest.null.z_hold
+    left = np.sqrt(1.0 - taken)
+    return Contest(
+        replace(contest.null, z_fit=z_fit, z_hold=z_hold),
+        (replace(entry, z_fit=left * z_fit, z_hold=left * z_hold),),
+    )
+
+
+@pytest.mark.parametrize(
+    ("misfit", "taken", "noise"),
+    [
+        (0.95, 0.10, True),
+        (0.95, 0.14, False),
+        (1.05, 0.10, False),
+        (1.05, 0.02, True),
+        (1.35, 0.05, False),
+        (1.35, 0.02, True),
+        (1.45, 0.0, False),
+    ],
+)
+def test_what_an_effect_may_take_where_noise_is_left_hangs_on_the_misfit(misfit, taken, noise, slight):
+    fit_to, held, _ = slight
+    assert is_noise(leaving(misfit, taken, *slight), fit_to, held) is noise
+
+
+def test_an_effect_that_is_next_to_none_may_take_what_it_will(slight):
+    fit_to, held, _ = slight
+    contest = leaving(0.95, 0.14, *slight)
+    [entry] = contest.singles
+    candidate = entry.fit.candidate
+    none = replace(entry, fit=replace(entry.fit, x=candidate.neutral + 0.01 * candidate.scale))
+    assert is_noise(replace(contest, singles=(none,)), fit_to, held)
+
+
+@pytest.mark.parametrize(
+    ("faults", "verdict"),
+    [((0, 0, 0), Verdict.NO_GAP), ((0, 1, 0), Verdict.NO_GAP), ((4, 4, 4), Verdict.UNKNOWN)],
+    ids=["none", "one", "many"],
+)
+def test_what_is_rare_but_far_beyond_noise_is_a_gap(faults, verdict):
+    """A wheel that reads 0.3 rad/s less for a tenth of a second, now and then: one block of 240 may be chance."""
+    nominal, logs = clean(pulses(16.0), 14.0), []
+    for seed, count in enumerate(faults):
+        measured = nominal.measured.copy()
+        for begin in 200 + 400 * np.arange(count):
+            measured[begin : begin + 12, WHEEL.start] -= 0.3
+        logs.append(noisy(remeasured(nominal, measured), seed))
+    few = set(EFFECTS) - {"aero_drag", "wheel_radius_offset"}
+    decision = find(MODEL, logs[:2], logs[2], exclude=few).decision
+    assert decision.before.misfit < NO_GAP_MISFIT
+    assert decision.verdict is verdict

@@ -9,11 +9,15 @@ from gap_drives import MODEL, SIGMA, clean, noisy, pulses, random_drives, rms, r
 from scenarios.effects import EFFECTS
 from scenarios.effects.accelerometer_bias import AccelerometerBias
 from scenarios.effects.mass_offset import MassOffset
+from scenarios.effects.torque_gain import TorqueGain
+from scenarios.effects.vehicle_speed_scale import VehicleSpeedScale
 from sim2real.diagnose import diagnose
 from sim2real.how_far import gap
+from sim2real.how_far.budget import budget
 from sim2real.observing.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
 from sim2real.observing.evidence import Evidence, gather, residuals
 from sim2real.observing.noise import Noise
+from sim2real.result import Interval
 from sim2real.telling import estimates
 from sim2real.telling.estimates import at_bound, intervals, is_excited
 from sim2real.where import localise
@@ -133,6 +137,62 @@ def test_the_interval_of_a_shrink_is_the_seeds(tame):
     before, after = held.residuals(MODEL.with_effects(MassOffset(150.0))), held.residuals(MODEL)
     assert gap.shrink(held, before, after, seed=3) == gap.shrink(held, before, after, seed=3)
     assert gap.shrink(held, before, after, seed=3) != gap.shrink(held, before, after, seed=4)
+
+
+# --- budget
+
+
+BIAS, SCALE = AccelerometerBias(0.3), VehicleSpeedScale(1.01)
+
+
+@pytest.fixture(scope="module")
+def two_sensors():
+    """A log of a biased accelerometer and a speed that reads too much: neither touches the other's signals."""
+    effects = {"accelerometer_bias": {"bias_m_s2": 0.3}, "vehicle_speed_scale": {"factor": 1.01}}
+    return known(noisy(clean(pulses(8.0), 14.0, effects=effects), 3))
+
+
+def shares_of(held, *effects, floor=1.0, seed=0):
+    found = budget(held, effects, MODEL, floor, seed).shares
+    assert sum(share.value for share in found.values()) == pytest.approx(1.0)
+    assert all(share.low <= share.value <= share.high for share in found.values())
+    return found
+
+
+def test_two_effects_that_act_alone_have_the_shares_of_their_own_signals(two_sensors):
+    found = shares_of(two_sensors, BIAS, SCALE)
+    assert list(found) == ["effect:accelerometer_bias", "effect:vehicle_speed_scale", "structure", "noise"]
+    signals = gap.measure(two_sensors, two_sensors.residuals(MODEL)).signals
+    whole = sum(size**2 for size in signals.values())
+    biased = (signals["accel_x"] ** 2 - 1.0) / whole
+    assert found["effect:accelerometer_bias"].value == pytest.approx(biased, rel=0.05)
+    assert found["effect:vehicle_speed_scale"].value == pytest.approx(1.0 - biased - 3.0 / whole, rel=0.05)
+    assert found["noise"].value == pytest.approx(3.0 / whole)
+    assert found["structure"].value == pytest.approx(0.0, abs=0.01)
+
+
+def test_effects_share_alike_in_whatever_order_they_are_named(two_sensors):
+    """Mass and gain take from each other what the first of them would take."""
+    pair = MassOffset(150.0), TorqueGain(0.9)
+    assert shares_of(two_sensors, *pair) == shares_of(two_sensors, *pair[::-1])
+    assert shares_of(two_sensors, *pair) != shares_of(two_sensors, *pair, seed=1)
+
+
+def test_what_no_effect_takes_is_structure(two_sensors):
+    found = shares_of(two_sensors, SCALE)
+    both = shares_of(two_sensors, BIAS, SCALE)
+    assert found["structure"].value == pytest.approx(both["effect:accelerometer_bias"].value, abs=0.01)
+    assert shares_of(two_sensors)["structure"].value == pytest.approx(1.0 - found["noise"].value)
+
+
+def test_noise_alone_is_all_of_a_budget(tame):
+    held = known(tame)
+    found = shares_of(held, floor=gap.noise_floor(MODEL, held, 0))
+    assert found["noise"].value == pytest.approx(1.0, abs=0.05)
+    assert shares_of(held, floor=1.1) == {
+        "structure": Interval(0.0, 0.0, 0.0),
+        "noise": Interval(1.0, 1.0, 1.0),
+    }
 
 
 # --- intervals

@@ -69,8 +69,14 @@ EXPECTED = {
     (Verdict.AMBIGUOUS, Verdict.IDENTIFIED): Verdict.COMPOUND,
     (Verdict.IDENTIFIED, Verdict.AMBIGUOUS): Verdict.COMPOUND,
     (Verdict.IDENTIFIED, Verdict.COMPOUND): Verdict.COMPOUND,
-    (Verdict.UNKNOWN, Verdict.IDENTIFIED): Verdict.UNKNOWN,
-    (Verdict.IDENTIFIED, Verdict.UNKNOWN): Verdict.UNKNOWN,
+    (Verdict.PARTIAL, Verdict.IDENTIFIED): Verdict.COMPOUND,
+    (Verdict.UNKNOWN, Verdict.IDENTIFIED): Verdict.PARTIAL,
+    (Verdict.IDENTIFIED, Verdict.UNKNOWN): Verdict.PARTIAL,
+    (Verdict.PARTIAL, Verdict.UNKNOWN): Verdict.PARTIAL,
+    (Verdict.UNKNOWN, Verdict.AMBIGUOUS): Verdict.AMBIGUOUS,
+    (Verdict.AMBIGUOUS, Verdict.UNKNOWN): Verdict.AMBIGUOUS,
+    (Verdict.UNKNOWN, Verdict.COMPOUND): Verdict.COMPOUND,
+    (Verdict.COMPOUND, Verdict.UNKNOWN): Verdict.COMPOUND,
     (Verdict.UNKNOWN, Verdict.UNKNOWN): Verdict.UNKNOWN,
 }
 
@@ -95,7 +101,11 @@ def test_whatever_is_merged_is_a_diagnosis_by_the_contract(main, side):
     effects = [c.effect for c in found.causes]
     assert len(effects) == len(set(effects))
     assert {c.effect for c in main_of(main).causes} | {"camera_latency", "camera_pitch"} == set(effects)
-    assert (found.unexplained is None) == (Verdict.UNKNOWN not in (main, side))
+    told = main in (Verdict.UNKNOWN, Verdict.PARTIAL) or side is Verdict.UNKNOWN
+    assert (found.unexplained is not None) == told
+    assert (found.budget is None) == (main is side is Verdict.NO_GAP)
+    if found.budget:
+        assert sum(found.budget.to_json().values()) == pytest.approx(1.0)
     assert found.to_json()["verdict"] == str(found.verdict)
     if found.verdict is not Verdict.COMPOUND:
         assert probabilities == sorted(probabilities, reverse=True)
@@ -117,6 +127,42 @@ def test_a_side_without_a_gap_gets_only_what_probability_is_left():
     top = {c.effect: c.probability for c in found.causes}
     assert top["tyre_relaxation"] == main.causes[0].probability
     assert sum(top.values()) <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("main", [Verdict.IDENTIFIED, Verdict.PARTIAL])
+def test_what_one_half_names_stands_where_the_other_is_unknown(main):
+    camera = merge(main_of(Verdict.UNKNOWN), side_of(Verdict.IDENTIFIED))
+    assert [c.effect for c in needed(camera)] == ["camera_latency"]
+    assert "Something" not in camera.sentence
+    car = merge(main_of(main), side_of(Verdict.UNKNOWN))
+    assert [c.effect for c in needed(car)] == [c.effect for c in needed(main_of(main))]
+    assert "Beside it, Something unknown" in car.sentence
+    two = merge(main_of(Verdict.COMPOUND), side_of(Verdict.UNKNOWN))
+    assert {c.effect for c in needed(two)} == set(two.together) == {"tyre_relaxation", "aero_drag"}
+
+
+# --- budget
+
+
+def test_each_half_has_as_much_of_the_budget_as_its_signals_make_of_the_gap():
+    main = main_of(Verdict.IDENTIFIED)
+    shares = merge(main, side_of(Verdict.IDENTIFIED)).budget.shares
+    of_car, of_camera = (sum(g * g for g in gaps.values()) for gaps in (main.gap.before.signals, LOUD))
+    whole = of_car + of_camera
+    relaxed = main.budget.shares["effect:tyre_relaxation"]
+    assert shares["effect:tyre_relaxation"].value == pytest.approx(relaxed.value * of_car / whole)
+    assert shares["effect:camera_latency"].value == pytest.approx((of_camera - 1.0) / whole)
+    assert shares["noise"].value == pytest.approx((main.budget.shares["noise"].value * of_car + 1.0) / whole)
+    assert all(s.low <= s.value <= s.high for s in shares.values())
+    assert [name.startswith("effect:") for name in shares] == [True, True, False, False]
+
+
+def test_what_an_unknown_camera_leaves_is_structure_beyond_its_noise():
+    main = main_of(Verdict.NO_GAP)
+    shares = merge(main, side_of(Verdict.UNKNOWN)).budget.to_json()
+    whole = sum(g * g for g in main.gap.before.signals.values()) + LOUD["image_class"] ** 2
+    assert shares == pytest.approx({"noise": 1.0 - 24.0 / whole, "structure": 24.0 / whole})
+    assert merge(main_of(Verdict.PARTIAL), side_of(Verdict.NO_GAP)).budget == made_up.partial().budget
 
 
 # --- gap, sentence, places
@@ -448,7 +494,9 @@ def test_an_effect_that_may_as_well_be_none_is_asked_about():
     assert "cannot tell exposure_shift from a car without it." in render(told)
 
 
-@pytest.mark.parametrize("verdict", [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.COMPOUND])
+@pytest.mark.parametrize(
+    "verdict", [Verdict.IDENTIFIED, Verdict.PARTIAL, Verdict.AMBIGUOUS, Verdict.COMPOUND]
+)
 def test_beside_a_gap_of_the_car_a_question_is_a_warning(verdict):
     main = main_of(verdict)
     told = merge(main, camera_side(ASKED))

@@ -19,8 +19,11 @@ from hypothesis import strategies as st
 
 from sim2real.how_far.rating import LEAST_SAMPLES, MOST_SAMPLES, rating
 from sim2real.result import Interval, Measure, Trace, Verdict
-from sim2real.telling import figures, report
+from sim2real.telling import figures, report, sentences
 from sim2real.telling.report import estimate, jsonable, percent, render, write_diagnosis
+from sim2real.which.contest import Entry
+from sim2real.which.goodness import Fitness
+from sim2real.which.selection import Decision
 
 DIAGNOSES = {name: make() for name, make in made_up.ALL.items()}
 BRIEF = {name: replace(diagnosis, traces=()) for name, diagnosis in DIAGNOSES.items()}
@@ -78,6 +81,27 @@ def test_text_of_files_is_text():
     page = render(said)
     assert page.count("&lt;i&gt;") >= 2
     assert "<i>" not in page
+
+
+@pytest.mark.parametrize(
+    ("rivals", "said"),
+    [
+        (["torque_gain"], "mass_offset or as well torque_gain: these"),
+        (["mass_offset+aero_drag"], "mass_offset, perhaps not alone (with aero_drag): these"),
+        (
+            ["torque_gain+road_grade", *(f"mass_offset+{key}" for key in "abcde")],
+            "mass_offset or as well torque_gain with road_grade, perhaps not alone (with a or b or c or one of 2 more)",
+        ),
+    ],
+)
+def test_a_sentence_lists_a_few_rivals_and_counts_the_others(rivals, said):
+    best, *others = (
+        Entry(tuple(name.split("+")), None, np.zeros(0), np.zeros(0)) for name in ("mass_offset", *rivals)
+    )
+    fitness = Fitness(1.0, {})
+    decision = Decision(Verdict.AMBIGUOUS, best, tuple(others), {}, fitness, fitness)
+    diagnosis = BRIEF["ambiguous"]
+    assert said in sentences.verdict(decision, diagnosis.gap, diagnosis.causes)
 
 
 @pytest.mark.parametrize("name", DIAGNOSES)

@@ -1,4 +1,6 @@
-"""Tyres of another curve: the plant's force and slopes, and an effect that is found beside them."""
+"""Tyres of another curve: the plant's force and slopes, and that alone they are no effect of the library."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +11,11 @@ from scenarios.effects.mu_split import MuSplit
 from scenarios.plant import dynamics
 from scenarios.plant.pipeline import make_setup
 from sim2real.diagnose import find
+from sim2real.discrepancy.verdict import beside_another_build
 from sim2real.observing.evidence import gather
 from sim2real.result import Verdict
-from sim2real.which.contest import first_round, hold_contest
+from sim2real.which.contest import enter, first_round, hold_contest
+from sim2real.which.selection import decide
 
 SHAPE = {"knee": -0.08, "crest": 0.06, "sliding": -0.1}
 FORMULA = {"share": 1.0, "shape": 1.5, "curvature": -0.8}
@@ -137,7 +141,10 @@ def test_sides_of_one_friction_are_no_split():
     ]
     fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
     first = first_round(MODEL, fit_to, only("mu_split", "mass_offset"))
-    assert "mu_split" in [f.candidate.ids[0] for f in first]
+    (split,) = [f for f in first if f.candidate.ids == ("mu_split",)]
     contest = hold_contest(MODEL, fit_to, held, first)
     assert [e.ids for e in contest.singles] == [("mass_offset",)]
     assert all(e.fitted.candidate.is_proper(e.fitted.x) for e in contest.singles)
+    alone = replace(contest, singles=(enter(split.candidate, fit_to, held, split.x, 4),))
+    said = decide(contest, fit_to, held)
+    assert beside_another_build(said, alone, MODEL, fit_to, held) == (alone, said)

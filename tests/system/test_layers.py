@@ -23,7 +23,9 @@ BELOW = {
     "trpac_cli": "trpac_core scenarios fmu_src sim2real trpac_hil trpac",
 }
 """What each folder may import of ours; a folder that is not listed may import all, and none of these imports it."""
-FLOORS = ["result", "logs", "observing", "where how_far", "which", "own_model", "next_manoeuvre", "telling"]
+FLOORS = [
+    "result", "logs", "observing", "which", "where how_far discrepancy", "own_model", "next_manoeuvre", "telling"
+]  # fmt: skip
 """The diagnosis from below; the files on top put them together."""
 
 Graph = dict[str, set[str]]

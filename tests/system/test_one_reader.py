@@ -53,6 +53,7 @@ OWN = {
     "scenarios/whole_files.py": {"open"},  # a file, to write
     "sim2real/demo.py": {"read_bytes"},  # a shipped vehicle, to copy it
     "sim2real/logs/write.py": {"MDF"},
+    "sim2real/discrepancy/prior.py": {"loads", "read_text"},  # what was learnt of other builds
     "trpac/scenarios.py": {"read_bytes"},  # a figure that it has drawn
     "trpac_hil/delays.py": {"open"},  # /proc
     "trpac_hil/realtime.py": {"read_text"},  # /proc
