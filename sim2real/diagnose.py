@@ -256,7 +256,8 @@ def find(
     if contest.singles and decision.verdict is Verdict.UNKNOWN:
         contest = add_pairs(contest, base, fit_to, held, jobs, progress)
         decision = decide(contest, fit_to, held)
-    if contest.singles and (decision.verdict is Verdict.UNKNOWN or baseline):
+    gap = decision.verdict is not Verdict.NO_GAP
+    if contest.singles and gap and (decision.verdict is Verdict.UNKNOWN or baseline):
         faultless = gather(base, baseline) if baseline else None
         contest, decision = beside_another_build(
             decision, contest, base, fit_to, held, faultless, jobs, progress

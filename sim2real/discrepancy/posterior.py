@@ -43,6 +43,9 @@ SECOND, SECOND_SHARE = 20.0, 0.10
 """What a second effect adds to the drop at least, and as a share of both [-]."""
 ALONE = 0.4
 """Share of both effects' drop that the better one takes alone, or they only bend to what neither is [-]."""
+MOTION_LEFT = 4.0
+"""What may be left of position and vehicle speed away from the tyres' limit, in standard deviations: another build hardly
+moves the body otherwise; faults of other forms leave 5 and more, true ones up to 3 [-]."""
 OF_TYRE = ("friction_offset", "mu_split", "friction_falloff", "tyre_stiffness_offset")
 """What a foreign tyre looks like beside a fault: never the second of two."""
 LOOSE = 1e-4
@@ -121,6 +124,12 @@ def _outside(stack: Stack, columns: Array, scale: Scale) -> float:
     return cost + float(np.linalg.slogdet(information)[1] - np.linalg.slogdet(information[:known, :known])[1])
 
 
+def _moves_so(stack: Stack, account: _Account) -> bool:
+    """Whether an account leaves little of how the body moves."""
+    size = read_scale(account.rest, stack.z != 0.0, stack.limit).size[~stack.limit, :2]
+    return not len(size) or float(size.max()) <= MOTION_LEFT
+
+
 def judge(
     stack: Stack,
     scale: Scale,
@@ -160,7 +169,7 @@ def judge(
         told = {stack.names[i]: float(values[i]) for i in order}
         return Judged(verdict, named, drops, probability, outside, told)
 
-    if top <= BLAMED:
+    if top <= BLAMED or not _moves_so(stack, best[ranked[0]]):
         return said(Verdict.UNKNOWN, (), {}, null.build)
     two = sorted(
         ((null.cost - _account(stack, h, scale).cost, h) for h in fit_pairs()), key=lambda found: -found[0]

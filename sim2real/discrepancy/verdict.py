@@ -83,8 +83,9 @@ def beside_another_build(
     told = [_told(fit_logs, own_scale, h) for h in found.named]
     entries = [_entry(h, fit_to, holdout) for h, _ in told]
     after = fitness(entries[0], fit_to, holdout)
-    if after.misfit >= decision.before.misfit:  # it only bends what the build does
-        return contest, decision
+    first = entries[0].fitted
+    if after.misfit >= decision.before.misfit or first.candidate.at_bound(first.x):
+        return contest, decision  # it only bends what the build does
     names = {entry.ids for entry in entries}
     others = tuple(e for e in contest.singles if e.ids not in names)
     alone = tuple(e for e in entries if len(e.ids) == 1)

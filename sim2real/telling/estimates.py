@@ -13,8 +13,6 @@ from sim2real.which.fitting import Fit
 
 Array = NDArray[np.float64]
 
-AT_BOUND = 1e-3
-"""An estimate this close to a bound, in shares of the range, lies at it [-]."""
 EXCITED_SHARE = 4.0 / 3.0
 """An effect is seen when the half width of its first parameter is below this many noticeable changes of it, or leaves
 its absence out [-]."""
@@ -107,13 +105,3 @@ def _inverse(scaled: Array, weight: Array) -> Array:
 def _without_slope(scaled: Array) -> NDArray[np.bool_]:
     """Parameters whose noticeable changes the logs do not answer to at all."""
     return np.sqrt((scaled**2).sum(axis=0)) < LEAST_SLOPE
-
-
-def at_bound(found: Fit) -> list[str]:
-    """Parameters whose estimate lies at a bound that is not the effect's absence."""
-    low, high = found.candidate.bounds
-    near = AT_BOUND * (high - low)
-    off = ((found.x - low < near) & (found.candidate.neutral > low + near)) | (
-        (high - found.x < near) & (found.candidate.neutral < high - near)
-    )
-    return [p.name for (_, p), is_off in zip(found.candidate.parameters, off, strict=True) if is_off]

@@ -32,7 +32,7 @@ from sim2real.result import (
     at_bound_in_words,
 )
 from sim2real.telling import sentences
-from sim2real.telling.estimates import at_bound, is_excited, joint
+from sim2real.telling.estimates import is_excited, joint
 from sim2real.where import localise
 from sim2real.where.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
 from sim2real.where.sensor_isolation import lone_sensor
@@ -219,7 +219,7 @@ def _cause(
         contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
     if not excited:
         contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
-    for name in at_bound(best):
+    for name in best.candidate.at_bound(best.x):
         contra.append(at_bound_in_words(name))
     if shrunk.high <= 1.0:
         contra.append("Does not shrink the gap on the hold-out.")

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 MOST_STARTS = 8
 """Points of the coarse grid before the local fit."""
+AT_BOUND = 1e-3
+"""An estimate this close to a bound, in shares of the range, lies at it [-]."""
 FULL_STEPS = 12
 """Most steps of a fit with full care."""
 
@@ -88,6 +90,15 @@ class Candidate:
     def model(self, x: Array) -> Simulation:
         """The base model with the effects at x."""
         return self.base.with_effects(*self.effects(x))
+
+    def at_bound(self, x: Array) -> list[str]:
+        """Parameters that lie at a bound which is not the effect's absence."""
+        low, high = self.bounds
+        near = AT_BOUND * (high - low)
+        off = ((x - low < near) & (self.neutral > low + near)) | (
+            (high - x < near) & (self.neutral < high - near)
+        )
+        return [p.name for (_, p), is_off in zip(self.parameters, off, strict=True) if is_off]
 
     def is_proper(self, x: Array) -> bool:
         """Whether every effect is itself at x, see `Effect.is_itself`."""

@@ -19,7 +19,7 @@ from sim2real.observing.evidence import Evidence, gather, residuals
 from sim2real.observing.noise import Noise
 from sim2real.result import Interval
 from sim2real.telling import estimates
-from sim2real.telling.estimates import at_bound, intervals, is_excited
+from sim2real.telling.estimates import intervals, is_excited
 from sim2real.where import localise
 from sim2real.where.localise import REGIMES, Blocks, blocks, equation_shares, heat_map, places, regimes
 from sim2real.which.contest import as_it_is, enter
@@ -434,9 +434,9 @@ def test_the_equation_that_takes_most_has_the_greatest_share():
 def test_an_estimate_at_a_bound_is_told_unless_it_means_no_effect(tame):
     found = fit(Candidate(MODEL, ("aero_drag",)), known(tame), np.array([0.1]), 1)
     low, high = found.candidate.bounds
-    assert at_bound(replace(found, x=high)) == ["drag_area_m2"]
-    assert at_bound(replace(found, x=0.5 * (low + high))) == []
-    assert at_bound(replace(found, x=low)) == []  # no drag at all is the neutral value
+    assert found.candidate.at_bound(high) == ["drag_area_m2"]
+    assert found.candidate.at_bound(0.5 * (low + high)) == []
+    assert found.candidate.at_bound(low) == []  # no drag at all is the neutral value
 
 
 def test_the_part_of_the_car_that_the_cause_lies_in_has_the_most_of_the_heat_map():
