@@ -44,8 +44,8 @@ SECOND, SECOND_SHARE = 20.0, 0.10
 ALONE = 0.4
 """Share of both effects' drop that the better one takes alone, or they only bend to what neither is [-]."""
 MOTION_LEFT = 4.0
-"""What may be left of position and vehicle speed away from the tyres' limit, in standard deviations: another build hardly
-moves the body otherwise; faults of other forms leave 5 and more, true ones up to 3 [-]."""
+"""What may be left of position and vehicle speed away from the tyres' limit [standard deviations]: another build hardly
+moves the body otherwise; faults of other forms leave 5 and more, true ones up to 3."""
 OF_TYRE = ("friction_offset", "mu_split", "friction_falloff", "tyre_stiffness_offset")
 """What a foreign tyre looks like beside a fault: never the second of two."""
 LOOSE = 1e-4

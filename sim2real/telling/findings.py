@@ -136,7 +136,7 @@ def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unex
     if decision.verdict is Verdict.PARTIAL:
         added = found.model.with_effects(*found.added())
         terms = fit_terms(added, *all_logs(found.fit_to, held), jobs)
-        return terms, characterise(terms), False
+        return terms, characterise(terms, of="what is left"), False
     if decision.verdict is not Verdict.UNKNOWN:
         return (
             fit_terms(

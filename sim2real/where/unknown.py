@@ -24,8 +24,10 @@ SENSOR_OF = {
 }
 
 
-def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unexplained:
-    """The best term in the form of a result; `suspect` is a sensor without which all else agrees."""
+def characterise(
+    terms: Sequence[Term], suspect: Equation | None = None, of: str = "the misfit"
+) -> Unexplained:
+    """The best term in the form of a result; `suspect` is a sensor that stands alone, `of` what it explains."""
     best = terms[0]
     share = 1.0 - best.loss / max(best.null_loss, 1e-12)
     shape, sign = shape_of(best), sign_of(best)
@@ -33,7 +35,7 @@ def characterise(terms: Sequence[Term], suspect: Equation | None = None) -> Unex
     subsystem = subsystem_of(best)
     sentence = (
         f"The {subsystem.replace('_', ' ')}'s equation ({best.equation.key}) {wanted}. "
-        f"Such a term takes {100.0 * share:.0f} % of the misfit."
+        f"Such a term takes {100.0 * share:.0f} % of {of}."
     )
     if suspect:
         sentence = f"Without the {suspect.key.removesuffix(' sensor')}'s signal all else agrees. {sentence}"
@@ -62,7 +64,8 @@ def _wanted(term: Term, sign: str, shape: str) -> str:
     """What an equation wants, in words; sign and shape are the curve's."""
     on = f"{term.quantity} [{QUANTITIES[term.quantity][0]}]"
     if term.equation.key != TORQUE_GAIN:
-        return f"wants a further term in {term.equation.unit} that depends on {on}: it {sign} and {shape}"
+        unit = "" if term.equation.unit == "-" else f" in {term.equation.unit}"
+        return f"wants a further term{unit} that depends on {on}: it {sign} and {shape}"
     x, y = term.drawn
     if term.quantity not in TWO_SIDED:
         return f"wants another share of the torque, which depends on {on}: {_span(x, y)}"
