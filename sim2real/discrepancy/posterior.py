@@ -169,7 +169,7 @@ def judge(
         told = {stack.names[i]: float(values[i]) for i in order}
         return Judged(verdict, named, drops, probability, outside, told)
 
-    if top <= BLAMED or not _moves_so(stack, best[ranked[0]]):
+    if top <= BLAMED:
         return said(Verdict.UNKNOWN, (), {}, null.build)
     two = sorted(
         ((null.cost - _account(stack, h, scale).cost, h) for h in fit_pairs()), key=lambda found: -found[0]
@@ -181,13 +181,15 @@ def judge(
         lesser = min(h.ids, key=lambda key: drops[key])
         if lesser in OF_TYRE:
             continue
-        if drop - top > max(SECOND, SECOND_SHARE * drop):
+        account = _account(stack, h, scale)
+        if drop - top > max(SECOND, SECOND_SHARE * drop) and _moves_so(stack, account):
             if max(drops[key] for key in h.ids) < ALONE * drop:
                 return said(Verdict.UNKNOWN, (), outside, null.build)
-            account = _account(stack, h, scale)
             told = said(Verdict.COMPOUND, (), outside, account.build)
             return replace(told, named=(replace(h, x=account.x),))
         break
+    if not _moves_so(stack, best[ranked[0]]):
+        return said(Verdict.UNKNOWN, (), outside, null.build)
     alike = [key for key in ranked if drops[key] > BLAMED and top - drops[key] < max(LIKE, LIKE_SHARE * top)]
     verdict = Verdict.AMBIGUOUS if len(alike) > 1 else Verdict.PARTIAL
     return said(verdict, alike or ranked[:1], outside, best[ranked[0]].build)

@@ -22,6 +22,8 @@ EXPLAINED_MISFIT = 1.5
 """Up to this misfit an entry explains everything [-]."""
 PAIR_MISFIT = 1.4
 """The same of a pair: two effects bend to much, so that more is asked of them [-]."""
+EXPLAINED_SHARE = 0.02
+"""Where the gap is large, this share of its misfit may be left, too: no form of an effect is exact [-]."""
 LIBRARY_BELIEF = 0.93
 """Probability that what explains all by itself is the cause, not the like of one that no library holds [-]."""
 PAIR_LOSS = 0.7
@@ -113,7 +115,7 @@ def _of_two(contest: Contest, before: Fitness, fit_to: Evidence, holdout: Eviden
     weight = probabilities(contest, list(contest.pairs), fit_to, holdout)[1:]
     pair = contest.pairs[int(weight.argmax())]  # of equals, the one that needs fewer parameters
     after = fitness(pair, fit_to, holdout)
-    if after.misfit > PAIR_MISFIT or not _two_are_needed(contest, pair):
+    if after.misfit > max(PAIR_MISFIT, EXPLAINED_SHARE * before.misfit) or not _two_are_needed(contest, pair):
         return None
     weighed = list(zip(contest.pairs, weight, strict=True))
     rivals = tuple(e for e, w in weighed if e is not pair and w > RIVAL * weight.max())
