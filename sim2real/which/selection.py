@@ -97,7 +97,9 @@ def decide(contest: Contest, fit_to: Evidence, holdout: Evidence) -> Decision:
         return Decision(Verdict.UNKNOWN, contest.null, (), {}, before, before)
     best = max(singles, key=lambda e: share[e.ids[0]])
     after = fitness(best, fit_to, holdout)
-    if after.misfit <= EXPLAINED_MISFIT and share[best.ids[0]] > none:  # what is rare hardly moves the misfit
+    if (
+        after.misfit <= max(EXPLAINED_MISFIT, EXPLAINED_SHARE * before.misfit) and share[best.ids[0]] > none
+    ):  # what is rare hardly moves the misfit
         rivals = tuple(
             e for e in singles if e is not best and share[e.ids[0]] > RIVAL_ALONE * share[best.ids[0]]
         )
