@@ -20,7 +20,7 @@ from sim2real.discrepancy.beside import (
     stack_of,
     with_tyre,
 )
-from sim2real.discrepancy.posterior import judge
+from sim2real.discrepancy.posterior import Judged, judge
 from sim2real.discrepancy.ridge import HUBER, Scale, solve
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.observer import Simulation
@@ -91,10 +91,8 @@ def beside_another_build(
     alone = tuple(e for e in entries if len(e.ids) == 1)
     contest = replace(contest, singles=(*alone, *others))
     share = dict.fromkeys((e.ids[0] for e in contest.singles), 0.0)
-    for key, value in found.probability.items():
+    for key, value in _believed(found).items():
         share[key] = LIBRARY_BELIEF * value
-    if found.verdict is Verdict.COMPOUND:
-        share |= dict.fromkeys(entries[0].ids, 0.5 * LIBRARY_BELIEF)
     return contest, Decision(
         found.verdict,
         entries[0],
@@ -105,6 +103,15 @@ def beside_another_build(
         intervals={name: interval for _, of_one in told for name, interval in of_one.items()},
         build=dict(found.structure),
     )
+
+
+def _believed(found: Judged) -> dict[str, float]:
+    """Probabilities of the effects; those that cannot be told apart have equal ones, as the two of a compound."""
+    if found.verdict is Verdict.COMPOUND:
+        return dict.fromkeys(found.named[0].ids, 0.5)
+    alike = [h.ids[0] for h in found.named]
+    mean = sum(found.probability[key] for key in alike) / len(alike)
+    return {**found.probability, **dict.fromkeys(alike, mean)}
 
 
 def _told(stack: Stack, scale: Scale, h: Hypothesis) -> tuple[Hypothesis, dict[tuple[str, str], Interval]]:

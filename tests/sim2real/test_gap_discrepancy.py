@@ -270,8 +270,19 @@ def test_on_foreign_tyres_a_fault_is_named_and_none_where_there_is_none(fault, f
         assert decision.verdict is Verdict.PARTIAL
         assert decision.winner.ids == (first,)
         assert decision.build["stiffness by load"] != 0.0
+        assert 0.9 < sum(decision.probability.values()) <= 1.0
         interval = decision.intervals[first, "grade"]
         assert interval.low < 0.03 < interval.high
+
+
+def test_two_faults_on_foreign_tyres_share_the_probability():
+    fault = {"road_grade": {"grade": 0.03}, "torque_lag": {"time_constant_s": 0.15}}
+    logs = [driven({**FOREIGN_TYRE, **fault}, v0, i, 20.0) for i, v0 in enumerate((14.0, 17.0))]
+    decision = find(MODEL, logs[:1], logs[1], exclude=only("road_grade", "torque_lag", "brake_drag")).decision
+    assert decision.verdict is Verdict.COMPOUND
+    assert set(decision.winner.ids) == {"road_grade", "torque_lag"}
+    assert 0.9 < sum(decision.probability.values()) <= 1.0
+    assert decision.probability["brake_drag"] < 0.05
 
 
 def test_what_the_car_had_before_is_not_the_fault():
