@@ -15,7 +15,7 @@ from scenarios.files import RoadFile, VehicleFile
 from scenarios.progress import StageProgress, silent
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
-from sim2real.result import Cause, Gap, Place, Verdict, needed
+from sim2real.result import Budget, Cause, Gap, Place, Verdict, needed
 from sim2real.result import Diagnosis as Result
 from trpac.extras import extras
 from trpac.files import read_log
@@ -52,6 +52,11 @@ class Diagnosis:
     def gap(self) -> Gap:
         """The gap on the hold-out log before and after, in noise floors."""
         return self.result.gap
+
+    @property
+    def budget(self) -> Budget | None:
+        """Shares of the squared gap by cause, structure and noise; None without a gap."""
+        return self.result.budget
 
     @property
     def where(self) -> tuple[Place, ...]:
