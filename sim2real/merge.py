@@ -125,9 +125,9 @@ def _ranked(
         if cause.effect not in best or cause.probability > best[cause.effect].probability:
             best[cause.effect] = cause
 
-    def key(cause: Cause) -> tuple[bool, float, float]:
+    def key(cause: Cause) -> tuple[bool, float]:
         named = verdict is Verdict.COMPOUND and cause.effect in first
-        return (not named, -cause.probability, cause.gap_after)
+        return (not named, -cause.probability)
 
     return tuple(sorted(best.values(), key=key))
 

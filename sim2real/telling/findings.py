@@ -187,7 +187,7 @@ def _causes(found: Findings, held: Evidence, before: Sequence[Array], seed: int)
     if not together and compound:
         together = joint(winner, found.fit_to)
     out = [_cause(found, entry, held, before, seed, together) for entry in found.contest.singles]
-    first = winner.ids if compound else ()
+    first = winner.ids if found.added() else ()
     return tuple(sorted(out, key=lambda c: (c.effect not in first, -c.probability, c.gap_after)))
 
 
