@@ -174,7 +174,16 @@ def _beside_own(said: Diagnosis) -> Diagnosis:
     It belongs there where the user's model, run with it, leaves as little as with the first effect.
     """
     found = said.own_model
-    if found is None or not found.parameters or said.verdict not in (Verdict.IDENTIFIED, Verdict.AMBIGUOUS):
+    if (
+        found is None
+        or not found.parameters
+        or said.verdict
+        not in (
+            Verdict.IDENTIFIED,
+            Verdict.PARTIAL,
+            Verdict.AMBIGUOUS,
+        )
+    ):
         return said
     best, first = found.parameters[0], said.causes[0]
     effect = best.effect.partition(".")[0]

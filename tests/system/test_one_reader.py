@@ -54,7 +54,11 @@ OWN = {
     "sim2real/demo.py": {"read_bytes"},  # a shipped vehicle, to copy it
     "sim2real/logs/write.py": {"MDF"},
     "sim2real/discrepancy/prior.py": {"loads", "read_text"},  # what was learnt of other builds
-    "sim2real/own_model/runs.py": {"load", "loads", "read_text"},  # the answer of the process that runs a unit
+    "sim2real/own_model/runs.py": {
+        "load",
+        "loads",
+        "read_text",
+    },  # the answer of the process that runs a unit
     "sim2real/own_model/worker.py": {"load", "loads", "read_text"},  # that process' job
     "trpac/scenarios.py": {"read_bytes"},  # a figure that it has drawn
     "trpac_hil/delays.py": {"open"},  # /proc
