@@ -12,9 +12,13 @@ import numpy as np
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
 from sim2real.adequacy import require_adequate
+from sim2real.auxiliary import camera_side, counter_side
 from sim2real.discrepancy.verdict import beside_another_build
 from sim2real.how_far.gap import measure
 from sim2real.how_far.trpac_error import trpac_error
+from sim2real.hypotheses.contest import COUNTER, Progress, first_round, hold_contest, silent
+from sim2real.hypotheses.pairs import add_pairs
+from sim2real.hypotheses.selection import decide
 from sim2real.merge import merge
 from sim2real.observing.drive import WHEEL, Drive
 from sim2real.observing.evidence import drift_of, gather, residuals
@@ -26,13 +30,9 @@ from sim2real.observing.reference import By
 from sim2real.own_model.study import Study, before_fits
 from sim2real.own_sources import require_alone, studied
 from sim2real.perception.diagnose import camera_shrink, diagnose_perception
+from sim2real.reporting.findings import Findings, describe
 from sim2real.result import Diagnosis, Measure, RmsError, Verdict, added
-from sim2real.sides import camera_side, counter_side
 from sim2real.sources import Source, Sources, pairing_of, read_source, read_sources
-from sim2real.telling.findings import Findings, describe
-from sim2real.which.contest import COUNTER, Progress, first_round, hold_contest, silent
-from sim2real.which.pairs import add_pairs
-from sim2real.which.selection import decide
 from trpac_core.files import file_sha256
 
 AS_LITTLE = 1.05

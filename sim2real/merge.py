@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sim2real.auxiliary import Side
 from sim2real.perception.shift import SIGNAL as PLACE
 from sim2real.result import (
     Budget,
@@ -19,7 +20,6 @@ from sim2real.result import (
     Verdict,
     added,
 )
-from sim2real.sides import Side
 
 QUIET_SIDE_DOUBT = 0.06
 """Probability that is left to the effects of data that show no gap: some of them would hardly show [-]."""

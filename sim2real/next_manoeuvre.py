@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from scenarios.effects import Effect
 from scenarios.files import RoadFile, VehicleFile
 from scenarios.plant.pipeline import simulate
+from sim2real.hypotheses.contest import Entry, Progress, silent
+from sim2real.hypotheses.fitting import fit
 from sim2real.observing.doubt import doubt
 from sim2real.observing.drive import CHANNELS, Drive, make_drive
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.noise import Noise, widening
 from sim2real.observing.observer import Simulation
 from sim2real.result import NextManoeuvre
-from sim2real.which.contest import Entry, Progress, silent
-from sim2real.which.fitting import fit
 from trpac_core.vehicle import WHEELS
 
 Array = NDArray[Any]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import ScenarioError
+from sim2real.hypotheses.contest import Progress
 from sim2real.observing.drive import Drive, awake
 from sim2real.observing.observer import Simulation
 from sim2real.observing.reference import held_against_stretches
@@ -19,7 +20,6 @@ from sim2real.own_model.signals import load_signals
 from sim2real.own_model.study import Study
 from sim2real.own_model.unit import opened_unit
 from sim2real.sources import Pairing, Sources, drive_of, on_grid, with_reference
-from sim2real.which.contest import Progress
 
 
 def require_alone(model: object, signals: object, pairing: Pairing | None) -> None:

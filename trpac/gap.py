@@ -90,7 +90,7 @@ class Diagnosis:
     def to_html(self, path: str | Path) -> Path:
         """Write the report; returns its path."""
         with extras("to_html", "gap"):
-            from sim2real.telling.report import rated, render
+            from sim2real.reporting.report import rated, render
 
             Path(path).write_text(render(rated(self.result)), encoding="utf-8")
         return Path(path)
@@ -98,7 +98,7 @@ class Diagnosis:
     def write(self, folder: str | Path) -> tuple[Path, Path]:
         """Write diagnosis.json and report.html; returns their paths."""
         with extras("write", "gap"):
-            from sim2real.telling.report import rated, write_diagnosis
+            from sim2real.reporting.report import rated, write_diagnosis
 
             return write_diagnosis(rated(self.result), folder)
 

@@ -145,7 +145,7 @@ def diagnose(
 
     from scenarios.errors import ScenarioError
     from sim2real.diagnose import diagnose_files
-    from sim2real.telling.report import rated, write_diagnosis
+    from sim2real.reporting.report import rated, write_diagnosis
 
     command = "trpac gap diagnose"
     require_folder(command, out)
@@ -273,7 +273,7 @@ def demo(
     from scenarios.errors import ScenarioError
     from sim2real.demo import make_case, open_seal
     from sim2real.diagnose import diagnose_files
-    from sim2real.telling.report import rated, write_diagnosis
+    from sim2real.reporting.report import rated, write_diagnosis
 
     command = "trpac gap demo"
     require_folder(command, out)
@@ -331,7 +331,7 @@ def _print_case(console: Terminal, case: Case) -> None:
 
 def _print_truth(console: Terminal, case: Case, truth: Truth, diagnosis: Diagnosis) -> None:
     """Print the hidden effect beside the diagnosis."""
-    from sim2real.telling.report import estimate
+    from sim2real.reporting.report import estimate
 
     hidden = ", ".join(f"{name} {value:g}" for name, value in truth.parameters.items())
     _print_step(
@@ -353,7 +353,7 @@ def _print_truth(console: Terminal, case: Case, truth: Truth, diagnosis: Diagnos
 
 def judge(hidden: str, diagnosis: Diagnosis) -> str:
     """The sentence, with markup, on whether the diagnosis found the hidden effect."""
-    from sim2real.telling.report import percent
+    from sim2real.reporting.report import percent
 
     ranked = [c.effect for c in diagnosis.causes]
     if hidden not in ranked:
@@ -372,8 +372,8 @@ def judge(hidden: str, diagnosis: Diagnosis) -> str:
 
 def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
     """Print outcome, gap and first causes."""
+    from sim2real.reporting.report import budget_parts, leading, percent
     from sim2real.result import added
-    from sim2real.telling.report import budget_parts, leading, percent
 
     gap = diagnosis.gap
     sizes = f"gap {gap.before.total:.2f}"
@@ -412,7 +412,7 @@ def _how_to_apply(diagnosis: Diagnosis, vehicle: Path, written: Path) -> str:
 
 
 def _cause_table(diagnosis: Diagnosis) -> Table:
-    from sim2real.telling.report import estimate, number, percent
+    from sim2real.reporting.report import estimate, number, percent
 
     table = Table(title="Causes, likeliest first", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("effect", no_wrap=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 from scenarios.errors import ScenarioError
 from sim2real.cases.case import Stage, budget, case_names, stages
 from sim2real.diagnose import diagnose
-from sim2real.telling.report import rated, write_diagnosis
+from sim2real.reporting.report import rated, write_diagnosis
 
 
 def main() -> int:

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from sim2real.discrepancy.columns import of_build, of_other_faults, of_tyres
 from sim2real.discrepancy.prior import prior_root
 from sim2real.discrepancy.ridge import HUBER, Scale, read_scale, solve
+from sim2real.hypotheses.contest import Entry, Progress, run_all
+from sim2real.hypotheses.fitting import STEP, Candidate
 from sim2real.observing.drive import Drive
 from sim2real.observing.evidence import Evidence, all_logs, rest_of
 from sim2real.observing.noise import Noise
 from sim2real.observing.observer import Push, Simulation
-from sim2real.which.contest import Entry, Progress, run_all
-from sim2real.which.fitting import STEP, Candidate
 
 Array = NDArray[np.float64]
 

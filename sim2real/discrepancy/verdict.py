@@ -22,14 +22,14 @@ from sim2real.discrepancy.beside import (
 )
 from sim2real.discrepancy.posterior import Judged, judge
 from sim2real.discrepancy.ridge import HUBER, Scale, solve
+from sim2real.hypotheses.contest import Contest, Entry, Progress, silent
+from sim2real.hypotheses.fitting import Fit, slopes
+from sim2real.hypotheses.goodness import fitness
+from sim2real.hypotheses.selection import LIBRARY_BELIEF, Decision
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.observer import Simulation
 from sim2real.observing.robust import loss
 from sim2real.result import Interval, Verdict
-from sim2real.which.contest import Contest, Entry, Progress, silent
-from sim2real.which.fitting import Fit, slopes
-from sim2real.which.goodness import fitness
-from sim2real.which.selection import LIBRARY_BELIEF, Decision
 
 Array = NDArray[np.float64]
 

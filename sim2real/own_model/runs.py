@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from scenarios.effects import Effect
 from scenarios.errors import ScenarioError
+from sim2real.hypotheses.contest import Progress, run_all, silent
 from sim2real.logs import Log, log_of_frame
 from sim2real.logs.contract import COLUMNS
 from sim2real.logs.errors import LogError
 from sim2real.own_model.signals import TORQUES, Signals
 from sim2real.own_model.unit import OpenedUnit
-from sim2real.which.contest import Progress, run_all, silent
 from trpac_core.files import quoted
 
 Array = NDArray[np.float64]

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from scenarios.effects import Effect
 from sim2real.how_far.gap import measure
+from sim2real.hypotheses.contest import Entry
+from sim2real.hypotheses.goodness import inflation
 from sim2real.logs import Log
 from sim2real.observing.drive import Drive
 from sim2real.observing.evidence import Evidence, gather
@@ -17,8 +19,6 @@ from sim2real.observing.observer import Simulation
 from sim2real.observing.robust import loss, robust_weight
 from sim2real.own_model.runs import OwnModel, Run, Stretch
 from sim2real.result import Interval, OwnFinding, OwnParameter
-from sim2real.which.contest import Entry
-from sim2real.which.goodness import inflation
 
 Array = NDArray[np.float64]
 Follow = Callable[[int, Sequence[Stretch]], Array]

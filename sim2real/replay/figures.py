@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from sim2real.replay.run import DYNAMICS, Replay
-from sim2real.telling.figures import AFTER, BEFORE, DPI, FLOOR, MEASURED, STYLE, WIDTH_IN
+from sim2real.reporting.figures import AFTER, BEFORE, DPI, FLOOR, MEASURED, STYLE, WIDTH_IN
 from trpac_core.estimator_data import Method
 from trpac_core.tyre import INITIAL_SLOPE
 from trpac_core.vehicle import WHEELS

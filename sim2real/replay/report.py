@@ -14,7 +14,7 @@ from scenarios.html_page import data_address, page
 from scenarios.whole_files import written_whole
 from sim2real.replay import figures
 from sim2real.replay.run import DYNAMICS, Replay
-from sim2real.telling.report import DASH, jsonable
+from sim2real.reporting.report import DASH, jsonable
 from trpac_core.estimator_data import Method, Source
 from trpac_core.vehicle import WHEELS
 

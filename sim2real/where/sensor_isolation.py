@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sim2real.hypotheses.contest import as_it_is
+from sim2real.hypotheses.goodness import fitness
 from sim2real.observing.drive import SPEED, WHEEL
 from sim2real.observing.evidence import SETTLING_S, Evidence
 from sim2real.observing.observer import Simulation
 from sim2real.where.equations import EQUATIONS, Equation
-from sim2real.which.contest import as_it_is
-from sim2real.which.goodness import fitness
 
 Array = NDArray[np.float64]
 

@@ -19,9 +19,9 @@ from scenarios.errors import ScenarioError
 from sim2real.demo import VEHICLE
 from sim2real.diagnose import diagnose, diagnose_files, shrink_on
 from sim2real.observing.drive import CHANNELS, RECOVERY_S, WHEEL, backward, make_drive
+from sim2real.reporting.report import jsonable
 from sim2real.result import Diagnosis, Verdict
 from sim2real.sources import read_sources, split
-from sim2real.telling.report import jsonable
 from trpac_core.vehicle import WHEELS
 
 PAYLOAD = {"mass_offset": {"mass_kg": 180.0}}

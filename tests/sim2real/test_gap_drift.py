@@ -8,14 +8,14 @@ from gap_drives import MODEL, SIGMA, STEP_S, clean, noisy, pulses, remeasured
 
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import find
+from sim2real.hypotheses.contest import Entry
+from sim2real.hypotheses.goodness import fitness
+from sim2real.hypotheses.no_gap import NO_GAP_MISFIT
 from sim2real.observing.drift import DRIFT_S, block_sums, read_drift, with_drift
 from sim2real.observing.drive import BLOCK_S, CHANNELS, WHEEL
 from sim2real.observing.evidence import Evidence, drift_of, gather
 from sim2real.observing.noise import Noise
 from sim2real.result import Verdict
-from sim2real.which.contest import Entry
-from sim2real.which.goodness import fitness
-from sim2real.which.no_gap import NO_GAP_MISFIT
 
 DURATION_S = 30.0
 SHARE = 0.4

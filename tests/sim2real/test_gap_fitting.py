@@ -12,16 +12,16 @@ from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.mass_offset import MassOffset
 from scenarios.effects.torque_gain import TorqueGain
 from sim2real.diagnose import find
+from sim2real.hypotheses import selection
+from sim2real.hypotheses.contest import COUNTER, _telling, first_round, hold_contest
+from sim2real.hypotheses.fitting import MOST_STARTS, Candidate, fit
+from sim2real.hypotheses.pairs import add_pairs
+from sim2real.hypotheses.selection import decide
 from sim2real.observing.drive import ACCEL, SPEED
 from sim2real.observing.evidence import ASTRAY, SETTLING_S, Evidence, gather, residuals, rest_of
 from sim2real.observing.robust import ROBUST_FROM, loss, robust, robust_weight
+from sim2real.reporting.estimates import FORM_SHARE, intervals
 from sim2real.result import Verdict
-from sim2real.telling.estimates import FORM_SHARE, intervals
-from sim2real.which import selection
-from sim2real.which.contest import COUNTER, _telling, first_round, hold_contest
-from sim2real.which.fitting import MOST_STARTS, Candidate, fit
-from sim2real.which.pairs import add_pairs
-from sim2real.which.selection import decide
 
 FITTED = [key for key in SEVERITY if key != COUNTER]
 FEW = ("mass_offset", "torque_gain", "torque_lag", "aero_drag", "accelerometer_bias", "road_grade")

@@ -14,16 +14,16 @@ from gap_drives import (
 
 from scenarios.effects import EFFECTS, FORMS
 from sim2real.diagnose import diagnose, find
+from sim2real.hypotheses.contest import first_round, hold_contest, silent
+from sim2real.hypotheses.fitting import Candidate, fit
+from sim2real.hypotheses.no_gap import is_noise
+from sim2real.hypotheses.pairs import add_pairs, beside
+from sim2real.hypotheses.selection import decide
 from sim2real.observing.drive import ACCEL, SPEED, WHEEL
 from sim2real.observing.evidence import Evidence, gather
 from sim2real.observing.noise import Noise
 from sim2real.result import Verdict
 from sim2real.where.sensor_isolation import lone_sensor
-from sim2real.which.contest import first_round, hold_contest, silent
-from sim2real.which.fitting import Candidate, fit
-from sim2real.which.no_gap import is_noise
-from sim2real.which.pairs import add_pairs, beside
-from sim2real.which.selection import decide
 
 
 def only(*keys):

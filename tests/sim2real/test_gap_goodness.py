@@ -8,15 +8,15 @@ from gap_drives import MODEL, STEP_S, clean, noisy, pulses, remeasured
 
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import find
+from sim2real.hypotheses.contest import Contest, Entry, as_it_is
+from sim2real.hypotheses.fitting import ROBUST_FROM, Candidate, fit
+from sim2real.hypotheses.goodness import fitness, gross_share, inflation
+from sim2real.hypotheses.no_gap import NO_GAP_MISFIT, is_noise
+from sim2real.hypotheses.selection import probabilities
 from sim2real.observing.drive import SPEED, WHEEL
 from sim2real.observing.evidence import gather
 from sim2real.observing.lattice import Lattice
 from sim2real.result import Verdict
-from sim2real.which.contest import Contest, Entry, as_it_is
-from sim2real.which.fitting import ROBUST_FROM, Candidate, fit
-from sim2real.which.goodness import fitness, gross_share, inflation
-from sim2real.which.no_gap import NO_GAP_MISFIT, is_noise
-from sim2real.which.selection import probabilities
 
 COUNTER = Lattice(quantum_rad_s=0.1, window_s=0.02, sigma_rad_s=0.01, step_s=STEP_S)
 

@@ -14,16 +14,16 @@ from scenarios.effects.vehicle_speed_scale import VehicleSpeedScale
 from sim2real.diagnose import diagnose
 from sim2real.how_far import gap
 from sim2real.how_far.budget import budget
+from sim2real.hypotheses.contest import as_it_is, enter
+from sim2real.hypotheses.fitting import Candidate, fit
 from sim2real.observing.drive import ACCEL, CHANNELS, GROUPS, SPEED, WHEEL
 from sim2real.observing.evidence import Evidence, gather, residuals
 from sim2real.observing.noise import Noise
+from sim2real.reporting import estimates
+from sim2real.reporting.estimates import intervals, is_excited
 from sim2real.result import Interval
-from sim2real.telling import estimates
-from sim2real.telling.estimates import intervals, is_excited
 from sim2real.where import localise
 from sim2real.where.localise import REGIMES, Blocks, blocks, equation_shares, heat_map, places, regimes
-from sim2real.which.contest import as_it_is, enter
-from sim2real.which.fitting import Candidate, fit
 
 
 def known(*drives):

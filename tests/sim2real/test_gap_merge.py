@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from scenarios.files import RoadFile, load_vehicle
+from sim2real.auxiliary import Side, camera_side, counter_side
 from sim2real.demo import VEHICLE
 from sim2real.merge import merge
 from sim2real.observing.lattice import Lattice, Reading
 from sim2real.perception.chain import DECISIVE, Oddity
 from sim2real.perception.finding import CameraCandidate, PerceptionFinding
+from sim2real.reporting.report import jsonable, render
 from sim2real.result import Cause, Interval, Measure, Place, Unexplained, Verdict, needed
-from sim2real.sides import Side, camera_side, counter_side
-from sim2real.telling.report import jsonable, render
 
 TURN = 2.0 * np.pi
 MADE_ROAD = RoadFile.model_validate(

@@ -8,13 +8,13 @@ from gap_drives import BARE, DRY, MODEL, STEP_S, clean, noisy, road_of, trace
 
 from scenarios.effects import EFFECTS
 from sim2real.diagnose import find
+from sim2real.hypotheses.contest import Contest, first_round, hold_contest
+from sim2real.hypotheses.fitting import fit
+from sim2real.hypotheses.selection import decide
 from sim2real.next_manoeuvre import PROFILES, SEPARATE_SIGMA, propose, torque_of
 from sim2real.observing.drive import Drive
 from sim2real.observing.evidence import Evidence, gather
 from sim2real.result import NextManoeuvre, Verdict
-from sim2real.which.contest import Contest, first_round, hold_contest
-from sim2real.which.fitting import fit
-from sim2real.which.selection import decide
 
 MILD = ((0, 0), (2, 40), (6, 40), (8, -40), (10, -40))
 FIRMER = ((0, 0), (2, 120), (5, 120), (7, -120), (10, -120))

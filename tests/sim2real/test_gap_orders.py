@@ -7,15 +7,15 @@ from scipy.integrate import cumulative_trapezoid
 
 from scenarios.plant.pipeline import simulate
 from sim2real.diagnose import diagnose, without_order
+from sim2real.hypotheses.contest import Contest, Entry, silent
+from sim2real.hypotheses.goodness import fitness
+from sim2real.hypotheses.selection import Decision
 from sim2real.observing import orders
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, make_drive
 from sim2real.observing.evidence import gather, residuals
 from sim2real.observing.orders import read_order
+from sim2real.reporting.findings import Findings, describe
 from sim2real.result import Verdict
-from sim2real.telling.findings import Findings, describe
-from sim2real.which.contest import Contest, Entry, silent
-from sim2real.which.goodness import fitness
-from sim2real.which.selection import Decision
 
 DURATION_S = 24.0
 AMPLITUDE = 0.15

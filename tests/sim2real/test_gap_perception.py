@@ -28,9 +28,9 @@ from long import beyond
 from scenarios.perception import perceive
 from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import make_log
+from sim2real.auxiliary import UNKNOWN_BELIEF, camera_side
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Verdict
-from sim2real.sides import UNKNOWN_BELIEF, camera_side
 
 
 @pytest.mark.parametrize("drives", beyond(1, [12, 60]))

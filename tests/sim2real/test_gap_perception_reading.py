@@ -24,10 +24,10 @@ from long import beyond
 
 from scenarios.effects.exposure_shift import share_left
 from scenarios.files import RoadFile
+from sim2real.auxiliary import camera_side
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.perception.frames import read_results
 from sim2real.result import Verdict
-from sim2real.sides import camera_side
 from trpac_core.vision import camera as vision
 
 ROAD = road()

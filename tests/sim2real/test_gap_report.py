@@ -18,12 +18,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim2real.how_far.rating import LEAST_SAMPLES, MOST_SAMPLES, rating
+from sim2real.hypotheses.contest import Entry
+from sim2real.hypotheses.goodness import Fitness
+from sim2real.hypotheses.selection import Decision
+from sim2real.reporting import figures, report, sentences
+from sim2real.reporting.report import estimate, jsonable, percent, render, write_diagnosis
 from sim2real.result import Interval, Measure, Trace, Verdict
-from sim2real.telling import figures, report, sentences
-from sim2real.telling.report import estimate, jsonable, percent, render, write_diagnosis
-from sim2real.which.contest import Entry
-from sim2real.which.goodness import Fitness
-from sim2real.which.selection import Decision
 
 DIAGNOSES = {name: make() for name, make in made_up.ALL.items()}
 BRIEF = {name: replace(diagnosis, traces=()) for name, diagnosis in DIAGNOSES.items()}

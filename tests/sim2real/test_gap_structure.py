@@ -12,10 +12,10 @@ from scenarios.plant import dynamics
 from scenarios.plant.pipeline import make_setup
 from sim2real.diagnose import find
 from sim2real.discrepancy.verdict import beside_another_build
+from sim2real.hypotheses.contest import enter, first_round, hold_contest
+from sim2real.hypotheses.selection import decide
 from sim2real.observing.evidence import gather
 from sim2real.result import Verdict
-from sim2real.which.contest import enter, first_round, hold_contest
-from sim2real.which.selection import decide
 
 SHAPE = {"knee": -0.08, "crest": 0.06, "sliding": -0.1}
 FORMULA = {"share": 1.0, "shape": 1.5, "curvature": -0.8}

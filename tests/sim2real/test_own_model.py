@@ -23,6 +23,7 @@ from scenarios.files import VehicleFile, load_vehicle
 from scenarios.yaml_text import to_yaml
 from sim2real.demo import VEHICLE
 from sim2real.diagnose import diagnose_files
+from sim2real.hypotheses.contest import silent
 from sim2real.logs import log_of_frame
 from sim2real.observing.observer import Simulation
 from sim2real.own_model.runs import OwnModel, Run
@@ -32,7 +33,6 @@ from sim2real.own_model.unit import opened_unit
 from sim2real.own_sources import studied
 from sim2real.result import Verdict
 from sim2real.sources import Sources, make_source
-from sim2real.which.contest import silent
 
 FEW = ("mass_offset", "torque_gain", "torque_lag", "brake_drag", "accelerometer_bias", "road_grade")
 EXCLUDE = set(EFFECTS) - set(FEW)

@@ -24,7 +24,7 @@ BELOW = {
 }
 """What each folder may import of ours; a folder that is not listed may import all, and none of these imports it."""
 FLOORS = [
-    "result", "logs", "observing", "which", "where how_far discrepancy", "own_model", "next_manoeuvre", "telling"
+    "result", "logs", "observing", "hypotheses", "where how_far discrepancy", "own_model", "next_manoeuvre", "reporting"
 ]  # fmt: skip
 """The diagnosis from below; the files on top put them together."""
 

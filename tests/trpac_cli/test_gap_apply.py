@@ -14,8 +14,8 @@ from plant_drives import SCENARIOS
 import trpac
 from scenarios.files import load_vehicle
 from sim2real.apply import load_diagnosis
+from sim2real.reporting.report import write_diagnosis
 from sim2real.result import Budget, Cause, Interval, Verdict
-from sim2real.telling.report import write_diagnosis
 from trpac_core.files import file_sha256
 
 CAR = SCENARIOS / "vehicles" / "four_in_wheel_motor_ev.yaml"

@@ -127,7 +127,7 @@ class TestDiagnose:
         def full(*_):
             raise OSError(28, "No space left on device")
 
-        monkeypatch.setattr("sim2real.telling.report.write_diagnosis", full)
+        monkeypatch.setattr("sim2real.reporting.report.write_diagnosis", full)
         result = run(*DIAGNOSE, "--holdout", "c.csv", "--out", tmp_path / "out")
         assert result.exit_code == 2
         assert "No space left on device" in result.stderr

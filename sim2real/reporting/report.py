@@ -17,6 +17,7 @@ from scenarios.effects import EFFECTS
 from scenarios.html_page import data_address, page
 from scenarios.whole_files import written_whole
 from sim2real.how_far.rating import rate
+from sim2real.reporting import figures
 from sim2real.result import (
     Cause,
     Diagnosis,
@@ -28,7 +29,6 @@ from sim2real.result import (
     added,
     needed,
 )
-from sim2real.telling import figures
 from trpac_core.vehicle import WHEELS
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")

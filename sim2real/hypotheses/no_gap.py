@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim2real.hypotheses.contest import Contest, Entry
+from sim2real.hypotheses.goodness import fitness, gross_share
 from sim2real.observing.drive import BLOCK_S
 from sim2real.observing.evidence import Evidence
-from sim2real.which.contest import Contest, Entry
-from sim2real.which.goodness import fitness, gross_share
 
 NO_GAP_MISFIT = 1.4
 """Up to this misfit of the model as it is, what is left is noise [-]."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sim2real.hypotheses.contest import Contest
+from sim2real.hypotheses.goodness import loss_beyond_noise
+from sim2real.hypotheses.selection import Decision
 from sim2real.result import Cause, Gap, Verdict
-from sim2real.which.contest import Contest
-from sim2real.which.goodness import loss_beyond_noise
-from sim2real.which.selection import Decision
 
 NEAR = 0.8
 """Share of the loss beyond noise from which on what comes nearest to an explanation is worth a sentence [-]."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sim2real.hypotheses.contest import Entry
+from sim2real.hypotheses.fitting import Fit
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.robust import robust_weight
 from sim2real.result import Interval
-from sim2real.which.contest import Entry
-from sim2real.which.fitting import Fit
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from sim2real.hypotheses.contest import Contest, Entry
+from sim2real.hypotheses.goodness import Fitness, fitness, inflation
+from sim2real.hypotheses.no_gap import is_noise
 from sim2real.observing.evidence import Evidence
 from sim2real.result import Interval, Verdict
-from sim2real.which.contest import Contest, Entry
-from sim2real.which.goodness import Fitness, fitness, inflation
-from sim2real.which.no_gap import is_noise
 
 Array = NDArray[np.float64]
 

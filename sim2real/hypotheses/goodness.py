@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim2real.hypotheses.contest import Entry
 from sim2real.observing.drift import block_sums
 from sim2real.observing.drive import BLOCK_S, GROUPS, WHEEL, Drive
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.noise import Noise
-from sim2real.which.contest import Entry
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from scenarios.effects import FORMS
+from sim2real.hypotheses.fitting import FULL_STEPS, Candidate, Fit, fit
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.observer import Simulation
 from sim2real.observing.robust import loss
-from sim2real.which.fitting import FULL_STEPS, Candidate, Fit, fit
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import EFFECTS
+from sim2real.hypotheses.contest import Contest, Entry, Progress, enter, run_all, silent
+from sim2real.hypotheses.fitting import FULL_STEPS, Candidate
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.observer import Simulation
 from sim2real.observing.robust import robust, robust_weight
-from sim2real.which.contest import Contest, Entry, Progress, enter, run_all, silent
-from sim2real.which.fitting import FULL_STEPS, Candidate
 
 Array = NDArray[np.float64]
 

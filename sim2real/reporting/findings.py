@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from scenarios.effects import EFFECTS, Effect
 from sim2real.how_far.budget import budget
 from sim2real.how_far.gap import measure, noise_floor, shrink
+from sim2real.hypotheses.contest import Contest, Entry, Progress
+from sim2real.hypotheses.goodness import fitness
+from sim2real.hypotheses.selection import Decision
 from sim2real.next_manoeuvre import propose
 from sim2real.observing.drive import CHANNELS
 from sim2real.observing.evidence import Evidence, all_logs, expected
@@ -19,6 +22,8 @@ from sim2real.observing.observer import Simulation
 from sim2real.observing.orders import Order
 from sim2real.observing.orders import characterise as swing_in_words
 from sim2real.observing.robust import loss
+from sim2real.reporting import sentences
+from sim2real.reporting.estimates import is_excited, joint
 from sim2real.result import (
     Cause,
     Diagnosis,
@@ -31,16 +36,11 @@ from sim2real.result import (
     Verdict,
     at_bound_in_words,
 )
-from sim2real.telling import sentences
-from sim2real.telling.estimates import is_excited, joint
 from sim2real.where import localise
 from sim2real.where.equations import EQUATIONS, OF_THE_MOTION, WHOLE_CAR
 from sim2real.where.sensor_isolation import lone_sensor
 from sim2real.where.terms import Term, finer, fit_terms, with_refined
 from sim2real.where.unknown import characterise, seen_alone, subsystem_of
-from sim2real.which.contest import Contest, Entry, Progress
-from sim2real.which.goodness import fitness
-from sim2real.which.selection import Decision
 
 Array = NDArray[np.float64]
 
