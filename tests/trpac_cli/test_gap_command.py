@@ -58,6 +58,8 @@ class TestDiagnose:
             "7",
             "--jobs",
             "2",
+            "--baseline",
+            "sound.csv@other.yaml",
         ]
         assert run(*DIAGNOSE, *options, "--out", tmp_path / "out").exit_code == 0
         assert fake[0] == [
@@ -67,6 +69,12 @@ class TestDiagnose:
                 "fit": ["a.csv", "b.mf4@other.yaml"],
                 "holdout": "c.parquet",
                 "mapping": Path("m.yaml"),
+                "baseline": ["sound.csv@other.yaml"],
+                "paired": (),
+                "simulated": (),
+                "by": "time",
+                "model": None,
+                "signals": None,
                 "seed": 7,
                 "jobs": 2,
             }
