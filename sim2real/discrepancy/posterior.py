@@ -33,8 +33,8 @@ LEAST_SIZE = 0.25
 PRICE = 2.0
 """Price of a parameter, as Akaike's [-]."""
 BLAMED = 30.0
-"""Drop of the cost from which on an effect is blamed: on drawn cars and others without a fault wrong ones reach 27, faults
-outside the library too; effects that are there and show have 37 and more, most above 100 [-]."""
+"""Drop of the cost from which on an effect is blamed: on cars without a fault wrong ones reach 27, with faults outside
+the library too; effects that are there and show have 37 and more, most above 100 [-]."""
 LIKE, LIKE_SHARE = 8.0, 0.08
 """Effects whose drops differ by less than this, or by this share of the best one, are not told apart [-]."""
 OUTSIDE = 6.0
