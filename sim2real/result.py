@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+NORMAL_95 = 1.96
+"""Half width of a normal's 95 % interval [standard deviations]."""
+
 
 class Verdict(StrEnum):
     """The outcome in a word; `MEANING` has the sentence."""

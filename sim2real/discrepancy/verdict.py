@@ -29,12 +29,9 @@ from sim2real.hypotheses.selection import LIBRARY_BELIEF, Decision
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.observer import Simulation
 from sim2real.observing.robust import loss
-from sim2real.result import Interval, Verdict
+from sim2real.result import NORMAL_95, Interval, Verdict
 
 Array = NDArray[np.float64]
-
-NORMAL_95 = 1.96
-"""Half width of a normal's 95 % interval [standard deviations]."""
 
 
 def beside_another_build(

@@ -18,7 +18,7 @@ from sim2real.observing.evidence import Evidence, gather
 from sim2real.observing.observer import Simulation
 from sim2real.observing.robust import loss, robust_weight
 from sim2real.own_model.runs import OwnModel, Run, Stretch
-from sim2real.result import Interval, OwnFinding, OwnParameter
+from sim2real.result import NORMAL_95, Interval, OwnFinding, OwnParameter
 
 Array = NDArray[np.float64]
 Follow = Callable[[int, Sequence[Stretch]], Array]
@@ -38,8 +38,6 @@ ROUNDS = 12
 """Reweightings of a robust linear fit."""
 CONFIRMED = 2
 """Most runs over each log to confirm an estimate: the response is linear near the nominal value only."""
-NORMAL_95 = 1.96
-"""Half width of a 95 % interval in standard deviations [-]."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from scenarios.effects.motion_blur import TOLERATED_SMEAR_M
 from sim2real.perception.blocks import Blocks
 from sim2real.perception.chain import DECISIVE
 from sim2real.perception.pictures import Light
-from sim2real.result import Interval
+from sim2real.result import NORMAL_95, Interval
 
 Array = NDArray[np.float64]
 
@@ -235,15 +235,15 @@ def _exposure_time(modelled_s: float, slope: float, half: float, power: float) -
         added = slope * TOLERATED_SMEAR_M
         return Interval(modelled_s + added, 0.0, modelled_s + half ** (1.0 / power) * TOLERATED_SMEAR_M, "s")
     added = slope ** (1.0 / power) * TOLERATED_SMEAR_M
-    spread = np.hypot(half / slope / power, 1.96 * BLUR_LAW_SPREAD)
+    spread = np.hypot(half / slope / power, NORMAL_95 * BLUR_LAW_SPREAD)
     factor = float(np.exp(min(spread, MOST_LOG_FACTOR)))
     return Interval(modelled_s + added, modelled_s + added / factor, modelled_s + added * factor, "s")
 
 
 def _exposure_error(profile: Array, *, signed: bool) -> Interval:
     """Exposure error, with the law's uncertainty; without pictures its sign is open, and the interval holds both."""
-    law = float(np.exp(0.5 * 1.96 * LAW_SPREAD))
-    inside = STOPS[profile >= profile.max() - 0.5 * 1.96**2]
+    law = float(np.exp(0.5 * NORMAL_95 * LAW_SPREAD))
+    inside = STOPS[profile >= profile.max() - 0.5 * NORMAL_95**2]
     if signed:
         value = float(np.average(STOPS, weights=np.exp(profile - profile.max())))
         low, high = float(inside[0]), float(inside[-1])

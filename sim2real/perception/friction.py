@@ -32,7 +32,7 @@ from sim2real.perception.stretches import (
     find_stretches,
     readings,
 )
-from sim2real.result import Interval, Place
+from sim2real.result import NORMAL_95, Interval, Place
 from trpac_core.vision.classes import CLASS_THETA, Surface
 
 Array = NDArray[np.float64]
@@ -135,7 +135,7 @@ def _class_values(stretches: Stretches, value: Array, reading: Reading) -> Frict
         told, deviation = stretches.reference[here], stretches.deviation[here]
         within = 0.5 * (reading.theta_of(told + deviation) - reading.theta_of(told - deviation))
         values[c], half = _location(reading.theta_of(told), within)
-        half = float(np.hypot(half, 1.96 * CALIBRATION_ERROR[c]))
+        half = float(np.hypot(half, NORMAL_95 * CALIBRATION_ERROR[c]))
         parameters[name] = Interval(float(values[c]), float(values[c] - half), float(values[c] + half))
     fit = _at_class_values((OFFSET,), values, parameters, reading, "class values of their own")
     return replace(fit, size=len(np.unique(stretches.classes)))

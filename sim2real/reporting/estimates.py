@@ -9,7 +9,7 @@ from sim2real.hypotheses.contest import Entry
 from sim2real.hypotheses.fitting import Fit
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.robust import robust_weight
-from sim2real.result import Interval
+from sim2real.result import NORMAL_95, Interval
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def intervals(found: Fit, evidence: Evidence) -> list[tuple[float, float, float]
             meat += np.outer(score, score)
     sandwich = bread @ meat @ bread
     variance = np.maximum(np.diag(sandwich), np.diag(bread))
-    half = np.hypot(1.96 * INTERVAL_FACTOR * np.sqrt(variance), LEAST_HALF_WIDTH) * scale
+    half = np.hypot(NORMAL_95 * INTERVAL_FACTOR * np.sqrt(variance), LEAST_HALF_WIDTH) * scale
     half[_without_slope(scaled)] = np.inf
     half = np.hypot(half, FORM_SHARE * (found.x - found.candidate.neutral))
     half = np.hypot(half, found.candidate.open_share * found.x)
@@ -90,7 +90,7 @@ def is_excited(entry: Entry, stands: Entry) -> bool:
     weight = robust_weight(stands.z_fit)
     bread = _inverse(scaled, weight)
     left = max(stands.loss_fit / max(int(np.count_nonzero(stands.z_fit)), 1), 1.0)
-    half = float(1.96 * INTERVAL_FACTOR * np.sqrt(bread[first, first] * left))
+    half = float(NORMAL_95 * INTERVAL_FACTOR * np.sqrt(bread[first, first] * left))
     off = float(abs(found.x[first] - found.candidate.neutral[first]) / found.candidate.scale[first])
     return half < EXCITED_SHARE or off > half
 
