@@ -310,6 +310,7 @@ def test_a_fault_acts_on_the_logs_and_not_on_the_baseline(stack):
 # --- drawn builds
 
 
+@pytest.mark.long
 def test_drawn_cases_can_be_read_and_tell_their_truth(tmp_path):
     truth = write_case(tmp_path, 1, "mass_offset", COURSES[0])
     assert truth["effects"] == ["mass_offset"]

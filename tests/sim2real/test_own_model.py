@@ -240,6 +240,7 @@ def test_a_late_torque_is_named_and_run_through_the_unit(folder, car, unit):
     assert found.runs <= 60
 
 
+@pytest.mark.long
 def test_a_payload_is_found_by_the_units_own_mass(folder, car, unit):
     said = ask(folder, car, unit, Run(log(), {"m": 1500.0}))
     best = said.own_model.parameters[0]
