@@ -104,10 +104,8 @@ def _verdict(main: Diagnosis, side: Side) -> Verdict:
         return side.verdict
     if main.verdict is side.verdict is Verdict.UNKNOWN:
         return Verdict.UNKNOWN
-    if Verdict.UNKNOWN in (
-        main.verdict,
-        side.verdict,
-    ):  # what one names stands, with something unknown beside it
+    if Verdict.UNKNOWN in (main.verdict, side.verdict):
+        # what one names stands, with something unknown beside it
         known = side.verdict if main.verdict is Verdict.UNKNOWN else main.verdict
         return Verdict.PARTIAL if known is Verdict.IDENTIFIED else known
     if main.causes and side.named == (main.causes[0].effect,):  # seen twice, still one effect

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import combinations
@@ -10,11 +10,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.discrepancy.columns import of_build, of_other_faults, of_tyres
+from sim2real.discrepancy.columns import OVER_TIME, of_build, of_other_faults, of_tyres
 from sim2real.discrepancy.prior import prior_root
-from sim2real.discrepancy.ridge import HUBER, Scale, read_scale, solve
+from sim2real.discrepancy.ridge import Scale, scale_beside, solve, weighed
 from sim2real.hypotheses.contest import Entry, Progress, run_all
-from sim2real.hypotheses.fitting import STEP, Candidate
+from sim2real.hypotheses.fitting import Candidate
+from sim2real.hypotheses.fitting import slopes as slopes_of
 from sim2real.observing.drive import Drive
 from sim2real.observing.evidence import Evidence, all_logs, rest_of
 from sim2real.observing.noise import Noise
@@ -32,10 +33,6 @@ MOST_STARTS = 3
 """Points of the effect's coarse grid that a fit may begin at, beside the one of the first fit."""
 ENOUGH = 0.5
 """A step that takes less off the cost is the last one [-]."""
-START_MEMORY = 20.0
-"""Memory that the first reading of the remainder's size begins with [blocks]."""
-SCALE_ROUNDS = 5
-"""Rounds in which size, memory and the build's coefficients are read in turn."""
 TEMPER = 30.0
 """Evidence counts by this much less than independent noise would say: what a family of columns leaves of another
 build is neither white nor small [-]."""
@@ -77,6 +74,11 @@ class Stack:
     limit: NDArray[np.bool_]
     faultless: int = 0
 
+    @property
+    def lengths(self) -> list[int]:
+        """Blocks of each log."""
+        return [len(drive) // drive.rows_in(BLOCK_S) for drive, _ in self.logs]
+
     @cached_property
     def mix(self) -> Array:
         """Root of the changes' prior covariance: mix @ independent unit normals is a draw of them, shape (k, k)."""
@@ -94,9 +96,8 @@ class Stack:
 
     def of_fit_logs(self, count: int) -> Stack:
         """The first logs, `count` of them, and those of the car without the fault."""
-        lengths = [len(drive) // drive.rows_in(BLOCK_S) for drive, _ in self.logs]
         kept = [i < count or i >= len(self.logs) - self.faultless for i in range(len(self.logs))]
-        rows = np.repeat(kept, lengths)
+        rows = np.repeat(kept, self.lengths)
         logs = tuple(log for log, keep in zip(self.logs, kept, strict=True) if keep)
         return replace(self, logs=logs, z=self.z[rows], changes=self.changes[rows], limit=self.limit[rows])
 
@@ -109,8 +110,7 @@ class Stack:
 
     def pushed(self, columns: Sequence[tuple[int, Push]]) -> Array:
         """Columns of pushes, each on the log of that number, shape (n, 7, number of pushes)."""
-        lengths = [len(drive) // drive.rows_in(BLOCK_S) for drive, _ in self.logs]
-        ends = np.cumsum([0, *lengths])
+        ends = np.cumsum([0, *self.lengths])
         out = np.zeros((*self.z.shape, len(columns)))
         for j, (log, push) in enumerate(columns):
             rows = slice(ends[log], ends[log + 1])
@@ -182,8 +182,7 @@ def stack_of(
     for j, (_, name, _) in enumerate(every):
         build[..., names.index(name)] += made[..., j]
     for name, (size, other) in tyres.items():
-        moved = [block_means(noise.whitened(_rest(other, drive)), drive) for drive, noise in logs]
-        build[..., names.index(name)] = (np.concatenate(moved) - z) / size
+        build[..., names.index(name)] = (bare.blocks(other) - z) / size
     return replace(bare, changes=build, faultless=len(faultless.drives) if faultless else 0)
 
 
@@ -208,26 +207,20 @@ def other_faults(stack: Stack) -> dict[str, Array]:
     """Columns of faults that the library lacks, shape (n, 7, k) each; a force over time has one per knot."""
     every = []
     for log in range(len(stack.logs) - stack.faultless):
-        every += [(log, name, push) for name, push in of_other_faults(stack.model, stack.logs[log][0], log)]
+        every += [(log, name, push) for name, push in of_other_faults(stack.model, stack.logs[log][0])]
     made = stack.pushed([(log, push) for log, _, push in every])
     found: dict[str, list[Array]] = {}
     for j, (_, name, _) in enumerate(every):
-        kind = "force over time" if name.startswith("force over time") else name
-        found.setdefault(kind, []).append(made[..., j])
+        found.setdefault(name, []).append(made[..., j])
     return {
-        kind: np.stack(parts, axis=-1) if kind == "force over time" else np.sum(parts, axis=0)[..., None]
+        kind: np.stack(parts, axis=-1) if kind == OVER_TIME else np.sum(parts, axis=0)[..., None]
         for kind, parts in found.items()
     }
 
 
 def scale_of_build(stack: Stack) -> Scale:
     """Size and memory of what another build alone leaves."""
-    live = stack.z != 0.0
-    scale = Scale(read_scale(stack.z, live, stack.limit).size, START_MEMORY)
-    for _ in range(SCALE_ROUNDS):
-        _, b = solve(stack.z, stack.build, scale.size, scale.memory, stack.one)
-        scale = read_scale(stack.z + stack.build @ b, live, stack.limit)
-    return scale
+    return scale_beside(stack.z, stack.build, stack.limit)[0]
 
 
 def hypotheses(
@@ -262,7 +255,7 @@ def fit_beside(stack: Stack, candidate: Candidate, starts: Sequence[Array], scal
         return cost_of(z), inside, z
 
     cost, x, z = min((tried(start) for start in starts), key=lambda found: found[0])
-    slopes = _slopes(z_at, candidate, x, z)
+    slopes = slopes_of(z_at, x, z, candidate) * candidate.scale
     for _ in range(STEPS):
         both = np.concatenate([stack.build, slopes], axis=-1)
         foretold, b = solve(z, both, scale.size, temper, np.r_[one, np.full(len(x), FREE)])
@@ -274,20 +267,10 @@ def fit_beside(stack: Stack, candidate: Candidate, starts: Sequence[Array], scal
             break
         gain = cost - better[0]
         cost, x, z = better
-        slopes = _slopes(z_at, candidate, x, z)
+        slopes = slopes_of(z_at, x, z, candidate) * candidate.scale
         if gain < ENOUGH:
             break
     return Hypothesis(candidate, x, z, slopes)
-
-
-def _slopes(z_at: Callable[[Array], Array], candidate: Candidate, x: Array, z: Array) -> Array:
-    low, high = candidate.bounds
-    out = np.zeros((*z.shape, len(x)))
-    for i, scale in enumerate(candidate.scale):
-        moved = x.copy()
-        moved[i] += (step := STEP * scale * (1.0 if high[i] - x[i] > x[i] - low[i] else -1.0))
-        out[..., i] = (z_at(moved) - z) / step * scale
-    return out
 
 
 def fit_pairs(
@@ -304,10 +287,9 @@ def _forecasts(stack: Stack, singles: Sequence[Hypothesis], scale: Scale) -> lis
     one = stack.one
     temper = scale.memory * TEMPER
     _, b = solve(stack.z, stack.build, scale.size, temper, one)
-    weight = 1.0 / (temper * np.maximum(1.0, np.abs((stack.z + stack.build @ b) / scale.size) / HUBER))
     columns = [stack.build, *(h.slopes for h in singles), *((h.z - stack.z)[..., None] for h in singles)]
     every = np.concatenate([*columns, stack.z[..., None]], axis=-1)
-    rows = (every * (np.sqrt(weight) / scale.size)[..., None]).reshape(-1, every.shape[-1])
+    rows = weighed(every, stack.z + stack.build @ b, scale.size, temper)
     gram = rows.T @ rows
     ends = np.cumsum([len(one), *(len(h.x) for h in singles)])
     out = []

@@ -37,6 +37,8 @@ SLOWEST_M_S = 3.0
 """Least speed that slip is divided by [m/s]."""
 FORCE_KNOT_S = 2.0
 """Distance of the knots of a force over time [s]."""
+OVER_TIME = "force over time"
+"""Name of the columns of such a force, one per knot."""
 FORCE_M_S2 = 0.2
 """Size of a force over time: prior standard deviation at each knot [m/s^2]."""
 
@@ -147,8 +149,8 @@ def of_tyres(model: Simulation) -> dict[str, tuple[float, Simulation]]:
     }
 
 
-def of_other_faults(model: Simulation, drive: Drive, log: int) -> list[Column]:
-    """Columns of faults that no effect of the library has the form of; `log` numbers the drive.
+def of_other_faults(model: Simulation, drive: Drive) -> list[Column]:
+    """Columns of faults that no effect of the library has the form of.
 
     One wheel's torque, brake, drag or radius; brakes that fade with heat; a force over time.
     """
@@ -168,7 +170,7 @@ def of_other_faults(model: Simulation, drive: Drive, log: int) -> list[Column]:
     heat = np.cumsum(-braking * turning, axis=0) * drive.step_s / 1e5
     columns.append(("fading brakes", tyres.turned(0.1 * braking * heat)))
     knots = np.arange(drive.time_s[0], drive.time_s[-1] + FORCE_KNOT_S, FORCE_KNOT_S)
-    for j, hat in enumerate(np.eye(len(knots))):
+    for hat in np.eye(len(knots)):
         force = FORCE_M_S2 * np.interp(drive.time_s, knots, hat)
-        columns.append((f"force over time {log} {j}", tyres.forced(force)))
+        columns.append((OVER_TIME, tyres.forced(force)))
     return columns

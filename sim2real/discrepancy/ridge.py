@@ -21,6 +21,10 @@ CLIPPED = 6.0
 """Remainders beyond this many medians do not widen the size any more [-]."""
 MEMORY_BLOCKS = 6
 """Consecutive blocks whose sum tells how far the remainder remembers itself."""
+START_MEMORY = 20.0
+"""Memory that the first reading of the remainder's size begins with [blocks]."""
+SCALE_ROUNDS = 5
+"""Rounds in which size, memory and the columns' coefficients are read in turn."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,12 @@ def solve(z: Array, columns: Array, size: Array, temper: float, precision: Array
     return float(huber(rest).sum() / temper + (precision * found * found).sum()), found
 
 
+def weighed(columns: Array, rest: Array, size: Array, temper: float) -> Array:
+    """Columns, shape (n, 7, k), as rows of a least-squares problem with the robust weights of a remainder."""
+    weight = 1.0 / (temper * np.maximum(1.0, np.abs(rest / size) / HUBER))
+    return np.asarray((columns * (np.sqrt(weight) / size)[..., None]).reshape(-1, columns.shape[-1]))
+
+
 def read_scale(rest: Array, live: NDArray[np.bool_], limit: NDArray[np.bool_]) -> Scale:
     """Size of a remainder, shape (n, 7), per group of channels near the tyres' limit and away from it; its memory."""
     size = np.ones(rest.shape)
@@ -96,3 +106,14 @@ def read_scale(rest: Array, live: NDArray[np.bool_], limit: NDArray[np.bool_]) -
     square = float(np.mean(units[live] ** 2))
     memory = float(np.mean(sums[full] ** 2 / number[full])) / max(square, 1e-9) if full.any() else 1.0
     return Scale(size, max(1.0, memory))
+
+
+def scale_beside(z: Array, columns: Array, limit: NDArray[np.bool_]) -> tuple[Scale, Array]:
+    """Size and memory of what columns of one prior standard deviation leave, and that remainder, shape (n, 7)."""
+    live, one = z != 0.0, np.ones(columns.shape[-1])
+    scale, rest = Scale(read_scale(z, live, limit).size, START_MEMORY), z
+    for _ in range(SCALE_ROUNDS):
+        _, b = solve(z, columns, scale.size, scale.memory, one)
+        rest = z + columns @ b
+        scale = read_scale(rest, live, limit)
+    return scale, rest

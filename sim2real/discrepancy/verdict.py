@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim2real.discrepancy.beside import (
+    FREE,
     TEMPER,
     Hypothesis,
     Stack,
@@ -21,7 +22,7 @@ from sim2real.discrepancy.beside import (
     with_tyre,
 )
 from sim2real.discrepancy.posterior import Judged, judge
-from sim2real.discrepancy.ridge import HUBER, Scale, solve
+from sim2real.discrepancy.ridge import Scale, solve, weighed
 from sim2real.hypotheses.contest import Contest, Entry, Progress, silent
 from sim2real.hypotheses.fitting import Fit, slopes
 from sim2real.hypotheses.goodness import fitness
@@ -116,11 +117,9 @@ def _told(stack: Stack, scale: Scale, h: Hypothesis) -> tuple[Hypothesis, dict[t
     found = fit_beside(stack, h.candidate, [h.x], scale)
     both = np.concatenate([stack.build, found.slopes], axis=-1)
     temper, count = scale.memory * TEMPER, len(found.x)
-    precision = np.r_[stack.one, np.full(count, 1e-6)]
+    precision = np.r_[stack.one, np.full(count, FREE)]
     _, b = solve(found.z, both, scale.size, temper, precision)
-    rest = (found.z + both @ b) / scale.size
-    weight = 1.0 / (temper * np.maximum(1.0, np.abs(rest) / HUBER))
-    rows = (both * (np.sqrt(weight) / scale.size)[..., None]).reshape(-1, both.shape[-1])
+    rows = weighed(both, found.z + both @ b, scale.size, temper)
     spread = np.sqrt(np.diag(np.linalg.inv(rows.T @ rows + np.diag(precision)))[-count:])
     half = NORMAL_95 * spread * h.candidate.scale
     low, high = h.candidate.bounds

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.effects import Effect
-from sim2real.how_far.gap import BOOTSTRAP, QUANTILES, block_squares
+from sim2real.how_far.gap import BOOTSTRAP, QUANTILES, block_squares, energy
 from sim2real.observing.evidence import Evidence
 from sim2real.observing.observer import Simulation
 from sim2real.result import Budget, Interval
@@ -44,13 +44,13 @@ def budget(
     rows = np.random.default_rng(seed).integers(0, blocks, (BOOTSTRAP, blocks))
 
     def shares(at: NDArray[np.int64]) -> list[float]:
-        energy = {chosen: _energy(*(part[at] for part in parts)) for chosen, parts in squares.items()}
-        none, every = energy[frozenset()], energy[frozenset(effects)]
+        left = {chosen: energy(*(part[at] for part in parts)) for chosen, parts in squares.items()}
+        none, every = left[frozenset()], left[frozenset(effects)]
         own = dict.fromkeys(effects, 0.0)
         for order in permutations(effects):
             for before, after in zip(_growing(order), _growing(order)[1:], strict=False):
                 (effect,) = after - before
-                own[effect] += (energy[before] - energy[after]) / factorial(len(effects))
+                own[effect] += (left[before] - left[after]) / factorial(len(effects))
         noise = min(floor**2, every)
         return [value / none for value in (*own.values(), every - noise, noise)]
 
@@ -68,9 +68,3 @@ def budget(
 def _growing(order: Sequence[Effect]) -> list[frozenset[Effect]]:
     """No effect, the first, the first two and so on."""
     return [frozenset(order[:count]) for count in range(len(order) + 1)]
-
-
-def _energy(squares: Array, counts: Array) -> float:
-    """Mean over the signals of the mean square residual in units of the noise [-]."""
-    total = counts.sum(axis=0)
-    return float(np.mean(squares.sum(axis=0)[total > 0] / total[total > 0]))

@@ -72,10 +72,13 @@ def shrink(evidence: Evidence, before: Sequence[Array], after: Sequence[Array], 
 
 
 def _shrink(before: Array, after: Array, counts: Array) -> float:
-    total = np.maximum(counts.sum(axis=0), 1.0)
-    old = np.mean((before.sum(axis=0) / total)[counts.sum(axis=0) > 0])
-    new = np.mean((after.sum(axis=0) / total)[counts.sum(axis=0) > 0])
-    return float(100.0 * (1.0 - np.sqrt(new / old)))
+    return 100.0 * (1.0 - float(np.sqrt(energy(after, counts) / energy(before, counts))))
+
+
+def energy(squares: Array, counts: Array) -> float:
+    """Mean over the signals of the mean square residual in units of the noise, of `block_squares` [-]."""
+    total = counts.sum(axis=0)
+    return float(np.mean(squares.sum(axis=0)[total > 0] / total[total > 0]))
 
 
 def block_squares(evidence: Evidence, rests: Sequence[Array]) -> tuple[Array, Array]:

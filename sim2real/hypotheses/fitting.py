@@ -200,14 +200,14 @@ def fit(candidate: Candidate, evidence: Evidence, start: Array | None = None, st
 
 
 def slopes(z_at: Callable[[Array], Array], x: Array, z: Array, candidate: Candidate) -> Array:
-    """Finite differences of z by x, away from the nearer bound, shape (len(z), k)."""
+    """Finite differences of z by x, away from the nearer bound, shape (*z.shape, k)."""
     low, high = candidate.bounds
-    out = np.empty((len(z), len(x)))
+    out = np.empty((*z.shape, len(x)))
     for i, scale in enumerate(candidate.scale):
         step = STEP * scale * (1.0 if high[i] - x[i] > x[i] - low[i] else -1.0)
         moved = x.copy()
         moved[i] += step
-        out[:, i] = (z_at(moved) - z) / step
+        out[..., i] = (z_at(moved) - z) / step
     return out
 
 

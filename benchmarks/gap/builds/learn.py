@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from benchmarks.gap.builds.draw import COURSES, write_case
 from sim2real.discrepancy.beside import Stack, stack_of
 from sim2real.discrepancy.prior import PRIOR
-from sim2real.discrepancy.ridge import HUBER, Scale, read_scale, solve
+from sim2real.discrepancy.ridge import scale_beside, weighed
 from sim2real.observing.evidence import gather
 from sim2real.observing.observer import Simulation
 from sim2real.sources import read_sources
@@ -48,7 +48,8 @@ SLIP_WIDTH = {0.1: 0.18, 0.3: 0.22, 0.5: 0.38, 0.7: 0.6, 0.9: 0.9}
 """The same of the slip's share over used grip [-]."""
 HELD = 10.0
 """Cars that the first guess counts as."""
-ROUNDS, SCALE_ROUNDS = 60, 5
+ROUNDS = 60
+"""Rounds of expectation and maximisation."""
 
 
 @dataclass(frozen=True)
@@ -86,16 +87,10 @@ def told_by(seed: int, course: str) -> Told | None:
 
 def _information(stack: Stack) -> Told:
     width = np.array([width_of(name) for name in stack.names])
-    columns, live, one = stack.changes * width, stack.z != 0.0, np.ones(len(width))
-    scale = Scale(read_scale(stack.z, live, stack.limit).size, 20.0)
-    rest = stack.z
-    for _ in range(SCALE_ROUNDS):
-        _, b = solve(stack.z, columns, scale.size, scale.memory, one)
-        rest = stack.z + columns @ b
-        scale = read_scale(rest, live, stack.limit)
-    weight = 1.0 / (scale.memory * np.maximum(1.0, np.abs(rest / scale.size) / HUBER))
-    design = (columns * (np.sqrt(weight) / scale.size)[..., None]).reshape(-1, len(width))
-    wanted = (stack.z * np.sqrt(weight) / scale.size).ravel()
+    columns = stack.changes * width
+    scale, rest = scale_beside(stack.z, columns, stack.limit)
+    rows = weighed(np.concatenate([columns, stack.z[..., None]], axis=-1), rest, scale.size, scale.memory)
+    design, wanted = rows[:, :-1], rows[:, -1]
     return Told(stack.names, design.T @ design, -(design.T @ wanted))
 
 
