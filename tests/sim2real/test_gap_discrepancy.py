@@ -19,6 +19,11 @@ from sim2real.discrepancy.columns import of_build
 from sim2real.discrepancy.posterior import judge
 from sim2real.discrepancy.prior import prior_root
 from sim2real.discrepancy.ridge import Scale, huber, read_scale, solve
+from sim2real.discrepancy.verdict import beside_another_build
+from sim2real.hypotheses.contest import first_round, hold_contest
+from sim2real.hypotheses.fitting import Candidate
+from sim2real.hypotheses.goodness import Fitness
+from sim2real.hypotheses.selection import decide
 from sim2real.observing.evidence import Evidence, gather
 from sim2real.result import Verdict
 
@@ -233,6 +238,35 @@ def test_a_fault_that_no_effect_has_the_form_of_is_unknown(made_up):
     found = judged(stack, [single], others={"torque fl": fault[..., None]})
     assert found.verdict is Verdict.UNKNOWN
     assert found.outside["torque fl"] > found.drops["mass_offset"]
+
+
+def test_an_effect_beside_which_the_body_moves_otherwise_is_not_named(made_up):
+    """Another build does not move the body: what is left of the vehicle speed says that the effect is another one."""
+    stack, effect = made_up
+    left = 8.0 * np.random.default_rng(8).normal(size=len(effect))
+    z = stack.z + effect
+    z[:, 1] += left
+    stack = replace(stack, z=z)
+    assert judged(stack, [plain(("mass_offset",), z - effect, -effect)]).verdict is Verdict.UNKNOWN
+    z = z.copy()
+    z[:, 1] -= 0.7 * left
+    stack = replace(stack, z=z)
+    assert judged(stack, [plain(("mass_offset",), z - effect, -effect)]).verdict is Verdict.PARTIAL
+
+
+@pytest.mark.parametrize(
+    ("at_bound", "before", "named"), [([], 1e3, True), (["grade"], 1e3, False), ([], 0.0, False)]
+)
+def test_nothing_is_named_at_its_bound_or_that_leaves_more_than_there_was(
+    monkeypatch, at_bound, before, named
+):
+    logs = [driven({"road_grade": {"grade": 0.03}}, v0, i, 8.0) for i, v0 in enumerate((14.0, 17.0))]
+    fit_to, held = gather(MODEL, logs[:1]), gather(MODEL, logs[1:])
+    contest = hold_contest(MODEL, fit_to, held, first_round(MODEL, fit_to, only("road_grade")))
+    decision = replace(decide(contest, fit_to, held), verdict=Verdict.UNKNOWN, before=Fitness(before, {}))
+    monkeypatch.setattr(Candidate, "at_bound", lambda self, x: at_bound)
+    _, said = beside_another_build(decision, contest, MODEL, fit_to, held)
+    assert said.verdict is (Verdict.PARTIAL if named else Verdict.UNKNOWN)
 
 
 def test_two_effects_that_both_do_much_are_a_compound(made_up):
