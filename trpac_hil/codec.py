@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import bitstruct  # type: ignore[import-untyped]
-import cantools
 from cantools.database.can import Message, Signal
 
-from trpac_core.files import FileError, quoted, read_text
+from sim2real.logs.dbc import DAMAGE, load_dbc
+from sim2real.logs.errors import LogError
+from trpac_core.files import quoted
 from trpac_hil.errors import HilError
 
 DBC_FILE = Path(__file__).with_name("trpac.dbc")
@@ -27,36 +26,12 @@ OUTPUT_MESSAGES = ("Estimate", "EstimateWheels", "Health")
 COUNTER_OF = "_Counter"
 LIFE_COUNTER = "LifeCounter"
 
-MOST_BYTES = 16_000_000
-"""Largest DBC file that is read [bytes]; files of a whole car have some megabytes."""
 LONGEST_MS = 60_000
 """Greatest cycle time and age limit [ms]; from the definitions in trpac.dbc."""
 CLASSIC_BYTES, FD_SIZES = 8, (8, 12, 16, 20, 24, 32, 48, 64)
 """Longest message of classic CAN, and lengths of a CAN FD message from there on [bytes]; ISO 11898-1."""
-LONGEST_PAYLOAD = 4095
-"""Longest message that a DBC file may describe [bytes]; ISO 15765-2. cantools stores each of its bits."""
-MOST_BRANCHES = 1_000_000
-"""Numbers in all ranges of extended multiplexing that a DBC file may have; cantools stores each of them."""
 GREATEST_FLOATS = {16: 65504.0, 32: 3.4028234e38, 64: 1.7976931348623157e308}
 """Greatest number that a float of so many bits holds; IEEE 754."""
-DAMAGE = (
-    cantools.Error,
-    bitstruct.Error,
-    ValueError,
-    TypeError,
-    AttributeError,
-    LookupError,
-    ArithmeticError,
-    AssertionError,
-    MemoryError,
-    NotImplementedError,
-    RecursionError,
-)
-"""Exceptions that cantools raises on damaged files, on reading or at the first message."""
-_COMMENT_OR_TEXT = re.compile(r'//[^\n]*|"(?:\\"|[^"])*?"')
-_SIZES = re.compile(r":\s*([-+]?\d+)(?:\s*\|\s*([-+]?\d+))?")
-"""Numbers after a colon: bytes of a message, or first bit and bits of a signal."""
-_BRANCHES, _RANGE = re.compile(r"SG_MUL_VAL_[^;]*"), re.compile(r"(\d+)\s*[-+]\s*(\d+)")
 
 
 @dataclass(frozen=True)
@@ -226,16 +201,9 @@ def load_codec(path: Path = DBC_FILE) -> Codec:
 
 def _read(path: Path) -> Codec:
     try:
-        text = read_text(path, MOST_BYTES, "a DBC file")
-    except FileError as error:
-        raise HilError(f"{error} It cannot be read as DBC file; {DBC_FILE} is one.") from error
-    try:
-        _require_sizes(text)
-        messages = cantools.database.load_string(text, "dbc").messages  # type: ignore[union-attr]
-    except DAMAGE as error:
-        raise HilError(
-            f"{quoted(path)}: cannot be read as DBC file ({quoted(error)}). Expected one like {DBC_FILE}."
-        ) from error
+        messages = load_dbc(path).messages
+    except LogError as error:
+        raise HilError(f"{error} {DBC_FILE} is one.") from error
     used: Counter[object] = Counter(
         key for m in messages for key in (m.name, (m.frame_id, m.is_extended_frame))
     )
@@ -253,17 +221,6 @@ def _read(path: Path) -> Codec:
                 f"Expected one like that of {DBC_FILE}."
             ) from error
     return Codec(path, coded)
-
-
-def _require_sizes(text: str) -> None:
-    """Raise ValueError where a message, signal or multiplexer is so large that cantools would fill the memory."""
-    bare = _COMMENT_OR_TEXT.sub(lambda found: " " if found[0][0] == "/" else '""', text)
-    for found in _SIZES.finditer(bare):
-        if not all(0 <= int(size) <= 8 * LONGEST_PAYLOAD for size in found.groups("0")):
-            raise ValueError(f"{quoted(found[0])}: no message has so many bytes or bits")
-    ranges = (each for found in _BRANCHES.finditer(bare) for each in _RANGE.findall(found[0]))
-    if sum(max(0, int(last) - int(first)) for first, last in ranges) > MOST_BRANCHES:
-        raise ValueError("its multiplexers have too many branches")
 
 
 def _tried(message: Message) -> Coded:

@@ -140,6 +140,7 @@ def _told(key: str, signal: Signal, arrays: dict[str, Any]) -> dict[str, Any]:
     return {
         "key": key,
         "plain": plain,
+        "unit": str(signal.unit or ""),
         "kind": "several values" if samples.ndim != 1 or samples.dtype.fields else str(samples.dtype)[:40],
         "sync": int(signal.master_metadata[1]) if signal.master_metadata else None,
     }

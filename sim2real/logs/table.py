@@ -69,13 +69,19 @@ class Table:
         Number of each row as an editor shows it.
     findings : tuple of Finding
         What the reader met.
+    units : dict
+        Units as the file states them, by column.
+    notes : tuple of str
+        How the file was understood, each in a few words: "decimal comma".
     """
 
     names: tuple[str, ...]
     numbers: dict[str, Array]
     text: dict[str, Text]
     rows: NDArray[np.int64]
-    findings: tuple[Finding, ...] = field(default=())
+    findings: tuple[Finding, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def numbered(labels: Iterable[str]) -> Array:

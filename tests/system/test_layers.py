@@ -18,7 +18,7 @@ BELOW = {
     "fmu_src": "trpac_core scenarios",
     "models": "trpac_core scenarios",
     "sim2real": "trpac_core scenarios",
-    "trpac_hil": "trpac_core scenarios fmu_src",
+    "trpac_hil": "trpac_core scenarios fmu_src sim2real",
     "trpac": "trpac_core scenarios fmu_src sim2real",
     "trpac_cli": "trpac_core scenarios fmu_src sim2real trpac_hil trpac",
 }

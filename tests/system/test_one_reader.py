@@ -38,7 +38,7 @@ OPENED = {
     },  # in a process that may die
     "sim2real/logs/mdf_file.py": {"load", "loads"},  # the answer of that process
     "sim2real/logs/formula.py": {"parse"},  # to a syntax tree, of which arithmetic alone is evaluated
-    "trpac_hil/codec.py": {"load_string"},  # of the text that the guard has read
+    "sim2real/logs/dbc.py": {"load_string"},  # of the text that the guard has read
 }
 """What reads files of others, and by which calls."""
 OWN = {

@@ -1,0 +1,76 @@
+"""DBC files of strangers, read with bounds on what they may ask of the memory."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import bitstruct  # type: ignore[import-untyped]
+import cantools
+from cantools.database.can import Database, Signal
+
+from sim2real.logs.errors import LogError
+from trpac_core.files import FileError, quoted, read_text
+
+MOST_BYTES = 16_000_000
+"""Largest DBC file that is read [bytes]; files of a whole car have some megabytes."""
+LONGEST_PAYLOAD = 4095
+"""Longest message that a DBC file may describe [bytes]; ISO 15765-2. cantools stores each of its bits."""
+MOST_BRANCHES = 1_000_000
+"""Numbers in all ranges of extended multiplexing that a DBC file may have; cantools stores each of them."""
+DAMAGE = (
+    cantools.Error,
+    bitstruct.Error,
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    ArithmeticError,
+    AssertionError,
+    MemoryError,
+    NotImplementedError,
+    RecursionError,
+)
+"""Exceptions that cantools raises on damaged files, on reading or at the first message."""
+_COMMENT_OR_TEXT = re.compile(r'//[^\n]*|"(?:\\"|[^"])*?"')
+_SIZES = re.compile(r":\s*([-+]?\d+)(?:\s*\|\s*([-+]?\d+))?")
+"""Numbers after a colon: bytes of a message, or first bit and bits of a signal."""
+_BRANCHES, _RANGE = re.compile(r"SG_MUL_VAL_[^;]*"), re.compile(r"(\d+)\s*[-+]\s*(\d+)")
+_NO_VALUE = re.compile(
+    r"sna|snv|n/?a|(signal|value|data)?\s*(is\s+)?(not|un)\s*(available|avail|valid|defined|used|known|init\w*)"
+    r"|invalid|init\w*|err(or)?|fault\w*|fail\w*|undefined|unknown",
+    re.IGNORECASE,
+)
+"""Names in a value table that say that there is no value; blanks and underscores do not matter."""
+
+
+def load_dbc(path: str | Path) -> Database:
+    """The database of a DBC file; raises LogError where it is missing, damaged or too large."""
+    try:
+        text = read_text(path, MOST_BYTES, "a DBC file")
+        _require_sizes(text)
+        return cantools.database.load_string(text, "dbc")  # type: ignore[return-value]
+    except FileError as error:
+        raise LogError(str(error)) from error
+    except DAMAGE as error:
+        raise LogError(f"{quoted(path)}: cannot be read as DBC file ({quoted(error)}).") from error
+
+
+def no_value(signal: Signal) -> frozenset[float]:
+    """Raw values of a signal that its value table names as "signal not available" (SNA), invalid or an error."""
+    return frozenset(
+        float(raw)
+        for raw, name in (signal.choices or {}).items()
+        if _NO_VALUE.fullmatch(str(name).replace("_", " ").strip())
+    )
+
+
+def _require_sizes(text: str) -> None:
+    """Raise ValueError where a message, signal or multiplexer is so large that cantools would fill the memory."""
+    bare = _COMMENT_OR_TEXT.sub(lambda found: " " if found[0][0] == "/" else '""', text)
+    for found in _SIZES.finditer(bare):
+        if not all(0 <= int(size) <= 8 * LONGEST_PAYLOAD for size in found.groups("0")):
+            raise ValueError(f"{quoted(found[0])}: no message has so many bytes or bits")
+    ranges = (each for found in _BRANCHES.finditer(bare) for each in _RANGE.findall(found[0]))
+    if sum(max(0, int(last) - int(first)) for first, last in ranges) > MOST_BRANCHES:
+        raise ValueError("its multiplexers have too many branches")
