@@ -8,15 +8,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sim2real.logs.checks import check_held, check_motion, check_time, check_values, check_wheels
+from sim2real.logs.checks import Clock, check_held, check_motion, check_time, check_values, check_wheels
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.frame_table import frame_sha256, frame_table
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import NO_MAPPING, Mapping
 from sim2real.logs.mdf_file import read_mdf
+from sim2real.logs.parquet_file import read_parquet
+from sim2real.logs.plausible import lost_samples, without_codes, without_stuck_codes
 from sim2real.logs.resampling import median_step
-from sim2real.logs.table import Finding, Table, Wanted
+from sim2real.logs.rows import in_order, one_per_message
+from sim2real.logs.table import Finding, Table
 from sim2real.logs.translate import (
     ignored_columns,
     missing_columns,
@@ -36,7 +39,9 @@ MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF"}
 SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"}
 
 
-def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
+def read_log(
+    path: str | Path, mapping: Mapping | None = None, *, progress: Callable[[int], None] = lambda _: None
+) -> Log:
     """Read a log strictly: CSV, Parquet or MDF, told apart by their content.
 
     Parameters
@@ -45,6 +50,8 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         The file.
     mapping : Mapping, optional
         How its columns become those of the log format; columns that it does not name are read under their own names.
+    progress : callable
+        Called with the bytes of a text table that were read so far.
 
     Raises
     ------
@@ -53,7 +60,7 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
     """
     path, mapping = Path(path), mapping or NO_MAPPING
     try:
-        row_word, table = _read_table(path, wanted_columns(mapping))
+        row_word, table = _read_table(path, mapping, progress)
     except LogError:
         raise
     except (FileError, ValueError) as error:  # the latter of text that is no picture's path
@@ -89,27 +96,39 @@ def _log(table: Table, mapping: Mapping, path: Path, row_word: str, sha256: Call
     def row(i: int) -> str:
         return f"{row_word} {table.rows[i]}"
 
+    wanted = wanted_columns(mapping)
+    table = without_codes(table, mapping.invalid)
+    table = without_stuck_codes(table, wanted.numbers - wanted.held - {wanted.time})
+    time_s, table = read_time(table, mapping)
     findings = [*table.findings, *missing_columns(table, mapping)]
-    time_s = read_time(table, mapping)
     if time_s is None or len(time_s) == 0:
         raise _error(path, findings)
-    clock = check_time(time_s, row)
+    if wanted.time and (apart := one_per_message(path, table, time_s, wanted)) is not None:
+        table, time_s = apart, apart.numbers[wanted.time]
+        findings = [*table.findings, *missing_columns(table, mapping)]
+    kept, said = in_order(time_s, row)
+    findings += said
+    table, time_s = table.kept(kept), time_s[kept]
+    usable = not any(finding.fatal for finding in said)
+    clock = check_time(time_s, row) if usable else Clock(tuple(said))
     made = translate(table, mapping, time_s if clock.usable else None)
+    signals, lost = lost_samples(time_s, made.signals) if clock.usable else (made.signals, [])
     findings += [
-        *clock.findings,
+        *(clock.findings if usable else ()),
         *made.findings,
-        *check_values(time_s if clock.usable else None, made.signals, row),
-        *check_wheels(made.signals),
+        *lost,
+        *check_values(time_s if clock.usable else None, signals, row),
+        *check_wheels(signals),
     ]
     if clock.usable:
-        findings += [*check_motion(time_s, made.signals), *check_held(time_s, made.signals)]
+        findings += [*check_motion(time_s, signals), *check_held(time_s, signals)]
     if any(finding.fatal for finding in findings):
         raise _error(path, findings)
     return Log(
         path=path,
         name=path.name,
         time_s=time_s,
-        signals={name: values for name, values in made.signals.items() if not np.isnan(values).all()},
+        signals={name: values for name, values in signals.items() if not np.isnan(values).all()},
         image_path=table.text.get(picture_source(mapping)),
         rate_hz=1.0 / median_step(time_s),
         gaps=clock.gaps,
@@ -117,11 +136,13 @@ def _log(table: Table, mapping: Mapping, path: Path, row_word: str, sha256: Call
         ignored=ignored_columns(table, mapping),
         warnings=tuple(quoted(finding.text, LONGEST_FINDING) for finding in findings),
         sha256=sha256(),
+        notes=table.notes,
     )
 
 
-def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
+def _read_table(path: Path, mapping: Mapping, progress: Callable[[int], None]) -> tuple[str, Table]:
     """The file's columns, and what one of its rows is called; the content tells the format, the name must agree."""
+    wanted = wanted_columns(mapping)
     with open_file(path, MOST_BYTES, "a log") as file:
         start = file.read(4)
     kind = MAGIC.get(start, "CSV")
@@ -131,12 +152,10 @@ def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
             f"{path}: is named like {named} and does not start like it; expected a whole {named} file."
         )
     if kind == "Parquet":
-        from sim2real.logs.parquet_file import read_parquet  # pyarrow is an extra
-
         return "row", read_parquet(path, wanted)
     if kind == "MDF":
         return "sample", read_mdf(path, wanted)
-    return "row", read_csv(path, wanted)
+    return "row", read_csv(path, wanted, mapping.format, progress)
 
 
 def _error(path: Path, findings: list[Finding]) -> LogError:
