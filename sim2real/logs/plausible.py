@@ -19,7 +19,7 @@ FASTEST_M_S = 150.0
 """Speed that no road vehicle reaches [m/s]."""
 HARDEST_M_S2 = 30.0
 """Change of a car's speed that no tyres make, short of a crash [m/s2]: three times the grip of a slick."""
-WHEEL_RAD_PER_S2 = 20_000.0
+SPIN_RAD_S2 = 20_000.0
 """Acceleration of a wheel that no brake makes [rad/s2]: 6 kN m on a small wheel of 0.3 kg m2."""
 LARGEST_NM = 40_000.0
 """Torque that no axle of a lorry carries [N m]."""
@@ -55,7 +55,7 @@ _WHEEL = Reach(
     FASTEST_M_S / SMALLEST_RADIUS_M,
     3.0 / SMALLEST_RADIUS_M,
     HARDEST_M_S2 / SMALLEST_RADIUS_M,
-    WHEEL_RAD_PER_S2,
+    SPIN_RAD_S2,
 )
 REACHES: Mapping[str, Reach] = {
     **dict.fromkeys(WHEEL_SPEEDS, _WHEEL),
