@@ -52,7 +52,7 @@ class Reach:
 
 
 _WHEEL = Reach(
-    FASTEST_M_S / SMALLEST_RADIUS_M,
+    2.0 * FASTEST_M_S / SMALLEST_RADIUS_M,  # one that spins is faster than any car
     3.0 / SMALLEST_RADIUS_M,
     HARDEST_M_S2 / SMALLEST_RADIUS_M,
     SPIN_RAD_S2,

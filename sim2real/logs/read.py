@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sim2real.logs.checks import Clock, check_held, check_motion, check_time, check_values, check_wheels
+from sim2real.logs.agreement import check_agreement, check_wheels
+from sim2real.logs.checks import Clock, check_held, check_time, check_values
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.frame_table import frame_sha256, frame_table
@@ -121,7 +122,7 @@ def _log(table: Table, mapping: Mapping, path: Path, row_word: str, sha256: Call
         *check_wheels(signals),
     ]
     if clock.usable:
-        findings += [*check_motion(time_s, signals), *check_held(time_s, signals)]
+        findings += [*check_agreement(time_s, signals, made.derived), *check_held(time_s, signals)]
     if any(finding.fatal for finding in findings):
         raise _error(path, findings)
     return Log(
