@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from sim2real.logs.parquet_file import read_parquet
 from sim2real.logs.plausible import lost_samples, without_codes, without_stuck_codes
 from sim2real.logs.resampling import median_step
 from sim2real.logs.rows import in_order, one_per_message
-from sim2real.logs.table import Finding, Table
+from sim2real.logs.table import Array, Finding, Table
 from sim2real.logs.translate import (
     ignored_columns,
     missing_columns,
@@ -59,6 +60,20 @@ def read_log(
     LogError
         With all problems of the file, one a line.
     """
+    path = Path(path)
+    return understood(path, mapping, progress=progress).log(lambda: file_sha256(path))
+
+
+def understood(
+    path: str | Path, mapping: Mapping | None = None, *, progress: Callable[[int], None] = lambda _: None
+) -> Understood:
+    """What a file is understood to hold, usable or not; parameters as of `read_log`.
+
+    Raises
+    ------
+    LogError
+        It cannot be read at all.
+    """
     path, mapping = Path(path), mapping or NO_MAPPING
     try:
         row_word, table = _read_table(path, mapping, progress)
@@ -66,7 +81,7 @@ def read_log(
         raise
     except (FileError, ValueError) as error:  # the latter of text that is no picture's path
         raise LogError(f"{quoted(path)}: {error}" if type(error) is ValueError else str(error)) from error
-    return _log(table, mapping, path, row_word, lambda: file_sha256(path))
+    return _understand(table, mapping, path, row_word)
 
 
 def log_of_frame(frame: pd.DataFrame, mapping: Mapping | None = None, name: str = "frame") -> Log:
@@ -88,12 +103,73 @@ def log_of_frame(frame: pd.DataFrame, mapping: Mapping | None = None, name: str 
     """
     mapping = mapping or NO_MAPPING
     table = frame_table(frame, wanted_columns(mapping))
-    return _log(table, mapping, Path(name), "row", lambda: frame_sha256(frame))
+    return _understand(table, mapping, Path(name), "row").log(lambda: frame_sha256(frame))
 
 
-def _log(table: Table, mapping: Mapping, path: Path, row_word: str, sha256: Callable[[], str]) -> Log:
-    """The log that a table makes under a mapping; raises LogError with all problems."""
+@dataclass(frozen=True)
+class Understood:
+    """A table under a mapping, with all that is odd about it.
 
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    mapping : Mapping
+        How its columns become those of the log format.
+    table : Table
+        The file's columns, in the rows that are kept.
+    time_s : array, shape (n,)
+        Ascending [s]; empty where the file has no time.
+    signals : dict
+        The columns of the log format that could be made, shape (n,).
+    derived : frozenset of str
+        Those of them that were computed rather than measured.
+    gaps : tuple of (float, float)
+        Pieces of time without rows [s].
+    findings : tuple of Finding
+        What is odd; a fatal one keeps it from being a log.
+    """
+
+    path: Path
+    mapping: Mapping
+    table: Table
+    time_s: Array
+    signals: dict[str, Array]
+    derived: frozenset[str]
+    gaps: tuple[tuple[float, float], ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What keeps it from being a log, in sentences."""
+        return tuple(quoted(finding.text, LONGEST_FINDING) for finding in self.findings if finding.fatal)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What else is odd, in sentences."""
+        return tuple(quoted(finding.text, LONGEST_FINDING) for finding in self.findings if not finding.fatal)
+
+    def log(self, sha256: Callable[[], str]) -> Log:
+        """The log, with what `sha256` returns; raises LogError with all problems."""
+        if self.problems:
+            raise LogError("\n".join(f"{quoted(self.path)}: {text}" for text in self.problems))
+        return Log(
+            path=self.path,
+            name=self.path.name,
+            time_s=self.time_s,
+            signals={name: values for name, values in self.signals.items() if not np.isnan(values).all()},
+            image_path=self.table.text.get(picture_source(self.mapping)),
+            rate_hz=1.0 / median_step(self.time_s),
+            gaps=self.gaps,
+            derived=self.derived,
+            ignored=ignored_columns(self.table, self.mapping),
+            warnings=self.warnings,
+            sha256=sha256(),
+            notes=self.table.notes,
+        )
+
+
+def _understand(table: Table, mapping: Mapping, path: Path, row_word: str) -> Understood:
     def row(i: int) -> str:
         return f"{row_word} {table.rows[i]}"
 
@@ -103,42 +179,22 @@ def _log(table: Table, mapping: Mapping, path: Path, row_word: str, sha256: Call
     time_s, table = read_time(table, mapping)
     findings = [*table.findings, *missing_columns(table, mapping)]
     if time_s is None or len(time_s) == 0:
-        raise _error(path, findings)
+        made = translate(table, mapping, None)
+        return Understood(path, mapping, table, np.zeros(0), made.signals, made.derived, (), tuple(findings))
     if wanted.time and (apart := one_per_message(path, table, time_s, wanted)) is not None:
         table, time_s = apart, apart.numbers[wanted.time]
         findings = [*table.findings, *missing_columns(table, mapping)]
     kept, said = in_order(time_s, row)
-    findings += said
     table, time_s = table.kept(kept), time_s[kept]
-    usable = not any(finding.fatal for finding in said)
-    clock = check_time(time_s, row) if usable else Clock(tuple(said))
-    made = translate(table, mapping, time_s if clock.usable else None)
-    signals, lost = lost_samples(time_s, made.signals) if clock.usable else (made.signals, [])
-    findings += [
-        *(clock.findings if usable else ()),
-        *made.findings,
-        *lost,
-        *check_values(time_s if clock.usable else None, signals, row),
-        *check_wheels(signals),
-    ]
-    if clock.usable:
+    clock = Clock() if any(finding.fatal for finding in said) else check_time(time_s, row)
+    usable = clock.usable and kept.any() and not any(finding.fatal for finding in said)
+    made = translate(table, mapping, time_s if usable else None)
+    signals, lost = lost_samples(time_s, made.signals) if usable else (made.signals, [])
+    findings += [*said, *clock.findings, *made.findings, *lost]
+    findings += [*check_values(time_s if usable else None, signals, row), *check_wheels(signals)]
+    if usable:
         findings += [*check_agreement(time_s, signals, made.derived), *check_held(time_s, signals)]
-    if any(finding.fatal for finding in findings):
-        raise _error(path, findings)
-    return Log(
-        path=path,
-        name=path.name,
-        time_s=time_s,
-        signals={name: values for name, values in signals.items() if not np.isnan(values).all()},
-        image_path=table.text.get(picture_source(mapping)),
-        rate_hz=1.0 / median_step(time_s),
-        gaps=clock.gaps,
-        derived=made.derived,
-        ignored=ignored_columns(table, mapping),
-        warnings=tuple(quoted(finding.text, LONGEST_FINDING) for finding in findings),
-        sha256=sha256(),
-        notes=table.notes,
-    )
+    return Understood(path, mapping, table, time_s, signals, made.derived, clock.gaps, tuple(findings))
 
 
 def _read_table(path: Path, mapping: Mapping, progress: Callable[[int], None]) -> tuple[str, Table]:
@@ -157,8 +213,3 @@ def _read_table(path: Path, mapping: Mapping, progress: Callable[[int], None]) -
     if kind == "MDF":
         return "sample", read_mdf(path, wanted)
     return "row", read_csv(path, wanted, mapping.format, progress)
-
-
-def _error(path: Path, findings: list[Finding]) -> LogError:
-    fatal = [quoted(finding.text, LONGEST_FINDING) for finding in findings if finding.fatal]
-    return LogError("\n".join(f"{quoted(path)}: {text}" for text in fatal))
