@@ -75,7 +75,7 @@ def check_wheels(signals: Mapping[str, Array]) -> Iterator[Finding]:
         others = [other for wheel, other in medians.items() if wheel != name]
         if len(others) > 1 and not 1.0 / FACTOR <= (times := ratio / float(np.median(others))) <= FACTOR:
             yield Finding(
-                f"{name} is {times:.3g} times the other wheels' speed; is its unit or scale wrong?",
+                f"{name} is {times:.2g} times the other wheels' speed; is its unit or scale wrong?",
                 fatal=False,
             )
 
@@ -193,7 +193,7 @@ def _culprit(ratio: float, slope: float) -> str:
     by = {name: float(seen @ side / np.dot(side, side)) for name, side in sides.items()}
     left = {name: float(np.linalg.norm(seen - by[name] * np.array(side))) for name, side in sides.items()}
     name = min(left, key=lambda n: left[n])
-    return f"{name} looks {np.exp(by[name]):.3g} times as large as it is, "
+    return f"{name} looks about {np.exp(by[name]):.2g} times as large as it is, "
 
 
 def _check_torques(signals: Mapping[str, Array]) -> Iterator[Finding]:

@@ -39,11 +39,13 @@ from sim2real.logs.table import (
     labels_of,
     numbered,
 )
-from sim2real.logs.times import times_of_texts
+from sim2real.logs.times import Times, times_of_texts, whole_nanoseconds
 from trpac_core.files import open_file, quoted
 
 BLOCK_BYTES = 4 * LONGEST_LINE
 """What is read at once; a row may be as long [bytes]."""
+LARGEST_WHOLE = 2.0**53
+"""Greatest number up to which a float64 holds every whole one."""
 Progress = Callable[[int], None]
 """Called with the bytes read so far."""
 
@@ -78,7 +80,10 @@ def read_csv(path: Path, wanted: Wanted, stated: Format, progress: Progress) -> 
             continue
         else:
             values, bad = _as_numbers(cells, dialect.decimal)
-            if name == wanted.time and (bad or wanted.time_form):
+            if name == wanted.time and (exact := _nanoseconds(cells, values)) is not None:
+                values, units[name] = exact.time_s, "s"
+                notes.append(f"time as {exact.note}")
+            elif name == wanted.time and (bad or wanted.time_form):
                 if len(bad) > 0.5 * len(cells) or "%" in wanted.time_form:
                     times = times_of_texts(_told(cells), wanted.time_form)
                     lost = np.flatnonzero(np.isnan(times.time_s))
@@ -88,7 +93,7 @@ def read_csv(path: Path, wanted: Wanted, stated: Format, progress: Progress) -> 
             elif bad and name in wanted.identifiers and len(bad) == len(cells) - _lost(cells):
                 values, bad = numbered(_told(cells)), []
         if bad:
-            findings.append(_bad_cells(name, bad, rows))
+            findings.append(_bad_cells(name, bad, rows, name == wanted.time))
         else:
             numbers[name] = values
     if not found.ends:
@@ -237,6 +242,15 @@ def _as_numbers(cells: pa.Array, decimal: str) -> tuple[Array, list[tuple[int, s
     return values, bad
 
 
+def _nanoseconds(cells: pa.ChunkedArray, values: Array) -> Times | None:
+    if len(values) == 0 or not np.nanmax(values, initial=0.0) > LARGEST_WHOLE:
+        return None
+    try:
+        return whole_nanoseconds(pc.cast(cells, pa.int64()).to_numpy())
+    except pa.ArrowInvalid:
+        return None
+
+
 def _joined(blocks: Sequence[tuple[Array, list[tuple[int, str]]]]) -> tuple[Array, list[tuple[int, str]]]:
     if not blocks:
         return np.zeros(0), []
@@ -292,10 +306,15 @@ def _row_numbers(path: Path, dialect: Dialect, found: _Found) -> tuple[NDArray[n
     return np.array(rows, dtype=np.int64), findings
 
 
-def _bad_cells(name: str, bad: list[tuple[int, str]], rows: NDArray[np.int64]) -> Finding:
+def _bad_cells(name: str, bad: list[tuple[int, str]], rows: NDArray[np.int64], is_time: bool) -> Finding:
     shown = ", ".join(f"row {rows[k]} ({cell[:30]!r})" for k, cell in bad[:SHOWN])
     hint = ""
-    if "," in bad[0][1]:
+    if is_time:
+        hint = (
+            f" Where it is a date or a clock, a mapping file says its form: `time: {{column: {name!r}, form: "
+            "'%d.%m.%Y %H:%M:%S.%f'}`."
+        )
+    elif "," in bad[0][1]:
         hint = (
             ' Is that a decimal comma, or one between thousands? A mapping file can say `format: {decimal: ","}`; '
             "marks between thousands are not read."

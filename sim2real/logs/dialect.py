@@ -231,13 +231,12 @@ def _rows(
     header = max(named, key=lambda i: (known[i], i))
     below = [i for i in range(header + 1, len(rows)) if rows[i]]
     if stated.unit_row is not None:
-        unit = stated.unit_row
+        unit, described = stated.unit_row, []
     else:
         unit = next((i + 1 for i in below if i < first and _are_units(rows[i], decimal)), 0)
-    told = max(header + 1, unit)
-    said = [i for i in below if i >= told and i < first and not counts[i] and len(rows[i]) == width]
-    described = [i for i in said if all(cell.lower() not in MISSING for cell in rows[i])]
-    values = next((i for i in below if i >= told and i not in described), len(rows))
+        words = [i for i in below if i < first and not counts[i] and len(rows[i]) == width]
+        described = [i for i in words if all(cell.lower() not in MISSING for cell in rows[i])]
+    values = next((i for i in below if i >= max(header + 1, unit) and i not in described), len(rows))
     return header + 1, unit, values + 1
 
 

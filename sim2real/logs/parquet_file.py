@@ -21,7 +21,7 @@ from sim2real.logs.table import (
     labels_of,
     numbered,
 )
-from sim2real.logs.times import Times, times_of_stamps, times_of_texts
+from sim2real.logs.times import Times, times_of_stamps, times_of_texts, whole_nanoseconds
 from trpac_core.files import quoted
 
 
@@ -98,6 +98,8 @@ def _times(column: pa.ChunkedArray, name: str, wanted: Wanted) -> Times | None:
         return times_of_stamps(column.cast(pa.duration(unit)).to_numpy())
     if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
         return times_of_stamps(column.to_numpy())
+    if name == wanted.time and pa.types.is_int64(kind) and column.null_count == 0:
+        return whole_nanoseconds(column.to_numpy())
     if name == wanted.time and _is_text(kind):
         return times_of_texts(_cells(column), wanted.time_form)
     return None

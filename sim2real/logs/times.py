@@ -73,17 +73,24 @@ def times_of_numbers(values: Array, form: str = "") -> Times:
     """
     known = values[np.isfinite(values)]
     if form in EPOCHS:
-        return Times(_from_first(values * EPOCHS[form]), f"{form}, from the first row on")
+        return Times(_from_first(values) * EPOCHS[form], f"{form}, from the first row on")
     if form == CLOCK:
         return Times(_over_midnight(_of_clock(values)), "a clock HHMMSS")
     if form or len(known) < 2:
         return Times(values)
     for name, unit_s in list(EPOCHS.items())[1:]:
         if EPOCH_S[0] <= known.min() * unit_s and known.max() * unit_s <= EPOCH_S[1]:
-            return Times(_from_first(values * unit_s), f"{name}, from the first row on")
+            return Times(_from_first(values) * unit_s, f"{name}, from the first row on")
     if _jumps_like_a_clock(known):
         return Times(_over_midnight(_of_clock(values)), "a clock HHMMSS")
     return Times(values)
+
+
+def whole_nanoseconds(values: NDArray[np.int64]) -> Times | None:
+    """Seconds since the first of whole numbers of nanoseconds since 1970, which no float64 holds; None of others."""
+    if len(values) == 0 or not EPOCH_S[0] * _NS <= values.min() <= values.max() <= EPOCH_S[1] * _NS:
+        return None
+    return Times((values - values[0]) / _NS, "epoch_ns, from the first row on")
 
 
 def _jumps_like_a_clock(values: Array) -> bool:
@@ -93,8 +100,9 @@ def _jumps_like_a_clock(values: Array) -> bool:
     if np.any(values % 100.0 >= 60.0) or np.any(values // 100.0 % 100.0 >= 60.0):
         return False
     step = median_step(values)
-    jumps = np.flatnonzero(np.diff(values) > 40.0)
-    if len(jumps) == 0 or not 0.0 < step < 1.0:
+    step_up = np.diff(values)
+    jumps = np.flatnonzero((step_up > 40.0) | (step_up < -235_000.0))
+    if len(jumps) == 0 or np.any(step_up[step_up < 0.0] > -235_000.0) or not 0.0 < step < 1.0:
         return False
     over = np.diff(_over_midnight(_of_clock(values)))
     return bool(np.all(over[jumps] < 1.0) and np.all(values[jumps] % 100.0 >= 59.0))
