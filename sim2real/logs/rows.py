@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,8 @@ MOST_OUT_OF_ORDER = 0.01
 """Share of rows without a time of their own up to which they are left out [-]."""
 MESSAGES = 20
 """Samples from which on a column counts as a message of its own."""
+LONGEST_PAUSE = 4.0
+"""Pause between the changes of a signal, over the usual one, up to which each of its messages changes it [-]."""
 
 
 def in_order(time_s: Array, row: Row) -> tuple[NDArray[np.bool_], list[Finding]]:
@@ -62,23 +65,28 @@ def _row(rows: NDArray[np.int64], i: int) -> str:
 
 
 def one_per_message(path: Path, table: Table, time_s: Array, wanted: Wanted) -> Table | None:
-    """The table on the wheel speeds' times, where each of its rows holds the cells of one message; else None."""
-    filled = {
-        name: np.isfinite(values) & np.isfinite(time_s)
-        for name, values in table.numbers.items()
-        if name != wanted.time
-    }
-    base = next((name for name in wanted.base if name in filled), None)
-    if base is None or np.count_nonzero(filled[base]) < MESSAGES:
+    """The table on the wheel speeds' times, where each of its rows holds one message; else None.
+
+    The cells of other messages are empty in such a row, or carried forward from the rows above.
+    """
+    known = np.isfinite(time_s)
+    filled = {name: np.isfinite(x) & known for name, x in table.numbers.items() if name != wanted.time}
+    wheels = [name for name in wanted.base if name in filled]
+    if not wheels:
         return None
-    shared = {
-        name: (np.count_nonzero(there), np.count_nonzero(there & filled[base]))
-        for name, there in filled.items()
-    }
-    if not any(own >= MESSAGES and both <= MOST_OUT_OF_ORDER * own for own, both in shared.values()):
-        return None
+    new, note = filled, "one row per message"
+    if not _apart(new, filled[wheels[0]]):
+        new = {name: filled[name] & _changed(table.numbers[name]) for name in filled}
+        carried = np.logical_or.reduce([new[name] for name in wheels])
+        if not _apart(new, carried):
+            return None
+        # What seldom changes is as good as its message's rows where the wheels' message is.
+        new = {
+            n: carried if n in wheels or not _is_steady(time_s[there]) else there for n, there in new.items()
+        }
+        note = "one row per message, other cells carried forward"
     channels, findings = {}, list(table.findings)
-    for name, there in filled.items():
+    for name, there in new.items():
         at = np.flatnonzero(there)
         kept, said = in_order(time_s[at], partial(_row, table.rows[at]))
         findings += said
@@ -88,12 +96,33 @@ def one_per_message(path: Path, table: Table, time_s: Array, wanted: Wanted) -> 
         at = np.flatnonzero(texts != "")
         channels[name] = Channel(time_s[at], texts[at])
     made = table_of(path, table.names, (), channels, wanted)
-    rows = table.rows[np.flatnonzero(filled[base])][: len(made.rows)]
+    at = np.flatnonzero(np.isin(time_s, channels[wheels[0]].time_s) & new[wheels[0]])
     return replace(
         made,
-        numbers={**made.numbers, wanted.time: channels[base].time_s},
-        rows=rows if len(rows) == len(made.rows) else made.rows,
+        numbers={**made.numbers, wanted.time: channels[wheels[0]].time_s},
+        rows=table.rows[at] if len(at) == len(made.rows) else made.rows,
         findings=(*findings, *made.findings),
         units=table.units | {wanted.time: "s"},
-        notes=(*table.notes, "one row per message"),
+        notes=(*table.notes, note),
+    )
+
+
+def _apart(new: Mapping[str, NDArray[np.bool_]], base: NDArray[np.bool_]) -> bool:
+    """Whether some signal has new cells in other rows than the base, and both have enough of them."""
+    counts = [(np.count_nonzero(there), np.count_nonzero(there & base)) for there in new.values()]
+    enough = [(own, both) for own, both in counts if own >= MESSAGES]
+    return bool(np.count_nonzero(base) >= MESSAGES) and any(
+        both <= MOST_OUT_OF_ORDER * own for own, both in enough
+    )
+
+
+def _changed(values: Array) -> NDArray[np.bool_]:
+    """Rows whose cell is another than the one above; the first row's message is not known."""
+    return np.concatenate((np.zeros(min(len(values), 1), dtype=bool), values[1:] != values[:-1]))
+
+
+def _is_steady(time_s: Array) -> bool:
+    """Whether a signal's changes come at a pace of their own, none left out for long."""
+    return len(time_s) >= MESSAGES and bool(
+        np.diff(time_s).max() < LONGEST_PAUSE * np.median(np.diff(time_s))
     )

@@ -222,6 +222,25 @@ class TestRowsOfMessages:
         assert np.array_equal(log.signals["vehicle_speed_m_s"], frame["vehicle_speed_m_s"][::2])
         assert np.allclose(log.signals["position_m"], frame["position_m"][::2], atol=1e-3, equal_nan=True)
 
+    def test_with_the_other_cells_carried_forward(self, read, frame):
+        rows = self.rows(frame, shifts=(0.0003, 0.0007, 0.0)).ffill().dropna()
+        log = read(rows.to_csv(index=False))
+        assert log.notes == ("one row per message, other cells carried forward",)
+        assert log.rate_hz == pytest.approx(100.0)
+        assert np.array_equal(log.time_s, frame["time_s"][1:])
+        assert np.array_equal(log.signals["wheel_speed_rr_rad_s"], frame["wheel_speed_rr_rad_s"][1:])
+        expected = np.interp(log.time_s[2:-2], frame["time_s"] + 0.0003, frame["accel_x_m_s2"])
+        assert np.allclose(log.signals["accel_x_m_s2"][2:-2], expected, atol=1e-9)
+
+    def test_a_torque_that_seldom_changes_is_carried_along(self, read, frame):
+        for w in WHEELS:
+            frame[f"wheel_torque_{w}_nm"] = np.where(frame["time_s"] > 1.5, -200.0, 0.0)
+        rows = self.rows(frame, shifts=(0.0003, 0.0007, 0.0)).ffill().dropna()
+        log = read(rows.to_csv(index=False))
+        torque = log.signals["wheel_torque_fl_nm"]
+        assert not np.isnan(torque).any()
+        assert np.count_nonzero(torque != frame["wheel_torque_fl_nm"].to_numpy()[1:]) <= 1
+
     def test_of_a_parquet_file_with_pictures(self, tmp_path):
         frame = make_frame(camera=True)
         pictures = (
