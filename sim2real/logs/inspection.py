@@ -59,13 +59,8 @@ def column_reports(log: Understood) -> list[ColumnReport]:
     for name in COLUMNS:
         if name not in every or len(every[name]) == 0:
             continue
-        spec = log.mapping.columns.get(name)
-        if spec is None:
-            derived = name in log.derived
-            source, unit, factor = (
-                ("from vehicle_speed_m_s", "", np.nan) if derived else _plain(log, name, Spec(column=name))
-            )
-        elif spec.column is not None:
+        spec = log.mapping.spec(name)
+        if spec.column is not None:
             source, unit, factor = _plain(log, name, spec)
         else:
             source = " + ".join(log.mapping.sources(name)) or "computed"
@@ -84,7 +79,7 @@ def missing_for_estimate(log: Understood) -> list[str]:
 def missing_for_diagnosis(log: Understood) -> list[str]:
     """What a diagnosis lacks beyond what an estimate needs, in a few words each."""
     missing = []
-    if POSITION in log.derived:
+    if POSITION not in log.signals or POSITION in log.derived:
         missing.append("no measured position: a road with several stretches cannot be laid under it")
     for name, what in (("vehicle_speed_m_s", "speed"), ("wheel_torque_fl_nm", "torque")):
         values = log.signals.get(name)

@@ -179,6 +179,8 @@ def _understand(table: Table, mapping: Mapping, path: Path, row_word: str) -> Un
     time_s, table = read_time(table, mapping)
     findings = [*table.findings, *missing_columns(table, mapping)]
     if time_s is None or len(time_s) == 0:
+        if not any(finding.fatal for finding in findings):
+            findings.append(Finding("has no rows; expected one row per sample."))
         made = translate(table, mapping, None)
         return Understood(path, mapping, table, np.zeros(0), made.signals, made.derived, (), tuple(findings))
     if wanted.time and (apart := one_per_message(path, table, time_s, wanted)) is not None:

@@ -17,9 +17,6 @@ from trpac_core.files import quoted
 BRIDGED_S = 0.25
 """An integral across a longer stretch of lost samples is worth a warning [s]."""
 
-FROM_SPEED = Spec(integrate=Spec(copy="vehicle_speed_m_s"))
-"""The position where a log has none: the way since its first row."""
-
 LISTED_NAMES, LONGEST_NAME = 12, 40
 """Column names of the file that an error lists, and characters of each."""
 MOST_COMPARED = 3_000
@@ -116,8 +113,6 @@ def translate(table: Table, mapping: Mapping, time_s: Array | None) -> Translate
     """Make the columns of the log format out of the file's; without usable times those that need none."""
     specs = _specs(mapping)
     del specs[TIME]
-    if POSITION not in mapping.columns and POSITION not in table.names:
-        specs[POSITION] = FROM_SPEED
     evaluation = _Evaluation(table, specs, time_s, {}, [])
     made = {name: evaluation.column(name) for name in specs}
     signals = {name: values for name, values in made.items() if values is not None}

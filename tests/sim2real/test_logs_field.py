@@ -4,9 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from log_maker import WHEELS, lines_of, make_frame
+from plant_drives import make_road
 
 import trpac
+from scenarios.errors import ScenarioError
 from sim2real.logs import LogError, load_mapping, read_log
+from sim2real.sources import make_source
 
 CAR = trpac.Vehicle.builtin("four_in_wheel_motor_ev")
 GERMAN = {
@@ -324,3 +327,23 @@ class TestLostSamples:
     def test_a_signal_that_is_impossible_for_long_is_refused(self, drive):
         with pytest.raises(LogError, match="accel_x_m_s2: 400 samples are no car's"):
             trpac.read_log(drive.assign(accel_x_m_s2=np.where(TIME_S < 2.0, 500.0, drive["accel_x_m_s2"])))
+
+
+class TestPosition:
+    """A log without a measured position can be estimated on, and diagnosed on a road of one stretch."""
+
+    def test_it_is_the_way_since_the_first_row(self, drive):
+        bare = drive.drop(columns="position_m")
+        assert "position_m" not in trpac.read_log(bare).signals
+        found, clean = (trpac.estimate(f, CAR).frame["TRPAC"].to_numpy() for f in (bare, drive))
+        assert np.array_equal(found, clean)
+
+    def test_a_road_of_several_stretches_asks_for_it(self, drive):
+        log = trpac.read_log(drive.drop(columns="position_m"))
+        assert "position_m" in make_source(log, make_road((0.0, 0.8, 0.8))).log.derived
+        with pytest.raises(ScenarioError, match="column position_m is missing.* has 2 stretches"):
+            make_source(log, make_road((0.0, 0.8, 0.8), (30.0, 0.3, 0.3)))
+
+    def test_stretches_of_pictures_ask_for_it(self):
+        with pytest.raises(LogError, match="required column missing: position_m"):
+            trpac.read_log(make_frame(camera=True).drop(columns="position_m"))
