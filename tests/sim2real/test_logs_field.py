@@ -341,7 +341,7 @@ class TestPosition:
     def test_a_road_of_several_stretches_asks_for_it(self, drive):
         log = trpac.read_log(drive.drop(columns="position_m"))
         assert "position_m" in make_source(log, make_road((0.0, 0.8, 0.8))).log.derived
-        with pytest.raises(ScenarioError, match="column position_m is missing.* has 2 stretches"):
+        with pytest.raises(ScenarioError, match=r"column position_m is missing.* has 2 stretches"):
             make_source(log, make_road((0.0, 0.8, 0.8), (30.0, 0.3, 0.3)))
 
     def test_stretches_of_pictures_ask_for_it(self):
