@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from sim2real.logs.bus_kinds import KINDS, text_kind
 from sim2real.logs.checks import check_held, check_motion, check_time, check_values, check_wheels
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.frame_table import frame_sha256, frame_table
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import NO_MAPPING, Mapping
-from sim2real.logs.mdf_file import read_mdf
+from sim2real.logs.mdf_file import needs_dbc, read_mdf
 from sim2real.logs.resampling import median_step
 from sim2real.logs.table import Finding, Table, Wanted
 from sim2real.logs.translate import (
@@ -31,13 +33,22 @@ MOST_BYTES = 4_000_000_000
 """Larger logs are refused unread [bytes]."""
 LONGEST_FINDING = 600
 """Characters of one sentence about a log."""
-MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF"}
+MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF", b"LOGG": "BLF"}
 """First four bytes of the files that are not text; UnFi is an MDF that its recorder did not close."""
 SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"}
+SUFFIXES |= {".blf": "BLF", ".trc": "TRC"}
+BUS_SUFFIXES = {".asc": "ASC", ".log": "candump"}
+"""Names that tables have, too: with a DBC file they must be bus logs."""
+START_BYTES = 4096
+"""So many bytes tell what a file is."""
 
 
-def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
-    """Read a log strictly: CSV, Parquet or MDF, told apart by their content.
+DbcFiles = str | Path | Sequence[str | Path] | None
+"""One or several DBC files."""
+
+
+def read_log(path: str | Path, mapping: Mapping | None = None, dbc: DbcFiles = None) -> Log:
+    """Read a log strictly: a table, MDF, or raw frames of a bus, told apart by their content.
 
     Parameters
     ----------
@@ -45,6 +56,8 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         The file.
     mapping : Mapping, optional
         How its columns become those of the log format; columns that it does not name are read under their own names.
+    dbc : path or sequence of paths, optional
+        DBC files that say what the frames of a bus mean: needed for BLF, ASC, candump, TRC, and MDF with raw frames.
 
     Raises
     ------
@@ -52,8 +65,9 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         With all problems of the file, one a line.
     """
     path, mapping = Path(path), mapping or NO_MAPPING
+    files = [dbc] if isinstance(dbc, str | Path) else list(dbc or ())
     try:
-        row_word, table = _read_table(path, wanted_columns(mapping))
+        row_word, table = _read_table(path, wanted_columns(mapping), files)
     except LogError:
         raise
     except (FileError, ValueError) as error:  # the latter of text that is no picture's path
@@ -120,16 +134,32 @@ def _log(table: Table, mapping: Mapping, path: Path, row_word: str, sha256: Call
     )
 
 
-def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
+def _read_table(path: Path, wanted: Wanted, dbc: Sequence[str | Path]) -> tuple[str, Table]:
     """The file's columns, and what one of its rows is called; the content tells the format, the name must agree."""
     with open_file(path, MOST_BYTES, "a log") as file:
-        start = file.read(4)
-    kind = MAGIC.get(start, "CSV")
-    named = SUFFIXES.get(path.suffix.lower(), kind)
+        start = file.read(START_BYTES)
+    kind = MAGIC.get(start[:4]) or text_kind(start) or "CSV"
+    suffix = path.suffix.lower()
+    named = SUFFIXES.get(suffix) or (BUS_SUFFIXES.get(suffix) if dbc and kind == "CSV" else None) or kind
     if kind != named:
         raise LogError(
             f"{path}: is named like {named} and does not start like it; expected a whole {named} file."
         )
+    if kind in KINDS or (kind == "MDF" and dbc):
+        if not dbc:
+            raise needs_dbc(path, kind)
+        from sim2real.logs.bus_file import read_bus  # cantools is an extra
+
+        return "sample", read_bus(path, kind, wanted, dbc)
+    row_word, table = _read_named(path, kind, wanted)
+    if dbc:
+        told = Finding(f"is a {kind} file, whose columns have names: the DBC file is not used.", fatal=False)
+        table = replace(table, findings=(*table.findings, told))
+    return row_word, table
+
+
+def _read_named(path: Path, kind: str, wanted: Wanted) -> tuple[str, Table]:
+    """The columns of a file that names them."""
     if kind == "Parquet":
         from sim2real.logs.parquet_file import read_parquet  # pyarrow is an extra
 

@@ -29,14 +29,14 @@ OPENED = {
         "parse"
     },  # in a process that may die, of a unit that the reader of archives has unpacked
     "sim2real/logs/parquet_file.py": {"ParquetFile", "read_schema"},  # behind the guard
-    "sim2real/logs/mdf_channels.py": {
-        "open",
-        "MDF",
+    "sim2real/logs/extractor.py": {
         "load",
         "fdopen",
         "read_text",
-    },  # in a process that may die
-    "sim2real/logs/mdf_file.py": {"load", "loads"},  # the answer of that process
+    },  # orders, answers and sizes of that process
+    "sim2real/logs/extraction.py": {"load", "loads"},  # the answer of the process that may die
+    "sim2real/logs/mdf_channels.py": {"open", "MDF"},  # in it
+    "sim2real/logs/bus_frames.py": {"open"},  # in it
     "sim2real/logs/formula.py": {"parse"},  # to a syntax tree, of which arithmetic alone is evaluated
     "sim2real/logs/dbc.py": {"load_string"},  # of the text that the guard has read
 }
