@@ -7,8 +7,10 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
 from sim2real.logs.bus_signals import Catalogue, Described, Frames, decoded, merged, ordered
-from sim2real.logs.contract import COLUMNS
+from sim2real.logs.contract import COLUMNS, TIME
 from sim2real.logs.errors import LogError
 from sim2real.logs.extraction import Extract, extract
 from sim2real.logs.mdf_file import extract_mdf
@@ -77,6 +79,8 @@ def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -
         *(each.name for each in catalogue.all if each.kind in seen and each.name not in used),
     ]
     notes = (f"{kind}, {found.told['count']} frames", *_since(found, start_s))
+    if any(finding.fatal for finding in findings):
+        return Table((*names, TIME), {}, {}, np.arange(0), tuple(findings), {}, notes)
     masters = found.told.get("masters", ()) if own else ()
     table = table_of(path, names, masters, own | channels, wanted, notes)
     return replace(table, findings=(*findings, *table.findings))

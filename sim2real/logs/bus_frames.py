@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import os
+import sys
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -13,11 +14,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from can.io.asc import ASCReader
-from can.io.blf import BLFReader
-from can.io.canutils import CanutilsLogReader
-from can.io.trc import TRCReader
-from can.message import Message
+
+_UNUSED = {"asammdf"} - set(sys.modules)
+"""python-can loads it for MDF, which is not read here; it takes a second."""
+sys.modules.update(dict.fromkeys(_UNUSED))  # type: ignore[arg-type]
+
+from can.io.asc import ASCReader  # noqa: E402
+from can.io.blf import BLFReader  # noqa: E402
+from can.io.canutils import CanutilsLogReader  # noqa: E402
+from can.io.trc import TRCReader  # noqa: E402
+from can.message import Message  # noqa: E402
+
+for _name in _UNUSED:
+    del sys.modules[_name]
 
 TEXT = {"ASC": ASCReader, "candump": CanutilsLogReader, "TRC": TRCReader}
 MOST_SEEN = 12

@@ -136,7 +136,7 @@ def ordered(name: str, frames: Frames) -> tuple[Frames, list[Finding]]:
     first_s = time_s[late[0]] if len(late) else repeated[0]
     text = (
         f"message {name}: of {len(time_s)} frames {len(late)} are late and {len(repeated)} repeat a time, the first at "
-        f"{first_s:.6g} s"
+        f"{first_s:.3f} s"
     )
     if len(late) + len(repeated) > MOST_MENDED * len(time_s):
         return frames, [Finding(f"{text}; expected ascending times.")]
@@ -214,6 +214,6 @@ def _values(name: str, signal: Signal, time_s: Array, raw: Array) -> tuple[Array
     ]
     text = (
         f"signal {name}: {np.count_nonzero(lost)} of {len(lost)} samples are lost, the first at "
-        f"{time_s[np.flatnonzero(lost)[0]]:.6g} s: {', '.join(parts)} by the DBC file."
+        f"{time_s[np.flatnonzero(lost)[0]]:.3f} s: {', '.join(parts)} by the DBC file."
     )
     return np.where(lost, np.nan, values), [Finding(text, fatal=False)]
