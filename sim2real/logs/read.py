@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sim2real.logs.bus_kinds import KINDS, text_kind
 from sim2real.logs.checks import check_held, check_motion, check_time, check_values, check_wheels
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.frame_table import frame_sha256, frame_table
+from sim2real.logs.kinds import KINDS, kind_of
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import NO_MAPPING, Mapping
+from sim2real.logs.mat_file import read_mat
 from sim2real.logs.mdf_file import needs_dbc, read_mdf
 from sim2real.logs.resampling import median_step
 from sim2real.logs.table import Finding, Table, Wanted
@@ -33,10 +34,10 @@ MOST_BYTES = 4_000_000_000
 """Larger logs are refused unread [bytes]."""
 LONGEST_FINDING = 600
 """Characters of one sentence about a log."""
-MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF", b"LOGG": "BLF"}
+MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF"}
 """First four bytes of the files that are not text; UnFi is an MDF that its recorder did not close."""
 SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"}
-SUFFIXES |= {".blf": "BLF", ".trc": "TRC"}
+SUFFIXES |= {".blf": "BLF", ".trc": "TRC", ".mat": "MAT"}
 BUS_SUFFIXES = {".asc": "ASC", ".log": "candump"}
 """Names that tables have, too: with a DBC file they must be bus logs."""
 START_BYTES = 4096
@@ -48,7 +49,7 @@ DbcFiles = str | Path | Sequence[str | Path] | None
 
 
 def read_log(path: str | Path, mapping: Mapping | None = None, dbc: DbcFiles = None) -> Log:
-    """Read a log strictly: a table, MDF, or raw frames of a bus, told apart by their content.
+    """Read a log strictly: a table, MDF, a MAT-file, or raw frames of a bus, told apart by their content.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def _read_table(path: Path, wanted: Wanted, dbc: Sequence[str | Path]) -> tuple[
     """The file's columns, and what one of its rows is called; the content tells the format, the name must agree."""
     with open_file(path, MOST_BYTES, "a log") as file:
         start = file.read(START_BYTES)
-    kind = MAGIC.get(start[:4]) or text_kind(start) or "CSV"
+    kind = MAGIC.get(start[:4]) or kind_of(start) or "CSV"
     suffix = path.suffix.lower()
     named = SUFFIXES.get(suffix) or (BUS_SUFFIXES.get(suffix) if dbc and kind == "CSV" else None) or kind
     if kind != named:
@@ -166,6 +167,8 @@ def _read_named(path: Path, kind: str, wanted: Wanted) -> tuple[str, Table]:
         return "row", read_parquet(path, wanted)
     if kind == "MDF":
         return "sample", read_mdf(path, wanted)
+    if kind == "MAT":
+        return "sample", read_mat(path, wanted)
     return "row", read_csv(path, wanted)
 
 

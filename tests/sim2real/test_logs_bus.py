@@ -303,12 +303,13 @@ def outcome(path, short):
     return ""
 
 
+@pytest.mark.parametrize("seeds", [range(5), pytest.param(range(5, 40), marks=pytest.mark.long)])
 @pytest.mark.parametrize("suffix", WRITERS)
-def test_damage_is_a_clean_error_or_a_log(tmp_path, short, monkeypatch, capfd, suffix):
+def test_damage_is_a_clean_error_or_a_log(tmp_path, short, monkeypatch, capfd, suffix, seeds):
     """Files that were cut, have changed bytes, or a stretch twice."""
     monkeypatch.setattr(extraction, "LEAST_LIMIT_S", 15.0)
     raw = short[0][suffix].read_bytes()
-    for seed in range(5):
+    for seed in seeds:
         (tmp_path / f"log{suffix}").write_bytes(damaged(raw, np.random.default_rng(seed)))
         assert "within 15 s" not in outcome(tmp_path / f"log{suffix}", short)
     assert capfd.readouterr().err == ""
