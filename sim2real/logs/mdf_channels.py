@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from io import BufferedReader, BytesIO
 from pathlib import Path
 from types import ModuleType
@@ -64,6 +64,8 @@ FRAME = "CAN_DataFrame"
 """Name of a channel that holds raw frames, after the standard for bus logging; its parts are NAME.ID and so on."""
 EXTENDED, ID_BITS = 1 << 31, (1 << 29) - 1
 """Bit of an ID that says that it has 29 bits, and those bits."""
+CHUNK = 100_000
+"""Raw frames that are looked at together; each takes about 100 bytes."""
 MOST_SEEN = 12
 """IDs that an error lists."""
 
@@ -119,50 +121,60 @@ def _frames(
     mdf: MDF, kept: Collection[tuple[int, bool]], most_numbers: int, arrays: dict[str, Any]
 ) -> dict[str, Any]:
     """The frames with these IDs, as `bus_frames` tells of them."""
-    frames: list[dict[str, Any]] = []
+    found: dict[tuple[int, ...], list[tuple[Any, Any, Any]]] = {}
     seen: Counter[tuple[int, bool]] = Counter()
-    first_s: list[float] = []
-    groups: list[Any] = list(mdf.groups)
-    for g, group in enumerate(groups):
-        parts = {str(channel.name): i for i, channel in enumerate(group.channels)}
-        if FRAME not in parts or not group.channel_group.cycles_nr:
-            continue
-        if group.channel_group.cycles_nr > most_numbers:
-            raise ValueError(f"{group.channel_group.cycles_nr} frames; expected at most {most_numbers}")
-
-        def part(name: str, g: int = g, parts: dict[str, int] = parts) -> Any:
-            i = parts.get(f"{FRAME}.{name}")
-            return None if i is None else mdf.get(group=g, index=i, raw=True)
-
-        numbers, payload = part("ID"), part("DataBytes")
-        if numbers is None or payload is None:
-            raise ValueError(f"raw frames in group {g} without {FRAME}.ID or {FRAME}.DataBytes")
-        ids = numbers.samples.astype(np.int64)
-        ide, channel, length = (part(name) for name in ("IDE", "BusChannel", "DataLength"))
-        extended = (ids & EXTENDED != 0) if ide is None else ide.samples.astype(bool)
-        ids &= ID_BITS
-        data = _as_bytes(payload.samples)
-        full = np.full(len(ids), data.shape[1])
-        lengths = full if length is None else np.minimum(length.samples.astype(np.int64), full)
-        channels = np.zeros(len(ids), np.int64) if channel is None else channel.samples.astype(np.int64)
-        first_s.append(float(numbers.timestamps.min()))
-        keys, which = np.unique(np.column_stack((ids, extended, channels)), axis=0, return_inverse=True)
-        for k, (number, long, bus) in enumerate(keys.tolist()):
+    first_s = np.inf
+    for time_s, kinds, lengths, data in _chunks(mdf, most_numbers):
+        first_s = min(first_s, float(time_s.min()))
+        keys, which = np.unique(kinds, axis=0, return_inverse=True)
+        for k, key in enumerate(keys.tolist()):
             rows = np.flatnonzero(which.ravel() == k)
-            seen[number, bool(long)] += len(rows)
-            if (number, bool(long)) not in kept:
-                continue
-            key = f"{g}_{k}"
-            arrays[f"time_{key}"] = numbers.timestamps[rows]
-            arrays[f"length_{key}"] = lengths[rows].astype(np.uint8)
-            arrays[f"data_{key}"] = data[rows][np.arange(data.shape[1]) < lengths[rows, None]]
-            frames.append({"id": number, "extended": bool(long), "channel": str(bus), "key": key})
+            kind = (key[0], bool(key[1]))
+            seen[kind] += len(rows)
+            if kind in kept:
+                there = np.arange(data.shape[1]) < lengths[rows, None]
+                part = time_s[rows], lengths[rows].astype(np.uint8), data[rows][there]
+                found.setdefault(tuple(key), []).append(part)
+    for k, parts in enumerate(found.values()):
+        for name, content in zip(("time", "length", "data"), zip(*parts, strict=True), strict=True):
+            arrays[f"{name}_f{k}"] = np.concatenate(content)
     return {
-        "frames": frames,
+        "frames": [
+            {"id": number, "extended": bool(extended), "channel": str(channel), "key": f"f{k}"}
+            for k, (number, extended, channel, _) in enumerate(found)
+        ],
         "seen": [[*key, n] for key, n in seen.most_common(MOST_SEEN)],
         "count": seen.total(),
-        "first_s": min(first_s, default=0.0),
+        "first_s": first_s if seen else 0.0,
     }
+
+
+def _chunks(mdf: MDF, most_numbers: int) -> Iterator[tuple[Any, Any, Any, Any]]:
+    """Of CHUNK raw frames at a time: times [s]; ID, is extended, channel, group; lengths; bytes, (frames, longest)."""
+    for g, group in enumerate(list[Any](mdf.groups)):
+        parts = {str(channel.name): i for i, channel in enumerate(group.channels)}
+        count = group.channel_group.cycles_nr
+        if FRAME not in parts or not count:
+            continue
+        if count > most_numbers:
+            raise ValueError(f"{count} frames; expected at most {most_numbers}")
+        missing = [name for name in ("ID", "DataBytes") if f"{FRAME}.{name}" not in parts]
+        if missing:
+            raise ValueError(f"raw frames in group {g} without {FRAME}.{missing[0]}")
+        for offset in range(0, count, CHUNK):
+            there = {
+                name: mdf.get(group=g, index=parts[full], raw=True, record_offset=offset, record_count=CHUNK)
+                for name in ("ID", "IDE", "BusChannel", "DataLength", "DataBytes")
+                if (full := f"{FRAME}.{name}") in parts
+            }
+            ids = there["ID"].samples.astype(np.int64)
+            data = _as_bytes(there["DataBytes"].samples)
+            none, full_length = np.zeros(len(ids), np.int64), np.full(len(ids), data.shape[1])
+            extended = there["IDE"].samples.astype(bool) if "IDE" in there else ids & EXTENDED != 0
+            channel = there["BusChannel"].samples.astype(np.int64) if "BusChannel" in there else none
+            lengths = there["DataLength"].samples.astype(np.int64) if "DataLength" in there else full_length
+            kinds = np.column_stack((ids & ID_BITS, extended, channel, none + g))
+            yield there["ID"].timestamps, kinds, np.minimum(lengths, full_length), data
 
 
 def _as_bytes(samples: Any) -> Any:

@@ -6,12 +6,13 @@ import time
 import can
 import numpy as np
 import pytest
+from asammdf import MDF, Signal
 from bus_maker import DBC, MAPPING, NONE, QUANTUM, WRITERS, described, frames_of, write
 from log_maker import make_frame
 from typer.testing import CliRunner
 
 import trpac
-from sim2real.logs import LogError, bus_file, bus_frames, extraction, load_mapping, read_log
+from sim2real.logs import LogError, bus_file, bus_frames, extraction, load_mapping, read_log, write_log
 from sim2real.logs.bus_signals import Catalogue, Frames, decoded
 from trpac_cli.main import app
 
@@ -237,6 +238,29 @@ def test_two_dbc_files(tmp_path, frame, mapping):
     (tmp_path / "b.dbc").write_text(head + tail[:values] + "SIG_VALTYPE_ 258 Speed : 1;\n")
     path = write(tmp_path / "log.blf", frames_of(frame))
     assert_same(read_log(path, mapping, [tmp_path / "a.dbc", tmp_path / "b.dbc"]), frame)
+
+
+def test_a_dbc_file_in_cp1252(tmp_path, frame, mapping):
+    """The format's first tools write no UTF-8."""
+    path = write(tmp_path / "log.blf", frames_of(frame))
+    (tmp_path / "car.dbc").write_bytes((DBC + 'CM_ "Räder, °C";\n').encode("cp1252"))
+    assert_same(read_log(path, mapping, tmp_path / "car.dbc"), frame)
+
+
+def test_an_mdf_with_frames_and_other_channels(tmp_path, frame, mapping):
+    path = write(tmp_path / "log.mf4", frames_of(frame, time.time() + 1.0, drop=["Motion"]))
+    with MDF(path) as mdf:
+        time_s = mdf.get("CAN_DataFrame.ID").timestamps[::3]
+        named = {"Motion.Speed": "vehicle_speed_m_s", "Ax": "accel_x_m_s2", "Position": "position_m"}
+        mdf.append([Signal(frame[name].to_numpy(), time_s, name=column) for column, name in named.items()])
+        mdf.save(tmp_path / "both.mf4")
+    assert_same(read_log(tmp_path / "both.mf4", mapping, described(tmp_path)), frame)
+
+
+def test_an_mdf_without_frames_beside_a_dbc_file(tmp_path, frame):
+    write_log(frame, tmp_path / "log.mf4")
+    log = read_log(tmp_path / "log.mf4", dbc=described(tmp_path))
+    assert "holds no raw frames of a bus: the DBC file is not used." in log.warnings
 
 
 def test_a_dbc_file_beside_a_table_is_not_used(tmp_path, frame):
