@@ -22,7 +22,7 @@ EPOCH_S = 631_152_000.0
 PARTS = ("CAN_DataFrame", "CAN_ErrorFrame", "CAN_RemoteFrame")
 """How channels of an MDF begin that hold raw frames and their parts."""
 LISTED = 8
-"""Messages that an error lists."""
+"""Messages, signals or IDs that an error lists."""
 
 
 def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -> Table:
@@ -60,7 +60,7 @@ def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -
         found = extract(path, "bus_frames", kind, f"expected a whole {kind} log", form=kind, frames=ids)
     own = found.channels()
     meant = {name: each for name, each in meant.items() if name not in own}
-    if not meant or (not own and not found.told["frames"]):
+    if not own and not found.told["frames"]:
         raise _none_of_them(path, catalogue, meant, found)
     start_s = _start(found)
     channels, findings = _channels(meant, found, start_s)
@@ -159,9 +159,7 @@ def _optional(name: str) -> bool:
 def _none_of_them(
     path: Path, catalogue: Catalogue, meant: dict[str, tuple[Described, str]], found: Extract
 ) -> LogError:
-    seen = (
-        ", ".join(f"{_hex(int(i), bool(x))} ({n} times)" for i, x, n in found.told.get("seen", ())) or "none"
-    )
+    seen = _listed(f"{_hex(int(i), bool(x))} ({n} times)" for i, x, n in found.told["seen"]) or "none"
     if not meant:
         known = _listed(each.name for each in catalogue.all)
         return LogError(

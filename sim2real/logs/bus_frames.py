@@ -29,8 +29,8 @@ for _name in _UNUSED:
     del sys.modules[_name]
 
 TEXT = {"ASC": ASCReader, "candump": CanutilsLogReader, "TRC": TRCReader}
-MOST_SEEN = 12
-"""IDs that an error lists."""
+MOST_SEEN = 5_000
+"""IDs that are told, those with the most frames."""
 LONGEST_LINE = 10_000
 """Bytes of a line of text; one frame of 64 bytes takes 300."""
 LONGEST_FRAME = 64

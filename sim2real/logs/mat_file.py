@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -74,15 +75,7 @@ def read_mat(path: Path, wanted: Wanted) -> Table:
         return Table((*names, TIME), {}, {}, np.arange(0), tuple(findings))
     channels = {name: _channel(found, said) for name, said in told.items()}
     table = table_of(path, names, found.told["masters"], channels, wanted)
-    return Table(
-        table.names,
-        table.numbers,
-        table.text,
-        table.rows,
-        (*findings, *table.findings),
-        table.units,
-        table.notes,
-    )
+    return replace(table, findings=(*findings, *table.findings))
 
 
 def _as_columns(

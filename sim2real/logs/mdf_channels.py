@@ -66,8 +66,8 @@ EXTENDED, ID_BITS = 1 << 31, (1 << 29) - 1
 """Bit of an ID that says that it has 29 bits, and those bits."""
 CHUNK = 100_000
 """Raw frames that are looked at together; each takes about 100 bytes."""
-MOST_SEEN = 12
-"""IDs that an error lists."""
+MOST_SEEN = 5_000
+"""IDs that are told, those with the most frames."""
 
 
 def extract(order: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -86,7 +86,7 @@ def extract(order: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     with _open(Path(order["path"])) as stream, MDF(stream) as mdf:
         told = _channels(mdf, frozenset(order["wanted"]), order["most_numbers"], arrays)
         told["bus"] = any(channel.name == FRAME for group in mdf.groups for channel in group.channels)
-        if told["bus"] and order.get("frames"):
+        if told["bus"] and order.get("frames") is not None:
             kept = {(int(i), bool(x)) for i, x in order["frames"]}
             told |= _frames(mdf, kept, order["most_numbers"], arrays)
         told["epoch_s"] = mdf.header.start_time.timestamp()

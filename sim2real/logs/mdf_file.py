@@ -24,7 +24,7 @@ def read_mdf(path: Path, wanted: Wanted) -> Table:
     return table_of(path, found.told["names"], found.told["masters"], channels, wanted)
 
 
-def extract_mdf(path: Path, wanted: Wanted, frames: tuple[tuple[int, bool], ...] = ()) -> Extract:
+def extract_mdf(path: Path, wanted: Wanted, frames: tuple[tuple[int, bool], ...] | None = None) -> Extract:
     """The wanted channels, and the raw frames with these (ID, is extended); raises LogError."""
     names = sorted(wanted.numbers | wanted.text)
     return extract(path, "mdf_channels", "MDF", EXPECTED, wanted=names, frames=frames)

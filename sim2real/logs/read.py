@@ -36,8 +36,11 @@ LONGEST_FINDING = 600
 """Characters of one sentence about a log."""
 MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF"}
 """First four bytes of the files that are not text; UnFi is an MDF that its recorder did not close."""
-SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"}
-SUFFIXES |= {".blf": "BLF", ".trc": "TRC", ".mat": "MAT"}
+SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"} | {
+    ".blf": "BLF",
+    ".trc": "TRC",
+    ".mat": "MAT",
+}
 BUS_SUFFIXES = {".asc": "ASC", ".log": "candump"}
 """Names that tables have, too: with a DBC file they must be bus logs."""
 START_BYTES = 4096

@@ -1,7 +1,9 @@
 """Reading raw logs of a bus with a DBC file: every format, what signals may be, and files that are damaged."""
 
 import json
+import struct
 import time
+import zlib
 
 import can
 import numpy as np
@@ -12,8 +14,10 @@ from log_maker import make_frame
 from typer.testing import CliRunner
 
 import trpac
+from scenarios.library import located
 from sim2real.logs import LogError, bus_file, bus_frames, extraction, load_mapping, read_log, write_log
 from sim2real.logs.bus_signals import Catalogue, Frames, decoded
+from sim2real.sources import read_source
 from trpac_cli.main import app
 
 HALF = 0.5 + 1e-6
@@ -254,7 +258,13 @@ def test_an_mdf_with_frames_and_other_channels(tmp_path, frame, mapping):
         named = {"Motion.Speed": "vehicle_speed_m_s", "Ax": "accel_x_m_s2", "Position": "position_m"}
         mdf.append([Signal(frame[name].to_numpy(), time_s, name=column) for column, name in named.items()])
         mdf.save(tmp_path / "both.mf4")
-    assert_same(read_log(tmp_path / "both.mf4", mapping, described(tmp_path)), frame)
+    dbc = described(tmp_path)
+    assert_same(read_log(tmp_path / "both.mf4", mapping, dbc), frame)
+    with MDF(path) as mdf:
+        mdf.append([Signal(frame[name].to_numpy(), time_s, name=name) for name in frame.columns[1:]])
+        mdf.save(tmp_path / "all.mf4")
+    log = read_log(tmp_path / "all.mf4", dbc=dbc)
+    assert np.array_equal(log.signals["position_m"], frame["position_m"])
 
 
 def test_an_mdf_without_frames_beside_a_dbc_file(tmp_path, frame):
@@ -393,9 +403,6 @@ def damaged(raw, rng):
 
 def test_a_length_of_nothing_does_not_hold_the_reader_up(tmp_path, short):
     """python-can would read one object of BLF without end."""
-    import struct
-    import zlib
-
     _, dbc, mapping = short
     head = struct.pack("<4sLBBBBBBBBQQLL16H", b"LOGG", 144, 5, 0, 0, 0, 2, 6, 8, 1, 0, 0, 0, 0, *[0] * 16)
     for version in (1, 9):
@@ -407,6 +414,28 @@ def test_a_length_of_nothing_does_not_hold_the_reader_up(tmp_path, short):
         with pytest.raises(LogError, match="cannot be read as BLF"):
             read_log(tmp_path / "log.blf", mapping, dbc)
         assert time.monotonic() - begin < 10.0
+
+
+def test_what_unfolds_is_refused(tmp_path, short, mapping):
+    """A container of BLF that unpacks to 600 MB, and a text of one endless line."""
+    head = struct.pack("<4sLBBBBBBBBQQLL16H", b"LOGG", 144, 5, 0, 0, 0, 2, 6, 8, 1, 0, 0, 0, 0, *[0] * 16)
+    packer = zlib.compressobj(1)
+    packed = b"".join(packer.compress(bytes(10_000_000)) for _ in range(60)) + packer.flush()
+    box = struct.pack("<4sHHLLHxxxxxxLxxxx", b"LOBJ", 16, 1, 32 + len(packed), 10, 2, 0) + packed
+    (tmp_path / "log.blf").write_bytes(head.ljust(144, b"\0") + box)
+    with pytest.raises(LogError, match=r"cannot be read as BLF \(MemoryError\)"):
+        read_log(tmp_path / "log.blf", mapping, short[1])
+    (tmp_path / "log.log").write_bytes(b"(1.0) can0 100#" + b"0" * 10_000_000)
+    with pytest.raises(LogError, match=r"cannot be read as candump .*row 1 is longer than 10000 bytes"):
+        read_log(tmp_path / "log.log", mapping, short[1])
+
+
+def test_a_diagnosis_reads_them_with_its_road(tmp_path, frame, mapping):
+    path = write(tmp_path / "log.blf", frames_of(frame))
+    source = read_source(
+        f"{path}@{located('road', 'paper_simulation')}", None, mapping, [described(tmp_path)]
+    )
+    assert_same(source.log, frame)
 
 
 def test_the_front_door_and_the_command_take_a_dbc_file(tmp_path, frame):
