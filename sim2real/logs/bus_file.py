@@ -67,7 +67,11 @@ def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -
     if found.told.get("cut"):
         findings.append(Finding("ends within a frame: it was cut off; look at its end.", fatal=False))
     if found.told.get("odd"):
-        findings.append(Finding(f"{found.told['odd']} frames or rows are damaged and left out.", fatal=False))
+        findings.append(
+            Finding(
+                f"{found.told['odd']} frames, rows or objects cannot be read and are left out.", fatal=False
+            )
+        )
     absent = {name for name, (each, _) in meant.items() if name not in channels and not _optional(name)}
     used = {each.name for each, _ in meant.values()}
     others = [n for n in found.told.get("names", ()) if not n.startswith(PARTS)]

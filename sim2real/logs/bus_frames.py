@@ -35,8 +35,10 @@ LONGEST_LINE = 10_000
 """Bytes of a line of text; one frame of 64 bytes takes 300."""
 LONGEST_FRAME = 64
 """Bytes of a frame of CAN FD."""
+MOST_COMPLAINTS = 300_000
+"""Warnings of python-can; more come from a damaged length that makes the reader stay where it is."""
 MOST_AT_ONCE = 10_000
-"""Frames of one time; more come from a damaged length that makes the reader stay where it is."""
+"""Frames of one time; likewise."""
 
 
 class Lines:
@@ -68,18 +70,23 @@ class Lines:
 
 
 class Complaints(logging.Handler):
-    """What python-can logs as a warning and goes on: counted, or raised as ValueError."""
+    """Counts what python-can logs as a warning before it goes on; raises ValueError where it does not come on."""
 
-    def __init__(self, fatal: bool) -> None:
+    def __init__(self) -> None:
         super().__init__(logging.WARNING)
         self.count = 0
-        self._fatal = fatal
+
+    def __enter__(self) -> Complaints:
         logging.getLogger("can").addHandler(self)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        logging.getLogger("can").removeHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Take note of one."""
         self.count += 1
-        if self._fatal:
+        if self.count > MOST_COMPLAINTS:
             raise ValueError(record.getMessage())
 
 
@@ -95,8 +102,7 @@ def extract(order: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     ValueError
         The text of a row cannot be read, or there are more frames.
     """
-    complaints = Complaints(fatal=order["form"] == "BLF")
-    with Path(order["path"]).open("rb") as file:
+    with Complaints() as complaints, Path(order["path"]).open("rb") as file:
         if order["form"] == "BLF":
             blf = BLFReader(file)
             epoch_s, blf.start_timestamp = (
@@ -106,7 +112,8 @@ def extract(order: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
             found = Collected(order["frames"], order["most_numbers"], first_channel=1)
             size = os.fstat(file.fileno()).st_size
             found.take(blf)
-            return found.told(epoch_s=epoch_s, cut=blf.file_size > size), found.arrays()
+            told = found.told(epoch_s, blf.file_size > size, complaints.count)
+            return told, found.arrays()
         lines = Lines(file)
         reader: Any = TEXT[order["form"]](lines)
         found = Collected(order["frames"], order["most_numbers"], first_channel=int(order["form"] == "ASC"))
@@ -116,8 +123,7 @@ def extract(order: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
             raise ValueError(f"row {lines.row}: {type(error).__name__}: {error}") from error
         if getattr(reader, "timestamps_format", None) == "relative":
             raise ValueError("its times are relative to the frame before; expected absolute ones")
-        told = found.told(epoch_s=0.0, cut=lines.cut)
-        return told | {"odd": told["odd"] + complaints.count}, found.arrays()
+        return found.told(0.0, lines.cut, complaints.count), found.arrays()
 
 
 class Collected:
@@ -164,8 +170,12 @@ class Collected:
             lengths.append(len(data))
             payload += data
 
-    def told(self, epoch_s: float, cut: bool) -> dict[str, Any]:
-        """What JSON says of them; `epoch_s` is the time that theirs count from, 0 where they count from 1970."""
+    def told(self, epoch_s: float, cut: bool, unread: int) -> dict[str, Any]:
+        """What JSON says of them.
+
+        `epoch_s` is the time that theirs count from, 0 where they count from 1970; `cut` says that the file ends early,
+        `unread` how many of its rows or objects python-can left out.
+        """
         return {
             "frames": [
                 {"id": number, "extended": extended, "channel": self._named(channel), "key": str(k)}
@@ -175,7 +185,7 @@ class Collected:
             "count": self._seen.total(),
             "first_s": self._first_s if self._seen else 0.0,
             "epoch_s": epoch_s,
-            "odd": self._odd,
+            "odd": self._odd + unread,
             "cut": cut,
         }
 

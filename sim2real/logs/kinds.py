@@ -12,7 +12,7 @@ _HDF5, _MAT_4 = b"\x89HDF\r\n\x1a\n", b"\0\0\0\0"
 """How HDF5 begins, and a MAT-file of version 4 with a matrix of doubles."""
 
 _CANDUMP = re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]{3,8}#")
-_TRC = re.compile(rb"\s*;[^\n]*(\$FILEVERSION|PEAK|PCAN|\.trc)", re.IGNORECASE)
+_TRC = re.compile(rb"(?:[ \t]*;[^\n]*\n)*?[ \t]*;[^\n]*(\$FILEVERSION|PEAK|PCAN|\.trc)", re.IGNORECASE)
 _ASC = re.compile(
     rb"(\s*//[^\n]*\n)*\s*(date\s+\w+\s[^\n,;]*\d:\d\d[^\n,;]*\n|base\s+(hex|dec)\b|begin\s+triggerblock\b)",
     re.IGNORECASE,

@@ -297,6 +297,22 @@ def test_names_and_contents(tmp_path, frame, mapping):
         read_log(tmp_path / "other.blf", mapping, dbc)
 
 
+def test_trc_of_version_1(tmp_path, frame, mapping):
+    """It has no CAN FD; times are whole milliseconds."""
+    with can.TRCWriter(tmp_path / "log.trc") as writer:
+        writer.file_version = can.io.trc.TRCFileVersion.V1_0
+        for message in frames_of(frame, drop=["Motion"]):
+            writer.on_message_received(message)
+    unmeasured = {
+        "vehicle_speed_m_s": "{sum: [{column: wheel_speed_fl_rad_s, scale: 0.29}]}",
+        "accel_x_m_s2": "{constant: 0.1}",
+        "position_m": "{integrate: {copy: vehicle_speed_m_s}}",
+    }
+    log = read_log(tmp_path / "log.trc", mapped(tmp_path, **unmeasured), described(tmp_path))
+    assert log.time_s == pytest.approx(frame["time_s"], abs=1e-9)
+    assert log.signals["wheel_torque_rr_nm"] == pytest.approx(frame["wheel_torque_rr_nm"], abs=HALF * 0.125)
+
+
 def test_times_relative_to_the_frame_before_are_refused(tmp_path, frame, mapping):
     path = write(tmp_path / "log.asc", frames_of(frame))
     path.write_text(path.read_text().replace("timestamps absolute", "timestamps relative"))
