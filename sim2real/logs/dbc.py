@@ -10,7 +10,7 @@ import cantools
 from cantools.database.can import Database, Signal
 
 from sim2real.logs.errors import LogError
-from trpac_core.files import FileError, quoted, read_text
+from trpac_core.files import FileError, quoted, read_bytes
 
 MOST_BYTES = 16_000_000
 """Largest DBC file that is read [bytes]; files of a whole car have some megabytes."""
@@ -47,13 +47,21 @@ _NO_VALUE = re.compile(
 def load_dbc(path: str | Path) -> Database:
     """The database of a DBC file; raises LogError where it is missing, damaged or too large."""
     try:
-        text = read_text(path, MOST_BYTES, "a DBC file")
+        text = _text(read_bytes(path, MOST_BYTES, "a DBC file"))
         _require_sizes(text)
         return cantools.database.load_string(text, "dbc")  # type: ignore[return-value]
     except FileError as error:
         raise LogError(str(error)) from error
     except DAMAGE as error:
         raise LogError(f"{quoted(path)}: cannot be read as DBC file ({quoted(error)}).") from error
+
+
+def _text(data: bytes) -> str:
+    """UTF-8, or the encoding that the format's first tools write: cp1252."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
 
 
 def no_value(signal: Signal) -> frozenset[float]:
