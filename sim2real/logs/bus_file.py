@@ -17,6 +17,8 @@ from sim2real.logs.mdf_file import extract_mdf
 from sim2real.logs.rasters import Channel, table_of
 from sim2real.logs.table import Finding, Table, Wanted
 
+TIME_DIGITS = 6
+"""Decimals of a time since 1970 [s]: a float64 holds 0.2 us of it."""
 EPOCH_S = 631_152_000.0
 """From here on, which is 1990, a time counts from 1970 rather than from the log's begin [s]."""
 PARTS = ("CAN_DataFrame", "CAN_ErrorFrame", "CAN_RemoteFrame")
@@ -114,7 +116,8 @@ def _channels(
                 )
             )
             continue
-        frames, mended = ordered(message, replace(chosen[0], time_s=chosen[0].time_s - start_s))
+        times = np.round(chosen[0].time_s - start_s, TIME_DIGITS) if start_s else chosen[0].time_s
+        frames, mended = ordered(message, replace(chosen[0], time_s=times))
         signals = {each.signal.name: each.signal for _, each in members}
         values, told = decoded(members[0][1].message, frames, list(signals.values()))
         findings += [*mended, *told]

@@ -304,7 +304,7 @@ def test_trc_of_version_1(tmp_path, frame, mapping):
         for message in frames_of(frame, drop=["Motion"]):
             writer.on_message_received(message)
     unmeasured = {
-        "vehicle_speed_m_s": "{sum: [{column: wheel_speed_fl_rad_s, scale: 0.29}]}",
+        "vehicle_speed_m_s": "{column: wheel_speed_fl_rad_s, unit: m/s, scale: 0.29}",
         "accel_x_m_s2": "{constant: 0.1}",
         "position_m": "{integrate: {copy: vehicle_speed_m_s}}",
     }

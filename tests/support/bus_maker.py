@@ -100,9 +100,11 @@ def frames_of(frame, start_s=1.7e9, channel=1, drop=()) -> list[can.Message]:
     return made
 
 
-def write(path: Path, messages: list[can.Message]) -> Path:
-    """The frames as a log of the format that the path's suffix names."""
+def write(path: Path, messages: list[can.Message], from_0: bool = False) -> Path:
+    """The frames as a log of the format that the path's suffix names; an MDF may count their times from 0."""
     with WRITERS[path.suffix](str(path)) as writer:
+        if from_0 and path.suffix == ".mf4":
+            writer.last_timestamp = writer._start_time = 0.0
         for message in messages:
             if path.suffix == ".trc" and message.is_fd:
                 _write_fd(writer, message)
