@@ -8,7 +8,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from fmu_src.doctor import State, UnusableError, examine_file
 from fmu_src.units import ROOT
 from scenarios.library import networks_folder
 
+from .forked import forked_readers
 from .mutations import BINARY, TEXT, Rng, damaged
 
 LONGEST_ERROR = 20_000
@@ -407,7 +408,10 @@ def workplace(kind: Kind) -> Iterator[tuple[Path, bytes, Any]]:
 def damaged_files(name: str, seed: int, numbers: range) -> Iterator[tuple[int, str | None]]:
     """Number and finding of each damaged file; the file of a number depends on the seed alone."""
     kind = KINDS[name]
-    with workplace(kind) as (path, good, right):
+    with (
+        forked_readers() if name.startswith("log_") else nullcontext(),
+        workplace(kind) as (path, good, right),
+    ):
         for number in numbers:
             yield number, None
             path.write_bytes(damaged(kind.ways, good, np.random.default_rng([seed, number])))
