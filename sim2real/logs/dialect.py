@@ -210,11 +210,11 @@ def _rows(
     above = max(stated.header_row or 0, stated.unit_row or 0)
     full = (i for i in filled if i >= above and len(rows[i]) == width and counts[i] >= least)
     first = next(full, len(rows))
+    if above > len(rows):
+        raise LogError(
+            f"{quoted(path)}: has {len(rows)} rows in its head; the mapping's format has row {above}."
+        )
     if stated.header_row is not None:
-        if stated.header_row > len(rows):
-            raise LogError(
-                f"{quoted(path)}: has no row {stated.header_row} in its head, where format has header_row."
-            )
         headers = [stated.header_row - 1]
     else:
         headers = [i for i in range(first) if rows[i] and (not width or len(rows[i]) in (width, width - 1))]

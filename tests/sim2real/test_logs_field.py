@@ -140,6 +140,11 @@ class TestUnitRows:
         text = "Recorder 7\nBy: NN\n" + self.rows(wide, UNITS | {"U": "V", "T": "°C", "p": "bar"})
         assert_same(read(text, MAP), frame)
 
+    @pytest.mark.parametrize("key", ["header_row", "unit_row"])
+    def test_stated_where_there_is_no_row(self, read, german, key):
+        with pytest.raises(LogError, match="has 304 rows in its head; the mapping's format has row 9000"):
+            read(self.rows(german, UNITS) + "\n", MAP + f"format: {{{key}: 9000}}\n")
+
     def test_stated_to_be_none(self, read, german):
         with pytest.raises(LogError, match=r"row 2 \('s'\) is not a number"):
             read(self.rows(german, UNITS), MAP + "format: {unit_row: 0}\n")
