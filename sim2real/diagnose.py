@@ -313,7 +313,7 @@ def _provenance(sources: Sources) -> dict[str, object]:
 
 
 def _origin(source: Source) -> dict[str, object]:
-    log = {"path": str(source.log.path), "sha256": source.log.sha256}
+    log = {"path": str(source.log.path), "sha256": source.log.sha256, "read_as": source.log.read_as}
     origin = {**log, "road": _file(source.road_path), "rate_hz": source.log.rate_hz}
     if source.reference is None:
         return origin

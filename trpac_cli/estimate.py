@@ -87,6 +87,7 @@ def estimate(
         refuse(COMMAND, error)
     console, summary = Terminal(), done.summary
     console.print(done.verdict)
+    console.print(f"{summary['log']['name']} read as: {summary['log']['read_as']}.")
     if summary["errors"] is not None:
         console.print(_error_table(summary["errors"]))
     for warning in summary["warnings"]:

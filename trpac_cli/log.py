@@ -70,6 +70,7 @@ def check(
     from sim2real.logs.mapping import load_mapping
     from sim2real.logs.proposal import candidates, proposed_mapping
     from sim2real.logs.read import understood
+    from sim2real.logs.table import read_as
     from sim2real.logs.write import write_log
     from trpac_core.errors import TrpacError
     from trpac_core.files import file_sha256
@@ -89,9 +90,7 @@ def check(
     except (TrpacError, OSError) as error:
         refuse(COMMAND, error)
     console = Terminal()
-    console.print(
-        f"{log.name}: {len(found.time_s)} rows, read as: {'; '.join(found.table.notes) or 'the plain form'}"
-    )
+    console.print(f"{log.name}: {len(found.time_s)} rows, read as: {read_as(found.table.notes)}")
     _show(console, found)
     for text in found.problems:
         console.print(text, style="red")

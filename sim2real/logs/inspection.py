@@ -15,7 +15,7 @@ from sim2real.logs.contract import COLUMNS, POSITION, REQUIRED, TIME, WHEEL_SPEE
 from sim2real.logs.mapping import Spec
 from sim2real.logs.read import Understood
 from sim2real.logs.resampling import median_step
-from sim2real.logs.table import Array
+from sim2real.logs.table import Array, read_as
 from trpac_core.vehicle import WHEELS
 
 if TYPE_CHECKING:
@@ -99,9 +99,7 @@ def draw(log: Understood, path: Path) -> None:
     _curves(panels[2], log, {f"wheel_torque_{w}_nm": w for w in WHEELS}, "wheel torque [N m]")
     _curves(panels[3], log, {"accel_x_m_s2": "a_x", "accel_y_m_s2": "a_y"}, "acceleration [m/s²]")
     panels[-1].set_xlabel("time [s]")
-    panels[0].set_title(
-        f"{log.path.name}: {'; '.join(log.table.notes) or 'in the plain form'}", fontsize=10, loc="left"
-    )
+    panels[0].set_title(f"{log.path.name}: {read_as(log.table.notes)}", fontsize=10, loc="left")
     picture = BytesIO()
     figure.savefig(picture, format="png", dpi=110)
     write_whole(path, picture.getvalue())

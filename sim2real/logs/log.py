@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sim2real.logs.contract import COLUMNS, IMAGE_PATH, TIME
 from sim2real.logs.errors import LogError
+from sim2real.logs.table import read_as
 
 Array = NDArray[np.float64]
 
@@ -58,6 +59,11 @@ class Log:
     warnings: tuple[str, ...]
     sha256: str
     notes: tuple[str, ...] = ()
+
+    @property
+    def read_as(self) -> str:
+        """How the file was understood, in one line."""
+        return read_as(self.notes)
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -183,6 +183,11 @@ def labels_of(cells: Sequence[str]) -> Text:
     return np.array(cells, dtype=np.str_)
 
 
+def read_as(notes: Sequence[str]) -> str:
+    """How a file was understood, in one line."""
+    return "; ".join(notes) or "the plain form"
+
+
 def and_more(count: int) -> str:
     """A closing bracket for a list that was cut after SHOWN entries."""
     return f" (and {count - SHOWN} more)" if count > SHOWN else ""

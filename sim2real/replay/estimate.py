@@ -74,6 +74,7 @@ def estimate_log(
             "sha256": read.sha256,
             "rate_hz": read.rate_hz,
             "rows": len(read),
+            "read_as": read.read_as,
         },
         "vehicle": {
             "name": car.name,
