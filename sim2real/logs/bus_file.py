@@ -60,10 +60,15 @@ def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -
             return replace(table, findings=(*table.findings, told))
     else:
         found = extract(path, "bus_frames", kind, f"expected a whole {kind} log", form=kind, frames=ids)
+    units = {each.name: str(each.signal.unit) for each in catalogue.all if each.signal.unit}
+    seen = {(int(i), bool(x)) for i, x, _ in found.told["seen"]}
+    if not meant and not found.told.get("channels"):
+        there = tuple(each.name for each in catalogue.all if each.kind in seen)
+        return Table((TIME, *there), {}, {}, np.arange(0), (_no_name(catalogue),), units)
     own = found.channels()
     meant = {name: each for name, each in meant.items() if name not in own}
     if not own and not found.told["frames"]:
-        raise _none_of_them(path, catalogue, meant, found)
+        raise _none_of_them(path, meant, found)
     start_s = _start(found)
     channels, findings = _channels(meant, found, start_s)
     if found.told.get("cut"):
@@ -77,7 +82,6 @@ def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -
     absent = {name for name, (each, _) in meant.items() if name not in channels and not _optional(name)}
     used = {each.name for each, _ in meant.values()}
     others = [n for n in found.told.get("names", ()) if not n.startswith(PARTS)]
-    seen = {(int(i), bool(x)) for i, x, _ in found.told["seen"]}
     names = [
         *channels,
         *absent,
@@ -89,7 +93,7 @@ def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -
         return Table((*names, TIME), {}, {}, np.arange(0), tuple(findings), {}, notes)
     masters = found.told.get("masters", ()) if own else ()
     table = table_of(path, names, masters, own | channels, wanted, notes)
-    return replace(table, findings=(*findings, *table.findings))
+    return replace(table, findings=(*findings, *table.findings), units=units | table.units)
 
 
 def _channels(
@@ -163,17 +167,16 @@ def _optional(name: str) -> bool:
     return name in COLUMNS and not COLUMNS[name].required
 
 
-def _none_of_them(
-    path: Path, catalogue: Catalogue, meant: dict[str, tuple[Described, str]], found: Extract
-) -> LogError:
+def _no_name(catalogue: Catalogue) -> Finding:
+    known = _listed(each.name for each in catalogue.all)
+    return Finding(
+        f"no signal of the DBC file has a name of the log format, or one that the mapping names. It has: {known}. "
+        "Write a mapping file with lines such as `vehicle_speed_m_s: {column: MESSAGE.SIGNAL}` and give it with --map."
+    )
+
+
+def _none_of_them(path: Path, meant: dict[str, tuple[Described, str]], found: Extract) -> LogError:
     seen = _listed(f"{_hex(int(i), bool(x))} ({n} times)" for i, x, n in found.told["seen"]) or "none"
-    if not meant:
-        known = _listed(each.name for each in catalogue.all)
-        return LogError(
-            f"{path}: no signal of the DBC file has a name of the log format, or one that the mapping names. It has: "
-            f"{known}. Write a mapping file with lines such as `vehicle_speed_m_s: {{column: MESSAGE.SIGNAL}}` and "
-            "give it with --map."
-        )
     missing = _listed(
         dict.fromkeys(f"{each.message.name} ({_hex(*each.kind)})" for each, _ in meant.values())
     )

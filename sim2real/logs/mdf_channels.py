@@ -110,6 +110,7 @@ def _channels(mdf: MDF, wanted: Collection[str], most_numbers: int, arrays: dict
     signals = mdf.select([(None, *places[name]) for name in found], ignore_value2text_conversions=True)
     return {
         "names": list(places),
+        "units": {name: str(groups[g].channels[i].unit or "") for name, (g, i) in places.items()},
         "masters": [str(groups[g].channels[i].name) for g, i in mdf.masters_db.items()],
         "channels": {
             name: _told(str(k), s, arrays) for k, (name, s) in enumerate(zip(found, signals, strict=True))

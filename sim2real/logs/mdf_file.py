@@ -21,7 +21,9 @@ def read_mdf(path: Path, wanted: Wanted) -> Table:
     channels = found.channels()
     if found.told["bus"] and not any(name in channels for name in wanted.base):
         raise needs_dbc(path, "MDF")
-    return table_of(path, found.told["names"], found.told["masters"], channels, wanted)
+    table = table_of(path, found.told["names"], found.told["masters"], channels, wanted)
+    units = {name: unit for name, unit in found.told["units"].items() if unit}
+    return replace(table, units=units | table.units)
 
 
 def extract_mdf(path: Path, wanted: Wanted, frames: tuple[tuple[int, bool], ...] | None = None) -> Extract:

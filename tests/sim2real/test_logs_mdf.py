@@ -15,6 +15,7 @@ from log_maker import make_frame
 
 from sim2real.logs import LogError, extraction, load_mapping, mdf_file, read_log, write_log
 from sim2real.logs.extraction import EXTRACTOR
+from sim2real.logs.read import understood
 from sim2real.logs.table import Wanted
 
 
@@ -70,6 +71,22 @@ def test_outside_its_own_time_a_channel_is_lost(tmp_path, frame):
     log = read_log(save_groups(tmp_path / "log.mf4", signals(frame, drop=["accel_x_m_s2"]), [other]))
     assert np.isnan(log.signals["accel_x_m_s2"][:100]).all()
     assert np.array_equal(log.signals["accel_x_m_s2"][100:], frame["accel_x_m_s2"][100:])
+
+
+def test_the_units_that_it_states_are_converted_and_known_of_all_channels(tmp_path, frame):
+    time_s = frame["time_s"].to_numpy()
+    units = {"vehicle_speed_m_s": ("km/h", 3.6), "accel_x_m_s2": ("g", 1 / 9.80665)}
+    with MDF(version="4.10") as mdf:
+        for name in frame.columns.drop("time_s"):
+            unit, by = units.get(name, ("", 1.0))
+            mdf.append(Signal(by * frame[name].to_numpy(), time_s, name=name, unit=unit))
+        mdf.append(Signal(time_s, time_s, name="Other", unit="bar"))
+        mdf.save(tmp_path / "log.mf4")
+    log = read_log(tmp_path / "log.mf4")
+    assert log.warnings == ()
+    for name in units:
+        assert np.allclose(log.signals[name], frame[name], rtol=1e-12)
+    assert understood(tmp_path / "log.mf4").table.units["Other"] == "bar"
 
 
 def test_invalid_samples_are_lost_ones(tmp_path, frame):
