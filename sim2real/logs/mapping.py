@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -108,10 +108,13 @@ class Mapping:
         Its file.
     columns : dict
         Column of the log format to its source.
+    counters : dict
+        Message of a bus to the signal that counts it; no column, and of use on a live bus alone.
     """
 
     path: Path
     columns: dict[str, Spec]
+    counters: dict[str, str] = field(default_factory=dict)
 
     def spec(self, column: str) -> Spec:
         """The source of a column of the log format."""
@@ -134,7 +137,7 @@ class _MappingBase(_Strict):
         if isinstance(data, dict) and "columns" in data:
             columns = data["columns"]
             rest = {key: value for key, value in data.items() if key != "columns"}
-            both = sorted(str(key) for key in set(rest) - {"schema"})
+            both = sorted(str(key) for key in set(rest) - {"schema", "counters"})
             if not isinstance(columns, dict) or both:
                 raise ValueError(
                     f"columns: stands beside {', '.join(both)}; expected all columns in one place."
@@ -161,6 +164,7 @@ MappingFile = create_model(
     "MappingFile",
     __base__=_MappingBase,
     schema_=(Literal[1], Field(default=1, alias="schema")),
+    counters=(dict[Name, Name], Field(default_factory=dict, max_length=1_000)),
     **{name: (Spec, Field(default=None)) for name in COLUMNS},  # type: ignore[call-overload]
 )
 
@@ -173,7 +177,7 @@ def load_mapping(path: str | Path) -> Mapping:
         raise
     except ValueError as error:
         raise LogError(str(error)) from error
-    return Mapping(Path(path), specs_of(file))
+    return Mapping(Path(path), specs_of(file), file.counters)
 
 
 def specs_of(file: BaseModel) -> dict[str, Spec]:
