@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from sim2real.logs.contract import COLUMNS
 from trpac_hil.bus import Link
 from trpac_hil.codec import CLASS_MESSAGE, Codec
 from trpac_hil.deadlines import SystemClock
 from trpac_hil.inputs import Heard, Inputs
-from trpac_hil.roles import TRUTH, Role
+from trpac_hil.message import Coded
+from trpac_hil.roles import Role
 from trpac_hil.unit import Wiring
 
 MEASURED_NS = 300_000_000
@@ -59,7 +61,7 @@ class Readiness:
     Attributes
     ----------
     lines : tuple of Line
-        One per quantity that the bus carries, and one for the class of the road.
+        One per quantity that the unit takes or that the file of signals names, and one for the class of the road.
     sent, notes : tuple of str
         Messages that the rig sends, with their identifiers; what is not used, and why.
     listened_s : float
@@ -115,8 +117,11 @@ def listen(
         elif now_ns - ready_ns >= MEASURED_NS:
             break
     look = _Look(inputs, first, now_ns, counters)
+    used = {*required, *wiring.optional.values()}
     lines = [
-        look.line(role, role.name in required) for role in codec.roles.values() if role.name not in TRUTH
+        look.line(role, role.name in required)
+        for role in codec.roles.values()
+        if role.name in used or (codec.signals is not None and role.name in COLUMNS)
     ]
     if classes:
         lines.append(look.class_line(codec))
@@ -127,14 +132,9 @@ def sent(codec: Codec, wiring: Wiring) -> tuple[str, ...]:
     """Messages that the rig sends, each with its identifier and the file that has its layout."""
     names = ["Estimate", *(["EstimateWheels"] if len(wiring.wheels) > 1 else []), "Health"]
     return tuple(
-        f"{name} {_identifier(codec, name)} ({'trpac.dbc' if name in codec.ours else codec.path.name})"
+        f"{name} {_identifier(codec[name])} ({'trpac.dbc' if name in codec.ours else codec.path.name})"
         for name in names
     )
-
-
-def _identifier(codec: Codec, name: str) -> str:
-    message = codec[name].message
-    return f"0x{message.frame_id:X}" + ("x" if message.is_extended_frame else "")
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class _Look:
             role.name,
             role.unit,
             role.text,
-            ", ".join(_identifier_of(each) for each in heard),
+            ", ".join(_identifier(each.coded) for each in heard),
             required,
             value,
             ", ".join(self._rate(each) for each in heard),
@@ -172,7 +172,7 @@ class _Look:
             return Line("road class", "", CLASS_MESSAGE, "", False, math.nan, "", "", "not on this bus")
         left = heard.values.get("RoadClass_Left", math.nan)
         problem = "" if heard.at_ns >= 0 else self._problem(heard, "RoadClass_Left")
-        frame_id, rate, counter = _identifier_of(heard), self._rate(heard), self._counter(heard)
+        frame_id, rate, counter = _identifier(heard.coded), self._rate(heard), self._counter(heard)
         return Line("road class", "", CLASS_MESSAGE, frame_id, False, left, rate, counter, problem)
 
     def _rate(self, heard: Heard) -> str:
@@ -184,6 +184,8 @@ class _Look:
         return f"{(heard.received - began[1]) / (self.now_ns - began[0]) * 1e9:.0f} of {due}"
 
     def _counter(self, heard: Heard) -> str:
+        if not heard.received:
+            return "-"
         if not heard.coded.counts:
             return "none"
         if not self.counters or heard.received < 2:
@@ -196,7 +198,7 @@ class _Look:
         """Why a signal has no value; empty where it has one."""
         name = heard.coded.message.name
         if not heard.received:
-            return f"no message {name} ({_identifier_of(heard)}) came"
+            return f"no message {name} ({_identifier(heard.coded)}) came"
         if heard.broken == heard.received:
             return f"{name} came with a length other than {heard.coded.message.length} bytes"
         if self.now_ns < heard.senders.until_ns:
@@ -215,6 +217,6 @@ class _Look:
         return "is marked as not available" if math.isnan(heard.values[signal]) else ""
 
 
-def _identifier_of(heard: Heard) -> str:
-    message = heard.coded.message
-    return f"0x{message.frame_id:X}" + ("x" if message.is_extended_frame else "")
+def _identifier(coded: Coded) -> str:
+    """Identifier of a message; an extended one ends in x."""
+    return f"0x{coded.message.frame_id:X}" + ("x" if coded.message.is_extended_frame else "")
