@@ -17,8 +17,8 @@ from trpac_hil.unit import Wiring
 
 MEASURED_NS = 300_000_000
 """Time for which it listens on once all is there, to count rates: 30 messages of 10 ms [ns]."""
-LOOK_NS = 1_000_000
-"""Time between two looks at the bus [ns]."""
+POLL_NS = 1_000_000
+"""Time between two polls of the bus [ns]."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def listen(
     began_ns = now_ns = clock.now_ns()
     ready_ns = None
     while not stop() and now_ns - began_ns < wait_s * 1e9:
-        clock.sleep_ns(LOOK_NS)
+        clock.sleep_ns(POLL_NS)
         now_ns = clock.now_ns()
         for message in link.receive():
             inputs.take(message.arbitration_id, message.is_extended_id, bytes(message.data), now_ns)
@@ -116,15 +116,15 @@ def listen(
             ready_ns = now_ns
         elif now_ns - ready_ns >= MEASURED_NS:
             break
-    look = _Look(inputs, first, now_ns, counters)
+    state = _Listened(inputs, first, now_ns, counters)
     used = {*required, *wiring.optional.values()}
     lines = [
-        look.line(role, role.name in required)
+        state.line(role, role.name in required)
         for role in codec.roles.values()
         if role.name in used or (codec.signals is not None and role.name in COLUMNS)
     ]
     if classes:
-        lines.append(look.class_line(codec))
+        lines.append(state.class_line(codec))
     return Readiness(tuple(lines), sent(codec, wiring), codec.notes, (now_ns - began_ns) * 1e-9)
 
 
@@ -138,7 +138,7 @@ def sent(codec: Codec, wiring: Wiring) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class _Look:
+class _Listened:
     """What has been heard by `now_ns`; `first` are time and number of the first messages of each kind."""
 
     inputs: Inputs

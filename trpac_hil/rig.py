@@ -259,19 +259,19 @@ def _run(
         ended = "asked to stop" if stopper.asked else "time was up"
         if rig.dead:
             ended = f"the process of the {' and of the '.join(rig.dead)} died"
-        told = rig.end(recorder)
+        answers = rig.end(recorder)
     summary = summarise(
-        settings, unit, counts, events, codec, inputs, link, camera_input, told, system, ended
+        settings, unit, counts, events, codec, inputs, link, camera_input, answers, system, ended
     )
     summary["died"] = list(rig.dead)
     if before_mb is not None and after_mb is not None:
         # The garbage collector is off, so that growth here would not end.
         summary["system"]["memory_mb"] = {"before": round(before_mb, 1), "after": round(after_mb, 1)}
-    summary["log"] = _outcome(LOG if settings.log else None, told, ("log_rows", "rows_lost"), LOG_FAILED)
+    summary["log"] = _outcome(LOG if settings.log else None, answers, ("log_rows", "rows_lost"), LOG_FAILED)
     if settings.record_bus is not None:
         keys = ("messages", "messages_lost")
-        summary["bus_recording"] = _outcome(str(settings.record_bus), told, keys, BUS_FILE_FAILED)
-    if "done" not in told:
+        summary["bus_recording"] = _outcome(str(settings.record_bus), answers, keys, BUS_FILE_FAILED)
+    if "done" not in answers:
         _clear(settings)
     summary["verdict"] = verdict(summary)
     write_whole(settings.out / SUMMARY, json.dumps(summary, indent=2).encode() + b"\n")
@@ -410,12 +410,14 @@ def _system(settings: HilSettings) -> dict[str, Any]:
     return granted
 
 
-def _outcome(file: str | None, told: Mapping[str, Any], keys: tuple[str, str], failed: str) -> dict[str, Any]:
+def _outcome(
+    file: str | None, answers: Mapping[str, Any], keys: tuple[str, str], failed: str
+) -> dict[str, Any]:
     """What became of a file of the recorder, as in summary.json; `keys` are those of its rows and of the lost ones."""
     if file is None:
         return {"file": None, "rows": 0, "rows_lost": 0, "problem": None}
-    rows, lost = (told.get("done", {}).get(key, 0) for key in keys)
-    problem = told.get(failed) or (None if "done" in told else "the recorder's process died.")
+    rows, lost = (answers.get("done", {}).get(key, 0) for key in keys)
+    problem = answers.get(failed) or (None if "done" in answers else "the recorder's process died.")
     return {"file": file if rows else None, "rows": rows, "rows_lost": lost, "problem": problem}
 
 
