@@ -144,7 +144,9 @@ def load_codec(path: Path = DBC_FILE, signals: Path | None = None) -> Codec:
     """
     theirs = _read(path)
     shipped = theirs if path == DBC_FILE else _read(DBC_FILE)
-    messages = {message.name: message for message in reversed(theirs)}  # of two of a name the first
+    messages: dict[str, Message] = {}
+    for message in theirs:
+        messages.setdefault(message.name, message)
     shipped_messages = {message.name: message for message in shipped}
     used = {name: _names(shipped_messages[name]) for name in (*INPUT_MESSAGES, *OUTPUT_MESSAGES)}
     ours, notes, counters = frozenset[str](), list[str](), dict[str, str]()

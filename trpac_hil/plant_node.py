@@ -116,7 +116,7 @@ class PlantNode:
             self.drive.advance(slot - done)
             done = slot
             self._link.receive()
-            self._send_readings(now_ns, deadlines.period_ns)
+            self._send_readings(deadlines.due_ns(slot), deadlines.period_ns)
             if cameras is not None and now_ns >= cameras.due_ns(picture + 1):
                 picture = cameras.next_slot(picture, now_ns)
                 left, right = self.drive.surfaces_ahead(P_0_M)
@@ -142,7 +142,7 @@ class PlantNode:
         readings["accel_x_m_s2"] = now.accel_x_m_s2 + noise.accel_x_noise_m_s2 * random[9]
         return readings
 
-    def _send_readings(self, now_ns: int, period_ns: int) -> None:
+    def _send_readings(self, slot_ns: int, period_ns: int) -> None:
         """Send the messages that are due: those of a short cycle time in each step."""
         readings, values = self._readings(), dict[str, dict[str, float]]()
         for name, role in self._carried.items():
@@ -154,9 +154,9 @@ class PlantNode:
                 values.setdefault(term.message, {})[term.signal] = part
                 rest -= term.gain * part
         for message, due_ns in self._due_ns.items():
-            if now_ns >= due_ns:
+            if slot_ns >= due_ns:
                 cycle_ns = self._codec[message].cycle_ns
-                self._due_ns[message] = 0 if cycle_ns <= period_ns else now_ns + cycle_ns
+                self._due_ns[message] = 0 if cycle_ns <= period_ns else slot_ns + cycle_ns
                 self._send(message, values[message])
 
     def _send_pictures(self, now_ns: int) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from sim2real.logs.contract import COLUMNS
 from trpac_hil.bus import Link
+from trpac_hil.camera_input import SURFACES
 from trpac_hil.codec import CLASS_MESSAGE, Codec
 from trpac_hil.deadlines import SystemClock
 from trpac_hil.inputs import Heard, Inputs
@@ -171,9 +172,10 @@ class _Listened:
         if heard is None:
             return Line("road class", "", CLASS_MESSAGE, "", False, math.nan, "", "", "not on this bus")
         left = heard.values.get("RoadClass_Left", math.nan)
+        surface = SURFACES[left].name.lower() if left in SURFACES else ""
         problem = "" if heard.at_ns >= 0 else self._problem(heard, "RoadClass_Left")
         frame_id, rate, counter = _identifier(heard.coded), self._rate(heard), self._counter(heard)
-        return Line("road class", "", CLASS_MESSAGE, frame_id, False, left, rate, counter, problem)
+        return Line("road class", surface, CLASS_MESSAGE, frame_id, False, left, rate, counter, problem)
 
     def _rate(self, heard: Heard) -> str:
         """Messages per second, and how many are due."""

@@ -43,7 +43,7 @@ from trpac_hil.mdf import SCRATCH_PREFIX
 from trpac_hil.message import CLASSIC_BYTES
 from trpac_hil.plant_node import play
 from trpac_hil.preview_stamps import UNIT_PREVIEW, PreviewStamps
-from trpac_hil.readiness import Readiness, listen
+from trpac_hil.readiness import Readiness, listen, sent
 from trpac_hil.realtime import as_before, loop_core, memory_mb, pin, raise_priority, undisturbed
 from trpac_hil.recorder import BUS_FILE_FAILED, LOG_FAILED, ROWS_KEPT, RecorderJob, record
 from trpac_hil.records import age_column, columns
@@ -160,7 +160,7 @@ def run_hil(
 ) -> dict[str, Any]:
     """Run the loop to its end and write log.mf4 and summary.json; returns the content of summary.json.
 
-    `show` is called with what was heard before the first cycle, where `settings.wait_s` asks for it.
+    `show` is called with what was heard before the first cycle, where `settings.wait_s` asks for it, and what is sent.
 
     Raises
     ------
@@ -217,7 +217,9 @@ def _run(
     period_ns = round(1e9 / settings.rate_hz)
     slots = None if settings.duration_s is None else max(1, round(settings.duration_s * settings.rate_hz))
     with undisturbed(), stopper.by_signal():
-        if settings.wait_s is not None:
+        if settings.wait_s is None:
+            show(Readiness((), sent(codec, unit.wiring), codec.notes, 0.0))
+        else:
             start_plant(clock.now_ns())
             readiness = listen(
                 link, codec, unit.wiring, settings.wait_s, settings.counters, clock, stopper, seen is None

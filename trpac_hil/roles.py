@@ -128,11 +128,19 @@ class Resolver:
         return 0.0, [] if gain is None else [Term(message.name, signal.name, gain)]
 
     def _signal(self, column: str, role: str) -> tuple[Message, Signal] | None:
-        """A signal by its name `Message.Signal`."""
+        """A signal by its name `Message.Signal`, or `Signal` where one message alone has it.
+
+        Behind a # a log's mapping may name a channel, which is the one bus here.
+        """
+        column = column.partition("#")[0]
         name, _, signal_name = column.partition(".")
         if not signal_name:
-            self._blame(role, f"{quoted(column)} is no Message.Signal, such as VehicleMotion.VehicleSpeed.")
-            return None
+            having = [m.name for m in self._messages.values() for s in m.signals if s.name == column]
+            if len(having) != 1:
+                of = f": {', '.join(having)} have it" if having else ", such as VehicleMotion.VehicleSpeed"
+                self._blame(role, f"{quoted(column)} is no Message.Signal{of}.")
+                return None
+            name, signal_name = having[0], column
         message = self._messages.get(name)
         if message is None:
             self._blame(role, f"{self._dbc} has no message {quoted(name)}; {_hint(name, self._messages)}")

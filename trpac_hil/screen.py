@@ -94,7 +94,7 @@ def readiness_table(readiness: Readiness) -> RenderableType:
         cells = (line.name, value, line.unit, line.source, line.frame_ids, line.rate, line.counter, state)
         table.add_row(*(Text(quoted(cell)) for cell in cells), style=style)
     notes = [Text(quoted(note)) for note in readiness.notes]
-    return Group(table, Text(f"Sent: {', '.join(readiness.sent)}."), *notes)
+    return Group(*([table] if readiness.lines else []), Text(f"Sent: {', '.join(readiness.sent)}."), *notes)
 
 
 def _estimate(figures: Figures, title: str) -> Table:
@@ -134,13 +134,13 @@ def _signals(figures: Figures, ages: Ages) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("signal (fl fr rl rr)")
     for heading in ("value", "unit", "age [ms]"):
-        table.add_column(heading, justify="left" if heading == "unit" else "right")
+        table.add_column(escape(heading), justify="left" if heading == "unit" else "right")
     for label, (names, unit, form) in SHOWN.items():
         carried = [name for name in names if name in ages]
         if not carried:
             continue
         values = [figures.now(name) for name in carried]
-        shown = "  ".join("lost" if math.isnan(value) else format(value, form) for value in values)
+        shown = "  ".join("no value" if math.isnan(value) else format(value, form) for value in values)
         oldest = max((figures.now(column) for name in carried for column in ages[name]), default=math.nan)
         table.add_row(label, shown, unit, "-" if math.isnan(oldest) else f"{oldest:.1f}")
     return table

@@ -41,8 +41,12 @@ def _deadlines(summary: Mapping[str, Any]) -> str:
     if not late:
         return f"{text}; none by more than 5 ms."
     cause, number = max(overruns["beyond_5_ms_by"].items(), key=lambda each: each[1])
-    share = "all" if number == late else f"most ({number:,})" if 2 * number > late else f"{number:,}"
-    return f"{text}; {late:,} by more than 5 ms, {share} of them because {CAUSES[cause]}."
+    share = (
+        ""
+        if number == late
+        else f"{'most' if 2 * number > late else 'the greatest part'} ({number:,}) of them "
+    )
+    return f"{text}; {late:,} by more than 5 ms, {share}because {CAUSES[cause]}."
 
 
 def _estimate(summary: Mapping[str, Any]) -> str:

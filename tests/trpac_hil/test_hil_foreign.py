@@ -183,6 +183,13 @@ def test_a_stated_counter_counts_over_its_stated_range_and_what_only_sounds_like
     assert uncounted["ABS_Wheels"].counts == 0
 
 
+def test_a_name_without_a_message_is_that_of_the_only_one_that_has_it_and_channels_are_for_logs(
+    tmp_path: Path,
+) -> None:
+    plain = changed(SIGNALS, ("Motion.VehSpd", "VehSpd"), ("Drive.MotFL", '"Drive.MotFL#2"'))
+    assert codec_of(tmp_path, signals=plain).roles == codec_of(tmp_path).roles
+
+
 def test_without_age_limits_they_follow_from_cycle_times(tmp_path: Path) -> None:
     codec = codec_of(tmp_path, changed(DBC, ("BO_ 1001 10", "BO_ 1001 20")))
     assert codec["Motion"].stale_ns["VehSpd"] == 60 * MS
@@ -234,10 +241,18 @@ def test_a_unit_that_cannot_be_converted_is_refused_by_name(
     assert words in str(refused.value)
 
 
+@pytest.mark.parametrize("rest", ["", "values"])
 @pytest.mark.parametrize("signal", ["WheelSpeed_RR", "WheelTorque_FL", "RoadClass_Age"])
-def test_a_signal_that_is_missing_is_named(signal: str, tmp_path: Path) -> None:
+def test_a_signal_that_is_missing_is_named_also_where_its_table_of_values_is_still_there(
+    signal: str, rest: str, tmp_path: Path
+) -> None:
     path = tmp_path / "own.dbc"
-    path.write_text("\n".join(line for line in SHIPPED_TEXT.splitlines() if signal not in line))
+    lines = [
+        line
+        for line in SHIPPED_TEXT.splitlines()
+        if signal not in line or (rest and "SG_ " + signal not in line)
+    ]
+    path.write_text("\n".join(lines))
     with pytest.raises(HilError, match=rf"lacks \w+\.{signal}\. Expected all .* or a file that maps"):
         load_codec(path)
 
@@ -250,7 +265,8 @@ def test_a_signal_that_is_missing_is_named(signal: str, tmp_path: Path) -> None:
     [
         ([], [("Motion.VehSpd", "Motoin.VehSpd")], "has no message Motoin; did you mean Motion?"),
         ([], [("Motion.VehSpd", "Motion.VehSpeed")], "has no signal Motion.VehSpeed; did you mean VehSpd?"),
-        ([], [("Motion.VehSpd", "VehSpd")], "VehSpd is no Message.Signal"),
+        ([], [("Motion.VehSpd", "Speed")], "Speed is no Message.Signal, such as"),
+        ([("MotR", "BrkRR")], [("Brakes.BrkRR", "BrkRR")], "BrkRR is no Message.Signal: Drive, Brakes have it"),
         ([('"km/h" Tool\n SG_ LongAcc', '"" Tool\n SG_ LongAcc')], [],
          "Motion.VehSpd has no unit in"),
         ([('"rpm"', '"ticks"')], [], "`wheel_speed_fl_rad_s: {column: ABS_Wheels.WhlSpdFL, unit: UNIT}`"),
