@@ -185,7 +185,7 @@ def hil(
             camera_threads=camera_threads,
             spin_ns=SPIN_NS,
         )
-        summary = run_hil(settings, show=_show_readiness)
+        summary = run_hil(settings, show=_show_readiness, say=lambda text: complain(COMMAND, text))
     except (TrpacError, OSError) as error:
         refuse(COMMAND, error)
     _show(summary, out)

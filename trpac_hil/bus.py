@@ -26,6 +26,8 @@ BUS_ERRORS = (can.CanError, OSError)
 """Exceptions that interfaces raise when a bus fails."""
 OPENING_ERRORS = (*BUS_ERRORS, ValueError, TypeError, ImportError, NameError, NotImplementedError)
 """Exceptions that they raise when a bus cannot be opened."""
+NOT_INSTALLED = (ImportError, NameError, can.CanInterfaceNotImplementedError)
+"""Those of them that python-can raises where what an interface needs is missing."""
 FD_PROTOCOLS = (can.CanProtocol.CAN_FD, can.CanProtocol.CAN_FD_NON_ISO)
 FD_OPTION = "fd"
 """Option of most interfaces that makes the bus one of CAN FD."""
@@ -128,7 +130,10 @@ class Link:
         try:
             self._bus: can.BusABC | None = open_bus()
         except OPENING_ERRORS as error:
-            why = WHY.get(getattr(error, "errno", None) or 0, f"{type(error).__name__}: {quoted(error)}")
+            why = f"{type(error).__name__}: {quoted(error)}"
+            if isinstance(error, NOT_INSTALLED):
+                why = f"the interface's driver or package is not installed ({quoted(error)})"
+            why = WHY.get(getattr(error, "errno", None) or 0, why).rstrip(".")
             raise HilError(
                 f"The bus cannot be opened: {why}. Check --interface, --channel and --bus-option; docs/hil.md has "
                 "examples."

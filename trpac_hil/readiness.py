@@ -18,6 +18,8 @@ from trpac_hil.unit import Wiring
 
 MEASURED_NS = 300_000_000
 """Time for which it listens on once all is there, to count rates: 30 messages of 10 ms [ns]."""
+SAID_AFTER_NS = 1_000_000_000
+"""Time after which it is said what is waited for [ns]."""
 POLL_NS = 1_000_000
 """Time between two polls of the bus [ns]."""
 
@@ -93,16 +95,18 @@ def listen(
     clock: SystemClock,
     stop: Callable[[], bool],
     classes: bool,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Readiness:
     """Listen until all that is required is there and its rate is counted, but no longer than `wait_s`.
 
-    `counters` is whether message counters are checked, `classes` whether classes of the road come by the bus.
+    `counters` is whether message counters are checked, `classes` whether classes of the road come by the bus; `say` is
+    called once where something is still missing after a second.
     """
     link.drain()
     inputs, required = Inputs(codec, lambda kind, text: None, counters), set(wiring.required.values())
     first: dict[str, tuple[int, int]] = {}
     began_ns = now_ns = clock.now_ns()
-    ready_ns = None
+    ready_ns, said = None, False
     while not stop() and now_ns - began_ns < wait_s * 1e9:
         clock.sleep_ns(POLL_NS)
         now_ns = clock.now_ns()
@@ -111,8 +115,12 @@ def listen(
         for name, heard in inputs.heard.items():
             if heard.received and name not in first:
                 first[name] = (now_ns, heard.received)
-        if any(math.isnan(inputs.value(role, now_ns)) for role in required):
+        missing = [role for role in required if math.isnan(inputs.value(role, now_ns))]
+        if missing:
             ready_ns = None
+            if not said and now_ns - began_ns > SAID_AFTER_NS:
+                said = True
+                say(f"waiting up to {wait_s:g} s for {', '.join(sorted(missing))}; Ctrl-C ends.")
         elif ready_ns is None:
             ready_ns = now_ns
         elif now_ns - ready_ns >= MEASURED_NS:

@@ -157,10 +157,12 @@ def run_hil(
     settings: HilSettings,
     stopper: Stopper | None = None,
     show: Callable[[Readiness], None] = lambda readiness: None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Run the loop to its end and write log.mf4 and summary.json; returns the content of summary.json.
 
-    `show` is called with what was heard before the first cycle, where `settings.wait_s` asks for it, and what is sent.
+    `show` is called with what was heard before the first cycle, where `settings.wait_s` asks for it, and with what is
+    sent; `say` with what is waited for.
 
     Raises
     ------
@@ -170,11 +172,15 @@ def run_hil(
     """
     stopper = stopper or Stopper()
     with ExitStack() as stack:
-        return _run(settings, stopper, show, stack)
+        return _run(settings, stopper, show, say, stack)
 
 
 def _run(
-    settings: HilSettings, stopper: Stopper, show: Callable[[Readiness], None], stack: ExitStack
+    settings: HilSettings,
+    stopper: Stopper,
+    show: Callable[[Readiness], None],
+    say: Callable[[str], None],
+    stack: ExitStack,
 ) -> dict[str, Any]:
     settings = replace(settings, core=loop_core(settings.core, settings.realtime))
     settings.bus.check()
@@ -222,7 +228,15 @@ def _run(
         else:
             start_plant(clock.now_ns())
             readiness = listen(
-                link, codec, unit.wiring, settings.wait_s, settings.counters, clock, stopper, seen is None
+                link,
+                codec,
+                unit.wiring,
+                settings.wait_s,
+                settings.counters,
+                clock,
+                stopper,
+                seen is None,
+                say,
             )
             show(readiness)
             if readiness.missing and not stopper.asked:

@@ -72,6 +72,7 @@ def _bus(settings: HilSettings, unit: Unit, codec: Codec, inputs: Inputs, link: 
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,
         "dbc": settings.dbc.name,
+        "mapping": settings.signals.name if settings.signals else None,
         "signals": {name: role.text for name, role in codec.roles.items()},
         "required": sorted(
             {

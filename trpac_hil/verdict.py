@@ -35,6 +35,8 @@ def verdict(summary: Mapping[str, Any]) -> list[str]:
 def _deadlines(summary: Mapping[str, Any]) -> str:
     overruns = summary["overruns"]
     slots, missed, late = summary["cycles"] + overruns["left_out"], overruns["count"], overruns["beyond_5_ms"]
+    if not slots:
+        return "Deadlines: none, no cycle ran."
     if not missed:
         return f"Deadlines kept: yes, all {slots:,}."
     text = f"Deadlines kept: no. {missed:,} of {slots:,} cycles were late, the worst by {overruns['worst_ms']:.2f} ms"

@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,6 +22,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from sim2real.logs.mapping import load_mapping
 from trpac_cli.main import app
 from trpac_hil.bus import BusSettings, Link
 from trpac_hil.bus_file import FORMATS, BusFile
@@ -31,6 +33,8 @@ from trpac_hil.inputs import Inputs
 from trpac_hil.message import NO_COUNTER, Coded
 from trpac_hil.plant_node import PlantJob, PlantNode
 from trpac_hil.readiness import Readiness, listen
+from trpac_hil.rig import Stopper, run_hil
+from trpac_hil.settings import HilSettings
 from trpac_hil.unit import Wiring
 from trpac_hil.verdict import verdict
 
@@ -445,10 +449,10 @@ class Sending:
 
 def heard_in(codec: Codec, wait_s: float = 2.0, **sending: object) -> Readiness:
     clock = FakeClock()
-    values = sending.pop("values", {})
+    values, said_of = sending.pop("values", {}), sending.pop("said", [])
     bus = Sending(codec, clock, **sending)  # type: ignore[arg-type]
     bus.values = values  # type: ignore[assignment]
-    return listen(bus, codec, WIRING, wait_s, True, clock, lambda: False, True)  # type: ignore[arg-type]
+    return listen(bus, codec, WIRING, wait_s, True, clock, lambda: False, True, said_of.append)  # type: ignore
 
 
 def test_when_all_is_there_it_begins_after_rates_were_counted(tmp_path: Path) -> None:
@@ -638,6 +642,9 @@ def test_a_foreign_car_drives_the_unit_and_the_recording_of_its_bus_says_the_sam
     assert done.exit_code == 0, done.output
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert "Motion.VehSpd x 0.2778" in done.stderr
+    assert load_mapping(signals).sources("vehicle_speed_m_s") == ["Motion.VehSpd"], (
+        "a recording's mapping, too"
+    )
     assert "Recording of the bus: complete" in done.stdout
     assert summary["bus"]["signals"]["vehicle_speed_m_s"] == "Motion.VehSpd x 0.2778"
     assert summary["bus"]["messages"]["Motion"]["frozen"] == 0
@@ -693,3 +700,19 @@ def test_a_foreign_car_of_another_process_comes_over_udp(unit_file: Path, tmp_pa
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["starting_cycles"] == 0
     assert summary["bus"]["messages"]["Motion"]["received"] > 50
+
+
+def test_a_long_wait_says_once_what_it_waits_for(tmp_path: Path) -> None:
+    told: list[str] = []
+    heard_in(codec_of(tmp_path), wait_s=5.0, quiet=("Motion",), said=told)
+    assert told == ["waiting up to 5 s for vehicle_speed_m_s; Ctrl-C ends."]
+
+
+def test_ctrl_c_while_it_waits_ends_it_with_a_summary_of_no_cycles(unit_file: Path, tmp_path: Path) -> None:
+    stopper = Stopper()
+    threading.Timer(1.0, stopper.ask).start()
+    bus = BusSettings("virtual", "waits")
+    summary = run_hil(HilSettings(tmp_path / "out", unit_file, bus=bus, rate_hz=100.0, wait_s=600.0), stopper)
+    assert (summary["ended"], summary["cycles"]) == ("asked to stop", 0)
+    assert summary["verdict"][1:3] == ["Deadlines: none, no cycle ran.", "Estimate: none, no cycle ran."]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["summary.json"]
