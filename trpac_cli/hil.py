@@ -115,7 +115,7 @@ def hil(
     ] = False,
     record_bus: Annotated[
         Path | None,
-        typer.Option(help="File for all messages of the bus: .blf, .asc, .log (candump), .mf4 or .trc."),
+        typer.Option(help="File for all messages of the bus: .blf, .asc, .log (candump) or .mf4."),
     ] = None,
     no_log: Annotated[bool, typer.Option("--no-log", help="Write no log.mf4.")] = False,
     no_counters: Annotated[
@@ -185,7 +185,7 @@ def hil(
             camera_threads=camera_threads,
             spin_ns=SPIN_NS,
         )
-        summary = run_hil(settings, show=_show_readiness, say=lambda text: complain(COMMAND, text))
+        summary = run_hil(settings, show=_show_readiness, report_wait=lambda text: complain(COMMAND, text))
     except (TrpacError, OSError) as error:
         refuse(COMMAND, error)
     _show(summary, out)
@@ -237,7 +237,11 @@ def hil_plant(
     except (ScenarioError, OSError) as error:
         refuse(PLANT_COMMAND, error)
     stopper = Stopper()
-    print(f"{PLANT_COMMAND}: driving on {job.bus.interface} {job.bus.channel}; Ctrl-C ends.", file=sys.stderr)
+    print(
+        f"{PLANT_COMMAND}: driving on {job.bus.interface} {job.bus.channel}; sends {', '.join(node.sends)}. "
+        "Ctrl-C ends.",
+        file=sys.stderr,
+    )
     with stopper.by_signal():
         slots = None if duration_s is None else round(duration_s * rate_hz)
         node.run(SystemClock().now_ns() + RUN_UP_NS, stopper, slots)

@@ -88,10 +88,10 @@ def frame(frame_id: int, extended: bool, data: bytes) -> can.Message:
     )
 
 
-def no_fd(name: str, length: int) -> str:
+def no_fd(what: str) -> str:
     """What to say of a message that is too long for a bus without CAN FD."""
     return (
-        f"{name} has {length} bytes, which is CAN FD, and the bus is classic CAN (8 bytes at most). "
+        f"{what}, which is CAN FD, and the bus is classic CAN (8 bytes at most). "
         "Open it with --bus-option fd=true and the bit rates that the interface wants for it."
     )
 

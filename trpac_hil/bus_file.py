@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from trpac_hil.bus_relay import unpacked
 
-FORMATS = (".blf", ".asc", ".log", ".mf4", ".trc")
-"""Endings of the recordings that can be written."""
+FORMATS = (".blf", ".asc", ".log", ".mf4")
+"""Endings of the recordings that can be written; python-can's .trc leaves out CAN FD."""
 
 
 def scratch(path: Path) -> Path:

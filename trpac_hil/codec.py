@@ -83,9 +83,10 @@ class Codec:
         return tuple(name for name in self.messages if name not in OUTPUT_MESSAGES)
 
     @property
-    def longest(self) -> str:
-        """Name of the longest message that comes in."""
-        return max(self.received, key=lambda name: self.messages[name].message.length)
+    def beyond_classic(self) -> str:
+        """Name and length of a message that comes in and is too long for a bus without CAN FD; empty for none."""
+        long = [m for name in self.received if (m := self.messages[name].message).length > CLASSIC_BYTES]
+        return f"{long[0].name} has {long[0].length} bytes" if long else ""
 
     def by_id(self, names: Iterable[str]) -> dict[tuple[int, bool], Coded]:
         """Messages by identifier and by whether it is an extended one."""

@@ -277,6 +277,11 @@ class Coded:
         return values, fields[self.counter].raw(little, big) if self.counts else -1
 
 
+def identifier(coded: Coded) -> str:
+    """Identifier of a message as text; an extended one ends in x."""
+    return f"0x{coded.message.frame_id:X}" + ("x" if coded.message.is_extended_frame else "")
+
+
 def _invalid(signal: Signal) -> frozenset[float]:
     """Raw values that say that there is no value; raises ValueError where the signal's bits do not hold one."""
     invalid = no_value(signal)

@@ -21,7 +21,7 @@ from trpac_hil.deadlines import Deadlines, SystemClock, wait_until
 from trpac_hil.driver import EndlessDrive
 from trpac_hil.errors import HilError
 from trpac_hil.helper import Control, helper
-from trpac_hil.message import CLASSIC_BYTES
+from trpac_hil.message import identifier
 from trpac_hil.realtime import raise_priority
 from trpac_hil.roles import TRUTH
 from trpac_hil.shared import Ring
@@ -99,10 +99,9 @@ class PlantNode:
         self._sent: dict[str, int] = {}
         self._pictures: deque[_Picture] = deque()
         self._link = open_link()  # last: what is refused before leaves no open bus
-        longest = self._codec[self._codec.longest].message
-        if longest.length > CLASSIC_BYTES and not self._link.fd:
+        if self._codec.beyond_classic and not self._link.fd:
             self._link.close()
-            raise HilError(no_fd(longest.name, longest.length))
+            raise HilError(no_fd(self._codec.beyond_classic))
 
     def run(self, start_ns: int, stop: Callable[[], bool], slots: int | None = None) -> None:
         """Drive in real time until `stop` returns True, or for a number of slots."""
@@ -122,6 +121,12 @@ class PlantNode:
                 left, right = self.drive.surfaces_ahead(P_0_M)
                 self._pictures.append(_Picture(picture, now_ns, (int(left), int(right))))
             self._send_pictures(now_ns)
+
+    @property
+    def sends(self) -> list[str]:
+        """Messages that it sends, with their identifiers."""
+        names = [*self._due_ns, *([CLASS_MESSAGE] if CLASS_MESSAGE in self._codec.messages else [])]
+        return [f"{name} {identifier(self._codec[name])}" for name in names]
 
     def close(self) -> None:
         """Close the bus."""

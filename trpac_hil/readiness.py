@@ -12,13 +12,13 @@ from trpac_hil.camera_input import SURFACES
 from trpac_hil.codec import CLASS_MESSAGE, Codec
 from trpac_hil.deadlines import SystemClock
 from trpac_hil.inputs import Heard, Inputs
-from trpac_hil.message import Coded
+from trpac_hil.message import identifier
 from trpac_hil.roles import Role
 from trpac_hil.unit import Wiring
 
 MEASURED_NS = 300_000_000
 """Time for which it listens on once all is there, to count rates: 30 messages of 10 ms [ns]."""
-SAID_AFTER_NS = 1_000_000_000
+WAIT_REPORTED_NS = 1_000_000_000
 """Time after which it is said what is waited for [ns]."""
 POLL_NS = 1_000_000
 """Time between two polls of the bus [ns]."""
@@ -95,18 +95,18 @@ def listen(
     clock: SystemClock,
     stop: Callable[[], bool],
     classes: bool,
-    say: Callable[[str], None] = lambda text: None,
+    report_wait: Callable[[str], None] = lambda text: None,
 ) -> Readiness:
     """Listen until all that is required is there and its rate is counted, but no longer than `wait_s`.
 
-    `counters` is whether message counters are checked, `classes` whether classes of the road come by the bus; `say` is
-    called once where something is still missing after a second.
+    `counters` is whether message counters are checked, `classes` whether classes of the road come by the bus;
+    `report_wait` is called once where something is still missing after a second.
     """
     link.drain()
     inputs, required = Inputs(codec, lambda kind, text: None, counters), set(wiring.required.values())
     first: dict[str, tuple[int, int]] = {}
     began_ns = now_ns = clock.now_ns()
-    ready_ns, said = None, False
+    ready_ns, reported = None, False
     while not stop() and now_ns - began_ns < wait_s * 1e9:
         clock.sleep_ns(POLL_NS)
         now_ns = clock.now_ns()
@@ -118,9 +118,9 @@ def listen(
         missing = [role for role in required if math.isnan(inputs.value(role, now_ns))]
         if missing:
             ready_ns = None
-            if not said and now_ns - began_ns > SAID_AFTER_NS:
-                said = True
-                say(f"waiting up to {wait_s:g} s for {', '.join(sorted(missing))}; Ctrl-C ends.")
+            if not reported and now_ns - began_ns > WAIT_REPORTED_NS:
+                reported = True
+                report_wait(f"waiting up to {wait_s:g} s for {', '.join(sorted(missing))}; Ctrl-C ends.")
         elif ready_ns is None:
             ready_ns = now_ns
         elif now_ns - ready_ns >= MEASURED_NS:
@@ -141,7 +141,7 @@ def sent(codec: Codec, wiring: Wiring) -> tuple[str, ...]:
     """Messages that the rig sends, each with its identifier and the file that has its layout."""
     names = ["Estimate", *(["EstimateWheels"] if len(wiring.wheels) > 1 else []), "Health"]
     return tuple(
-        f"{name} {_identifier(codec[name])} ({'trpac.dbc' if name in codec.ours else codec.path.name})"
+        f"{name} {identifier(codec[name])} ({'trpac.dbc' if name in codec.ours else codec.path.name})"
         for name in names
     )
 
@@ -166,7 +166,7 @@ class _Listened:
             role.name,
             role.unit,
             role.text,
-            ", ".join(_identifier(each.coded) for each in heard),
+            ", ".join(identifier(each.coded) for each in heard),
             required,
             value,
             ", ".join(self._rate(each) for each in heard),
@@ -182,7 +182,7 @@ class _Listened:
         left = heard.values.get("RoadClass_Left", math.nan)
         surface = SURFACES[left].name.lower() if left in SURFACES else ""
         problem = "" if heard.at_ns >= 0 else self._problem(heard, "RoadClass_Left")
-        frame_id, rate, counter = _identifier(heard.coded), self._rate(heard), self._counter(heard)
+        frame_id, rate, counter = identifier(heard.coded), self._rate(heard), self._counter(heard)
         return Line("road class", surface, CLASS_MESSAGE, frame_id, False, left, rate, counter, problem)
 
     def _rate(self, heard: Heard) -> str:
@@ -208,7 +208,7 @@ class _Listened:
         """Why a signal has no value; empty where it has one."""
         name = heard.coded.message.name
         if not heard.received:
-            return f"no message {name} ({_identifier(heard.coded)}) came"
+            return f"no message {name} ({identifier(heard.coded)}) came"
         if heard.broken == heard.received:
             return f"{name} came with a length other than {heard.coded.message.length} bytes"
         if self.now_ns < heard.senders.until_ns:
@@ -225,8 +225,3 @@ class _Listened:
             low, high = heard.coded.bounds[signal]
             return f"is outside {low:g} ... {high:g}, its range in the DBC file"
         return "is marked as not available" if math.isnan(heard.values[signal]) else ""
-
-
-def _identifier(coded: Coded) -> str:
-    """Identifier of a message; an extended one ends in x."""
-    return f"0x{coded.message.frame_id:X}" + ("x" if coded.message.is_extended_frame else "")

@@ -40,7 +40,6 @@ from trpac_hil.helper import CONTEXT, Body, Control, begin
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Loop
 from trpac_hil.mdf import SCRATCH_PREFIX
-from trpac_hil.message import CLASSIC_BYTES
 from trpac_hil.plant_node import play
 from trpac_hil.preview_stamps import UNIT_PREVIEW, PreviewStamps
 from trpac_hil.readiness import Readiness, listen, sent
@@ -157,12 +156,12 @@ def run_hil(
     settings: HilSettings,
     stopper: Stopper | None = None,
     show: Callable[[Readiness], None] = lambda readiness: None,
-    say: Callable[[str], None] = lambda text: None,
+    report_wait: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Run the loop to its end and write log.mf4 and summary.json; returns the content of summary.json.
 
     `show` is called with what was heard before the first cycle, where `settings.wait_s` asks for it, and with what is
-    sent; `say` with what is waited for.
+    sent; `report_wait` with what is waited for.
 
     Raises
     ------
@@ -172,14 +171,14 @@ def run_hil(
     """
     stopper = stopper or Stopper()
     with ExitStack() as stack:
-        return _run(settings, stopper, show, say, stack)
+        return _run(settings, stopper, show, report_wait, stack)
 
 
 def _run(
     settings: HilSettings,
     stopper: Stopper,
     show: Callable[[Readiness], None],
-    say: Callable[[str], None],
+    report_wait: Callable[[str], None],
     stack: ExitStack,
 ) -> dict[str, Any]:
     settings = replace(settings, core=loop_core(settings.core, settings.realtime))
@@ -236,7 +235,7 @@ def _run(
                 clock,
                 stopper,
                 seen is None,
-                say,
+                report_wait,
             )
             show(readiness)
             if readiness.missing and not stopper.asked:
@@ -298,9 +297,8 @@ def _link(settings: HilSettings, codec: Codec, events: Events, stack: ExitStack)
     """The open bus; raises HilError, also where a message is too long for it."""
     link = Link(settings.bus.open, events.report)
     stack.callback(link.close)
-    longest = codec[codec.longest].message
-    if longest.length > CLASSIC_BYTES and not link.fd:
-        raise HilError(no_fd(longest.name, longest.length))
+    if codec.beyond_classic and not link.fd:
+        raise HilError(no_fd(codec.beyond_classic))
     return link
 
 

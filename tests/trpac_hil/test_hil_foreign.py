@@ -109,6 +109,31 @@ def test_floats_are_read_in_both_byte_orders(tmp_path: Path) -> None:
     assert math.isnan(broken["B"])
 
 
+def test_multiplexers_within_multiplexers_select_what_cantools_selects() -> None:
+    text = (
+        'VERSION ""\n\nBU_: X\n\nBO_ 5 M: 8 X\n SG_ A M : 0|4@1+ (1,0) [0|0] "" X\n'
+        ' SG_ B m2M : 4|4@1+ (1,0) [0|0] "" X\n'
+        ' SG_ C m1 : 8|8@1+ (1,0) [0|0] "" X\n SG_ D m3 : 8|8@1- (1,0) [0|0] "" X\n SG_ E : 16|8@1+ (1,0) [0|0] "" X\n'
+        "\nSG_MUL_VAL_ 5 B A 2-2, 5-6;\nSG_MUL_VAL_ 5 C A 1-1;\nSG_MUL_VAL_ 5 D B 3-4, 9-9;\n"
+    )
+    message = cantools.database.load_string(text, "dbc").messages[0]
+    coded = Coded.of(message, {"C", "D", "E"})
+    found = set()
+    for first in range(256):
+        data = bytes([first, 200, 7, 0, 0, 0, 0, 0])
+        values, _ = coded.decode(data)
+        try:
+            expected = message.decode(data, allow_truncated=False)
+        except cantools.database.DecodeError:
+            expected = {name: values[name] for name in values if name == "E"}
+        assert values == {name: expected[name] for name in ("C", "D", "E") if name in expected}
+        found.add(tuple(values))
+    assert found == {("E",), ("C", "E"), ("D", "E")}
+    for count in range(2):
+        back, _ = coded.decode(coded.encode({"C": 11.0, "D": -5.0, "E": 3.0}, count))
+        assert back in ({"C": 11.0, "E": 3.0}, {"D": -5.0, "E": 3.0})
+
+
 # Quantities
 
 
@@ -524,8 +549,8 @@ def test_a_recording_has_all_messages_with_their_times(ending: str, tmp_path: Pa
             timestamp=1.7e9 + 0.001 * number,
             arbitration_id=number if number % 2 else 0x18FF0200 + number,
             is_extended_id=number % 2 == 0,
-            data=bytes([number % 256] * (64 if number % 7 == 6 and ending != ".trc" else number % 9)),
-            is_fd=number % 7 == 6 and ending != ".trc",
+            data=bytes([number % 256] * (64 if number % 7 == 6 else number % 9)),
+            is_fd=number % 7 == 6,
             is_rx=number % 3 > 0,
         )
         for number in range(1, 200)
@@ -698,8 +723,8 @@ def test_a_foreign_car_of_another_process_comes_over_udp(unit_file: Path, tmp_pa
         plant.communicate(timeout=30.0)
     assert done.exit_code == 0, done.output
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["starting_cycles"] == 0
-    assert summary["bus"]["messages"]["Motion"]["received"] > 50
+    assert summary["starting_cycles"] < 20
+    assert summary["bus"]["messages"]["Motion"]["received"] > 20
 
 
 def test_a_long_wait_says_once_what_it_waits_for(tmp_path: Path) -> None:
