@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import sys
 from dataclasses import replace
@@ -154,6 +155,7 @@ def hil(
     from trpac_hil.settings import HilSettings
     from trpac_hil.unit import WHEELS
 
+    _quiet_libraries()
     require_folder(COMMAND, out)
     if wheel not in WHEELS:
         refuse(COMMAND, f"--wheel {wheel}: expected {', '.join(WHEELS)}.")
@@ -230,6 +232,7 @@ def hil_plant(
     from trpac_hil.plant_node import open_plant_node
     from trpac_hil.rig import RUN_UP_NS, Stopper
 
+    _quiet_libraries()
     try:
         job = _plant_job(_bus(interface, channel, bus_option), dbc, signals, scenario, rate_hz, True)
         job = replace(job, camera_fps=camera_fps, camera_delay_s=camera_delay_s)
@@ -238,8 +241,7 @@ def hil_plant(
         refuse(PLANT_COMMAND, error)
     stopper = Stopper()
     print(
-        f"{PLANT_COMMAND}: driving on {job.bus.interface} {job.bus.channel}; sends {', '.join(node.sends)}. "
-        "Ctrl-C ends.",
+        f"{PLANT_COMMAND}: driving on {job.bus.name}; sends {', '.join(node.sends)}. Ctrl-C ends.",
         file=sys.stderr,
     )
     with stopper.by_signal():
@@ -247,6 +249,12 @@ def hil_plant(
         node.run(SystemClock().now_ns() + RUN_UP_NS, stopper, slots)
     node.close()
     print(f"{PLANT_COMMAND}: {node.left_out} cycles were left out for being late.", file=sys.stderr)
+
+
+def _quiet_libraries() -> None:
+    """Keep warnings of the libraries off the terminal: what is wrong is said by this command, once."""
+    for library in ("can", "cantools"):
+        logging.getLogger(library).setLevel(logging.ERROR)
 
 
 def _bus(interface: str, channel: str | None, options: list[str] | None) -> BusSettings:

@@ -59,6 +59,11 @@ class BusSettings:
     channel: str = "trpac"
     options: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def name(self) -> str:
+        """Interface and channel, as messages name them."""
+        return f"{self.interface} {self.channel}"
+
     def check(self) -> None:
         """Raise HilError where python-can knows no such interface."""
         if self.interface not in can.VALID_INTERFACES:
@@ -109,20 +114,21 @@ def bus_options(pairs: Sequence[str]) -> dict[str, Any]:
 
 
 class Link:
-    """The bus as the loop uses it: no method waits, and none raises."""
+    """The bus as the loop uses it: no method waits, and none raises.
+
+    `tap` is called with each message that comes or goes.
+    """
 
     def __init__(
         self,
         open_bus: Callable[[], can.BusABC],
         report: ReportEvent,
         retry_s: float = RETRY_S,
-        tap: Callable[[can.Message], None] | None = None,
+        name: str = "the bus",
     ) -> None:
-        """Open the bus; raises HilError where it cannot be opened at the start.
-
-        Each message that comes or goes is also written to `tap`.
-        """
-        self._open, self._report, self._retry_s, self.tap = open_bus, report, retry_s, tap
+        """Open the bus; raises HilError, with its `name`, where it cannot be opened at the start."""
+        self._open, self._report, self._retry_s = open_bus, report, retry_s
+        self.tap: Callable[[can.Message], None] | None = None
         self.losses = self.unsent = self.error_frames = self.garbled = self.backlogs = 0
         self._found: can.BusABC | None = None
         self._closing = threading.Event()
@@ -135,8 +141,8 @@ class Link:
                 why = f"the interface's driver or package is not installed ({quoted(error)})"
             why = WHY.get(getattr(error, "errno", None) or 0, why).rstrip(".")
             raise HilError(
-                f"The bus cannot be opened: {why}. Check --interface, --channel and --bus-option; docs/hil.md has "
-                "examples."
+                f"{quoted(name)} cannot be opened: {why}. Check --interface, --channel and --bus-option; docs/hil.md "
+                "has examples."
             ) from error
 
     @property

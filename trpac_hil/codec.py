@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -171,13 +170,11 @@ def load_codec(path: Path = DBC_FILE, signals: Path | None = None) -> Codec:
     for role in roles.values():
         for term in role.terms:
             used[term.message] = used.get(term.message, frozenset()) | {term.signal}
-    occurrences = Counter(key for m in theirs for key in (m.name, (m.frame_id, m.is_extended_frame)))
     coded = {}
     for name, names in used.items():
         message = messages[name]
         try:
-            if max(occurrences[name], occurrences[message.frame_id, message.is_extended_frame]) > 1:
-                raise ValueError("its name or its identifier is there twice")
+            _require_single(message, theirs)
             coded[name] = _tried(message, names, counters.get(name, ""))
         except DAMAGE as error:
             like = f" Expected one like that of {DBC_FILE}." if name in shipped_messages else ""
@@ -279,6 +276,15 @@ def _require_counted(
                 f"{quoted(signals)}: counters: {quoted(path)} has no {quoted(name)}.{quoted(counter)}. "
                 f"Expected `counters: {{Message: Signal}}`, or `{NO_COUNTER}` in place of the signal."
             )
+
+
+def _require_single(message: Message, all_messages: Iterable[Message]) -> None:
+    """Raise ValueError where a message's name or identifier is there twice."""
+    key = (message.frame_id, message.is_extended_frame)
+    alike = [m for m in all_messages if (m.frame_id, m.is_extended_frame) == key or m.name == message.name]
+    if len(alike) > 1:
+        others = ", ".join(f"{quoted(m.name)} 0x{m.frame_id:X}" for m in alike)
+        raise ValueError(f"its name or its identifier is there twice: {others}")
 
 
 def _tried(message: Message, used: Collection[str], counter: str) -> Coded:

@@ -193,7 +193,9 @@ class PlantNode:
 def open_plant_node(job: PlantJob, report: Callable[[str, str], None], wire: Ring | None = None) -> PlantNode:
     """The plant on its own link to the bus, or relayed through `wire`; raises ScenarioError and HilError."""
     return PlantNode(
-        job, lambda: Link(job.bus.open, report) if wire is None else RelayedBus(wire), SystemClock()
+        job,
+        lambda: Link(job.bus.open, report, name=job.bus.name) if wire is None else RelayedBus(wire),
+        SystemClock(),
     )
 
 

@@ -295,7 +295,7 @@ def _run(
 
 def _link(settings: HilSettings, codec: Codec, events: Events, stack: ExitStack) -> Link:
     """The open bus; raises HilError, also where a message is too long for it."""
-    link = Link(settings.bus.open, events.report)
+    link = Link(settings.bus.open, events.report, name=settings.bus.name)
     stack.callback(link.close)
     if codec.beyond_classic and not link.fd:
         raise HilError(no_fd(codec.beyond_classic))
@@ -306,7 +306,7 @@ def _not_ready(readiness: Readiness, bus: BusSettings) -> str:
     """What to say where something that is required has no value."""
     missing = "; ".join(readiness.missing)
     return (
-        f"{bus.interface} {bus.channel}: within {readiness.listened_s:.1f} s these had no value: {missing}. Start "
+        f"{bus.name}: within {readiness.listened_s:.1f} s these had no value: {missing}. Start "
         "their senders, wait longer for them with --wait-s, or begin without them with --no-wait."
     )
 
@@ -342,7 +342,7 @@ def _preview(settings: HilSettings) -> PreviewConfig:
 
 
 def _recorder_job(settings: HilSettings, unit: Unit, codec: Codec) -> RecorderJob:
-    title = f"{unit.name} at {settings.rate_hz:g} Hz on {settings.bus.interface} {settings.bus.channel}"
+    title = f"{unit.name} at {settings.rate_hz:g} Hz on {settings.bus.name}"
     log = settings.out / LOG if settings.log else None
     ages = {
         name: tuple(age_column(s) for s in codec.supplies_of([role]) if s in codec.supplies)

@@ -306,7 +306,7 @@ def test_a_signal_that_is_missing_is_named_also_where_its_table_of_values_is_sti
         ([], [("counters:", "checksums: {Motion: Crc}\ncounters:")], "checksums"),
         ([], [("Motion: AliveCnt", "Motion: VehSpd")], "VehSpd does not count by one from 0"),
         ([("BO_ 700 ", "BO_ 512 ")], [], "Estimate is sent with the identifier 0x200 of trpac.dbc, which is that of"),
-        ([("BO_ 701 Brakes", "BO_ 700 Brakes")], [], "cannot be used"),
+        ([("BO_ 701 Brakes", "BO_ 700 Brakes")], [], "is there twice: Drive 0x2BC, Brakes 0x2BC"),
         ([("BO_ 900 Health", "BO_ 900 Drive")], [], "Drive cannot be used"),
         ([("(0.001,0) [-4|4]", "(0,0) [-4|4]")], [], "Motion cannot be used"),
         ([("VehSpd 65535", "VehSpd 165535")], [], "Motion cannot be used"),
@@ -522,7 +522,7 @@ def test_what_is_required_and_has_no_value_is_named_with_the_reason(
     ("options", "words"),
     [
         (["--interface", "virtul", "--channel", "x"], "virtul: unknown to python-can; did you mean 'virtual'?"),
-        (["--interface", "socketcan", "--channel", "can7"], "The bus cannot be opened: "),
+        (["--interface", "socketcan", "--channel", "can7"], "socketcan can7 cannot be opened: "),
         (["--wait-s", "0.2"], "these had no value: wheel_torque_fl_nm (Drive.MotFL + Brakes.BrkFL x -1000): no "),
         (["--record-bus", "bus.txt"], "--record-bus bus.txt: expected a name that ends in .blf"),
     ],
